@@ -1,0 +1,3 @@
+//! The program `dynocar-bench`.
+
+fn main() {}

@@ -1,0 +1,4 @@
+//! Accuracy over seeded runs: the papers' figures, their methods and ours beside the bound.
+
+pub mod row;
+pub mod statistics;

@@ -1,0 +1,1 @@
+//! What a train controller links: publish samples, poll parameter snapshots.

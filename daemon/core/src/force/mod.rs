@@ -1,0 +1,16 @@
+//! The known forces on a train.
+//!
+//! The declared model, all in N, along the direction of travel:
+//!
+//! ```text
+//! mass (1 + gamma) dv/dt = traction - brake
+//!                          - weight_kN (w0(v) + k mean(1/R) + tunnel_constant tunnel_length)
+//!                          - weight_kN gradient
+//! ```
+//!
+//! with the gradient in ‰ and the means taken along the train. [`ForceResolver`] gives
+//! everything but w0(v), which is what the estimators look for.
+
+mod resolver;
+
+pub use resolver::{ForceResolver, ResolvedSample};

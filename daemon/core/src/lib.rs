@@ -1,0 +1,18 @@
+//! The pure library of Dynocar: physics and statistics.
+//!
+//! It knows no channel, clock, file, thread or logger: texts, times and seeds come in as
+//! arguments. The daemon runs these pipelines online, `dynocar identify` offline; both get the
+//! same bits from the same samples.
+//!
+//! # Layout, in the order a sample takes
+//!
+//! - [`train`], [`track`]: what is declared of the train and the line
+//! - [`validation`]: which samples are fit for use, and why the others are not
+//! - [`force`]: the known forces on the train at a sample
+//! - [`pipeline`]: estimators behind one interface, from sample to snapshot
+
+pub mod force;
+pub mod pipeline;
+pub mod track;
+pub mod train;
+pub mod validation;

@@ -1,0 +1,41 @@
+//! The interface of every estimator.
+
+use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason};
+
+use crate::force::ResolvedSample;
+
+/// What an estimator did with a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// The sample was taken into account; the estimate stays as it was.
+    Used,
+    /// The sample was taken into account and the estimate was updated.
+    Updated,
+    /// The sample, or the window that it closed, was refused.
+    Rejected(RejectionReason),
+}
+
+/// Learns parameters of the train from its samples, in order.
+///
+/// An implementation allocates only while it is built; time comes in with the samples, and any
+/// randomness from a seed in its settings.
+pub trait Estimator: Send {
+    /// The kind of estimator, for the snapshot.
+    fn kind(&self) -> PipelineKind;
+
+    /// Takes one sample into account.
+    ///
+    /// # Real-time
+    ///
+    /// Allocates nothing, locks nothing, reads no clock.
+    fn update(&mut self, sample: &ResolvedSample) -> Outcome;
+
+    /// Writes the estimate into a snapshot: status and reason, parameters with values and
+    /// covariance, excitation, innovation statistics, unexplained force, speed range. The
+    /// counters and times are the pipeline's.
+    ///
+    /// # Real-time
+    ///
+    /// Allocates nothing, locks nothing, reads no clock.
+    fn write(&self, snapshot: &mut ParameterSnapshot);
+}

@@ -1,0 +1,42 @@
+//! Writing an estimate into a snapshot.
+
+use dynocar_shared::snapshot::{PARAMETERS_MAX, packed_index};
+use dynocar_shared::{Parameter, ParameterSnapshot, Reason, Status};
+use nalgebra::{SMatrix, SVector};
+
+use super::InnovationMonitor;
+
+/// Writes parameters with values and full covariance, each in the parameter's unit.
+///
+/// # Panics
+///
+/// At compile time when there are more parameters than a snapshot holds.
+pub fn write_parameters<const N: usize>(
+    snapshot: &mut ParameterSnapshot,
+    parameters: [Parameter; N],
+    values: &SVector<f64, N>,
+    covariance: &SMatrix<f64, N, N>,
+) {
+    const { assert!(N <= PARAMETERS_MAX) };
+    snapshot.parameter_count = N as u32;
+    for i in 0..N {
+        snapshot.parameters[i] = parameters[i] as u32;
+        snapshot.values[i] = values[i];
+        for j in 0..=i {
+            snapshot.covariance[packed_index(i, j)] = covariance[(i, j)];
+        }
+    }
+}
+
+/// Writes status and reason.
+pub fn write_status(snapshot: &mut ParameterSnapshot, status: Status, reason: Reason) {
+    snapshot.status = status as u32;
+    snapshot.reason = reason as u32;
+}
+
+/// Writes the innovation statistics.
+pub fn write_innovations(snapshot: &mut ParameterSnapshot, monitor: &InnovationMonitor) {
+    snapshot.innovation_normalised = monitor.last();
+    snapshot.innovation_mean_square = monitor.mean_square();
+    snapshot.innovation_correlation = monitor.correlation();
+}

@@ -1,0 +1,307 @@
+//! The line: gradient, curves and tunnels along the chainage.
+//!
+//! Every property acts along the train's length. Each is kept as a step profile with its
+//! cumulative sum, so that the mean over a train costs two look-ups whatever the number of
+//! entries.
+
+mod profile;
+
+pub use profile::{ProfileError, StepProfile};
+
+/// A curve of the line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Curve {
+    /// Chainage in m where it starts.
+    pub start_m: f64,
+    /// Chainage in m where it ends.
+    pub end_m: f64,
+    /// Radius in m.
+    pub radius_m: f64,
+}
+
+/// A tunnel of the line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tunnel {
+    /// Chainage in m of the lower portal.
+    pub start_m: f64,
+    /// Chainage in m of the upper portal.
+    pub end_m: f64,
+}
+
+/// Why a list of track entries is refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TrackError {
+    /// The gradient list breaks a rule of profiles.
+    #[error("gradient: {0}")]
+    Gradient(ProfileError),
+    /// An interval is empty, reversed or not finite.
+    #[error(
+        "{list} entry {index}: expected start < end, both finite, got {start_m} m to {end_m} m"
+    )]
+    BadInterval {
+        /// `curves` or `tunnels`.
+        list: &'static str,
+        /// Number of the entry, from 1.
+        index: usize,
+        /// Its start in m.
+        start_m: f64,
+        /// Its end in m.
+        end_m: f64,
+    },
+    /// A radius is not positive.
+    #[error("curves entry {index}: expected a radius above 0 m, got {radius_m} m")]
+    BadRadius {
+        /// Number of the entry, from 1.
+        index: usize,
+        /// Its radius in m.
+        radius_m: f64,
+    },
+    /// Two intervals overlap.
+    #[error("{list} entry {index} starts at {start_m} m, inside the one that ends at {end_m} m")]
+    Overlap {
+        /// `curves` or `tunnels`.
+        list: &'static str,
+        /// Number of the later entry, from 1, by chainage.
+        index: usize,
+        /// Its start in m.
+        start_m: f64,
+        /// The end in m of the entry before it.
+        end_m: f64,
+    },
+}
+
+/// A line, as far as it is known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Track {
+    /// Name for people.
+    pub name: String,
+    /// Length in m, when declared.
+    pub length_m: Option<f64>,
+    gradient_permille: Option<StepProfile>,
+    curvature_per_m: Option<StepProfile>,
+    tunnel: Option<TunnelProfiles>,
+    curves: Vec<Curve>,
+    tunnels: Vec<Tunnel>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct TunnelProfiles {
+    /// 1 inside a tunnel.
+    inside: StepProfile,
+    /// The tunnel's length in m inside a tunnel.
+    length_m: StepProfile,
+}
+
+impl Track {
+    /// A line from its lists; a list that is `None` is not known.
+    ///
+    /// `gradient` holds (chainage in m, ‰ climbing positive as the chainage grows), each
+    /// valid until the next.
+    ///
+    /// # Errors
+    ///
+    /// When a list is not ordered, has overlapping or reversed intervals, or values that are
+    /// not finite.
+    pub fn new(
+        name: String,
+        length_m: Option<f64>,
+        gradient: Option<&[(f64, f64)]>,
+        curves: Option<Vec<Curve>>,
+        tunnels: Option<Vec<Tunnel>>,
+    ) -> Result<Self, TrackError> {
+        let gradient_permille =
+            gradient.map(StepProfile::new).transpose().map_err(TrackError::Gradient)?;
+        let curvature_per_m = curves.as_deref().map(curvature_profile).transpose()?;
+        let tunnel = tunnels.as_deref().map(tunnel_profiles).transpose()?;
+        Ok(Track {
+            name,
+            length_m,
+            gradient_permille,
+            curvature_per_m,
+            tunnel,
+            curves: curves.unwrap_or_default(),
+            tunnels: tunnels.unwrap_or_default(),
+        })
+    }
+
+    /// Mean gradient in ‰ under a train, climbing positive as the chainage grows.
+    ///
+    /// `centre_m` is the chainage of the train's centre. `None` when no gradient is known.
+    pub fn gradient_permille(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
+        Some(self.gradient_permille.as_ref()?.mean_around(centre_m, train_length_m))
+    }
+
+    /// Mean of 1/R in 1/m along a train; `None` when no curves are known.
+    pub fn curvature_per_m(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
+        Some(self.curvature_per_m.as_ref()?.mean_around(centre_m, train_length_m))
+    }
+
+    /// Share of the train inside tunnels, 0 to 1; `None` when no tunnels are known.
+    pub fn tunnel_share(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
+        Some(self.tunnel.as_ref()?.inside.mean_around(centre_m, train_length_m))
+    }
+
+    /// Length in m of the tunnel around the train, weighted by the share of the train inside;
+    /// `None` when no tunnels are known.
+    pub fn tunnel_length_m(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
+        Some(self.tunnel.as_ref()?.length_m.mean_around(centre_m, train_length_m))
+    }
+
+    /// The gradient profile, when known.
+    pub fn gradient(&self) -> Option<&StepProfile> {
+        self.gradient_permille.as_ref()
+    }
+
+    /// The known curves, by chainage as declared.
+    pub fn curves(&self) -> &[Curve] {
+        &self.curves
+    }
+
+    /// The known tunnels, as declared.
+    pub fn tunnels(&self) -> &[Tunnel] {
+        &self.tunnels
+    }
+
+    /// True when the list of curves is known, be it empty.
+    pub fn knows_curves(&self) -> bool {
+        self.curvature_per_m.is_some()
+    }
+
+    /// True when the list of tunnels is known, be it empty.
+    pub fn knows_tunnels(&self) -> bool {
+        self.tunnel.is_some()
+    }
+}
+
+fn curvature_profile(curves: &[Curve]) -> Result<StepProfile, TrackError> {
+    for (i, curve) in curves.iter().enumerate() {
+        if !(curve.radius_m.is_finite() && curve.radius_m > 0.0) {
+            return Err(TrackError::BadRadius { index: i + 1, radius_m: curve.radius_m });
+        }
+    }
+    let intervals: Vec<_> =
+        curves.iter().map(|curve| (curve.start_m, curve.end_m, 1.0 / curve.radius_m)).collect();
+    interval_profile("curves", &intervals)
+}
+
+fn tunnel_profiles(tunnels: &[Tunnel]) -> Result<TunnelProfiles, TrackError> {
+    let with = |value: fn(&Tunnel) -> f64| -> Vec<(f64, f64, f64)> {
+        tunnels.iter().map(|tunnel| (tunnel.start_m, tunnel.end_m, value(tunnel))).collect()
+    };
+    Ok(TunnelProfiles {
+        inside: interval_profile("tunnels", &with(|_| 1.0))?,
+        length_m: interval_profile("tunnels", &with(|tunnel| tunnel.end_m - tunnel.start_m))?,
+    })
+}
+
+/// A profile that is zero outside the given (start, end, value) intervals.
+fn interval_profile(
+    list: &'static str,
+    intervals: &[(f64, f64, f64)],
+) -> Result<StepProfile, TrackError> {
+    for (i, &(start_m, end_m, _)) in intervals.iter().enumerate() {
+        if !(start_m.is_finite() && end_m.is_finite() && start_m < end_m) {
+            return Err(TrackError::BadInterval { list, index: i + 1, start_m, end_m });
+        }
+    }
+    let mut ordered = intervals.to_vec();
+    ordered.sort_by(|one, other| one.0.total_cmp(&other.0));
+    let mut steps: Vec<(f64, f64)> = vec![(f64::MIN, 0.0)];
+    for (i, &(start_m, end_m, value)) in ordered.iter().enumerate() {
+        let last = steps.len() - 1;
+        let (free_from, _) = steps[last];
+        if start_m < free_from {
+            return Err(TrackError::Overlap { list, index: i + 1, start_m, end_m: free_from });
+        }
+        if start_m == free_from {
+            steps[last].1 = value;
+        } else {
+            steps.push((start_m, value));
+        }
+        steps.push((end_m, 0.0));
+    }
+    // The first entry only opens the profile; the profile itself extends it to the left.
+    if steps.len() > 1 {
+        steps[0].0 = steps[1].0 - 1.0;
+    } else {
+        steps[0].0 = 0.0;
+    }
+    Ok(StepProfile::new(&steps).expect("ordered, finite steps"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line() -> Track {
+        Track::new(
+            "test".into(),
+            Some(3000.0),
+            Some(&[(0.0, 4.0), (1000.0, -2.0)]),
+            Some(vec![Curve { start_m: 500.0, end_m: 600.0, radius_m: 400.0 }]),
+            Some(vec![Tunnel { start_m: 2000.0, end_m: 2500.0 }]),
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn gradient_is_averaged_along_the_train() {
+        let track = line();
+        assert_eq!(track.gradient_permille(500.0, 200.0), Some(4.0));
+        assert_eq!(track.gradient_permille(1000.0, 200.0), Some(1.0));
+        assert_eq!(track.gradient_permille(1050.0, 200.0), Some(-0.5));
+        assert_eq!(track.gradient_permille(9999.0, 200.0), Some(-2.0));
+        assert_eq!(track.gradient_permille(-50.0, 200.0), Some(4.0));
+    }
+
+    #[test]
+    fn a_curve_shorter_than_the_train_acts_on_the_part_inside() {
+        let curvature = line().curvature_per_m(550.0, 200.0).unwrap();
+        assert!((curvature - 0.5 / 400.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn tunnel_share_grows_as_the_train_enters() {
+        let track = line();
+        assert_eq!(track.tunnel_share(1900.0, 200.0), Some(0.0));
+        assert_eq!(track.tunnel_share(2000.0, 200.0), Some(0.5));
+        assert_eq!(track.tunnel_share(2200.0, 200.0), Some(1.0));
+        assert_eq!(track.tunnel_length_m(2200.0, 200.0), Some(500.0));
+    }
+
+    #[test]
+    fn an_absent_list_is_unknown_and_an_empty_one_is_none_there() {
+        let unknown = Track::new("u".into(), None, None, None, None).unwrap();
+        assert_eq!(unknown.gradient_permille(0.0, 100.0), None);
+        assert_eq!(unknown.tunnel_share(0.0, 100.0), None);
+        let empty = Track::new("e".into(), None, None, Some(vec![]), Some(vec![])).unwrap();
+        assert_eq!(empty.curvature_per_m(0.0, 100.0), Some(0.0));
+        assert!(empty.knows_tunnels());
+    }
+
+    #[test]
+    fn overlapping_and_reversed_intervals_are_refused_with_their_number() {
+        let curve = |start_m, end_m, radius_m| Curve { start_m, end_m, radius_m };
+        let with = |curves| Track::new("x".into(), None, None, Some(curves), None).unwrap_err();
+        assert!(matches!(
+            with(vec![curve(0.0, 100.0, 300.0), curve(50.0, 150.0, 300.0)]),
+            TrackError::Overlap { list: "curves", index: 2, .. }
+        ));
+        assert!(matches!(
+            with(vec![curve(100.0, 0.0, 300.0)]),
+            TrackError::BadInterval { index: 1, .. }
+        ));
+        assert!(matches!(with(vec![curve(0.0, 1.0, 0.0)]), TrackError::BadRadius { .. }));
+    }
+
+    #[test]
+    fn touching_curves_are_one_after_the_other() {
+        let curves = vec![
+            Curve { start_m: 0.0, end_m: 100.0, radius_m: 200.0 },
+            Curve { start_m: 100.0, end_m: 200.0, radius_m: 400.0 },
+        ];
+        let track = Track::new("t".into(), None, None, Some(curves), None).unwrap();
+        let curvature = track.curvature_per_m(100.0, 100.0).unwrap();
+        assert!((curvature - (0.5 / 200.0 + 0.5 / 400.0)).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,373 @@
+//! Which samples are fit for use, and why the others are not.
+//!
+//! A [`Validator`] sees every sample of one train in the order of arrival. It refuses what
+//! cannot be true and counts what never came; it never repairs a value. Where the train has
+//! plainly been moved or the clock set (several samples in a row agree with each other but not
+//! with the past), it starts a new stretch of motion instead of refusing for ever.
+
+use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
+use dynocar_shared::{RejectionReason, SampleField, TrainId, TrainSample};
+
+/// Bounds beyond which a sample cannot be true.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ValidationLimits {
+    /// Highest speed in m/s.
+    pub speed_max_mps: f64,
+    /// Greatest |dv/dt| in m/s².
+    pub acceleration_max_mps2: f64,
+    /// Change of speed in m/s that is let pass whatever the time step: quantum and noise.
+    pub speed_tolerance_mps: f64,
+    /// Difference in m between position and integrated speed that is let pass: balises.
+    pub position_tolerance_m: f64,
+    /// Greatest force in N per N of train weight.
+    pub force_max_per_weight: f64,
+    /// Lowest and highest mass in kg.
+    pub mass_kg: (f64, f64),
+    /// A longer step in s ends a stretch of motion.
+    pub gap_max_s: f64,
+    /// A longer step ahead in s is not believed within a run.
+    pub jump_max_s: f64,
+    /// After so many refusals in a row that agree with each other, the past is given up.
+    pub refusals_before_restart: u32,
+}
+
+impl ValidationLimits {
+    /// Limits for a train of a nominal mass in kg.
+    pub fn for_train(mass_kg: f64) -> Self {
+        ValidationLimits {
+            speed_max_mps: 170.0,
+            acceleration_max_mps2: 4.0,
+            speed_tolerance_mps: 1.0,
+            position_tolerance_m: 60.0,
+            force_max_per_weight: 0.6,
+            mass_kg: (0.2 * mass_kg, 5.0 * mass_kg),
+            gap_max_s: 2.5,
+            jump_max_s: 86_400.0,
+            refusals_before_restart: 5,
+        }
+    }
+}
+
+/// A sample that passed, with what its predecessors say about it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ValidSample {
+    /// The sample as it came.
+    pub sample: TrainSample,
+    /// Time in s since the accepted sample before it; 0 when it starts a stretch.
+    pub step_s: f64,
+    /// Number of the stretch of unbroken motion; integrals never cross its change.
+    pub stretch: u32,
+}
+
+impl ValidSample {
+    /// True while the controller's wheel-slide protection is active.
+    pub fn is_sliding(&self) -> bool {
+        self.sample.flags & FLAG_WHEEL_SLIDE != 0
+    }
+}
+
+/// Checks the samples of one train, in order.
+#[derive(Clone, Debug)]
+pub struct Validator {
+    train: TrainId,
+    limits: ValidationLimits,
+    nominal_mass_kg: f64,
+    last: Option<TrainSample>,
+    last_sequence: Option<(u32, u64)>,
+    last_refused: Option<TrainSample>,
+    refusals_in_a_row: u32,
+    stretch: u32,
+    lost: u64,
+}
+
+impl Validator {
+    /// A validator for one train of a nominal mass in kg.
+    pub fn new(train: TrainId, nominal_mass_kg: f64, limits: ValidationLimits) -> Self {
+        Validator {
+            train,
+            limits,
+            nominal_mass_kg,
+            last: None,
+            last_sequence: None,
+            last_refused: None,
+            refusals_in_a_row: 0,
+            stretch: 0,
+            lost: 0,
+        }
+    }
+
+    /// Samples that never arrived so far.
+    pub fn lost(&self) -> u64 {
+        self.lost
+    }
+
+    /// Passes a sample or says why not.
+    ///
+    /// # Errors
+    ///
+    /// The first reason that applies.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    pub fn check(&mut self, sample: &TrainSample) -> Result<ValidSample, RejectionReason> {
+        if sample.train_id != self.train.0 {
+            return Err(RejectionReason::WrongTrain);
+        }
+        self.check_sequence(sample)?;
+        self.check_values(sample)?;
+        match self.check_motion(sample) {
+            Ok(step_s) => Ok(self.accept(sample, step_s)),
+            Err(reason) => {
+                if self.is_new_beginning(sample) {
+                    return Ok(self.accept(sample, None));
+                }
+                Err(reason)
+            }
+        }
+    }
+
+    /// Counts the gap before a sample; a run that starts its count anew is a restart.
+    fn check_sequence(&mut self, sample: &TrainSample) -> Result<(), RejectionReason> {
+        if let Some((run, sequence)) = self.last_sequence {
+            if sample.sequence > sequence {
+                self.lost += sample.sequence - sequence - 1;
+            } else if sample.run != run {
+                self.lost += sample.sequence.saturating_sub(1);
+            } else {
+                return Err(RejectionReason::SequenceNotIncreasing);
+            }
+        }
+        self.last_sequence = Some((sample.run, sample.sequence));
+        Ok(())
+    }
+
+    fn check_values(&self, sample: &TrainSample) -> Result<(), RejectionReason> {
+        let limits = &self.limits;
+        if sample.direction != 1 && sample.direction != -1 {
+            return Err(RejectionReason::BadDirection);
+        }
+        for field in SampleField::ALL {
+            if sample.get(field).is_some_and(|value| !value.is_finite()) {
+                return Err(RejectionReason::NotFinite);
+            }
+        }
+        let speed_mps = sample.get(SampleField::Speed).ok_or(RejectionReason::Missing)?;
+        if !(0.0..=limits.speed_max_mps).contains(&speed_mps) {
+            return Err(RejectionReason::SpeedOutOfRange);
+        }
+        let mass_kg = sample.get(SampleField::Mass).unwrap_or(self.nominal_mass_kg);
+        if !(limits.mass_kg.0..=limits.mass_kg.1).contains(&mass_kg) {
+            return Err(RejectionReason::MassOutOfRange);
+        }
+        let force_max_n = limits.force_max_per_weight * mass_kg * STANDARD_GRAVITY_MPS2;
+        for field in [SampleField::TractionForce, SampleField::BrakeForce] {
+            if sample.get(field).is_some_and(|force| !(0.0..=force_max_n).contains(&force)) {
+                return Err(RejectionReason::ForceOutOfRange);
+            }
+        }
+        let within = |field, low: f64, high: f64| {
+            sample.get(field).is_none_or(|value| (low..=high).contains(&value))
+        };
+        let plausible = within(SampleField::BrakeCylinderPressure, -5e4, 2e6)
+            && within(SampleField::AmbientTemperature, -80.0, 80.0)
+            && within(SampleField::Gradient, -150.0, 150.0)
+            && within(SampleField::CurveRadius, 0.0, f64::INFINITY)
+            && within(SampleField::Acceleration, -20.0, 20.0)
+            && within(SampleField::SpecificForce, -20.0, 20.0);
+        if plausible { Ok(()) } else { Err(RejectionReason::OutOfRange) }
+    }
+
+    /// The step in s since the last accepted sample, `None` when a new stretch starts here.
+    fn check_motion(&self, sample: &TrainSample) -> Result<Option<f64>, RejectionReason> {
+        let Some(last) = &self.last else { return Ok(None) };
+        if sample.run != last.run {
+            return Ok(None);
+        }
+        if sample.time_ns <= last.time_ns {
+            return Err(RejectionReason::TimeNotIncreasing);
+        }
+        let step_s = step_s(last, sample);
+        if step_s > self.limits.jump_max_s {
+            return Err(RejectionReason::TimeJump);
+        }
+        if step_s > self.limits.gap_max_s || sample.direction != last.direction {
+            return Ok(None);
+        }
+        self.check_continuity(last, sample, step_s)?;
+        Ok(Some(step_s))
+    }
+
+    fn check_continuity(
+        &self,
+        last: &TrainSample,
+        sample: &TrainSample,
+        step_s: f64,
+    ) -> Result<(), RejectionReason> {
+        let limits = &self.limits;
+        let speed_change = (sample.speed_mps - last.speed_mps).abs();
+        if speed_change > limits.speed_tolerance_mps + limits.acceleration_max_mps2 * step_s {
+            return Err(RejectionReason::SpeedJump);
+        }
+        if let (Some(from_m), Some(to_m)) =
+            (last.get(SampleField::Position), sample.get(SampleField::Position))
+        {
+            let travelled_m = 0.5 * (last.speed_mps + sample.speed_mps) * step_s;
+            let expected_m = from_m + f64::from(sample.direction) * travelled_m;
+            if (to_m - expected_m).abs() > limits.position_tolerance_m {
+                return Err(RejectionReason::PositionJump);
+            }
+        }
+        Ok(())
+    }
+
+    /// True when enough refused samples in a row continue each other.
+    fn is_new_beginning(&mut self, sample: &TrainSample) -> bool {
+        let continues = self.last_refused.as_ref().is_some_and(|before| {
+            let step_s = step_s(before, sample);
+            step_s > 0.0
+                && step_s <= self.limits.gap_max_s
+                && sample.direction == before.direction
+                && self.check_continuity(before, sample, step_s).is_ok()
+        });
+        self.refusals_in_a_row = if continues { self.refusals_in_a_row + 1 } else { 1 };
+        self.last_refused = Some(*sample);
+        self.refusals_in_a_row > self.limits.refusals_before_restart
+    }
+
+    fn accept(&mut self, sample: &TrainSample, step_s: Option<f64>) -> ValidSample {
+        if step_s.is_none() {
+            self.stretch = self.stretch.wrapping_add(1);
+        }
+        self.last = Some(*sample);
+        self.last_refused = None;
+        self.refusals_in_a_row = 0;
+        ValidSample { sample: *sample, step_s: step_s.unwrap_or(0.0), stretch: self.stretch }
+    }
+}
+
+fn step_s(from: &TrainSample, to: &TrainSample) -> f64 {
+    to.time_ns.saturating_sub(from.time_ns) as f64 * 1e-9
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRAIN: TrainId = TrainId(3);
+
+    fn validator() -> Validator {
+        Validator::new(TRAIN, 100_000.0, ValidationLimits::for_train(100_000.0))
+    }
+
+    /// A train at a steady 20 m/s, five samples a second.
+    fn cruising(index: u64) -> TrainSample {
+        let mut sample = TrainSample::empty(TRAIN)
+            .with(SampleField::Speed, 20.0)
+            .with(SampleField::Position, 4.0 * index as f64)
+            .with(SampleField::TractionForce, 5_000.0)
+            .with(SampleField::BrakeForce, 0.0);
+        sample.time_ns = index as i64 * 200_000_000;
+        sample.sequence = index + 1;
+        sample
+    }
+
+    #[test]
+    fn steady_motion_passes_in_one_stretch() {
+        let mut validator = validator();
+        for index in 0..50 {
+            let valid = validator.check(&cruising(index)).unwrap();
+            assert_eq!(valid.stretch, 1);
+            assert_eq!(valid.step_s, if index == 0 { 0.0 } else { 0.2 });
+        }
+        assert_eq!(validator.lost(), 0);
+    }
+
+    #[test]
+    fn a_bad_value_is_refused_with_its_reason() {
+        let cases = [
+            (cruising(1).with(SampleField::Speed, f64::NAN), RejectionReason::NotFinite),
+            (cruising(1).with(SampleField::Speed, 400.0), RejectionReason::SpeedOutOfRange),
+            (cruising(1).with(SampleField::Speed, -1.0), RejectionReason::SpeedOutOfRange),
+            (cruising(1).with(SampleField::Speed, 72.0), RejectionReason::SpeedJump),
+            (cruising(1).with(SampleField::Position, 900.0), RejectionReason::PositionJump),
+            (cruising(1).with(SampleField::BrakeForce, -4.0), RejectionReason::ForceOutOfRange),
+            (cruising(1).with(SampleField::TractionForce, 5e6), RejectionReason::ForceOutOfRange),
+            (cruising(1).with(SampleField::Mass, 100.0), RejectionReason::MassOutOfRange),
+            (cruising(1).with(SampleField::Gradient, 400.0), RejectionReason::OutOfRange),
+        ];
+        for (sample, reason) in cases {
+            let mut validator = validator();
+            validator.check(&cruising(0)).unwrap();
+            assert_eq!(validator.check(&sample), Err(reason));
+            assert!(validator.check(&cruising(2)).is_ok(), "{reason}: the next good one passes");
+        }
+    }
+
+    #[test]
+    fn repeated_and_reversed_samples_are_refused() {
+        let mut validator = validator();
+        validator.check(&cruising(5)).unwrap();
+        assert_eq!(validator.check(&cruising(5)), Err(RejectionReason::SequenceNotIncreasing));
+        let mut reversed = cruising(6);
+        reversed.time_ns = cruising(3).time_ns;
+        assert_eq!(validator.check(&reversed), Err(RejectionReason::TimeNotIncreasing));
+    }
+
+    #[test]
+    fn missing_sequence_numbers_count_as_lost() {
+        let mut validator = validator();
+        validator.check(&cruising(0)).unwrap();
+        validator.check(&cruising(4)).unwrap();
+        assert_eq!(validator.lost(), 3);
+    }
+
+    #[test]
+    fn a_restarted_controller_starts_a_new_stretch_and_its_own_count() {
+        let mut validator = validator();
+        for index in 0..10 {
+            validator.check(&cruising(index)).unwrap();
+        }
+        let mut restarted = cruising(300);
+        (restarted.run, restarted.sequence) = (9, 2);
+        let valid = validator.check(&restarted).unwrap();
+        assert_eq!((valid.stretch, valid.step_s), (2, 0.0));
+        assert_eq!(validator.lost(), 1, "its first sample never came");
+    }
+
+    #[test]
+    fn a_long_gap_starts_a_new_stretch() {
+        let mut validator = validator();
+        validator.check(&cruising(0)).unwrap();
+        let mut late = cruising(50);
+        late.sequence = 2;
+        assert_eq!(validator.check(&late).unwrap().stretch, 2);
+        assert_eq!(validator.lost(), 0);
+    }
+
+    #[test]
+    fn a_clock_set_back_is_refused_a_few_times_and_then_believed() {
+        let mut validator = validator();
+        for index in 1000..1010 {
+            validator.check(&cruising(index)).unwrap();
+        }
+        let results: Vec<_> = (0..8)
+            .map(|index| {
+                let mut sample = cruising(index);
+                sample.sequence = 1011 + index;
+                validator.check(&sample)
+            })
+            .collect();
+        assert!(results[..5].iter().all(|r| *r == Err(RejectionReason::TimeNotIncreasing)));
+        assert_eq!(results[5].unwrap().stretch, 2);
+        assert!(results[6].is_ok());
+    }
+
+    #[test]
+    fn another_train_is_refused() {
+        let mut sample = cruising(0);
+        sample.train_id = 4;
+        assert_eq!(validator().check(&sample), Err(RejectionReason::WrongTrain));
+    }
+}

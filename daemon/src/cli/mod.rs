@@ -1,0 +1,45 @@
+//! The commands of `dynocar`, one file each.
+//!
+//! Messages for people go to standard error, results to standard output. Exit status: 0 done,
+//! 1 the work failed, 2 the command line or an input file is wrong.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Dynocar, a dynamometer car in software.
+#[derive(Debug, Parser)]
+#[command(name = "dynocar", version, about)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {}
+
+/// Why a command ended without a result; says which exit status follows.
+#[derive(Debug)]
+pub enum Failure {
+    /// The command line or an input file is wrong: exit status 2.
+    Input(String),
+    /// The work failed: exit status 1.
+    Work(String),
+}
+
+/// Parses the command line, runs the command, reports a failure on standard error.
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let result: Result<(), Failure> = match arguments.command {};
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Failure::Input(message)) => {
+            eprintln!("dynocar: {message}");
+            ExitCode::from(2)
+        }
+        Err(Failure::Work(message)) => {
+            eprintln!("dynocar: {message}");
+            ExitCode::from(1)
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! The contract between a train controller and the Dynocar daemon, and nothing else.
+//!
+//! The crate knows bytes: which fields cross the shared memory, in which units, at which
+//! offsets, under which service names. It allocates nothing, depends on nothing, and holds
+//! no estimator, so that it may be linked into a controller.
+//!
+//! # Layout
+//!
+//! - [`layout`]: how a type describes its own bytes, and the hash both peers compare
+//! - [`sample`]: what the controller writes each cycle, [`TrainSample`]
+//! - [`vocabulary`]: pipelines, parameters, statuses, reasons, effects: the numbers on the wire
+//! - [`snapshot`]: what the daemon answers, [`ParameterSnapshot`]
+//! - [`resistance`]: resistance at a speed, with its standard deviation, from a snapshot
+//! - [`services`]: names, prefix and schema version of the channels
+
+pub mod layout;
+pub mod resistance;
+pub mod sample;
+pub mod services;
+pub mod snapshot;
+pub mod vocabulary;
+
+pub use resistance::ResistanceEstimate;
+pub use sample::{SampleField, TrainId, TrainSample};
+pub use services::SCHEMA_MAJOR;
+pub use snapshot::ParameterSnapshot;
+pub use vocabulary::{Manoeuvre, Parameter, PipelineKind, Reason, RejectionReason, Status};

@@ -1,0 +1,66 @@
+//! Names and versions of the channels.
+
+use crate::sample::TrainId;
+
+/// Schema version of the channels; peers of different majors use different services.
+pub const SCHEMA_MAJOR: u32 = 1;
+
+/// The iceoryx2 release whose shared-memory layout the channels use.
+pub const TRANSPORT_VERSION: &str = "0.10.0";
+
+/// Prefix of every shared-memory file, own to product and transport version, so that another
+/// iceoryx2 release never meets our segments.
+pub const SEGMENT_PREFIX: &str = "dynocar_0_10_0_";
+
+/// Environment variable that moves all run-time files of Dynocar to another directory.
+pub const ROOT_VARIABLE: &str = "DYNOCAR_ROOT";
+
+/// The channels that belong to one train.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Channel {
+    /// Samples, from the controller to every pipeline thread.
+    Samples,
+    /// Snapshots, from every pipeline to the controller.
+    Snapshots,
+    /// Tells the controller which pipeline threads sleep.
+    Sleepers,
+    /// Wakes the pipeline threads that sleep.
+    Wake,
+}
+
+impl Channel {
+    /// The channel's part of the service name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Channel::Samples => "samples",
+            Channel::Snapshots => "snapshots",
+            Channel::Sleepers => "sleepers",
+            Channel::Wake => "wake",
+        }
+    }
+
+    /// Writes the service name of this channel for a train: `dynocar/v1/train/7/samples`.
+    ///
+    /// # Errors
+    ///
+    /// When `out` is full.
+    pub fn write_service_name(
+        self,
+        train: TrainId,
+        out: &mut impl core::fmt::Write,
+    ) -> core::fmt::Result {
+        write!(out, "dynocar/v{SCHEMA_MAJOR}/train/{train}/{}", self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn service_names_carry_schema_train_and_channel() {
+        let mut name = String::new();
+        Channel::Snapshots.write_service_name(TrainId(7), &mut name).unwrap();
+        assert_eq!(name, "dynocar/v1/train/7/snapshots");
+    }
+}

@@ -1,0 +1,300 @@
+//! The numbers on the wire and what they mean.
+//!
+//! A number, once given, keeps its meaning for a schema version. A peer that reads a number it
+//! does not know gets `None`, never a guess.
+
+/// Declares an enum with explicit wire numbers, a snake-case name and conversion from the number.
+macro_rules! vocabulary {
+    ($(#[$meta:meta])* $name:ident : $repr:ty { $( $(#[$item_meta:meta])* $item:ident = $number:literal $text:literal ),* $(,)? }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        #[repr($repr)]
+        pub enum $name { $( $(#[$item_meta])* $item = $number ),* }
+
+        impl $name {
+            /// Every member, in the order of its number.
+            pub const ALL: &'static [$name] = &[ $( $name::$item ),* ];
+
+            /// The member's name in files, command lines and machine-readable results.
+            pub const fn name(self) -> &'static str {
+                match self { $( $name::$item => $text ),* }
+            }
+
+            /// The member with this wire number.
+            pub const fn from_number(number: $repr) -> Option<Self> {
+                match number { $( $number => Some($name::$item), )* _ => None }
+            }
+
+            /// The member with this name.
+            pub fn from_name(name: &str) -> Option<Self> {
+                Self::ALL.iter().copied().find(|member| member.name() == name)
+            }
+        }
+
+        impl core::fmt::Display for $name {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                f.write_str(self.name())
+            }
+        }
+    };
+}
+
+vocabulary! {
+    /// The kind of estimator behind a snapshot.
+    PipelineKind: u32 {
+        /// Regularised least squares over all windows (Liu 2018, eq. 7).
+        LeastSquares = 1 "ls",
+        /// Recursive least squares (Liu 2018, eq. 9-11).
+        Rls = 2 "rls",
+        /// Regularised recursive least squares (Liu 2018, eq. 12-16).
+        RegularisedRls = 3 "regularised_rls",
+        /// Multi-innovation least squares, regularised (Liu 2018).
+        Mils = 4 "mils",
+        /// Interval-varying multi-innovation least squares, regularised (Liu 2018).
+        VMils = 5 "v_mils",
+        /// Trajectory fit by Wolfe-Newton over a sliding window (Xia 2023).
+        TrajectoryNewton = 10 "trajectory_newton",
+        /// Kalman filter [v, a, b, c] with jump hypotheses.
+        TrajectoryKalman = 11 "trajectory_kalman",
+        /// Robust resistance filter with a disturbance state.
+        ResistanceKalman = 12 "resistance_kalman",
+        /// Adhesion by sliding-window expectation maximisation (Xie 2019).
+        AdhesionEm = 20 "adhesion_em",
+        /// Adhesion by extended Kalman filter (the baseline of Xie 2019).
+        AdhesionEkf = 21 "adhesion_ekf",
+        /// Adhesion by fixed-lag smoothing of the effective deceleration.
+        AdhesionSmoother = 22 "adhesion_smoother",
+        /// Adhesion as the scale of a known law.
+        AdhesionLaw = 23 "adhesion_law",
+        /// Brake-disc friction times braking ratio by expectation maximisation (Jin 2020).
+        BrakeEm = 30 "brake_em",
+        /// Brake-disc friction times braking ratio by extended Kalman filter (Jin 2020's baseline).
+        BrakeEkf = 31 "brake_ekf",
+        /// Brake-disc friction times braking ratio by fixed-lag smoothing.
+        BrakeSmoother = 32 "brake_smoother",
+        /// Staged gradient descent for resistance and mass (Wang 2022).
+        StagedDescent = 40 "staged_descent",
+        /// Joint integral least squares for resistance and mass.
+        JointLeastSquares = 41 "joint_least_squares",
+        /// Kalman filter [v, 1/m, bias] for mass.
+        MassKalman = 42 "mass_kalman",
+        /// Watches the residual between model and measurement.
+        ResidualMonitor = 50 "residual_monitor",
+        /// Copies sample to snapshot without estimating: the latency floor.
+        Echo = 60 "echo",
+    }
+}
+
+vocabulary! {
+    /// A quantity that a pipeline estimates; the unit is part of the name where it has one.
+    Parameter: u32 {
+        /// Davis a in N/kN.
+        DavisA = 1 "a",
+        /// Davis b in N/kN per m/s.
+        DavisB = 2 "b",
+        /// Davis c in N/kN per (m/s)².
+        DavisC = 3 "c",
+        /// Speed in m/s.
+        Speed = 4 "speed_mps",
+        /// Mass in t.
+        Mass = 5 "mass_t",
+        /// Wheel-rail adhesion coefficient.
+        Adhesion = 6 "adhesion",
+        /// A lower bound of the adhesion coefficient.
+        AdhesionLowerBound = 7 "adhesion_lower_bound",
+        /// Scale of the known adhesion law.
+        AdhesionLawScale = 8 "adhesion_law_scale",
+        /// Brake-disc friction coefficient.
+        DiscFriction = 9 "disc_friction",
+        /// Braking ratio.
+        BrakingRatio = 10 "braking_ratio",
+        /// Disturbance force in N/kN that the model does not explain.
+        Disturbance = 11 "disturbance_n_per_kn",
+        /// Curve resistance constant k in k/R, in N/kN m.
+        CurveConstant = 12 "curve_constant_n_per_kn_m",
+        /// Tunnel resistance in N/kN per m of tunnel.
+        TunnelConstant = 13 "tunnel_constant_n_per_kn_m",
+        /// Acceleration bias in m/s².
+        AccelerationBias = 14 "acceleration_bias_mps2",
+        /// Unexplained force in N.
+        UnexplainedForce = 15 "unexplained_force_n",
+    }
+}
+
+vocabulary! {
+    /// What a controller may do with an estimate.
+    Status: u32 {
+        /// Not enough data yet; the values are the declared or the initial ones.
+        Unestimated = 1 "unestimated",
+        /// The values may be used.
+        Estimated = 2 "estimated",
+        /// There are values, with a reservation named by the reason.
+        Degraded = 3 "degraded",
+        /// The values must not be used.
+        Invalid = 4 "invalid",
+    }
+}
+
+vocabulary! {
+    /// Why a status is what it is.
+    Reason: u32 {
+        /// Nothing to remark.
+        None = 0 "none",
+        /// Too few samples were used.
+        TooFewSamples = 1 "too_few_samples",
+        /// Some parameter directions were not excited by the data.
+        WeakExcitation = 2 "weak_excitation",
+        /// A parameter lies at a physical bound.
+        AtBound = 3 "at_bound",
+        /// The innovations are larger than their covariance says.
+        InnovationsTooLarge = 4 "innovations_too_large",
+        /// The innovations are correlated: the model lacks something.
+        InnovationsNotWhite = 5 "innovations_not_white",
+        /// A large share of the samples is rejected or lost.
+        BadInput = 6 "bad_input",
+        /// The samples lack a quantity that the pipeline needs.
+        MissingQuantity = 7 "missing_quantity",
+        /// No gradient is known: neither track nor sample gives one.
+        GradientUnknown = 8 "gradient_unknown",
+        /// A factorisation failed; the filter was reset.
+        NumericalFailure = 9 "numerical_failure",
+        /// No sample has come for a while.
+        InputStale = 10 "input_stale",
+        /// The last manoeuvre that could excite the parameter lies too far back.
+        EstimateStale = 11 "estimate_stale",
+        /// Only a lower bound can be had from these data.
+        OnlyLowerBound = 12 "only_lower_bound",
+        /// The same data fit other values of the parameters as well.
+        NotIdentifiable = 13 "not_identifiable",
+    }
+}
+
+vocabulary! {
+    /// Why a sample was not used.
+    RejectionReason: u32 {
+        /// The time is not later than the last accepted one.
+        TimeNotIncreasing = 0 "time_not_increasing",
+        /// The time jumped ahead by more than a stretch of motion allows.
+        TimeJump = 1 "time_jump",
+        /// The sequence number repeats or runs backwards.
+        SequenceNotIncreasing = 2 "sequence_not_increasing",
+        /// The sample is of another train.
+        WrongTrain = 3 "wrong_train",
+        /// A quantity that is needed is missing.
+        Missing = 4 "missing",
+        /// A quantity is NaN or infinite.
+        NotFinite = 5 "not_finite",
+        /// The speed lies outside the train's range.
+        SpeedOutOfRange = 6 "speed_out_of_range",
+        /// The speed changed faster than a train can.
+        SpeedJump = 7 "speed_jump",
+        /// The position disagrees with the speed or lies off the line.
+        PositionJump = 8 "position_jump",
+        /// A force lies outside what the train can exert.
+        ForceOutOfRange = 9 "force_out_of_range",
+        /// The mass lies outside the train's range.
+        MassOutOfRange = 10 "mass_out_of_range",
+        /// The direction is neither +1 nor -1.
+        BadDirection = 11 "bad_direction",
+        /// The estimator's outlier test refused the window.
+        Outlier = 12 "outlier",
+        /// Wheel slide or wheel spin: the speed is not the train's.
+        WheelSlide = 13 "wheel_slide",
+        /// Another quantity lies outside its physical range.
+        OutOfRange = 14 "out_of_range",
+        /// The speed did not change while the force says that it must have.
+        Frozen = 15 "frozen",
+    }
+}
+
+vocabulary! {
+    /// A manoeuvre that would excite a direction the data have not excited; bits of
+    /// [`crate::ParameterSnapshot::missing_manoeuvres`] are `1 << number`.
+    Manoeuvre: u32 {
+        /// Coasting at low speed, which tells of Davis a.
+        CoastSlow = 0 "coast_slow",
+        /// Coasting at high speed, which tells of Davis c.
+        CoastFast = 1 "coast_fast",
+        /// A wider range of speeds, which tells a, b and c apart.
+        VarySpeed = 2 "vary_speed",
+        /// Strong traction, which tells of mass.
+        Accelerate = 3 "accelerate",
+        /// Strong braking, which tells of adhesion and brake friction.
+        Brake = 4 "brake",
+        /// Any motion.
+        Move = 5 "move",
+    }
+}
+
+impl Manoeuvre {
+    /// The manoeuvre's bit in [`crate::ParameterSnapshot::missing_manoeuvres`].
+    pub const fn bit(self) -> u32 {
+        1 << self as u32
+    }
+}
+
+vocabulary! {
+    /// An effect that a model may lack, as in the answers of `dynocar explain`.
+    EffectKind: u32 {
+        /// No suspicion.
+        None = 0 "none",
+        /// Air drag in tunnels.
+        TunnelDrag = 1 "tunnel_drag",
+        /// Resistance in curves.
+        CurveResistance = 2 "curve_resistance",
+        /// Wind along the line.
+        Wind = 3 "wind",
+        /// A brake that does not release.
+        DraggingBrake = 4 "dragging_brake",
+        /// A wrong wheel diameter, hence a wrong speed scale.
+        WheelDiameter = 5 "wheel_diameter",
+        /// A gradient profile moved along the line.
+        GradientShift = 6 "gradient_shift",
+        /// Another mass than declared.
+        MassChange = 7 "mass_change",
+        /// A reported force that is not the true one.
+        TractionGain = 8 "traction_gain",
+        /// Forces that act later than reported.
+        ActuatorDelay = 9 "actuator_delay",
+        /// Another rotating mass than declared.
+        RotatingMass = 10 "rotating_mass",
+        /// Cold bearings that warm up.
+        BearingTemperature = 11 "bearing_temperature",
+        /// Resistance that follows the outside temperature.
+        AmbientTemperature = 12 "ambient_temperature",
+        /// Extra resistance at a place.
+        LocalResistance = 13 "local_resistance",
+        /// A brake force that the rail does not carry.
+        LowAdhesion = 14 "low_adhesion",
+        /// A real residual that no known effect explains.
+        Unknown = 15 "unknown",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_names_lead_back_to_the_member() {
+        for &kind in PipelineKind::ALL {
+            assert_eq!(PipelineKind::from_number(kind as u32), Some(kind));
+            assert_eq!(PipelineKind::from_name(kind.name()), Some(kind));
+        }
+        for &reason in RejectionReason::ALL {
+            assert_eq!(RejectionReason::from_number(reason as u32), Some(reason));
+        }
+    }
+
+    #[test]
+    fn an_unknown_number_is_none() {
+        assert_eq!(Status::from_number(0), None);
+        assert_eq!(PipelineKind::from_name("kalmann"), None);
+    }
+
+    #[test]
+    fn rejection_reasons_fit_the_snapshot_counters() {
+        let highest = RejectionReason::ALL.iter().map(|reason| *reason as usize).max();
+        assert_eq!(highest, Some(crate::snapshot::REJECTION_REASONS - 1));
+    }
+}

@@ -1,0 +1,1 @@
+//! Scenarios, simulator and process harness for the tests of Dynocar.
