@@ -102,7 +102,7 @@ impl SnapshotReader {
     /// The newest snapshot of every pipeline, by the pipeline's number in the configuration.
     pub fn readings(&self, now_ns: i64) -> impl Iterator<Item = Reading<'_>> {
         self.latest.iter().flatten().map(move |snapshot| {
-            let age_ns = now_ns.saturating_sub(snapshot.published_ns);
+            let age_ns = now_ns.saturating_sub(snapshot.vouched_ns);
             Reading { snapshot, age_ns, is_stale: age_ns > self.stale_after_ns }
         })
     }
@@ -133,7 +133,7 @@ impl SnapshotReader {
             return false;
         }
         let place = &mut self.latest[snapshot.pipeline_index as usize];
-        let order = |it: &ParameterSnapshot| (it.epoch, it.sequence, it.published_ns);
+        let order = |it: &ParameterSnapshot| (it.epoch, it.sequence, it.vouched_ns);
         let before = place.as_ref().map(order);
         if before.is_some_and(|before| order(snapshot) <= before) {
             return false;

@@ -30,6 +30,7 @@ fn snapshot(epoch: u64, sequence: u64) -> ParameterSnapshot {
     snapshot.pipeline_kind = PipelineKind::Rls as u32;
     snapshot.status = Status::Estimated as u32;
     snapshot.published_ns = monotonic_now_ns();
+    snapshot.vouched_ns = snapshot.published_ns;
     snapshot
 }
 
@@ -118,10 +119,10 @@ fn a_vouched_snapshot_is_younger_but_no_news() {
     let mut same = snapshot(1, 7);
     sender.send(&same).unwrap();
     assert_eq!(reader.poll(), 1);
-    same.published_ns += 50_000_000;
+    same.vouched_ns += 50_000_000;
     sender.send(&same).unwrap();
     assert_eq!(reader.poll(), 0);
-    let reading = reader.latest(PipelineKind::Rls, same.published_ns).unwrap();
+    let reading = reader.latest(PipelineKind::Rls, same.vouched_ns).unwrap();
     assert_eq!(reading.age_ns, 0);
 }
 

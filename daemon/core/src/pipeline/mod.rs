@@ -89,6 +89,11 @@ impl Pipeline {
     pub fn snapshot(&self) -> &ParameterSnapshot {
         &self.snapshot
     }
+
+    /// The snapshot after the last sample, for its publisher to stamp.
+    pub fn snapshot_mut(&mut self) -> &mut ParameterSnapshot {
+        &mut self.snapshot
+    }
 }
 
 fn count_rejection(snapshot: &mut ParameterSnapshot, reason: RejectionReason) {
