@@ -50,7 +50,8 @@ impl<T: Payload> Sender<T> {
     ///
     /// # Real-time
     ///
-    /// No system call and no allocation, save when a receiver has come or gone since.
+    /// No system call, save when a receiver has come or gone since. The transport takes one
+    /// reference count of fixed size from the heap and gives it back within the call.
     pub fn send(&self, message: &T) -> Result<(), SendRefused> {
         let slot = self.publisher.loan_uninit().map_err(|_| SendRefused)?;
         slot.write_payload(Wire(*message)).send().map(|_| ()).map_err(|_| SendRefused)
