@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::Failure;
 use super::output::write_json;
-use crate::dataset::load_dataset;
+use crate::dataset;
 use crate::identify::{default_estimators, identify, published_samples};
 
 /// Learn the train's parameters from recorded runs with the daemon's own pipelines.
@@ -72,7 +72,7 @@ struct SampleCounts {
 pub fn execute(arguments: &IdentifyArguments) -> Result<(), Failure> {
     let estimators = chosen_estimators(arguments.estimator.as_deref())?;
     let dataset =
-        load_dataset(&arguments.dataset).map_err(|error| Failure::Input(error.to_string()))?;
+        dataset::load(&arguments.dataset).map_err(|error| Failure::Input(error.to_string()))?;
     let samples = published_samples(&dataset, TrainId(1));
     let snapshots: Vec<_> = std::thread::scope(|scope| {
         let threads: Vec<_> = estimators

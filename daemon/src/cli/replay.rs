@@ -9,7 +9,7 @@ use dynocar_shared::{PipelineKind, TrainId};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Failure;
-use crate::dataset::load_dataset;
+use crate::dataset;
 use crate::replay::{Rate, ReplayReport, Replayer};
 
 /// Play recorded runs into the sample channel, as a controller would.
@@ -39,7 +39,7 @@ pub struct ReplayArguments {
 /// failure of the work.
 pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
     let dataset =
-        load_dataset(&arguments.dataset).map_err(|error| Failure::Input(error.to_string()))?;
+        dataset::load(&arguments.dataset).map_err(|error| Failure::Input(error.to_string()))?;
     let runs = match arguments.run {
         None => &dataset.runs[..],
         Some(number) if (1..=dataset.runs.len()).contains(&number) => {

@@ -135,7 +135,7 @@ pub enum ConfigError {
     },
     /// A train or track file is wrong; the message names it.
     #[error(transparent)]
-    Model(#[from] crate::dataset::DatasetError),
+    Model(#[from] crate::dataset::LoadError),
 }
 
 impl DaemonConfig {

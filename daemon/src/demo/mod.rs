@@ -17,7 +17,9 @@ use hdrhistogram::Histogram;
 
 pub use summary::DemoAnswer;
 
-use crate::dataset::{Dataset, DatasetError, load_dataset};
+use dynocar_core::dataset::Dataset;
+
+use crate::dataset::{self, LoadError};
 use stage::{Stage, StageError};
 use summary::Summary;
 use view::View;
@@ -37,7 +39,7 @@ pub enum DemoError {
     Stage(#[from] StageError),
     /// The embedded dataset could not be read.
     #[error(transparent)]
-    Dataset(#[from] DatasetError),
+    Dataset(#[from] LoadError),
     /// A channel could not be opened.
     #[error(transparent)]
     Channel(#[from] dynocar_client::ChannelError),
@@ -58,7 +60,7 @@ pub enum DemoError {
 /// See [`DemoError`].
 pub fn play(rate: f64) -> Result<DemoAnswer, DemoError> {
     let mut stage = Stage::build()?;
-    let dataset = load_dataset(stage.dataset())?;
+    let dataset = dataset::load(stage.dataset())?;
     let mut reader = SnapshotReader::open(stage.host(), TRAIN)?;
     stage.start_daemon()?;
     await_fresh(&mut reader, &mut stage)?;

@@ -4,7 +4,7 @@ use dynocar_shared::{ParameterSnapshot, PipelineKind};
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
-use crate::dataset::Dataset;
+use dynocar_core::dataset::Dataset;
 
 /// The demo's result for machines.
 #[derive(Clone, Debug, Serialize)]

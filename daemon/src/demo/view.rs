@@ -7,7 +7,7 @@ use dynocar_client::{Reading, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, PipelineKind};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
-use crate::dataset::Dataset;
+use dynocar_core::dataset::Dataset;
 
 /// How often a plain line is written for each pipeline.
 const PLAIN_EVERY: Duration = Duration::from_secs(3);
