@@ -2,8 +2,8 @@
 
 use dynocar_client::peer::{Announcement, Role};
 use dynocar_client::{SamplePublisher, SnapshotReader};
-use dynocar_shared::TrainId;
-use dynocar_tests::process::{Process, Site};
+use dynocar_shared::{SampleField, TrainId, TrainSample};
+use dynocar_tests::process::{Process, Site, await_true};
 use rustix::process::Signal;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
@@ -36,11 +36,10 @@ fn every_idle_strategy_serves() {
         let mut publisher = SamplePublisher::open(&host, TrainId(1)).unwrap();
         let mut reader = SnapshotReader::open(&host, TrainId(1)).unwrap();
         for sent in 1..=50 {
-            let mut sample = dynocar_shared::TrainSample::empty(TrainId(1))
-                .with(dynocar_shared::SampleField::Speed, 20.0);
+            let mut sample = TrainSample::empty(TrainId(1)).with(SampleField::Speed, 20.0);
             sample.time_ns = sent * 10_000_000;
             publisher.publish(&mut sample).unwrap();
-            dynocar_tests::process::await_true(
+            await_true(
                 || {
                     reader.poll();
                     let mut readings = reader.readings(0);
@@ -117,5 +116,40 @@ fn a_wrong_configuration_is_refused_with_key_value_and_range() {
         let message = daemon.errors();
         assert!(message.contains(expected), "expected {expected:?} in:\n{message}");
         assert!(message.contains("daemon.toml"), "the file is named:\n{message}");
+    }
+}
+
+#[test]
+fn several_trains_on_one_thread_are_kept_apart() {
+    const TRAINS: u64 = 5;
+    let site = Site::new();
+    let pipelines = "[[threads]]\nname = \"all\"\n\
+                     [[pipelines]]\nkind = \"echo\"\nname = \"one\"\nthread = \"all\"\n\
+                     [[pipelines]]\nkind = \"echo\"\nname = \"two\"\nthread = \"all\"\ntrains = [2, 4]\n";
+    let config = site.write_config(TRAINS, "", pipelines);
+    let daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().expect("UTF-8")]);
+    daemon.await_error("serving");
+    let host = site.host();
+    for id in 1..=TRAINS {
+        let train = TrainId(id);
+        let mut publisher = SamplePublisher::open(&host, train).unwrap();
+        let mut reader = SnapshotReader::open(&host, train).unwrap();
+        for _ in 0..10 * id {
+            let mut sample = TrainSample::empty(train).with(SampleField::Speed, 10.0 + id as f64);
+            sample.time_ns = publisher.published() as i64 * 100_000_000;
+            publisher.publish(&mut sample).unwrap();
+        }
+        let expected = if id % 2 == 0 { 2 } else { 1 };
+        await_true(
+            || {
+                reader.poll();
+                let used = |count: u64| {
+                    reader.readings(0).filter(move |it| it.snapshot.samples_used == count).count()
+                };
+                used(10 * id) == expected
+            },
+            || format!("train {id}: {}", daemon.errors()),
+        );
+        assert!(reader.readings(0).all(|reading| reading.snapshot.train_id == id));
     }
 }
