@@ -10,9 +10,11 @@
 //! - [`dataset`]: recorded runs, from texts to the samples that a controller would publish
 //! - [`validation`]: which samples are fit for use, and why the others are not
 //! - [`force`]: the known forces on the train at a sample
+//! - [`filter`]: recursive estimators of fixed size, without knowledge of trains
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
 
 pub mod dataset;
+pub mod filter;
 pub mod force;
 pub mod pipeline;
 pub mod track;

@@ -7,6 +7,7 @@ mod echo;
 mod estimator;
 mod innovation;
 pub mod output;
+pub mod resistance;
 pub mod settings;
 
 pub use echo::Echo;
