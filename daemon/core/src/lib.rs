@@ -10,9 +10,11 @@
 //! - [`validation`]: which samples are fit for use, and why the others are not
 //! - [`force`]: the known forces on the train at a sample
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
+//! - [`simulate`]: the speed that a force model predicts, over a recorded run or with a driver
 
 pub mod force;
 pub mod pipeline;
+pub mod simulate;
 pub mod track;
 pub mod train;
 pub mod validation;
