@@ -215,7 +215,12 @@ fn another_mass(random: &mut Random) -> f64 {
 /// Rain in some runs along the whole line, or slippery approaches of some stations.
 fn low_adhesion(scene: &EffectScene<'_>, random: &mut Random) -> Effect {
     let handling = &scene.train.handling;
-    let adhesion = random.uniform(0.55, 0.85) * handling.braking_mps2 / 9.81;
+    // A fast train runs on for kilometres when the rail carries much less than asked.
+    let (low, high) = match scene.train.train_type {
+        TrainType::HighSpeed => (0.85, 0.97),
+        _ => (0.6, 0.88),
+    };
+    let adhesion = random.uniform(low, high) * handling.braking_mps2 / 9.81;
     let runs = scene.some_runs(random);
     if random.chance(0.5) || scene.line.stations_m.len() < 5 {
         return Effect::LowAdhesion { adhesion, intervals_m: Vec::new(), runs };

@@ -54,6 +54,8 @@ struct Ranges {
     curve_length_m: (f64, f64),
     radii_m: &'static [f64],
     station_gap_m: (f64, f64),
+    /// Beyond the last stations, for trains that overrun.
+    end_margin_m: f64,
     limit_length_m: (f64, f64),
     /// Limits as shares of the train's highest speed.
     limit_shares: &'static [f64],
@@ -71,6 +73,7 @@ const FREIGHT: Ranges = Ranges {
     curve_length_m: (250.0, 800.0),
     radii_m: &[350.0, 400.0, 500.0, 600.0, 750.0, 1200.0, 1500.0],
     station_gap_m: (9e3, 15e3),
+    end_margin_m: 200.0,
     limit_length_m: (2500.0, 6000.0),
     limit_shares: &[1.0, 0.9, 0.8, 0.75],
     tunnels: (2, 3),
@@ -86,6 +89,7 @@ const REGIONAL: Ranges = Ranges {
     curve_length_m: (150.0, 700.0),
     radii_m: &[400.0, 500.0, 600.0, 700.0, 850.0, 1000.0, 1600.0, 2200.0],
     station_gap_m: (3.2e3, 5.8e3),
+    end_margin_m: 400.0,
     limit_length_m: (1200.0, 4000.0),
     limit_shares: &[1.0, 0.95, 0.9, 0.8, 0.7],
     tunnels: (2, 4),
@@ -101,6 +105,7 @@ const METRO: Ranges = Ranges {
     curve_length_m: (110.0, 280.0),
     radii_m: &[280.0, 350.0, 450.0, 550.0, 700.0, 900.0, 1200.0],
     station_gap_m: (850.0, 1700.0),
+    end_margin_m: 250.0,
     limit_length_m: (700.0, 2500.0),
     limit_shares: &[1.0, 0.95, 0.85, 0.7],
     tunnels: (2, 3),
@@ -116,6 +121,7 @@ const HIGH_SPEED: Ranges = Ranges {
     curve_length_m: (800.0, 2200.0),
     radii_m: &[6000.0, 8000.0, 9000.0, 10000.0],
     station_gap_m: (20e3, 32e3),
+    end_margin_m: 1200.0,
     limit_length_m: (8e3, 20e3),
     limit_shares: &[1.0, 0.97, 0.9, 0.85],
     tunnels: (3, 4),
@@ -214,8 +220,9 @@ fn make_stations(
     train_length_m: f64,
     random: &mut Random,
 ) -> Vec<f64> {
-    let end_m = length_m - 0.5 * train_length_m - 60.0;
-    let mut stations_m = vec![(0.5 * train_length_m + 60.0).round()];
+    let margin_m = 0.5 * train_length_m + ranges.end_margin_m;
+    let end_m = length_m - margin_m;
+    let mut stations_m = vec![margin_m.round()];
     loop {
         let gap_m = random.uniform(ranges.station_gap_m.0, ranges.station_gap_m.1);
         let next_m = (stations_m[stations_m.len() - 1] + gap_m).round();
