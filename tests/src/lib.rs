@@ -1,5 +1,9 @@
 //! Scenarios, simulator and process harness for the tests of Dynocar.
 //!
+//! # Layout
+//!
 //! - [`process`]: real processes with a run-time directory of their own, cleaned up on drop
+//! - [`simulator`]: recorded runs of random trains with known, undeclared effects
 
 pub mod process;
+pub mod simulator;

@@ -12,11 +12,13 @@
 //! - [`force`]: the known forces on the train at a sample
 //! - [`filter`]: recursive estimators of fixed size, without knowledge of trains
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
+//! - [`simulate`]: the speed that a force model predicts, over a recorded run or with a driver
 
 pub mod dataset;
 pub mod filter;
 pub mod force;
 pub mod pipeline;
+pub mod simulate;
 pub mod track;
 pub mod train;
 pub mod validation;

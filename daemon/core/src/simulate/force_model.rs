@@ -1,0 +1,122 @@
+//! What accelerates a train at a sample of a recorded run.
+
+use super::recording::Recording;
+use crate::force::ResolvedSample;
+use crate::train::Davis;
+
+/// The acceleration of a train at each sample of a recorded run, for any speed.
+///
+/// The simulated speed is not the measured one, so a model answers for any speed; everything
+/// else (place, forces, weather) is the sample's. Between samples the answers are interpolated.
+pub trait ForceModel {
+    /// dv/dt in m/s² at the sample of this index if the train went at `speed_mps` there.
+    fn acceleration_mps2(&self, index: usize, speed_mps: f64) -> f64;
+
+    /// Measured speed over true speed; differs from 1 where the wheel diameter is not the
+    /// declared one.
+    fn speed_scale(&self) -> f64 {
+        1.0
+    }
+}
+
+/// A closure (index, speed in m/s) to dv/dt in m/s².
+impl<F: Fn(usize, f64) -> f64> ForceModel for F {
+    fn acceleration_mps2(&self, index: usize, speed_mps: f64) -> f64 {
+        self(index, speed_mps)
+    }
+}
+
+/// Acceleration at one sample as a polynomial of the speed: p0 + p1 v + p2 v².
+type Polynomial = [f64; 3];
+
+/// A force model that is a quadratic polynomial of the speed at every sample.
+///
+/// The declared model is of this form, and so are tunnel and curve resistance, wind, dragging
+/// brakes, another mass, gain or delay of the forces: an effect adds its three numbers per sample
+/// once, and the simulation costs the same with ten effects as with none.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct QuadraticForces {
+    polynomials: Vec<Polynomial>,
+    speed_scale: f64,
+}
+
+impl QuadraticForces {
+    /// The declared model over a run with the given Davis coefficients.
+    pub fn declared(recording: &Recording, resistance: Davis) -> Self {
+        let mut forces = QuadraticForces::default();
+        forces.set_declared(recording, resistance);
+        forces
+    }
+
+    /// Becomes the declared model over a run; keeps its memory, so that an optimiser allocates
+    /// only once.
+    pub fn set_declared(&mut self, recording: &Recording, resistance: Davis) {
+        self.speed_scale = 1.0;
+        self.polynomials.clear();
+        self.polynomials.extend(
+            recording.samples().iter().map(|sample| declared_polynomial(sample, resistance)),
+        );
+    }
+
+    /// Adds the force `constant_n` + `linear` v + `quadratic` v² in N along the direction of
+    /// travel (a resistance is negative) at one sample; v in m/s.
+    ///
+    /// # Panics
+    ///
+    /// When the run has no sample of this index.
+    #[inline]
+    pub fn add_force(
+        &mut self,
+        index: usize,
+        sample: &ResolvedSample,
+        [constant_n, linear, quadratic]: [f64; 3],
+    ) {
+        let polynomial = &mut self.polynomials[index];
+        let per_kg = 1.0 / sample.inertial_mass_kg;
+        polynomial[0] += per_kg * constant_n;
+        polynomial[1] += per_kg * linear;
+        polynomial[2] += per_kg * quadratic;
+    }
+
+    /// Multiplies the acceleration at one sample, as another inertial mass does.
+    ///
+    /// # Panics
+    ///
+    /// When the run has no sample of this index.
+    #[inline]
+    pub fn scale_acceleration(&mut self, index: usize, factor: f64) {
+        for coefficient in &mut self.polynomials[index] {
+            *coefficient *= factor;
+        }
+    }
+
+    /// Sets measured speed over true speed.
+    pub fn set_speed_scale(&mut self, scale: f64) {
+        self.speed_scale = scale;
+    }
+}
+
+impl ForceModel for QuadraticForces {
+    #[inline]
+    fn acceleration_mps2(&self, index: usize, speed_mps: f64) -> f64 {
+        let [p0, p1, p2] = self.polynomials[index];
+        p0 + speed_mps * (p1 + speed_mps * p2)
+    }
+
+    fn speed_scale(&self) -> f64 {
+        self.speed_scale
+    }
+}
+
+/// A gradient that is not known counts as level track; [`Recording::knows_gradient`] tells.
+fn declared_polynomial(sample: &ResolvedSample, resistance: Davis) -> Polynomial {
+    let gradient_permille = sample.gradient_permille.unwrap_or(0.0);
+    let tied_n_per_kn = gradient_permille + sample.curve_n_per_kn + sample.tunnel_n_per_kn;
+    let control_force_n = sample.control_force_n().unwrap_or(0.0);
+    let weight_per_kg = sample.weight_kn / sample.inertial_mass_kg;
+    [
+        control_force_n / sample.inertial_mass_kg - weight_per_kg * (tied_n_per_kn + resistance.a),
+        -weight_per_kg * resistance.b,
+        -weight_per_kg * resistance.c,
+    ]
+}

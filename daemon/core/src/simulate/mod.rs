@@ -1,0 +1,45 @@
+//! The forward simulation of a train: what speed a force model predicts.
+//!
+//! ```text
+//! mass (1 + gamma) dv/dt = traction - brake - weight_kN (w0(v) + k mean(1/R) + tunnel)
+//!                          - weight_kN gradient + whatever else the force model says
+//! ```
+//!
+//! Two ways to drive it share the same step ([`motion`]):
+//!
+//! - *open loop* over a recorded run ([`Recording`], [`Prediction`]): the reported forces act, the
+//!   track is looked up at the measured position, the predicted speed is compared with the
+//!   measured one. It is the judge of every model, and an optimiser calls it thousands of times.
+//! - *driving* ([`drive`]): a driver commands the forces, the track is looked up at the simulated
+//!   position.
+//!
+//! # Integration
+//!
+//! Heun's method, second order. Between two samples the acceleration at a fixed speed is linear
+//! in time, so the reported forces enter by the trapezoidal rule, which is exact for them. What
+//! is left is the change of resistance within a step: with d(dv/dt)/dv = -lambda, a step h errs
+//! by about (lambda h)²/6 of the step's change of speed; lambda is below 0.01 1/s on a train, so
+//! that is below 2e-5 at h = 1 s, and longer steps are divided.
+//!
+//! # Standstill
+//!
+//! Resistance and brakes only oppose motion, so a train never rolls backwards: the speed is kept
+//! at or above zero, the instant of stopping and of starting is found within the step, and the
+//! time at rest adds nothing. See [`Recording`] for what else is done about stops and gaps.
+
+#[cfg(test)]
+mod analytic_tests;
+mod driving;
+mod force_model;
+#[cfg(test)]
+mod gap_tests;
+mod metric;
+pub mod motion;
+mod prediction;
+mod recording;
+
+pub use driving::{Controls, DrivenPoint, Driver, TrainOnLine, drive};
+pub use force_model::{ForceModel, QuadraticForces};
+pub use metric::{MOVING_SPEED_MPS, SpeedError};
+pub use prediction::{Prediction, Restart};
+pub use recording::{BridgeLimits, Recording, SimulateError};

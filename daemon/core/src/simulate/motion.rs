@@ -1,0 +1,106 @@
+//! One step of a train's motion, standstill included.
+
+/// Where a train is and how fast it goes along its direction of travel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// Distance travelled in m.
+    pub distance_m: f64,
+    /// Speed in m/s, never negative.
+    pub speed_mps: f64,
+}
+
+/// No train is faster, in m/s; a model with a negative resistance, as an optimiser may try it,
+/// stays finite.
+pub const SPEED_MAX_MPS: f64 = 250.0;
+
+/// Speed in m/s after `step_s` of an acceleration that changes linearly in time from `start` to
+/// `end` (m/s²), never below zero.
+///
+/// A train that comes to rest within the step stays there until the acceleration turns positive.
+#[inline]
+pub fn speed_after(speed_mps: f64, start: f64, end: f64, step_s: f64) -> f64 {
+    let dips = start < 0.0 && end > 0.0;
+    if dips {
+        return speed_after_dip(speed_mps, start, end, step_s);
+    }
+    (speed_mps + 0.5 * step_s * (start + end)).clamp(0.0, SPEED_MAX_MPS)
+}
+
+/// The speed is lowest where the acceleration turns positive; from rest it grows only after that.
+fn speed_after_dip(speed_mps: f64, start: f64, end: f64, step_s: f64) -> f64 {
+    let turn_s = step_s * start / (start - end);
+    let lowest_mps = speed_mps + 0.5 * start * turn_s;
+    (lowest_mps.max(0.0) + 0.5 * end * (step_s - turn_s)).min(SPEED_MAX_MPS)
+}
+
+/// One step of Heun's method for a train whose acceleration in m/s² depends on distance and speed.
+///
+/// A stop within the step ends the way at the stopping point.
+#[inline]
+pub fn advance(
+    motion: Motion,
+    step_s: f64,
+    mut acceleration_mps2: impl FnMut(Motion) -> f64,
+) -> Motion {
+    let start = acceleration_mps2(motion);
+    let predicted_mps = (motion.speed_mps + step_s * start).clamp(0.0, SPEED_MAX_MPS);
+    let predicted = Motion {
+        distance_m: motion.distance_m + 0.5 * step_s * (motion.speed_mps + predicted_mps),
+        speed_mps: predicted_mps,
+    };
+    let end = acceleration_mps2(predicted);
+    let speed_mps = speed_after(motion.speed_mps, start, end, step_s);
+    let way_m = if speed_mps > 0.0 || motion.speed_mps == 0.0 {
+        // Exact for an acceleration linear in time.
+        let bend_m = step_s * step_s * (start - end) / 12.0;
+        (0.5 * step_s * (motion.speed_mps + speed_mps) + bend_m).max(0.0)
+    } else {
+        let braking = -0.5 * (start + end);
+        (0.5 * motion.speed_mps * motion.speed_mps / braking).min(motion.speed_mps * step_s)
+    };
+    Motion { distance_m: motion.distance_m + way_m, speed_mps }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The same motion in ten thousand explicit steps.
+    fn by_small_steps(speed_mps: f64, start: f64, end: f64, step_s: f64) -> f64 {
+        let count = 10_000;
+        let h = step_s / f64::from(count);
+        (0..count).fold(speed_mps, |v, k| {
+            let share = (f64::from(k) + 0.5) / f64::from(count);
+            (v + h * (start + share * (end - start))).max(0.0)
+        })
+    }
+
+    #[test]
+    fn a_step_agrees_with_many_small_ones_whatever_the_signs() {
+        for speed in [0.0, 0.02, 0.1, 3.0] {
+            for start in [-0.8, -0.1, 0.0, 0.3] {
+                for end in [-0.8, 0.0, 0.1, 0.9] {
+                    let one = speed_after(speed, start, end, 0.5);
+                    let many = by_small_steps(speed, start, end, 0.5);
+                    assert!((one - many).abs() < 1e-4, "{speed} {start} {end}: {one} {many}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_train_pulled_backwards_stays_where_it_is() {
+        let at_rest = Motion { distance_m: 7.0, speed_mps: 0.0 };
+        assert_eq!(advance(at_rest, 1.0, |_| -0.4), at_rest);
+    }
+
+    #[test]
+    fn a_stop_ends_after_the_braking_distance() {
+        let mut motion = Motion { distance_m: 0.0, speed_mps: 10.03 };
+        for _ in 0..100 {
+            motion = advance(motion, 0.5, |_| -0.8);
+        }
+        assert_eq!(motion.speed_mps, 0.0);
+        assert!((motion.distance_m - 10.03 * 10.03 / 1.6).abs() < 1e-9);
+    }
+}

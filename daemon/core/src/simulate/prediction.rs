@@ -1,0 +1,139 @@
+//! The open-loop simulation of a recorded run.
+
+use super::force_model::ForceModel;
+use super::motion::{SPEED_MAX_MPS, speed_after};
+use super::recording::{Recording, SampleRole};
+
+/// How long the simulation runs before it takes up a measured speed again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Restart {
+    /// Never: from the run's first sample to its end. The metric `full_run`.
+    FullRun,
+    /// Every so many seconds from the run's first sample. The metric `window60` is 60 s.
+    EverySeconds(f64),
+}
+
+impl Restart {
+    /// The metric `window60`.
+    pub const WINDOW_60: Restart = Restart::EverySeconds(60.0);
+
+    /// Number of the window at a time in ns from the run's first sample.
+    #[inline]
+    fn window(self, time_ns: i64) -> i64 {
+        match self {
+            Restart::FullRun => 0,
+            Restart::EverySeconds(seconds) => time_ns / ((seconds * 1e9) as i64).max(1),
+        }
+    }
+}
+
+/// A longer step in s is divided.
+const STEP_MAX_S: f64 = 1.0;
+/// Samples whose speeds together tell whether a starting speed is an outlier.
+const START_SAMPLES: usize = 5;
+/// They lie within this time in s: over a longer one the forces say too little.
+const START_SPAN_S: f64 = 2.5;
+/// A starting speed farther in m/s from what the samples after it say is an outlier.
+const START_TOLERANCE_MPS: f64 = 1.0;
+
+/// Predicted measured speeds of one run; keeps its memory from one simulation to the next.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Prediction {
+    speed_mps: Vec<f64>,
+}
+
+impl Prediction {
+    /// An empty prediction.
+    pub fn new() -> Self {
+        Prediction::default()
+    }
+
+    /// Predicted measured speed in m/s at each sample; the measured one where the run cannot be
+    /// simulated (see [`Recording::is_simulated`]).
+    pub fn speed_mps(&self) -> &[f64] {
+        &self.speed_mps
+    }
+
+    /// Simulates a run.
+    ///
+    /// The start is the measured speed, unless the samples after it show it to be an outlier:
+    /// then it is the median of the starts that they would have given.
+    pub fn simulate(&mut self, recording: &Recording, model: &impl ForceModel, restart: Restart) {
+        let (samples, time_s, roles) = (recording.samples(), recording.time_s(), recording.roles());
+        let scale = model.speed_scale();
+        let mut last_window = 0;
+        let mut speed_mps = 0.0;
+        self.speed_mps.clear();
+        for (i, role) in roles.iter().enumerate() {
+            let window = restart.window(samples[i].time_ns - samples[0].time_ns);
+            let is_new_window = window != last_window;
+            last_window = window;
+            match role {
+                SampleRole::Unknown => {
+                    self.speed_mps.push(samples[i].speed_mps);
+                    continue;
+                }
+                SampleRole::Starts => speed_mps = start_speed(recording, model, i),
+                _ if is_new_window => speed_mps = start_speed(recording, model, i),
+                SampleRole::HeldAtRest if speed_mps == 0.0 => {}
+                SampleRole::HeldAtRest | SampleRole::Follows => {
+                    speed_mps = step(model, i - 1, speed_mps, time_s[i] - time_s[i - 1]);
+                }
+            }
+            self.speed_mps.push(scale * speed_mps);
+        }
+    }
+}
+
+/// One step of Heun's method from a sample to the next, divided when long.
+#[inline]
+fn step(model: &impl ForceModel, from: usize, speed_mps: f64, step_s: f64) -> f64 {
+    if step_s <= STEP_MAX_S {
+        let start = model.acceleration_mps2(from, speed_mps);
+        let predicted_mps = (speed_mps + step_s * start).clamp(0.0, SPEED_MAX_MPS);
+        let end = model.acceleration_mps2(from + 1, predicted_mps);
+        return speed_after(speed_mps, start, end, step_s);
+    }
+    let parts = (step_s / STEP_MAX_S).ceil();
+    let part_s = step_s / parts;
+    let at = |share: f64, speed: f64| {
+        let (from_here, from_next) =
+            (model.acceleration_mps2(from, speed), model.acceleration_mps2(from + 1, speed));
+        from_here + share * (from_next - from_here)
+    };
+    (0..parts as usize).fold(speed_mps, |speed, part| {
+        let start = at(part as f64 / parts, speed);
+        let end = at((part + 1) as f64 / parts, (speed + part_s * start).clamp(0.0, SPEED_MAX_MPS));
+        speed_after(speed, start, end, part_s)
+    })
+}
+
+/// True speed in m/s to start from at a sample.
+fn start_speed(recording: &Recording, model: &impl ForceModel, index: usize) -> f64 {
+    let (samples, time_s, roles) = (recording.samples(), recording.time_s(), recording.roles());
+    let scale = model.speed_scale();
+    let measured_mps = samples[index].speed_mps / scale;
+    let mut starts = [measured_mps; START_SAMPLES];
+    let mut count = 1;
+    let mut gained_mps = 0.0;
+    while count < START_SAMPLES {
+        let next = index + count;
+        let is_near = time_s.get(next).is_some_and(|time| time - time_s[index] <= START_SPAN_S);
+        if !is_near || !matches!(roles[next], SampleRole::Follows | SampleRole::HeldAtRest) {
+            break;
+        }
+        let next_mps = samples[next].speed_mps / scale;
+        let step_s = time_s[next] - time_s[next - 1];
+        let slope =
+            model.acceleration_mps2(next - 1, next_mps) + model.acceleration_mps2(next, next_mps);
+        // At rest the forces need not balance.
+        gained_mps += if next_mps > 0.0 { 0.5 * step_s * slope } else { 0.0 };
+        starts[count] = next_mps - gained_mps;
+        count += 1;
+    }
+    let starts = &mut starts[..count];
+    starts.sort_by(f64::total_cmp);
+    let median_mps = starts[count / 2];
+    let is_outlier = count >= 3 && (measured_mps - median_mps).abs() > START_TOLERANCE_MPS;
+    if is_outlier { median_mps.clamp(0.0, SPEED_MAX_MPS) } else { measured_mps }
+}

@@ -1,0 +1,253 @@
+//! A recorded run, made ready to be simulated.
+
+use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+
+use crate::force::ResolvedSample;
+
+/// How long a gap in a recording may be and still be bridged.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BridgeLimits {
+    /// Longest time in s over which missing forces or gradients are interpolated.
+    pub force_gap_max_s: f64,
+    /// Longest time in s between two rows; beyond it the run is restarted.
+    pub row_gap_max_s: f64,
+}
+
+impl Default for BridgeLimits {
+    fn default() -> Self {
+        BridgeLimits { force_gap_max_s: 2.0, row_gap_max_s: 10.0 }
+    }
+}
+
+/// Why a run cannot be simulated.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SimulateError {
+    /// There is no sample with both forces.
+    #[error("expected samples with traction and brake force, got none among {samples} samples")]
+    NoForces {
+        /// Samples of the run.
+        samples: usize,
+    },
+    /// Times do not grow.
+    #[error("sample {index}: expected a time after {before_ns} ns, got {time_ns} ns")]
+    TimeNotIncreasing {
+        /// Number of the sample, from 0.
+        index: usize,
+        /// Time of the sample before it in ns.
+        before_ns: i64,
+        /// Its time in ns.
+        time_ns: i64,
+    },
+}
+
+/// A recorded run made ready for the open-loop simulation.
+///
+/// - Missing forces and gradients are interpolated over short gaps. Where a gap of forces or rows
+///   is longer than the limits, nothing can be said: the simulation starts anew after it at the
+///   measured speed, and the samples within are neither simulated nor scored.
+/// - A train that is measured at rest while no traction is reported is held by a brake, reported
+///   or not: gravity does not set it in motion.
+/// - Samples that validation refused (outliers, repeated rows) are simply not there; the step
+///   across them is longer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    samples: Vec<ResolvedSample>,
+    /// Time in s from the run's first sample.
+    time_s: Vec<f64>,
+    roles: Vec<SampleRole>,
+    knows_gradient: bool,
+    bridged: usize,
+}
+
+/// What the simulation does with a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum SampleRole {
+    /// Reached by a step from the sample before.
+    Follows,
+    /// As `Follows`, but the train is held at rest by a brake during the step.
+    HeldAtRest,
+    /// The simulation starts here with the measured speed.
+    Starts,
+    /// Forces are unknown here.
+    Unknown,
+}
+
+/// Below this speed in m/s a measurement means rest.
+const REST_SPEED_MPS: f64 = 0.05;
+/// Below this traction, as acceleration in m/s², a train at rest counts as not pulled.
+const REST_TRACTION_MPS2: f64 = 0.005;
+
+impl Recording {
+    /// Makes a run ready; `samples` are in order of time.
+    ///
+    /// # Errors
+    ///
+    /// When times do not grow or no sample has forces.
+    pub fn new(
+        mut samples: Vec<ResolvedSample>,
+        limits: BridgeLimits,
+    ) -> Result<Self, SimulateError> {
+        for (i, pair) in samples.windows(2).enumerate() {
+            let (before_ns, time_ns) = (pair[0].time_ns, pair[1].time_ns);
+            if time_ns <= before_ns {
+                return Err(SimulateError::TimeNotIncreasing { index: i + 1, before_ns, time_ns });
+            }
+        }
+        let first_ns = samples.first().map_or(0, |sample| sample.time_ns);
+        let time_s: Vec<f64> = samples
+            .iter()
+            .map(|sample| sample.time_ns.saturating_sub(first_ns) as f64 * 1e-9)
+            .collect();
+        let knows_gradient = samples.iter().any(|sample| sample.gradient_permille.is_some());
+        let force_gap_max_s = limits.force_gap_max_s;
+        let bridged = bridge(&mut samples, &time_s, force_gap_max_s, |s| &mut s.traction_force_n)
+            .max(bridge(&mut samples, &time_s, force_gap_max_s, |s| &mut s.brake_force_n));
+        // A profile along the line has no short gaps in time: hold it to the ends of the run.
+        bridge(&mut samples, &time_s, force_gap_max_s, |s| &mut s.gradient_permille);
+        hold_ends(&mut samples);
+        let roles = roles(&samples, &time_s, knows_gradient, limits.row_gap_max_s);
+        if !roles.contains(&SampleRole::Starts) {
+            return Err(SimulateError::NoForces { samples: samples.len() });
+        }
+        Ok(Recording { samples, time_s, roles, knows_gradient, bridged })
+    }
+
+    /// The samples, missing forces bridged where they could be.
+    pub fn samples(&self) -> &[ResolvedSample] {
+        &self.samples
+    }
+
+    /// Time in s of each sample from the run's first.
+    pub fn time_s(&self) -> &[f64] {
+        &self.time_s
+    }
+
+    /// False when no gradient is known anywhere: the line then counts as level.
+    pub fn knows_gradient(&self) -> bool {
+        self.knows_gradient
+    }
+
+    /// Samples whose missing forces were interpolated.
+    pub fn bridged(&self) -> usize {
+        self.bridged
+    }
+
+    /// How often the simulation starts at a measured speed in mid-run, because forces or rows
+    /// were missing for too long.
+    pub fn restarts(&self) -> usize {
+        self.roles.iter().filter(|role| **role == SampleRole::Starts).count() - 1
+    }
+
+    /// True when the simulation gives a speed for this sample.
+    ///
+    /// # Panics
+    ///
+    /// When the run has no sample of this index.
+    pub fn is_simulated(&self, index: usize) -> bool {
+        self.roles[index] != SampleRole::Unknown
+    }
+
+    pub(super) fn roles(&self) -> &[SampleRole] {
+        &self.roles
+    }
+}
+
+/// Interpolates a quantity over gaps of at most `gap_max_s`; returns the number of samples filled.
+fn bridge(
+    samples: &mut [ResolvedSample],
+    time_s: &[f64],
+    gap_max_s: f64,
+    field: fn(&mut ResolvedSample) -> &mut Option<f64>,
+) -> usize {
+    let mut filled = 0;
+    let mut known: Option<(usize, f64)> = None;
+    for i in 0..samples.len() {
+        let Some(value) = *field(&mut samples[i]) else { continue };
+        if let Some((from, from_value)) = known
+            && time_s[i] - time_s[from] <= gap_max_s
+        {
+            for k in from + 1..i {
+                let share = (time_s[k] - time_s[from]) / (time_s[i] - time_s[from]);
+                *field(&mut samples[k]) = Some(from_value + share * (value - from_value));
+                filled += 1;
+            }
+        }
+        known = Some((i, value));
+    }
+    filled
+}
+
+/// Gives the samples before the first known gradient its value: an accelerometer tells the
+/// gradient only from the second sample on.
+fn hold_ends(samples: &mut [ResolvedSample]) {
+    let Some(first) = samples.iter().position(|sample| sample.gradient_permille.is_some()) else {
+        return;
+    };
+    let gradient_permille = samples[first].gradient_permille;
+    for sample in &mut samples[..first] {
+        sample.gradient_permille = gradient_permille;
+    }
+}
+
+fn roles(
+    samples: &[ResolvedSample],
+    time_s: &[f64],
+    knows_gradient: bool,
+    row_gap_max_s: f64,
+) -> Vec<SampleRole> {
+    let mut roles = Vec::with_capacity(samples.len());
+    for (i, sample) in samples.iter().enumerate() {
+        let is_known = sample.control_force_n().is_some()
+            && (!knows_gradient || sample.gradient_permille.is_some());
+        let follows = i > 0
+            && roles[i - 1] != SampleRole::Unknown
+            && time_s[i] - time_s[i - 1] <= row_gap_max_s;
+        roles.push(match (is_known, follows) {
+            (false, _) => SampleRole::Unknown,
+            (true, false) => SampleRole::Starts,
+            (true, true) if is_held(&samples[i - 1]) && is_held(sample) => SampleRole::HeldAtRest,
+            (true, true) => SampleRole::Follows,
+        });
+    }
+    roles
+}
+
+fn is_held(sample: &ResolvedSample) -> bool {
+    let traction_n = sample.traction_force_n.unwrap_or(0.0);
+    sample.speed_mps < REST_SPEED_MPS
+        && traction_n < REST_TRACTION_MPS2 * sample.weight_kn * 1000.0 / STANDARD_GRAVITY_MPS2
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A train of 100 t with gamma 0.06 that coasts on the level at 20 m/s.
+    pub(in crate::simulate) fn coasting_sample(time_s: f64) -> ResolvedSample {
+        ResolvedSample {
+            time_ns: (time_s * 1e9).round() as i64,
+            step_s: 0.0,
+            stretch: 1,
+            direction: 1.0,
+            position_m: None,
+            speed_mps: 20.0,
+            mass_kg: 100_000.0,
+            inertial_mass_kg: 106_000.0,
+            weight_kn: 100.0 * STANDARD_GRAVITY_MPS2,
+            traction_force_n: Some(0.0),
+            brake_force_n: Some(0.0),
+            gradient_permille: Some(0.0),
+            curve_n_per_kn: 0.0,
+            curvature_per_m: None,
+            tunnel_n_per_kn: 0.0,
+            tunnel_share: None,
+            brake_cylinder_pressure_pa: None,
+            ambient_temperature_degc: None,
+            is_sliding: false,
+        }
+    }
+
+    pub(in crate::simulate) fn recorded(samples: Vec<ResolvedSample>) -> Recording {
+        Recording::new(samples, BridgeLimits::default()).unwrap()
+    }
+}
