@@ -14,7 +14,6 @@ const PLAIN_EVERY: Duration = Duration::from_secs(3);
 
 /// Shows the estimates as they come.
 pub struct View {
-    train: String,
     total: u64,
     bars: Option<Bars>,
     last_plain: Option<Instant>,
@@ -36,7 +35,7 @@ impl View {
             dataset.train.name
         );
         let bars = std::io::stderr().is_terminal().then(|| Bars::new(total));
-        View { train: dataset.train.name.clone(), total, bars, last_plain: None }
+        View { total, bars, last_plain: None }
     }
 
     /// Shows what the reader knows.
@@ -63,7 +62,7 @@ impl View {
     fn write_lines(&self, reader: &SnapshotReader, now_ns: i64) {
         for reading in reader.readings(now_ns) {
             let percent = 100 * reading.snapshot.sample_sequence / self.total.max(1);
-            eprintln!("{percent:3} % {} {}", self.train, describe(&reading));
+            eprintln!("{percent:3} %  {}", describe(&reading));
         }
     }
 }
@@ -100,6 +99,9 @@ fn describe(reading: &Reading) -> String {
 }
 
 fn describe_estimate(snapshot: &ParameterSnapshot) -> String {
+    if snapshot.speed_max_mps <= snapshot.speed_min_mps {
+        return "no motion yet".into();
+    }
     let middle = 0.5 * (snapshot.speed_min_mps + snapshot.speed_max_mps);
     let speeds = [snapshot.speed_min_mps.ceil(), middle.round(), snapshot.speed_max_mps.floor()];
     let points: Vec<String> = speeds
