@@ -59,8 +59,8 @@ impl SamplePublisher {
     ///
     /// # Real-time
     ///
-    /// Never waits. No system call and no allocation while the pipelines are awake and no
-    /// process comes or goes.
+    /// Never waits. No system call while the pipelines are awake and no process comes or goes,
+    /// and one allocation: see [`Sender::send`].
     pub fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, SendRefused> {
         self.sequence += 1;
         sample.train_id = self.train.0;

@@ -50,7 +50,8 @@ impl<T: Payload> Sender<T> {
     ///
     /// # Real-time
     ///
-    /// No system call and no allocation, save when a receiver has come or gone since.
+    /// No system call, save when a receiver has come or gone since. The transport allocates its
+    /// account of the loan and frees it again: once, under 128 bytes, never from the shared memory.
     pub fn send(&self, message: &T) -> Result<(), SendRefused> {
         let slot = self.publisher.loan_uninit().map_err(|_| SendRefused)?;
         slot.write_payload(Wire(*message)).send().map(|_| ()).map_err(|_| SendRefused)
