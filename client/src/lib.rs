@@ -36,10 +36,12 @@
 //! - [`channel`]: the shared-memory ports, also used by the daemon
 //! - [`publisher`], [`reader`]: the two ends a controller holds
 //! - [`clock`]: the host's monotonic clock
+//! - [`ffi`]: the same for C, C++ and Python
 
 pub mod channel;
 pub mod clock;
 pub mod error;
+pub mod ffi;
 pub mod host;
 pub mod peer;
 pub mod publisher;

@@ -1,0 +1,512 @@
+/*
+ * Dynocar's client library for C (C99 and later) and C++ (C++17 and later).
+ *
+ * A controller publishes one sample each control cycle and polls what the daemon has learned:
+ *
+ *     dynocar_publisher_publish(publisher, &sample);
+ *     dynocar_reader_poll(reader, NULL);
+ *     dynocar_reader_latest(reader, DYNOCAR_PIPELINE_RESISTANCE_KALMAN, now_ns, &reading);
+ *     if (reading.is_usable) { ... } else { ... the controller's own parameters ... }
+ *
+ * Rules
+ *
+ *   - Calls marked REAL-TIME never wait for the daemon, take no lock and make no system call and
+ *     no allocation; only publish allocates, once, under 128 bytes, freed before it returns. Two
+ *     exceptions: when a process has come or gone, the next publish and the next poll connect or
+ *     disconnect it; and while pipeline threads sleep (or for a publisher's first half second, in
+ *     which it does not know who sleeps), a publish makes a system call to wake each of them.
+ *     All other calls open files or shared memory: make them before the cycle starts.
+ *   - A handle belongs to the thread that opened it; every other thread gets
+ *     DYNOCAR_ERROR_WRONG_THREAD. Do not use a handle after fork() or after closing it.
+ *   - One controller drives a train: a second publisher for the same train is refused. Any number
+ *     of processes, up to 12, may read.
+ *   - The daemon may start, die and come back at any time: nothing has to be reopened. While it
+ *     is silent for longer than the stale limit (250 ms unless set otherwise), every reading is
+ *     stale and not usable.
+ *   - All functions check their pointers for NULL, none throws, and none installs a signal handler.
+ *
+ * Functions that can fail give DYNOCAR_OK (0) or a DYNOCAR_ERROR_...; then nothing was written
+ * through the caller's pointers, except where said. Units are part of the names; forces are of the
+ * whole train. mps = m/s, mps2 = m/s^2, permille = 0.001, ns = 1e-9 s.
+ */
+#ifndef DYNOCAR_H
+#define DYNOCAR_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- What this header was written for; see dynocar_header_matches_library() ---- */
+
+#define DYNOCAR_SCHEMA 1u
+#define DYNOCAR_SAMPLE_LAYOUT UINT64_C(0xdc0c8856b34a4c70)
+#define DYNOCAR_SNAPSHOT_LAYOUT UINT64_C(0x50736ec182885f8f)
+
+#define DYNOCAR_PIPELINES_MAX 32      /* pipelines of one train */
+#define DYNOCAR_PARAMETERS_MAX 6      /* parameters that one pipeline estimates together */
+#define DYNOCAR_COVARIANCE_ENTRIES 21 /* of the lower triangle, packed by rows */
+#define DYNOCAR_REJECTION_REASONS 16
+#define DYNOCAR_MESSAGE_BYTES 512     /* room for any message; shorter buffers cut it */
+
+/* ---- Vocabularies: numbers on the wire. A peer of a later release may send others. ---- */
+
+/* What every function that can fail gives. */
+typedef int32_t dynocar_code;
+enum {
+    DYNOCAR_OK = 0,
+    DYNOCAR_ERROR_NULL_ARGUMENT = 1,
+    DYNOCAR_ERROR_BAD_NUMBER = 2,          /* means nothing, lies out of range or is not finite */
+    DYNOCAR_ERROR_WRONG_THREAD = 3,        /* the handle was opened by another thread */
+    DYNOCAR_ERROR_ROOT_NAME = 4,           /* not absolute, too long, or special characters */
+    DYNOCAR_ERROR_DIRECTORY = 5,           /* a run-time directory or file cannot be used */
+    DYNOCAR_ERROR_OCCUPIED = 6,            /* the train already has a controller */
+    DYNOCAR_ERROR_INCOMPATIBLE_DAEMON = 7, /* another schema, layout or transport version */
+    DYNOCAR_ERROR_TRANSPORT = 8,           /* the shared memory cannot be used */
+    DYNOCAR_ERROR_SEND_REFUSED = 9,        /* the sample counts as lost; just go on */
+    DYNOCAR_ERROR_NO_SNAPSHOT = 10,        /* none of this pipeline has come yet */
+    DYNOCAR_ERROR_NOT_IN_SNAPSHOT = 11,    /* the pipeline does not estimate this parameter */
+    DYNOCAR_ERROR_PANIC = 12               /* a fault inside the library: close the handle */
+};
+
+/* Who serves a train. */
+enum {
+    DYNOCAR_DAEMON_ABSENT = 0,
+    DYNOCAR_DAEMON_COMPATIBLE = 1,
+    DYNOCAR_DAEMON_INCOMPATIBLE = 2
+};
+
+/* What a controller may do with an estimate. */
+enum {
+    DYNOCAR_STATUS_UNESTIMATED = 1, /* not enough data; values are declared or initial ones */
+    DYNOCAR_STATUS_ESTIMATED = 2,   /* the values may be used */
+    DYNOCAR_STATUS_DEGRADED = 3,    /* there are values, with a reservation: see the reason */
+    DYNOCAR_STATUS_INVALID = 4      /* the values must not be used */
+};
+
+/* Why a status is what it is. */
+enum {
+    DYNOCAR_REASON_NONE = 0,
+    DYNOCAR_REASON_TOO_FEW_SAMPLES = 1,
+    DYNOCAR_REASON_WEAK_EXCITATION = 2,       /* see excited and missing_manoeuvres */
+    DYNOCAR_REASON_AT_BOUND = 3,              /* a parameter lies at a physical bound */
+    DYNOCAR_REASON_INNOVATIONS_TOO_LARGE = 4, /* larger than their covariance says */
+    DYNOCAR_REASON_INNOVATIONS_NOT_WHITE = 5, /* correlated: the model lacks something */
+    DYNOCAR_REASON_BAD_INPUT = 6,             /* many samples are rejected or lost */
+    DYNOCAR_REASON_MISSING_QUANTITY = 7,      /* the samples lack what the pipeline needs */
+    DYNOCAR_REASON_GRADIENT_UNKNOWN = 8,      /* neither track nor sample gives one */
+    DYNOCAR_REASON_NUMERICAL_FAILURE = 9,     /* the filter was reset */
+    DYNOCAR_REASON_INPUT_STALE = 10,          /* no sample has come for a while */
+    DYNOCAR_REASON_ESTIMATE_STALE = 11,       /* the last exciting manoeuvre is too long ago */
+    DYNOCAR_REASON_ONLY_LOWER_BOUND = 12,     /* these data give no more */
+    DYNOCAR_REASON_NOT_IDENTIFIABLE = 13,     /* other values fit the data as well */
+    DYNOCAR_REASON_DAEMON_SILENT = 14         /* set by the client, never by the daemon */
+};
+
+/* The kind of estimator behind a snapshot. */
+enum {
+    DYNOCAR_PIPELINE_LEAST_SQUARES = 1,      /* regularised, all windows (Liu 2018) */
+    DYNOCAR_PIPELINE_RLS = 2,                /* recursive least squares (Liu 2018) */
+    DYNOCAR_PIPELINE_REGULARISED_RLS = 3,    /* the same, regularised (Liu 2018) */
+    DYNOCAR_PIPELINE_MILS = 4,               /* multi-innovation (Liu 2018) */
+    DYNOCAR_PIPELINE_V_MILS = 5,             /* interval-varying multi-innovation (Liu 2018) */
+    DYNOCAR_PIPELINE_TRAJECTORY_NEWTON = 10, /* sliding-window trajectory fit (Xia 2023) */
+    DYNOCAR_PIPELINE_TRAJECTORY_KALMAN = 11, /* [v, a, b, c] with jump hypotheses */
+    DYNOCAR_PIPELINE_RESISTANCE_KALMAN = 12, /* robust, with a disturbance state */
+    DYNOCAR_PIPELINE_ADHESION_EM = 20,       /* expectation maximisation (Xie 2019) */
+    DYNOCAR_PIPELINE_ADHESION_EKF = 21,      /* extended Kalman filter (baseline of Xie 2019) */
+    DYNOCAR_PIPELINE_ADHESION_SMOOTHER = 22, /* fixed-lag smoothing */
+    DYNOCAR_PIPELINE_ADHESION_LAW = 23,      /* scale of a known law */
+    DYNOCAR_PIPELINE_BRAKE_EM = 30,          /* disc friction times ratio (Jin 2020) */
+    DYNOCAR_PIPELINE_BRAKE_EKF = 31,         /* extended Kalman filter (baseline of Jin 2020) */
+    DYNOCAR_PIPELINE_BRAKE_SMOOTHER = 32,    /* fixed-lag smoothing */
+    DYNOCAR_PIPELINE_STAGED_DESCENT = 40,    /* resistance and mass (Wang 2022) */
+    DYNOCAR_PIPELINE_JOINT_LEAST_SQUARES = 41, /* resistance and mass */
+    DYNOCAR_PIPELINE_MASS_KALMAN = 42,       /* [v, 1/m, bias] */
+    DYNOCAR_PIPELINE_RESIDUAL_MONITOR = 50,  /* watches model against measurement */
+    DYNOCAR_PIPELINE_ECHO = 60               /* estimates nothing: the latency floor */
+};
+
+/* A quantity that a pipeline estimates, with the unit of its value. */
+enum {
+    DYNOCAR_PARAMETER_DAVIS_A = 1,              /* N/kN */
+    DYNOCAR_PARAMETER_DAVIS_B = 2,              /* N/kN per m/s */
+    DYNOCAR_PARAMETER_DAVIS_C = 3,              /* N/kN per (m/s)^2 */
+    DYNOCAR_PARAMETER_SPEED = 4,                /* m/s */
+    DYNOCAR_PARAMETER_MASS = 5,                 /* t; a sample's mass is in kg */
+    DYNOCAR_PARAMETER_ADHESION = 6,             /* 1, wheel on rail */
+    DYNOCAR_PARAMETER_ADHESION_LOWER_BOUND = 7, /* 1 */
+    DYNOCAR_PARAMETER_ADHESION_LAW_SCALE = 8,   /* 1 */
+    DYNOCAR_PARAMETER_DISC_FRICTION = 9,        /* 1 */
+    DYNOCAR_PARAMETER_BRAKING_RATIO = 10,       /* 1 */
+    DYNOCAR_PARAMETER_DISTURBANCE = 11,         /* N/kN that the model does not explain */
+    DYNOCAR_PARAMETER_CURVE_CONSTANT = 12,      /* N/kN m: k in k/R */
+    DYNOCAR_PARAMETER_TUNNEL_CONSTANT = 13,     /* N/kN per m of tunnel */
+    DYNOCAR_PARAMETER_ACCELERATION_BIAS = 14,   /* m/s^2 */
+    DYNOCAR_PARAMETER_UNEXPLAINED_FORCE = 15    /* N */
+};
+
+/* Why a sample was not used: places in rejected_by_reason. */
+enum {
+    DYNOCAR_REJECTED_TIME_NOT_INCREASING = 0,
+    DYNOCAR_REJECTED_TIME_JUMP = 1,
+    DYNOCAR_REJECTED_SEQUENCE_NOT_INCREASING = 2,
+    DYNOCAR_REJECTED_WRONG_TRAIN = 3,
+    DYNOCAR_REJECTED_MISSING = 4,    /* a quantity that is needed */
+    DYNOCAR_REJECTED_NOT_FINITE = 5, /* NaN or infinite */
+    DYNOCAR_REJECTED_SPEED_OUT_OF_RANGE = 6,
+    DYNOCAR_REJECTED_SPEED_JUMP = 7,    /* faster than a train can */
+    DYNOCAR_REJECTED_POSITION_JUMP = 8, /* disagrees with the speed, or lies off the line */
+    DYNOCAR_REJECTED_FORCE_OUT_OF_RANGE = 9,
+    DYNOCAR_REJECTED_MASS_OUT_OF_RANGE = 10,
+    DYNOCAR_REJECTED_BAD_DIRECTION = 11, /* neither +1 nor -1 */
+    DYNOCAR_REJECTED_OUTLIER = 12,       /* by the estimator's own test */
+    DYNOCAR_REJECTED_WHEEL_SLIDE = 13,   /* slide or spin: not the train's speed */
+    DYNOCAR_REJECTED_OUT_OF_RANGE = 14,  /* another quantity */
+    DYNOCAR_REJECTED_FROZEN = 15         /* the speed stood still although the force changed it */
+};
+
+/* Manoeuvres that would tell more: bits of missing_manoeuvres. */
+enum {
+    DYNOCAR_MANOEUVRE_COAST_SLOW = 1 << 0, /* tells of Davis a */
+    DYNOCAR_MANOEUVRE_COAST_FAST = 1 << 1, /* tells of Davis c */
+    DYNOCAR_MANOEUVRE_VARY_SPEED = 1 << 2, /* tells a, b and c apart */
+    DYNOCAR_MANOEUVRE_ACCELERATE = 1 << 3, /* tells of mass */
+    DYNOCAR_MANOEUVRE_BRAKE = 1 << 4,      /* tells of adhesion and brake friction */
+    DYNOCAR_MANOEUVRE_MOVE = 1 << 5        /* any motion */
+};
+
+/* An effect that the model may lack. */
+enum {
+    DYNOCAR_EFFECT_NONE = 0,
+    DYNOCAR_EFFECT_TUNNEL_DRAG = 1,
+    DYNOCAR_EFFECT_CURVE_RESISTANCE = 2,
+    DYNOCAR_EFFECT_WIND = 3,
+    DYNOCAR_EFFECT_DRAGGING_BRAKE = 4,
+    DYNOCAR_EFFECT_WHEEL_DIAMETER = 5,
+    DYNOCAR_EFFECT_GRADIENT_SHIFT = 6, /* a profile moved along the line */
+    DYNOCAR_EFFECT_MASS_CHANGE = 7,
+    DYNOCAR_EFFECT_TRACTION_GAIN = 8,  /* a reported force that is not the true one */
+    DYNOCAR_EFFECT_ACTUATOR_DELAY = 9, /* forces act later than reported */
+    DYNOCAR_EFFECT_ROTATING_MASS = 10,
+    DYNOCAR_EFFECT_BEARING_TEMPERATURE = 11,
+    DYNOCAR_EFFECT_AMBIENT_TEMPERATURE = 12,
+    DYNOCAR_EFFECT_LOCAL_RESISTANCE = 13,
+    DYNOCAR_EFFECT_LOW_ADHESION = 14,
+    DYNOCAR_EFFECT_UNKNOWN = 15 /* a real residual that no known effect explains */
+};
+
+/* Measured quantities: bits of valid. */
+enum {
+    DYNOCAR_HAS_POSITION = 1 << 0,
+    DYNOCAR_HAS_SPEED = 1 << 1,
+    DYNOCAR_HAS_TRACTION_FORCE = 1 << 2,
+    DYNOCAR_HAS_BRAKE_FORCE = 1 << 3,
+    DYNOCAR_HAS_BRAKE_CYLINDER_PRESSURE = 1 << 4,
+    DYNOCAR_HAS_ACCELERATION = 1 << 5,
+    DYNOCAR_HAS_SPECIFIC_FORCE = 1 << 6,
+    DYNOCAR_HAS_MASS = 1 << 7,
+    DYNOCAR_HAS_AMBIENT_TEMPERATURE = 1 << 8,
+    DYNOCAR_HAS_GRADIENT = 1 << 9,
+    DYNOCAR_HAS_CURVE_RADIUS = 1 << 10
+};
+
+#define DYNOCAR_FLAG_WHEEL_SLIDE 1 /* in flags: the wheel-slide protection is active */
+
+/* ---- What a controller writes ---- */
+
+/* One cycle of a train. A field counts only while its bit in valid is set; start from
+ * dynocar_sample_empty(). Missing values: leave the bit out; never write a made-up number. */
+typedef struct dynocar_train_sample {
+    int64_t time_ns;      /* when measured, controller's monotonic clock */
+    int64_t published_ns; /* filled in by publish: host's monotonic clock */
+    uint64_t sequence;    /* filled in by publish: counts from 1; a gap tells of lost samples */
+    uint64_t train_id;    /* filled in by publish */
+    uint16_t valid;       /* DYNOCAR_HAS_... of every field that holds a value */
+    uint8_t flags;        /* DYNOCAR_FLAG_WHEEL_SLIDE */
+    int8_t direction;     /* +1 while the chainage grows in the direction of travel, else -1 */
+    uint32_t run;         /* filled in by publish: number of the run (trip) */
+    double position_m;    /* chainage of the train's centre */
+    double speed_mps;     /* never negative */
+    double traction_force_n; /* at the wheel rims, never negative */
+    double brake_force_n;    /* retarding, never negative */
+    double brake_cylinder_pressure_pa;
+    double acceleration_mps2;        /* dv/dt, as measured */
+    double specific_force_mps2;      /* accelerometer along the track: dv/dt + g * gradient */
+    double mass_kg;                  /* gross, without the rotating part */
+    double ambient_temperature_degc; /* outside */
+    double gradient_permille; /* climbing positive as the chainage grows; if no track file */
+    double curve_radius_m;    /* 0 on straight track; if no track file */
+} dynocar_train_sample;
+
+/* ---- What the daemon answers ---- */
+
+/* A pipeline's knowledge of one train at one moment. */
+typedef struct dynocar_parameter_snapshot {
+    uint64_t epoch;      /* start of the daemon, host's monotonic ns: grows with every restart */
+    uint64_t sequence;   /* counts the pipeline's snapshots within the epoch, from 1 */
+    uint64_t generation; /* counts the estimate's resets within the epoch */
+    uint64_t train_id;
+    uint32_t pipeline_index; /* in the daemon's configuration */
+    uint32_t pipeline_kind;  /* DYNOCAR_PIPELINE_... */
+    uint32_t status;         /* DYNOCAR_STATUS_... as the daemon wrote it */
+    uint32_t reason;         /* DYNOCAR_REASON_... as the daemon wrote it */
+
+    int64_t sample_time_ns;      /* newest sample: when measured, controller's clock */
+    int64_t sample_published_ns; /* newest sample: when published, host's monotonic clock */
+    int64_t published_ns;        /* this snapshot: when published, host's monotonic clock */
+    uint64_t sample_sequence;    /* newest sample: its number */
+
+    uint64_t samples_used;
+    uint64_t samples_rejected;
+    uint64_t samples_lost; /* by gaps of the sequence number */
+    uint64_t updates;      /* windows or segments that updated the estimate */
+    uint32_t rejected_by_reason[DYNOCAR_REJECTION_REASONS]; /* by DYNOCAR_REJECTED_... */
+
+    uint32_t parameter_count;    /* in use, at most DYNOCAR_PARAMETERS_MAX */
+    uint32_t excited;            /* one bit for each parameter that the data excited */
+    uint32_t missing_manoeuvres; /* DYNOCAR_MANOEUVRE_... that would excite the others */
+    uint32_t suspected_effect;   /* DYNOCAR_EFFECT_... */
+    uint32_t parameters[DYNOCAR_PARAMETERS_MAX];   /* DYNOCAR_PARAMETER_... */
+    double values[DYNOCAR_PARAMETERS_MAX];         /* in the parameters' units */
+    double covariance[DYNOCAR_COVARIANCE_ENTRIES]; /* (0,0), (1,0), (1,1), (2,0), ... */
+
+    double innovation_normalised;   /* 1: newest innovation over its predicted deviation */
+    double innovation_mean_square;  /* 1: of the normalised ones lately; 1 when the model holds */
+    double innovation_correlation;  /* 1: lag 1, lately; 0 when white */
+    double unexplained_force_n;     /* retarding positive */
+    double unexplained_force_std_n; /* its standard deviation */
+    double suspicion_evidence;      /* 1: twice the log-likelihood ratio of the suspicion */
+    double speed_min_mps;           /* lowest speed behind the estimate */
+    double speed_max_mps;           /* highest speed behind the estimate */
+} dynocar_parameter_snapshot;
+
+/* A snapshot copied out, with its age. */
+typedef struct dynocar_reading {
+    int64_t age_ns;     /* since the daemon last vouched for the snapshot */
+    uint32_t status;    /* DYNOCAR_STATUS_...; INVALID while the daemon is silent */
+    uint32_t reason;    /* DYNOCAR_REASON_...; DAEMON_SILENT while the daemon is silent */
+    uint32_t is_stale;  /* 1 when the daemon has been silent for too long */
+    uint32_t is_usable; /* 1 when the values may be used: ESTIMATED and not stale */
+    dynocar_parameter_snapshot snapshot;
+} dynocar_reading;
+
+/* Basic resistance (no gradient, no curve) at a speed: w0(v) = a + b v + c v^2. */
+typedef struct dynocar_resistance {
+    double w0_n_per_kn;       /* N per kN of train weight */
+    double w0_std_n_per_kn;   /* standard deviation, from the full covariance */
+    double force_n;           /* w0 times the train's weight */
+    double force_std_n;       /* standard deviation, the mass taken as exact */
+    uint64_t is_extrapolated; /* 1 when the speed lies outside the speeds behind the estimate */
+} dynocar_resistance;
+
+/* ---- Publishing ---- */
+
+typedef struct dynocar_publisher dynocar_publisher; /* opaque */
+
+/* Opens the sample channel of a train; the daemon need not run yet.
+ * root: run-time directory; NULL: the variable DYNOCAR_ROOT, else /tmp/dynocar-<user id>.
+ * message: NULL, or message_size bytes for the error in words ("" after success).
+ * On failure *publisher is NULL. */
+dynocar_code dynocar_publisher_open(const char *root, uint64_t train_id,
+                                    dynocar_publisher **publisher, char *message,
+                                    size_t message_size);
+
+/* Starts a new run (trip): filters do not integrate across. REAL-TIME */
+dynocar_code dynocar_publisher_start_run(dynocar_publisher *publisher);
+
+/* Publishes a sample, overwriting the oldest one where nobody reads. Fills in train_id, sequence,
+ * run and published_ns, also when the transport refuses the sample. REAL-TIME */
+dynocar_code dynocar_publisher_publish(dynocar_publisher *publisher, dynocar_train_sample *sample);
+
+/* Closes the publisher and gives the train free; NULL does nothing. */
+dynocar_code dynocar_publisher_close(dynocar_publisher *publisher);
+
+/* ---- Polling ---- */
+
+typedef struct dynocar_reader dynocar_reader; /* opaque */
+
+/* Opens the snapshot channel of a train; arguments as in dynocar_publisher_open(). */
+dynocar_code dynocar_reader_open(const char *root, uint64_t train_id, dynocar_reader **reader,
+                                 char *message, size_t message_size);
+
+/* Sets the age (> 0) from which a snapshot counts as stale; 250 ms at first. REAL-TIME */
+dynocar_code dynocar_reader_set_stale_after_ns(dynocar_reader *reader, int64_t stale_after_ns);
+
+/* Takes what has come since the last poll: a bounded number of messages. news may be NULL; it
+ * gets the number of snapshots that told something new. REAL-TIME */
+dynocar_code dynocar_reader_poll(dynocar_reader *reader, uint32_t *news);
+
+/* Copies the newest polled snapshot of the first pipeline of a kind (DYNOCAR_PIPELINE_...).
+ * now_ns: dynocar_monotonic_now_ns(). On failure the reading is stale and not usable. REAL-TIME */
+dynocar_code dynocar_reader_latest(dynocar_reader *reader, uint32_t pipeline_kind, int64_t now_ns,
+                                   dynocar_reading *reading);
+
+/* The same, by the pipeline's number in the daemon's configuration. REAL-TIME */
+dynocar_code dynocar_reader_latest_by_index(dynocar_reader *reader, uint32_t pipeline_index,
+                                            int64_t now_ns, dynocar_reading *reading);
+
+/* Counts messages that no sane daemon would send: foreign train, NaN, ... REAL-TIME */
+dynocar_code dynocar_reader_refused(dynocar_reader *reader, uint64_t *count);
+
+/* Closes the reader; NULL does nothing. */
+dynocar_code dynocar_reader_close(dynocar_reader *reader);
+
+/* ---- Reading a snapshot; no handle, any thread ---- */
+
+/* Resistance at a finite speed for a train of mass_kg (>= 0; 0 when only w0 is wanted).
+ * DYNOCAR_ERROR_NOT_IN_SNAPSHOT unless the pipeline estimates all three of a, b, c. REAL-TIME */
+dynocar_code dynocar_snapshot_resistance(const dynocar_parameter_snapshot *snapshot,
+                                         double speed_mps, double mass_kg,
+                                         dynocar_resistance *resistance);
+
+/* A parameter's value and standard deviation (may be NULL) in its unit. REAL-TIME */
+dynocar_code dynocar_snapshot_value(const dynocar_parameter_snapshot *snapshot,
+                                    uint32_t parameter, double *value, double *std);
+
+/* Covariance of two parameters in the product of their units. REAL-TIME */
+dynocar_code dynocar_snapshot_covariance(const dynocar_parameter_snapshot *snapshot,
+                                         uint32_t parameter, uint32_t other, double *covariance);
+
+/* ---- About ---- */
+
+/* Who serves a train: state gets DYNOCAR_DAEMON_..., message says it in words, root and message as
+ * in dynocar_publisher_open(). Opens files: not for the control cycle. */
+dynocar_code dynocar_daemon_state(const char *root, uint64_t train_id, int32_t *state,
+                                  char *message, size_t message_size);
+
+/* The host's monotonic clock in ns since boot. REAL-TIME */
+int64_t dynocar_monotonic_now_ns(void);
+
+/* Names, never NULL, never to be freed; also for numbers that this release does not know.
+ * REAL-TIME */
+const char *dynocar_code_text(dynocar_code code);
+const char *dynocar_pipeline_name(uint32_t kind);
+const char *dynocar_parameter_name(uint32_t parameter);
+const char *dynocar_status_name(uint32_t status);
+const char *dynocar_reason_name(uint32_t reason);
+const char *dynocar_rejection_name(uint32_t reason);
+const char *dynocar_manoeuvre_name(uint32_t bit);
+const char *dynocar_effect_name(uint32_t effect);
+
+/* The library's release, schema and layouts. REAL-TIME */
+const char *dynocar_version(void);
+uint32_t dynocar_schema(void);
+uint64_t dynocar_sample_layout(void);
+uint64_t dynocar_snapshot_layout(void);
+
+/* ---- Helpers in the header ---- */
+
+/* 1 when the library maps the very structs that this header declares; check it once at start. */
+static inline int dynocar_header_matches_library(void)
+{
+    return dynocar_schema() == DYNOCAR_SCHEMA && dynocar_sample_layout() == DYNOCAR_SAMPLE_LAYOUT
+           && dynocar_snapshot_layout() == DYNOCAR_SNAPSHOT_LAYOUT;
+}
+
+/* A sample without any measured value, in direction +1. REAL-TIME */
+static inline dynocar_train_sample dynocar_sample_empty(void)
+{
+    dynocar_train_sample sample;
+    memset(&sample, 0, sizeof sample);
+    sample.direction = 1;
+    return sample;
+}
+
+#ifdef __cplusplus
+}
+#endif
+
+/* ---- The compiler checks what the library counts on ---- */
+
+#if defined(__cplusplus)
+#define DYNOCAR_ASSERT_(condition, message) static_assert(condition, message)
+#elif defined(__STDC_VERSION__) && __STDC_VERSION__ >= 201112L
+#define DYNOCAR_ASSERT_(condition, message) _Static_assert(condition, message)
+#endif
+
+#ifdef DYNOCAR_ASSERT_
+#define DYNOCAR_AT_(type, field, place) \
+    DYNOCAR_ASSERT_(offsetof(type, field) == (place), #type "." #field " lies elsewhere")
+#define DYNOCAR_SIZE_(type, size) \
+    DYNOCAR_ASSERT_(sizeof(type) == (size), #type " has another size")
+
+DYNOCAR_SIZE_(dynocar_train_sample, 128);
+DYNOCAR_AT_(dynocar_train_sample, time_ns, 0);
+DYNOCAR_AT_(dynocar_train_sample, published_ns, 8);
+DYNOCAR_AT_(dynocar_train_sample, sequence, 16);
+DYNOCAR_AT_(dynocar_train_sample, train_id, 24);
+DYNOCAR_AT_(dynocar_train_sample, valid, 32);
+DYNOCAR_AT_(dynocar_train_sample, flags, 34);
+DYNOCAR_AT_(dynocar_train_sample, direction, 35);
+DYNOCAR_AT_(dynocar_train_sample, run, 36);
+DYNOCAR_AT_(dynocar_train_sample, position_m, 40);
+DYNOCAR_AT_(dynocar_train_sample, speed_mps, 48);
+DYNOCAR_AT_(dynocar_train_sample, traction_force_n, 56);
+DYNOCAR_AT_(dynocar_train_sample, brake_force_n, 64);
+DYNOCAR_AT_(dynocar_train_sample, brake_cylinder_pressure_pa, 72);
+DYNOCAR_AT_(dynocar_train_sample, acceleration_mps2, 80);
+DYNOCAR_AT_(dynocar_train_sample, specific_force_mps2, 88);
+DYNOCAR_AT_(dynocar_train_sample, mass_kg, 96);
+DYNOCAR_AT_(dynocar_train_sample, ambient_temperature_degc, 104);
+DYNOCAR_AT_(dynocar_train_sample, gradient_permille, 112);
+DYNOCAR_AT_(dynocar_train_sample, curve_radius_m, 120);
+
+DYNOCAR_SIZE_(dynocar_parameter_snapshot, 496);
+DYNOCAR_AT_(dynocar_parameter_snapshot, epoch, 0);
+DYNOCAR_AT_(dynocar_parameter_snapshot, sequence, 8);
+DYNOCAR_AT_(dynocar_parameter_snapshot, generation, 16);
+DYNOCAR_AT_(dynocar_parameter_snapshot, train_id, 24);
+DYNOCAR_AT_(dynocar_parameter_snapshot, pipeline_index, 32);
+DYNOCAR_AT_(dynocar_parameter_snapshot, pipeline_kind, 36);
+DYNOCAR_AT_(dynocar_parameter_snapshot, status, 40);
+DYNOCAR_AT_(dynocar_parameter_snapshot, reason, 44);
+DYNOCAR_AT_(dynocar_parameter_snapshot, sample_time_ns, 48);
+DYNOCAR_AT_(dynocar_parameter_snapshot, sample_published_ns, 56);
+DYNOCAR_AT_(dynocar_parameter_snapshot, published_ns, 64);
+DYNOCAR_AT_(dynocar_parameter_snapshot, sample_sequence, 72);
+DYNOCAR_AT_(dynocar_parameter_snapshot, samples_used, 80);
+DYNOCAR_AT_(dynocar_parameter_snapshot, samples_rejected, 88);
+DYNOCAR_AT_(dynocar_parameter_snapshot, samples_lost, 96);
+DYNOCAR_AT_(dynocar_parameter_snapshot, updates, 104);
+DYNOCAR_AT_(dynocar_parameter_snapshot, rejected_by_reason, 112);
+DYNOCAR_AT_(dynocar_parameter_snapshot, parameter_count, 176);
+DYNOCAR_AT_(dynocar_parameter_snapshot, excited, 180);
+DYNOCAR_AT_(dynocar_parameter_snapshot, missing_manoeuvres, 184);
+DYNOCAR_AT_(dynocar_parameter_snapshot, suspected_effect, 188);
+DYNOCAR_AT_(dynocar_parameter_snapshot, parameters, 192);
+DYNOCAR_AT_(dynocar_parameter_snapshot, values, 216);
+DYNOCAR_AT_(dynocar_parameter_snapshot, covariance, 264);
+DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_normalised, 432);
+DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_mean_square, 440);
+DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_correlation, 448);
+DYNOCAR_AT_(dynocar_parameter_snapshot, unexplained_force_n, 456);
+DYNOCAR_AT_(dynocar_parameter_snapshot, unexplained_force_std_n, 464);
+DYNOCAR_AT_(dynocar_parameter_snapshot, suspicion_evidence, 472);
+DYNOCAR_AT_(dynocar_parameter_snapshot, speed_min_mps, 480);
+DYNOCAR_AT_(dynocar_parameter_snapshot, speed_max_mps, 488);
+
+DYNOCAR_SIZE_(dynocar_reading, 520);
+DYNOCAR_AT_(dynocar_reading, age_ns, 0);
+DYNOCAR_AT_(dynocar_reading, status, 8);
+DYNOCAR_AT_(dynocar_reading, reason, 12);
+DYNOCAR_AT_(dynocar_reading, is_stale, 16);
+DYNOCAR_AT_(dynocar_reading, is_usable, 20);
+DYNOCAR_AT_(dynocar_reading, snapshot, 24);
+
+DYNOCAR_SIZE_(dynocar_resistance, 40);
+DYNOCAR_AT_(dynocar_resistance, w0_n_per_kn, 0);
+DYNOCAR_AT_(dynocar_resistance, w0_std_n_per_kn, 8);
+DYNOCAR_AT_(dynocar_resistance, force_n, 16);
+DYNOCAR_AT_(dynocar_resistance, force_std_n, 24);
+DYNOCAR_AT_(dynocar_resistance, is_extrapolated, 32);
+
+#undef DYNOCAR_AT_
+#undef DYNOCAR_SIZE_
+#undef DYNOCAR_ASSERT_
+#endif
+
+#endif /* DYNOCAR_H */

@@ -1,0 +1,36 @@
+//! The C interface: what C, C++ and Python controllers link, declared in `include/dynocar.h`.
+//!
+//! Thin on purpose: each function checks its pointers, calls the Rust end that a Rust controller
+//! uses, and gives a [`Code`]. No panic crosses the boundary ([`error`]), and a handle used by
+//! another thread than the one that opened it is refused ([`handle`]).
+//!
+//! # Layout
+//!
+//! - [`error`]: codes, messages, and the wall that panics do not pass
+//! - [`handle`]: what a `dynocar_publisher *` or a `dynocar_reader *` points to
+//! - [`publisher`], [`reader`]: the two ends a controller holds
+//! - [`snapshot`]: resistance, parameters and covariances out of a copied snapshot
+//! - [`about`]: clock, versions, and who serves a train
+//! - [`names`]: the vocabularies' names
+//!
+//! # Safety
+//!
+//! All functions here share these conditions, and add none of their own:
+//!
+//! - a pointer is NULL or points to a readable (`const`) or writable object of its type, aligned,
+//!   that nobody else touches during the call;
+//! - a `message` is NULL or points to `message_size` writable bytes;
+//! - a root is NULL or ends with a NUL byte;
+//! - a handle comes from this library's `open` and has not been closed.
+
+pub mod about;
+pub mod error;
+pub mod handle;
+pub mod names;
+pub mod publisher;
+pub mod reader;
+pub mod snapshot;
+
+pub use error::Code;
+pub use reader::ReadingCopy;
+pub use snapshot::Resistance;

@@ -1,0 +1,177 @@
+//! C, C++ and Python controllers in processes of their own; this process plays the daemon.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use dynocar_shared::services::ROOT_VARIABLE;
+use dynocar_shared::{Parameter, SampleField, TrainSample};
+
+mod support;
+use support::{
+    Link, PIPELINE_INDEX, PlayedDaemon, Program, TRAIN, client_directory, compiler, is_installed,
+    library_directory, snapshot_for,
+};
+
+fn foreign(file: &str) -> PathBuf {
+    client_directory().join("tests/foreign").join(file)
+}
+
+fn example(file: &str) -> PathBuf {
+    client_directory().join("examples").join(file)
+}
+
+/// Each field of a sample of the round-trip programs is known from its cycle.
+fn assert_sample_came_through(sample: &TrainSample) {
+    let cycle = (sample.sequence - 1) as f64;
+    assert_eq!((sample.time_ns, sample.train_id), (1000 + cycle as i64, TRAIN.0));
+    assert_eq!((sample.direction, sample.flags), (-1, 1));
+    for (place, field) in SampleField::ALL.into_iter().enumerate() {
+        assert_eq!(sample.get(field), Some(cycle + place as f64 + 0.5), "{field:?}");
+    }
+}
+
+/// Plays the daemon until the controller starts a new run, then falls silent. Gives what the
+/// controller printed, by the first word of each line.
+fn serve(daemon: &PlayedDaemon, controller: Program) -> HashMap<String, String> {
+    let mut first_run = None;
+    let mut received = 0;
+    let mut lines = HashMap::new();
+    while let Some(line) = controller.next_line(|| {
+        while let Some(sample) = daemon.next_sample() {
+            assert_sample_came_through(&sample);
+            received += 1;
+            assert_eq!(sample.sequence, received);
+            if *first_run.get_or_insert(sample.run) == sample.run {
+                daemon.answer(&sample);
+            }
+        }
+    }) {
+        let (word, rest) = line.split_once(' ').unwrap();
+        lines.insert(word.to_owned(), rest.to_owned());
+    }
+    controller.finish();
+    lines
+}
+
+fn numbers(line: &str) -> Vec<f64> {
+    line.split_whitespace().map(|number| number.parse().unwrap()).collect()
+}
+
+fn assert_round_trip(command: &mut Command, daemon: &PlayedDaemon) {
+    let lines = serve(daemon, Program::start(command.arg(daemon.root()).arg(TRAIN.to_string())));
+    let line = |word: &str| lines.get(word).unwrap_or_else(|| panic!("no {word} in {lines:?}"));
+    assert_eq!(line("matches"), "1");
+    assert_eq!(line("daemon"), "1");
+    assert_eq!(line("second"), "6");
+    assert_eq!(line("same"), "1");
+    assert_eq!(line("status"), "estimated none");
+    assert_eq!(*line("pipeline"), format!("{PIPELINE_INDEX} resistance_kalman"));
+    assert!(numbers(line("sample_sequence"))[0] >= 20.0);
+
+    let mut sample = TrainSample::empty(TRAIN);
+    sample.sequence = 20;
+    let snapshot = snapshot_for(&sample);
+    let estimate = snapshot.resistance_at(20.0).unwrap();
+    let (force_n, force_std_n) = estimate.force_n(1e5);
+    let expected = [estimate.w0_n_per_kn, estimate.w0_std_n_per_kn, force_n, force_std_n];
+    assert_eq!(numbers(line("resistance")), expected);
+    assert_eq!(line("extrapolated"), "0");
+    let davis_b =
+        [snapshot.value(Parameter::DavisB).unwrap(), snapshot.std(Parameter::DavisB).unwrap()];
+    assert_eq!(numbers(line("davis_b")), davis_b);
+    let places = [Parameter::DavisB, Parameter::DavisC].map(|it| snapshot.index_of(it).unwrap());
+    assert_eq!(numbers(line("covariance")), [snapshot.covariance_at(places[0], places[1])]);
+    assert_eq!(line("wheel_slide"), "4");
+    assert_eq!(line("manoeuvres"), "1");
+    assert_eq!(line("silent"), "invalid daemon_silent 0");
+    assert_eq!(line("refused"), "0");
+}
+
+/// Answers once the controller drives by its own parameters, falls silent once it drives by
+/// ours, and expects it to go back.
+fn assert_example_falls_back(command: &mut Command) {
+    let daemon = PlayedDaemon::start();
+    command.env(ROOT_VARIABLE, daemon.root()).args([TRAIN.to_string(), "600".into()]);
+    let controller = Program::start(command);
+    let mut is_answering = false;
+    let mut origins = Vec::new();
+    while origins.len() < 3 {
+        let line = controller.next_line(|| {
+            while let Some(sample) = daemon.next_sample() {
+                if is_answering {
+                    daemon.answer(&sample);
+                }
+            }
+        });
+        let line = line.unwrap_or_else(|| panic!("the controller ended after {origins:?}"));
+        is_answering = line.contains("built-in");
+        origins.push(line.split_once(" from ").unwrap().1.to_owned());
+    }
+    let built_in = |reason| format!("the built-in parameters ({reason})");
+    let expected =
+        [built_in("no_snapshot"), "the daemon (estimated)".into(), built_in("daemon_silent")];
+    assert_eq!(origins, expected);
+}
+
+fn c_program(source: &Path, link: Link, directory: &tempfile::TempDir) -> Command {
+    let program = directory.path().join("program");
+    support::build_c(source, "c99", link, &program);
+    Command::new(program)
+}
+
+#[test]
+fn a_c_controller_with_the_static_library_goes_the_whole_way() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut command = c_program(&foreign("round_trip.c"), Link::Static, &directory);
+    assert_round_trip(&mut command, &PlayedDaemon::start());
+}
+
+#[test]
+fn a_c_controller_with_the_shared_library_goes_the_whole_way() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut command = c_program(&foreign("round_trip.c"), Link::Shared, &directory);
+    assert_round_trip(&mut command, &PlayedDaemon::start());
+}
+
+#[test]
+fn a_cpp_controller_goes_the_whole_way() {
+    if !is_installed("c++") {
+        return;
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let program = directory.path().join("program");
+    let mut command = compiler("CXX", "c++", "c++17");
+    command.args(["-x", "c++"]).arg(foreign("round_trip.c")).args(["-x", "none", "-o"]);
+    command.arg(&program).arg(library_directory().join("libdynocar_client.a"));
+    support::must_succeed(command.args(["-lpthread", "-ldl", "-lm"]));
+    assert_round_trip(&mut Command::new(program), &PlayedDaemon::start());
+}
+
+#[test]
+fn a_python_controller_goes_the_whole_way() {
+    if is_installed("python3") {
+        let mut command = support::python(&foreign("round_trip.py"));
+        assert_round_trip(&mut command, &PlayedDaemon::start());
+    }
+}
+
+#[test]
+fn the_c_example_uses_the_daemon_and_falls_back() {
+    let directory = tempfile::tempdir().unwrap();
+    assert_example_falls_back(&mut c_program(&example("controller.c"), Link::Shared, &directory));
+}
+
+#[test]
+fn the_python_example_uses_the_daemon_and_falls_back() {
+    if is_installed("python3") {
+        assert_example_falls_back(&mut support::python(&example("controller.py")));
+    }
+}
+
+#[test]
+fn the_rust_example_uses_the_daemon_and_falls_back() {
+    let program = library_directory().join("../examples/controller");
+    assert!(program.exists(), "run all tests of the package: that builds the example");
+    assert_example_falls_back(&mut Command::new(program));
+}

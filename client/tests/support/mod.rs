@@ -1,0 +1,238 @@
+//! What the tests of the C interface share: the libraries just built, the C compiler, a daemon
+//! played by the test, and child processes that never outlive it.
+
+#![allow(dead_code, reason = "each test uses its own part")]
+
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver as Lines, RecvTimeoutError, channel};
+use std::time::Duration;
+
+use dynocar_client::channel::{Receiver, Sender, Transport};
+use dynocar_client::peer::RoleLock;
+use dynocar_client::{Host, Role, monotonic_now_ns};
+use dynocar_shared::snapshot::packed_index;
+use dynocar_shared::{
+    Parameter, ParameterSnapshot, PipelineKind, RejectionReason, Status, TrainId, TrainSample,
+};
+
+pub const TRAIN: TrainId = TrainId(11);
+/// Where the played daemon's only pipeline stands in its configuration.
+pub const PIPELINE_INDEX: u32 = 3;
+/// A child that says nothing for so long has failed.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+pub fn client_directory() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The folder in which cargo put this test and, with the same build, the libraries.
+pub fn library_directory() -> PathBuf {
+    std::env::current_exe().unwrap().parent().unwrap().to_path_buf()
+}
+
+#[derive(Clone, Copy, Debug)]
+pub enum Link {
+    Static,
+    Shared,
+}
+
+/// A call of a compiler with every warning an error, for the header's folder.
+pub fn compiler(variable: &str, default: &str, standard: &str) -> Command {
+    let program = std::env::var(variable).unwrap_or_else(|_| default.into());
+    let mut command = Command::new(program);
+    command.arg(format!("-std={standard}"));
+    command.args(["-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror"]);
+    command.arg("-I").arg(client_directory().join("include"));
+    command
+}
+
+/// Compiles and links a C program into `out`.
+pub fn build_c(source: &Path, standard: &str, link: Link, out: &Path) {
+    build_c_with(source, standard, link, out, &[]);
+}
+
+/// [`build_c`] with further options.
+pub fn build_c_with(source: &Path, standard: &str, link: Link, out: &Path, options: &[&str]) {
+    let mut command = compiler("CC", "cc", standard);
+    command.args(options).arg(source).arg("-o").arg(out);
+    let libraries = library_directory();
+    match link {
+        Link::Static => {
+            command.arg(libraries.join("libdynocar_client.a"));
+            command.args(["-lpthread", "-ldl", "-lm"]);
+        }
+        Link::Shared => {
+            command.arg("-L").arg(&libraries).arg("-ldynocar_client");
+            command.arg(format!("-Wl,-rpath,{}", libraries.display()));
+        }
+    }
+    must_succeed(&mut command);
+}
+
+/// Runs a command to its end and gives its standard output.
+pub fn must_succeed(command: &mut Command) -> String {
+    let output = command.output().unwrap_or_else(|error| panic!("{command:?}: {error}"));
+    let words = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{command:?}: {}\n{words}", output.status);
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// A call of a script that finds `dynocar.py` and the library just built.
+pub fn python(script: &Path) -> Command {
+    let mut command = Command::new("python3");
+    command.arg("-B").arg(script);
+    command.env("PYTHONPATH", client_directory().join("python"));
+    command.env("DYNOCAR_LIBRARY", library_directory().join("libdynocar_client.so"));
+    command
+}
+
+/// True when the program is there; says so when it is not.
+pub fn is_installed(program: &str) -> bool {
+    let found = Command::new(program).arg("--version").output().is_ok_and(|it| it.status.success());
+    if !found {
+        println!("{program} was not found: what needs it is NOT tested");
+    }
+    found
+}
+
+/// A root of its own; takes the shared memory away that killed processes left under it.
+pub struct TestRoot {
+    directory: tempfile::TempDir,
+    pub host: Host,
+}
+
+impl TestRoot {
+    pub fn new() -> Self {
+        let directory = tempfile::tempdir().unwrap();
+        let host = Host::at(directory.path()).unwrap();
+        TestRoot { directory, host }
+    }
+
+    pub fn path(&self) -> &Path {
+        self.directory.path()
+    }
+}
+
+impl Drop for TestRoot {
+    fn drop(&mut self) {
+        let prefix = self.host.segment_prefix();
+        // What cannot be removed stays behind; no test depends on it.
+        for entry in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
+            if entry.file_name().to_string_lossy().starts_with(&prefix) {
+                let _ = std::fs::remove_file(entry.path());
+            }
+        }
+    }
+}
+
+/// A daemon with one pipeline, played by this process.
+pub struct PlayedDaemon {
+    receiver: Receiver<TrainSample>,
+    sender: Sender<ParameterSnapshot>,
+    _role: RoleLock,
+    // Last, so that it goes after all that uses it.
+    root: TestRoot,
+}
+
+impl PlayedDaemon {
+    pub fn start() -> Self {
+        let root = TestRoot::new();
+        let role = RoleLock::claim(&root.host, TRAIN, Role::Daemon).unwrap();
+        let transport = Transport::open(&root.host, "played-daemon").unwrap();
+        let receiver = transport.receiver(TRAIN).unwrap();
+        let sender = transport.sender(TRAIN).unwrap();
+        PlayedDaemon { receiver, sender, _role: role, root }
+    }
+
+    pub fn root(&self) -> &Path {
+        self.root.path()
+    }
+
+    pub fn next_sample(&self) -> Option<TrainSample> {
+        self.receiver.receive()
+    }
+
+    pub fn answer(&self, sample: &TrainSample) {
+        self.sender.send(&snapshot_for(sample)).unwrap();
+    }
+}
+
+/// The played daemon's answer to a sample: parameters out of order, every covariance its own.
+pub fn snapshot_for(sample: &TrainSample) -> ParameterSnapshot {
+    let mut snapshot = ParameterSnapshot::empty();
+    (snapshot.epoch, snapshot.sequence, snapshot.train_id) = (1, sample.sequence, TRAIN.0);
+    snapshot.pipeline_index = PIPELINE_INDEX;
+    snapshot.pipeline_kind = PipelineKind::ResistanceKalman as u32;
+    snapshot.status = Status::Estimated as u32;
+    snapshot.reason = 0;
+    snapshot.sample_sequence = sample.sequence;
+    snapshot.published_ns = monotonic_now_ns();
+    snapshot.samples_rejected = 4;
+    snapshot.rejected_by_reason[RejectionReason::WheelSlide as usize] = 4;
+    snapshot.missing_manoeuvres = 0b1001;
+    let parameters = [Parameter::Mass, Parameter::DavisC, Parameter::DavisA, Parameter::DavisB];
+    snapshot.parameter_count = parameters.len() as u32;
+    for (place, parameter) in parameters.into_iter().enumerate() {
+        snapshot.parameters[place] = parameter as u32;
+        snapshot.values[place] = [114.5, 0.0013, 1.7, 0.021][place];
+        for other in 0..=place {
+            let entry = if place == other { 0.25 } else { 0.01 };
+            snapshot.covariance[packed_index(place, other)] = entry / (1 + place + other) as f64;
+        }
+    }
+    (snapshot.speed_min_mps, snapshot.speed_max_mps) = (5.0, 30.0);
+    snapshot
+}
+
+/// A child process whose lines are read as they come; killed when dropped.
+pub struct Program {
+    child: Child,
+    lines: Lines<String>,
+}
+
+impl Program {
+    pub fn start(command: &mut Command) -> Self {
+        let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
+        let output = BufReader::new(child.stdout.take().unwrap());
+        let (sender, lines) = channel();
+        std::thread::spawn(move || {
+            for line in output.lines().map_while(Result::ok) {
+                if sender.send(line).is_err() {
+                    break;
+                }
+            }
+        });
+        Program { child, lines }
+    }
+
+    /// The next line; `meanwhile` runs until it comes. `None` when the program has ended.
+    pub fn next_line(&self, mut meanwhile: impl FnMut()) -> Option<String> {
+        let start = std::time::Instant::now();
+        loop {
+            meanwhile();
+            match self.lines.recv_timeout(Duration::from_micros(500)) {
+                Ok(line) => return Some(line),
+                Err(RecvTimeoutError::Disconnected) => return None,
+                Err(RecvTimeoutError::Timeout) => {
+                    assert!(start.elapsed() < PATIENCE, "the program says nothing");
+                }
+            }
+        }
+    }
+
+    /// Waits for the end, which must be a good one.
+    pub fn finish(mut self) {
+        let status = self.child.wait().unwrap();
+        assert!(status.success(), "{status}");
+    }
+}
+
+impl Drop for Program {
+    fn drop(&mut self) {
+        // Both fail only when the child is gone already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
