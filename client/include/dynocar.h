@@ -44,7 +44,7 @@ extern "C" {
 
 #define DYNOCAR_SCHEMA 1u
 #define DYNOCAR_SAMPLE_LAYOUT UINT64_C(0xdc0c8856b34a4c70)
-#define DYNOCAR_SNAPSHOT_LAYOUT UINT64_C(0x50736ec182885f8f)
+#define DYNOCAR_SNAPSHOT_LAYOUT UINT64_C(0x0e65b28ef808a2ec)
 
 #define DYNOCAR_PIPELINES_MAX 32      /* pipelines of one train */
 #define DYNOCAR_PARAMETERS_MAX 6      /* parameters that one pipeline estimates together */
@@ -257,7 +257,8 @@ typedef struct dynocar_parameter_snapshot {
 
     int64_t sample_time_ns;      /* newest sample: when measured, controller's clock */
     int64_t sample_published_ns; /* newest sample: when published, host's monotonic clock */
-    int64_t published_ns;        /* this snapshot: when published, host's monotonic clock */
+    int64_t published_ns;        /* this snapshot: when first published, same clock */
+    int64_t vouched_ns;          /* this snapshot: when the daemon last vouched for it, same clock */
     uint64_t sample_sequence;    /* newest sample: its number */
 
     uint64_t samples_used;
@@ -455,7 +456,7 @@ DYNOCAR_AT_(dynocar_train_sample, ambient_temperature_degc, 104);
 DYNOCAR_AT_(dynocar_train_sample, gradient_permille, 112);
 DYNOCAR_AT_(dynocar_train_sample, curve_radius_m, 120);
 
-DYNOCAR_SIZE_(dynocar_parameter_snapshot, 496);
+DYNOCAR_SIZE_(dynocar_parameter_snapshot, 504);
 DYNOCAR_AT_(dynocar_parameter_snapshot, epoch, 0);
 DYNOCAR_AT_(dynocar_parameter_snapshot, sequence, 8);
 DYNOCAR_AT_(dynocar_parameter_snapshot, generation, 16);
@@ -467,29 +468,30 @@ DYNOCAR_AT_(dynocar_parameter_snapshot, reason, 44);
 DYNOCAR_AT_(dynocar_parameter_snapshot, sample_time_ns, 48);
 DYNOCAR_AT_(dynocar_parameter_snapshot, sample_published_ns, 56);
 DYNOCAR_AT_(dynocar_parameter_snapshot, published_ns, 64);
-DYNOCAR_AT_(dynocar_parameter_snapshot, sample_sequence, 72);
-DYNOCAR_AT_(dynocar_parameter_snapshot, samples_used, 80);
-DYNOCAR_AT_(dynocar_parameter_snapshot, samples_rejected, 88);
-DYNOCAR_AT_(dynocar_parameter_snapshot, samples_lost, 96);
-DYNOCAR_AT_(dynocar_parameter_snapshot, updates, 104);
-DYNOCAR_AT_(dynocar_parameter_snapshot, rejected_by_reason, 112);
-DYNOCAR_AT_(dynocar_parameter_snapshot, parameter_count, 176);
-DYNOCAR_AT_(dynocar_parameter_snapshot, excited, 180);
-DYNOCAR_AT_(dynocar_parameter_snapshot, missing_manoeuvres, 184);
-DYNOCAR_AT_(dynocar_parameter_snapshot, suspected_effect, 188);
-DYNOCAR_AT_(dynocar_parameter_snapshot, parameters, 192);
-DYNOCAR_AT_(dynocar_parameter_snapshot, values, 216);
-DYNOCAR_AT_(dynocar_parameter_snapshot, covariance, 264);
-DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_normalised, 432);
-DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_mean_square, 440);
-DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_correlation, 448);
-DYNOCAR_AT_(dynocar_parameter_snapshot, unexplained_force_n, 456);
-DYNOCAR_AT_(dynocar_parameter_snapshot, unexplained_force_std_n, 464);
-DYNOCAR_AT_(dynocar_parameter_snapshot, suspicion_evidence, 472);
-DYNOCAR_AT_(dynocar_parameter_snapshot, speed_min_mps, 480);
-DYNOCAR_AT_(dynocar_parameter_snapshot, speed_max_mps, 488);
+DYNOCAR_AT_(dynocar_parameter_snapshot, vouched_ns, 72);
+DYNOCAR_AT_(dynocar_parameter_snapshot, sample_sequence, 80);
+DYNOCAR_AT_(dynocar_parameter_snapshot, samples_used, 88);
+DYNOCAR_AT_(dynocar_parameter_snapshot, samples_rejected, 96);
+DYNOCAR_AT_(dynocar_parameter_snapshot, samples_lost, 104);
+DYNOCAR_AT_(dynocar_parameter_snapshot, updates, 112);
+DYNOCAR_AT_(dynocar_parameter_snapshot, rejected_by_reason, 120);
+DYNOCAR_AT_(dynocar_parameter_snapshot, parameter_count, 184);
+DYNOCAR_AT_(dynocar_parameter_snapshot, excited, 188);
+DYNOCAR_AT_(dynocar_parameter_snapshot, missing_manoeuvres, 192);
+DYNOCAR_AT_(dynocar_parameter_snapshot, suspected_effect, 196);
+DYNOCAR_AT_(dynocar_parameter_snapshot, parameters, 200);
+DYNOCAR_AT_(dynocar_parameter_snapshot, values, 224);
+DYNOCAR_AT_(dynocar_parameter_snapshot, covariance, 272);
+DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_normalised, 440);
+DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_mean_square, 448);
+DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_correlation, 456);
+DYNOCAR_AT_(dynocar_parameter_snapshot, unexplained_force_n, 464);
+DYNOCAR_AT_(dynocar_parameter_snapshot, unexplained_force_std_n, 472);
+DYNOCAR_AT_(dynocar_parameter_snapshot, suspicion_evidence, 480);
+DYNOCAR_AT_(dynocar_parameter_snapshot, speed_min_mps, 488);
+DYNOCAR_AT_(dynocar_parameter_snapshot, speed_max_mps, 496);
 
-DYNOCAR_SIZE_(dynocar_reading, 520);
+DYNOCAR_SIZE_(dynocar_reading, 528);
 DYNOCAR_AT_(dynocar_reading, age_ns, 0);
 DYNOCAR_AT_(dynocar_reading, status, 8);
 DYNOCAR_AT_(dynocar_reading, reason, 12);

@@ -33,7 +33,7 @@ PathLike = Union[str, "os.PathLike[str]"]
 
 SCHEMA = 1
 SAMPLE_LAYOUT = 0xdc0c8856b34a4c70
-SNAPSHOT_LAYOUT = 0x50736ec182885f8f
+SNAPSHOT_LAYOUT = 0x0e65b28ef808a2ec
 PARAMETERS_MAX = 6
 COVARIANCE_ENTRIES = 21
 REJECTION_REASONS = 16
@@ -264,6 +264,7 @@ class ParameterSnapshot(ctypes.Structure):
         ("sample_time_ns", c_int64),
         ("sample_published_ns", c_int64),
         ("published_ns", c_int64),
+        ("vouched_ns", c_int64),
         ("sample_sequence", c_uint64),
         ("samples_used", c_uint64),
         ("samples_rejected", c_uint64),

@@ -169,6 +169,7 @@ pub fn snapshot_for(sample: &TrainSample) -> ParameterSnapshot {
     snapshot.reason = 0;
     snapshot.sample_sequence = sample.sequence;
     snapshot.published_ns = monotonic_now_ns();
+    snapshot.vouched_ns = snapshot.published_ns;
     snapshot.samples_rejected = 4;
     snapshot.rejected_by_reason[RejectionReason::WheelSlide as usize] = 4;
     snapshot.missing_manoeuvres = 0b1001;
