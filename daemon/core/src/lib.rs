@@ -7,11 +7,13 @@
 //! # Layout, in the order a sample takes
 //!
 //! - [`train`], [`track`]: what is declared of the train and the line
+//! - [`dataset`]: recorded runs, from texts to the samples that a controller would publish
 //! - [`validation`]: which samples are fit for use, and why the others are not
 //! - [`force`]: the known forces on the train at a sample
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
 //! - [`simulate`]: the speed that a force model predicts, over a recorded run or with a driver
 
+pub mod dataset;
 pub mod force;
 pub mod pipeline;
 pub mod simulate;

@@ -1,0 +1,180 @@
+//! Speed and position of a run's rows.
+
+use serde::Serialize;
+
+use super::manifest::PositionReference;
+use super::order::TimeOrder;
+use super::spikes::spikes;
+
+/// A speed below zero by no more than this many m/s is the noise of a train that stands.
+const SPEED_NOISE_MPS: f64 = 0.2;
+/// A difference in m/s from the neighbours that is never a spike.
+const SPEED_SPIKE_LEAST_MPS: f64 = 0.3;
+/// The sharpest bend of a speed curve in m/s²; what is sharper may be a spike.
+const SPEED_BEND_MPS2: f64 = 1.5;
+
+/// Where the positions come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PositionSource {
+    /// The mapped column.
+    Column,
+    /// Integrated from the speed.
+    IntegratedSpeed,
+}
+
+/// Speeds as read, with small negative ones set to zero.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Speeds {
+    /// Speed in m/s, `NaN` where missing.
+    pub speed_mps: Vec<f64>,
+    /// Marks outliers.
+    pub is_spike: Vec<bool>,
+    /// Speeds set to zero because they were negative by noise.
+    pub zeroed: usize,
+    /// Speeds that stay negative.
+    pub negative: usize,
+}
+
+impl Speeds {
+    /// From the column, given the rows' order.
+    pub fn of(column: &[f64], order: &TimeOrder) -> Self {
+        let (mut zeroed, mut negative) = (0, 0);
+        let mut speed_mps = column.to_vec();
+        for speed in &mut speed_mps {
+            if *speed < 0.0 && *speed >= -SPEED_NOISE_MPS {
+                *speed = 0.0;
+                zeroed += 1;
+            } else if *speed < 0.0 {
+                negative += 1;
+            }
+        }
+        let least = SPEED_SPIKE_LEAST_MPS + SPEED_BEND_MPS2 * order.counts.step_s;
+        let is_spike = spikes(&speed_mps, &order.in_order, least);
+        Speeds { speed_mps, is_spike, zeroed, negative }
+    }
+}
+
+/// Where a run's positions start and which way they grow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Placement {
+    /// Which point of the train the positions are of.
+    pub reference: PositionReference,
+    /// 1 while the chainage grows, -1 while it falls.
+    pub direction: f64,
+    /// Length of the train in m.
+    pub train_length_m: f64,
+    /// Declared chainage in m at the start.
+    pub start_m: Option<f64>,
+}
+
+impl Placement {
+    /// From the reference point to the train's centre, in m of chainage.
+    fn to_centre_m(self) -> f64 {
+        match self.reference {
+            PositionReference::Centre => 0.0,
+            PositionReference::Head => -0.5 * self.direction * self.train_length_m,
+        }
+    }
+
+    /// Chainage in m of the train's centre from the mapped column.
+    pub fn centre_m(self, column: &[f64]) -> Vec<f64> {
+        let to_centre_m = self.to_centre_m();
+        column.iter().map(|position| position + to_centre_m).collect()
+    }
+
+    /// Chainage in m of the train's centre, integrated from the speed.
+    ///
+    /// The speed is taken as linear between the rows that have one, over missing rows, missing
+    /// speeds and spikes too. Without a declared start, the centre starts at 0. Rows out of
+    /// order, and rows before the first speed or after the last one, get none.
+    pub fn integrate(self, times_s: &[f64], speeds: &Speeds, order: &TimeOrder) -> Vec<f64> {
+        let ordered = (0..times_s.len()).filter(|&row| order.in_order[row]);
+        let mut position_m = vec![f64::NAN; times_s.len()];
+        let mut centre_m = self.start_m.map_or(0.0, |start| start + self.to_centre_m());
+        let mut last: Option<usize> = None;
+        let mut skipped: Vec<usize> = Vec::new();
+        for row in ordered {
+            let speed = speeds.speed_mps[row];
+            if speed.is_nan() || speeds.is_spike[row] {
+                skipped.push(row);
+                continue;
+            }
+            if let Some(from) = last {
+                let (v0, duration) = (speeds.speed_mps[from], times_s[row] - times_s[from]);
+                let acceleration = (speed - v0) / duration;
+                for &between in &skipped {
+                    let t = times_s[between] - times_s[from];
+                    let travelled_m = t * (v0 + 0.5 * acceleration * t);
+                    position_m[between] = centre_m + self.direction * travelled_m;
+                }
+                centre_m += self.direction * 0.5 * (v0 + speed) * duration;
+            }
+            position_m[row] = centre_m;
+            skipped.clear();
+            last = Some(row);
+        }
+        position_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEAD: Placement = Placement {
+        reference: PositionReference::Head,
+        direction: 1.0,
+        train_length_m: 100.0,
+        start_m: None,
+    };
+
+    #[test]
+    fn the_centre_is_half_a_length_behind_the_head_in_both_directions() {
+        assert_eq!(HEAD.centre_m(&[1000.0]), [950.0]);
+        let back = Placement { direction: -1.0, ..HEAD };
+        assert_eq!(back.centre_m(&[1000.0]), [1050.0]);
+        let centre = Placement { reference: PositionReference::Centre, ..HEAD };
+        assert_eq!(centre.centre_m(&[1000.0]), [1000.0]);
+    }
+
+    fn integrated(placement: Placement, times: &[f64], column: &[f64]) -> Vec<f64> {
+        let order = TimeOrder::of(times);
+        placement.integrate(times, &Speeds::of(column, &order), &order)
+    }
+
+    #[test]
+    fn position_is_the_integral_of_speed_from_the_declared_start() {
+        let (times, speeds) = ([10.0, 11.0, 12.0, 13.0], [0.0, 2.0, 4.0, 4.0]);
+        assert_eq!(integrated(HEAD, &times, &speeds), [0.0, 1.0, 4.0, 8.0]);
+        let back = Placement { direction: -1.0, start_m: Some(500.0), ..HEAD };
+        assert_eq!(integrated(back, &times, &speeds), [550.0, 549.0, 546.0, 542.0]);
+    }
+
+    #[test]
+    fn missing_speeds_rows_and_spikes_are_bridged() {
+        let nan = f64::NAN;
+        let times: Vec<f64> = (0..12).filter(|i| *i != 9).map(f64::from).collect();
+        let mut speeds: Vec<f64> = times.iter().map(|t| 2.0 * t).collect();
+        (speeds[3], speeds[5]) = (nan, 300.0);
+        let position = integrated(HEAD, &times, &speeds);
+        for (time, position) in times.iter().zip(position) {
+            assert!((position - time * time).abs() < 1e-9, "{time} s: {position} m");
+        }
+    }
+
+    #[test]
+    fn rows_out_of_order_have_no_integrated_position() {
+        let position = integrated(HEAD, &[0.0, 1.0, 0.5, 2.0], &[1.0, 1.0, 1.0, 1.0]);
+        assert!(position[2].is_nan());
+        assert_eq!(position[3], 2.0);
+    }
+
+    #[test]
+    fn only_the_noise_of_standstill_is_set_to_zero() {
+        let order = TimeOrder::of(&[0.0, 1.0, 2.0]);
+        let speeds = Speeds::of(&[-0.05, -3.0, 1.0], &order);
+        assert_eq!(speeds.speed_mps, [0.0, -3.0, 1.0]);
+        assert_eq!((speeds.zeroed, speeds.negative), (1, 1));
+    }
+}

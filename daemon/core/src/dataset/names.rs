@@ -1,0 +1,105 @@
+//! Names that a user may mistype, and what was meant.
+
+/// The names that were possible, with the one most like what was written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Choices {
+    names: Vec<String>,
+    nearest: Option<usize>,
+}
+
+impl Choices {
+    /// The choices for a word that is none of them.
+    pub fn new<T: Into<String>>(word: &str, names: impl IntoIterator<Item = T>) -> Self {
+        let names: Vec<String> = names.into_iter().map(Into::into).collect();
+        let nearest = nearest(word, &names);
+        Choices { names, nearest }
+    }
+
+    /// The possible names.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// The name most like the word, when it is like enough to be meant.
+    pub fn nearest(&self) -> Option<&str> {
+        self.nearest.map(|index| self.names[index].as_str())
+    }
+}
+
+impl std::fmt::Display for Choices {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if let Some(nearest) = self.nearest() {
+            write!(f, "; did you mean '{nearest}'?")?;
+        }
+        let names: Vec<_> = self.names.iter().map(|name| format!("'{name}'")).collect();
+        write!(f, " (choices: {})", names.join(", "))
+    }
+}
+
+/// The index of the name nearest to a word: at most a third of the letters differ, or else it
+/// is the only name that the word begins.
+fn nearest(word: &str, names: &[String]) -> Option<usize> {
+    let word = folded(word);
+    let names: Vec<_> = names.iter().map(|name| folded(name)).collect();
+    let distances =
+        names.iter().enumerate().map(|(index, name)| (edit_distance(&word, name), index));
+    let (distance, index) = distances.min()?;
+    if distance <= word.len().max(names[index].len()) / 3 {
+        return Some(index);
+    }
+    let mut begun = (0..names.len()).filter(|&index| names[index].starts_with(&word));
+    begun.next().filter(|_| begun.next().is_none() && !word.is_empty())
+}
+
+/// Case and what separates words do not tell names apart for the purpose of a guess.
+fn folded(name: &str) -> Vec<char> {
+    // A word of any length may come from a file; a name's first letters are enough for a guess.
+    let letters = name.chars().take(80).flat_map(char::to_lowercase);
+    letters.map(|letter| if letter == '-' || letter == ' ' { '_' } else { letter }).collect()
+}
+
+/// Number of single-letter changes between two words (Levenshtein 1966).
+fn edit_distance(one: &[char], other: &[char]) -> usize {
+    let mut row: Vec<usize> = (0..=other.len()).collect();
+    for (i, letter) in one.iter().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, other_letter) in other.iter().enumerate() {
+            let replaced = diagonal + usize::from(letter != other_letter);
+            diagonal = row[j + 1];
+            row[j + 1] = replaced.min(row[j] + 1).min(row[j + 1] + 1);
+        }
+    }
+    row[other.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_name_that_was_meant_is_suggested() {
+        let units = ["m/s", "km/h", "mph"];
+        assert_eq!(Choices::new("kmh", units).nearest(), Some("km/h"));
+        assert_eq!(Choices::new("KM/H", units).nearest(), Some("km/h"));
+        assert_eq!(Choices::new("furlong", units).nearest(), None);
+        assert_eq!(Choices::new("v", ["t", "v_kmh"]).nearest(), Some("v_kmh"));
+        assert_eq!(Choices::new("v", ["t", "v_kmh", "v_ref"]).nearest(), None);
+        let keys = ["position_reference", "description"];
+        assert_eq!(Choices::new("Position-Referance", keys).nearest(), Some("position_reference"));
+    }
+
+    #[test]
+    fn choices_are_listed_after_the_suggestion() {
+        let shown = Choices::new("sped", ["speed", "time"]).to_string();
+        assert_eq!(shown, "; did you mean 'speed'? (choices: 'speed', 'time')");
+    }
+
+    #[test]
+    fn edit_distance_counts_single_changes() {
+        let distance = |one: &str, other: &str| edit_distance(&folded(one), &folded(other));
+        assert_eq!(distance("kitten", "sitting"), 3);
+        assert_eq!(distance("", "abc"), 3);
+        assert_eq!(distance("same", "same"), 0);
+    }
+}

@@ -1,0 +1,232 @@
+//! What looks like a mistake in a run, or should be known before its results are believed.
+
+use serde::Serialize;
+
+use super::forces::{Force, ForceSource};
+use super::motion::PositionSource;
+use super::quality::RunQuality;
+use super::quantity::Quantity;
+use super::run::{Context, GradientSource, Resolved};
+
+/// Below this distance in m, comparisons of position and speed say nothing.
+const DISTANCE_MIN_M: f64 = 200.0;
+/// Position and integrated speed may differ by this share: wheel wear, balises, gaps.
+const DISTANCE_TOLERANCE: f64 = 0.05;
+/// So far in m off the line's ends a train's centre may be.
+const LINE_TOLERANCE_M: f64 = 50.0;
+/// Median time steps in s of recordings that make sense.
+const USUAL_STEP_S: (f64, f64) = (0.0005, 60.0);
+
+/// A remark on a run.
+#[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
+#[serde(tag = "remark", rename_all = "snake_case")]
+pub enum Remark {
+    /// The chainage runs against the declared direction.
+    #[error("the position changes by {net_m:.0} m in all, against direction = {direction}")]
+    AgainstDirection {
+        /// The declared direction.
+        direction: i8,
+        /// Change of the chainage in m from the first to the last row.
+        net_m: f64,
+    },
+    /// Position and integrated speed disagree.
+    #[error(
+        "the position covers {position_m:.0} m, the integrated speed {speed_m:.0} m (ratio \
+         {:.3}): are the units of time, position and speed right?",
+        position_m / speed_m
+    )]
+    DistanceMismatch {
+        /// Distance in m by the position.
+        position_m: f64,
+        /// Distance in m by the speed.
+        speed_m: f64,
+    },
+    /// Positions beyond the ends of the line.
+    #[error("positions from {from_m:.0} m to {to_m:.0} m leave the line, 0 m to {length_m:.0} m")]
+    OffTheLine {
+        /// Lowest chainage in m.
+        from_m: f64,
+        /// Highest chainage in m.
+        to_m: f64,
+        /// Length of the line in m.
+        length_m: f64,
+    },
+    /// The position is integrated from an unknown start although the line is known.
+    #[error(
+        "no position is recorded: it is integrated from 0 m; give the run's start_m to place it \
+         on the line"
+    )]
+    StartUnknown,
+    /// A force that may not be negative is, by more than noise.
+    #[error(
+        "{quantity} is below zero in {count} rows, down to {lowest_n:.0} N, and those samples are \
+         refused: a signed force is a control_force, a negative retarding one needs scale = -1"
+    )]
+    NegativeForce {
+        /// The quantity.
+        quantity: Quantity,
+        /// In how many rows.
+        count: usize,
+        /// The lowest in N.
+        lowest_n: f64,
+    },
+    /// The speed is negative by more than noise.
+    #[error(
+        "the speed is below zero in {count} rows, and those samples are refused: speed counts in \
+         the direction of travel, whatever the chainage does"
+    )]
+    NegativeSpeed {
+        /// In how many rows.
+        count: usize,
+    },
+    /// Handles outside 0 to 1.
+    #[error("{quantity} lies outside 0 to 1 in {count} rows, up to {highest}: is the unit '%'?")]
+    HandleOutOfRange {
+        /// The quantity.
+        quantity: Quantity,
+        /// In how many rows.
+        count: usize,
+        /// The highest.
+        highest: f64,
+    },
+    /// A handle is mapped besides the force itself.
+    #[error("{quantity} is not used, since the force itself is mapped")]
+    UnusedHandle {
+        /// The quantity.
+        quantity: Quantity,
+    },
+    /// A force is not recorded, so that no balance of forces can be formed.
+    #[error("no {quantity} is mapped: without it the balance of forces is not known")]
+    ForceNotRecorded {
+        /// The quantity.
+        quantity: Quantity,
+    },
+    /// Nothing tells the gradient.
+    #[error(
+        "the gradient is unknown: there is no gradient in the track, no gradient, specific_force \
+         or altitude in the columns"
+    )]
+    GradientUnknown,
+    /// A step of time that no recording has.
+    #[error("the median time step is {step_s} s: is the unit of time right?")]
+    UnusualStep {
+        /// The median step in s.
+        step_s: f64,
+    },
+    /// Values outside what the quantity can be on a railway.
+    #[error(
+        "{quantity} lies outside {low} to {high} {unit} in {count} rows, and those samples are \
+         refused: is the unit right?"
+    )]
+    Implausible {
+        /// The quantity.
+        quantity: Quantity,
+        /// In how many rows.
+        count: usize,
+        /// Lowest plausible value.
+        low: f64,
+        /// Highest plausible value.
+        high: f64,
+        /// Unit of the bounds.
+        unit: &'static str,
+    },
+}
+
+/// Looks for what may be wrong with a run.
+pub(super) fn remarks(context: Context, run: &Resolved, quality: &RunQuality) -> Vec<Remark> {
+    let mut remarks = Vec::new();
+    of_time(quality, &mut remarks);
+    of_position(context, run, quality, &mut remarks);
+    if run.speeds.negative > 0 {
+        remarks.push(Remark::NegativeSpeed { count: run.speeds.negative });
+    }
+    let handles = (Quantity::TractionHandle, Quantity::BrakeHandle);
+    of_force(run, &run.forces.traction, Quantity::TractionForce, handles.0, &mut remarks);
+    of_force(run, &run.forces.brake, Quantity::BrakeForce, handles.1, &mut remarks);
+    if run.gradient_source == GradientSource::Unknown {
+        remarks.push(Remark::GradientUnknown);
+    }
+    of_plausibility(run, &mut remarks);
+    remarks
+}
+
+fn of_time(quality: &RunQuality, remarks: &mut Vec<Remark>) {
+    let step_s = quality.order.step_s;
+    if step_s > 0.0 && !(USUAL_STEP_S.0..=USUAL_STEP_S.1).contains(&step_s) {
+        remarks.push(Remark::UnusualStep { step_s });
+    }
+}
+
+fn of_position(context: Context, run: &Resolved, quality: &RunQuality, remarks: &mut Vec<Remark>) {
+    if run.position_source == PositionSource::IntegratedSpeed {
+        if context.track.is_some() && run.entry.start_m.is_none() {
+            remarks.push(Remark::StartUnknown);
+        }
+        return;
+    }
+    let ordered = |row: &usize| run.order.in_order[*row] && !run.position_m[*row].is_nan();
+    let mut rows = (0..run.position_m.len()).filter(ordered);
+    let (Some(first), Some(last)) = (rows.next(), rows.next_back()) else { return };
+    let net_m = run.position_m[last] - run.position_m[first];
+    let direction = run.entry.direction;
+    if net_m * f64::from(direction) < -DISTANCE_MIN_M {
+        remarks.push(Remark::AgainstDirection { direction, net_m });
+    }
+    let (position_m, speed_m) = (net_m.abs(), quality.distance_m);
+    let is_long = position_m.max(speed_m) > DISTANCE_MIN_M;
+    if is_long && (position_m - speed_m).abs() > DISTANCE_TOLERANCE * position_m.max(speed_m) {
+        remarks.push(Remark::DistanceMismatch { position_m, speed_m });
+    }
+    let length_m = context.track.and_then(|track| track.length_m);
+    if let (Some(length_m), Some((from_m, to_m))) = (length_m, quality.position_range_m)
+        && (from_m < -LINE_TOLERANCE_M || to_m > length_m + LINE_TOLERANCE_M)
+    {
+        remarks.push(Remark::OffTheLine { from_m, to_m, length_m });
+    }
+}
+
+fn of_force(
+    run: &Resolved,
+    force: &Force,
+    quantity: Quantity,
+    handle: Quantity,
+    remarks: &mut Vec<Remark>,
+) {
+    if force.negative > 0 {
+        let lowest_n = force.force_n.iter().copied().fold(f64::INFINITY, f64::min);
+        remarks.push(Remark::NegativeForce { quantity, count: force.negative, lowest_n });
+    }
+    if force.handle_out_of_range > 0 {
+        let column = run.table.column(handle).unwrap_or_default();
+        let highest = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let count = force.handle_out_of_range;
+        remarks.push(Remark::HandleOutOfRange { quantity: handle, count, highest });
+    }
+    if force.source == ForceSource::Column && run.table.column(handle).is_some() {
+        remarks.push(Remark::UnusedHandle { quantity: handle });
+    }
+    if force.source == ForceSource::None {
+        remarks.push(Remark::ForceNotRecorded { quantity });
+    }
+}
+
+/// The bounds beyond which [`crate::validation::Validator`] refuses a sample.
+const PLAUSIBLE: [(Quantity, f64, f64); 5] = [
+    (Quantity::Acceleration, -20.0, 20.0),
+    (Quantity::SpecificForce, -20.0, 20.0),
+    (Quantity::BrakeCylinderPressure, -5e4, 2e6),
+    (Quantity::AmbientTemperature, -80.0, 80.0),
+    (Quantity::Gradient, -150.0, 150.0),
+];
+
+fn of_plausibility(run: &Resolved, remarks: &mut Vec<Remark>) {
+    for (quantity, low, high) in PLAUSIBLE {
+        let Some(column) = run.table.column(quantity) else { continue };
+        let is_outside = |value: &&f64| !value.is_nan() && !(low..=high).contains(*value);
+        let count = column.iter().filter(is_outside).count();
+        if count > 0 {
+            let unit = quantity.unit().name();
+            remarks.push(Remark::Implausible { quantity, count, low, high, unit });
+        }
+    }
+}

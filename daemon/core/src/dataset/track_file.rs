@@ -1,0 +1,196 @@
+//! `track.toml`.
+
+use super::document::{Document, Section};
+use super::error::{DatasetError, Place, Problem};
+use crate::track::{Curve, ProfileError, Track, TrackError, Tunnel};
+
+/// A steeper gradient in ‰ than any adhesion railway has is a mistake of unit.
+const GRADIENT_MAX_PERMILLE: f64 = 150.0;
+
+/// Reads the text of a `track.toml`; `label` names the file in messages.
+///
+/// # Errors
+///
+/// Names file, line, key, value and what was allowed. Unknown keys are refused.
+pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
+    let document = Document::parse(label, text)?;
+    let root = document.root();
+    root.allow(&["track"])?;
+    let section = root.required_table("track")?;
+    section.allow(&["name", "length_m", "gradient", "curves", "tunnels"])?;
+    let length_m = section.number("length_m", "a length in m above 0", |length| length > 0.0)?;
+    let (gradient, gradient_places) = gradient(&section)?.unzip();
+    let curves = section.entries::<3>("curves", "[start_m, end_m, radius_m]")?.map(split);
+    let (curves, curve_places) = curves.unzip();
+    let tunnels = section.entries::<2>("tunnels", "[start_m, end_m]")?.map(split);
+    let (tunnels, tunnel_places) = tunnels.unzip();
+    let to_curve = |&[start_m, end_m, radius_m]: &[f64; 3]| Curve { start_m, end_m, radius_m };
+    let to_tunnel = |&[start_m, end_m]: &[f64; 2]| Tunnel { start_m, end_m };
+    let curves: Option<Vec<Curve>> = curves.map(|list: Vec<_>| list.iter().map(to_curve).collect());
+    let tunnels: Option<Vec<Tunnel>> =
+        tunnels.map(|list: Vec<_>| list.iter().map(to_tunnel).collect());
+    let starts = Starts {
+        curves: curves.iter().flatten().map(|curve| curve.start_m).collect(),
+        tunnels: tunnels.iter().flatten().map(|tunnel| tunnel.start_m).collect(),
+    };
+    let places = Places {
+        gradient: gradient_places.unwrap_or_default(),
+        curves: curve_places.unwrap_or_default(),
+        tunnels: tunnel_places.unwrap_or_default(),
+    };
+    let name = section.text("name")?.unwrap_or("unnamed line").into();
+    Track::new(name, length_m, gradient.as_deref(), curves, tunnels)
+        .map_err(|error| places.of(&error, &starts, &section).problem(Problem::Track(error)))
+}
+
+/// Where the entries of the lists stand.
+struct Places {
+    gradient: Vec<Place>,
+    curves: Vec<Place>,
+    tunnels: Vec<Place>,
+}
+
+/// Where the intervals start, in the order of the file.
+struct Starts {
+    curves: Vec<f64>,
+    tunnels: Vec<f64>,
+}
+
+impl Places {
+    /// The place of the entry that an error means.
+    fn of(&self, error: &TrackError, starts: &Starts, section: &Section) -> Place {
+        let (list, index) = match error {
+            TrackError::Gradient(ProfileError::Empty) => return section.place_of("gradient"),
+            TrackError::Gradient(
+                ProfileError::NotFinite { index, .. } | ProfileError::NotIncreasing { index, .. },
+            ) => (&self.gradient, *index),
+            TrackError::BadRadius { index, .. } => (&self.curves, *index),
+            TrackError::BadInterval { list, index, .. } => (self.list(list), *index),
+            TrackError::Overlap { list, index, .. } => {
+                let starts = if *list == "tunnels" { &starts.tunnels } else { &starts.curves };
+                // The error counts by chainage; the file may be in another order.
+                let mut order: Vec<usize> = (0..starts.len()).collect();
+                order.sort_by(|&one, &other| starts[one].total_cmp(&starts[other]));
+                (self.list(list), order.get(index - 1).map_or(*index, |entry| entry + 1))
+            }
+        };
+        list.get(index - 1).cloned().unwrap_or_else(|| section.place())
+    }
+
+    fn list(&self, list: &str) -> &Vec<Place> {
+        if list == "tunnels" { &self.tunnels } else { &self.curves }
+    }
+}
+
+fn split<const N: usize>(entries: Vec<([f64; N], Place)>) -> (Vec<[f64; N]>, Vec<Place>) {
+    entries.into_iter().unzip()
+}
+
+type Gradient = (Vec<(f64, f64)>, Vec<Place>);
+
+fn gradient(section: &Section) -> Result<Option<Gradient>, DatasetError> {
+    const KEY: &str = "gradient";
+    let Some(entries) = section.entries::<2>(KEY, "[chainage_m, permille]")? else {
+        return Ok(None);
+    };
+    for (index, ([_, permille], place)) in entries.iter().enumerate() {
+        if permille.abs() > GRADIENT_MAX_PERMILLE {
+            let key = format!("{} entry {}", section.full(KEY), index + 1);
+            let (value, allowed) = (permille.to_string(), "from -150 to 150 permille".into());
+            return Err(place.clone().problem(Problem::OutOfRange { key, value, allowed }));
+        }
+    }
+    let (list, places) = split(entries);
+    Ok(Some((
+        list.into_iter().map(|[chainage_m, permille]| (chainage_m, permille)).collect(),
+        places,
+    )))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FULL: &str = "[track]
+name = \"line\"
+length_m = 3000
+gradient = [
+  [0, 3.0],
+  [1200.0, -2.5],
+]
+curves = [
+  [1000.0, 1600.0, 800.0],
+  [200.0, 300.0, 500.0],
+]
+tunnels = [[2200.0, 2900.0]]
+";
+
+    fn refusal(text: &str) -> String {
+        parse_track("track.toml", text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn every_list_is_read() {
+        let track = parse_track("track.toml", FULL).unwrap();
+        assert_eq!((track.name.as_str(), track.length_m), ("line", Some(3000.0)));
+        assert_eq!(track.gradient_permille(1300.0, 0.0), Some(-2.5));
+        assert_eq!(track.curves().len(), 2);
+        assert_eq!(track.tunnels(), [Tunnel { start_m: 2200.0, end_m: 2900.0 }]);
+    }
+
+    #[test]
+    fn an_absent_list_is_unknown_and_an_empty_one_is_none_there() {
+        let track = parse_track("track.toml", "[track]\ntunnels = []\n").unwrap();
+        assert!(track.knows_tunnels() && !track.knows_curves());
+        assert_eq!(track.gradient(), None);
+    }
+
+    #[test]
+    fn the_line_of_a_bad_entry_is_named() {
+        let cases = [
+            (
+                ("[1200.0, -2.5]", "[0.0, -2.5]"),
+                "track.toml:6: gradient: entry 2: expected a chainage above the one before (0 m), \
+                 got 0 m",
+            ),
+            (
+                ("[1200.0, -2.5]", "[1200.0, -250]"),
+                "track.toml:6: track.gradient entry 2 = -250: expected from -150 to 150 permille",
+            ),
+            (
+                ("[1200.0, -2.5]", "[1200.0]"),
+                "track.toml:6: track.gradient entry 2: expected [chainage_m, permille], finite \
+                 numbers, got [1200.0]",
+            ),
+            (
+                ("[200.0, 300.0, 500.0]", "[200.0, 100.0, 500.0]"),
+                "track.toml:10: curves entry 2: expected start < end, both finite, got 200 m to \
+                 100 m",
+            ),
+            (
+                ("[200.0, 300.0, 500.0]", "[200.0, 1300.0, 500.0]"),
+                "track.toml:9: curves entry 2 starts at 1000 m, inside the one that ends at 1300 m",
+            ),
+            (
+                ("[200.0, 300.0, 500.0]", "[200.0, 300.0, 0]"),
+                "track.toml:10: curves entry 2: expected a radius above 0 m, got 0 m",
+            ),
+            (
+                ("length_m = 3000", "length_m = 0"),
+                "track.toml:3: track.length_m = 0: expected a length in m above 0",
+            ),
+            (
+                ("tunnels", "tunnel"),
+                "track.toml:12: unknown key 'tunnel' in [track]; did you mean 'tunnels'? \
+                 (choices: 'name', 'length_m', 'gradient', 'curves', 'tunnels')",
+            ),
+        ];
+        for ((from, to), expected) in cases {
+            assert_eq!(refusal(&FULL.replace(from, to)), expected);
+        }
+        assert_eq!(
+            refusal("[track]\ngradient = []\n"),
+            "track.toml:2: gradient: expected at least one entry, got none"
+        );
+    }
+}
