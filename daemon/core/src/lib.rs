@@ -14,6 +14,7 @@
 //! - [`simulate`]: the speed that a force model predicts, over a recorded run or with a driver
 
 pub mod dataset;
+pub mod explain;
 pub mod force;
 pub mod pipeline;
 pub mod simulate;
