@@ -1,0 +1,257 @@
+//! How the effects change the physics and the sensors of one run.
+
+use dynocar_core::track::StepProfile;
+
+use super::effects::{Effect, MassSection, RunWindow};
+use super::line_maker::Line;
+use super::random::{Random, Stream};
+use super::run_maker::RunPlan;
+use super::settings::SimulatorSettings;
+use super::train_maker::TrueTrain;
+
+/// A cap on the achieved brake force.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AdhesionCap {
+    /// Greatest brake force over weight.
+    pub adhesion: f64,
+    /// (from, to) in m of the train's centre; everywhere when empty.
+    pub intervals_m: Vec<(f64, f64)>,
+}
+
+/// A bell-shaped resistance over speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpeedBand {
+    /// Middle of the band in m/s.
+    pub centre_mps: f64,
+    /// Standard deviation in m/s.
+    pub width_mps: f64,
+    /// Resistance in N/kN in the middle.
+    pub extra_n_per_kn: f64,
+}
+
+/// Everything undeclared in one run; [`Disturbances::none`] leaves the declared model true.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Disturbances {
+    /// The true gradient in ‰ by chainage.
+    pub gradient: StepProfile,
+    /// How far in m the true gradient lies towards +chainage of the map's.
+    pub gradient_shift_m: f64,
+    /// Basic resistance of this run over the train's ordinary one.
+    pub resistance_factor: f64,
+    /// Reading of the force sensors of this run over the reported forces.
+    pub force_reading_factor: f64,
+    /// k of the curve resistance k/R in N/kN m.
+    pub curve_constant_n_per_kn_m: f64,
+    /// Factor on c v² in tunnels.
+    pub tunnel_c_factor: f64,
+    /// Mean headwind in m/s along the travel.
+    pub headwind_mps: f64,
+    /// Spread of the gusts in m/s.
+    pub gust_sd_mps: f64,
+    /// Dragging brake in N.
+    pub drag_force_n: f64,
+    /// When it drags.
+    pub drag_windows: Vec<RunWindow>,
+    /// Cylinder pressure in Pa that remains while it drags.
+    pub residual_pressure_pa: f64,
+    /// Measured over true speed.
+    pub speed_scale: f64,
+    /// Other masses by place.
+    pub mass_sections: Vec<MassSection>,
+    /// Other masses by time.
+    pub mass_windows: Vec<(RunWindow, f64)>,
+    /// Reported over true traction force.
+    pub traction_gain: f64,
+    /// Dead time in s between reported and true forces.
+    pub delay_s: f64,
+    /// Lag in s between reported and true forces.
+    pub lag_s: f64,
+    /// True rotating-mass factor.
+    pub rotating_mass_factor: f64,
+    /// Extra a in N/kN at the start and its time constant in s.
+    pub cold_bearings: Option<(f64, f64)>,
+    /// Relative change of basic resistance per K and the reference in K.
+    pub ambient: Option<(f64, f64)>,
+    /// Extra resistance in N/kN by chainage.
+    pub local: Option<StepProfile>,
+    /// A cap on the achieved brake force.
+    pub adhesion: Option<AdhesionCap>,
+    /// A resistance outside every library.
+    pub speed_band: Option<SpeedBand>,
+}
+
+impl Disturbances {
+    /// Nothing undeclared.
+    ///
+    /// # Panics
+    ///
+    /// When the line has no gradient, which generated lines have.
+    pub fn none(train: &TrueTrain, line: &Line) -> Self {
+        Disturbances {
+            gradient: line.track.gradient().expect("a generated line has a gradient").clone(),
+            gradient_shift_m: 0.0,
+            resistance_factor: 1.0,
+            force_reading_factor: 1.0,
+            curve_constant_n_per_kn_m: train.declared.curve_constant_n_per_kn_m,
+            tunnel_c_factor: 1.0,
+            headwind_mps: 0.0,
+            gust_sd_mps: 0.0,
+            drag_force_n: 0.0,
+            drag_windows: Vec::new(),
+            residual_pressure_pa: 0.0,
+            speed_scale: 1.0,
+            mass_sections: Vec::new(),
+            mass_windows: Vec::new(),
+            traction_gain: 1.0,
+            delay_s: 0.0,
+            lag_s: 0.0,
+            rotating_mass_factor: train.declared.rotating_mass_factor,
+            cold_bearings: None,
+            ambient: None,
+            local: None,
+            adhesion: None,
+            speed_band: None,
+        }
+    }
+
+    /// What a dataset's effects are in one run of it.
+    pub fn of(
+        effects: &[Effect],
+        train: &TrueTrain,
+        line: &Line,
+        plan: &RunPlan,
+        settings: &SimulatorSettings,
+    ) -> Self {
+        let mut disturbances = Disturbances::none(train, line);
+        disturbances.vary(plan, settings);
+        for effect in effects {
+            disturbances.apply(effect, plan, settings.seed);
+        }
+        disturbances
+    }
+
+    /// Small differences that no effect describes.
+    fn vary(&mut self, plan: &RunPlan, settings: &SimulatorSettings) {
+        let factor = settings.hidden_variation;
+        let mut of_run = Random::new(settings.seed, Stream::Variation(plan.number));
+        self.resistance_factor = 1.0 + 0.01 * factor * of_run.gaussian();
+        self.force_reading_factor = 1.0 + 0.002 * factor * of_run.gaussian();
+        let mut survey = Random::new(settings.seed, Stream::Survey);
+        let surveyed: Vec<(f64, f64)> = self
+            .gradient
+            .entries()
+            .map(|(m, permille)| (m, permille + 0.05 * factor * survey.gaussian()))
+            .collect();
+        self.gradient = StepProfile::new(&surveyed).expect("the chainages are the map's");
+    }
+
+    fn apply(&mut self, effect: &Effect, plan: &RunPlan, seed: u64) {
+        let of_run = |window: &&RunWindow| window.run == plan.number;
+        let in_runs = |runs: &[usize]| runs.is_empty() || runs.contains(&plan.number);
+        match effect {
+            Effect::TunnelDrag { c_factor } => self.tunnel_c_factor = *c_factor,
+            Effect::CurveResistance { k_n_per_kn_m } => {
+                self.curve_constant_n_per_kn_m = *k_n_per_kn_m;
+            }
+            Effect::Wind { wind_plus_mps, run_sd_mps, gust_sd_mps } => {
+                let of_the_day = Random::new(seed, Stream::Gusts(plan.number)).gaussian();
+                self.headwind_mps = plan.direction * wind_plus_mps + run_sd_mps * of_the_day;
+                self.gust_sd_mps = *gust_sd_mps;
+            }
+            Effect::DraggingBrake { force_n, windows, residual_pressure_pa } => {
+                self.drag_force_n = *force_n;
+                self.drag_windows = windows.iter().filter(of_run).copied().collect();
+                self.residual_pressure_pa = *residual_pressure_pa;
+            }
+            Effect::WheelDiameter { speed_scale } => self.speed_scale = *speed_scale,
+            Effect::GradientShift { shift_m } => {
+                let moved: Vec<(f64, f64)> =
+                    self.gradient.entries().map(|(m, permille)| (m + shift_m, permille)).collect();
+                self.gradient = StepProfile::new(&moved).expect("a moved profile keeps its order");
+                self.gradient_shift_m = *shift_m;
+            }
+            Effect::MassChangeSections(sections) => {
+                let of_direction =
+                    sections.iter().filter(|section| section.direction == plan.direction);
+                self.mass_sections = of_direction.copied().collect();
+            }
+            Effect::MassChangeWindows(windows) => {
+                let of_run = windows.iter().filter(|(window, _)| window.run == plan.number);
+                self.mass_windows = of_run.copied().collect();
+            }
+            Effect::TractionGain { gain } => self.traction_gain = *gain,
+            Effect::ActuatorDelay { delay_s, lag_s } => {
+                (self.delay_s, self.lag_s) = (*delay_s, *lag_s);
+            }
+            Effect::RotatingMass { rotating_mass_factor } => {
+                self.rotating_mass_factor = *rotating_mass_factor;
+            }
+            Effect::BearingTemperature { delta_a_n_per_kn, tau_s } => {
+                self.cold_bearings = Some((*delta_a_n_per_kn, *tau_s));
+            }
+            Effect::AmbientTemperature { w0_per_k, reference_k } => {
+                self.ambient = Some((*w0_per_k, *reference_k));
+            }
+            Effect::LocalResistance { extra_n_per_kn, intervals_m, runs } => {
+                self.local = in_runs(runs).then(|| interval_profile(intervals_m, *extra_n_per_kn));
+            }
+            Effect::LowAdhesion { adhesion, intervals_m, runs } => {
+                let cap = AdhesionCap { adhesion: *adhesion, intervals_m: intervals_m.clone() };
+                self.adhesion = in_runs(runs).then_some(cap);
+            }
+            Effect::SpeedBand { centre_mps, width_mps, extra_n_per_kn } => {
+                self.speed_band = Some(SpeedBand {
+                    centre_mps: *centre_mps,
+                    width_mps: *width_mps,
+                    extra_n_per_kn: *extra_n_per_kn,
+                });
+            }
+        }
+    }
+
+    /// True over declared mass at a time in s from the start and a chainage in m.
+    pub fn mass_factor(&self, time_s: f64, centre_m: f64) -> f64 {
+        let by_time = self
+            .mass_windows
+            .iter()
+            .find(|(window, _)| (window.start_s..window.end_s).contains(&time_s))
+            .map(|(_, factor)| *factor);
+        let by_place = || {
+            let sections = self.mass_sections.iter();
+            let around =
+                |section: &&MassSection| (section.from_m..section.to_m).contains(&centre_m);
+            sections.clone().find(around).map(|section| section.mass_factor)
+        };
+        by_time.or_else(by_place).unwrap_or(1.0)
+    }
+
+    /// Force in N of a dragging brake at a time in s from the start; it builds up over 10 s.
+    pub fn drag_n(&self, time_s: f64) -> f64 {
+        let share = self
+            .drag_windows
+            .iter()
+            .filter(|window| (window.start_s..=window.end_s).contains(&time_s))
+            .map(|window| ((time_s - window.start_s) / 10.0).min(1.0))
+            .fold(0.0, f64::max);
+        share * self.drag_force_n
+    }
+}
+
+impl AdhesionCap {
+    /// The brake force in N that the rail carries at a chainage in m.
+    pub fn carried_n(&self, brake_n: f64, weight_n: f64, centre_m: f64) -> f64 {
+        let is_inside = self.intervals_m.is_empty()
+            || self.intervals_m.iter().any(|&(from_m, to_m)| (from_m..=to_m).contains(&centre_m));
+        if is_inside { brake_n.min(self.adhesion * weight_n) } else { brake_n }
+    }
+}
+
+/// A profile of `value` within ordered intervals and zero elsewhere.
+pub(super) fn interval_profile(intervals_m: &[(f64, f64)], value: f64) -> StepProfile {
+    let mut entries = vec![(f64::MIN / 4.0, 0.0)];
+    for &(from_m, to_m) in intervals_m {
+        entries.extend([(from_m, value), (to_m, 0.0)]);
+    }
+    entries[0].0 = entries.get(1).map_or(0.0, |first| first.0 - 1.0);
+    StepProfile::new(&entries).expect("intervals are ordered and apart")
+}

@@ -1,0 +1,181 @@
+//! A high-fidelity simulator of recorded runs, the project's own judge of what it claims.
+//!
+//! From a seed it draws a train of one of four types, a line, and runs in both directions with
+//! their load, weather and driver. The truth is a train of many cars that each feel their own
+//! gradient, curve and tunnel, under jerk-limited commands and lagging actuators. Undeclared
+//! effects act on that truth, or on the sensors where they belong; what is declared, and what the
+//! sensors recorded, is all that the program under test may see.
+//!
+//! # Layout
+//!
+//! - [`settings`]: what is asked of a dataset; [`random`]: a stream of numbers per subject
+//! - [`train_maker`], [`line_maker`], [`run_maker`]: what there is
+//! - [`effects`], [`effect_maker`], [`disturbances`]: what is undeclared, and what it changes
+//! - [`permitted_speed`], [`driver`], [`actuators`], [`dynamics`], [`true_run`]: what happens
+//! - [`sensors`], [`defects`]: what is recorded of it
+//! - [`truth`], [`oracle`]: what a perfect explainer would find, and how well it would predict
+//! - [`columns`], [`dataset_writer`]: the recording as a dataset folder
+
+pub mod actuators;
+pub mod columns;
+pub mod dataset_writer;
+pub mod defects;
+pub mod disturbances;
+pub mod driver;
+pub mod dynamics;
+pub mod effect_maker;
+pub mod effects;
+pub mod line_maker;
+pub mod oracle;
+pub mod permitted_speed;
+pub mod random;
+pub mod run_maker;
+pub mod sensors;
+pub mod settings;
+pub mod train_maker;
+pub mod true_run;
+pub mod truth;
+
+use dynocar_core::track::Track;
+use dynocar_core::train::TrainModel;
+use dynocar_shared::TrainSample;
+
+pub use effects::Effect;
+pub use settings::{Defects, EffectRequest, SimulatorSettings, TrainType};
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use disturbances::Disturbances;
+use dynamics::TruePhysics;
+use effect_maker::{EffectScene, make_effect, suitable_types};
+use line_maker::{Line, make_line};
+use random::{Random, Stream};
+use run_maker::{RunPlan, make_plans};
+use sensors::{Sensors, make_sensors, measure_run};
+use train_maker::{TrueTrain, make_train};
+use true_run::{TrueState, drive_run};
+
+/// One simulated run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SimulatedRun {
+    /// What was planned.
+    pub plan: RunPlan,
+    /// What was undeclared in it.
+    pub disturbances: Disturbances,
+    /// What happened, every 0.05 s.
+    pub states: Vec<TrueState>,
+    /// What was recorded.
+    pub samples: Vec<TrainSample>,
+}
+
+/// A simulated dataset with its truth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SimulatedDataset {
+    /// What was asked for.
+    pub settings: SimulatorSettings,
+    /// The train, declared and true.
+    pub train: TrueTrain,
+    /// The line, declared and true.
+    pub line: Line,
+    /// The undeclared effects.
+    pub effects: Vec<Effect>,
+    /// The sensors.
+    pub sensors: Sensors,
+    /// The runs.
+    pub runs: Vec<SimulatedRun>,
+}
+
+impl SimulatedDataset {
+    /// The declared train.
+    pub fn declared_train(&self) -> &TrainModel {
+        &self.train.declared
+    }
+
+    /// The declared track.
+    pub fn track(&self) -> &Track {
+        &self.line.track
+    }
+}
+
+/// Simulates a dataset.
+///
+/// # Panics
+///
+/// When fewer than two runs, a period of sampling outside 0.1 to 1 s, or a duration below 60 s is
+/// asked for.
+pub fn simulate(settings: &SimulatorSettings) -> SimulatedDataset {
+    assert!(settings.runs >= 2, "expected at least 2 runs, got {}", settings.runs);
+    let period_s = settings.sample_period_s;
+    assert!((0.1..=1.0).contains(&period_s), "expected a period of 0.1 to 1 s, got {period_s} s");
+    assert!(settings.duration_s >= 60.0, "expected 60 s or more, got {} s", settings.duration_s);
+    let stream = |stream: Stream| Random::new(settings.seed, stream);
+    let mut of_train = stream(Stream::Train);
+    let drawn_type = of_train.pick(&fitting_types(&settings.effects));
+    let train_type = settings.train_type.unwrap_or(drawn_type);
+    let train = make_train(train_type, settings.resistance_spread, &mut of_train);
+    let mut of_line = stream(Stream::Line);
+    let has_tunnels =
+        of_line.chance(0.5) || settings.effects.kinds().contains(&EffectKind::TunnelDrag);
+    let size = (train.declared.length_m, train.handling.speed_max_mps);
+    let line = make_line(train_type, size, has_tunnels, &mut of_line);
+    let plans = make_plans(settings, &train, &line, &mut stream(Stream::Plans));
+    let effects =
+        draw_effects(settings, &EffectScene { train: &train, line: &line, plans: &plans });
+    let sensors = make_sensors(&train, settings.sensor_noise, &mut stream(Stream::SensorTypes));
+    let runs: Vec<SimulatedRun> = plans
+        .into_iter()
+        .map(|plan| simulate_run(settings, &train, &line, plan, &effects, &sensors))
+        .collect();
+    let lengths_s: Vec<f64> =
+        runs.iter().map(|run| run.states[run.states.len() - 1].time_s).collect();
+    let effects = effects.into_iter().map(|effect| effect.ended_with_runs(&lengths_s)).collect();
+    SimulatedDataset { settings: settings.clone(), train, line, effects, sensors, runs }
+}
+
+/// Types of train on which all the effects show; all types when there is no such.
+fn fitting_types(request: &EffectRequest) -> Vec<TrainType> {
+    let kinds = request.kinds();
+    let fits = |train_type: &TrainType| {
+        kinds.iter().all(|&kind| suitable_types(kind).contains(train_type))
+    };
+    let fitting: Vec<TrainType> = TrainType::ALL.into_iter().filter(fits).collect();
+    if fitting.is_empty() { TrainType::ALL.to_vec() } else { fitting }
+}
+
+fn draw_effects(settings: &SimulatorSettings, scene: &EffectScene<'_>) -> Vec<Effect> {
+    match &settings.effects {
+        EffectRequest::Exactly(effects) => effects.clone(),
+        EffectRequest::Kinds(kinds) => {
+            let mut random = Random::new(settings.seed, Stream::Effects);
+            kinds
+                .iter()
+                .filter_map(|&kind| make_effect(kind, scene, settings.duration_s, &mut random))
+                .collect()
+        }
+    }
+}
+
+fn simulate_run(
+    settings: &SimulatorSettings,
+    train: &TrueTrain,
+    line: &Line,
+    plan: RunPlan,
+    effects: &[Effect],
+    sensors: &Sensors,
+) -> SimulatedRun {
+    let stream = |stream: Stream| Random::new(settings.seed, stream);
+    let disturbances = Disturbances::of(effects, train, line, &plan, settings);
+    let physics = TruePhysics { train, line, plan: &plan, disturbances: &disturbances };
+    let states = drive_run(&physics, settings);
+    let clean = measure_run(
+        &states,
+        &plan,
+        line,
+        (sensors, &disturbances),
+        settings,
+        &mut stream(Stream::Sensors(plan.number)),
+    );
+    let samples =
+        defects::spoil(clean, &settings.defects, &mut stream(Stream::Defects(plan.number)));
+    SimulatedRun { plan, disturbances, states, samples }
+}

@@ -1,0 +1,143 @@
+//! One seeded stream of random numbers per subject.
+
+use std::f64::consts::TAU;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// What a stream of random numbers is for.
+///
+/// Subjects draw from streams of their own, so that an effect added to a dataset leaves train,
+/// line, driver and noise as they were.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stream {
+    /// The train.
+    Train,
+    /// The line.
+    Line,
+    /// Which runs are made, and how they are driven.
+    Plans,
+    /// The size and place of effects.
+    Effects,
+    /// Column names and units of the files.
+    Files,
+    /// The quality of the sensors.
+    SensorTypes,
+    /// The survey's errors.
+    Survey,
+    /// What differs from run to run without being planned.
+    Variation(usize),
+    /// Gusts of wind in a run.
+    Gusts(usize),
+    /// The driver of a run.
+    Driver(usize),
+    /// Wheel slip in a run.
+    Slip(usize),
+    /// The sensors of a run.
+    Sensors(usize),
+    /// Missing rows and outliers of a run.
+    Defects(usize),
+}
+
+impl Stream {
+    fn number(self) -> u64 {
+        let of_run = |subject: u64, run: usize| subject + 16 * (run as u64 + 1);
+        match self {
+            Stream::Train => 1,
+            Stream::Line => 2,
+            Stream::Plans => 3,
+            Stream::Effects => 4,
+            Stream::Files => 5,
+            Stream::SensorTypes => 11,
+            Stream::Survey => 12,
+            Stream::Variation(run) => of_run(13, run),
+            Stream::Gusts(run) => of_run(6, run),
+            Stream::Driver(run) => of_run(7, run),
+            Stream::Slip(run) => of_run(8, run),
+            Stream::Sensors(run) => of_run(9, run),
+            Stream::Defects(run) => of_run(10, run),
+        }
+    }
+}
+
+/// A seeded source of random numbers.
+#[derive(Clone, Debug)]
+pub struct Random {
+    generator: ChaCha8Rng,
+    spare_gaussian: Option<f64>,
+}
+
+impl Random {
+    /// The stream of a subject under a seed.
+    pub fn new(seed: u64, stream: Stream) -> Self {
+        let mut generator = ChaCha8Rng::seed_from_u64(seed);
+        generator.set_stream(stream.number());
+        Random { generator, spare_gaussian: None }
+    }
+
+    /// Uniform from `low` to `high`.
+    pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.generator.random::<f64>()
+    }
+
+    /// Standard normal (Box-Muller).
+    pub fn gaussian(&mut self) -> f64 {
+        if let Some(spare) = self.spare_gaussian.take() {
+            return spare;
+        }
+        let radius = (-2.0 * (1.0 - self.generator.random::<f64>()).ln()).sqrt();
+        let (sine, cosine) = (TAU * self.generator.random::<f64>()).sin_cos();
+        self.spare_gaussian = Some(radius * sine);
+        radius * cosine
+    }
+
+    /// A whole number from `low` to `high`, both included.
+    pub fn integer(&mut self, low: usize, high: usize) -> usize {
+        self.generator.random_range(low..=high)
+    }
+
+    /// True with this probability.
+    pub fn chance(&mut self, probability: f64) -> bool {
+        self.generator.random::<f64>() < probability
+    }
+
+    /// +1 or -1.
+    pub fn sign(&mut self) -> f64 {
+        if self.chance(0.5) { 1.0 } else { -1.0 }
+    }
+
+    /// One of several.
+    ///
+    /// # Panics
+    ///
+    /// When there is nothing to choose from.
+    pub fn pick<T: Copy>(&mut self, choices: &[T]) -> T {
+        choices[self.integer(0, choices.len() - 1)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn streams_differ_and_repeat() {
+        let draw = |seed, stream| {
+            let mut random = Random::new(seed, stream);
+            (0..4).map(|_| random.uniform(0.0, 1.0)).collect::<Vec<_>>()
+        };
+        assert_eq!(draw(7, Stream::Driver(2)), draw(7, Stream::Driver(2)));
+        assert_ne!(draw(7, Stream::Driver(2)), draw(7, Stream::Driver(3)));
+        assert_ne!(draw(7, Stream::Driver(2)), draw(8, Stream::Driver(2)));
+    }
+
+    #[test]
+    fn gaussians_have_unit_variance() {
+        let mut random = Random::new(1, Stream::Train);
+        let draws: Vec<f64> = (0..20_000).map(|_| random.gaussian()).collect();
+        let mean = draws.iter().sum::<f64>() / draws.len() as f64;
+        let variance = draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / draws.len() as f64;
+        // Five standard errors.
+        assert!(mean.abs() < 0.035 && (variance - 1.0).abs() < 0.05, "{mean} {variance}");
+    }
+}
