@@ -1,5 +1,7 @@
 //! The measurements behind every figure that Dynocar's documents state.
 //!
+//! - [`cli`]: the commands of `dynocar-bench`
 //! - [`papers`]: accuracy of every estimator over seeded runs, beside the statistical bound
 
+pub mod cli;
 pub mod papers;

@@ -1,3 +1,7 @@
-//! The program `dynocar-bench`.
+//! The program `dynocar-bench`; everything it does is in the library.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    dynocar_bench::cli::main()
+}

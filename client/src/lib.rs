@@ -1,1 +1,53 @@
 //! What a train controller links: publish samples, poll parameter snapshots.
+//!
+//! ```no_run
+//! use dynocar_client::{Host, SamplePublisher, SnapshotReader};
+//! use dynocar_shared::{PipelineKind, SampleField, TrainId, TrainSample};
+//!
+//! let host = Host::from_environment()?;
+//! let train = TrainId(7);
+//! let mut publisher = SamplePublisher::open(&host, train)?;
+//! let mut reader = SnapshotReader::open(&host, train)?;
+//! loop {
+//!     let mut sample = TrainSample::empty(train).with(SampleField::Speed, 21.5);
+//!     sample.time_ns = dynocar_client::monotonic_now_ns();
+//!     publisher.publish(&mut sample)?;
+//!     reader.poll();
+//!     let now_ns = dynocar_client::monotonic_now_ns();
+//!     if let Some(reading) = reader.latest(PipelineKind::VMils, now_ns)
+//!         && reading.is_usable()
+//!         && let Some(resistance) = reading.snapshot.resistance_at(21.5)
+//!     {
+//!         println!("{} N/kN", resistance.w0_n_per_kn);
+//!     }
+//! #   break;
+//! }
+//! # Ok::<(), dynocar_client::ChannelError>(())
+//! ```
+//!
+//! Neither call ever waits for the daemon: publishing overwrites the oldest sample when nobody
+//! reads, polling takes what is there. A daemon that died shows as age, and the next one is
+//! read without reopening anything.
+//!
+//! # Layout
+//!
+//! - [`host`]: where the run-time files of this host lie
+//! - [`peer`]: who serves and who drives a train, and whether we understand each other
+//! - [`channel`]: the shared-memory ports, also used by the daemon
+//! - [`publisher`], [`reader`]: the two ends a controller holds
+//! - [`clock`]: the host's monotonic clock
+
+pub mod channel;
+pub mod clock;
+pub mod error;
+pub mod host;
+pub mod peer;
+pub mod publisher;
+pub mod reader;
+
+pub use clock::monotonic_now_ns;
+pub use error::ChannelError;
+pub use host::Host;
+pub use peer::{Announcement, Peer, Role};
+pub use publisher::SamplePublisher;
+pub use reader::{Reading, SnapshotReader};

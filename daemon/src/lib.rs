@@ -1,5 +1,21 @@
 //! The daemon, its command line and its files.
 //!
+//! # Layout
+//!
 //! - [`cli`]: the commands of `dynocar`, one file each
+//! - [`config`]: the daemon's configuration
+//! - [`dataset`]: recorded runs from disk
+//! - [`identify`]: the pipelines over recorded runs
+//! - [`demo`]: the main job as a show
+//! - [`run`]: the daemon, every stage on one screen
+//! - [`runtime`]: its threads
+//! - [`replay`]: recorded runs into the sample channel
 
 pub mod cli;
+pub mod config;
+pub mod dataset;
+pub mod demo;
+pub mod identify;
+pub mod replay;
+pub mod run;
+pub mod runtime;

@@ -11,17 +11,20 @@
 //! - [`vocabulary`]: pipelines, parameters, statuses, reasons, effects: the numbers on the wire
 //! - [`snapshot`]: what the daemon answers, [`ParameterSnapshot`]
 //! - [`resistance`]: resistance at a speed, with its standard deviation, from a snapshot
+//! - [`sleeper`]: which pipeline threads want to be woken
 //! - [`services`]: names, prefix and schema version of the channels
 
 pub mod layout;
 pub mod resistance;
 pub mod sample;
 pub mod services;
+pub mod sleeper;
 pub mod snapshot;
 pub mod vocabulary;
 
 pub use resistance::ResistanceEstimate;
 pub use sample::{SampleField, TrainId, TrainSample};
 pub use services::SCHEMA_MAJOR;
+pub use sleeper::SleeperState;
 pub use snapshot::ParameterSnapshot;
 pub use vocabulary::{Manoeuvre, Parameter, PipelineKind, Reason, RejectionReason, Status};

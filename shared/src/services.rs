@@ -12,8 +12,18 @@ pub const TRANSPORT_VERSION: &str = "0.10.0";
 /// iceoryx2 release never meets our segments.
 pub const SEGMENT_PREFIX: &str = "dynocar_0_10_0_";
 
+/// Samples a pipeline thread may fall behind before the oldest are overwritten.
+pub const SAMPLE_BUFFER: usize = 512;
+
+/// The most pipelines, over all daemons' configurations, that one train may have.
+pub const PIPELINES_MAX: usize = 32;
+
 /// Environment variable that moves all run-time files of Dynocar to another directory.
 pub const ROOT_VARIABLE: &str = "DYNOCAR_ROOT";
+
+/// The event service over which controllers wake sleeping pipeline threads; one for all trains,
+/// with one listener for each thread.
+pub const WAKE_SERVICE: &str = "dynocar/v1/wake";
 
 /// The channels that belong to one train.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -24,8 +34,6 @@ pub enum Channel {
     Snapshots,
     /// Tells the controller which pipeline threads sleep.
     Sleepers,
-    /// Wakes the pipeline threads that sleep.
-    Wake,
 }
 
 impl Channel {
@@ -35,7 +43,6 @@ impl Channel {
             Channel::Samples => "samples",
             Channel::Snapshots => "snapshots",
             Channel::Sleepers => "sleepers",
-            Channel::Wake => "wake",
         }
     }
 
@@ -62,5 +69,6 @@ mod tests {
         let mut name = String::new();
         Channel::Snapshots.write_service_name(TrainId(7), &mut name).unwrap();
         assert_eq!(name, "dynocar/v1/train/7/snapshots");
+        assert!(WAKE_SERVICE.starts_with(&format!("dynocar/v{SCHEMA_MAJOR}/")));
     }
 }

@@ -37,8 +37,11 @@ wire_struct! {
         pub sample_time_ns: i64,
         /// When that sample was handed to the channel, host's monotonic clock, in ns.
         pub sample_published_ns: i64,
-        /// When the snapshot was handed to the channel, host's monotonic clock, in ns.
+        /// When the snapshot was first handed to the channel, host's monotonic clock, in ns.
         pub published_ns: i64,
+        /// When the daemon last vouched for it, host's monotonic clock, in ns; a snapshot is sent
+        /// again from time to time while no sample comes.
+        pub vouched_ns: i64,
         /// Sequence number of the newest sample behind the snapshot.
         pub sample_sequence: u64,
 
@@ -102,6 +105,7 @@ impl ParameterSnapshot {
             sample_time_ns: 0,
             sample_published_ns: 0,
             published_ns: 0,
+            vouched_ns: 0,
             sample_sequence: 0,
             samples_used: 0,
             samples_rejected: 0,

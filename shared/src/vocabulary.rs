@@ -166,6 +166,8 @@ vocabulary! {
         OnlyLowerBound = 12 "only_lower_bound",
         /// The same data fit other values of the parameters as well.
         NotIdentifiable = 13 "not_identifiable",
+        /// The daemon has not been heard of lately; set by the client, never by the daemon.
+        DaemonSilent = 14 "daemon_silent",
     }
 }
 

@@ -10,11 +10,14 @@
 //! - [`dataset`]: recorded runs, from texts to the samples that a controller would publish
 //! - [`validation`]: which samples are fit for use, and why the others are not
 //! - [`force`]: the known forces on the train at a sample
+//! - [`filter`]: recursive estimators of fixed size, without knowledge of trains
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
 //! - [`simulate`]: the speed that a force model predicts, over a recorded run or with a driver
+//! - [`explain`]: which undeclared effect explains what the declared model leaves
 
 pub mod dataset;
 pub mod explain;
+pub mod filter;
 pub mod force;
 pub mod pipeline;
 pub mod simulate;

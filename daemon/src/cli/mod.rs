@@ -3,6 +3,12 @@
 //! Messages for people go to standard error, results to standard output. Exit status: 0 done,
 //! 1 the work failed, 2 the command line or an input file is wrong.
 
+mod demo;
+mod identify;
+mod output;
+mod replay;
+mod run;
+
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -16,7 +22,12 @@ struct Arguments {
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {}
+enum Command {
+    Demo(demo::DemoArguments),
+    Run(run::RunArguments),
+    Replay(replay::ReplayArguments),
+    Identify(identify::IdentifyArguments),
+}
 
 /// Why a command ended without a result; says which exit status follows.
 #[derive(Debug)]
@@ -30,7 +41,12 @@ pub enum Failure {
 /// Parses the command line, runs the command, reports a failure on standard error.
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let result: Result<(), Failure> = match arguments.command {};
+    let result: Result<(), Failure> = match &arguments.command {
+        Command::Demo(arguments) => demo::execute(arguments),
+        Command::Run(arguments) => run::execute(arguments),
+        Command::Replay(arguments) => replay::execute(arguments),
+        Command::Identify(arguments) => identify::execute(arguments),
+    };
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(Failure::Input(message)) => {

@@ -36,6 +36,9 @@ pub mod track_file;
 pub mod train_file;
 pub mod units;
 
+#[cfg(test)]
+mod tests;
+
 pub use error::{DatasetError, FileProblem, Place, Problem};
 pub use forces::ForceSource;
 pub use manifest::{ColumnMapping, FileEntry, Manifest, PositionReference, Role, RunEntry};

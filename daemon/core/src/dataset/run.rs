@@ -202,7 +202,7 @@ impl<'d> Resolved<'d> {
         let radius_m = column(Quantity::CurveRadius);
         let wheel_slide = column(Quantity::WheelSlide);
         let is_there =
-            |values: &[f64], row: usize| values.get(row).copied().filter(|v| !v.is_nan());
+            |values: &[f64], row: usize| values.get(row).copied().filter(|v| v.is_finite());
         let mut sequence = 0;
         (0..self.times_s.len())
             .map(|row| {

@@ -7,6 +7,7 @@ mod echo;
 mod estimator;
 mod innovation;
 pub mod output;
+pub mod resistance;
 pub mod settings;
 
 pub use echo::Echo;
@@ -88,6 +89,11 @@ impl Pipeline {
     /// The snapshot after the last sample.
     pub fn snapshot(&self) -> &ParameterSnapshot {
         &self.snapshot
+    }
+
+    /// The snapshot after the last sample, for its publisher to stamp.
+    pub fn snapshot_mut(&mut self) -> &mut ParameterSnapshot {
+        &mut self.snapshot
     }
 }
 

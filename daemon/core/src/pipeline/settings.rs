@@ -9,6 +9,8 @@ use serde::Deserialize;
 
 use super::Estimator;
 use super::echo::Echo;
+use super::resistance;
+use super::resistance::settings::{LsSettings, MilsSettings, RlsSettings};
 use crate::train::TrainModel;
 
 /// A setting outside its allowed range.
@@ -48,6 +50,16 @@ pub struct NoSettings {}
 pub enum EstimatorSettings {
     /// No estimate: the latency floor.
     Echo(NoSettings),
+    /// Regularised least squares over all rows.
+    Ls(LsSettings),
+    /// Recursive least squares with directional forgetting.
+    Rls(RlsSettings),
+    /// Regularised recursive least squares.
+    RegularisedRls(MilsSettings),
+    /// Regularised multi-innovation least squares.
+    Mils(MilsSettings),
+    /// Interval-varying, regularised multi-innovation least squares.
+    VMils(MilsSettings),
 }
 
 impl EstimatorSettings {
@@ -55,6 +67,13 @@ impl EstimatorSettings {
     pub fn default_of(kind: PipelineKind) -> Option<Self> {
         match kind {
             PipelineKind::Echo => Some(EstimatorSettings::Echo(NoSettings {})),
+            PipelineKind::LeastSquares => Some(EstimatorSettings::Ls(LsSettings::default())),
+            PipelineKind::Rls => Some(EstimatorSettings::Rls(RlsSettings::default())),
+            PipelineKind::RegularisedRls => {
+                Some(EstimatorSettings::RegularisedRls(MilsSettings::default()))
+            }
+            PipelineKind::Mils => Some(EstimatorSettings::Mils(MilsSettings::default())),
+            PipelineKind::VMils => Some(EstimatorSettings::VMils(MilsSettings::default())),
             _ => None,
         }
     }
@@ -63,6 +82,11 @@ impl EstimatorSettings {
     pub fn kind(&self) -> PipelineKind {
         match self {
             EstimatorSettings::Echo(_) => PipelineKind::Echo,
+            EstimatorSettings::Ls(_) => PipelineKind::LeastSquares,
+            EstimatorSettings::Rls(_) => PipelineKind::Rls,
+            EstimatorSettings::RegularisedRls(_) => PipelineKind::RegularisedRls,
+            EstimatorSettings::Mils(_) => PipelineKind::Mils,
+            EstimatorSettings::VMils(_) => PipelineKind::VMils,
         }
     }
 
@@ -71,9 +95,18 @@ impl EstimatorSettings {
     /// # Errors
     ///
     /// When a setting lies outside its range.
-    pub fn build(&self, _train: &Arc<TrainModel>) -> Result<Box<dyn Estimator>, SettingError> {
+    pub fn build(&self, train: &Arc<TrainModel>) -> Result<Box<dyn Estimator>, SettingError> {
         match self {
             EstimatorSettings::Echo(_) => Ok(Box::new(Echo)),
+            EstimatorSettings::Ls(settings) => Ok(Box::new(resistance::ls(train, settings)?)),
+            EstimatorSettings::Rls(settings) => Ok(Box::new(resistance::rls(train, settings)?)),
+            EstimatorSettings::RegularisedRls(settings) => {
+                Ok(Box::new(resistance::regularised_rls(train, settings)?))
+            }
+            EstimatorSettings::Mils(settings) => Ok(Box::new(resistance::mils(train, settings)?)),
+            EstimatorSettings::VMils(settings) => {
+                Ok(Box::new(resistance::v_mils(train, settings)?))
+            }
         }
     }
 }

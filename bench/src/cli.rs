@@ -1,0 +1,104 @@
+//! The commands of `dynocar-bench`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+use serde::Serialize;
+
+use crate::papers::{self, Row, table};
+
+/// Measures Dynocar: accuracy against the statistical bound, speed against peers.
+#[derive(Debug, Parser)]
+#[command(name = "dynocar-bench", version, about)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Papers(PapersArguments),
+}
+
+/// Every table of the five papers over seeded runs: the paper's figure, its method, ours, the bound.
+#[derive(Debug, Args)]
+struct PapersArguments {
+    /// Few seeds: a check that everything runs, not a measurement
+    #[arg(long)]
+    quick: bool,
+    /// Only this paper, as xia
+    #[arg(long, value_name = "NAME")]
+    paper: Option<String>,
+    /// Write the result for machines; - for standard output
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write the tables as a page of the documentation
+    #[arg(long, value_name = "FILE")]
+    markdown: Option<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct PapersAnswer<'a> {
+    rows: &'a [Row],
+}
+
+/// Seeded runs of a full measurement.
+const SEEDS: usize = 200;
+/// Seeded runs of a quick check.
+const QUICK_SEEDS: usize = 8;
+
+/// Parses the command line, runs the command, reports a failure on standard error.
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let result = match &arguments.command {
+        Command::Papers(arguments) => papers(arguments),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err((message, status)) => {
+            eprintln!("dynocar-bench: {message}");
+            ExitCode::from(status)
+        }
+    }
+}
+
+fn papers(arguments: &PapersArguments) -> Result<(), (String, u8)> {
+    let seeds = if arguments.quick { QUICK_SEEDS } else { SEEDS };
+    let sources = papers::sources();
+    let chosen: Vec<_> = sources
+        .iter()
+        .filter(|source| arguments.paper.as_ref().is_none_or(|name| name == source.name))
+        .collect();
+    if chosen.is_empty() {
+        let names: Vec<_> = sources.iter().map(|source| source.name).collect();
+        return Err((format!("--paper: expected one of {}", names.join(", ")), 2));
+    }
+    let mut rows = Vec::new();
+    for source in chosen {
+        eprintln!("{}: {seeds} seeds", source.name);
+        rows.extend((source.rows)(seeds));
+    }
+    let is_json_on_stdout = arguments.json.as_ref().is_some_and(|file| file.as_os_str() == "-");
+    if !is_json_on_stdout {
+        print!("{}", table::for_terminal(&rows));
+    }
+    if let Some(file) = &arguments.json {
+        let text = serde_json::to_string_pretty(&PapersAnswer { rows: &rows })
+            .map_err(|error| (error.to_string(), 1))?;
+        if is_json_on_stdout {
+            println!("{text}");
+        } else {
+            write(file, &(text + "\n"))?;
+        }
+    }
+    if let Some(file) = &arguments.markdown {
+        write(file, &table::for_documentation(&rows))?;
+    }
+    Ok(())
+}
+
+fn write(file: &PathBuf, text: &str) -> Result<(), (String, u8)> {
+    std::fs::write(file, text)
+        .map_err(|error| (format!("{}: cannot be written: {error}", file.display()), 1))
+}

@@ -1,0 +1,141 @@
+//! The comparison as text.
+
+use std::fmt::Write;
+
+use super::Row;
+
+const HEADINGS: [&str; 11] = [
+    "paper",
+    "table",
+    "quantity",
+    "unit",
+    "published",
+    "paper's method",
+    "baseline",
+    "ours",
+    "bound",
+    "ours / bound",
+    "coverage",
+];
+
+fn cells(row: &Row) -> [String; 11] {
+    let ratio = row.ours.zip(row.bound).filter(|(_, bound)| *bound > 0.0);
+    [
+        row.paper.to_owned(),
+        row.table.to_owned(),
+        row.quantity.clone(),
+        row.unit.to_owned(),
+        figure(row.published),
+        figure(row.paper_method),
+        figure(row.baseline),
+        figure(row.ours),
+        figure(row.bound),
+        ratio.map_or(String::new(), |(ours, bound)| format!("{:.2}", ours / bound)),
+        row.coverage.map_or(String::new(), |share| format!("{:.1} %", 100.0 * share)),
+    ]
+}
+
+/// Three significant digits, in scientific form where a plain one would be long.
+fn figure(value: Option<f64>) -> String {
+    let Some(value) = value else { return String::new() };
+    if value == 0.0 {
+        return "0".into();
+    }
+    let exponent = value.abs().log10().floor() as i32;
+    if !(-4..=5).contains(&exponent) {
+        return format!("{value:.2e}");
+    }
+    format!("{value:.*}", (2 - exponent).max(0) as usize)
+}
+
+/// Aligned columns for a terminal.
+pub fn for_terminal(rows: &[Row]) -> String {
+    let body: Vec<_> = rows.iter().map(cells).collect();
+    let mut widths = HEADINGS.map(|heading| heading.chars().count());
+    for line in &body {
+        for (width, cell) in widths.iter_mut().zip(line) {
+            *width = (*width).max(cell.chars().count());
+        }
+    }
+    let mut text = String::new();
+    let headings = HEADINGS.map(str::to_owned);
+    for line in std::iter::once(&headings).chain(&body) {
+        for (place, (cell, width)) in line.iter().zip(widths).enumerate() {
+            // Writing into a String cannot fail.
+            let _ = match place {
+                0..4 => write!(text, "{cell:<width$}  "),
+                _ => write!(text, "{cell:>width$}  "),
+            };
+        }
+        text.truncate(text.trim_end().len());
+        text.push('\n');
+    }
+    text
+}
+
+/// A page of the documentation: one table for each paper.
+pub fn for_documentation(rows: &[Row]) -> String {
+    let mut text = String::from(
+        "# The papers' tables, measured\n\n\
+         Made by `cargo run --release -p dynocar-bench -- papers --markdown docs/papers.md`. Errors\n\
+         over seeded runs; *paper's method* and *baseline* are faithful to the corrected formulas and\n\
+         run on the same data as *ours*; *bound* is the Cramér–Rao or posterior Cramér–Rao bound of\n\
+         the scenario, computed in the same run; *coverage* is the share of our 95 % intervals that\n\
+         hold the truth.\n",
+    );
+    let mut paper = "";
+    for row in rows {
+        if row.paper != paper {
+            paper = row.paper;
+            let _ = writeln!(text, "\n## {paper}\n");
+            let _ = writeln!(text, "| {} | seeds |", HEADINGS[1..].join(" | "));
+            let _ = writeln!(text, "|{}", " --- |".repeat(HEADINGS.len()));
+        }
+        let _ = writeln!(text, "| {} | {} |", cells(row)[1..].join(" | "), row.seeds);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row() -> Row {
+        Row {
+            paper: "Xia 2023",
+            table: "Table 3",
+            quantity: "w0 over driven speeds".into(),
+            unit: "N/kN",
+            published: Some(0.04),
+            paper_method: None,
+            baseline: None,
+            ours: Some(0.0297),
+            bound: Some(0.027),
+            seeds: 200,
+            coverage: Some(0.951),
+            nees: None,
+        }
+    }
+
+    #[test]
+    fn the_ratio_to_the_bound_is_shown() {
+        let text = for_terminal(&[row()]);
+        assert!(text.lines().nth(1).unwrap().ends_with("0.0297  0.0270          1.10    95.1 %"));
+    }
+
+    #[test]
+    fn a_page_has_one_table_for_each_paper() {
+        let text = for_documentation(&[row(), row()]);
+        assert_eq!(text.matches("## Xia 2023").count(), 1);
+        assert_eq!(text.matches("| Table 3 |").count(), 2);
+    }
+
+    #[test]
+    fn figures_have_three_significant_digits() {
+        let cases = [(4.1e-10, "4.10e-10"), (0.02971, "0.0297"), (56.04, "56.0"), (3085.5, "3086")];
+        for (value, expected) in cases {
+            assert_eq!(figure(Some(value)), expected);
+        }
+        assert_eq!(figure(None), "");
+    }
+}

@@ -1,0 +1,316 @@
+//! Who serves and who drives a train, and whether we understand each other.
+//!
+//! Each side keeps a small text file locked while it lives. The kernel drops the lock when the
+//! process dies, however it dies, so that a locked file means a living peer. The files lie
+//! outside the transport and tell schema, layouts and transport version: a peer that shares no
+//! memory format with us can still be named in words.
+
+use std::fmt;
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{Read, Seek, Write};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use dynocar_shared::services::TRANSPORT_VERSION;
+use dynocar_shared::{ParameterSnapshot, SCHEMA_MAJOR, TrainId, TrainSample};
+
+use crate::error::ChannelError;
+use crate::host::Host;
+
+/// A side of the channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Role {
+    /// Serves the train: reads samples, writes snapshots.
+    Daemon,
+    /// Drives the train: writes samples, reads snapshots.
+    Controller,
+}
+
+impl Role {
+    const fn name(self) -> &'static str {
+        match self {
+            Role::Daemon => "daemon",
+            Role::Controller => "controller",
+        }
+    }
+}
+
+impl fmt::Display for Role {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// What a peer says of itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Announcement {
+    /// Its side of the channel.
+    pub role: Role,
+    /// Its process.
+    pub process_id: u32,
+    /// Release of Dynocar it was built from.
+    pub version: String,
+    /// Schema major of its channels.
+    pub schema: u32,
+    /// Release of iceoryx2 it was built with.
+    pub transport: String,
+    /// Layout hash of its [`TrainSample`].
+    pub sample_layout: u64,
+    /// Layout hash of its [`ParameterSnapshot`].
+    pub snapshot_layout: u64,
+}
+
+impl Announcement {
+    /// What this process is.
+    pub fn of_this_process(role: Role) -> Self {
+        Announcement {
+            role,
+            process_id: std::process::id(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            schema: SCHEMA_MAJOR,
+            transport: TRANSPORT_VERSION.to_owned(),
+            sample_layout: TrainSample::LAYOUT_HASH,
+            snapshot_layout: ParameterSnapshot::LAYOUT_HASH,
+        }
+    }
+
+    /// True when both sides map the same bytes.
+    pub fn is_compatible_with(&self, other: &Announcement) -> bool {
+        self.schema == other.schema
+            && self.transport == other.transport
+            && self.sample_layout == other.sample_layout
+            && self.snapshot_layout == other.snapshot_layout
+    }
+
+    fn to_text(&self) -> String {
+        format!(
+            "role={}\nprocess_id={}\nversion={}\nschema={}\ntransport={}\nsample_layout={:016x}\n\
+             snapshot_layout={:016x}\n",
+            self.role,
+            self.process_id,
+            self.version,
+            self.schema,
+            self.transport,
+            self.sample_layout,
+            self.snapshot_layout
+        )
+    }
+
+    /// Reads what [`Announcement::to_text`] wrote; keys that a newer release adds are passed over.
+    fn from_text(role: Role, text: &str) -> Option<Self> {
+        let value = |key: &str| {
+            text.lines().find_map(|line| line.split_once('=').filter(|pair| pair.0 == key))
+        };
+        let value = |key| value(key).map(|pair| pair.1);
+        let hash = |key| u64::from_str_radix(value(key)?, 16).ok();
+        Some(Announcement {
+            role,
+            process_id: value("process_id")?.parse().ok()?,
+            version: value("version")?.to_owned(),
+            schema: value("schema")?.parse().ok()?,
+            transport: value("transport")?.to_owned(),
+            sample_layout: hash("sample_layout")?,
+            snapshot_layout: hash("snapshot_layout")?,
+        })
+    }
+}
+
+impl fmt::Display for Announcement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} {} (process {}, schema {}, sample layout {:016x}, snapshot layout {:016x}, \
+             iceoryx2 {})",
+            self.role,
+            self.version,
+            self.process_id,
+            self.schema,
+            self.sample_layout,
+            self.snapshot_layout,
+            self.transport
+        )
+    }
+}
+
+/// What is known of the other side.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Peer {
+    /// Nobody holds the role.
+    Absent,
+    /// A living process holds it and maps the same bytes.
+    Compatible(Announcement),
+    /// A living process holds it, and we cannot understand each other.
+    Incompatible(Announcement),
+}
+
+impl Peer {
+    /// Who holds a role for a train now.
+    ///
+    /// Opens a file: call it outside the control cycle.
+    ///
+    /// # Errors
+    ///
+    /// When the announcement exists but cannot be read.
+    pub fn look_up(host: &Host, train: TrainId, role: Role) -> Result<Peer, ChannelError> {
+        let path = announcement_path(host, train, role);
+        let file = match File::open(&path) {
+            Ok(file) => file,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Peer::Absent),
+            Err(source) => return Err(unusable(&path, "opening")(source)),
+        };
+        match file.try_lock_shared() {
+            Ok(()) => Ok(Peer::Absent),
+            Err(TryLockError::Error(source)) => Err(unusable(&path, "locking")(source)),
+            Err(TryLockError::WouldBlock) => Ok(match read_announcement(&file, role) {
+                None => Peer::Absent,
+                Some(theirs) if theirs.is_compatible_with(&Announcement::of_this_process(role)) => {
+                    Peer::Compatible(theirs)
+                }
+                Some(theirs) => Peer::Incompatible(theirs),
+            }),
+        }
+    }
+
+    /// Turns an incompatible peer into an error.
+    ///
+    /// # Errors
+    ///
+    /// [`ChannelError::IncompatiblePeer`] when the peer is incompatible.
+    pub fn require_compatible(self, train: TrainId, our_role: Role) -> Result<Peer, ChannelError> {
+        match self {
+            Peer::Incompatible(theirs) => Err(ChannelError::IncompatiblePeer {
+                train,
+                theirs: Box::new(theirs),
+                ours: Box::new(Announcement::of_this_process(our_role)),
+            }),
+            peer => Ok(peer),
+        }
+    }
+}
+
+/// Holds a role for a train; dropping it, or dying, gives the role back.
+#[derive(Debug)]
+pub struct RoleLock {
+    _file: File,
+}
+
+/// A look-up holds the lock for a moment; a claim waits that long before it believes a refusal.
+const CLAIM_TRIES: u32 = 25;
+const CLAIM_PAUSE: Duration = Duration::from_millis(4);
+
+impl RoleLock {
+    /// Takes a role for a train, unless a living process holds it.
+    ///
+    /// # Errors
+    ///
+    /// [`ChannelError::Occupied`] names the holder.
+    pub fn claim(host: &Host, train: TrainId, role: Role) -> Result<Self, ChannelError> {
+        let path = announcement_path(host, train, role);
+        let mut file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(&path)
+            .map_err(unusable(&path, "opening"))?;
+        let mut tries = 0;
+        while let Err(error) = file.try_lock() {
+            tries += 1;
+            match error {
+                TryLockError::Error(source) => return Err(unusable(&path, "locking")(source)),
+                TryLockError::WouldBlock if tries < CLAIM_TRIES => std::thread::sleep(CLAIM_PAUSE),
+                TryLockError::WouldBlock => {
+                    let holder = read_announcement(&file, role)
+                        .map_or("a process that is just starting".into(), |it| it.to_string());
+                    return Err(ChannelError::Occupied { train, role, holder });
+                }
+            }
+        }
+        let text = Announcement::of_this_process(role).to_text();
+        file.set_len(0)
+            .and_then(|()| file.write_all(text.as_bytes()))
+            .map_err(unusable(&path, "writing"))?;
+        Ok(RoleLock { _file: file })
+    }
+}
+
+fn announcement_path(host: &Host, train: TrainId, role: Role) -> PathBuf {
+    host.trains_directory().join(format!("{train}.{role}"))
+}
+
+fn unusable<'a>(
+    path: &'a Path,
+    action: &'static str,
+) -> impl FnOnce(std::io::Error) -> ChannelError + 'a {
+    move |source| ChannelError::Directory { path: path.to_path_buf(), action, source }
+}
+
+/// `None` while the holder is still writing.
+fn read_announcement(mut file: &File, role: Role) -> Option<Announcement> {
+    let mut text = String::new();
+    file.rewind().ok()?;
+    file.take(4096).read_to_string(&mut text).ok()?;
+    Announcement::from_text(role, &text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRAIN: TrainId = TrainId(5);
+
+    fn host() -> (tempfile::TempDir, Host) {
+        let directory = tempfile::tempdir().unwrap();
+        let host = Host::at(directory.path()).unwrap();
+        (directory, host)
+    }
+
+    #[test]
+    fn a_held_role_is_seen_and_a_dropped_one_is_absent() {
+        let (_directory, host) = host();
+        assert_eq!(Peer::look_up(&host, TRAIN, Role::Daemon).unwrap(), Peer::Absent);
+        let lock = RoleLock::claim(&host, TRAIN, Role::Daemon).unwrap();
+        let ours = Announcement::of_this_process(Role::Daemon);
+        assert_eq!(Peer::look_up(&host, TRAIN, Role::Daemon).unwrap(), Peer::Compatible(ours));
+        drop(lock);
+        assert_eq!(Peer::look_up(&host, TRAIN, Role::Daemon).unwrap(), Peer::Absent);
+    }
+
+    #[test]
+    fn a_second_daemon_on_a_train_is_refused_by_name() {
+        let (_directory, host) = host();
+        let _lock = RoleLock::claim(&host, TRAIN, Role::Daemon).unwrap();
+        let message = RoleLock::claim(&host, TRAIN, Role::Daemon).unwrap_err().to_string();
+        let expected =
+            format!("train 5: already has a daemon: daemon {}", env!("CARGO_PKG_VERSION"));
+        assert!(message.starts_with(&expected), "{message}");
+        assert!(message.contains(&std::process::id().to_string()), "{message}");
+        assert!(RoleLock::claim(&host, TrainId(6), Role::Daemon).is_ok());
+        assert!(RoleLock::claim(&host, TRAIN, Role::Controller).is_ok());
+    }
+
+    #[test]
+    fn a_peer_of_another_schema_is_named_in_words() {
+        let (_directory, host) = host();
+        let newer = Announcement { schema: 2, ..Announcement::of_this_process(Role::Daemon) };
+        let path = announcement_path(&host, TRAIN, Role::Daemon);
+        std::fs::write(&path, newer.to_text() + "added_later=yes\n").unwrap();
+        let held = File::open(&path).unwrap();
+        held.lock().unwrap();
+        let peer = Peer::look_up(&host, TRAIN, Role::Daemon).unwrap();
+        assert_eq!(peer, Peer::Incompatible(newer));
+        let message = peer.require_compatible(TRAIN, Role::Controller).unwrap_err().to_string();
+        assert!(message.contains("the daemon is incompatible"), "{message}");
+        assert!(message.contains("schema 2") && message.contains("schema 1"), "{message}");
+    }
+
+    #[test]
+    fn text_that_is_no_announcement_reads_as_absent() {
+        let (_directory, host) = host();
+        let path = announcement_path(&host, TRAIN, Role::Daemon);
+        std::fs::write(&path, [0xff, 0xfe, 0x00]).unwrap();
+        let held = File::open(&path).unwrap();
+        held.lock().unwrap();
+        assert_eq!(Peer::look_up(&host, TRAIN, Role::Daemon).unwrap(), Peer::Absent);
+    }
+}

@@ -1,0 +1,146 @@
+//! The end a controller polls snapshots from.
+
+use dynocar_shared::services::PIPELINES_MAX;
+use dynocar_shared::snapshot::PARAMETERS_MAX;
+use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, Status, TrainId};
+
+use crate::channel::{Receiver, Transport};
+use crate::error::ChannelError;
+use crate::host::Host;
+use crate::peer::{Peer, Role};
+
+/// A snapshot older than this counts as stale, in ns. The daemon republishes every 50 ms.
+pub const STALE_AFTER_NS: i64 = 250_000_000;
+
+/// Reads the newest snapshot of each pipeline of one train.
+#[derive(Debug)]
+pub struct SnapshotReader {
+    host: Host,
+    train: TrainId,
+    receiver: Receiver<ParameterSnapshot>,
+    latest: Box<[Option<ParameterSnapshot>; PIPELINES_MAX]>,
+    stale_after_ns: i64,
+    refused: u64,
+}
+
+/// A snapshot with its age.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading<'a> {
+    /// The snapshot.
+    pub snapshot: &'a ParameterSnapshot,
+    /// Time in ns since the daemon last vouched for it.
+    pub age_ns: i64,
+    /// True when the daemon has been silent for too long.
+    pub is_stale: bool,
+}
+
+impl Reading<'_> {
+    /// The estimate's status; invalid while the daemon is silent.
+    pub fn status(&self) -> Status {
+        if self.is_stale { Status::Invalid } else { self.snapshot.status() }
+    }
+
+    /// Why the status is what it is; `None` for a reason that a newer peer gives.
+    pub fn reason(&self) -> Option<Reason> {
+        if self.is_stale { Some(Reason::DaemonSilent) } else { self.snapshot.reason() }
+    }
+
+    /// True when a controller may use the values; else it falls back to its own parameters.
+    pub fn is_usable(&self) -> bool {
+        self.status() == Status::Estimated
+    }
+}
+
+impl SnapshotReader {
+    /// Opens the snapshot channel of a train. The daemon need not run yet.
+    ///
+    /// # Errors
+    ///
+    /// When the daemon there is incompatible, or when the shared memory cannot be used.
+    pub fn open(host: &Host, train: TrainId) -> Result<Self, ChannelError> {
+        Peer::look_up(host, train, Role::Daemon)?.require_compatible(train, Role::Controller)?;
+        let transport = Transport::open(host, "dynocar-reader")?;
+        Ok(SnapshotReader {
+            host: host.clone(),
+            train,
+            receiver: transport.receiver::<ParameterSnapshot>(train)?,
+            latest: Box::new([None; PIPELINES_MAX]),
+            stale_after_ns: STALE_AFTER_NS,
+            refused: 0,
+        })
+    }
+
+    /// Sets the age in ns from which a snapshot counts as stale.
+    pub fn set_stale_after_ns(&mut self, stale_after_ns: i64) {
+        self.stale_after_ns = stale_after_ns;
+    }
+
+    /// Takes what has come since the last poll; gives the number of snapshots that told
+    /// something new.
+    ///
+    /// # Real-time
+    ///
+    /// Never waits; at most a few messages of each pipeline are taken. No system call and no
+    /// allocation while no process comes or goes.
+    pub fn poll(&mut self) -> usize {
+        let mut news = 0;
+        for _ in 0..4 * PIPELINES_MAX {
+            match self.receiver.receive() {
+                Some(snapshot) => news += usize::from(self.take(&snapshot)),
+                None => break,
+            }
+        }
+        news
+    }
+
+    /// The newest snapshot of the first pipeline of a kind; `now_ns` is the host's monotonic
+    /// clock.
+    pub fn latest(&self, kind: PipelineKind, now_ns: i64) -> Option<Reading<'_>> {
+        self.readings(now_ns).find(|reading| reading.snapshot.pipeline_kind == kind as u32)
+    }
+
+    /// The newest snapshot of every pipeline, by the pipeline's number in the configuration.
+    pub fn readings(&self, now_ns: i64) -> impl Iterator<Item = Reading<'_>> {
+        self.latest.iter().flatten().map(move |snapshot| {
+            let age_ns = now_ns.saturating_sub(snapshot.vouched_ns);
+            Reading { snapshot, age_ns, is_stale: age_ns > self.stale_after_ns }
+        })
+    }
+
+    /// Messages that no daemon of ours would send: foreign train, number out of range, NaN.
+    pub fn refused(&self) -> u64 {
+        self.refused
+    }
+
+    /// Who serves the train now. Opens a file: call it outside the control cycle.
+    ///
+    /// # Errors
+    ///
+    /// When the announcement cannot be read.
+    pub fn daemon(&self) -> Result<Peer, ChannelError> {
+        Peer::look_up(&self.host, self.train, Role::Daemon)
+    }
+
+    /// Keeps a snapshot unless it is older than the one we have: connections to a daemon that
+    /// died are drained before those to its successor.
+    fn take(&mut self, snapshot: &ParameterSnapshot) -> bool {
+        let is_plausible = snapshot.train_id == self.train.0
+            && (snapshot.pipeline_index as usize) < PIPELINES_MAX
+            && snapshot.parameter_count as usize <= PARAMETERS_MAX
+            && snapshot.values.iter().chain(&snapshot.covariance).all(|value| value.is_finite());
+        if !is_plausible {
+            self.refused += 1;
+            return false;
+        }
+        let place = &mut self.latest[snapshot.pipeline_index as usize];
+        let order = |it: &ParameterSnapshot| (it.epoch, it.sequence, it.vouched_ns);
+        let before = place.as_ref().map(order);
+        if before.is_some_and(|before| order(snapshot) <= before) {
+            return false;
+        }
+        *place = Some(*snapshot);
+        before.is_none_or(|(epoch, sequence, _)| {
+            (snapshot.epoch, snapshot.sequence) > (epoch, sequence)
+        })
+    }
+}

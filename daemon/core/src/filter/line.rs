@@ -1,0 +1,104 @@
+//! A straight line through points that come one by one.
+
+/// Sums for the least-squares line through (t, x).
+///
+/// The sums are about t = 0 and x = 0: choose the origin near the points.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Line {
+    count: f64,
+    t: f64,
+    tt: f64,
+    x: f64,
+    tx: f64,
+    xx: f64,
+}
+
+impl Line {
+    /// Takes in a point.
+    pub fn push(&mut self, t: f64, x: f64) {
+        self.count += 1.0;
+        self.t += t;
+        self.tt += t * t;
+        self.x += x;
+        self.tx += t * x;
+        self.xx += x * x;
+    }
+
+    /// The line through the points of both, which must share their origin.
+    pub fn joined(&self, other: &Line) -> Line {
+        Line {
+            count: self.count + other.count,
+            t: self.t + other.t,
+            tt: self.tt + other.tt,
+            x: self.x + other.x,
+            tx: self.tx + other.tx,
+            xx: self.xx + other.xx,
+        }
+    }
+
+    /// The number of points.
+    pub fn count(&self) -> f64 {
+        self.count
+    }
+
+    /// The mean of x; 0 without points.
+    pub fn mean(&self) -> f64 {
+        if self.count > 0.0 { self.x / self.count } else { 0.0 }
+    }
+
+    /// The sum of squares of t about its mean: the slope's variance is the points' over this.
+    pub fn spread(&self) -> f64 {
+        if self.count > 0.0 { (self.tt - self.t * self.t / self.count).max(0.0) } else { 0.0 }
+    }
+
+    /// The slope; `None` while all points have the same t.
+    pub fn slope(&self) -> Option<f64> {
+        let spread = self.spread();
+        (spread > 0.0).then(|| (self.tx - self.t * self.mean()) / spread)
+    }
+
+    /// The sum of squares of x about the line, with count - 2 degrees of freedom.
+    pub fn scatter(&self) -> f64 {
+        let about_mean = self.xx - self.count * self.mean() * self.mean();
+        let explained = self.slope().map_or(0.0, |slope| slope * slope * self.spread());
+        (about_mean - explained).max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_on_a_line_have_its_slope_and_no_scatter() {
+        let mut line = Line::default();
+        for i in 0..10 {
+            line.push(0.2 * f64::from(i), 3.0 - 0.5 * 0.2 * f64::from(i));
+        }
+        assert!((line.slope().unwrap() + 0.5).abs() < 1e-12);
+        assert!(line.scatter() < 1e-12);
+        assert!((line.mean() - 2.55).abs() < 1e-12);
+    }
+
+    #[test]
+    fn joining_equals_pushing_all() {
+        let points = [(0.0, 1.0), (1.0, 0.5), (2.0, 1.5), (3.0, 4.0)];
+        let (mut all, mut first, mut last) = (Line::default(), Line::default(), Line::default());
+        for (i, &(t, x)) in points.iter().enumerate() {
+            all.push(t, x);
+            if i < 2 { first.push(t, x) } else { last.push(t, x) }
+        }
+        assert_eq!(first.joined(&last), all);
+        // By hand: slope 5/5, residuals 0.75, -0.75, -0.75, 0.75.
+        assert!((all.slope().unwrap() - 1.0).abs() < 1e-12);
+        assert!((all.scatter() - 2.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn one_point_has_no_slope() {
+        let mut line = Line::default();
+        assert_eq!(line.slope(), None);
+        line.push(1.0, 2.0);
+        assert_eq!(line.slope(), None);
+    }
+}

@@ -1,0 +1,216 @@
+//! Recursive least squares with forgetting.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::NotPositiveDefinite;
+
+/// How old rows lose weight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Forgetting {
+    /// All rows count alike.
+    None,
+    /// Every row before the newest loses the share 1 - factor, in all directions; directions
+    /// that the data no longer excite are forgotten too.
+    Exponential(f64),
+    /// Only what the newest row tells anew is forgotten (Cao and Schwartz 2000): the estimate
+    /// keeps what it knows in unexcited directions.
+    Directional(f64),
+}
+
+/// What a row did to an estimate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Observed minus predicted.
+    pub innovation: f64,
+    /// Variance of the innovation, in units of the error's variance.
+    pub variance: f64,
+}
+
+/// Recursive least squares (Liu 2018, eq. 9-11) in Joseph form.
+///
+/// The covariance is in units of the error's variance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rls<const N: usize> {
+    estimate: SVector<f64, N>,
+    covariance: SMatrix<f64, N, N>,
+    forgetting: Forgetting,
+}
+
+impl<const N: usize> Rls<N> {
+    /// Starts at `estimate` with independent errors of these variances; p0 for all of them in
+    /// Liu 2018.
+    pub fn new(
+        estimate: SVector<f64, N>,
+        variances: &SVector<f64, N>,
+        forgetting: Forgetting,
+    ) -> Self {
+        Rls { estimate, covariance: SMatrix::from_diagonal(variances), forgetting }
+    }
+
+    /// The estimate.
+    pub fn estimate(&self) -> &SVector<f64, N> {
+        &self.estimate
+    }
+
+    /// The estimate's covariance, in units of the error's variance.
+    pub fn covariance(&self) -> &SMatrix<f64, N, N> {
+        &self.covariance
+    }
+
+    /// Goes on from another estimate and covariance.
+    pub fn restart(&mut self, estimate: SVector<f64, N>, covariance: SMatrix<f64, N, N>) {
+        (self.estimate, self.covariance) = (estimate, covariance);
+    }
+
+    /// Takes in a row `observed = features . theta + error`.
+    ///
+    /// # Errors
+    ///
+    /// When the covariance is no longer positive definite; the estimate is then left alone.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    pub fn update(
+        &mut self,
+        features: &SVector<f64, N>,
+        observed: f64,
+    ) -> Result<Step, NotPositiveDefinite> {
+        match self.forgetting {
+            Forgetting::None => {}
+            Forgetting::Exponential(factor) => self.covariance /= factor,
+            Forgetting::Directional(factor) => self.forget_along(features, factor)?,
+        }
+        scalar_update(&mut self.estimate, &mut self.covariance, features, observed)
+    }
+
+    /// P + (1 - f)/f phi phi' / (phi' P^-1 phi): takes the share 1 - f of the information
+    /// along the new row, and nothing across it.
+    fn forget_along(
+        &mut self,
+        features: &SVector<f64, N>,
+        factor: f64,
+    ) -> Result<(), NotPositiveDefinite> {
+        let solved = self.covariance.cholesky().ok_or(NotPositiveDefinite)?.solve(features);
+        let held = features.dot(&solved);
+        if held > 0.0 {
+            let step = (1.0 - factor) / (factor * held);
+            self.covariance.ger(step, features, features, 1.0);
+        }
+        Ok(())
+    }
+}
+
+/// One row of recursive least squares, in Joseph form: P stays symmetric and positive.
+pub(super) fn scalar_update<const N: usize>(
+    estimate: &mut SVector<f64, N>,
+    covariance: &mut SMatrix<f64, N, N>,
+    features: &SVector<f64, N>,
+    observed: f64,
+) -> Result<Step, NotPositiveDefinite> {
+    let spread = *covariance * features;
+    let variance = 1.0 + features.dot(&spread);
+    let innovation = observed - features.dot(estimate);
+    if !(variance >= 1.0 && variance.is_finite() && innovation.is_finite()) {
+        return Err(NotPositiveDefinite);
+    }
+    let gain = spread / variance;
+    *estimate += gain * innovation;
+    // (I - L phi') P (I - L phi')' + L L', expanded by columns of P (I - L phi')'.
+    let reduced = *covariance - spread * gain.transpose();
+    let column = reduced.transpose() * features;
+    let joseph = reduced - gain * column.transpose() + gain * gain.transpose();
+    *covariance = (joseph + joseph.transpose()) * 0.5;
+    Ok(Step { innovation, variance })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::filter::SquareRootInformation;
+    use nalgebra::{Matrix3, Vector3};
+    use rand::{RngExt, SeedableRng};
+
+    fn rows(count: usize) -> Vec<(Vector3<f64>, f64)> {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+        (0..count)
+            .map(|_| {
+                let x = 2.0 * random.random::<f64>();
+                let row = Vector3::new(1.0, x, x * x);
+                (row, row.dot(&Vector3::new(1.0, 0.2, 0.5)) + random.random::<f64>() - 0.5)
+            })
+            .collect()
+    }
+
+    /// The batch twin: the same prior and weights, by orthogonal rotations.
+    fn twin(
+        rows: &[(Vector3<f64>, f64)],
+        variance: f64,
+        factor: f64,
+    ) -> (Vector3<f64>, Matrix3<f64>) {
+        let mut batch =
+            SquareRootInformation::<3>::new(&Vector3::repeat(1.0 / variance), &Vector3::zeros());
+        for (features, observed) in rows {
+            batch.forget(factor);
+            batch.update(features, *observed);
+        }
+        (batch.solve().unwrap(), batch.covariance().unwrap())
+    }
+
+    #[test]
+    fn the_recursion_equals_its_batch_twin_with_and_without_forgetting() {
+        for (forgetting, factor) in [(Forgetting::None, 1.0), (Forgetting::Exponential(0.95), 0.95)]
+        {
+            let rows = rows(60);
+            let mut rls = Rls::new(Vector3::zeros(), &Vector3::repeat(1e4), forgetting);
+            for (features, observed) in &rows {
+                rls.update(features, *observed).unwrap();
+            }
+            let (estimate, covariance) = twin(&rows, 1e4, factor);
+            assert!((rls.estimate() - estimate).norm() < 1e-7);
+            assert!((rls.covariance() - covariance).norm() < 1e-7 * covariance.norm().max(1.0));
+        }
+    }
+
+    #[test]
+    fn directional_forgetting_keeps_what_the_data_no_longer_excite() {
+        let mut directional =
+            Rls::new(Vector3::zeros(), &Vector3::repeat(1e4), Forgetting::Directional(0.9));
+        let mut exponential =
+            Rls::new(Vector3::zeros(), &Vector3::repeat(1e4), Forgetting::Exponential(0.9));
+        for (features, observed) in rows(100) {
+            directional.update(&features, observed).unwrap();
+            exponential.update(&features, observed).unwrap();
+        }
+        let across = Vector3::new(1.0, -2.0, 1.0).normalize();
+        let spread = |rls: &Rls<3>| (across.transpose() * rls.covariance() * across)[0];
+        let before = spread(&directional);
+        let cruise = Vector3::new(1.0, 1.0, 1.0);
+        for _ in 0..150 {
+            directional.update(&cruise, 1.7).unwrap();
+            exponential.update(&cruise, 1.7).unwrap();
+        }
+        assert!(spread(&directional) < 1.5 * before, "across the cruise nothing is forgotten");
+        assert!(spread(&exponential) > 1e5 * before, "plain forgetting winds up");
+        assert!((directional.estimate().dot(&cruise) - 1.7).abs() < 1e-6, "along it all is new");
+    }
+
+    #[test]
+    fn the_covariance_stays_positive_over_a_million_updates_of_one_direction() {
+        let mut rls =
+            Rls::new(Vector3::zeros(), &Vector3::repeat(1e6), Forgetting::Directional(0.999));
+        for _ in 0..1_000_000 {
+            rls.update(&Vector3::new(1.0, 0.999, 0.998), 2.0).unwrap();
+        }
+        assert!(rls.covariance().cholesky().is_some());
+    }
+
+    #[test]
+    fn a_row_of_nan_is_refused_and_leaves_the_estimate() {
+        let mut rls = Rls::new(Vector3::zeros(), &Vector3::repeat(1.0), Forgetting::None);
+        let before = rls;
+        assert!(rls.update(&Vector3::repeat(f64::NAN), 1.0).is_err());
+        assert!(rls.update(&Vector3::repeat(1.0), f64::NAN).is_err());
+        assert_eq!(rls, before);
+    }
+}

@@ -1,0 +1,290 @@
+//! The pipelines `ls`, `rls`, `regularised_rls`, `mils` and `v_mils`.
+
+use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason};
+use nalgebra::{Matrix3, SMatrix};
+
+use super::coasting::CoastingSegments;
+use super::momentum::MomentumBlocks;
+use super::noise_bank::{NoiseBank, WhiteRow};
+use super::regression::{Observation, PARAMETERS, Unknowns, scaled, unscaling};
+use super::report::{DrivenSpeeds, Report};
+use super::sample::UnitSample;
+use super::settings::{DataSettings, DataSource};
+use super::solver::{Solution, Solver, bank_penalty};
+use crate::filter::RunningMedian;
+use crate::force::ResolvedSample;
+use crate::pipeline::output::{write_innovations, write_parameters, write_status};
+use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
+use crate::train::{Davis, TrainModel};
+
+/// Rows that the innovation statistics look back over.
+const MONITOR_ROWS: u32 = 60;
+/// Rows whose median gives the robust scale of the innovations.
+const SCALE_ROWS: usize = 31;
+/// Rows before the median is believed.
+const SCALE_ROWS_MIN: usize = 8;
+/// The median of |x| for a standard normal x.
+const NORMAL_MEDIAN: f64 = 0.6745;
+/// Robust standard deviations beyond which a row is refused.
+const REFUSED_BEYOND: f64 = 5.0;
+/// Rows before the solution replaces the declared resistance in telling outliers.
+const ROWS_BEFORE_OWN: f64 = 12.0;
+
+#[derive(Clone, Debug)]
+enum Source {
+    Momentum(MomentumBlocks),
+    Coasting(CoastingSegments),
+}
+
+/// Davis coefficients by one of the least-squares recursions of Liu 2018.
+///
+/// Samples become rows ([`MomentumBlocks`] or [`CoastingSegments`]), the [`NoiseBank`] makes
+/// them independent and says how noisy they are, a [`Solver`] takes them in.
+#[derive(Clone, Debug)]
+pub struct ResistanceLeastSquares {
+    kind: PipelineKind,
+    settings: DataSettings,
+    source: Source,
+    bank: NoiseBank,
+    fresh: Solver,
+    solver: Solver,
+    declared: Solution,
+    solution: Option<Solution>,
+    known: Davis,
+    monitor: InnovationMonitor,
+    deviations: RunningMedian<SCALE_ROWS>,
+    refused_share: f64,
+    speeds: DrivenSpeeds,
+    report: Report,
+    obstacle: Option<Reason>,
+    disturbance: (f64, f64),
+    weight_kn: f64,
+    resets: u64,
+}
+
+impl ResistanceLeastSquares {
+    /// An estimator for a train; `lambda` is the noise bank's, `forgetting` its weight kept per
+    /// row.
+    pub fn new(
+        kind: PipelineKind,
+        train: &TrainModel,
+        settings: DataSettings,
+        solver: Solver,
+        lambda: f64,
+        forgetting: f64,
+    ) -> Self {
+        let bank = NoiseBank::new(&bank_penalty(&settings, lambda), forgetting);
+        let declared = declared_solution(train, &settings);
+        ResistanceLeastSquares {
+            kind,
+            settings,
+            source: match settings.source {
+                DataSource::Momentum => Source::Momentum(MomentumBlocks::new(settings)),
+                DataSource::Coasting => Source::Coasting(CoastingSegments::new(settings)),
+            },
+            bank,
+            fresh: solver.clone(),
+            solver,
+            declared,
+            solution: None,
+            known: train.resistance,
+            monitor: InnovationMonitor::new(MONITOR_ROWS),
+            deviations: RunningMedian::default(),
+            refused_share: 0.0,
+            speeds: DrivenSpeeds::default(),
+            report: Report::unestimated(&declared, Reason::TooFewSamples),
+            obstacle: None,
+            disturbance: (0.0, 0.0),
+            weight_kn: TrainModel::weight_kn(train.mass_kg),
+            resets: 0,
+        }
+    }
+
+    fn observe(&mut self, now: &UnitSample) -> Result<Option<(Observation, f64)>, RejectionReason> {
+        if now.speed_mps < self.settings.speed_min_mps {
+            // A holding brake may be reported, and static friction is no Davis resistance.
+            self.break_chain();
+            return Ok(None);
+        }
+        Ok(match &mut self.source {
+            Source::Momentum(blocks) => blocks
+                .push(now, &self.known)?
+                .map(|block| (Observation::Block(block), block.speed_mps)),
+            Source::Coasting(segments) => segments
+                .push(now, &self.known)?
+                .map(|segment| (Observation::Segment(segment), segment.speed_mps)),
+        })
+    }
+
+    fn break_chain(&mut self) {
+        match &mut self.source {
+            Source::Momentum(blocks) => blocks.break_chain(),
+            Source::Coasting(segments) => segments.break_chain(),
+        }
+    }
+
+    /// The innovation of a row over its standard deviation.
+    fn normalised(&self, row: &WhiteRow) -> f64 {
+        let own = self.solution.filter(|_| self.bank.count() >= ROWS_BEFORE_OWN);
+        let Solution { estimate, covariance } = own.unwrap_or(self.declared);
+        let variance = 1.0 + row.features.dot(&(covariance * row.features));
+        (row.observed - row.features.dot(&estimate)) / variance.sqrt()
+    }
+
+    fn take(&mut self, observation: &Observation, speed_mps: f64) -> Outcome {
+        if observation.is_first() {
+            self.monitor.break_here();
+            self.solver.skip();
+        }
+        let Some(row) = self.bank.predict(observation) else { return Outcome::Used };
+        let normalised = self.normalised(&row);
+        if !normalised.is_finite() {
+            self.reset();
+            return Outcome::Rejected(RejectionReason::NotFinite);
+        }
+        self.deviations.push(normalised.abs());
+        let is_bad = normalised.abs() > self.solver.bad_beyond(REFUSED_BEYOND) * self.robust_std();
+        self.refused_share += (f64::from(is_bad) - self.refused_share) / f64::from(MONITOR_ROWS);
+        if is_bad {
+            self.bank.refuse(observation);
+            self.solver.skip();
+            self.monitor.break_here();
+            return Outcome::Rejected(RejectionReason::Outlier);
+        }
+        let is_other_noise = self.bank.accept(observation);
+        if self.solver.take(&row).is_err() {
+            self.reset();
+            return Outcome::Used;
+        }
+        if is_other_noise {
+            self.solver.restart(&self.bank);
+        }
+        if self.bank.count() >= ROWS_BEFORE_OWN {
+            self.monitor.push(normalised);
+        }
+        self.speeds.push(speed_mps);
+        self.judge();
+        Outcome::Updated
+    }
+
+    /// Robust standard deviation of the normalised innovations, never below 1.
+    ///
+    /// It grows when all rows deviate, so that a train that has truly changed is believed after
+    /// a few rows.
+    fn robust_std(&self) -> f64 {
+        match self.deviations.median() {
+            Some(median) if self.deviations.count() >= SCALE_ROWS_MIN => {
+                (median / NORMAL_MEDIAN).max(1.0)
+            }
+            _ => 1.0,
+        }
+    }
+
+    fn judge(&mut self) {
+        self.solution = self.solver.solution(&self.bank);
+        let Some(solution) = self.solution else { return };
+        self.disturbance = self.bank.disturbance(&solution.estimate);
+        let judged = Report::judge(
+            &solution,
+            &self.bank.disturbed(),
+            &self.monitor,
+            &self.speeds,
+            self.bank.count(),
+            self.refused_share,
+        );
+        match judged {
+            Some(report) => {
+                self.report = report;
+                if self.bank.count() >= ROWS_BEFORE_OWN {
+                    self.known = report.davis();
+                }
+            }
+            // Not yet determined; once it was, something is broken.
+            None if self.bank.count() >= 2.0 * ROWS_BEFORE_OWN => self.reset(),
+            None => {}
+        }
+    }
+
+    /// Starts anew after a numerical failure, and says so until there is an estimate again.
+    fn reset(&mut self) {
+        self.bank.clear();
+        self.solver.clone_from(&self.fresh);
+        self.solution = None;
+        self.break_chain();
+        self.resets += 1;
+        self.report = Report::unestimated(&self.declared, Reason::NumericalFailure);
+    }
+}
+
+impl Estimator for ResistanceLeastSquares {
+    fn kind(&self) -> PipelineKind {
+        self.kind
+    }
+
+    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+        self.weight_kn = sample.weight_kn;
+        let observed = UnitSample::of(sample).and_then(|now| self.observe(&now));
+        match observed {
+            Ok(observation) => {
+                self.obstacle = None;
+                match observation {
+                    Some((observation, speed_mps)) => self.take(&observation, speed_mps),
+                    None => Outcome::Used,
+                }
+            }
+            Err(reason) => {
+                if reason != RejectionReason::Outlier {
+                    self.break_chain();
+                }
+                if reason == RejectionReason::Missing {
+                    self.obstacle = Some(match sample.gradient_permille {
+                        None => Reason::GradientUnknown,
+                        Some(_) => Reason::MissingQuantity,
+                    });
+                }
+                Outcome::Rejected(reason)
+            }
+        }
+    }
+
+    fn write(&self, snapshot: &mut ParameterSnapshot) {
+        let report = &self.report;
+        let reason = match self.obstacle {
+            // Without a single row, what is missing tells more than that rows are few.
+            Some(obstacle) if self.bank.count() == 0.0 => obstacle,
+            _ => report.reason,
+        };
+        write_status(snapshot, report.status, reason);
+        let factors = unscaling();
+        let covariance =
+            Matrix3::from_diagonal(&factors) * report.covariance * Matrix3::from_diagonal(&factors);
+        write_parameters(
+            snapshot,
+            [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC],
+            &report.estimate.component_mul(&factors),
+            &covariance,
+        );
+        write_innovations(snapshot, &self.monitor);
+        snapshot.generation = self.resets;
+        snapshot.excited = report.excited;
+        snapshot.missing_manoeuvres = report.missing_manoeuvres;
+        // The disturbance acts against the motion as resistance does.
+        snapshot.unexplained_force_n = self.disturbance.0 * self.weight_kn;
+        snapshot.unexplained_force_std_n = self.disturbance.1 * self.weight_kn;
+        snapshot.speed_min_mps = self.speeds.min_mps;
+        snapshot.speed_max_mps = self.speeds.max_mps;
+    }
+}
+
+/// The declared resistance as a start, trusted to half its value and 1 N/kN; the forces as the
+/// settings trust them.
+fn declared_solution(train: &TrainModel, settings: &DataSettings) -> Solution {
+    let declared = scaled(&train.resistance);
+    let forces = bank_penalty(settings, 0.0);
+    let estimate = Unknowns::from_fn(|i, _| if i < PARAMETERS { declared[i] } else { 0.0 });
+    let variances = Unknowns::from_fn(|i, _| match i < PARAMETERS {
+        true => (1.0 + 0.5 * declared[i].abs()).powi(2),
+        false => 1.0 / forces[i],
+    });
+    Solution { estimate, covariance: SMatrix::from_diagonal(&variances) }
+}

@@ -1,0 +1,109 @@
+//! Davis a, b, c by least squares (Liu 2018), from coasting or from measured forces.
+//!
+//! # Layout, in the order a sample takes
+//!
+//! - `sample`, `speed`: forces per weight; spikes refused, noise of the speed learned
+//! - `momentum`, `coasting`: samples to observations of the regression in `regression`
+//! - `noise_bank`: observations to independent rows, and how noisy they are
+//! - `solver`: the recursions
+//! - `report`: bounds, excitation, status
+//! - `least_squares`: the pipeline around all of it
+
+mod coasting;
+mod least_squares;
+mod momentum;
+mod noise_bank;
+mod regression;
+mod report;
+mod sample;
+pub mod settings;
+mod solver;
+mod speed;
+
+pub use least_squares::ResistanceLeastSquares;
+
+use dynocar_shared::PipelineKind;
+
+use self::settings::{LsSettings, MilsSettings, RlsSettings};
+use self::solver::Solver;
+use super::settings::SettingError;
+use crate::train::TrainModel;
+
+/// Regularised least squares over all rows (Liu 2018, eq. 7).
+///
+/// # Errors
+///
+/// When a setting lies outside its range.
+pub fn ls(
+    train: &TrainModel,
+    settings: &LsSettings,
+) -> Result<ResistanceLeastSquares, SettingError> {
+    settings.check()?;
+    let kind = PipelineKind::LeastSquares;
+    let (data, lambda) = (settings.data, settings.lambda);
+    Ok(ResistanceLeastSquares::new(kind, train, data, Solver::Batch, lambda, 1.0))
+}
+
+/// Recursive least squares (eq. 9-11) with directional forgetting.
+///
+/// # Errors
+///
+/// When a setting lies outside its range.
+pub fn rls(
+    train: &TrainModel,
+    settings: &RlsSettings,
+) -> Result<ResistanceLeastSquares, SettingError> {
+    settings.check()?;
+    let solver = Solver::rls(settings);
+    // The bank needs some regularisation of its own while rows are few.
+    let lambda = 2.0 / settings.start_variance;
+    let (data, forgetting) = (settings.data, settings.forgetting);
+    Ok(ResistanceLeastSquares::new(PipelineKind::Rls, train, data, solver, lambda, forgetting))
+}
+
+/// Regularised recursive least squares (eq. 12-16).
+///
+/// # Errors
+///
+/// When a setting lies outside its range.
+pub fn regularised_rls(
+    train: &TrainModel,
+    settings: &MilsSettings,
+) -> Result<ResistanceLeastSquares, SettingError> {
+    regularised(PipelineKind::RegularisedRls, train, settings, Solver::mils(settings, 1))
+}
+
+/// Regularised multi-innovation least squares.
+///
+/// # Errors
+///
+/// When a setting lies outside its range.
+pub fn mils(
+    train: &TrainModel,
+    settings: &MilsSettings,
+) -> Result<ResistanceLeastSquares, SettingError> {
+    let solver = Solver::mils(settings, settings.innovation_length as usize);
+    regularised(PipelineKind::Mils, train, settings, solver)
+}
+
+/// Interval-varying, regularised multi-innovation least squares.
+///
+/// # Errors
+///
+/// When a setting lies outside its range.
+pub fn v_mils(
+    train: &TrainModel,
+    settings: &MilsSettings,
+) -> Result<ResistanceLeastSquares, SettingError> {
+    regularised(PipelineKind::VMils, train, settings, Solver::v_mils(settings))
+}
+
+fn regularised(
+    kind: PipelineKind,
+    train: &TrainModel,
+    settings: &MilsSettings,
+    solver: Solver,
+) -> Result<ResistanceLeastSquares, SettingError> {
+    settings.check()?;
+    Ok(ResistanceLeastSquares::new(kind, train, settings.data, solver, settings.lambda, 1.0))
+}

@@ -1,0 +1,189 @@
+//! Regression data from measured forces: means of short blocks, joined by the impulse between.
+//!
+//! A row compares the change of the mean momentum from one block to the next with the impulse of
+//! the known forces. All speeds of a block are used, so that white noise averages out, and the
+//! regressors are integrals of powers of the speed, not powers of its mean. Neighbouring rows
+//! share the mean of a block (their errors correlate by -1/2); the whitener that follows knows
+//! it, so that nothing is lost by short blocks.
+
+use dynocar_shared::RejectionReason;
+
+use super::regression::{BRAKE_SCALE, Columns, FORCE_DELAY, MomentumBlock, TRACTION_SCALE};
+use super::sample::{SpeedWatch, UnitSample, resistance_integral, trapezoids};
+use super::settings::DataSettings;
+use super::speed::SpeedVerdict;
+use crate::filter::Line;
+use crate::train::Davis;
+
+/// Fewest samples in a block: the scatter about a line needs three.
+const COUNT_MIN: f64 = 3.0;
+
+/// Sums over the samples of a block.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Block {
+    first: UnitSample,
+    /// Time since the mean of the block before, at the first sample.
+    start_s: f64,
+    speed_sum: f64,
+    integral_sum: Columns,
+    /// The speed less what the forces explain, over time: its scatter is noise.
+    rest: Line,
+    edge_variance: f64,
+    speed_min_mps: f64,
+    speed_max_mps: f64,
+}
+
+/// An unbroken row of samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Chain {
+    last: UnitSample,
+    /// What each column gathered since the mean of the block before.
+    integral: Columns,
+    block: Block,
+    /// Variance of the impulse in the block before; `None` in the first block.
+    variance_before: Option<f64>,
+}
+
+/// Builds [`MomentumBlock`]s from samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MomentumBlocks {
+    settings: DataSettings,
+    watch: SpeedWatch,
+    chain: Option<Chain>,
+}
+
+impl MomentumBlocks {
+    /// A builder without samples.
+    pub fn new(settings: DataSettings) -> Self {
+        MomentumBlocks { settings, watch: SpeedWatch::new(settings.spike_mps), chain: None }
+    }
+
+    /// Ends the chain: the next sample starts a new one.
+    pub fn break_chain(&mut self) {
+        self.chain = None;
+    }
+
+    /// Takes in a sample that moves; gives the block that it closes. `known` is the resistance
+    /// as far as it is known, for telling spikes.
+    ///
+    /// # Errors
+    ///
+    /// [`RejectionReason::Outlier`] for a spike of the speed.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    pub fn push(
+        &mut self,
+        now: &UnitSample,
+        known: &Davis,
+    ) -> Result<Option<MomentumBlock>, RejectionReason> {
+        self.watch.noise.see(now.speed_mps);
+        let Some(chain) = self.chain.as_mut().filter(|chain| chain.last.stretch == now.stretch)
+        else {
+            self.chain = Some(Chain::start(now));
+            return Ok(None);
+        };
+        match self.watch.judge(&chain.last, now, known) {
+            SpeedVerdict::Continues => {}
+            SpeedVerdict::Spike => return Err(RejectionReason::Outlier),
+            SpeedVerdict::Restart => {
+                self.chain = Some(Chain::start(now));
+                return Err(RejectionReason::Outlier);
+            }
+        }
+        chain.advance(now, known);
+        if chain.integral[1] - chain.block.start_s < self.settings.block_s
+            || chain.block.rest.count() < COUNT_MIN
+        {
+            return Ok(None);
+        }
+        let rest = &chain.block.rest;
+        self.watch.noise.take(rest.scatter(), rest.count() - 2.0);
+        let range_mps = chain.block.speed_max_mps - chain.block.speed_min_mps;
+        let speed_variance = self.watch.noise.variance_of_mean(rest.count(), range_mps);
+        Ok(Some(chain.close(speed_variance, &self.settings)))
+    }
+}
+
+impl Chain {
+    fn start(first: &UnitSample) -> Self {
+        let mut chain = Chain {
+            last: *first,
+            integral: Columns::zeros(),
+            block: Block::open(first, 0.0),
+            variance_before: None,
+        };
+        chain.block.add(first, &chain.integral, 0.0);
+        chain
+    }
+
+    fn advance(&mut self, now: &UnitSample, known: &Davis) {
+        let before = self.last;
+        for (column, area) in trapezoids(&before, now).into_iter().enumerate() {
+            self.integral[column] += area;
+        }
+        let step_s = now.seconds_since(&before);
+        let change = (now.traction - now.brake) - (before.traction - before.brake);
+        self.integral[1 + TRACTION_SCALE] -= 0.5 * step_s * (before.traction + now.traction);
+        self.integral[1 + BRAKE_SCALE] += 0.5 * step_s * (before.brake + now.brake);
+        // A force that acts later by d has given d times its change less.
+        self.integral[1 + FORCE_DELAY] += change;
+        // Where within the step the force changed is not known.
+        self.block.edge_variance += (step_s * change).powi(2) / 12.0;
+        let gained = self.integral[0] - resistance_integral(known, &self.integral.as_slice()[1..]);
+        self.block.add(now, &self.integral, gained / now.inertia);
+        self.last = *now;
+    }
+
+    fn close(&mut self, speed_variance: f64, settings: &DataSettings) -> MomentumBlock {
+        let block = &self.block;
+        let count = block.rest.count();
+        let inertia = self.last.inertia;
+        let mean_integral = block.integral_sum / count;
+        let variance = block.impulse_variance(&self.last, settings);
+        let closed = MomentumBlock {
+            is_first: self.variance_before.is_none(),
+            momentum: inertia * block.speed_sum / count,
+            momentum_variance: inertia * inertia * speed_variance,
+            impulse: mean_integral,
+            impulse_variance: 0.5 * (variance + self.variance_before.unwrap_or(variance)),
+            speed_mps: block.speed_sum / count,
+        };
+        self.integral -= mean_integral;
+        self.variance_before = Some(variance);
+        self.block = Block::open(&self.last, self.integral[1]);
+        closed
+    }
+}
+
+impl Block {
+    fn open(first: &UnitSample, start_s: f64) -> Self {
+        Block {
+            first: *first,
+            start_s,
+            speed_sum: 0.0,
+            integral_sum: Columns::zeros(),
+            rest: Line::default(),
+            edge_variance: 0.0,
+            speed_min_mps: f64::INFINITY,
+            speed_max_mps: 0.0,
+        }
+    }
+
+    fn add(&mut self, now: &UnitSample, integral: &Columns, gained_mps: f64) {
+        self.speed_sum += now.speed_mps;
+        self.integral_sum += integral;
+        self.rest.push(integral[1] - self.start_s, now.speed_mps - gained_mps);
+        self.speed_min_mps = self.speed_min_mps.min(now.speed_mps);
+        self.speed_max_mps = self.speed_max_mps.max(now.speed_mps);
+    }
+
+    /// Variance of the impulse by what is not known of when and where the forces acted.
+    fn impulse_variance(&self, last: &UnitSample, settings: &DataSettings) -> f64 {
+        let speed_mps = (self.speed_sum / self.rest.count()).max(settings.speed_min_mps);
+        let place = settings.position_std_m / speed_mps
+            * (last.gradient_permille - self.first.gradient_permille);
+        self.edge_variance + place * place
+    }
+}

@@ -1,0 +1,192 @@
+//! The linear regression that resistance estimators share.
+//!
+//! In momentum per weight, with s = 1000 (1 + gamma) / g, the declared model reads
+//! `s dv/dt = f(t) - w0(v)`, f being the driving force in N per kN of weight (Liu 2018, eq. 5,
+//! whose printed factor 100 lacks rotating mass and rounds 1000/g). It is linear in Davis a, b
+//! and c whatever window it is integrated over.
+
+use nalgebra::{SMatrix, SVector, Vector2, Vector3};
+
+use crate::filter::{Propagation, Sighting, Whitener};
+use crate::train::Davis;
+
+/// Davis a, b, c.
+pub const PARAMETERS: usize = 3;
+/// All that a row depends on: Davis a, b, c, then what is not exactly known of the forces, in
+/// this order: the scale of traction, the scale of the brake, the delay in s of both.
+pub const UNKNOWNS: usize = 6;
+/// Place of the error of the traction force's scale among the unknowns.
+pub const TRACTION_SCALE: usize = 3;
+/// Place of the error of the brake force's scale among the unknowns.
+pub const BRAKE_SCALE: usize = 4;
+/// Place of the delay in s of a force behind its report among the unknowns.
+pub const FORCE_DELAY: usize = 5;
+/// Columns of a row: the known part, then what each unknown takes off it.
+pub const COLUMNS: usize = 1 + UNKNOWNS;
+/// Regressors are 1, v/20 and (v/20)²: of one magnitude over the speeds of trains.
+pub const SPEED_SCALE_MPS: f64 = 20.0;
+
+/// Hidden states of the error: accumulated momentum (or what the overlap brings over), and the
+/// disturbance.
+const STATES: usize = 2;
+const MOMENTUM: usize = 0;
+const DISTURBANCE: usize = 1;
+
+/// Known part and regressors by column.
+pub type Columns = SVector<f64, COLUMNS>;
+/// Values of the unknowns.
+pub type Unknowns = SVector<f64, UNKNOWNS>;
+/// The filter that makes rows independent.
+pub type RowWhitener = Whitener<STATES, COLUMNS>;
+
+/// The scaled regressors of w0 at a speed in m/s.
+pub fn regressors(speed_mps: f64) -> [f64; PARAMETERS] {
+    let scaled = speed_mps / SPEED_SCALE_MPS;
+    [1.0, scaled, scaled * scaled]
+}
+
+/// Scaled parameters, all in N/kN, of Davis coefficients.
+pub fn scaled(davis: &Davis) -> Vector3<f64> {
+    Vector3::new(davis.a, davis.b * SPEED_SCALE_MPS, davis.c * SPEED_SCALE_MPS * SPEED_SCALE_MPS)
+}
+
+/// Factors that turn scaled parameters into Davis coefficients.
+pub fn unscaling() -> Vector3<f64> {
+    Vector3::new(1.0, 1.0 / SPEED_SCALE_MPS, 1.0 / (SPEED_SCALE_MPS * SPEED_SCALE_MPS))
+}
+
+/// A slow force that the model does not know: an Ornstein-Uhlenbeck process.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Disturbance {
+    /// Standard deviation in N/kN.
+    pub std_n_per_kn: f64,
+    /// Correlation time in s.
+    pub time_s: f64,
+}
+
+/// Mean momentum of a block of samples, and what should have led to it from the block before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MomentumBlock {
+    /// True when no block before it belongs to it.
+    pub is_first: bool,
+    /// s times the mean speed, in N/kN s.
+    pub momentum: f64,
+    /// Variance of `momentum` by the noise of the speed.
+    pub momentum_variance: f64,
+    /// From the mean of the block before to this one's: the integral of f, then what each
+    /// unknown takes off it.
+    pub impulse: Columns,
+    /// Variance of the integral of f.
+    pub impulse_variance: f64,
+    /// Mean speed in m/s.
+    pub speed_mps: f64,
+}
+
+/// Least-squares slope of the speed over a coasting segment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CoastingSegment {
+    /// True when it shares its first half with no segment before it.
+    pub is_first: bool,
+    /// Resistance after known forces in N/kN, then the mean regressors with the slope's weights.
+    pub row: Columns,
+    /// The row of the segment before, which shares half of the samples; unused in the first.
+    pub row_before: Columns,
+    /// Variance of the resistance by the noise of the speed.
+    pub variance: f64,
+    /// Time in s from the segment before.
+    pub step_s: f64,
+    /// Mean speed in m/s.
+    pub speed_mps: f64,
+}
+
+/// One observation of the regression, of either source.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Observation {
+    /// From measured forces.
+    Block(MomentumBlock),
+    /// From coasting.
+    Segment(CoastingSegment),
+}
+
+/// Half-overlapping slopes correlate by -1/4 (white noise, equal halves), which is a moving
+/// average of new errors, `e_k + OVERLAP e_{k-1}`: OVERLAP / (1 + OVERLAP²) = -1/4.
+const OVERLAP: f64 = -0.267_949_192_431_122_7;
+
+impl Observation {
+    /// True when nothing before it is connected with it.
+    pub fn is_first(&self) -> bool {
+        match self {
+            Observation::Block(block) => block.is_first,
+            Observation::Segment(segment) => segment.is_first,
+        }
+    }
+
+    /// A whitener at this observation, the first of a chain; a block is then used up.
+    pub fn start(&self, disturbance: &Disturbance) -> RowWhitener {
+        let mut state = SMatrix::zeros();
+        let mut covariance = SMatrix::zeros();
+        covariance[(DISTURBANCE, DISTURBANCE)] = disturbance.std_n_per_kn.powi(2);
+        match self {
+            Observation::Block(block) => {
+                state[(MOMENTUM, 0)] = block.momentum;
+                covariance[(MOMENTUM, MOMENTUM)] = block.momentum_variance;
+            }
+            // No segment before, so nothing is brought over.
+            Observation::Segment(_) => {}
+        }
+        Whitener::new(state, covariance)
+    }
+
+    /// How the error moves from the observation before to this one.
+    pub fn propagation(&self, disturbance: &Disturbance) -> Propagation<STATES, COLUMNS> {
+        let mut step: Propagation<STATES, COLUMNS> = Propagation {
+            transition: SMatrix::zeros(),
+            input: SMatrix::zeros(),
+            noise: SMatrix::zeros(),
+        };
+        let duration_s = match self {
+            Observation::Block(block) => {
+                step.transition[(MOMENTUM, MOMENTUM)] = 1.0;
+                step.input.set_row(MOMENTUM, &block.impulse.transpose());
+                step.noise[(MOMENTUM, MOMENTUM)] = block.impulse_variance;
+                step.transition[(MOMENTUM, DISTURBANCE)] = -block.impulse[1];
+                block.impulse[1]
+            }
+            Observation::Segment(segment) => {
+                // The new error of the row before is that row less its other parts.
+                step.transition[(MOMENTUM, MOMENTUM)] = -OVERLAP;
+                step.transition[(MOMENTUM, DISTURBANCE)] = -OVERLAP;
+                step.input.set_row(MOMENTUM, &(segment.row_before * OVERLAP).transpose());
+                segment.step_s
+            }
+        };
+        let kept = (-duration_s / disturbance.time_s).exp();
+        step.transition[(DISTURBANCE, DISTURBANCE)] = kept;
+        step.noise[(DISTURBANCE, DISTURBANCE)] =
+            disturbance.std_n_per_kn.powi(2) * (1.0 - kept * kept);
+        step
+    }
+
+    /// What is seen of the error.
+    pub fn sighting(&self) -> Sighting<STATES, COLUMNS> {
+        match self {
+            Observation::Block(block) => Sighting {
+                direction: Vector2::new(1.0, 0.0),
+                observed: Columns::from_fn(|i, _| if i == 0 { block.momentum } else { 0.0 }),
+                variance: block.momentum_variance,
+            },
+            Observation::Segment(segment) => Sighting {
+                direction: Vector2::new(1.0, 1.0),
+                observed: segment.row,
+                variance: segment.variance / (1.0 + OVERLAP * OVERLAP),
+            },
+        }
+    }
+}
+
+/// The disturbance in N/kN for given parameters, with its variance in units of the errors'.
+pub fn disturbance_of(whitener: &RowWhitener, unknowns: &Unknowns) -> (f64, f64) {
+    let columns = whitener.state().row(DISTURBANCE);
+    let taken: f64 = (0..UNKNOWNS).map(|i| columns[i + 1] * unknowns[i]).sum();
+    (columns[0] - taken, whitener.covariance()[(DISTURBANCE, DISTURBANCE)])
+}

@@ -1,0 +1,109 @@
+//! What the regression takes from a sample.
+
+use dynocar_shared::RejectionReason;
+use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+
+use super::regression::{PARAMETERS, regressors, scaled};
+use super::speed::{SpeedGate, SpeedNoise, SpeedVerdict};
+use crate::force::ResolvedSample;
+use crate::train::Davis;
+
+/// A sample with its forces per weight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnitSample {
+    /// Measurement time in ns.
+    pub time_ns: i64,
+    /// Stretch of unbroken motion.
+    pub stretch: u32,
+    /// Speed in m/s.
+    pub speed_mps: f64,
+    /// Traction minus brake minus gradient, declared curve and tunnel resistance, in N/kN.
+    pub driving: f64,
+    /// Traction in N/kN.
+    pub traction: f64,
+    /// Brake in N/kN, retarding.
+    pub brake: f64,
+    /// Gradient in ‰ along the travel.
+    pub gradient_permille: f64,
+    /// s = 1000 (1 + gamma) / g in N/kN per m/s²: momentum per weight and speed.
+    pub inertia: f64,
+}
+
+impl UnitSample {
+    /// The forces of a sample per weight.
+    ///
+    /// # Errors
+    ///
+    /// [`RejectionReason::WheelSlide`] while the wheels slide, [`RejectionReason::Missing`]
+    /// while a force or the gradient is missing.
+    pub fn of(sample: &ResolvedSample) -> Result<Self, RejectionReason> {
+        if sample.is_sliding {
+            return Err(RejectionReason::WheelSlide);
+        }
+        let per_weight = |force: Option<f64>| {
+            force.map(|force_n| force_n / sample.weight_kn).ok_or(RejectionReason::Missing)
+        };
+        Ok(UnitSample {
+            time_ns: sample.time_ns,
+            stretch: sample.stretch,
+            speed_mps: sample.speed_mps,
+            driving: per_weight(sample.driving_force_n())?,
+            traction: per_weight(sample.traction_force_n)?,
+            brake: per_weight(sample.brake_force_n)?,
+            gradient_permille: sample.gradient_permille.ok_or(RejectionReason::Missing)?,
+            inertia: 1000.0 * sample.inertial_mass_kg / (sample.mass_kg * STANDARD_GRAVITY_MPS2),
+        })
+    }
+
+    /// Time in s since another sample.
+    pub fn seconds_since(&self, earlier: &UnitSample) -> f64 {
+        (self.time_ns - earlier.time_ns) as f64 * 1e-9
+    }
+}
+
+/// Trapezoids from one sample to the next: of the driving force, then of the regressors.
+pub fn trapezoids(from: &UnitSample, to: &UnitSample) -> [f64; 1 + PARAMETERS] {
+    let half_s = 0.5 * to.seconds_since(from);
+    let (at_from, at_to) = (regressors(from.speed_mps), regressors(to.speed_mps));
+    let mut areas = [half_s * (from.driving + to.driving); 1 + PARAMETERS];
+    for i in 0..PARAMETERS {
+        areas[i + 1] = half_s * (at_from[i] + at_to[i]);
+    }
+    areas
+}
+
+/// Keeps the newest accepted sample, refuses spikes, learns the noise of the speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpeedWatch {
+    /// Noise of the speed so far.
+    pub noise: SpeedNoise,
+    gate: SpeedGate,
+    spike_mps: f64,
+}
+
+impl SpeedWatch {
+    /// A watch that never calls a deviation below `spike_mps` a spike.
+    pub fn new(spike_mps: f64) -> Self {
+        SpeedWatch { noise: SpeedNoise::default(), gate: SpeedGate::default(), spike_mps }
+    }
+
+    /// Judges a sample by the one before it and the resistance as far as it is known.
+    ///
+    /// The force may have changed anywhere in the step, and a tenth of every force is doubted.
+    pub fn judge(&mut self, before: &UnitSample, now: &UnitSample, known: &Davis) -> SpeedVerdict {
+        let step_s = now.seconds_since(before);
+        let driving = 0.5 * (before.driving + now.driving);
+        let resistance = known.w0_n_per_kn(before.speed_mps);
+        let expected_mps = before.speed_mps + step_s * (driving - resistance) / now.inertia;
+        let control = (before.traction - before.brake).abs().max((now.traction - now.brake).abs());
+        let doubt = 0.5 * (now.driving - before.driving).abs() + 0.1 * (control + resistance.abs());
+        let allowed_mps =
+            self.spike_mps + 8.0 * self.noise.variance().sqrt() + step_s * doubt / now.inertia;
+        self.gate.judge(now.speed_mps - expected_mps, allowed_mps)
+    }
+}
+
+/// w0 integrated, from the integrals of the regressors.
+pub fn resistance_integral(known: &Davis, regressor_integrals: &[f64]) -> f64 {
+    scaled(known).iter().zip(regressor_integrals).map(|(value, integral)| value * integral).sum()
+}

@@ -1,0 +1,106 @@
+//! What the speed signal itself says of its noise, and which of its values are spikes.
+
+/// Verdict on one speed value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SpeedVerdict {
+    /// It continues the ones before.
+    Continues,
+    /// It does not; the next may.
+    Spike,
+    /// So many in a row do not that the ones before must have been wrong.
+    Restart,
+}
+
+/// Refuses speeds that neither force nor inertia can explain.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SpeedGate {
+    refusals: u32,
+}
+
+/// After so many refusals in a row the new level is believed.
+const REFUSALS_BEFORE_RESTART: u32 = 3;
+
+impl SpeedGate {
+    /// Judges a deviation from the predicted speed against what may be.
+    pub fn judge(&mut self, deviation_mps: f64, allowed_mps: f64) -> SpeedVerdict {
+        if deviation_mps.abs() <= allowed_mps {
+            self.refusals = 0;
+            return SpeedVerdict::Continues;
+        }
+        self.refusals += 1;
+        if self.refusals < REFUSALS_BEFORE_RESTART {
+            return SpeedVerdict::Spike;
+        }
+        self.refusals = 0;
+        SpeedVerdict::Restart
+    }
+}
+
+/// Variance of the speed's white noise and its quantum, from the signal itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpeedNoise {
+    square_sum: f64,
+    freedom: f64,
+    quantum_mps: f64,
+    last_mps: Option<f64>,
+}
+
+/// The degrees of freedom that the variance looks back over.
+const MEMORY: f64 = 2_000.0;
+/// A scatter beyond this many times the known variance counts as so many times only.
+const CLIP: f64 = 9.0;
+/// Degrees of freedom before the scatter is clipped.
+const FREEDOM_BEFORE_CLIP: f64 = 20.0;
+
+impl Default for SpeedNoise {
+    fn default() -> Self {
+        SpeedNoise { square_sum: 0.0, freedom: 0.0, quantum_mps: f64::INFINITY, last_mps: None }
+    }
+}
+
+impl SpeedNoise {
+    /// Takes in a speed for the quantum: the smallest step ever seen.
+    pub fn see(&mut self, speed_mps: f64) {
+        if let Some(last) = self.last_mps.replace(speed_mps) {
+            let step = (speed_mps - last).abs();
+            // Below this it is the rounding of the numbers themselves.
+            if step > 1e-6 {
+                self.quantum_mps = self.quantum_mps.min(step);
+            }
+        }
+    }
+
+    /// Takes in the sum of squares, in (m/s)², of `freedom` independent deviations.
+    pub fn take(&mut self, square_sum: f64, freedom: f64) {
+        if freedom <= 0.0 || !square_sum.is_finite() {
+            return;
+        }
+        let clipped = match self.freedom > FREEDOM_BEFORE_CLIP {
+            true => square_sum.min(CLIP * freedom * self.variance().max(self.rounding_variance())),
+            false => square_sum,
+        };
+        let kept = 1.0 - freedom / MEMORY;
+        self.square_sum = kept * self.square_sum + clipped;
+        self.freedom = kept * self.freedom + freedom;
+    }
+
+    /// Variance of one speed value in (m/s)²; 0 before the first scatter.
+    pub fn variance(&self) -> f64 {
+        if self.freedom > 0.0 { self.square_sum / self.freedom } else { 0.0 }
+    }
+
+    /// Variance of the mean of `count` values that ran through `range_mps`.
+    ///
+    /// A speed that hardly moves falls on the same step again and again, so that averaging does
+    /// not lessen its rounding error.
+    pub fn variance_of_mean(&self, count: f64, range_mps: f64) -> f64 {
+        let steps = if self.quantum_mps.is_finite() { range_mps / self.quantum_mps } else { count };
+        let rounding = self.rounding_variance() / count.min(1.0 + steps);
+        (self.variance() / count).max(rounding)
+    }
+
+    /// Variance of rounding to the quantum in (m/s)².
+    pub fn rounding_variance(&self) -> f64 {
+        if self.quantum_mps.is_finite() { self.quantum_mps.powi(2) / 12.0 } else { 0.0 }
+    }
+}

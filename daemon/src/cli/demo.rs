@@ -1,0 +1,34 @@
+//! `dynocar demo`: the main job, with no arguments.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::Failure;
+use super::output::write_json;
+use crate::demo::play;
+
+/// Show the whole way of a sample: controller, daemon and client on embedded recorded runs.
+#[derive(Debug, Args)]
+pub struct DemoArguments {
+    /// How many times as fast as recorded
+    #[arg(long, default_value_t = 200.0, value_name = "K")]
+    rate: f64,
+    /// Write the result for machines; - for standard output
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// Plays the demo.
+///
+/// # Errors
+///
+/// A rate out of range is an input failure; everything else a failure of the work.
+pub fn execute(arguments: &DemoArguments) -> Result<(), Failure> {
+    let rate = arguments.rate;
+    if !(1.0..=1000.0).contains(&rate) {
+        return Err(Failure::Input(format!("--rate {rate}: expected 1 to 1000")));
+    }
+    let answer = play(rate).map_err(|error| Failure::Work(error.to_string()))?;
+    arguments.json.as_ref().map_or(Ok(()), |file| write_json(file, &answer))
+}

@@ -1,0 +1,97 @@
+//! `dynocar replay`: recorded runs into the sample channel, as a controller would.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Args;
+use dynocar_client::Host;
+use dynocar_shared::{PipelineKind, TrainId};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::Failure;
+use crate::dataset;
+use crate::replay::{Rate, ReplayReport, Replayer};
+
+/// Play recorded runs into the sample channel, as a controller would.
+#[derive(Debug, Args)]
+pub struct ReplayArguments {
+    /// The dataset's folder
+    dataset: PathBuf,
+    /// Only this run, counted from 1
+    #[arg(long, value_name = "N")]
+    run: Option<usize>,
+    /// How many times as fast as recorded; max: as fast as the pipelines follow
+    #[arg(long, default_value = "1", value_name = "1|K|max")]
+    rate: Rate,
+    /// The train's number on the channels
+    #[arg(long, default_value_t = 1, value_name = "ID")]
+    train: u64,
+    /// Wait so long for a daemon before the first sample
+    #[arg(long, default_value_t = 0.0, value_name = "SECONDS")]
+    wait: f64,
+}
+
+/// Plays the runs.
+///
+/// # Errors
+///
+/// A wrong dataset or run number is an input failure; a channel that cannot be opened is a
+/// failure of the work.
+pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
+    let dataset =
+        dataset::load(&arguments.dataset).map_err(|error| Failure::Input(error.to_string()))?;
+    let runs = match arguments.run {
+        None => &dataset.runs[..],
+        Some(number) if (1..=dataset.runs.len()).contains(&number) => {
+            &dataset.runs[number - 1..number]
+        }
+        Some(number) => {
+            let last = dataset.runs.len();
+            return Err(Failure::Input(format!("--run {number}: expected 1 to {last}")));
+        }
+    };
+    let host = Host::from_environment().map_err(|error| Failure::Work(error.to_string()))?;
+    let mut replayer = Replayer::open(&host, TrainId(arguments.train), arguments.rate)
+        .map_err(|error| Failure::Work(error.to_string()))?;
+    let wait = Duration::try_from_secs_f64(arguments.wait).map_err(|_| {
+        Failure::Input(format!("--wait {}: expected a time in s from 0", arguments.wait))
+    })?;
+    if !replayer.await_daemon(wait) {
+        eprintln!(
+            "dynocar: no daemon serves train {} yet; publishing all the same",
+            arguments.train
+        );
+    }
+    for run in runs {
+        let bar = progress_bar(run.samples.len(), &run.file);
+        replayer.play(&run.samples, |count| bar.set_position(count as u64));
+        bar.finish();
+    }
+    report(&replayer.finish());
+    Ok(())
+}
+
+fn progress_bar(samples: usize, file: &str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg:20} {wide_bar} {pos}/{len} {eta}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(samples as u64).with_style(style).with_message(file.to_owned())
+}
+
+fn report(report: &ReplayReport) {
+    eprintln!(
+        "{} samples published in {:.1} s, {} not taken by the transport",
+        report.published, report.elapsed_s, report.refused
+    );
+    for snapshot in &report.snapshots {
+        let kind = PipelineKind::from_number(snapshot.pipeline_kind);
+        eprintln!(
+            "  pipeline {} ({}): {}, {} used, {} rejected, {} lost",
+            snapshot.pipeline_index,
+            kind.map_or("unknown kind", PipelineKind::name),
+            snapshot.status(),
+            snapshot.samples_used,
+            snapshot.samples_rejected,
+            snapshot.samples_lost
+        );
+    }
+}

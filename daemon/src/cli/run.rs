@@ -1,0 +1,52 @@
+//! `dynocar run`: the daemon.
+
+use std::io::IsTerminal;
+use std::path::PathBuf;
+
+use clap::Args;
+use tracing_subscriber::EnvFilter;
+
+use super::Failure;
+use crate::config::{DaemonConfig, LogFormat};
+use crate::run::{RunError, run};
+
+/// Serve trains: read their samples, estimate, publish snapshots.
+#[derive(Debug, Args)]
+pub struct RunArguments {
+    /// The daemon's configuration
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+}
+
+/// Runs the daemon until SIGTERM or SIGINT.
+///
+/// # Errors
+///
+/// A wrong configuration is an input failure, anything later a failure of the work.
+pub fn execute(arguments: &RunArguments) -> Result<(), Failure> {
+    let config =
+        DaemonConfig::load(&arguments.config).map_err(|error| Failure::Input(error.to_string()))?;
+    start_log(&config)?;
+    run(&config).map_err(|error| match error {
+        RunError::Setting { .. } => {
+            Failure::Input(format!("{}: {error}", arguments.config.display()))
+        }
+        error => Failure::Work(error.to_string()),
+    })
+}
+
+fn start_log(config: &DaemonConfig) -> Result<(), Failure> {
+    let filter = EnvFilter::try_new(&config.log).map_err(|error| {
+        let log = &config.log;
+        Failure::Input(format!("daemon.log = {log:?}: expected a level as info or debug: {error}"))
+    })?;
+    let log = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal());
+    match config.log_format {
+        LogFormat::Text => log.with_target(false).init(),
+        LogFormat::Json => log.json().init(),
+    }
+    Ok(())
+}

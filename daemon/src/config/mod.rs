@@ -1,0 +1,152 @@
+//! The daemon's configuration: `daemon.toml`.
+//!
+//! Unknown keys are refused; a value outside its range is refused with key, value and range.
+//! File names inside the configuration are relative to the configuration file.
+
+mod raw;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use dynocar_core::pipeline::EstimatorSettings;
+use dynocar_core::track::Track;
+use dynocar_core::train::TrainModel;
+use dynocar_shared::TrainId;
+use serde::Deserialize;
+
+/// What a pipeline thread does while no sample comes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum IdleStrategy {
+    /// Looks for samples without pause: lowest latency, one whole core.
+    Busy,
+    /// Looks for a while, then sleeps until the controller wakes it.
+    Adaptive,
+    /// Sleeps at once: least processor time.
+    Event,
+}
+
+impl std::fmt::Display for IdleStrategy {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            IdleStrategy::Busy => "busy",
+            IdleStrategy::Adaptive => "adaptive",
+            IdleStrategy::Event => "event",
+        })
+    }
+}
+
+/// How the daemon writes its log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LogFormat {
+    /// Lines for people.
+    Text,
+    /// One JSON object a line.
+    Json,
+}
+
+/// A train that the daemon serves.
+#[derive(Clone, Debug)]
+pub struct TrainConfig {
+    /// Its number on the channels.
+    pub id: TrainId,
+    /// What is declared of it.
+    pub model: Arc<TrainModel>,
+    /// The line it runs on, when known.
+    pub track: Option<Arc<Track>>,
+}
+
+/// A thread that serves pipelines.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ThreadConfig {
+    /// Name, also shown by the operating system.
+    pub name: String,
+    /// Processor core that it is bound to.
+    pub core: Option<usize>,
+    /// What it does while no sample comes.
+    pub idle: IdleStrategy,
+}
+
+/// A pipeline: one estimator for each of its trains.
+#[derive(Clone, Debug)]
+pub struct PipelineConfig {
+    /// Name for people.
+    pub name: String,
+    /// Kind and settings of the estimator.
+    pub estimator: EstimatorSettings,
+    /// Place of its thread in [`DaemonConfig::threads`].
+    pub thread: usize,
+    /// The trains it serves.
+    pub trains: Vec<TrainId>,
+}
+
+/// A configuration, checked as a whole.
+#[derive(Clone, Debug)]
+pub struct DaemonConfig {
+    /// Run-time directory; the environment's when absent.
+    pub root: Option<PathBuf>,
+    /// Level of the log, as `info` or `dynocar=debug`.
+    pub log: String,
+    /// Form of the log.
+    pub log_format: LogFormat,
+    /// How long an adaptive thread looks for samples before it sleeps, in µs.
+    pub spin_us: u64,
+    /// How often a snapshot is vouched for while no sample comes, in ms.
+    pub heartbeat_ms: u64,
+    /// The trains.
+    pub trains: Vec<TrainConfig>,
+    /// The threads.
+    pub threads: Vec<ThreadConfig>,
+    /// The pipelines, by the number that their snapshots carry.
+    pub pipelines: Vec<PipelineConfig>,
+}
+
+/// Why a configuration is refused.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("{path}: cannot be read: {source}")]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// The system's answer.
+        source: std::io::Error,
+    },
+    /// The file is no TOML, or has a key or type that is not expected.
+    #[error("{path}: {message}")]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// What the reader says, with the line.
+        message: String,
+    },
+    /// A value lies outside its range.
+    #[error("{path}: {key} = {value}: expected {allowed}")]
+    OutOfRange {
+        /// The file.
+        path: PathBuf,
+        /// The key, with its table.
+        key: String,
+        /// The value it was given.
+        value: String,
+        /// The allowed range, in words.
+        allowed: String,
+    },
+    /// A train or track file is wrong; the message names it.
+    #[error(transparent)]
+    Model(#[from] crate::dataset::LoadError),
+}
+
+impl DaemonConfig {
+    /// Reads and checks a configuration and the train and track files it names.
+    ///
+    /// # Errors
+    ///
+    /// See [`ConfigError`]; every message names the file and what was expected.
+    pub fn load(path: &Path) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| ConfigError::Unreadable { path: path.into(), source })?;
+        raw::check(path, &text)
+    }
+}

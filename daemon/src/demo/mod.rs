@@ -1,0 +1,157 @@
+//! `dynocar demo`: the main job, end to end, with real processes.
+//!
+//! A controller process replays an embedded recorded run into shared memory, a daemon process
+//! estimates, and this process is the client that polls each control cycle.
+
+mod embedded;
+mod stage;
+mod summary;
+mod view;
+
+use std::time::{Duration, Instant};
+
+use dynocar_client::{SnapshotReader, monotonic_now_ns};
+use dynocar_shared::services::PIPELINES_MAX;
+use dynocar_shared::{ParameterSnapshot, TrainId};
+use hdrhistogram::Histogram;
+
+pub use summary::DemoAnswer;
+
+use dynocar_core::dataset::Dataset;
+
+use crate::dataset::{self, LoadError};
+use stage::{Stage, StageError};
+use summary::Summary;
+use view::View;
+
+/// Number of the demo's train on the channels.
+const TRAIN: TrainId = TrainId(1);
+/// How often the view is drawn.
+const DRAW_EVERY: Duration = Duration::from_millis(100);
+/// How long the pipelines may take for the last samples.
+const CATCH_UP: Duration = Duration::from_secs(5);
+
+/// Why the demo failed.
+#[derive(Debug, thiserror::Error)]
+pub enum DemoError {
+    /// A process or file could not be had.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+    /// The embedded dataset could not be read.
+    #[error(transparent)]
+    Dataset(#[from] LoadError),
+    /// A channel could not be opened.
+    #[error(transparent)]
+    Channel(#[from] dynocar_client::ChannelError),
+    /// Samples were lost although the rate allows for none to be.
+    #[error("{lost} samples were lost at {rate} times the recorded rate")]
+    Lost {
+        /// Samples lost by the pipeline that lost most.
+        lost: u64,
+        /// The rate of the replay.
+        rate: f64,
+    },
+}
+
+/// Plays the demo at so many times the recorded rate, and gives the summary.
+///
+/// # Errors
+///
+/// See [`DemoError`].
+pub fn play(rate: f64) -> Result<DemoAnswer, DemoError> {
+    let mut stage = Stage::build()?;
+    let dataset = dataset::load(stage.dataset())?;
+    let mut reader = SnapshotReader::open(stage.host(), TRAIN)?;
+    stage.start_daemon()?;
+    await_fresh(&mut reader, &mut stage)?;
+    stage.start_controller(rate)?;
+
+    let cycle = control_cycle(&dataset, rate);
+    let total = dataset.runs.iter().map(|run| run.samples.len() as u64).sum();
+    let mut view = View::new(&dataset, total, rate);
+    let mut latency = Latency::new();
+    let mut last_draw = Instant::now();
+    let mut ended: Option<Instant> = None;
+    loop {
+        let news = reader.poll();
+        let now_ns = monotonic_now_ns();
+        if news > 0 {
+            latency.record(&reader, now_ns);
+        }
+        if last_draw.elapsed() >= DRAW_EVERY {
+            last_draw = Instant::now();
+            view.draw(&reader, now_ns);
+            stage.require_daemon()?;
+            if ended.is_none() && stage.controller_has_ended()? {
+                ended = Some(Instant::now());
+            }
+        }
+        let slowest = reader.readings(now_ns).map(|it| it.snapshot.sample_sequence).min();
+        let is_done = slowest.is_some_and(|sequence| sequence >= total);
+        if ended.is_some_and(|since| is_done || since.elapsed() > CATCH_UP) {
+            break;
+        }
+        std::thread::sleep(cycle);
+    }
+    view.draw(&reader, monotonic_now_ns());
+    view.finish();
+    let snapshots: Vec<ParameterSnapshot> =
+        reader.readings(monotonic_now_ns()).map(|reading| *reading.snapshot).collect();
+    stage.stop_daemon()?;
+    let latency = latency.histogram;
+    let summary =
+        Summary { dataset: &dataset, published: total, rate, snapshots: &snapshots, latency };
+    summary.print();
+    let answer = summary.answer();
+    match answer.samples.lost {
+        0 => Ok(answer),
+        lost => Err(DemoError::Lost { lost, rate }),
+    }
+}
+
+fn await_fresh(reader: &mut SnapshotReader, stage: &mut Stage) -> Result<(), DemoError> {
+    loop {
+        reader.poll();
+        if reader.readings(monotonic_now_ns()).any(|reading| !reading.is_stale) {
+            return Ok(());
+        }
+        stage.require_daemon()?;
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// The recorded sample period at this rate, but at least 100 µs.
+fn control_cycle(dataset: &Dataset, rate: f64) -> Duration {
+    let samples = &dataset.runs[0].samples;
+    let recorded_ns = match &samples[..] {
+        [first, second, ..] => second.time_ns - first.time_ns,
+        _ => 200_000_000,
+    };
+    Duration::from_nanos((recorded_ns as f64 / rate).max(1e5) as u64)
+}
+
+/// Times from a sample's publishing to the publishing of the snapshot that it gave.
+struct Latency {
+    histogram: Histogram<u64>,
+    last_sequence: [u64; PIPELINES_MAX],
+}
+
+impl Latency {
+    fn new() -> Self {
+        let histogram = Histogram::new(3).expect("three digits are allowed");
+        Latency { histogram, last_sequence: [0; PIPELINES_MAX] }
+    }
+
+    /// Takes in each snapshot that is new since the last call.
+    fn record(&mut self, reader: &SnapshotReader, now_ns: i64) {
+        for reading in reader.readings(now_ns) {
+            let snapshot = reading.snapshot;
+            let last = &mut self.last_sequence[snapshot.pipeline_index as usize];
+            if snapshot.sequence > *last {
+                *last = snapshot.sequence;
+                let taken_ns = snapshot.published_ns - snapshot.sample_published_ns;
+                self.histogram.saturating_record(u64::try_from(taken_ns).unwrap_or(0));
+            }
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! The demo's processes and files; all gone when the demo is over.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use dynocar_client::{ChannelError, Host};
+use dynocar_shared::services::ROOT_VARIABLE;
+use rustix::process::{Pid, Signal, kill_process};
+use tempfile::TempDir;
+
+use super::embedded::{DAEMON_CONFIG, write_dataset};
+
+/// Why a process or file could not be had.
+#[derive(Debug, thiserror::Error)]
+pub enum StageError {
+    /// The system refused.
+    #[error("{what}: {source}")]
+    System {
+        /// What was tried.
+        what: &'static str,
+        /// The system's answer.
+        source: std::io::Error,
+    },
+    /// A process ended before its time.
+    #[error("the {role} ended: {status}; it said:\n{said}")]
+    Ended {
+        /// Daemon or controller.
+        role: &'static str,
+        /// Its exit status.
+        status: String,
+        /// Its standard error.
+        said: String,
+    },
+    /// The run-time directory cannot be used.
+    #[error(transparent)]
+    Channel(#[from] ChannelError),
+}
+
+fn system(what: &'static str) -> impl FnOnce(std::io::Error) -> StageError {
+    move |source| StageError::System { what, source }
+}
+
+/// The demo's own run-time directory with its daemon and controller.
+pub struct Stage {
+    folder: TempDir,
+    dataset: PathBuf,
+    host: Host,
+    daemon: Option<Child>,
+    controller: Option<Child>,
+}
+
+impl Stage {
+    /// Writes dataset and configuration into a temporary folder.
+    ///
+    /// # Errors
+    ///
+    /// When the folder cannot be written.
+    pub fn build() -> Result<Self, StageError> {
+        let folder = tempfile::Builder::new()
+            .prefix("dynocar-demo-")
+            .tempdir()
+            .map_err(system("temporary folder"))?;
+        // The configuration names its train as config/daemon.toml does: demo/train.toml.
+        let dataset = folder.path().join("demo");
+        write_dataset(&dataset).map_err(system("writing the embedded runs"))?;
+        std::fs::write(folder.path().join("daemon.toml"), DAEMON_CONFIG)
+            .map_err(system("writing the configuration"))?;
+        let host = Host::at(&folder.path().join("root"))?;
+        Ok(Stage { folder, dataset, host, daemon: None, controller: None })
+    }
+
+    /// The dataset's folder.
+    pub fn dataset(&self) -> &Path {
+        &self.dataset
+    }
+
+    /// The run-time directory.
+    pub fn host(&self) -> &Host {
+        &self.host
+    }
+
+    /// Starts the daemon process.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be started.
+    pub fn start_daemon(&mut self) -> Result<(), StageError> {
+        let config = self.folder.path().join("daemon.toml");
+        self.daemon = Some(self.start("daemon", &["run".as_ref(), "--config".as_ref(), &config])?);
+        Ok(())
+    }
+
+    /// Starts the controller process.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be started.
+    pub fn start_controller(&mut self, rate: f64) -> Result<(), StageError> {
+        let rate = rate.to_string();
+        let arguments =
+            ["replay".as_ref(), self.dataset.as_path(), "--rate".as_ref(), rate.as_ref()];
+        self.controller = Some(self.start("controller", &arguments)?);
+        Ok(())
+    }
+
+    fn start(&self, role: &'static str, arguments: &[&Path]) -> Result<Child, StageError> {
+        let program = std::env::current_exe().map_err(system("finding this program"))?;
+        let log = File::create(self.log(role)).map_err(system("writing a log"))?;
+        Command::new(program)
+            .args(arguments)
+            .env(ROOT_VARIABLE, self.host.root())
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(log)
+            .spawn()
+            .map_err(system("starting a process"))
+    }
+
+    fn log(&self, role: &str) -> PathBuf {
+        self.folder.path().join(format!("{role}.log"))
+    }
+
+    fn ended(&self, role: &'static str, status: std::process::ExitStatus) -> StageError {
+        let said = std::fs::read_to_string(self.log(role)).unwrap_or_default();
+        StageError::Ended { role, status: status.to_string(), said }
+    }
+
+    /// Fails when the daemon has ended.
+    ///
+    /// # Errors
+    ///
+    /// With what it said.
+    pub fn require_daemon(&mut self) -> Result<(), StageError> {
+        let status = match &mut self.daemon {
+            Some(daemon) => daemon.try_wait().map_err(system("looking after the daemon"))?,
+            None => None,
+        };
+        status.map_or(Ok(()), |status| Err(self.ended("daemon", status)))
+    }
+
+    /// True when the controller has published everything.
+    ///
+    /// # Errors
+    ///
+    /// When it failed.
+    pub fn controller_has_ended(&mut self) -> Result<bool, StageError> {
+        let status = match &mut self.controller {
+            Some(controller) => {
+                controller.try_wait().map_err(system("looking after the controller"))?
+            }
+            None => None,
+        };
+        match status {
+            None => Ok(false),
+            Some(status) if status.success() => Ok(true),
+            Some(status) => Err(self.ended("controller", status)),
+        }
+    }
+
+    /// Stops the daemon as an operator would.
+    ///
+    /// # Errors
+    ///
+    /// When it does not end cleanly.
+    pub fn stop_daemon(&mut self) -> Result<(), StageError> {
+        let Some(mut daemon) = self.daemon.take() else { return Ok(()) };
+        if let Some(pid) = Pid::from_raw(daemon.id() as i32) {
+            kill_process(pid, Signal::TERM)
+                .map_err(|error| system("stopping the daemon")(error.into()))?;
+        }
+        let status = daemon.wait().map_err(system("waiting for the daemon"))?;
+        if status.success() { Ok(()) } else { Err(self.ended("daemon", status)) }
+    }
+}
+
+impl Drop for Stage {
+    fn drop(&mut self) {
+        for child in [&mut self.daemon, &mut self.controller].into_iter().flatten() {
+            // A child that has ended by itself is as good as a killed one.
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}

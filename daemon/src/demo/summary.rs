@@ -1,0 +1,158 @@
+//! What the demo found.
+
+use dynocar_shared::{ParameterSnapshot, PipelineKind};
+use hdrhistogram::Histogram;
+use serde::Serialize;
+
+use dynocar_core::dataset::Dataset;
+
+/// The demo's result for machines.
+#[derive(Clone, Debug, Serialize)]
+pub struct DemoAnswer {
+    /// Each pipeline with its status.
+    pub pipelines: Vec<PipelineAnswer>,
+    /// What became of the samples, for the pipeline that fared worst.
+    pub samples: SampleAnswer,
+    /// From a sample's publishing to its snapshot's.
+    pub latency: LatencyAnswer,
+}
+
+/// A pipeline of the demo.
+#[derive(Clone, Debug, Serialize)]
+pub struct PipelineAnswer {
+    /// The estimator's name.
+    pub name: &'static str,
+    /// Its status at the end.
+    pub status: &'static str,
+    /// Samples that entered the estimate.
+    pub used: u64,
+    /// Samples refused.
+    pub rejected: u64,
+    /// Samples that never arrived.
+    pub lost: u64,
+}
+
+/// Counts of samples.
+#[derive(Clone, Debug, Serialize)]
+pub struct SampleAnswer {
+    /// Handed to the channel.
+    pub published: u64,
+    /// Entered the estimate.
+    pub used: u64,
+    /// Refused.
+    pub rejected: u64,
+    /// Never arrived.
+    pub lost: u64,
+}
+
+/// Percentiles of the latency.
+#[derive(Clone, Debug, Serialize)]
+pub struct LatencyAnswer {
+    /// Half of the snapshots came within this time, in ns.
+    pub p50_ns: u64,
+    /// 99 of 100 snapshots came within this time, in ns.
+    pub p99_ns: u64,
+    /// Snapshots measured.
+    pub count: u64,
+}
+
+/// What the demo found, for people and for machines.
+pub struct Summary<'a> {
+    /// What was played.
+    pub dataset: &'a Dataset,
+    /// Samples played.
+    pub published: u64,
+    /// How fast.
+    pub rate: f64,
+    /// The last snapshot of each pipeline.
+    pub snapshots: &'a [ParameterSnapshot],
+    /// Time from sample to snapshot in ns.
+    pub latency: Histogram<u64>,
+}
+
+impl Summary<'_> {
+    /// The result for machines.
+    pub fn answer(&self) -> DemoAnswer {
+        let pipelines: Vec<PipelineAnswer> = self.snapshots.iter().map(pipeline_answer).collect();
+        let worst = |of: fn(&PipelineAnswer) -> u64| pipelines.iter().map(of);
+        let samples = SampleAnswer {
+            published: self.published,
+            used: worst(|it| it.used).min().unwrap_or(0),
+            rejected: worst(|it| it.rejected).max().unwrap_or(0),
+            lost: worst(|it| it.lost).max().unwrap_or(self.published),
+        };
+        let latency = LatencyAnswer {
+            p50_ns: self.latency.value_at_quantile(0.5),
+            p99_ns: self.latency.value_at_quantile(0.99),
+            count: self.latency.len(),
+        };
+        DemoAnswer { pipelines, samples, latency }
+    }
+
+    /// Prints the result for people.
+    pub fn print(&self) {
+        let answer = self.answer();
+        println!();
+        self.print_resistance();
+        println!(
+            "\n{:<20} {:<12} {:>9} {:>9} {:>9}",
+            "pipeline", "status", "used", "rejected", "lost"
+        );
+        for it in &answer.pipelines {
+            println!(
+                "{:<20} {:<12} {:>9} {:>9} {:>9}",
+                it.name, it.status, it.used, it.rejected, it.lost
+            );
+        }
+        println!(
+            "\n{} samples published at {} times the recorded rate, {} lost",
+            answer.samples.published, self.rate, answer.samples.lost
+        );
+        println!(
+            "sample → snapshot: p50 {:.1} µs, p99 {:.1} µs over {} snapshots",
+            answer.latency.p50_ns as f64 * 1e-3,
+            answer.latency.p99_ns as f64 * 1e-3,
+            answer.latency.count
+        );
+    }
+
+    /// Declared and estimated resistance over the driven speeds.
+    fn print_resistance(&self) {
+        let estimates: Vec<&ParameterSnapshot> =
+            self.snapshots.iter().filter(|it| it.resistance_at(10.0).is_some()).collect();
+        let low = estimates.iter().map(|it| it.speed_min_mps).fold(f64::INFINITY, f64::min);
+        let high = estimates.iter().map(|it| it.speed_max_mps).fold(0.0, f64::max);
+        if estimates.is_empty() || low >= high {
+            return;
+        }
+        println!("Basic resistance in N/kN: declared, and estimated with its 95 % interval");
+        print!("{:>8} {:>9}", "m/s", "declared");
+        estimates.iter().for_each(|it| print!(" {:>17}", name(it)));
+        println!();
+        let steps = 6;
+        for step in 0..=steps {
+            let speed_mps = low + (high - low) * f64::from(step) / f64::from(steps);
+            let declared = self.dataset.train.resistance.w0_n_per_kn(speed_mps);
+            print!("{speed_mps:>8.1} {declared:>9.3}");
+            for estimate in estimates.iter().filter_map(|it| it.resistance_at(speed_mps)) {
+                let half_width = 1.96 * estimate.w0_std_n_per_kn;
+                print!(" {:>17}", format!("{:.3} ± {half_width:.3}", estimate.w0_n_per_kn));
+            }
+            println!();
+        }
+    }
+}
+
+fn name(snapshot: &ParameterSnapshot) -> &'static str {
+    PipelineKind::from_number(snapshot.pipeline_kind).map_or("?", PipelineKind::name)
+}
+
+fn pipeline_answer(snapshot: &ParameterSnapshot) -> PipelineAnswer {
+    PipelineAnswer {
+        name: name(snapshot),
+        status: snapshot.status().name(),
+        used: snapshot.samples_used,
+        rejected: snapshot.samples_rejected,
+        lost: snapshot.samples_lost,
+    }
+}

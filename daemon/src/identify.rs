@@ -1,0 +1,50 @@
+//! The daemon's own pipelines over recorded runs, offline and deterministic.
+
+use std::sync::Arc;
+
+use dynocar_core::pipeline::{EstimatorSettings, Pipeline, SettingError};
+use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
+
+use dynocar_core::dataset::Dataset;
+
+/// The samples of all runs, in file order, as a controller publishes them: numbered on without
+/// a gap, each run under a number of its own.
+pub fn published_samples(dataset: &Dataset, train: TrainId) -> Vec<TrainSample> {
+    let mut samples = Vec::with_capacity(dataset.runs.iter().map(|run| run.samples.len()).sum());
+    for (run, recorded) in (1..).zip(&dataset.runs) {
+        for sample in &recorded.samples {
+            let sequence = samples.len() as u64 + 1;
+            samples.push(TrainSample { sequence, run, train_id: train.0, ..*sample });
+        }
+    }
+    samples
+}
+
+/// Runs one estimator with its settings over the samples; gives the last snapshot.
+///
+/// # Errors
+///
+/// When a setting is out of range.
+pub fn identify(
+    dataset: &Dataset,
+    samples: &[TrainSample],
+    settings: &EstimatorSettings,
+) -> Result<ParameterSnapshot, SettingError> {
+    let train = Arc::clone(&dataset.train);
+    let estimator = settings.build(&train)?;
+    let train_id = samples.first().map_or(TrainId(1), |sample| TrainId(sample.train_id));
+    let mut pipeline = Pipeline::new(train_id, 0, train, dataset.track.clone(), estimator);
+    for sample in samples {
+        pipeline.process(sample);
+    }
+    Ok(*pipeline.snapshot())
+}
+
+/// Every kind of estimator that learns something, with its default settings.
+pub fn default_estimators() -> Vec<EstimatorSettings> {
+    PipelineKind::ALL
+        .iter()
+        .filter(|&&kind| kind != PipelineKind::Echo)
+        .filter_map(|&kind| EstimatorSettings::default_of(kind))
+        .collect()
+}

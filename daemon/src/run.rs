@@ -1,0 +1,191 @@
+//! The daemon: every stage of the online way on one screen.
+//!
+//! ```text
+//! controller ──TrainSample──▶ validation ─▶ track and forces ─▶ estimator ──ParameterSnapshot──▶ client
+//!             shared memory   └───────────── Pipeline, one or more in a Worker ─────┘  shared memory
+//! ```
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::thread::JoinHandle;
+
+use crossbeam::channel::{Sender, bounded};
+use dynocar_client::peer::RoleLock;
+use dynocar_client::{ChannelError, Host, Role, monotonic_now_ns};
+use dynocar_core::pipeline::{Pipeline, SettingError};
+use dynocar_shared::TrainId;
+use tracing::{info, warn};
+
+use crate::config::{DaemonConfig, PipelineConfig, TrainConfig};
+use crate::runtime::affinity::pin_to_core;
+use crate::runtime::tally::Tally;
+use crate::runtime::watch::{Watch, WatchedPipeline};
+use crate::runtime::worker::{LanePlan, Worker, WorkerPlan};
+
+/// Why the daemon could not start or had to stop.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// A channel cannot be opened.
+    #[error(transparent)]
+    Channel(#[from] ChannelError),
+    /// A setting of a pipeline is out of range.
+    #[error("pipelines.{pipeline}.settings.{source}")]
+    Setting {
+        /// The pipeline's name.
+        pipeline: String,
+        /// Key, value and range.
+        source: SettingError,
+    },
+    /// The system gives no thread or no signal handler.
+    #[error("{what}: {source}")]
+    System {
+        /// What was asked for.
+        what: &'static str,
+        /// The system's answer.
+        source: std::io::Error,
+    },
+    /// A pipeline thread ended by itself.
+    #[error("thread {0}: ended unexpectedly; the daemon stops so that a supervisor can restart it")]
+    ThreadEnded(String),
+}
+
+/// Serves the configured trains until SIGTERM or SIGINT.
+///
+/// # Errors
+///
+/// See [`RunError`]; a second daemon on a train is refused with the name of the first.
+pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
+    let host = match &config.root {
+        Some(root) => Host::at(root)?,
+        None => Host::from_environment()?,
+    };
+    let stop = stop_on_signals()?;
+    let trains: Vec<TrainId> = config.trains.iter().map(|train| train.id).collect();
+    let _roles = trains
+        .iter()
+        .map(|&train| RoleLock::claim(&host, train, Role::Daemon))
+        .collect::<Result<Vec<_>, _>>()?;
+    // Grows with every start: the monotonic clock is common to all processes of the host.
+    let epoch = monotonic_now_ns() as u64;
+    let (plans, watched) = plan_workers(config, &host, epoch, &stop)?;
+    let workers = start_workers(plans)?;
+    info!(epoch, trains = trains.len(), pipelines = config.pipelines.len(), "serving");
+
+    let mut watch = Watch::new(host, trains, watched);
+    watch.until_stopped(&stop, || workers.iter().any(JoinHandle::is_finished));
+
+    let ended = workers.iter().find(|worker| worker.is_finished()).map(thread_name);
+    let was_asked = stop.swap(true, std::sync::atomic::Ordering::Relaxed);
+    for worker in workers {
+        // A panic was already printed by the thread itself; `ended` names it below.
+        let _ = worker.join();
+    }
+    watch.report_totals();
+    match ended {
+        Some(name) if !was_asked => Err(RunError::ThreadEnded(name)),
+        _ => Ok(()),
+    }
+}
+
+fn stop_on_signals() -> Result<Arc<AtomicBool>, RunError> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
+        signal_hook::flag::register(signal, Arc::clone(&stop))
+            .map_err(|source| RunError::System { what: "signal handler", source })?;
+    }
+    Ok(stop)
+}
+
+/// Builds every pipeline and deals them out to the threads.
+fn plan_workers(
+    config: &DaemonConfig,
+    host: &Host,
+    epoch: u64,
+    stop: &Arc<AtomicBool>,
+) -> Result<(Vec<WorkerPlan>, Vec<WatchedPipeline>), RunError> {
+    let mut plans: Vec<WorkerPlan> = config
+        .threads
+        .iter()
+        .map(|thread| WorkerPlan {
+            thread: thread.clone(),
+            host: host.clone(),
+            epoch,
+            spin_us: config.spin_us,
+            heartbeat_ms: config.heartbeat_ms,
+            lanes: Vec::new(),
+            stop: Arc::clone(stop),
+        })
+        .collect();
+    let mut watched = Vec::new();
+    for (index, settings) in config.pipelines.iter().enumerate() {
+        for train in config.trains.iter().filter(|train| settings.trains.contains(&train.id)) {
+            let pipeline = build_pipeline(settings, index as u32, train)?;
+            let tally = Arc::new(Tally::default());
+            let name = settings.name.clone();
+            watched.push(WatchedPipeline { name, train: train.id, tally: Arc::clone(&tally) });
+            let lanes = &mut plans[settings.thread].lanes;
+            match lanes.iter_mut().find(|lane| lane.train == train.id) {
+                Some(lane) => lane.pipelines.push((pipeline, tally)),
+                None => {
+                    lanes.push(LanePlan { train: train.id, pipelines: vec![(pipeline, tally)] });
+                }
+            }
+        }
+    }
+    Ok((plans, watched))
+}
+
+fn build_pipeline(
+    settings: &PipelineConfig,
+    index: u32,
+    train: &TrainConfig,
+) -> Result<Pipeline, RunError> {
+    let estimator = settings
+        .estimator
+        .build(&train.model)
+        .map_err(|source| RunError::Setting { pipeline: settings.name.clone(), source })?;
+    Ok(Pipeline::new(train.id, index, Arc::clone(&train.model), train.track.clone(), estimator))
+}
+
+/// Starts one thread for each plan and waits until all of them have their ports open.
+fn start_workers(plans: Vec<WorkerPlan>) -> Result<Vec<JoinHandle<()>>, RunError> {
+    let (told, started) = bounded(plans.len());
+    let workers = plans
+        .into_iter()
+        .map(|plan| {
+            let told = told.clone();
+            std::thread::Builder::new()
+                .name(plan.thread.name.clone())
+                .spawn(move || work(plan, told))
+                .map_err(|source| RunError::System { what: "pipeline thread", source })
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    drop(told);
+    started.iter().collect::<Result<(), _>>()?;
+    Ok(workers)
+}
+
+fn work(plan: WorkerPlan, told: Sender<Result<(), ChannelError>>) {
+    let (name, core) = (plan.thread.name.clone(), plan.thread.core);
+    if let Some(core) = core
+        && let Err(error) = pin_to_core(core)
+    {
+        warn!(thread = name, core, "not bound to its core, latency will vary more: {error}");
+    }
+    info!(thread = name, core, idle = %plan.thread.idle, "pipeline thread");
+    match Worker::start(plan) {
+        Ok(mut worker) => {
+            // The main thread has given up when it no longer listens; the stop flag says so too.
+            let _ = told.send(Ok(()));
+            drop(told);
+            worker.run();
+        }
+        Err(error) => {
+            let _ = told.send(Err(error));
+        }
+    }
+}
+
+fn thread_name(worker: &JoinHandle<()>) -> String {
+    worker.thread().name().unwrap_or("unnamed").to_owned()
+}

@@ -1,0 +1,13 @@
+//! The threads of the daemon.
+//!
+//! - [`worker`]: a pipeline thread, from sample to snapshot
+//! - [`idle`]: what it does while no sample comes
+//! - [`affinity`]: binding it to a core
+//! - [`tally`]: what it tells the main thread without waiting for it
+//! - [`watch`]: what the main thread does meanwhile: signals, peers, the log
+
+pub mod affinity;
+pub mod idle;
+pub mod tally;
+pub mod watch;
+pub mod worker;

@@ -1,0 +1,128 @@
+//! What the main thread does while the pipeline threads work.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use dynocar_client::{Announcement, ChannelError, Host, Peer, Role};
+use dynocar_shared::{Reason, Status, TrainId};
+use tracing::{info, warn};
+
+use super::tally::{Tally, TallyReading};
+
+/// How often the main thread looks around.
+const ROUND: Duration = Duration::from_millis(100);
+/// Every so many rounds it looks who drives the trains.
+const ROUNDS_PER_PEER_CHECK: u32 = 4;
+
+/// A tally with the names it is logged under.
+pub struct WatchedPipeline {
+    /// The pipeline's name.
+    pub name: String,
+    /// The train.
+    pub train: TrainId,
+    /// What its thread counts.
+    pub tally: Arc<Tally>,
+}
+
+/// Watches signals, peers and tallies, and writes what changes into the log.
+pub struct Watch {
+    host: Host,
+    trains: Vec<TrainId>,
+    pipelines: Vec<WatchedPipeline>,
+    readings: Vec<TallyReading>,
+    controllers: HashMap<TrainId, Option<Announcement>>,
+}
+
+impl Watch {
+    /// A watch over the daemon's trains and pipelines.
+    pub fn new(host: Host, trains: Vec<TrainId>, pipelines: Vec<WatchedPipeline>) -> Self {
+        let readings = vec![TallyReading::default(); pipelines.len()];
+        Watch { host, trains, pipelines, readings, controllers: HashMap::new() }
+    }
+
+    /// Watches until a signal asks the daemon to stop, or a pipeline thread has ended.
+    pub fn until_stopped(&mut self, stop: &AtomicBool, has_ended: impl Fn() -> bool) {
+        let mut round = 0;
+        while !stop.load(Ordering::Relaxed) && !has_ended() {
+            if round % ROUNDS_PER_PEER_CHECK == 0 {
+                self.check_controllers();
+            }
+            self.report_changes();
+            round += 1;
+            std::thread::sleep(ROUND);
+        }
+    }
+
+    /// Logs the final counts.
+    pub fn report_totals(&self) {
+        for pipeline in &self.pipelines {
+            let reading = pipeline.tally.read();
+            info!(
+                pipeline = pipeline.name,
+                train = pipeline.train.0,
+                used = reading.used,
+                rejected = reading.rejected,
+                lost = reading.lost,
+                "stopped"
+            );
+        }
+    }
+
+    fn check_controllers(&mut self) {
+        for &train in &self.trains {
+            let seen = match Peer::look_up(&self.host, train, Role::Controller) {
+                Ok(Peer::Absent) => None,
+                Ok(Peer::Compatible(peer) | Peer::Incompatible(peer)) => Some(peer),
+                Err(error) => {
+                    warn!(train = train.0, "{error}");
+                    None
+                }
+            };
+            if self.controllers.get(&train) != Some(&seen) {
+                report_controller(train, seen.as_ref());
+                self.controllers.insert(train, seen);
+            }
+        }
+    }
+
+    fn report_changes(&mut self) {
+        for (pipeline, last) in self.pipelines.iter().zip(&mut self.readings) {
+            let reading = pipeline.tally.read();
+            let (name, train) = (pipeline.name.as_str(), pipeline.train.0);
+            if reading.status != last.status {
+                let status = Status::from_number(reading.status.0).unwrap_or(Status::Invalid);
+                let reason = Reason::from_number(reading.status.1).unwrap_or(Reason::None);
+                info!(pipeline = name, train, %status, %reason, "status");
+            }
+            if reading.lost > last.lost {
+                let lost = reading.lost - last.lost;
+                warn!(pipeline = name, train, lost, "samples lost");
+            }
+            if reading.unsent > last.unsent {
+                let unsent = reading.unsent - last.unsent;
+                warn!(pipeline = name, train, unsent, "snapshots the transport did not take");
+            }
+            *last = reading;
+        }
+    }
+}
+
+fn report_controller(train: TrainId, controller: Option<&Announcement>) {
+    let ours = Announcement::of_this_process(Role::Daemon);
+    match controller {
+        None => info!(train = train.0, "no controller"),
+        Some(theirs) if theirs.is_compatible_with(&ours) => {
+            info!(train = train.0, process = theirs.process_id, "controller connected");
+        }
+        Some(theirs) => {
+            let error = ChannelError::IncompatiblePeer {
+                train,
+                theirs: Box::new(theirs.clone()),
+                ours: Box::new(ours),
+            };
+            warn!(train = train.0, "{error}");
+        }
+    }
+}

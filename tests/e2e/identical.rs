@@ -1,0 +1,78 @@
+//! The daemon online and `dynocar identify` offline give the same bits from the same samples.
+
+use std::path::Path;
+use std::time::Duration;
+
+use dynocar::dataset;
+use dynocar::identify::{default_estimators, identify, published_samples};
+use dynocar::replay::{Rate, Replayer};
+use dynocar_shared::{ParameterSnapshot, TrainId};
+use dynocar_tests::process::Site;
+
+const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
+
+/// What is left of a snapshot without the times of this run of the daemon.
+fn without_times(snapshot: &ParameterSnapshot) -> ParameterSnapshot {
+    ParameterSnapshot {
+        epoch: 0,
+        pipeline_index: 0,
+        sample_published_ns: 0,
+        published_ns: 0,
+        vouched_ns: 0,
+        ..*snapshot
+    }
+}
+
+/// Equal to the bit, so that NaN and the sign of zero count.
+fn bits(snapshot: &ParameterSnapshot) -> Vec<u64> {
+    snapshot.values.iter().chain(&snapshot.covariance).map(|value| value.to_bits()).collect()
+}
+
+#[test]
+fn every_pipeline_gives_the_same_bits_online_and_offline() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo");
+    let dataset = dataset::load(&folder).unwrap();
+    let train = TrainId(1);
+    let samples = published_samples(&dataset, train);
+    let estimators = default_estimators();
+
+    let site = Site::new();
+    let pipelines: String = estimators
+        .iter()
+        .map(|it| format!("[[pipelines]]\nkind = \"{}\"\nthread = \"all\"\n", it.kind()))
+        .collect();
+    for file in ["train.toml", "track.toml"] {
+        site.write(file, &std::fs::read_to_string(folder.join(file)).unwrap());
+    }
+    let config = site.write(
+        "daemon.toml",
+        &format!(
+            "[[trains]]\nid = 1\nfile = \"train.toml\"\ntrack = \"track.toml\"\n\
+             [[threads]]\nname = \"all\"\n{pipelines}"
+        ),
+    );
+    let daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().unwrap()]);
+    daemon.await_error("serving");
+    let mut replayer = Replayer::open(&site.host(), train, Rate::Max).unwrap();
+    assert!(replayer.await_daemon(Duration::from_secs(10)), "{}", daemon.errors());
+    dataset.runs.iter().for_each(|run| replayer.play(&run.samples, |_| {}));
+    let report = replayer.finish();
+
+    assert_eq!(report.published, samples.len() as u64);
+    assert_eq!(report.snapshots.len(), estimators.len());
+    for settings in &estimators {
+        let kind = settings.kind();
+        let offline = without_times(&identify(&dataset, &samples, settings).unwrap());
+        let number = kind as u32;
+        let online = report.snapshots.iter().find(|it| it.pipeline_kind == number).unwrap();
+        let online = without_times(online);
+        assert_eq!(bits(&online), bits(&offline), "{kind}");
+        assert_eq!(online, offline, "{kind}");
+        assert_eq!(online.samples_lost, 0, "{kind}");
+        assert_eq!(
+            online.samples_used + online.samples_rejected,
+            report.published,
+            "{kind}: every sample is accounted for"
+        );
+    }
+}

@@ -1,0 +1,79 @@
+//! The invariants of `ARCHITECTURE.md` that can be read off the dependency tree and the sources.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Names of all packages that a package is built from.
+fn dependencies(package: &str) -> Vec<String> {
+    let output = Command::new(env!("CARGO"))
+        .args(["tree", "--offline", "--edges", "normal", "--prefix", "none", "--format", "{p}"])
+        .args(["--package", package])
+        .current_dir(workspace())
+        .output()
+        .expect("cargo tree");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout)
+        .lines()
+        .filter_map(|line| line.split(' ').next())
+        .map(str::to_owned)
+        .collect()
+}
+
+fn assert_free_of(package: &str, forbidden: &[&str]) {
+    let names = dependencies(package);
+    assert!(names.iter().any(|name| name == package), "cargo tree lists the package itself");
+    for name in names {
+        let is_forbidden = forbidden.iter().any(|it| name.starts_with(it));
+        assert!(!is_forbidden, "{package} must not be built from {name}");
+    }
+}
+
+#[test]
+fn the_core_knows_no_channel_clock_or_logger() {
+    assert_free_of(
+        "dynocar-core",
+        &["iceoryx2", "tracing", "log", "tokio", "rustix", "libc", "dynocar-client"],
+    );
+}
+
+#[test]
+fn what_a_controller_links_pulls_in_no_estimator() {
+    for package in ["dynocar-client", "dynocar-shared"] {
+        assert_free_of(package, &["dynocar-core", "nalgebra"]);
+    }
+}
+
+#[test]
+fn the_contract_depends_on_nothing() {
+    assert_eq!(dependencies("dynocar-shared"), ["dynocar-shared"]);
+}
+
+fn rust_files(folder: &Path, files: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("a source folder") {
+        let path = entry.expect("a folder entry").path();
+        if path.is_dir() {
+            rust_files(&path, files);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            files.push(path);
+        }
+    }
+}
+
+#[test]
+fn the_core_touches_no_file_thread_clock_or_terminal() {
+    let mut files = Vec::new();
+    rust_files(&workspace().join("daemon/core/src"), &mut files);
+    assert!(files.len() > 10, "the core's sources were found");
+    let forbidden =
+        ["std::fs", "std::thread", "std::net", "Instant::now", "SystemTime", "println!("];
+    for file in files {
+        let text = std::fs::read_to_string(&file).expect("a source file");
+        for word in forbidden {
+            assert!(!text.contains(word), "{}: {word}", file.display());
+        }
+    }
+}
