@@ -13,8 +13,10 @@
 //! - [`filter`]: recursive estimators of fixed size, without knowledge of trains
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
 //! - [`simulate`]: the speed that a force model predicts, over a recorded run or with a driver
+//! - [`explain`]: which undeclared effect explains what the declared model leaves
 
 pub mod dataset;
+pub mod explain;
 pub mod filter;
 pub mod force;
 pub mod pipeline;

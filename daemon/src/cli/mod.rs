@@ -4,6 +4,7 @@
 //! 1 the work failed, 2 the command line or an input file is wrong.
 
 mod demo;
+mod explain;
 mod identify;
 mod output;
 mod replay;
@@ -24,6 +25,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::DemoArguments),
+    Explain(explain::ExplainArguments),
     Run(run::RunArguments),
     Replay(replay::ReplayArguments),
     Identify(identify::IdentifyArguments),
@@ -43,6 +45,7 @@ pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let result: Result<(), Failure> = match &arguments.command {
         Command::Demo(arguments) => demo::execute(arguments),
+        Command::Explain(arguments) => explain::execute(arguments),
         Command::Run(arguments) => run::execute(arguments),
         Command::Replay(arguments) => replay::execute(arguments),
         Command::Identify(arguments) => identify::execute(arguments),

@@ -1,0 +1,202 @@
+//! The machine-readable answer of `dynocar explain --json`.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+/// What the data say, in a word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Nothing undeclared acts, as far as the data tell.
+    None,
+    /// One or more effects of the library act.
+    Effect,
+    /// Several effects explain the data equally well.
+    Ambiguous,
+    /// The residual is real, but no effect of the library explains it.
+    Unknown,
+    /// The data do not suffice for a statement.
+    InsufficientData,
+}
+
+/// A stretch of time in a run, in the recording's own time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RunWindow {
+    /// The run's file.
+    pub run: String,
+    /// Start in s.
+    pub t_start_s: f64,
+    /// End in s.
+    pub t_end_s: f64,
+}
+
+/// A range of a covariate.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CovariateRange {
+    /// Its name with the unit.
+    pub name: String,
+    /// Lowest and highest value.
+    pub range: [f64; 2],
+}
+
+/// Where an effect acts; all that is given holds together.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Place {
+    /// Chainages in m of the train's centre.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub intervals_m: Option<Vec<[f64; 2]>>,
+    /// Stretches of time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub windows: Option<Vec<RunWindow>>,
+    /// Files of the runs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub runs: Option<Vec<String>>,
+    /// Lowest and highest speed in m/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speed_range_mps: Option<[f64; 2]>,
+    /// A covariate and its range.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub covariate: Option<CovariateRange>,
+}
+
+impl Place {
+    /// A place that is a set of intervals; nothing given for an empty set.
+    pub fn of_intervals(intervals_m: Vec<[f64; 2]>) -> Self {
+        Place {
+            intervals_m: (!intervals_m.is_empty()).then_some(intervals_m),
+            ..Place::default()
+        }
+    }
+}
+
+/// A mass that holds between two places.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MassSection {
+    /// Lower chainage in m.
+    pub from_m: f64,
+    /// Upper chainage in m.
+    pub to_m: f64,
+    /// Direction of travel, 1 or -1.
+    pub direction: i8,
+    /// True over declared mass.
+    pub mass_factor: f64,
+}
+
+/// A mass that holds for some time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MassWindow {
+    /// The run's file.
+    pub run: String,
+    /// Start in s.
+    pub t_start_s: f64,
+    /// End in s.
+    pub t_end_s: f64,
+    /// True over declared mass.
+    pub mass_factor: f64,
+}
+
+/// The value of a parameter.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum ParameterValue {
+    /// A number.
+    Number(f64),
+    /// A number for each run.
+    ByRun(BTreeMap<String, f64>),
+    /// Numbers in the order of a list.
+    List(Vec<f64>),
+    /// Masses by place.
+    Sections(Vec<MassSection>),
+    /// Masses by time.
+    Windows(Vec<MassWindow>),
+}
+
+/// An effect that was found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EffectAnswer {
+    /// Its kind.
+    pub kind: &'static str,
+    /// Where it acts.
+    #[serde(rename = "where")]
+    pub place: Place,
+    /// Parameters in SI units.
+    pub parameters: BTreeMap<String, ParameterValue>,
+    /// Their standard deviations.
+    pub std: BTreeMap<String, ParameterValue>,
+    /// Probability that the search finds as much where nothing acts.
+    pub p_value: f64,
+    /// Share of the open-loop error on the fit runs that goes when the effect is added last.
+    pub error_reduction: f64,
+}
+
+/// An effect that was considered.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Considered {
+    /// Its kind.
+    pub kind: &'static str,
+    /// What it explains beyond a, b, c and the effects found, less the cost of its parameters and
+    /// choices, in units of -2 log likelihood; absent when it could not be tested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub evidence: Option<f64>,
+    /// Why it was not chosen, or could not be tested.
+    pub remark: String,
+}
+
+/// Davis coefficients with their standard deviations.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BaseAnswer {
+    /// a in N/kN.
+    pub a: f64,
+    /// b in N/kN per m/s.
+    pub b: f64,
+    /// c in N/kN per (m/s)².
+    pub c: f64,
+    /// Their standard deviations.
+    pub std: DavisDeviations,
+}
+
+/// Standard deviations of a, b, c.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DavisDeviations {
+    /// Of a.
+    pub a: f64,
+    /// Of b.
+    pub b: f64,
+    /// Of c.
+    pub c: f64,
+}
+
+/// The answer.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Answer {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The verdict in a sentence or two.
+    pub statement: String,
+    /// The effects found, the strongest first.
+    pub effects: Vec<EffectAnswer>,
+    /// Kinds that explain the data as well as the first effect.
+    pub ambiguous_with: Vec<&'static str>,
+    /// What would separate or settle them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub experiment: Option<String>,
+    /// a, b, c fitted together with the effects.
+    pub base: BaseAnswer,
+    /// Always `full_run`.
+    pub metric: &'static str,
+    /// RMSE in m/s on the holdout runs without the effects.
+    pub rmse_before: Option<f64>,
+    /// RMSE in m/s on the holdout runs with the effects.
+    pub rmse_after: Option<f64>,
+    /// 95 % interval of 1 - after / before, by bootstrap over the holdout runs.
+    pub error_reduction_interval: Option<[f64; 2]>,
+    /// The same errors restarted every 60 s: before and after.
+    pub window60: Option<[f64; 2]>,
+    /// The same errors on the fit runs: before and after.
+    pub fit_runs: Option<[f64; 2]>,
+    /// What else was considered.
+    pub considered: Vec<Considered>,
+    /// Prediction files by run.
+    pub predictions: BTreeMap<String, String>,
+}

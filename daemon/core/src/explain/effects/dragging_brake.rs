@@ -1,0 +1,244 @@
+//! A brake that does not release: a constant force from some instant to the end of the run.
+//!
+//! Where the brake cylinders keep some pressure while no brake is reported, that tells the
+//! windows too, in holdout runs as well, whose speeds are not looked at.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
+use crate::explain::answer::{Place, RunWindow};
+use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::residual_pressure;
+use crate::explain::scan::{Scan, Tuple};
+
+const PARAMETERS: [Parameter; 1] = [Parameter::new("force_n", (0.0, 3e5), 20.0)];
+/// The force builds up over this time in s.
+const BUILD_UP_S: f64 = 10.0;
+/// Onsets are first looked for this far apart in s.
+const GRID_S: f64 = 12.0;
+/// Motion in s that must follow an onset.
+const TAIL_MIN_S: f64 = 40.0;
+/// A run takes part when that explains more than this beyond the choice of its onset.
+const RUN_GAIN_MIN: f64 = 4.0;
+
+/// The kind.
+pub struct DraggingBrake;
+
+#[derive(Debug)]
+struct Dragging {
+    windows: Vec<RunWindow>,
+    choice_cost: f64,
+}
+
+/// The onsets of one run, by time, with their tuples.
+struct Onsets {
+    times_s: Vec<f64>,
+    tuples: Vec<Tuple>,
+}
+
+fn onset_tuple(scan: &Scan, index: usize, onset_s: f64) -> Tuple {
+    scan.run_tuple(index, |run, i| {
+        -build_up(run.recording.time_s()[i] - onset_s) / run.samples()[i].inertial_mass_kg
+    })
+}
+
+/// Share of the force so many s after the onset.
+fn build_up(since_s: f64) -> f64 {
+    (since_s / BUILD_UP_S).clamp(0.0, 1.0)
+}
+
+impl Onsets {
+    fn of(scan: &Scan, index: usize) -> Self {
+        let run = &scan.problem.runs[index];
+        let last_s = run.duration_s() - TAIL_MIN_S;
+        let count = (last_s / GRID_S).floor().max(0.0) as usize;
+        let first_s = run.bins.first().map_or(0.0, |bin| bin.time_s) - BUILD_UP_S;
+        let times_s: Vec<f64> = std::iter::once(first_s)
+            .chain((1..count).map(|k| GRID_S * k as f64).filter(|&time| time > first_s))
+            .collect();
+        let tuples = times_s.iter().map(|&onset_s| onset_tuple(scan, index, onset_s)).collect();
+        Onsets { times_s, tuples }
+    }
+
+    fn cost(&self) -> f64 {
+        2.0 * (self.times_s.len().max(2) as f64).ln()
+    }
+}
+
+impl Effect for DraggingBrake {
+    fn kind(&self) -> EffectKind {
+        EffectKind::DraggingBrake
+    }
+
+    fn propose(&self, scan: &Scan) -> Proposal {
+        let mut candidates = Vec::new();
+        let runs = &scan.problem.runs;
+        let by_pressure = residual_pressure::windows(runs.iter().chain(scan.holdout));
+        let fitted = |windows: &[RunWindow]| {
+            windows.iter().any(|window| runs.iter().any(|run| run.file == window.run))
+        };
+        if let Some(windows) = by_pressure.clone().filter(|windows| fitted(windows)) {
+            let tuple = window_tuple(scan, &windows);
+            let (_, estimate) = scan.gain(&tuple);
+            let hypothesis = Dragging { windows, choice_cost: 2.0 };
+            candidates.push(Candidate::new(hypothesis, vec![estimate.max(0.0)]));
+        }
+        if let Some((windows, estimate, choice_cost)) = by_speed(scan) {
+            let windows = with_holdout(scan, windows, by_pressure);
+            let hypothesis = Dragging { windows, choice_cost };
+            candidates.push(Candidate::new(hypothesis, vec![estimate]));
+        }
+        Proposal::Candidates(candidates)
+    }
+}
+
+fn window_tuple(scan: &Scan, windows: &[RunWindow]) -> Tuple {
+    let mut sum = Tuple::zero(scan.fit.theta.len());
+    for (index, run) in scan.problem.runs.iter().enumerate() {
+        for window in windows.iter().filter(|window| window.run == run.file) {
+            sum.add(&onset_tuple(scan, index, window.t_start_s - run.offset_s));
+        }
+    }
+    sum
+}
+
+/// Windows from the speeds of the fit runs: a common force, an onset for each run that takes
+/// part, improved run by run until nothing changes.
+fn by_speed(scan: &Scan) -> Option<(Vec<RunWindow>, f64, f64)> {
+    let count = scan.problem.runs.len();
+    let onsets: Vec<Onsets> = (0..count).map(|index| Onsets::of(scan, index)).collect();
+    let mut chosen: Vec<Option<usize>> = vec![None; count];
+    let value = |chosen: &[Option<usize>]| {
+        let mut sum = Tuple::zero(scan.fit.theta.len());
+        let mut cost = 0.0;
+        for (onsets, choice) in onsets.iter().zip(chosen) {
+            if let Some(k) = choice {
+                sum.add(&onsets.tuples[*k]);
+                cost += onsets.cost() + RUN_GAIN_MIN;
+            }
+        }
+        let (gain, estimate) = scan.gain(&sum);
+        if estimate > 0.0 { gain - cost } else { f64::NEG_INFINITY }
+    };
+    let mut best = 0.0;
+    for _ in 0..12 {
+        let mut change: Option<(usize, Option<usize>)> = None;
+        for (index, run_onsets) in onsets.iter().enumerate() {
+            let mut trial = chosen.clone();
+            let choices = (0..run_onsets.times_s.len()).map(Some).chain([None]);
+            for choice in choices {
+                trial[index] = choice;
+                let reached = value(&trial);
+                if reached > best + 1e-9 && trial.iter().any(Option::is_some) {
+                    best = reached;
+                    change = Some((index, choice));
+                }
+            }
+        }
+        let Some((index, choice)) = change else { break };
+        chosen[index] = choice;
+    }
+    if chosen.iter().all(Option::is_none) {
+        return None;
+    }
+    Some(refined(scan, &onsets, &chosen))
+}
+
+/// Onsets to about a bin, one run after the other.
+fn refined(
+    scan: &Scan,
+    onsets: &[Onsets],
+    chosen: &[Option<usize>],
+) -> (Vec<RunWindow>, f64, f64) {
+    let mut found: Vec<(usize, f64, Tuple)> = Vec::new();
+    let mut choice_cost = 0.0;
+    for (index, choice) in chosen.iter().enumerate() {
+        if let Some(k) = choice {
+            let onsets = &onsets[index];
+            found.push((index, onsets.times_s[*k], onsets.tuples[*k].clone()));
+            choice_cost += onsets.cost();
+        }
+    }
+    let count = scan.fit.theta.len();
+    for at in 0..found.len() {
+        let mut rest = Tuple::zero(count);
+        for (other, (_, _, tuple)) in found.iter().enumerate() {
+            if other != at {
+                rest.add(tuple);
+            }
+        }
+        let (index, middle_s, _) = found[at];
+        let best = (-6..=6)
+            .map(|k| {
+                let onset_s = middle_s + GRID_S / 6.0 * f64::from(k);
+                let own = onset_tuple(scan, index, onset_s);
+                let mut sum = rest.clone();
+                sum.add(&own);
+                (scan.gain(&sum).0, onset_s, own)
+            })
+            .max_by(|one, other| one.0.total_cmp(&other.0));
+        if let Some((_, onset_s, own)) = best {
+            found[at] = (index, onset_s, own);
+        }
+    }
+    let mut sum = Tuple::zero(count);
+    let mut windows = Vec::new();
+    for (index, onset_s, tuple) in &found {
+        sum.add(tuple);
+        let run = &scan.problem.runs[*index];
+        windows.push(RunWindow {
+            run: run.file.clone(),
+            t_start_s: run.offset_s + onset_s.max(0.0),
+            t_end_s: run.offset_s + run.duration_s(),
+        });
+    }
+    (windows, scan.gain(&sum).1, choice_cost)
+}
+
+/// Adds holdout windows by pressure, if pressure and speeds agree on the fit runs.
+fn with_holdout(
+    scan: &Scan,
+    mut windows: Vec<RunWindow>,
+    by_pressure: Option<Vec<RunWindow>>,
+) -> Vec<RunWindow> {
+    const SAME_S: f64 = 90.0;
+    let Some(by_pressure) = by_pressure else { return windows };
+    let agreeing = windows.iter().filter(|window| {
+        by_pressure.iter().any(|other| {
+            other.run == window.run && (other.t_start_s - window.t_start_s).abs() < SAME_S
+        })
+    });
+    let on_fit = |window: &&RunWindow| scan.problem.runs.iter().any(|run| run.file == window.run);
+    let agree = agreeing.count();
+    if 2 * agree > windows.len() && 2 * agree > by_pressure.iter().filter(on_fit).count() {
+        windows.extend(by_pressure.iter().filter(|window| !on_fit(window)).cloned());
+    }
+    windows
+}
+
+impl Hypothesis for Dragging {
+    fn kind(&self) -> EffectKind {
+        EffectKind::DraggingBrake
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &PARAMETERS
+    }
+
+    fn choice_cost(&self) -> f64 {
+        self.choice_cost
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        for window in self.windows.iter().filter(|window| window.run == run.file) {
+            let onset_s = window.t_start_s - run.offset_s;
+            for (force, time_s) in forces.iter_mut().zip(run.recording.time_s()) {
+                force.extra_n += parameters[0] * build_up(time_s - onset_s);
+            }
+        }
+    }
+
+    fn place(&self) -> Place {
+        Place { windows: Some(self.windows.clone()), ..Place::default() }
+    }
+}

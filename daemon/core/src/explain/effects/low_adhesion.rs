@@ -1,0 +1,167 @@
+//! A brake force that the rail does not carry: achieved = min(reported, mu * weight), or a share
+//! of the reported one, at certain places and in certain runs.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
+use crate::explain::answer::Place;
+use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::localise::{Found, Inside, find};
+use crate::explain::scan::{Scan, Tuple};
+use crate::force::ResolvedSample;
+
+const ADHESION: [Parameter; 1] = [Parameter::new("adhesion", (0.005, 0.5), 0.0005)];
+const RATIO: [Parameter; 1] = [Parameter::new("achieved_ratio", (0.05, 1.0), 0.005)];
+/// Caps that a search starts from, as share of the strongest braking seen.
+const CAP_SHARES: [f64; 4] = [0.3, 0.5, 0.65, 0.8];
+/// Braking for less than this in s says nothing.
+const BRAKING_MIN_S: f64 = 20.0;
+
+/// The kind.
+pub struct LowAdhesion;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Form {
+    Cap,
+    Ratio,
+}
+
+#[derive(Debug)]
+struct Slippery {
+    form: Form,
+    /// `None` for everywhere.
+    intervals_m: Option<Vec<[f64; 2]>>,
+    /// Files of the runs; `None` for all.
+    runs: Option<Vec<String>>,
+    choice_cost: f64,
+}
+
+fn weight_n(sample: &ResolvedSample) -> f64 {
+    1000.0 * sample.weight_kn
+}
+
+/// Brake force over weight.
+fn braking(sample: &ResolvedSample) -> f64 {
+    sample.brake_force_n.unwrap_or(0.0) / weight_n(sample)
+}
+
+impl Effect for LowAdhesion {
+    fn kind(&self) -> EffectKind {
+        EffectKind::LowAdhesion
+    }
+
+    fn propose(&self, scan: &Scan) -> Proposal {
+        let braking_s = scan.seconds_where(|_, sample| braking(sample) > 0.01);
+        if braking_s < BRAKING_MIN_S {
+            return Proposal::NotTestable("the runs hold hardly any braking".into());
+        }
+        let strongest = scan
+            .problem
+            .runs
+            .iter()
+            .flat_map(|run| run.bins.iter().map(|bin| braking(&run.samples()[bin.middle()])))
+            .fold(0.0, f64::max);
+        let mut candidates = Vec::new();
+        for cap in CAP_SHARES.map(|share| share * strongest) {
+            let shape = |run: &RunData, i: usize| {
+                let sample = &run.samples()[i];
+                (braking(sample) - cap).max(0.0) * weight_n(sample) / sample.inertial_mass_kg
+            };
+            candidates.extend(places(scan, &shape, Form::Cap, cap));
+        }
+        let shape = |run: &RunData, i: usize| {
+            let sample = &run.samples()[i];
+            sample.brake_force_n.unwrap_or(0.0) / sample.inertial_mass_kg
+        };
+        candidates.extend(places(scan, &shape, Form::Ratio, 0.0));
+        candidates.sort_by(|one, other| other.0.total_cmp(&one.0));
+        let best_cap = candidates.iter().position(|(_, form, _)| *form == Form::Cap);
+        let best_ratio = candidates.iter().position(|(_, form, _)| *form == Form::Ratio);
+        let mut chosen: Vec<usize> =
+            [Some(0), best_cap, best_ratio].into_iter().flatten().collect();
+        chosen.dedup();
+        let picked = chosen.into_iter().filter_map(|k| candidates.get(k));
+        Proposal::Candidates(picked.map(|(_, _, candidate)| candidate.clone()).collect())
+    }
+}
+
+/// Structures for one shape: everywhere in all or some runs, and at places.
+fn places(
+    scan: &Scan,
+    shape: &dyn Fn(&RunData, usize) -> f64,
+    form: Form,
+    cap: f64,
+) -> Vec<(f64, Form, Candidate)> {
+    let files = |runs: &[usize]| -> Vec<String> {
+        runs.iter().map(|&index| scan.problem.runs[index].file.clone()).collect()
+    };
+    let candidate = |found: &Found, intervals_m: Option<Vec<[f64; 2]>>| {
+        let runs = found.runs.as_deref().map(files);
+        let start = match form {
+            Form::Cap => vec![cap.max(0.006)],
+            Form::Ratio => vec![(1.0 - found.estimate).clamp(0.1, 0.99)],
+        };
+        let choice_cost = found.choice_cost;
+        let value = found.gain - choice_cost;
+        let hypothesis = Slippery { form, intervals_m, runs, choice_cost };
+        (value, form, Candidate::new(hypothesis, start))
+    };
+    let mut candidates = Vec::new();
+    let by_run: Vec<Tuple> =
+        (0..scan.problem.runs.len()).map(|index| scan.run_tuple(index, shape)).collect();
+    let everywhere = crate::explain::localise::best_of_runs(scan, &by_run);
+    if everywhere.gain > 0.0 {
+        candidates.push(candidate(&everywhere, None));
+    }
+    if scan.problem.way_ratio.is_some()
+        && let Some(found) = find(scan, shape, Inside::Centre, true)
+    {
+        candidates.push(candidate(&found, Some(found.intervals_m.clone())));
+    }
+    candidates
+}
+
+impl Hypothesis for Slippery {
+    fn kind(&self) -> EffectKind {
+        EffectKind::LowAdhesion
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        match self.form {
+            Form::Cap => &ADHESION,
+            Form::Ratio => &RATIO,
+        }
+    }
+
+    fn choice_cost(&self) -> f64 {
+        self.choice_cost
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        if self.runs.as_ref().is_some_and(|runs| !runs.contains(&run.file)) {
+            return;
+        }
+        for (force, sample) in forces.iter_mut().zip(run.samples()) {
+            let is_there = self
+                .intervals_m
+                .as_ref()
+                .is_none_or(|intervals| Inside::Centre.share(sample, intervals) > 0.0);
+            if is_there {
+                force.brake_n = match self.form {
+                    Form::Cap => {
+                        force.brake_n.min(parameters[0] * weight_n(sample) * force.mass_factor)
+                    }
+                    Form::Ratio => force.brake_n * parameters[0],
+                };
+            }
+        }
+    }
+
+    fn place(&self) -> Place {
+        Place {
+            runs: self.runs.clone(),
+            intervals_m: self.intervals_m.clone(),
+            ..Place::default()
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! The library of effects, declared beforehand: one file for each kind.
+//!
+//! A kind ([`Effect`]) proposes [`Hypothesis`] structures for the data at hand: which tunnels,
+//! which interval, which windows. A hypothesis says how it changes the forces on the train for
+//! given parameters, and nothing else is needed: the same code fits it, simulates it and predicts
+//! with it. A new kind is one file and one line in [`LIBRARY`].
+
+mod actuator_delay;
+mod ambient_temperature;
+mod bearing_temperature;
+mod curve_resistance;
+mod dragging_brake;
+mod gradient_shift;
+mod local_resistance;
+mod low_adhesion;
+mod mass_change;
+mod residual_band;
+mod rotating_mass;
+mod traction_gain;
+mod tunnel_drag;
+mod wheel_diameter;
+mod wind;
+
+use std::collections::BTreeMap;
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::answer::{ParameterValue, Place};
+use super::evidence::{RunData, SampleForces, SharedHypothesis};
+use super::scan::Scan;
+
+/// Every kind, in the order of the search: timing, scales, mass and gain, what is tied to a
+/// place, environment, actuators. What is in no library comes last.
+pub const LIBRARY: [&dyn Effect; 15] = [
+    &actuator_delay::ActuatorDelay,
+    &wheel_diameter::WheelDiameter,
+    &traction_gain::TractionGain,
+    &mass_change::MassChange,
+    &rotating_mass::RotatingMass,
+    &gradient_shift::GradientShift,
+    &curve_resistance::CurveResistance,
+    &tunnel_drag::TunnelDrag,
+    &local_resistance::LocalResistance,
+    &wind::Wind,
+    &ambient_temperature::AmbientTemperature,
+    &bearing_temperature::BearingTemperature,
+    &dragging_brake::DraggingBrake,
+    &low_adhesion::LowAdhesion,
+    &residual_band::ResidualBand,
+];
+
+/// A parameter of a hypothesis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Its name in the answer.
+    pub name: &'static str,
+    /// Least value.
+    pub lower: f64,
+    /// Greatest value.
+    pub upper: f64,
+    /// Step for finite differences.
+    pub step: f64,
+}
+
+impl Parameter {
+    /// A parameter with its bounds.
+    pub const fn new(name: &'static str, (lower, upper): (f64, f64), step: f64) -> Self {
+        Parameter { name, lower, upper, step }
+    }
+}
+
+/// What an estimate says outside: values and standard deviations by the names of the answer.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Reported {
+    /// Values.
+    pub values: BTreeMap<String, ParameterValue>,
+    /// Standard deviations.
+    pub deviations: BTreeMap<String, ParameterValue>,
+}
+
+impl Reported {
+    /// Adds a number with its standard deviation.
+    pub fn push(&mut self, name: &str, value: f64, deviation: f64) {
+        self.values.insert(name.into(), ParameterValue::Number(value));
+        self.deviations.insert(name.into(), ParameterValue::Number(deviation));
+    }
+}
+
+/// What a report may need beside the parameters of the effect itself.
+pub struct ReportContext<'a> {
+    /// Parameters of the effect.
+    pub parameters: &'a [f64],
+    /// Their standard deviations.
+    pub deviations: &'a [f64],
+    /// Fitted c of the Davis formula.
+    pub c: f64,
+    /// Its standard deviation.
+    pub c_deviation: f64,
+    /// Covariance of c with the effect's first parameter.
+    pub c_covariance: f64,
+    /// Mean weight of the fit runs in kN.
+    pub weight_kn: f64,
+}
+
+/// A structure that a kind proposes: everything but the values of its parameters.
+pub trait Hypothesis: Send + Sync + std::fmt::Debug {
+    /// The kind it belongs to.
+    fn kind(&self) -> EffectKind;
+
+    /// Its parameters, in order.
+    fn parameters(&self) -> &[Parameter];
+
+    /// Changes the forces at all samples of a run.
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]);
+
+    /// Measured over true speed.
+    fn speed_scale(&self, _parameters: &[f64]) -> f64 {
+        1.0
+    }
+
+    /// True when its first parameter is the speed scale.
+    fn changes_speed_scale(&self) -> bool {
+        false
+    }
+
+    /// Where it acts.
+    fn place(&self) -> Place {
+        Place::default()
+    }
+
+    /// Twice the logarithm of the number of structures it was chosen from.
+    fn choice_cost(&self) -> f64 {
+        0.0
+    }
+
+    /// Parameters by the names of the answer.
+    fn report(&self, context: &ReportContext) -> Reported {
+        let mut reported = Reported::default();
+        for (i, spec) in self.parameters().iter().enumerate() {
+            reported.push(spec.name, context.parameters[i], context.deviations[i]);
+        }
+        reported
+    }
+}
+
+/// A hypothesis with values to start the fit from.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// The structure.
+    pub hypothesis: SharedHypothesis,
+    /// Values of its parameters.
+    pub start: Vec<f64>,
+}
+
+impl Candidate {
+    /// A candidate from a hypothesis.
+    pub fn new(hypothesis: impl Hypothesis + 'static, start: Vec<f64>) -> Self {
+        Candidate { hypothesis: std::sync::Arc::new(hypothesis), start }
+    }
+}
+
+/// What a kind makes of the data.
+#[derive(Clone, Debug)]
+pub enum Proposal {
+    /// Structures worth a fit.
+    Candidates(Vec<Candidate>),
+    /// The data do not allow to test it: why.
+    NotTestable(String),
+}
+
+/// A kind of effect.
+pub trait Effect: Send + Sync {
+    /// Its name.
+    fn kind(&self) -> EffectKind;
+
+    /// Structures for the data at hand, given what the current model leaves.
+    fn propose(&self, scan: &Scan) -> Proposal;
+}

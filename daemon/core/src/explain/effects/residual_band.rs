@@ -1,0 +1,216 @@
+//! A residual that is real but fits no kind of the library: an extra force in a range of some
+//! covariate. It is not an explanation; it says where an explanation is to be looked for.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
+use crate::explain::answer::{CovariateRange, Place};
+use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::scan::{Scan, Tuple};
+use crate::force::ResolvedSample;
+
+const RESISTANCE: [Parameter; 1] = [Parameter::new("extra_n_per_kn", (-50.0, 50.0), 0.01)];
+const GRADIENT: [Parameter; 1] = [Parameter::new("gradient_error_permille", (-30.0, 30.0), 0.01)];
+const SHARE: [Parameter; 1] = [Parameter::new("force_error_share", (-0.6, 0.6), 0.002)];
+/// Cells into which the range of a covariate is cut.
+const CELLS: usize = 20;
+/// The library comes first: a band must explain more than a known kind.
+const OUTSIDE_COST: f64 = 10.0;
+
+/// The kind.
+pub struct ResidualBand;
+
+/// What the residual may depend on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Covariate {
+    Speed,
+    Chainage,
+    TimeSinceStart,
+    TractionForce,
+    BrakeForce,
+    Temperature,
+    Run,
+}
+
+const COVARIATES: [Covariate; 7] = [
+    Covariate::Speed,
+    Covariate::Chainage,
+    Covariate::TimeSinceStart,
+    Covariate::TractionForce,
+    Covariate::BrakeForce,
+    Covariate::Temperature,
+    Covariate::Run,
+];
+
+#[derive(Debug)]
+struct Band {
+    covariate: Covariate,
+    low: f64,
+    high: f64,
+    /// Files of all fit runs, by number, for the covariate `Run`.
+    files: Vec<String>,
+    choice_cost: f64,
+}
+
+impl Covariate {
+    fn name(self) -> &'static str {
+        match self {
+            Covariate::Speed => "speed_mps",
+            Covariate::Chainage => "chainage_m",
+            Covariate::TimeSinceStart => "time_since_start_s",
+            Covariate::TractionForce => "traction_force_n",
+            Covariate::BrakeForce => "brake_force_n",
+            Covariate::Temperature => "ambient_temperature_degc",
+            Covariate::Run => "run",
+        }
+    }
+
+    fn value(self, run: &RunData, index: usize, files: &[String]) -> Option<f64> {
+        let sample = &run.samples()[index];
+        match self {
+            Covariate::Speed => Some(run.smooth_mps[index]),
+            Covariate::Chainage => sample.position_m,
+            Covariate::TimeSinceStart => Some(run.recording.time_s()[index]),
+            Covariate::TractionForce => sample.traction_force_n,
+            Covariate::BrakeForce => sample.brake_force_n,
+            Covariate::Temperature => sample.ambient_temperature_degc,
+            Covariate::Run => files.iter().position(|file| *file == run.file).map(|k| k as f64),
+        }
+    }
+
+    fn parameters(self) -> &'static [Parameter] {
+        match self {
+            Covariate::Chainage => &GRADIENT,
+            Covariate::TractionForce | Covariate::BrakeForce => &SHARE,
+            _ => &RESISTANCE,
+        }
+    }
+
+    /// Acceleration in m/s² per unit of the parameter.
+    fn shape(self, scan: &Scan, sample: &ResolvedSample) -> f64 {
+        let per_unit = scan.per_unit_resistance_mps2(sample);
+        match self {
+            // The map's error turns its sign with the direction of travel.
+            Covariate::Chainage => -sample.direction * per_unit,
+            Covariate::TractionForce => {
+                sample.traction_force_n.unwrap_or(0.0) / sample.inertial_mass_kg
+            }
+            Covariate::BrakeForce => {
+                -sample.brake_force_n.unwrap_or(0.0) / sample.inertial_mass_kg
+            }
+            _ => -per_unit,
+        }
+    }
+}
+
+impl Effect for ResidualBand {
+    fn kind(&self) -> EffectKind {
+        EffectKind::Unknown
+    }
+
+    fn propose(&self, scan: &Scan) -> Proposal {
+        let mut bands: Vec<(f64, Candidate)> =
+            COVARIATES.iter().filter_map(|&covariate| best_band(scan, covariate)).collect();
+        bands.sort_by(|one, other| other.0.total_cmp(&one.0));
+        bands.truncate(2);
+        Proposal::Candidates(bands.into_iter().map(|(_, candidate)| candidate).collect())
+    }
+}
+
+/// The range of a covariate in which an extra force explains most.
+fn best_band(scan: &Scan, covariate: Covariate) -> Option<(f64, Candidate)> {
+    let runs = &scan.problem.runs;
+    let files: Vec<String> = runs.iter().map(|run| run.file.clone()).collect();
+    let values = runs.iter().flat_map(|run| {
+        run.bins.iter().filter_map(|bin| covariate.value(run, bin.middle(), &files))
+    });
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+        (low.min(value), high.max(value))
+    });
+    if high - low < 1e-6 || !(high - low).is_finite() {
+        return None;
+    }
+    let is_run = covariate == Covariate::Run;
+    let count = if is_run { runs.len() } else { CELLS };
+    let width = if is_run { 1.0 } else { (high - low) / count as f64 * (1.0 + 1e-9) };
+    let low = if is_run { -0.5 } else { low };
+    let edge = |k: usize| low + width * k as f64;
+    let cells: Vec<Tuple> = (0..count)
+        .map(|k| {
+            scan.tuple(|run, i| match covariate.value(run, i, &files) {
+                Some(value) if value >= edge(k) && value < edge(k + 1) => {
+                    covariate.shape(scan, &run.samples()[i])
+                }
+                _ => 0.0,
+            })
+        })
+        .collect();
+    let mut best: Option<(f64, f64, usize, usize)> = None;
+    for from in 0..count {
+        let mut sum = Tuple::zero(scan.fit.theta.len());
+        for (to, cell) in cells.iter().enumerate().skip(from) {
+            sum.add(cell);
+            let (gain, estimate) = scan.gain(&sum);
+            if best.is_none_or(|best| gain > best.0) {
+                best = Some((gain, estimate, from, to + 1));
+            }
+        }
+    }
+    let (gain, estimate, from, to) = best?;
+    let structures = COVARIATES.len() as f64 * (count * (count + 1)) as f64 / 2.0;
+    let choice_cost = OUTSIDE_COST + 2.0 * structures.ln();
+    let band = Band { covariate, low: edge(from), high: edge(to), files, choice_cost };
+    Some((gain, Candidate::new(band, vec![estimate])))
+}
+
+impl Hypothesis for Band {
+    fn kind(&self) -> EffectKind {
+        EffectKind::Unknown
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        self.covariate.parameters()
+    }
+
+    fn choice_cost(&self) -> f64 {
+        self.choice_cost
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        for (i, force) in forces.iter_mut().enumerate() {
+            let value = self.covariate.value(run, i, &self.files);
+            if !value.is_some_and(|value| value >= self.low && value < self.high) {
+                continue;
+            }
+            match self.covariate {
+                Covariate::Chainage => {
+                    force.gradient_permille += run.samples()[i].direction * parameters[0];
+                }
+                Covariate::TractionForce => force.traction_n *= 1.0 + parameters[0],
+                Covariate::BrakeForce => force.brake_n *= 1.0 + parameters[0],
+                _ => force.extra_n_per_kn += parameters[0],
+            }
+        }
+    }
+
+    fn place(&self) -> Place {
+        let mut place = Place::default();
+        match self.covariate {
+            Covariate::Speed => place.speed_range_mps = Some([self.low, self.high]),
+            Covariate::Chainage => place.intervals_m = Some(vec![[self.low, self.high]]),
+            Covariate::Run => {
+                let inside = self.files.iter().enumerate().filter(|(k, _)| {
+                    let k = *k as f64;
+                    k >= self.low && k < self.high
+                });
+                place.runs = Some(inside.map(|(_, file)| file.clone()).collect());
+            }
+            _ => {}
+        }
+        place.covariate = Some(CovariateRange {
+            name: self.covariate.name().into(),
+            range: [self.low, self.high],
+        });
+        place
+    }
+}

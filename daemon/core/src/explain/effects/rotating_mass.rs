@@ -1,0 +1,44 @@
+//! Another rotating mass than declared: inertial mass = mass (1 + gamma). Unlike the mass it does
+//! not feel the gradient.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
+use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::scan::Scan;
+
+/// Locomotives with small loads reach 0.25 to 0.3.
+const PARAMETERS: [Parameter; 1] = [Parameter::new("rotating_mass_factor", (0.0, 0.5), 0.005)];
+
+/// The kind.
+pub struct RotatingMass;
+
+#[derive(Debug)]
+struct Gamma;
+
+impl Effect for RotatingMass {
+    fn kind(&self) -> EffectKind {
+        EffectKind::RotatingMass
+    }
+
+    fn propose(&self, scan: &Scan) -> Proposal {
+        let declared = scan.train.rotating_mass_factor;
+        Proposal::Candidates(vec![Candidate::new(Gamma, vec![declared])])
+    }
+}
+
+impl Hypothesis for Gamma {
+    fn kind(&self) -> EffectKind {
+        EffectKind::RotatingMass
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &PARAMETERS
+    }
+
+    fn apply(&self, parameters: &[f64], _run: &RunData, forces: &mut [SampleForces]) {
+        for force in forces {
+            force.rotating_mass_factor = parameters[0];
+        }
+    }
+}

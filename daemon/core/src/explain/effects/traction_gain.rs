@@ -1,0 +1,46 @@
+//! A reported traction force that is not the true one: gain = reported over true.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
+use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::scan::Scan;
+
+const PARAMETERS: [Parameter; 1] = [Parameter::new("gain", (0.6, 1.6), 0.005)];
+
+/// The kind.
+pub struct TractionGain;
+
+#[derive(Debug)]
+struct Gain;
+
+impl Effect for TractionGain {
+    fn kind(&self) -> EffectKind {
+        EffectKind::TractionGain
+    }
+
+    fn propose(&self, scan: &Scan) -> Proposal {
+        let pulling_s =
+            scan.seconds_where(|_, sample| sample.traction_force_n.is_some_and(|f| f > 0.0));
+        if pulling_s < 30.0 {
+            return Proposal::NotTestable("the runs hold hardly any traction".into());
+        }
+        Proposal::Candidates(vec![Candidate::new(Gain, vec![1.0])])
+    }
+}
+
+impl Hypothesis for Gain {
+    fn kind(&self) -> EffectKind {
+        EffectKind::TractionGain
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &PARAMETERS
+    }
+
+    fn apply(&self, parameters: &[f64], _run: &RunData, forces: &mut [SampleForces]) {
+        for force in forces {
+            force.traction_n /= parameters[0];
+        }
+    }
+}

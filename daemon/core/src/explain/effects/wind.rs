@@ -1,0 +1,114 @@
+//! Wind along the line: air resistance c (v + w)² with the headwind w, whose sign turns with the
+//! direction of travel. One wind for all runs, or one for each run.
+
+use std::collections::BTreeMap;
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Candidate, Effect, Hypothesis, Parameter, Proposal, ReportContext, Reported};
+use crate::explain::answer::ParameterValue;
+use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::scan::Scan;
+
+const SPEED_MAX_MPS: f64 = 35.0;
+
+/// The kind.
+pub struct Wind;
+
+#[derive(Debug)]
+struct Steady {
+    parameters: [Parameter; 1],
+}
+
+#[derive(Debug)]
+struct ByRun {
+    /// Run files with their directions; the parameters are wind towards direction -1.
+    runs: Vec<(String, f64)>,
+    parameters: Vec<Parameter>,
+}
+
+fn parameter() -> Parameter {
+    Parameter::new("wind_plus_mps", (-SPEED_MAX_MPS, SPEED_MAX_MPS), 0.05)
+}
+
+impl Effect for Wind {
+    fn kind(&self) -> EffectKind {
+        EffectKind::Wind
+    }
+
+    fn propose(&self, scan: &Scan) -> Proposal {
+        let runs = &scan.problem.runs;
+        if runs.iter().all(|run| run.direction == runs[0].direction) {
+            return Proposal::NotTestable(
+                "all runs go in one direction, where wind looks like b and c".into(),
+            );
+        }
+        let by_run = ByRun {
+            runs: runs.iter().map(|run| (run.file.clone(), run.direction)).collect(),
+            parameters: vec![parameter(); runs.len()],
+        };
+        let mut candidates =
+            vec![Candidate::new(Steady { parameters: [parameter()] }, vec![0.0])];
+        if runs.len() >= 3 {
+            candidates.push(Candidate::new(by_run, vec![0.0; runs.len()]));
+        }
+        Proposal::Candidates(candidates)
+    }
+}
+
+/// Only the part of the train outside tunnels feels the wind.
+fn blow(wind_plus_mps: f64, run: &RunData, forces: &mut [SampleForces]) {
+    for (force, sample) in forces.iter_mut().zip(run.samples()) {
+        let outside = 1.0 - sample.tunnel_share.unwrap_or(0.0);
+        force.headwind_mps += wind_plus_mps * sample.direction * outside;
+    }
+}
+
+impl Hypothesis for Steady {
+    fn kind(&self) -> EffectKind {
+        EffectKind::Wind
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        blow(parameters[0], run, forces);
+    }
+}
+
+impl Hypothesis for ByRun {
+    fn kind(&self) -> EffectKind {
+        EffectKind::Wind
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        let own = self.runs.iter().position(|(file, _)| *file == run.file);
+        let mean = parameters.iter().sum::<f64>() / parameters.len() as f64;
+        blow(own.map_or(mean, |index| parameters[index]), run, forces);
+    }
+
+    fn report(&self, context: &ReportContext) -> Reported {
+        let count = context.parameters.len() as f64;
+        let mean = context.parameters.iter().sum::<f64>() / count;
+        let scatter: f64 = context.parameters.iter().map(|wind| (wind - mean).powi(2)).sum();
+        let mut reported = Reported::default();
+        reported.push("wind_plus_mps", mean, (scatter / (count * (count - 1.0))).sqrt());
+        let by_run = |values: &[f64], signed: bool| -> BTreeMap<String, f64> {
+            let signed = |direction: f64| if signed { direction } else { 1.0 };
+            let runs = self.runs.iter().zip(values);
+            runs.map(|((file, direction), value)| (file.clone(), signed(*direction) * value))
+                .collect()
+        };
+        let values = ParameterValue::ByRun(by_run(context.parameters, true));
+        let deviations = ParameterValue::ByRun(by_run(context.deviations, false));
+        reported.values.insert("headwind_mps".into(), values);
+        reported.deviations.insert("headwind_mps".into(), deviations);
+        reported
+    }
+}

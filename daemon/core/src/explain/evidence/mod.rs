@@ -1,0 +1,19 @@
+//! What the runs say about a model: observations, their noise, and the joint fit.
+//!
+//! The measured speed is compared with the integral of the modelled acceleration, never
+//! differentiated. Samples are averaged in bins of about two seconds, within which outliers have
+//! been replaced before. What is left after the model is a random process: measurement noise on
+//! top of the integral of an unmodelled force. A Kalman filter of that process turns the bins'
+//! differences into white innovations, for residuals and regressors alike, so that the fit is a
+//! least-squares problem whatever the noise.
+
+mod cleaning;
+mod fit;
+mod model;
+mod noise;
+mod run_data;
+
+pub use fit::{Fit, FitProblem, RunNormal, robust_weight};
+pub use model::{GrownForces, GrownModel, SampleForces, SharedHypothesis};
+pub use noise::{Noise, Whitener};
+pub use run_data::{Bin, RunData, RunDataError, prepare};

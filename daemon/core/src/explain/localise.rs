@@ -1,0 +1,286 @@
+//! Where along the line, and in which runs, a force of a given shape acts.
+
+use super::evidence::RunData;
+use super::scan::{Scan, Tuple};
+use crate::force::ResolvedSample;
+
+/// Shortest interval in m that is looked for.
+const SHORTEST_M: f64 = 150.0;
+/// Ends are refined to so many m.
+const FINEST_M: f64 = 10.0;
+/// Intervals of one effect at most.
+const INTERVALS_MAX: usize = 6;
+
+/// How much of a train counts as inside an interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Inside {
+    /// The part of the train's length inside.
+    Share {
+        /// The train's length in m.
+        length_m: f64,
+    },
+    /// All of it while its centre is inside.
+    Centre,
+}
+
+impl Inside {
+    /// The share of the train inside any of some disjoint intervals, 0 to 1.
+    #[inline]
+    pub fn share(self, sample: &ResolvedSample, intervals_m: &[[f64; 2]]) -> f64 {
+        let Some(centre_m) = sample.position_m else { return 0.0 };
+        match self {
+            Inside::Centre => {
+                let inside = intervals_m.iter().any(|&[from, to]| (from..=to).contains(&centre_m));
+                f64::from(u8::from(inside))
+            }
+            Inside::Share { length_m } => {
+                let length_m = length_m.max(1.0);
+                let (rear, front) = (centre_m - 0.5 * length_m, centre_m + 0.5 * length_m);
+                let inside: f64 = intervals_m
+                    .iter()
+                    .map(|&[from, to]| (front.min(to) - rear.max(from)).max(0.0))
+                    .sum();
+                inside / length_m
+            }
+        }
+    }
+}
+
+/// A set of intervals and runs with what a common factor on the shape there explains.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// Disjoint intervals in m, by chainage.
+    pub intervals_m: Vec<[f64; 2]>,
+    /// Fit runs by number; `None` for all that pass.
+    pub runs: Option<Vec<usize>>,
+    /// Decrease of the cost.
+    pub gain: f64,
+    /// The factor.
+    pub estimate: f64,
+    /// Twice the logarithm of the number of structures this was chosen from.
+    pub choice_cost: f64,
+}
+
+struct Cell {
+    interval_m: [f64; 2],
+    runs: Vec<Tuple>,
+}
+
+/// A shape: acceleration in m/s² per unit at a sample of a run, where the force acts in full.
+pub type Shape<'s> = &'s dyn Fn(&RunData, usize) -> f64;
+
+fn tuples(scan: &Scan, shape: Shape, inside: Inside, interval_m: [f64; 2]) -> Vec<Tuple> {
+    (0..scan.problem.runs.len())
+        .map(|index| {
+            scan.run_tuple(index, |run, i| {
+                match inside.share(&run.samples()[i], &[interval_m]) {
+                    0.0 => 0.0,
+                    share => share * shape(run, i),
+                }
+            })
+        })
+        .collect()
+}
+
+/// The chainage in m over which the fit runs move.
+pub fn span_m(scan: &Scan) -> Option<[f64; 2]> {
+    let mut span: Option<[f64; 2]> = None;
+    for run in &scan.problem.runs {
+        for bin in &run.bins {
+            if let Some(at) = run.samples()[bin.middle()].position_m {
+                let [low, high] = span.unwrap_or([at, at]);
+                span = Some([low.min(at), high.max(at)]);
+            }
+        }
+    }
+    span.filter(|[low, high]| high - low > 4.0 * SHORTEST_M)
+}
+
+fn cells(scan: &Scan, shape: Shape, inside: Inside, [low, high]: [f64; 2]) -> Vec<Cell> {
+    let shortest_m = SHORTEST_M.max((high - low) / 250.0);
+    let mut cells = Vec::new();
+    let mut length_m = shortest_m;
+    while length_m < 0.6 * (high - low) {
+        let count = ((high - low) / (0.5 * length_m)).ceil() as usize;
+        for k in 0..count {
+            let from_m = low + 0.5 * length_m * k as f64;
+            let interval_m = [from_m, from_m + length_m];
+            cells.push(Cell { interval_m, runs: tuples(scan, shape, inside, interval_m) });
+        }
+        length_m *= 1.6;
+    }
+    cells
+}
+
+/// The runs, as a set of numbers, whose common factor explains most after the cost of choosing.
+fn best_runs(scan: &Scan, tuples: &[Tuple], positive: bool) -> (Option<Vec<usize>>, f64, f64, f64) {
+    let mut order: Vec<(usize, f64)> = tuples
+        .iter()
+        .enumerate()
+        .filter(|(_, tuple)| tuple.square > 0.0)
+        .map(|(index, tuple)| (index, scan.gain(tuple).1))
+        .collect();
+    order.sort_by(|one, other| other.1.abs().total_cmp(&one.1.abs()));
+    let passing = order.len();
+    let mut best = (None, 0.0, 0.0, 0.0);
+    let signs: &[f64] = if positive { &[1.0] } else { &[1.0, -1.0] };
+    for &sign in signs {
+        let mut sum = Tuple::zero(scan.fit.theta.len());
+        let mut chosen = Vec::new();
+        let ordered = order.iter().filter(|(_, estimate)| estimate * sign > 0.0);
+        let others = order.iter().filter(|(_, estimate)| estimate * sign <= 0.0);
+        for &(index, _) in ordered.chain(others) {
+            sum.add(&tuples[index]);
+            chosen.push(index);
+            let (gain, estimate) = scan.gain(&sum);
+            let all = chosen.len() == passing;
+            let cost = if all { 0.0 } else { subset_cost(passing, chosen.len()) };
+            if estimate * sign > 0.0 && gain - cost > best.1 - best.3 {
+                let mut runs = chosen.clone();
+                runs.sort_unstable();
+                best = ((!all).then_some(runs), gain, estimate, cost);
+            }
+        }
+    }
+    best
+}
+
+/// The runs in which a common positive factor on a shape explains most, wherever they are.
+pub fn best_of_runs(scan: &Scan, tuples: &[Tuple]) -> Found {
+    let (runs, gain, estimate, choice_cost) = best_runs(scan, tuples, true);
+    Found { intervals_m: Vec::new(), runs, gain, estimate, choice_cost }
+}
+
+/// Twice the logarithm of the number of ways to take `taken` of `count` runs.
+pub fn subset_cost(count: usize, taken: usize) -> f64 {
+    let ways: f64 =
+        (0..taken).map(|k| ((count - k) as f64 / (k + 1) as f64).ln()).sum::<f64>();
+    2.0 * (ways + (count.max(1) as f64).ln())
+}
+
+/// Finds the intervals and runs in which a common factor on a shape explains most.
+///
+/// `positive` asks for a positive factor. Intervals are added while each explains more than the
+/// choice among all of them does by chance.
+pub fn find(scan: &Scan, shape: Shape, inside: Inside, positive: bool) -> Option<Found> {
+    let span = span_m(scan)?;
+    let cells = cells(scan, shape, inside, span);
+    let interval_cost = 2.0 * (cells.len().max(2) as f64).ln();
+    let best = cells
+        .iter()
+        .map(|cell| (cell, best_runs(scan, &cell.runs, positive)))
+        .max_by(|one, other| (one.1.1 - one.1.3).total_cmp(&(other.1.1 - other.1.3)))?;
+    let (cell, (runs, gain, _, subset)) = best;
+    if gain <= 0.0 {
+        return None;
+    }
+    let mut found = Found {
+        intervals_m: vec![cell.interval_m],
+        runs,
+        gain,
+        estimate: 0.0,
+        choice_cost: interval_cost + subset,
+    };
+    polish(scan, shape, inside, &mut found, positive);
+    while found.intervals_m.len() < INTERVALS_MAX {
+        let Some(added) = with_another(scan, &cells, shape, inside, &found, positive) else { break };
+        if added.gain - found.gain < interval_cost + 6.0 {
+            break;
+        }
+        found = Found { choice_cost: found.choice_cost + interval_cost, ..added };
+    }
+    found.intervals_m.sort_by(|one, other| one[0].total_cmp(&other[0]));
+    Some(found)
+}
+
+fn summed(scan: &Scan, tuples: &[Tuple], runs: &Option<Vec<usize>>) -> Tuple {
+    let mut sum = Tuple::zero(scan.fit.theta.len());
+    for (index, tuple) in tuples.iter().enumerate() {
+        if runs.as_ref().is_none_or(|runs| runs.contains(&index)) {
+            sum.add(tuple);
+        }
+    }
+    sum
+}
+
+fn with_another(
+    scan: &Scan,
+    cells: &[Cell],
+    shape: Shape,
+    inside: Inside,
+    found: &Found,
+    positive: bool,
+) -> Option<Found> {
+    let mut base = Tuple::zero(scan.fit.theta.len());
+    for &interval in &found.intervals_m {
+        base.add(&summed(scan, &tuples(scan, shape, inside, interval), &found.runs));
+    }
+    let apart = |one: [f64; 2]| found.intervals_m.iter().all(|o| one[1] <= o[0] || one[0] >= o[1]);
+    let (cell, gain) = cells
+        .iter()
+        .filter(|cell| apart(cell.interval_m))
+        .map(|cell| {
+            let mut sum = summed(scan, &cell.runs, &found.runs);
+            sum.add(&base);
+            (cell, scan.gain(&sum).0)
+        })
+        .max_by(|one, other| one.1.total_cmp(&other.1))?;
+    let mut grown = found.clone();
+    grown.intervals_m.push(cell.interval_m);
+    grown.gain = gain;
+    polish(scan, shape, inside, &mut grown, positive);
+    Some(grown)
+}
+
+/// Moves the ends of the last interval while that explains more.
+fn polish(scan: &Scan, shape: Shape, inside: Inside, found: &mut Found, positive: bool) {
+    let last = found.intervals_m.len() - 1;
+    let mut base = Tuple::zero(scan.fit.theta.len());
+    for &interval in &found.intervals_m[..last] {
+        base.add(&summed(scan, &tuples(scan, shape, inside, interval), &found.runs));
+    }
+    let value = |interval: [f64; 2]| {
+        let mut sum = summed(scan, &tuples(scan, shape, inside, interval), &found.runs);
+        sum.add(&base);
+        let (gain, estimate) = scan.gain(&sum);
+        if positive && estimate <= 0.0 { (0.0, estimate) } else { (gain, estimate) }
+    };
+    let mut best = (found.intervals_m[last], value(found.intervals_m[last]));
+    let mut step_m = 0.5 * (best.0[1] - best.0[0]);
+    while step_m > FINEST_M {
+        let [from, to] = best.0;
+        let tries = [
+            [from - step_m, to],
+            [from + step_m, to],
+            [from, to - step_m],
+            [from, to + step_m],
+            [from - step_m, to - step_m],
+            [from + step_m, to + step_m],
+        ];
+        let apart = |one: [f64; 2]| {
+            found.intervals_m[..last].iter().all(|o| one[1] <= o[0] || one[0] >= o[1])
+        };
+        let better = tries
+            .into_iter()
+            .filter(|&interval| interval[1] - interval[0] >= 50.0 && apart(interval))
+            .map(|interval| (interval, value(interval)))
+            .max_by(|one, other| one.1.0.total_cmp(&other.1.0));
+        match better {
+            Some(better) if better.1.0 > best.1.0 => best = better,
+            _ => step_m *= 0.5,
+        }
+    }
+    found.intervals_m[last] = best.0;
+    (found.gain, found.estimate) = best.1;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn choosing_all_or_none_of_the_runs_costs_less_than_choosing_half() {
+        assert!(subset_cost(8, 4) > subset_cost(8, 1));
+        assert!((subset_cost(8, 4) - 2.0 * (70f64.ln() + 8f64.ln())).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,89 @@
+//! Explaining a residual: what the declared model leaves, which undeclared effect explains it,
+//! how sure that is, and what the model with the effect predicts.
+//!
+//! # Layout, in the order of the work
+//!
+//! - [`evidence`]: observations, noise, the joint fit of a, b, c and effects
+//! - [`effects`]: the library, one file for each kind
+//! - [`scan`], [`localise`], [`residual_pressure`]: what a force of some shape, at some place or
+//!   time, would explain
+//! - [`selection`]: the search for effects, its significance, evidence by run
+//! - [`score`]: open-loop prediction of fit and holdout runs
+//! - [`verdict`], [`answer`]: the statement
+//!
+//! [`explain`] runs it all.
+
+pub mod answer;
+pub mod effects;
+pub mod evidence;
+pub mod localise;
+pub mod residual_pressure;
+pub mod scan;
+pub mod score;
+pub mod selection;
+pub mod verdict;
+
+use std::collections::BTreeMap;
+
+use crate::dataset::{Dataset, Role};
+use answer::Answer;
+use evidence::{Fit, FitProblem, RunData, RunDataError};
+use score::{PredictedRun, Score};
+use selection::{Outcome, Search};
+
+/// Fit and holdout runs with the models that were fitted.
+pub struct Explanation {
+    /// The machine-readable answer.
+    pub answer: Answer,
+    /// The fit runs and their prior.
+    pub problem: FitProblem,
+    /// The runs set aside.
+    pub holdout: Vec<RunData>,
+    /// The declared model with a, b, c refitted.
+    pub base: Fit,
+    /// The same with the effects.
+    pub grown: Fit,
+    /// Open-loop errors.
+    pub score: Score,
+    /// Predicted measured speeds of all runs by the grown model.
+    pub predictions: Vec<PredictedRun>,
+    /// What the search found.
+    pub outcome: Outcome,
+}
+
+/// Told how far the work is: share done, and what is being done.
+pub type Progress<'p> = &'p dyn Fn(f64, &str);
+
+/// Explains what the declared model of a dataset leaves.
+///
+/// Holdout runs are read once, to score the finished model.
+///
+/// # Errors
+///
+/// When a run has no usable sample.
+pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, RunDataError> {
+    progress(0.0, "reading the runs");
+    let (fit_runs, holdout): (Vec<RunData>, Vec<RunData>) =
+        evidence::prepare(dataset)?.into_iter().partition(|run| run.role == Role::Fit);
+    let problem = FitProblem::new(fit_runs, dataset.train.resistance);
+    let search = Search {
+        problem: &problem,
+        holdout: &holdout,
+        train: &dataset.train,
+        track: dataset.track.as_ref(),
+        progress,
+    };
+    let outcome = search.run();
+    progress(0.95, "scoring the holdout runs");
+    let score = Score::of(&problem, &holdout, &outcome.base, &outcome.fit);
+    let predictions = score::predictions(&problem, &holdout, &outcome.fit);
+    let answer = verdict::answer(&search, &outcome, &score);
+    progress(1.0, "done");
+    let (base, grown) = (outcome.base.clone(), outcome.fit.clone());
+    Ok(Explanation { answer, base, grown, score, predictions, outcome, problem, holdout })
+}
+
+/// Where predictions were written, for the answer.
+pub fn set_prediction_files(answer: &mut Answer, files: BTreeMap<String, String>) {
+    answer.predictions = files;
+}

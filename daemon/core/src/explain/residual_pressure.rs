@@ -1,0 +1,96 @@
+//! Brake-cylinder pressure that stays while no brake is reported.
+
+use super::answer::RunWindow;
+use super::evidence::RunData;
+
+/// After the brake force is gone, the cylinders get this time in s to empty.
+const RELEASE_S: f64 = 6.0;
+/// A lasting pressure below this in Pa is nothing.
+const STEP_MIN_PA: f64 = 2500.0;
+/// The step must be so many times the scatter.
+const STEP_SPREADS: f64 = 4.0;
+/// Released samples needed on either side.
+const SAMPLES_MIN: usize = 20;
+
+/// Times in s from the run's start and pressures in Pa while the brake is released.
+fn released(run: &RunData) -> Vec<(f64, f64)> {
+    let (samples, time_s) = (run.samples(), run.recording.time_s());
+    let strongest = samples.iter().filter_map(|sample| sample.brake_force_n).fold(0.0, f64::max);
+    let mut braked_s = f64::NEG_INFINITY;
+    let mut points = Vec::new();
+    for (sample, &time_s) in samples.iter().zip(time_s) {
+        if sample.brake_force_n.is_none_or(|force| force > 0.01 * strongest) {
+            braked_s = time_s;
+        } else if time_s - braked_s > RELEASE_S
+            && let Some(pressure) = sample.brake_cylinder_pressure_pa
+        {
+            points.push((time_s, pressure));
+        }
+    }
+    points
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// The instant from which the pressure of one run is higher for good.
+fn onset_s(points: &[(f64, f64)], baseline_pa: f64) -> Option<f64> {
+    if points.len() < 2 * SAMPLES_MIN {
+        return None;
+    }
+    // The split that leaves the least squares.
+    let total: f64 = points.iter().map(|point| point.1).sum();
+    let (mut sum, mut best) = (0.0, None::<(f64, usize)>);
+    for (k, point) in points.iter().enumerate() {
+        let (before, after) = (k as f64, (points.len() - k) as f64);
+        if k >= SAMPLES_MIN && points.len() - k >= SAMPLES_MIN {
+            let between = (total - sum) / after - sum / before;
+            let explained = between.signum() * between * between * before * after;
+            if best.is_none_or(|(most, _)| explained > most) {
+                best = Some((explained, k));
+            }
+        }
+        sum += point.1;
+    }
+    let (_, split) = best?;
+    let (before, after) = points.split_at(split);
+    let low = median(before.iter().map(|point| point.1).collect());
+    let high = median(after.iter().map(|point| point.1).collect());
+    let deviation = |half: &[(f64, f64)], middle: f64| {
+        1.48 * median(half.iter().map(|point| (point.1 - middle).abs()).collect())
+    };
+    let spread = deviation(before, low).max(deviation(after, high));
+    let is_step = high - low > STEP_MIN_PA.max(STEP_SPREADS * spread);
+    if is_step {
+        return Some(points[split].0);
+    }
+    // High from the start.
+    let is_high = low.min(high) - baseline_pa > STEP_MIN_PA.max(STEP_SPREADS * spread);
+    is_high.then_some(0.0)
+}
+
+/// Windows, in the recordings' own time, in which the cylinders of some runs keep a pressure;
+/// `None` when no pressure tells anything.
+pub fn windows<'r>(runs: impl Iterator<Item = &'r RunData> + Clone) -> Option<Vec<RunWindow>> {
+    let points: Vec<(&RunData, Vec<(f64, f64)>)> = runs.map(|run| (run, released(run))).collect();
+    let medians: Vec<f64> = points
+        .iter()
+        .filter(|(_, points)| points.len() >= SAMPLES_MIN)
+        .map(|(_, points)| median(points.iter().map(|point| point.1).collect()))
+        .collect();
+    let baseline_pa = medians.iter().copied().fold(f64::INFINITY, f64::min);
+    let windows: Vec<RunWindow> = points
+        .iter()
+        .filter_map(|(run, points)| {
+            let onset_s = onset_s(points, baseline_pa)?;
+            Some(RunWindow {
+                run: run.file.clone(),
+                t_start_s: run.offset_s + onset_s,
+                t_end_s: run.offset_s + run.duration_s(),
+            })
+        })
+        .collect();
+    (!windows.is_empty()).then_some(windows)
+}

@@ -1,0 +1,72 @@
+//! The run as the unit of evidence.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use crate::explain::evidence::Fit;
+
+/// What an effect does for runs that did not take part in its fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Held {
+    /// Decrease of -2 log likelihood on the runs left out, summed.
+    pub gain: f64,
+    /// Runs on which it helps.
+    pub better: usize,
+    /// Runs in all.
+    pub runs: usize,
+}
+
+/// Cost of each run under the parameters fitted without it, to second order.
+fn held_out_costs(fit: &Fit) -> Vec<f64> {
+    let information = fit.information();
+    fit.runs
+        .iter()
+        .map(|run| {
+            let rest = &information - &run.information;
+            match Cholesky::new(rest) {
+                Some(factor) => {
+                    let away: DVector<f64> = -factor.solve(&run.score);
+                    run.cost - 2.0 * run.score.dot(&away) + away.dot(&(&run.information * &away))
+                }
+                None => run.cost,
+            }
+        })
+        .collect()
+}
+
+/// Leaves one run out at a time: what the larger model gains on it.
+pub fn leave_one_run_out(smaller: &Fit, larger: &Fit) -> Held {
+    let (before, after) = (held_out_costs(smaller), held_out_costs(larger));
+    let gains = before.iter().zip(&after).map(|(before, after)| before - after);
+    Held {
+        gain: gains.clone().sum(),
+        better: gains.filter(|&gain| gain > 0.0).count(),
+        runs: before.len(),
+    }
+}
+
+/// Standard deviations of all parameters, and their covariance.
+///
+/// The likelihood's covariance is enlarged where the scores scatter more from run to run than it
+/// says (cluster-robust). With few runs a parameter's own scatter is itself uncertain, so that
+/// half of the enlargement is that of all parameters together.
+pub fn deviations(fit: &Fit) -> (Vec<f64>, DMatrix<f64>) {
+    let count = fit.theta.len();
+    let Some(factor) = fit.factor() else {
+        return (vec![f64::NAN; count], DMatrix::zeros(count, count));
+    };
+    let covariance = factor.inverse();
+    let runs = fit.runs.len() as f64;
+    let mut scatter = DMatrix::zeros(count, count);
+    for run in &fit.runs {
+        scatter += &run.score * run.score.transpose();
+    }
+    let robust = &covariance * scatter * &covariance * (runs / (runs - 1.0).max(1.0));
+    let own: Vec<f64> = (0..count).map(|i| robust[(i, i)] / covariance[(i, i)]).collect();
+    let pooled = own.iter().sum::<f64>() / count as f64;
+    let enlarged: Vec<f64> = own.iter().map(|own| (0.5 * (own + pooled)).max(1.0)).collect();
+    let deviations = (0..count).map(|i| (covariance[(i, i)] * enlarged[i]).sqrt()).collect();
+    let scaled = DMatrix::from_fn(count, count, |i, j| {
+        covariance[(i, j)] * (enlarged[i] * enlarged[j]).sqrt()
+    });
+    (deviations, scaled)
+}

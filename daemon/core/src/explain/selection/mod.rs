@@ -1,0 +1,9 @@
+//! The search for effects.
+
+mod by_run;
+mod search;
+mod significance;
+
+pub use by_run::{Held, deviations, leave_one_run_out};
+pub use search::{Outcome, Search, Trial};
+pub use significance::{ACCEPT, p_value, penalty};

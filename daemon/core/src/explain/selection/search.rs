@@ -1,0 +1,243 @@
+//! Forward search with a swap pass and pruning.
+
+use std::sync::Arc;
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::significance::{ACCEPT, model_penalty, penalty};
+use crate::explain::Progress;
+use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal};
+use crate::explain::evidence::{Fit, FitProblem, GrownModel, Noise, RunData};
+use crate::explain::scan::Scan;
+use crate::explain::score;
+use crate::track::Track;
+use crate::train::TrainModel;
+
+/// Effects at most.
+const EFFECTS_MAX: usize = 3;
+/// Kinds that get a noise of their own and a second localisation in each round.
+const FINALISTS: usize = 5;
+/// An effect must take away this share of the open-loop error of the fit runs.
+const REDUCTION_MIN: f64 = 0.03;
+/// Less observations than this tell nothing.
+pub const OBSERVATIONS_MIN: usize = 80;
+
+/// One candidate, fitted together with everything accepted so far.
+#[derive(Clone)]
+pub struct Trial {
+    /// Its kind.
+    pub kind: EffectKind,
+    /// The fitted model; the candidate is its last effect.
+    pub fit: Fit,
+    /// Decrease of -2 log likelihood by it.
+    pub decrease: f64,
+    /// The same less the penalty.
+    pub evidence: f64,
+}
+
+/// What the search found.
+#[derive(Clone)]
+pub struct Outcome {
+    /// The declared model with a, b, c refitted.
+    pub base: Fit,
+    /// The model with all accepted effects.
+    pub fit: Fit,
+    /// The best trial of each kind in each round, the strongest first; the last round is the one
+    /// in which nothing more was accepted.
+    pub rounds: Vec<Vec<Trial>>,
+    /// Kinds that the data do not allow to test, and why.
+    pub not_testable: Vec<(EffectKind, String)>,
+}
+
+/// The search over one dataset.
+pub struct Search<'a> {
+    /// The fit runs.
+    pub problem: &'a FitProblem,
+    /// Runs whose speeds are not looked at.
+    pub holdout: &'a [RunData],
+    /// The declared train.
+    pub train: &'a TrainModel,
+    /// The declared line.
+    pub track: Option<&'a Arc<Track>>,
+    /// Told how far the search is.
+    pub progress: Progress<'a>,
+}
+
+impl Search<'_> {
+    /// Searches.
+    pub fn run(&self) -> Outcome {
+        (self.progress)(0.05, "fitting a, b, c");
+        let declared = GrownModel::declared(self.train);
+        let start = self.problem.start(&[]);
+        let first = self.problem.fit_with_noise(&declared, start, Noise::START);
+        let base = self.problem.fit_with_noise(&declared, first.theta, first.noise);
+        let mut outcome = Outcome {
+            base: base.clone(),
+            fit: base,
+            rounds: Vec::new(),
+            not_testable: Vec::new(),
+        };
+        if outcome.base.observations() < OBSERVATIONS_MIN {
+            return outcome;
+        }
+        while outcome.fit.model.effects.len() < EFFECTS_MAX {
+            let round = outcome.rounds.len() as f64;
+            (self.progress)((0.1 + 0.25 * round).min(0.8), "trying effects");
+            let trials = self.round(&outcome.fit, &mut outcome.not_testable);
+            let accepted = trials.iter().find(|trial| self.is_accepted(&outcome.fit, trial));
+            let next = accepted.map(|trial| trial.fit.clone());
+            outcome.rounds.push(trials);
+            let Some(next) = next else { break };
+            outcome.fit = next;
+            if outcome.fit.model.effects.len() > 1 {
+                (self.progress)((0.2 + 0.25 * round).min(0.85), "swapping effects");
+                self.swap(&mut outcome.fit);
+                self.prune(&mut outcome.fit);
+            }
+        }
+        outcome
+    }
+
+    /// Tries every kind that the model does not have yet; the strongest first.
+    fn round(&self, base: &Fit, not_testable: &mut Vec<(EffectKind, String)>) -> Vec<Trial> {
+        let Some(scan) = self.scan(base) else { return Vec::new() };
+        let mut trials: Vec<(Trial, &dyn Effect)> = Vec::new();
+        for effect in LIBRARY {
+            let kind = effect.kind();
+            if base.model.effects.iter().any(|own| own.kind() == kind) {
+                continue;
+            }
+            match effect.propose(&scan) {
+                Proposal::NotTestable(reason) => {
+                    if !not_testable.iter().any(|(other, _)| *other == kind) {
+                        not_testable.push((kind, reason));
+                    }
+                }
+                Proposal::Candidates(candidates) => {
+                    let best = candidates
+                        .into_iter()
+                        .map(|candidate| self.attempt(base, base, candidate, false))
+                        .max_by(|one, other| one.evidence.total_cmp(&other.evidence));
+                    trials.extend(best.map(|trial| (trial, effect)));
+                }
+            }
+        }
+        let by_evidence =
+            |one: &Trial, other: &Trial| other.evidence.total_cmp(&one.evidence);
+        trials.sort_by(|one, other| by_evidence(&one.0, &other.0));
+        let mut finished: Vec<Trial> = trials
+            .into_iter()
+            .enumerate()
+            .map(|(rank, (trial, effect))| {
+                let is_finalist = rank < FINALISTS && trial.evidence > -20.0;
+                if is_finalist { self.finalist(base, trial, effect) } else { trial }
+            })
+            .collect();
+        finished.sort_by(by_evidence);
+        finished
+    }
+
+    fn scan<'s>(&'s self, fit: &'s Fit) -> Option<Scan<'s>> {
+        Scan::new(self.problem, self.holdout, self.train, self.track, fit)
+    }
+
+    /// Fits a candidate on top of a fit; its evidence counts against `base`.
+    fn attempt(&self, base: &Fit, onto: &Fit, candidate: Candidate, own_noise: bool) -> Trial {
+        let kind = candidate.hypothesis.kind();
+        let price = penalty(&candidate.hypothesis, base.observations());
+        let model = onto.model.with(candidate.hypothesis);
+        let start = onto.theta.iter().chain(&candidate.start).copied().collect();
+        let fit = if own_noise {
+            self.problem.fit_with_noise(&model, start, onto.noise)
+        } else {
+            self.problem.fit(&model, start, onto.noise)
+        };
+        let decrease = base.cost - fit.cost;
+        Trial { kind, fit, decrease, evidence: decrease - price }
+    }
+
+    /// Gives a trial the noise that remains under it and lets its kind look again for places and
+    /// windows under that noise: the noise of the smaller model holds the effect itself.
+    fn finalist(&self, base: &Fit, trial: Trial, effect: &dyn Effect) -> Trial {
+        let refit = |trial: &Trial| {
+            let fit = self.problem.fit_with_noise(
+                &trial.fit.model,
+                trial.fit.theta.clone(),
+                trial.fit.noise,
+            );
+            let decrease = base.cost - fit.cost;
+            let price = trial.decrease - trial.evidence;
+            Trial { kind: trial.kind, fit, decrease, evidence: decrease - price }
+        };
+        let mut best = refit(&trial);
+        for _ in 0..2 {
+            let sharper = self.problem.fit(&base.model, base.theta.clone(), best.fit.noise);
+            let Some(scan) = self.scan(&sharper) else { break };
+            let Proposal::Candidates(candidates) = effect.propose(&scan) else { break };
+            let again = candidates
+                .into_iter()
+                .map(|candidate| self.attempt(base, &sharper, candidate, true))
+                .max_by(|one, other| one.evidence.total_cmp(&other.evidence));
+            match again {
+                Some(again) if again.evidence > best.evidence + 1.0 => best = again,
+                _ => break,
+            }
+        }
+        best
+    }
+
+    /// Whether the last effect of a trial is more than chance and large enough to matter.
+    fn is_accepted(&self, base: &Fit, trial: &Trial) -> bool {
+        trial.evidence > ACCEPT && self.reduction(base, &trial.fit) > REDUCTION_MIN
+    }
+
+    /// Share of the open-loop error of the fit runs that the larger model takes away, over whole
+    /// runs or minutes, whichever is more.
+    fn reduction(&self, smaller: &Fit, larger: &Fit) -> f64 {
+        score::reduction_on_fit_runs(self.problem, smaller, larger)
+    }
+
+    /// Total cost of a model: fit and price.
+    fn total(fit: &Fit) -> f64 {
+        fit.cost + model_penalty(fit)
+    }
+
+    /// Takes each effect out in turn and looks whether another kind does better in its place.
+    fn swap(&self, fit: &mut Fit) {
+        for index in 0..fit.model.effects.len() {
+            let rest = self.without(fit, index);
+            let best = self.round(&rest, &mut Vec::new()).into_iter().next();
+            if let Some(best) = best
+                && Self::total(&best.fit) < Self::total(fit) - 4.0
+                && self.is_accepted(&rest, &best)
+            {
+                *fit = best.fit;
+            }
+        }
+    }
+
+    /// Drops effects that the others have made needless.
+    fn prune(&self, fit: &mut Fit) {
+        let mut index = 0;
+        while index < fit.model.effects.len() && fit.model.effects.len() > 1 {
+            let rest = self.without(fit, index);
+            let needless = Self::total(&rest) < Self::total(fit) + ACCEPT
+                || self.reduction(&rest, fit) < REDUCTION_MIN;
+            if needless {
+                *fit = rest;
+            } else {
+                index += 1;
+            }
+        }
+    }
+
+    /// The model without one effect, refitted.
+    pub fn without(&self, fit: &Fit, index: usize) -> Fit {
+        let range = fit.model.ranges()[index].clone();
+        let mut model = fit.model.clone();
+        model.effects.remove(index);
+        let kept = fit.theta.iter().enumerate().filter(|(i, _)| !range.contains(i));
+        let start = kept.map(|(_, value)| *value).collect();
+        self.problem.fit_with_noise(&model, start, fit.noise)
+    }
+}
