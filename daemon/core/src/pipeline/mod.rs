@@ -8,6 +8,7 @@ mod estimator;
 mod innovation;
 pub mod output;
 pub mod settings;
+pub mod trajectory;
 
 pub use echo::Echo;
 pub use estimator::{Estimator, Outcome};
