@@ -1,14 +1,23 @@
-//! Recursive estimators of fixed size, without any knowledge of trains.
+//! Recursive estimators and solvers of fixed size, without any knowledge of trains.
 //!
 //! Sizes are const generics, memory is the structs' own, and no update allocates. Each is
 //! tested against its batch least-squares twin.
+//!
+//! - `rls`, `mils`, `information`, `bounded`: least squares, recursive, with bounds
+//! - `whitening`, `line`, `median`: from raw rows to independent, clean ones
+//! - [`triangular`]: least-squares rows gathered in a triangular factor by Householder reflections
+//! - [`levenberg_marquardt`]: small nonlinear least squares in a box
+//! - [`square_root`]: covariance as a triangular factor, updated by one measurement at a time
 
 mod bounded;
 mod information;
+pub mod levenberg_marquardt;
 mod line;
 mod median;
 mod mils;
 mod rls;
+pub mod square_root;
+pub mod triangular;
 mod whitening;
 
 pub use bounded::{Bounded, bounded_minimum};

@@ -9,6 +9,7 @@ mod innovation;
 pub mod output;
 pub mod resistance;
 pub mod settings;
+pub mod trajectory;
 
 pub use echo::Echo;
 pub use estimator::{Estimator, Outcome};

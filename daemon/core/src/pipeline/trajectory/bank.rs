@@ -1,0 +1,195 @@
+//! A bank of hypotheses about when (a, b, c) last jumped.
+//!
+//! Rain, wind or a tunnel change the resistance at once. A single filter either forgets, and
+//! pays with noise all the time, or it does not, and is wrong for long after a jump. The bank
+//! follows several filters instead, each of which opened its coefficients at another time, and
+//! weighs them by the likelihood of the speeds (Andersson 1985, adaptive forgetting by multiple
+//! models; Adams, MacKay 2007, run lengths). Ages are kept about evenly on a logarithmic scale:
+//! when the bank is full, the two hypotheses closest in relative age become one.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::hypothesis::{Hypothesis, Innovation, OutlierModel};
+use super::noise::NoiseModel;
+use super::step::{Step, StepRule};
+use crate::train::Davis;
+
+/// The most hypotheses of a bank.
+pub const HYPOTHESES_MAX: usize = 16;
+
+/// What the bank expects of jumps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JumpModel {
+    /// Evidence in nats (logarithm of the likelihood ratio) that it takes to believe in a jump
+    /// within a given second; minus the logarithm of the mean time in s between jumps.
+    pub evidence: f64,
+    /// Standard deviations of a jump of a, b and c.
+    pub std: Vector3<f64>,
+    /// Least time in s between two hypotheses.
+    pub spacing_s: f64,
+}
+
+/// Filters with different times of the last jump.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JumpBank {
+    /// By age, the oldest first.
+    hypotheses: [Hypothesis; HYPOTHESES_MAX],
+    count: usize,
+    capacity: usize,
+    jumps: JumpModel,
+    noise: NoiseModel,
+    outliers: OutlierModel,
+    since_spawn_s: f64,
+}
+
+/// Hypotheses less probable than this do not enter the published estimate: a jump within the
+/// last second is always possible, and would widen every interval by its whole size.
+const WEIGHT_PUBLISHED_MIN: f64 = 0.05;
+/// Log-weight below the best at which a hypothesis is dropped.
+const LOG_WEIGHT_RANGE: f64 = 40.0;
+
+impl JumpBank {
+    /// A bank of at most `capacity` hypotheses (1 to [`HYPOTHESES_MAX`]) that starts from one.
+    pub fn new(
+        first: Hypothesis,
+        capacity: usize,
+        jumps: JumpModel,
+        noise: NoiseModel,
+        outliers: OutlierModel,
+    ) -> Self {
+        JumpBank {
+            hypotheses: [first; HYPOTHESES_MAX],
+            count: 1,
+            capacity: capacity.clamp(1, HYPOTHESES_MAX),
+            jumps,
+            noise,
+            outliers,
+            since_spawn_s: 0.0,
+        }
+    }
+
+    /// The hypotheses, the oldest first.
+    pub fn hypotheses(&self) -> &[Hypothesis] {
+        &self.hypotheses[..self.count]
+    }
+
+    /// The most probable hypothesis.
+    pub fn likeliest(&self) -> &Hypothesis {
+        &self.hypotheses[self.likeliest_index()]
+    }
+
+    fn likeliest_index(&self) -> usize {
+        let weight = |i: &usize| self.hypotheses[*i].log_weight;
+        (0..self.count).max_by(|i, j| weight(i).total_cmp(&weight(j))).unwrap_or(0)
+    }
+
+    /// Takes the speed of every hypothesis from a measurement alone.
+    pub fn anchor(&mut self, speed_mps: f64) {
+        for hypothesis in &mut self.hypotheses[..self.count] {
+            hypothesis.anchor(speed_mps);
+        }
+    }
+
+    /// Moves every hypothesis over a step and weighs it by the speed measured after it; the
+    /// innovation is that of the hypothesis that was likeliest before. `None` when no
+    /// hypothesis is sound any more.
+    ///
+    /// # Real-time
+    ///
+    /// Work bounded by the capacity, no allocation.
+    pub fn advance(
+        &mut self,
+        rule: StepRule,
+        step: &Step,
+        duration_s: f64,
+        measured_mps: f64,
+    ) -> Option<Innovation> {
+        self.spawn(duration_s);
+        let likeliest = self.likeliest_index();
+        let mut told = None;
+        for (index, hypothesis) in self.hypotheses[..self.count].iter_mut().enumerate() {
+            hypothesis.predict(rule, step, duration_s);
+            let innovation = hypothesis.measure(measured_mps, &self.noise, &self.outliers);
+            if index == likeliest {
+                told = Some(innovation);
+            }
+        }
+        self.drop_unlikely();
+        if self.count == 0 { None } else { told }
+    }
+
+    /// Adds the hypothesis that the coefficients jump now.
+    fn spawn(&mut self, duration_s: f64) {
+        self.since_spawn_s += duration_s;
+        let is_due = self.since_spawn_s >= self.jumps.spacing_s;
+        if self.capacity < 2 || !is_due {
+            return;
+        }
+        let mut child = *self.likeliest();
+        let variance = self.jumps.std.component_mul(&self.jumps.std);
+        child.log_weight += (self.since_spawn_s.ln() - self.jumps.evidence).min(-0.7);
+        self.since_spawn_s = 0.0;
+        if child.jump(&variance) {
+            if self.count == self.capacity {
+                self.unite_closest();
+            }
+            self.hypotheses[self.count] = child;
+            self.count += 1;
+        }
+    }
+
+    /// Makes one of the two neighbours whose ages differ least in proportion.
+    fn unite_closest(&mut self) {
+        let age = |i: usize| self.hypotheses[i].age_s;
+        let gap = |i: usize| (age(i) - age(i + 1)) / age(i).max(f64::MIN_POSITIVE);
+        let Some(older) = (0..self.count - 1).min_by(|&i, &j| gap(i).total_cmp(&gap(j))) else {
+            return;
+        };
+        let (one, other) = (&self.hypotheses[older], &self.hypotheses[older + 1]);
+        self.hypotheses[older] = one.united(other);
+        self.remove(older + 1);
+    }
+
+    fn remove(&mut self, index: usize) {
+        self.hypotheses.copy_within(index + 1..self.count, index);
+        self.count -= 1;
+    }
+
+    /// Drops what is unsound or out of the question, and sets the greatest log-weight to 0.
+    fn drop_unlikely(&mut self) {
+        let best = self.hypotheses[..self.count]
+            .iter()
+            .filter(|hypothesis| hypothesis.is_sound())
+            .map(|hypothesis| hypothesis.log_weight)
+            .fold(f64::NEG_INFINITY, f64::max);
+        for index in (0..self.count).rev() {
+            let hypothesis = &mut self.hypotheses[index];
+            hypothesis.log_weight -= best;
+            if !(hypothesis.is_sound() && hypothesis.log_weight > -LOG_WEIGHT_RANGE) {
+                self.remove(index);
+            }
+        }
+    }
+
+    /// Mean and covariance of (a, b, c) over the hypotheses that count.
+    pub fn davis(&self) -> (Davis, Matrix3<f64>) {
+        let live = self.hypotheses();
+        let total: f64 = live.iter().map(|hypothesis| hypothesis.log_weight.exp()).sum();
+        let published =
+            |hypothesis: &&Hypothesis| hypothesis.log_weight.exp() >= WEIGHT_PUBLISHED_MIN * total;
+        let (mut mean, mut weight) = (Vector3::zeros(), 0.0);
+        for hypothesis in live.iter().filter(published) {
+            let share = hypothesis.log_weight.exp();
+            mean += hypothesis.state.fixed_rows::<3>(0) * share;
+            weight += share;
+        }
+        mean /= weight;
+        let mut covariance = Matrix3::zeros();
+        for hypothesis in live.iter().filter(published) {
+            let share = hypothesis.log_weight.exp() / weight;
+            let apart = hypothesis.state.fixed_rows::<3>(0) - mean;
+            covariance += (hypothesis.davis_covariance() + apart * apart.transpose()) * share;
+        }
+        (Davis { a: mean[0], b: mean[1], c: mean[2] }, covariance)
+    }
+}

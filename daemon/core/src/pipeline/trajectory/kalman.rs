@@ -1,0 +1,230 @@
+//! `trajectory_kalman`: Davis coefficients sample by sample, on any train.
+
+use std::sync::Arc;
+
+use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
+use nalgebra::Vector3;
+use serde::Deserialize;
+
+use super::bank::{HYPOTHESES_MAX, JumpModel};
+use super::hypothesis::Innovation;
+use super::index::DAVIS;
+use super::motion::{Motion, MotionStep, MotionTracker};
+use super::noise::NoiseModel;
+use super::online::{OnlineFilter, OnlineSettings};
+use super::quality::{Estimate, SpeedRange, prior_std};
+use super::step::{Step, StepRule, resistance_gain};
+use super::unexplained::UnexplainedForce;
+use crate::force::ResolvedSample;
+use crate::pipeline::output::write_parameters;
+use crate::pipeline::settings::{SettingError, require};
+use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
+use crate::train::TrainModel;
+
+/// Settings of `trajectory_kalman`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TrajectoryKalmanSettings {
+    /// Standard deviations of the declared coefficients, as a share of each.
+    pub prior_relative_std: f64,
+    /// Evidence in nats that it takes to believe in a jump of the coefficients (rain, wind, a
+    /// change of the train) within a given second. Disturbances that last, as no noise model
+    /// here has them, look like jumps: less evidence is quicker and more often wrong.
+    pub jump_evidence: f64,
+    /// The most hypotheses about the last jump; 1 looks for no jumps.
+    pub hypotheses: u32,
+    /// Standard deviation of the measured speed in m/s; learned when absent.
+    pub speed_noise_mps: Option<f64>,
+    /// Root of the density of disturbing forces in N/kN √s; learned when absent.
+    pub disturbance_n_per_kn_sqrt_s: Option<f64>,
+    /// Samples that the learned noise looks back over.
+    pub noise_memory: u32,
+}
+
+impl Default for TrajectoryKalmanSettings {
+    fn default() -> Self {
+        TrajectoryKalmanSettings {
+            prior_relative_std: 0.5,
+            jump_evidence: 16.0,
+            hypotheses: 8,
+            speed_noise_mps: None,
+            disturbance_n_per_kn_sqrt_s: None,
+            noise_memory: 2000,
+        }
+    }
+}
+
+/// Lowest and highest speed noise that is learned, in m/s.
+const SPEED_NOISE_RANGE_MPS: (f64, f64) = (1e-3, 1.0);
+/// Speed noise before any data, in m/s.
+const SPEED_NOISE_FIRST_MPS: f64 = 0.03;
+/// Lowest and highest disturbance that is learned, in N/kN √s.
+const DISTURBANCE_RANGE: (f64, f64) = (0.01, 10.0);
+/// Disturbance before any data, in N/kN √s.
+const DISTURBANCE_FIRST: f64 = 0.2;
+/// Least time in s between two hypotheses.
+const SPACING_S: f64 = 1.0;
+
+impl TrajectoryKalmanSettings {
+    /// Builds the estimator for a train.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn build(&self, train: &Arc<TrainModel>) -> Result<TrajectoryKalman, SettingError> {
+        let positive = "a finite number above 0";
+        let is_positive = |value: f64| value > 0.0 && value.is_finite();
+        let relative = self.prior_relative_std;
+        require(is_positive(relative), "prior_relative_std", relative, positive)?;
+        let evidence = self.jump_evidence;
+        require((1.0..=1e3).contains(&evidence), "jump_evidence", evidence, "1 to 1000 nats")?;
+        let hypotheses = f64::from(self.hypotheses);
+        let is_allowed = (1..=HYPOTHESES_MAX as u32).contains(&self.hypotheses);
+        require(is_allowed, "hypotheses", hypotheses, "1 to 16")?;
+        let speed_noise_mps = self.speed_noise_mps.unwrap_or(SPEED_NOISE_FIRST_MPS);
+        require(is_positive(speed_noise_mps), "speed_noise_mps", speed_noise_mps, positive)?;
+        let disturbance = self.disturbance_n_per_kn_sqrt_s.unwrap_or(DISTURBANCE_FIRST);
+        let is_allowed = disturbance >= 0.0 && disturbance.is_finite();
+        let key = "disturbance_n_per_kn_sqrt_s";
+        require(is_allowed, key, disturbance, "a finite number, 0 or above")?;
+        let memory = f64::from(self.noise_memory);
+        require(memory >= 50.0, "noise_memory", memory, "at least 50 samples")?;
+        let gain = resistance_gain(train.rotating_mass_factor);
+        let davis_std = prior_std(train, relative);
+        Ok(TrajectoryKalman::new(OnlineSettings {
+            davis: train.resistance,
+            davis_std,
+            jumps: JumpModel { evidence, std: davis_std, spacing_s: SPACING_S },
+            hypotheses: self.hypotheses as usize,
+            noise: NoiseModel {
+                speed_noise_mps,
+                speed_noise_range_mps: SPEED_NOISE_RANGE_MPS,
+                disturbance: gain * disturbance,
+                disturbance_range: (gain * DISTURBANCE_RANGE.0, gain * DISTURBANCE_RANGE.1),
+                memory,
+                learns_speed_noise: self.speed_noise_mps.is_none(),
+                learns_disturbance: self.disturbance_n_per_kn_sqrt_s.is_none(),
+            },
+        }))
+    }
+}
+
+/// Kalman filters of [a, b, c, v] with jump hypotheses over the samples of a train.
+///
+/// Samples are stepped over in time, one step for each sample, so that none waits for a
+/// distance to pass and no force is averaged away.
+#[derive(Clone, Debug)]
+pub struct TrajectoryKalman {
+    tracker: MotionTracker,
+    filter: OnlineFilter,
+    prior_std: Vector3<f64>,
+    innovations: InnovationMonitor,
+    unexplained: UnexplainedForce,
+    speeds: SpeedRange,
+    updates: u64,
+    /// Samples in a row, and in all, of which nothing could be used for a reason.
+    fault: Option<(Status, Reason)>,
+}
+
+/// Updates before the estimate is more than the declared values.
+const UPDATES_MIN: u64 = 50;
+/// Innovations that the published statistics look back over.
+const INNOVATION_MEMORY: u32 = 500;
+
+impl TrajectoryKalman {
+    /// An estimator from checked settings.
+    pub fn new(settings: OnlineSettings) -> Self {
+        TrajectoryKalman {
+            tracker: MotionTracker::default(),
+            filter: OnlineFilter::new(settings),
+            prior_std: settings.davis_std,
+            innovations: InnovationMonitor::new(INNOVATION_MEMORY),
+            unexplained: UnexplainedForce::default(),
+            speeds: SpeedRange::default(),
+            updates: 0,
+            fault: None,
+        }
+    }
+
+    /// The filter, for tests and offline work.
+    pub fn filter(&self) -> &OnlineFilter {
+        &self.filter
+    }
+
+    fn take_step(&mut self, motion: &MotionStep, sample: &ResolvedSample) -> Outcome {
+        let step = Step {
+            size: motion.duration_s,
+            drive_mps2: motion.drive_mps2,
+            resistance_gain: motion.resistance_gain,
+        };
+        let told = self.filter.advance(StepRule::Time, &step, motion.duration_s, sample.speed_mps);
+        let Some(innovation) = told else {
+            self.fault = Some((Status::Unestimated, Reason::NumericalFailure));
+            self.updates = 0;
+            return Outcome::Used;
+        };
+        self.fault = None;
+        let Innovation { innovation_mps, deviation_mps, is_used } = innovation;
+        if !is_used {
+            self.innovations.break_here();
+            return Outcome::Rejected(RejectionReason::Outlier);
+        }
+        self.innovations.push(innovation_mps / deviation_mps);
+        let likeliest = self.filter.bank().likeliest();
+        self.unexplained.push(&step, sample, &likeliest.davis(), likeliest.noise.speed_variance);
+        self.speeds.push(sample.speed_mps);
+        self.updates += 1;
+        Outcome::Updated
+    }
+}
+
+impl Estimator for TrajectoryKalman {
+    fn kind(&self) -> PipelineKind {
+        PipelineKind::TrajectoryKalman
+    }
+
+    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+        match self.tracker.advance(sample) {
+            Motion::Continue(motion) => self.take_step(&motion, sample),
+            Motion::Begin => {
+                self.filter.begin(sample.speed_mps);
+                self.unexplained.begin(sample.speed_mps);
+                self.innovations.break_here();
+                Outcome::Used
+            }
+            Motion::Standstill => Outcome::Used,
+            Motion::Unusable(reason) => {
+                if reason == RejectionReason::Missing {
+                    let lacks_gradient = sample.gradient_permille.is_none();
+                    self.fault = (self.updates < UPDATES_MIN).then_some((
+                        Status::Unestimated,
+                        if lacks_gradient {
+                            Reason::GradientUnknown
+                        } else {
+                            Reason::MissingQuantity
+                        },
+                    ));
+                }
+                Outcome::Rejected(reason)
+            }
+        }
+    }
+
+    fn write(&self, snapshot: &mut ParameterSnapshot) {
+        let (davis, covariance) = self.filter.davis();
+        write_parameters(snapshot, DAVIS, &Vector3::new(davis.a, davis.b, davis.c), &covariance);
+        let estimate = Estimate {
+            davis,
+            covariance,
+            prior_std: self.prior_std,
+            speeds_mps: self.speeds.get(),
+            innovations: &self.innovations,
+            inflation: self.filter.inflation(),
+            is_ready: self.updates >= UPDATES_MIN,
+            is_at_bound: false,
+        };
+        estimate.write(snapshot, self.fault);
+        self.unexplained.write(snapshot);
+        snapshot.generation = self.filter.resets();
+    }
+}

@@ -1,0 +1,190 @@
+//! The noise of the measured speed and the density of disturbing forces, learned on the way.
+//!
+//! Recursive maximum likelihood (Ljung, Söderström 1983, section 3.6) for ln R and ln q: the
+//! innovation e of a filter and its variance S have derivatives with respect to both, which
+//! follow scalar recursions beside the filter's own. The step is the score over the Fisher
+//! information of the samples remembered. While the coefficients are uncertain, the innovations
+//! say little of q, their derivatives are small, and q waits.
+
+use nalgebra::{Matrix2, Vector2};
+
+/// What is expected of the noise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NoiseModel {
+    /// Standard deviation of the measured speed in m/s before any data.
+    pub speed_noise_mps: f64,
+    /// Its lowest and highest value.
+    pub speed_noise_range_mps: (f64, f64),
+    /// Root of the density q of the disturbing acceleration in m/s² √s before any data.
+    pub disturbance: f64,
+    /// Its lowest and highest value.
+    pub disturbance_range: (f64, f64),
+    /// Samples that the estimates look back over.
+    pub memory: f64,
+    /// False keeps R as it is.
+    pub learns_speed_noise: bool,
+    /// False keeps q as it is.
+    pub learns_disturbance: bool,
+}
+
+/// Index of ln R.
+const SPEED: usize = 0;
+/// Index of ln q.
+const DISTURBANCE: usize = 1;
+
+/// Innovations beyond so many standard deviations say nothing precise.
+const CLIP_DEVIATIONS: f64 = 4.0;
+/// So many innovations in a row beyond the clip are no outliers: the noise has grown.
+const GROWN_AFTER: u32 = 3;
+/// Samples that the newest mean square looks back over.
+const NEWEST: f64 = 32.0;
+/// The newest mean square of normalised innovations below which the noise has shrunk; white
+/// noise hardly ever comes here.
+const SHRUNK_BELOW: f64 = 0.25;
+/// Information on ln R and ln q from before any data: standard deviations of 1.4.
+const PRIOR_INFORMATION: f64 = 0.5;
+/// Largest step of ln R and ln q for one innovation.
+const STEP_MAX: f64 = 0.5;
+
+/// R and q under one hypothesis, with the derivatives that learning needs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LearnedNoise {
+    /// Variance R of the measured speed in (m/s)².
+    pub speed_variance: f64,
+    /// Density q of the disturbing acceleration in (m/s)²/s.
+    pub disturbance_density: f64,
+    /// Derivatives of the predicted speed.
+    by_speed: Vector2<f64>,
+    /// Derivatives of the speed's variance.
+    by_variance: Vector2<f64>,
+    information: Matrix2<f64>,
+    newest_square: f64,
+    exceeded: u32,
+    exceeded_square: f64,
+}
+
+impl LearnedNoise {
+    /// The noise before any data.
+    pub fn new(model: &NoiseModel) -> Self {
+        LearnedNoise {
+            speed_variance: model.speed_noise_mps * model.speed_noise_mps,
+            disturbance_density: model.disturbance * model.disturbance,
+            by_speed: Vector2::zeros(),
+            by_variance: Vector2::zeros(),
+            information: Matrix2::from_diagonal_element(PRIOR_INFORMATION),
+            newest_square: 1.0,
+            exceeded: 0,
+            exceeded_square: 0.0,
+        }
+    }
+
+    /// The speed has been taken from a measurement alone.
+    pub fn anchor(&mut self) {
+        self.by_speed = Vector2::zeros();
+        self.by_variance = Vector2::new(self.speed_variance, 0.0);
+        self.exceeded = 0;
+    }
+
+    /// The filter has moved over a step of a given time; `by_before` is the derivative of the
+    /// speed after it with respect to the speed before.
+    pub fn predict(&mut self, by_before: f64, duration_s: f64) {
+        self.by_speed *= by_before;
+        self.by_variance *= by_before * by_before;
+        self.by_variance[DISTURBANCE] += self.disturbance_density * duration_s;
+    }
+
+    /// Learns from an innovation in m/s, given the variance of the predicted speed; call it
+    /// before the filter takes the measurement. `is_used` tells whether it will.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    pub fn learn(
+        &mut self,
+        innovation_mps: f64,
+        own_variance: f64,
+        is_used: bool,
+        model: &NoiseModel,
+    ) {
+        let inverse = 1.0 / (own_variance + self.speed_variance);
+        let square = innovation_mps * innovation_mps * inverse;
+        let mut by_total = self.by_variance;
+        by_total[SPEED] += self.speed_variance;
+        if self.watch_for_change(innovation_mps, square, own_variance, model) || !is_used {
+            return;
+        }
+        let by_total_share = by_total * inverse;
+        let clipped = innovation_mps.signum()
+            * innovation_mps.abs().min(CLIP_DEVIATIONS * inverse.sqrt().recip());
+        let clipped_square = square.min(CLIP_DEVIATIONS * CLIP_DEVIATIONS);
+        let score =
+            by_total_share * (0.5 * (clipped_square - 1.0)) + self.by_speed * (clipped * inverse);
+        let fading = 1.0 - 1.0 / model.memory;
+        self.information = self.information * fading
+            + by_total_share * by_total_share.transpose() * 0.5
+            + self.by_speed * self.by_speed.transpose() * inverse;
+        self.step(&score, model);
+        let gain = own_variance * inverse;
+        let by_gain = (self.by_variance - by_total * gain) * inverse;
+        self.by_speed = self.by_speed * (1.0 - gain) + by_gain * innovation_mps;
+        let kept = 1.0 - gain;
+        self.by_variance *= kept * kept;
+        self.by_variance[SPEED] += self.speed_variance * gain * gain;
+    }
+
+    /// One step of ln R and ln q along the score.
+    fn step(&mut self, score: &Vector2<f64>, model: &NoiseModel) {
+        let [[rr, _], [rq, qq]] = self.information.data.0;
+        let (rr, qq) = (rr + PRIOR_INFORMATION, qq + PRIOR_INFORMATION);
+        let inverse = 1.0 / (rr * qq - rq * rq);
+        let for_speed = (qq * score[SPEED] - rq * score[DISTURBANCE]) * inverse;
+        let for_disturbance = (rr * score[DISTURBANCE] - rq * score[SPEED]) * inverse;
+        if model.learns_speed_noise {
+            let (low, high) = model.speed_noise_range_mps;
+            let factor = for_speed.clamp(-STEP_MAX, STEP_MAX).exp();
+            self.speed_variance = (self.speed_variance * factor).clamp(low * low, high * high);
+        }
+        if model.learns_disturbance {
+            let (low, high) = model.disturbance_range;
+            let factor = for_disturbance.clamp(-STEP_MAX, STEP_MAX).exp();
+            let density = self.disturbance_density * factor;
+            self.disturbance_density = density.clamp(low * low, high * high);
+        }
+    }
+
+    /// Notices noise that has grown or shrunk out of all proportion, and follows it at once.
+    fn watch_for_change(
+        &mut self,
+        innovation_mps: f64,
+        square: f64,
+        own_variance: f64,
+        model: &NoiseModel,
+    ) -> bool {
+        let clip = CLIP_DEVIATIONS * CLIP_DEVIATIONS;
+        self.newest_square += (square.min(clip) - self.newest_square) / NEWEST;
+        if square > clip {
+            self.exceeded += 1;
+            self.exceeded_square += innovation_mps * innovation_mps;
+        } else {
+            self.exceeded = 0;
+            self.exceeded_square = 0.0;
+        }
+        let has_grown = self.exceeded >= GROWN_AFTER;
+        let has_shrunk = self.newest_square < SHRUNK_BELOW && self.speed_variance > own_variance;
+        if !(model.learns_speed_noise && (has_grown || has_shrunk)) {
+            return false;
+        }
+        let (low, high) = model.speed_noise_range_mps;
+        let variance = if has_grown {
+            self.exceeded_square / f64::from(self.exceeded)
+        } else {
+            self.speed_variance * self.newest_square
+        };
+        self.speed_variance = variance.clamp(low * low, high * high);
+        self.information = Matrix2::from_diagonal_element(PRIOR_INFORMATION);
+        self.newest_square = 1.0;
+        self.anchor();
+        self.exceeded_square = 0.0;
+        true
+    }
+}

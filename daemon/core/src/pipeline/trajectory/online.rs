@@ -1,0 +1,108 @@
+//! The online filter of `trajectory_kalman`, apart from samples and snapshots.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::bank::{JumpBank, JumpModel};
+use super::hypothesis::{Hypothesis, Innovation, OutlierModel};
+use super::long_run::LongRunVariance;
+use super::noise::{LearnedNoise, NoiseModel};
+use super::step::{Step, StepRule};
+use crate::train::Davis;
+
+/// How the online filter starts and what it expects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OnlineSettings {
+    /// Coefficients before any data.
+    pub davis: Davis,
+    /// Their standard deviations.
+    pub davis_std: Vector3<f64>,
+    /// Jumps of the coefficients.
+    pub jumps: JumpModel,
+    /// The most hypotheses about the last jump.
+    pub hypotheses: usize,
+    /// Noise of the measured speed and of the forces.
+    pub noise: NoiseModel,
+}
+
+/// Outliers: one sample in a hundred, anywhere within ±1 m/s of the prediction.
+const OUTLIERS: OutlierModel = OutlierModel { share: 0.01, density: 0.5 };
+
+/// Kalman filters of [a, b, c, v] with jump hypotheses.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OnlineFilter {
+    settings: OnlineSettings,
+    bank: JumpBank,
+    long_run: LongRunVariance,
+    resets: u64,
+}
+
+impl OnlineFilter {
+    /// A filter that knows no speed yet.
+    pub fn new(settings: OnlineSettings) -> Self {
+        OnlineFilter {
+            settings,
+            bank: Self::first_bank(&settings),
+            long_run: LongRunVariance::default(),
+            resets: 0,
+        }
+    }
+
+    fn first_bank(settings: &OnlineSettings) -> JumpBank {
+        let noise = LearnedNoise::new(&settings.noise);
+        let first = Hypothesis::new(&settings.davis, &settings.davis_std, noise);
+        JumpBank::new(first, settings.hypotheses, settings.jumps, settings.noise, OUTLIERS)
+    }
+
+    /// Takes a speed as the start of a trajectory; the coefficients keep what they know.
+    pub fn begin(&mut self, measured_mps: f64) {
+        self.bank.anchor(measured_mps);
+        self.long_run.break_here();
+    }
+
+    /// Takes in a step and the speed measured after it; `None` after a reset for numerical
+    /// failure.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    pub fn advance(
+        &mut self,
+        rule: StepRule,
+        step: &Step,
+        duration_s: f64,
+        measured_mps: f64,
+    ) -> Option<Innovation> {
+        let Some(innovation) = self.bank.advance(rule, step, duration_s, measured_mps) else {
+            self.bank = Self::first_bank(&self.settings);
+            self.resets += 1;
+            self.begin(measured_mps);
+            return None;
+        };
+        if innovation.is_used {
+            let normalised = innovation.innovation_mps / innovation.deviation_mps;
+            self.long_run.push(normalised, duration_s);
+        }
+        Some(innovation)
+    }
+
+    /// Mean and covariance of the coefficients, widened for disturbances that last.
+    pub fn davis(&self) -> (Davis, Matrix3<f64>) {
+        let (davis, covariance) = self.bank.davis();
+        (davis, covariance * self.long_run.inflation())
+    }
+
+    /// Factor on the covariance for disturbances that last; 1 when innovations are white.
+    pub fn inflation(&self) -> f64 {
+        self.long_run.inflation()
+    }
+
+    /// The hypotheses.
+    pub fn bank(&self) -> &JumpBank {
+        &self.bank
+    }
+
+    /// Resets for numerical failure so far.
+    pub fn resets(&self) -> u64 {
+        self.resets
+    }
+}

@@ -1,0 +1,212 @@
+//! What an estimate of (a, b, c) is worth: status, reason, excitation.
+//!
+//! In cruise a and b cannot be told apart (correlations beyond ±0.9999), while w0 over the
+//! driven speeds is known well. The status therefore rests on w0 over the driven speeds; which
+//! coefficients the data excited is said beside it.
+
+use dynocar_shared::{Manoeuvre, ParameterSnapshot, Reason, Status};
+use nalgebra::{Matrix3, Vector3};
+
+use super::index::{A, B, C};
+use crate::pipeline::InnovationMonitor;
+use crate::pipeline::output::{write_innovations, write_status};
+use crate::train::{Davis, TrainModel};
+
+/// Standard deviation of w0 over w0 above which an estimate is degraded.
+const W0_DEVIATION_MAX: f64 = 0.1;
+/// A coefficient is excited when the data have cut its prior standard deviation to this share.
+const EXCITED_SHARE: f64 = 0.5;
+/// Mean square of the innovations above which the model does not hold.
+const INNOVATION_SQUARE_MAX: f64 = 4.0;
+/// Lag-1 correlation of the innovations beyond which the model lacks something.
+const INNOVATION_CORRELATION_MAX: f64 = 0.6;
+/// Long-run variance of the innovations beyond which the model lacks something.
+const INFLATION_MAX: f64 = 4.0;
+/// Innovations before their statistics count.
+const INNOVATIONS_MIN: f64 = 50.0;
+
+/// Standard deviations of declared coefficients, as a share of each, or of a fifth of the
+/// resistance at the train's highest speed where one is declared small or zero.
+pub fn prior_std(train: &TrainModel, relative: f64) -> Vector3<f64> {
+    let davis = &train.resistance;
+    let speed_mps = train.speed_max_mps().filter(|speed| *speed > 1.0).unwrap_or(30.0);
+    let typical = 0.2 * davis.w0_n_per_kn(speed_mps).max(2.0);
+    Vector3::new(
+        relative * davis.a.max(typical),
+        relative * davis.b.max(typical / speed_mps),
+        relative * davis.c.max(typical / (speed_mps * speed_mps)),
+    )
+}
+
+/// An estimate with what is needed to judge it.
+#[derive(Clone, Copy, Debug)]
+pub struct Estimate<'a> {
+    /// The coefficients.
+    pub davis: Davis,
+    /// Their covariance.
+    pub covariance: Matrix3<f64>,
+    /// Their standard deviations before any data.
+    pub prior_std: Vector3<f64>,
+    /// Lowest and highest speed in m/s behind them; `None` before the first.
+    pub speeds_mps: Option<(f64, f64)>,
+    /// Innovations so far.
+    pub innovations: &'a InnovationMonitor,
+    /// Factor by which disturbances that last have widened the covariance.
+    pub inflation: f64,
+    /// True when enough samples were used.
+    pub is_ready: bool,
+    /// True when a coefficient lies at a bound.
+    pub is_at_bound: bool,
+}
+
+impl Estimate<'_> {
+    /// Status and reason, without regard to the input.
+    pub fn status(&self) -> (Status, Reason) {
+        let Some((low_mps, high_mps)) = self.speeds_mps.filter(|_| self.is_ready) else {
+            return (Status::Unestimated, Reason::TooFewSamples);
+        };
+        if !self.covariance.iter().all(|entry| entry.is_finite()) {
+            return (Status::Invalid, Reason::NumericalFailure);
+        }
+        let is_loose = [low_mps, 0.5 * (low_mps + high_mps), high_mps].into_iter().any(|speed| {
+            let powers = Vector3::new(1.0, speed, speed * speed);
+            let variance = (powers.transpose() * self.covariance * powers)[0];
+            let w0 = self.davis.w0_n_per_kn(speed).abs().max(0.1);
+            variance.max(0.0).sqrt() > W0_DEVIATION_MAX * w0
+        });
+        let monitor = self.innovations;
+        if is_loose {
+            (Status::Degraded, Reason::WeakExcitation)
+        } else if monitor.effective_count() < INNOVATIONS_MIN {
+            (Status::Estimated, self.remark())
+        } else if monitor.mean_square() > INNOVATION_SQUARE_MAX {
+            (Status::Degraded, Reason::InnovationsTooLarge)
+        } else if self.inflation > INFLATION_MAX || self.is_correlated() {
+            (Status::Degraded, Reason::InnovationsNotWhite)
+        } else {
+            (Status::Estimated, self.remark())
+        }
+    }
+
+    /// True for innovations that follow each other; smaller than predicted, they do no harm.
+    fn is_correlated(&self) -> bool {
+        let monitor = self.innovations;
+        monitor.correlation().abs() > INNOVATION_CORRELATION_MAX && monitor.mean_square() > 0.5
+    }
+
+    fn remark(&self) -> Reason {
+        if self.is_at_bound {
+            Reason::AtBound
+        } else if self.excited() == [true; 3] {
+            Reason::None
+        } else {
+            Reason::WeakExcitation
+        }
+    }
+
+    /// Which coefficients the data told apart.
+    pub fn excited(&self) -> [bool; 3] {
+        std::array::from_fn(|i| {
+            let std = self.covariance[(i, i)].max(0.0).sqrt();
+            self.is_ready && std <= EXCITED_SHARE * self.prior_std[i]
+        })
+    }
+
+    /// Writes everything but parameters and unexplained force.
+    ///
+    /// # Real-time
+    ///
+    /// Allocates nothing.
+    pub fn write(&self, snapshot: &mut ParameterSnapshot, fault: Option<(Status, Reason)>) {
+        let (status, reason) = fault.unwrap_or_else(|| self.status());
+        write_status(snapshot, status, reason);
+        write_innovations(snapshot, self.innovations);
+        let excited = self.excited();
+        let mut missing = 0;
+        for (parameter, manoeuvre) in
+            [(A, Manoeuvre::CoastSlow), (B, Manoeuvre::VarySpeed), (C, Manoeuvre::CoastFast)]
+        {
+            if !excited[parameter] {
+                missing |= manoeuvre.bit();
+            }
+        }
+        if self.speeds_mps.is_none() {
+            missing |= Manoeuvre::Move.bit();
+        }
+        snapshot.excited = (0..3).map(|i| u32::from(excited[i]) << i).sum();
+        snapshot.missing_manoeuvres = missing;
+        let (low_mps, high_mps) = self.speeds_mps.unwrap_or((0.0, 0.0));
+        snapshot.speed_min_mps = low_mps;
+        snapshot.speed_max_mps = high_mps;
+    }
+}
+
+/// Lowest and highest speed so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SpeedRange(Option<(f64, f64)>);
+
+impl SpeedRange {
+    /// Takes in a speed in m/s.
+    pub fn push(&mut self, speed_mps: f64) {
+        let (low, high) = self.0.unwrap_or((speed_mps, speed_mps));
+        self.0 = Some((low.min(speed_mps), high.max(speed_mps)));
+    }
+
+    /// Lowest and highest, in m/s.
+    pub fn get(&self) -> Option<(f64, f64)> {
+        self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn estimate(monitor: &InnovationMonitor, covariance: Matrix3<f64>) -> Estimate<'_> {
+        Estimate {
+            davis: Davis { a: 1.0, b: 0.02, c: 0.001 },
+            covariance,
+            prior_std: Vector3::new(0.5, 0.01, 0.0005),
+            speeds_mps: Some((75.0, 84.0)),
+            innovations: monitor,
+            inflation: 1.0,
+            is_ready: true,
+            is_at_bound: false,
+        }
+    }
+
+    /// Known at 80 m/s alone: a = -80 b in every direction but one.
+    fn cruise_covariance() -> Matrix3<f64> {
+        let slack = Vector3::new(0.8, -0.01, 0.0);
+        slack * slack.transpose() + Matrix3::from_diagonal(&Vector3::new(1e-6, 1e-10, 1e-14))
+    }
+
+    #[test]
+    fn cruise_gives_an_estimate_that_says_what_it_lacks() {
+        let monitor = InnovationMonitor::new(100);
+        let estimate = estimate(&monitor, cruise_covariance());
+        assert_eq!(estimate.status(), (Status::Estimated, Reason::WeakExcitation));
+        assert_eq!(estimate.excited(), [false, false, true]);
+        let mut snapshot = ParameterSnapshot::empty();
+        estimate.write(&mut snapshot, None);
+        assert_eq!(snapshot.excited, 0b100);
+        let expected = Manoeuvre::CoastSlow.bit() | Manoeuvre::VarySpeed.bit();
+        assert_eq!(snapshot.missing_manoeuvres, expected);
+    }
+
+    #[test]
+    fn an_uncertain_resistance_degrades_the_estimate() {
+        let monitor = InnovationMonitor::new(100);
+        let covariance = Matrix3::from_diagonal(&Vector3::new(9.0, 0.0, 0.0));
+        let estimate = estimate(&monitor, covariance);
+        assert_eq!(estimate.status(), (Status::Degraded, Reason::WeakExcitation));
+    }
+
+    #[test]
+    fn correlated_innovations_degrade_the_estimate() {
+        let mut monitor = InnovationMonitor::new(100);
+        (0..200).for_each(|_| monitor.push(1.0));
+        let estimate = estimate(&monitor, cruise_covariance());
+        assert_eq!(estimate.status(), (Status::Degraded, Reason::InnovationsNotWhite));
+    }
+}

@@ -1,0 +1,209 @@
+//! One step of a computed trajectory, with its derivatives.
+//!
+//! Two rules lead from the speed before a step to the speed after it, under a driving
+//! acceleration u that holds over the step and a resistance κ w0(v), κ = g / (1000 (1 + γ)):
+//!
+//! ```text
+//! distance  v'² = v² + 2 Δs (u - κ w0(v))                    Xia 2023, eq. 7
+//! time      v'  = v + Δt (u - κ w0(v + ½ Δt (u - κ w0(v))))  midpoint rule
+//! ```
+//!
+//! The distance rule is the paper's: the resistance of a step is that at its start, which is
+//! of first order in Δs. The time rule is of second order, so that samples of 1 s do as well as
+//! samples of 0.2 s.
+
+use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use nalgebra::Vector3;
+
+use crate::train::Davis;
+
+/// κ in m/s² of deceleration per N/kN of resistance, for a rotating-mass factor.
+pub fn resistance_gain(rotating_mass_factor: f64) -> f64 {
+    STANDARD_GRAVITY_MPS2 / (1000.0 * (1.0 + rotating_mass_factor))
+}
+
+/// What a step's size counts, and with it the rule that leads over the step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StepRule {
+    /// Size in m; eq. 7 of Xia 2023.
+    Distance,
+    /// Size in s; midpoint rule.
+    Time,
+}
+
+/// A step of constant driving force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Distance in m or time in s, as the rule says; positive.
+    pub size: f64,
+    /// Acceleration u in m/s² by every known force: traction, brake, gradient, curve, tunnel.
+    pub drive_mps2: f64,
+    /// κ in m/s² per N/kN, see [`resistance_gain`].
+    pub resistance_gain: f64,
+}
+
+/// The speed after a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Advance {
+    /// Speed in m/s.
+    pub speed_mps: f64,
+    /// Its derivative with respect to the speed before; k in eq. 13.
+    pub by_speed: f64,
+    /// Its derivatives with respect to a, b and c at a fixed speed before; -p, -p v and -p v²
+    /// in eq. 13-15 (eq. 14 corrected: its first term carries ∂v/∂b).
+    pub by_davis: Vector3<f64>,
+}
+
+/// A speed in m/s below which a train counts as stopped: no rule leads below it.
+pub const STALL_SPEED_MPS: f64 = 0.1;
+
+impl StepRule {
+    /// The speed after a step; `None` when the train would stop within it (v'² < 0 in eq. 7).
+    pub fn advance(self, step: &Step, davis: &Davis, speed_mps: f64) -> Option<Advance> {
+        match self {
+            StepRule::Distance => advance_distance(step, davis, speed_mps),
+            StepRule::Time => advance_time(step, davis, speed_mps),
+        }
+    }
+
+    /// As [`StepRule::advance`], but a train that would stop rolls on at the stall speed,
+    /// whatever the parameters: a fit may start from parameters that stop the train.
+    pub fn advance_or_crawl(self, step: &Step, davis: &Davis, speed_mps: f64) -> (Advance, bool) {
+        match self.advance(step, davis, speed_mps) {
+            Some(advance) => (advance, false),
+            None => (
+                Advance { speed_mps: STALL_SPEED_MPS, by_speed: 0.0, by_davis: Vector3::zeros() },
+                true,
+            ),
+        }
+    }
+}
+
+fn advance_distance(step: &Step, davis: &Davis, speed_mps: f64) -> Option<Advance> {
+    let reach = step.resistance_gain * step.size;
+    let energy = speed_mps * speed_mps + 2.0 * step.size * step.drive_mps2
+        - 2.0 * reach * davis.w0_n_per_kn(speed_mps);
+    if !(energy >= STALL_SPEED_MPS * STALL_SPEED_MPS) {
+        return None;
+    }
+    let after_mps = energy.sqrt();
+    let inverse = 1.0 / after_mps;
+    let p = reach * inverse;
+    Some(Advance {
+        speed_mps: after_mps,
+        by_speed: (speed_mps - reach * slope(davis, speed_mps)) * inverse,
+        by_davis: Vector3::new(-p, -p * speed_mps, -p * speed_mps * speed_mps),
+    })
+}
+
+fn advance_time(step: &Step, davis: &Davis, speed_mps: f64) -> Option<Advance> {
+    let reach = step.resistance_gain * step.size;
+    let impulse = step.size * step.drive_mps2;
+    let middle_mps = speed_mps + 0.5 * (impulse - reach * davis.w0_n_per_kn(speed_mps));
+    let after_mps = speed_mps + impulse - reach * davis.w0_n_per_kn(middle_mps);
+    if !(middle_mps >= 0.0 && after_mps >= STALL_SPEED_MPS) {
+        return None;
+    }
+    let slope_middle = slope(davis, middle_mps);
+    let middle_by_speed = 1.0 - 0.5 * reach * slope(davis, speed_mps);
+    // The regressors at the middle, less what the middle itself loses to the resistance.
+    let inner = 0.5 * reach * slope_middle;
+    let through = |at_middle: f64, at_start: f64| -reach * (at_middle - inner * at_start);
+    Some(Advance {
+        speed_mps: after_mps,
+        by_speed: 1.0 - reach * slope_middle * middle_by_speed,
+        by_davis: Vector3::new(
+            through(1.0, 1.0),
+            through(middle_mps, speed_mps),
+            through(middle_mps * middle_mps, speed_mps * speed_mps),
+        ),
+    })
+}
+
+/// dw0/dv in N/kN per m/s.
+fn slope(davis: &Davis, speed_mps: f64) -> f64 {
+    davis.b + 2.0 * davis.c * speed_mps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DAVIS: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
+
+    fn steps() -> [(StepRule, Step); 2] {
+        let gain = resistance_gain(0.06);
+        [
+            (StepRule::Distance, Step { size: 100.0, drive_mps2: 0.2, resistance_gain: gain }),
+            (StepRule::Time, Step { size: 4.0, drive_mps2: -0.3, resistance_gain: gain }),
+        ]
+    }
+
+    #[test]
+    fn derivatives_of_both_rules_match_finite_differences() {
+        for (rule, step) in steps() {
+            for speed_mps in [12.0, 55.0, 83.0] {
+                let at = |davis: Davis, speed| rule.advance(&step, &davis, speed).unwrap();
+                let here = at(DAVIS, speed_mps);
+                let central = |plus: Advance, minus: Advance, width: f64| {
+                    (plus.speed_mps - minus.speed_mps) / (2.0 * width)
+                };
+                let h = 1e-3;
+                let by_speed = central(at(DAVIS, speed_mps + h), at(DAVIS, speed_mps - h), h);
+                assert!((by_speed - here.by_speed).abs() < 1e-8, "{rule:?} {speed_mps}");
+                let moved = |da: f64, db: f64, dc: f64| {
+                    let plus = Davis { a: DAVIS.a + da, b: DAVIS.b + db, c: DAVIS.c + dc };
+                    let minus = Davis { a: DAVIS.a - da, b: DAVIS.b - db, c: DAVIS.c - dc };
+                    central(at(plus, speed_mps), at(minus, speed_mps), da + db + dc)
+                };
+                for (i, (difference, size)) in [
+                    (moved(1e-3, 0.0, 0.0), 1.0),
+                    (moved(0.0, 1e-5, 0.0), 1e2),
+                    (moved(0.0, 0.0, 1e-7), 1e4),
+                ]
+                .into_iter()
+                .enumerate()
+                {
+                    let error = (difference - here.by_davis[i]).abs();
+                    assert!(error < 1e-8 * size, "{rule:?} {speed_mps} {i}: {error:e}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_time_rule_follows_the_exact_solution_to_second_order() {
+        // dv/dt = -κ c v²: v = v0 / (1 + κ c v0 t).
+        let davis = Davis { a: 0.0, b: 0.0, c: 0.002 };
+        let gain = resistance_gain(0.0);
+        let exact = |t: f64| 80.0 / (1.0 + gain * davis.c * 80.0 * t);
+        let error = |size: f64| {
+            let step = Step { size, drive_mps2: 0.0, resistance_gain: gain };
+            let mut speed_mps = 80.0;
+            for _ in 0..(64.0 / size) as usize {
+                speed_mps = StepRule::Time.advance(&step, &davis, speed_mps).unwrap().speed_mps;
+            }
+            (speed_mps - exact(64.0)).abs()
+        };
+        let ratio = error(8.0) / error(4.0);
+        assert!((3.5..4.5).contains(&ratio), "{ratio}");
+        assert!(error(1.0) < 1e-4);
+    }
+
+    #[test]
+    fn a_train_that_stops_has_no_speed_after_the_step() {
+        let gain = resistance_gain(0.06);
+        let brake = Step { size: 100.0, drive_mps2: -1.0, resistance_gain: gain };
+        assert_eq!(StepRule::Distance.advance(&brake, &DAVIS, 10.0), None);
+        assert_eq!(StepRule::Time.advance(&brake, &DAVIS, 10.0), None);
+        let (crawl, is_stalled) = StepRule::Distance.advance_or_crawl(&brake, &DAVIS, 10.0);
+        assert!(is_stalled && crawl.speed_mps == STALL_SPEED_MPS);
+    }
+
+    #[test]
+    fn what_is_not_a_number_stops_the_train() {
+        let step = Step { size: f64::NAN, drive_mps2: 0.0, resistance_gain: 0.01 };
+        assert_eq!(StepRule::Distance.advance(&step, &DAVIS, 10.0), None);
+        assert_eq!(StepRule::Time.advance(&step, &DAVIS, 10.0), None);
+    }
+}
