@@ -9,6 +9,10 @@ use serde::Deserialize;
 
 use super::Estimator;
 use super::echo::Echo;
+use super::mass::{
+    JointLeastSquares, JointLeastSquaresSettings, MassKalman, MassKalmanSettings, StagedDescent,
+    StagedDescentSettings,
+};
 use crate::train::TrainModel;
 
 /// A setting outside its allowed range.
@@ -48,6 +52,12 @@ pub struct NoSettings {}
 pub enum EstimatorSettings {
     /// No estimate: the latency floor.
     Echo(NoSettings),
+    /// Staged gradient descent for resistance and mass.
+    StagedDescent(StagedDescentSettings),
+    /// Joint integral least squares for resistance and mass.
+    JointLeastSquares(JointLeastSquaresSettings),
+    /// Kalman filters [v, 1/m, bias] for mass.
+    MassKalman(MassKalmanSettings),
 }
 
 impl EstimatorSettings {
@@ -55,6 +65,13 @@ impl EstimatorSettings {
     pub fn default_of(kind: PipelineKind) -> Option<Self> {
         match kind {
             PipelineKind::Echo => Some(EstimatorSettings::Echo(NoSettings {})),
+            PipelineKind::StagedDescent => {
+                Some(EstimatorSettings::StagedDescent(Default::default()))
+            }
+            PipelineKind::JointLeastSquares => {
+                Some(EstimatorSettings::JointLeastSquares(Default::default()))
+            }
+            PipelineKind::MassKalman => Some(EstimatorSettings::MassKalman(Default::default())),
             _ => None,
         }
     }
@@ -63,6 +80,9 @@ impl EstimatorSettings {
     pub fn kind(&self) -> PipelineKind {
         match self {
             EstimatorSettings::Echo(_) => PipelineKind::Echo,
+            EstimatorSettings::StagedDescent(_) => PipelineKind::StagedDescent,
+            EstimatorSettings::JointLeastSquares(_) => PipelineKind::JointLeastSquares,
+            EstimatorSettings::MassKalman(_) => PipelineKind::MassKalman,
         }
     }
 
@@ -71,9 +91,18 @@ impl EstimatorSettings {
     /// # Errors
     ///
     /// When a setting lies outside its range.
-    pub fn build(&self, _train: &Arc<TrainModel>) -> Result<Box<dyn Estimator>, SettingError> {
+    pub fn build(&self, train: &Arc<TrainModel>) -> Result<Box<dyn Estimator>, SettingError> {
         match self {
             EstimatorSettings::Echo(_) => Ok(Box::new(Echo)),
+            EstimatorSettings::StagedDescent(settings) => {
+                Ok(Box::new(StagedDescent::new(*settings, train)?))
+            }
+            EstimatorSettings::JointLeastSquares(settings) => {
+                Ok(Box::new(JointLeastSquares::new(*settings, train)?))
+            }
+            EstimatorSettings::MassKalman(settings) => {
+                Ok(Box::new(MassKalman::new(*settings, train)?))
+            }
         }
     }
 }

@@ -9,6 +9,7 @@
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use nalgebra::{Matrix3, Vector3};
 
+use super::bias_model::BiasModel;
 use super::line_resistance::LineResistance;
 use super::motion::Motion;
 use crate::filter::JosephFilter;
@@ -24,28 +25,8 @@ pub const BIAS: usize = 2;
 /// Number of behaviours.
 pub const MODELS: usize = 8;
 
-/// Speed in m/s at which the bias of a behaviour that grows with speed is stated.
-const GROWTH_REFERENCE_MPS: f64 = 20.0;
 /// Logarithm of the least weight against the best: any behaviour can come back.
 const LOG_WEIGHT_MIN: f64 = -30.0;
-
-/// An Ornstein-Uhlenbeck process: how a bias behaves in time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BiasModel {
-    /// Standard deviation in m/s².
-    pub std_mps2: f64,
-    /// Correlation time in s; infinite for a constant.
-    pub time_s: f64,
-    /// True when the bias is proportional to speed, as the drag of a headwind is; the
-    /// deviation then holds at 20 m/s.
-    pub grows_with_speed: bool,
-}
-
-impl BiasModel {
-    fn shape(&self, speed_mps: f64) -> f64 {
-        if self.grows_with_speed { speed_mps / GROWTH_REFERENCE_MPS } else { 1.0 }
-    }
-}
 
 /// What turns forces into acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -155,7 +136,7 @@ impl BiasBank {
             let ahead = speed + step_s * start;
             let end = push_to * inverse_mass - dynamics.drag_mps2(to, ahead) + shape * bias;
             let damping = dynamics.mps2_per_n_per_kn() * dynamics.resistance.slope(from, speed);
-            let keep = (-step_s / model.time_s).exp();
+            let keep = model.keep(step_s);
             let mean_push = 0.5 * (push_from + push_to);
             #[rustfmt::skip]
             let transition = Matrix3::new(
@@ -165,8 +146,8 @@ impl BiasBank {
             );
             let next =
                 Vector3::new(speed + 0.5 * step_s * (start + end), inverse_mass, keep * bias);
-            let bias_noise = model.std_mps2 * model.std_mps2 * (1.0 - keep * keep);
-            filter.predict(next, &transition, &Vector3::new(0.0, 0.0, bias_noise));
+            let noise = Vector3::new(0.0, 0.0, model.noise_variance(keep));
+            filter.predict(next, &transition, &noise);
         }
     }
 

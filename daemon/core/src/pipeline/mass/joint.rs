@@ -2,151 +2,57 @@
 
 use std::sync::Arc;
 
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
-use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason};
-use nalgebra::{Matrix4, SMatrix, SVector, Vector3, Vector4};
-use serde::Deserialize;
+use dynocar_shared::{
+    Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status,
+};
+use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3, Vector4};
 
-use super::line_resistance::{DEFAULT_REFERENCE_RADIUS_M, LineResistance};
+use super::health::{InputHealth, innovation_complaint};
+use super::hypothesis::Hypothesis;
+use super::integrals::{INVERSE_MASS, Integrals, POLYNOMIALS, Regressors, Row, UNKNOWNS};
+use super::joint_settings::{JOINT_MODELS, JointLeastSquaresSettings};
+use super::line_resistance::LineResistance;
 use super::motion::{Motion, StopWatch};
-use super::speed_basis::SpeedBasis;
-use crate::filter::DriftingLevel;
-use crate::filter::drifting_level::LEVEL;
+use super::section::Section;
+use crate::filter::drifting_level::BIAS;
 use crate::force::ResolvedSample;
-use crate::pipeline::output::{write_innovations, write_parameters};
-use crate::pipeline::settings::{SettingError, require};
+use crate::pipeline::output::{write_innovations, write_parameters, write_status};
+use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 use crate::train::{Davis, TrainModel};
 
-/// Number of unknowns: level, inverse mass, z1, z2, z3.
-const UNKNOWNS: usize = 11;
-/// Place of the reference mass over the mass.
-const INVERSE_MASS: usize = 1;
-/// Places where the coefficients of z1, z2 and z3 begin.
-const BASIC: usize = 2;
-const CURVE: usize = 5;
-const TUNNEL: usize = 8;
-
-type Row = SVector<f64, UNKNOWNS>;
-
-/// Settings of [`JointLeastSquares`].
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct JointLeastSquaresSettings {
-    /// Standard deviation of the declared mass in %.
-    pub mass_std_percent: f64,
-    /// Standard deviation in % of a change of mass at a stop; 0 when it never changes.
-    pub mass_change_std_percent: f64,
-    /// Shortest stop in s at which the mass may change.
-    pub stop_min_s: f64,
-    /// Standard deviation in N/kN of the declared resistances.
-    pub resistance_std_n_per_kn: f64,
-    /// Standard deviation of the measured speed in m/s to start with; it is learned.
-    pub speed_noise_mps: f64,
-    /// Lowest speed in m/s that is used.
-    pub speed_min_mps: f64,
-    /// Radius in m that the curve resistance refers to.
-    pub reference_radius_m: f64,
-}
-
-impl Default for JointLeastSquaresSettings {
-    fn default() -> Self {
-        JointLeastSquaresSettings {
-            mass_std_percent: 20.0,
-            mass_change_std_percent: 10.0,
-            stop_min_s: 5.0,
-            resistance_std_n_per_kn: 5.0,
-            speed_noise_mps: 0.03,
-            speed_min_mps: 1.0,
-            reference_radius_m: DEFAULT_REFERENCE_RADIUS_M,
-        }
-    }
-}
-
-/// Drift of the level, in measurement variances per second, of each hypothesis.
-const DRIFTS_PER_S: [f64; 4] = [0.0, 3e-3, 3e-2, 3e-1];
-/// Innovations that the speed noise of the settings counts for.
-const NOISE_PRIOR_COUNT: f64 = 4.0;
+/// A normalised innovation beyond which the speed is not believed.
 const OUTLIER: f64 = 8.0;
+/// A normalised innovation beyond which a speed counts less (Huber 1964).
 const HUBER: f64 = 3.0;
+/// After so many outliers in a row the measured speed is believed and the model's is not.
 const OUTLIERS_BEFORE_RESTART: u32 = 5;
+/// Used samples below which nothing is said.
+const SAMPLES_MIN: u64 = 50;
+/// Shares of the highest speed at which a, b and c are judged.
+const JUDGED_AT: [f64; 3] = [0.1, 0.5, 0.9];
 
-/// One assumption on how unsteady the unexplained acceleration is.
-#[derive(Clone, Debug)]
-struct Hypothesis {
-    drift_per_s: f64,
-    regression: DriftingLevel<UNKNOWNS>,
-    squares: f64,
-    count: f64,
-    log_ratios: f64,
-}
-
-impl Hypothesis {
-    /// Estimated over assumed variance of the measured speed.
-    fn scale(&self) -> f64 {
-        (NOISE_PRIOR_COUNT + self.squares) / (NOISE_PRIOR_COUNT + self.count)
-    }
-
-    /// Logarithm of the likelihood with the noise variance at its estimate.
-    fn evidence(&self) -> f64 {
-        -0.5 * (self.log_ratios + (NOISE_PRIOR_COUNT + self.count) * self.scale().ln())
-    }
-
-    fn absorb(&mut self, row: &Row, value: f64, weight: f64) {
-        let innovation = self.regression.absorb(row, value, weight);
-        if let Some(normalised) = innovation.normalised {
-            self.squares += normalised * normalised;
-            self.count += 1.0;
-            self.log_ratios += innovation.log_variance_ratio;
-        }
-    }
-}
-
-/// Integrals since the start of an unbroken piece of motion.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Integrals {
-    /// Of force over the reference inertia, in m/s.
-    push_mps: f64,
-    /// Of the gradient's deceleration, in m/s.
-    gradient_mps: f64,
-    /// Of the nine resistance features, times g / (1000 (1 + gamma)), in m/s per N/kN.
-    features: SVector<f64, 9>,
-}
-
-impl Integrals {
-    fn zero() -> Self {
-        Integrals { push_mps: 0.0, gradient_mps: 0.0, features: SVector::zeros() }
-    }
-
-    fn add(&mut self, rate: &Integrals, factor: f64) {
-        self.push_mps += factor * rate.push_mps;
-        self.gradient_mps += factor * rate.gradient_mps;
-        self.features += factor * rate.features;
-    }
-
-    fn row(&self) -> Row {
-        let mut row = Row::zeros();
-        row[LEVEL] = 1.0;
-        row[INVERSE_MASS] = self.push_mps;
-        row.fixed_rows_mut::<9>(BASIC).copy_from(&-self.features);
-        row
-    }
-}
-
-/// Learns z1, z2, z3 and the mass together.
+/// Learns z1, z2, z3 and the mass together, see [`super::integrals`].
+///
+/// Levels and, at stops, the mass are marginalised exactly; what the legs told of the
+/// resistances adds up. Several assumptions on the unexplained acceleration run side by side,
+/// and the one with the most evidence is published.
 #[derive(Clone, Debug)]
 pub struct JointLeastSquares {
     settings: JointLeastSquaresSettings,
-    train: Arc<TrainModel>,
-    basis: SpeedBasis,
-    hypotheses: [Hypothesis; DRIFTS_PER_S.len()],
+    regressors: Regressors,
+    initial: [Hypothesis; JOINT_MODELS],
+    hypotheses: [Hypothesis; JOINT_MODELS],
     best: usize,
     stops: StopWatch,
     last: Option<(Motion, Integrals)>,
     integrals: Integrals,
     outliers_in_a_row: u32,
     monitor: InnovationMonitor,
-    speed_range_mps: (f64, f64),
+    health: InputHealth,
+    speed_mps: f64,
+    speed_range_mps: Option<(f64, f64)>,
+    is_fresh_reset: bool,
     generation: u64,
 }
 
@@ -160,111 +66,111 @@ impl JointLeastSquares {
         settings: JointLeastSquaresSettings,
         train: &Arc<TrainModel>,
     ) -> Result<Self, SettingError> {
-        let basis = SpeedBasis::new(train.speed_max_mps().unwrap_or(40.0));
-        let regression = prior(&settings, train, &basis);
-        let hypotheses = DRIFTS_PER_S.map(|drift_per_s| Hypothesis {
-            drift_per_s,
-            regression: regression.clone(),
-            squares: 0.0,
-            count: 0.0,
-            log_ratios: 0.0,
-        });
+        settings.check()?;
+        let regressors = Regressors::new(train, settings.reference_radius_m);
+        let mut mean = Row::zeros();
+        mean[INVERSE_MASS] = 1.0;
+        let basic = regressors.basis.of_davis(&train.resistance);
+        mean.fixed_rows_mut::<3>(POLYNOMIALS[0]).copy_from(&basic);
+        mean[POLYNOMIALS[1]] = train.curve_constant_n_per_kn_m / settings.reference_radius_m;
+        let mut std = Row::repeat(settings.resistance_std_n_per_kn);
+        std[INVERSE_MASS] = 0.01 * settings.mass_std_percent;
+        let initial = settings.bias_models().map(|model| Hypothesis::new(model, &mean, &std));
         Ok(JointLeastSquares {
             settings,
-            train: Arc::clone(train),
-            basis,
-            hypotheses,
+            regressors,
+            hypotheses: initial.clone(),
+            initial,
             best: 0,
             stops: StopWatch::new(settings.stop_min_s),
             last: None,
             integrals: Integrals::zero(),
             outliers_in_a_row: 0,
             monitor: InnovationMonitor::new(500),
-            speed_range_mps: (f64::INFINITY, f64::NEG_INFINITY),
+            health: InputHealth::default(),
+            speed_mps: 0.0,
+            speed_range_mps: None,
+            is_fresh_reset: false,
             generation: 0,
         })
     }
-
-    fn rates(&self, motion: &Motion) -> Integrals {
-        let inertia_factor = 1.0 + self.train.rotating_mass_factor;
-        let per_n_per_kn = 1e-3 * STANDARD_GRAVITY_MPS2 / inertia_factor;
-        let phi = self.basis.at(motion.speed_mps) * per_n_per_kn;
-        let curve = self.settings.reference_radius_m * motion.curvature_per_m;
-        let mut features = SVector::<f64, 9>::zeros();
-        features.fixed_rows_mut::<3>(0).copy_from(&phi);
-        features.fixed_rows_mut::<3>(3).copy_from(&(phi * curve));
-        features.fixed_rows_mut::<3>(6).copy_from(&(phi * motion.tunnel_share));
-        Integrals {
-            push_mps: motion.force_n / (self.train.mass_kg * inertia_factor),
-            gradient_mps: per_n_per_kn * motion.gradient_permille,
-            features,
-        }
-    }
-
-    /// s
-    pub fn drift(&self) -> (usize, f64) { (self.best, self.hypotheses[self.best].scale().sqrt()*self.settings.speed_noise_mps) }
-
-    /// z1, z2, z3.
+    /// z1, z2 and z3; `None` when the regression is not sound.
     pub fn resistance(&self) -> Option<LineResistance> {
-        let solution = self.hypotheses[self.best].regression.solve()?;
-        let davis = |at: usize| -> Davis {
-            self.basis.to_davis(&Vector3::new(solution[at], solution[at + 1], solution[at + 2]))
-        };
+        let solution = self.hypotheses[self.best].regression().solve()?;
+        let [basic, curve, tunnel] = Section::ALL.map(|section| self.davis(&solution, section));
         Some(LineResistance {
-            basic: davis(BASIC),
-            curve: Some(davis(CURVE)),
-            tunnel: Some(davis(TUNNEL)),
-            reference_radius_m: self.settings.reference_radius_m,
+            basic,
+            curve: Some(curve),
+            tunnel: Some(tunnel),
+            reference_radius_m: self.regressors.reference_radius_m,
         })
     }
 
-    /// mass
-    pub fn mass_kg(&self) -> Option<(f64, f64)> {
-        let h = &self.hypotheses[self.best];
-        let solution = h.regression.solve()?;
-        let root = h.regression.covariance_root()?;
-        let sd = (root.row(1).norm_squared() * h.scale()).sqrt();
-        let m = self.train.mass_kg / solution[1];
-        Some((m, m * sd / solution[1]))
+    /// Covariance of [a, b, c] of one polynomial; `None` when the regression is not sound.
+    pub fn resistance_covariance(&self, section: Section) -> Option<Matrix3<f64>> {
+        let places = [0, 1, 2].map(|i| POLYNOMIALS[section as usize] + i);
+        let own = self.covariance(&self.covariance_root()?, places);
+        let to_davis = self.regressors.basis.to_davis_matrix();
+        Some(to_davis * own * to_davis.transpose())
     }
 
-    /// Covariance of coefficient of the curve `which` (0 basic...).
-    pub fn covariance(&self, which: usize) -> Option<nalgebra::Matrix3<f64>> {
-        let hypothesis = &self.hypotheses[self.best];
-        let root = hypothesis.regression.covariance_root()?;
-        let all = root * root.transpose() * hypothesis.scale();
-        let own = all.fixed_view::<3, 3>(BASIC + 3 * which, BASIC + 3 * which).into_owned();
-        let to = self.basis.to_davis_matrix();
-        Some(to * own * to.transpose())
+    /// Mass in kg and its standard deviation; `None` when the regression is not sound.
+    pub fn mass_kg(&self) -> Option<(f64, f64)> {
+        let inverse = self.hypotheses[self.best].regression().solve()?[INVERSE_MASS];
+        let std = self.covariance_root()?.row(INVERSE_MASS).norm();
+        let mass_kg = self.regressors.reference_mass_kg / inverse;
+        Some((mass_kg, mass_kg / inverse * std))
+    }
+
+    /// Standard deviation of the measured speed in m/s, as learned.
+    pub fn speed_noise_mps(&self) -> f64 {
+        self.settings.speed_noise_mps * self.hypotheses[self.best].noise_scale().sqrt()
+    }
+
+    fn davis(&self, solution: &Row, section: Section) -> Davis {
+        let at = POLYNOMIALS[section as usize];
+        self.regressors.basis.to_davis(&solution.fixed_rows::<3>(at).into_owned())
+    }
+
+    fn covariance_root(&self) -> Option<SMatrix<f64, UNKNOWNS, UNKNOWNS>> {
+        let best = &self.hypotheses[self.best];
+        Some(best.regression().covariance_root()? * best.noise_scale().sqrt())
+    }
+
+    /// Covariance of some unknowns from the square root of the whole.
+    fn covariance<const K: usize>(
+        &self,
+        root: &SMatrix<f64, UNKNOWNS, UNKNOWNS>,
+        places: [usize; K],
+    ) -> SMatrix<f64, K, K> {
+        SMatrix::from_fn(|i, j| root.row(places[i]).dot(&root.row(places[j])))
     }
 
     fn begin(&mut self, motion: Motion) -> Outcome {
         self.integrals = Integrals::zero();
-        let row = self.integrals.row();
-        let weight = self.settings.speed_noise_mps.powi(-2);
+        let (row, value) = self.integrals.equation(motion.speed_mps);
         for hypothesis in &mut self.hypotheses {
-            hypothesis.regression.free_level();
-            hypothesis.absorb(&row, motion.speed_mps, weight);
+            hypothesis.free_level();
+            hypothesis.absorb(&row, value, self.settings.speed_noise_mps.powi(-2));
         }
         self.monitor.break_here();
-        self.last = Some((motion, self.rates(&motion)));
+        self.last = Some((motion, self.regressors.rates(&motion)));
         Outcome::Used
     }
 
     fn advance(&mut self, last: (Motion, Integrals), motion: Motion, step_s: f64) -> Outcome {
-        let rates = self.rates(&motion);
-        self.integrals.add(&last.1, 0.5 * step_s);
-        self.integrals.add(&rates, 0.5 * step_s);
-        let row = self.integrals.row();
-        let value = motion.speed_mps + self.integrals.gradient_mps;
+        let rates = self.regressors.rates(&motion);
+        self.integrals.add(&last.1, &rates, step_s);
+        let (row, value) = self.integrals.equation(motion.speed_mps);
         let weight = self.settings.speed_noise_mps.powi(-2);
         for hypothesis in &mut self.hypotheses {
-            let variance = hypothesis.drift_per_s * step_s / weight;
-            hypothesis.regression.drift_level(variance);
+            hypothesis.propagate(step_s, last.0.speed_mps);
         }
-        let mut trial = self.hypotheses[self.best].regression.clone();
-        let normalised = trial.absorb(&row, value, weight).normalised.unwrap_or(0.0)
-            / self.hypotheses[self.best].scale().sqrt();
+        let normalised = self.hypotheses[self.best].innovation(&row, value, weight);
+        if !normalised.is_finite() {
+            self.reset();
+            return self.begin(motion);
+        }
         if normalised.abs() > OUTLIER {
             self.outliers_in_a_row += 1;
             if self.outliers_in_a_row >= OUTLIERS_BEFORE_RESTART {
@@ -276,31 +182,88 @@ impl JointLeastSquares {
         }
         self.outliers_in_a_row = 0;
         self.monitor.push(normalised);
-        let robust = (HUBER / normalised.abs()).min(1.0);
+        let trust = (HUBER / normalised.abs()).min(1.0);
         for hypothesis in &mut self.hypotheses {
-            hypothesis.absorb(&row, value, robust * weight);
+            hypothesis.absorb(&row, value, trust * weight);
         }
-        self.best = (1..self.hypotheses.len()).fold(0, |best, i| {
-            let is_better = self.hypotheses[i].evidence() > self.hypotheses[best].evidence();
-            if is_better { i } else { best }
-        });
+        self.choose();
+        let (low, high) = self.speed_range_mps.unwrap_or((motion.speed_mps, motion.speed_mps));
+        self.speed_range_mps = Some((low.min(motion.speed_mps), high.max(motion.speed_mps)));
         self.last = Some((motion, rates));
         Outcome::Updated
     }
-}
 
-fn prior(
-    settings: &JointLeastSquaresSettings,
-    train: &TrainModel,
-    basis: &SpeedBasis,
-) -> DriftingLevel<UNKNOWNS> {
-    let mut mean = Row::zeros();
-    mean[INVERSE_MASS] = 1.0;
-    mean.fixed_rows_mut::<3>(BASIC).copy_from(&basis.of_davis(&train.resistance));
-    mean[CURVE] = train.curve_constant_n_per_kn_m / settings.reference_radius_m;
-    let mut std = Row::repeat(settings.resistance_std_n_per_kn);
-    std[INVERSE_MASS] = 0.01 * settings.mass_std_percent;
-    DriftingLevel::new(&mean, &std)
+    fn choose(&mut self) {
+        for (i, hypothesis) in self.hypotheses.iter().enumerate() {
+            if hypothesis.evidence() > self.hypotheses[self.best].evidence() {
+                self.best = i;
+            }
+        }
+    }
+
+    fn reset(&mut self) {
+        self.hypotheses.clone_from(&self.initial);
+        self.best = 0;
+        self.is_fresh_reset = true;
+        self.generation += 1;
+    }
+
+    fn status(&self, is_mass_known: bool, is_resistance_known: bool) -> (Status, Reason) {
+        if self.is_fresh_reset && !is_mass_known {
+            return (Status::Invalid, Reason::NumericalFailure);
+        }
+        let some = is_mass_known || is_resistance_known;
+        let lacking = if some { Status::Degraded } else { Status::Unestimated };
+        if let Some(reason) = self.health.complaint() {
+            return (lacking, reason);
+        }
+        if self.health.used() < SAMPLES_MIN {
+            return (Status::Unestimated, Reason::TooFewSamples);
+        }
+        if !(is_mass_known && is_resistance_known) {
+            return (lacking, Reason::WeakExcitation);
+        }
+        match innovation_complaint(&self.monitor) {
+            Some(reason) => (Status::Degraded, reason),
+            None => (Status::Estimated, Reason::None),
+        }
+    }
+
+    /// Writes values and covariance of [a, b, c, mass in t]; gives the relative standard
+    /// deviation of the mass.
+    fn write_estimate(
+        &self,
+        solution: &Row,
+        root: &SMatrix<f64, UNKNOWNS, UNKNOWNS>,
+        snapshot: &mut ParameterSnapshot,
+    ) -> f64 {
+        let davis = self.davis(solution, Section::Basic);
+        let inverse = solution[INVERSE_MASS];
+        let mass_t = 1e-3 * self.regressors.reference_mass_kg / inverse;
+        let first = POLYNOMIALS[Section::Basic as usize];
+        let own = self.covariance(root, [first, first + 1, first + 2, INVERSE_MASS]);
+        let mut to_units = Matrix4::zeros();
+        let to_davis = self.regressors.basis.to_davis_matrix();
+        to_units.fixed_view_mut::<3, 3>(0, 0).copy_from(&to_davis);
+        to_units[(3, 3)] = -mass_t / inverse;
+        write_parameters(
+            snapshot,
+            [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC, Parameter::Mass],
+            &Vector4::new(davis.a, davis.b, davis.c, mass_t),
+            &(to_units * own * to_units.transpose()),
+        );
+        own[(3, 3)].sqrt() / inverse.abs()
+    }
+
+    /// Standard deviations of the basic resistance in N/kN at low, middle and high speed.
+    fn resistance_stds(&self, root: &SMatrix<f64, UNKNOWNS, UNKNOWNS>) -> [f64; 3] {
+        let first = POLYNOMIALS[Section::Basic as usize];
+        let own = self.covariance(root, [first, first + 1, first + 2]);
+        JUDGED_AT.map(|share| {
+            let phi: Vector3<f64> = self.regressors.basis.at(share * self.regressors.basis.scale_mps());
+            phi.dot(&(own * phi)).max(0.0).sqrt()
+        })
+    }
 }
 
 impl Estimator for JointLeastSquares {
@@ -310,10 +273,8 @@ impl Estimator for JointLeastSquares {
 
     fn update(&mut self, sample: &ResolvedSample) -> Outcome {
         if self.stops.departs(sample.time_ns, sample.stretch, sample.speed_mps) {
-            let std = 0.01 * self.settings.mass_change_std_percent;
             for hypothesis in &mut self.hypotheses {
-                let variance = std * std / hypothesis.scale();
-                hypothesis.regression.widen_first_parameter(variance);
+                hypothesis.reopen(0.01 * self.settings.mass_change_std_percent);
             }
             self.last = None;
         }
@@ -323,16 +284,61 @@ impl Estimator for JointLeastSquares {
         }
         let motion = match Motion::of(sample) {
             Ok(motion) => motion,
-            Err(reason) => return Outcome::Rejected(reason),
+            Err(reason) => {
+                if reason == RejectionReason::WheelSlide {
+                    self.last = None;
+                }
+                self.health.refuse(reason, sample);
+                return Outcome::Rejected(reason);
+            }
         };
+        self.speed_mps = motion.speed_mps;
         let step = self.last.and_then(|last| Some((last, motion.step_from(&last.0)?)));
-        match step {
+        let outcome = match step {
             Some((last, step_s)) => self.advance(last, motion, step_s),
             None => self.begin(motion),
+        };
+        match outcome {
+            Outcome::Rejected(reason) => self.health.refuse(reason, sample),
+            Outcome::Used | Outcome::Updated => self.health.accept(),
         }
+        outcome
     }
 
     fn write(&self, snapshot: &mut ParameterSnapshot) {
+        snapshot.generation = self.generation;
         write_innovations(snapshot, &self.monitor);
+        let best = &self.hypotheses[self.best];
+        let (Some(solution), Some(root)) = (best.regression().solve(), self.covariance_root())
+        else {
+            snapshot.parameter_count = 0;
+            write_status(snapshot, Status::Invalid, Reason::NumericalFailure);
+            return;
+        };
+        let mass_std = self.write_estimate(&solution, &root, snapshot);
+        let is_mass_known = mass_std <= 0.01 * self.settings.usable_std_percent;
+        let usable = self.settings.usable_std_n_per_kn;
+        let known = self.resistance_stds(&root).map(|std| std <= usable);
+        let manoeuvres = [
+            (known[0], Manoeuvre::CoastSlow),
+            (known[1], Manoeuvre::VarySpeed),
+            (known[2], Manoeuvre::CoastFast),
+            (is_mass_known, Manoeuvre::Accelerate),
+        ];
+        snapshot.excited = 0;
+        snapshot.missing_manoeuvres = 0;
+        for (i, (is_known, manoeuvre)) in manoeuvres.into_iter().enumerate() {
+            snapshot.excited |= u32::from(is_known) << i;
+            snapshot.missing_manoeuvres |= if is_known { 0 } else { manoeuvre.bit() };
+        }
+        let (status, reason) = self.status(is_mass_known, known[1]);
+        write_status(snapshot, status, reason);
+        let inertia_kg = self.regressors.reference_mass_kg / solution[INVERSE_MASS]
+            * self.regressors.inertia_factor;
+        let shape = best.shape(self.speed_mps);
+        snapshot.unexplained_force_n = -shape * solution[BIAS] * inertia_kg;
+        snapshot.unexplained_force_std_n = shape * root.row(BIAS).norm() * inertia_kg;
+        (snapshot.speed_min_mps, snapshot.speed_max_mps) =
+            self.speed_range_mps.unwrap_or((0.0, 0.0));
     }
 }

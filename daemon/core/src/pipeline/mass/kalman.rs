@@ -26,7 +26,7 @@ const OUTLIERS_BEFORE_RESTART: u32 = 5;
 /// Innovations over which the speed noise is learned.
 const NOISE_MEMORY: f64 = 1000.0;
 /// Innovations that the speed noise of the settings counts for.
-const NOISE_PRIOR_COUNT: f64 = 4.0;
+const NOISE_PRIOR_COUNT: f64 = 2.0;
 /// Least variance of the speed noise in (m/s)².
 const NOISE_VARIANCE_MIN: f64 = 1e-6;
 /// Samples over which the evidence for a behaviour of the bias is remembered.

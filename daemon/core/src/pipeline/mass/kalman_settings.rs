@@ -2,7 +2,8 @@
 
 use serde::Deserialize;
 
-use super::bias_bank::{BiasModel, MODELS};
+use super::bias_bank::MODELS;
+use super::bias_model::BiasModel;
 use super::line_resistance::{DEFAULT_REFERENCE_RADIUS_M, LineResistance};
 use super::within;
 use crate::pipeline::settings::SettingError;
@@ -44,7 +45,7 @@ impl Default for MassKalmanSettings {
             mass_std_percent: 20.0,
             mass_change_std_percent: 10.0,
             stop_min_s: 5.0,
-            speed_noise_mps: 0.03,
+            speed_noise_mps: 0.02,
             bias_std_mps2: 0.01,
             force_min_n_per_kn: 5.0,
             speed_min_mps: 1.0,
@@ -111,11 +112,7 @@ impl MassKalmanSettings {
     /// The behaviours of the bias: none; constant; constant and slow in proportion to speed;
     /// small and large, each slow and gusty.
     pub fn bias_models(&self) -> [BiasModel; MODELS] {
-        let model = |share: f64, time_s, grows_with_speed| BiasModel {
-            std_mps2: share * self.bias_std_mps2,
-            time_s,
-            grows_with_speed,
-        };
+        let model = |share: f64, time_s, grows| BiasModel::new(share * self.bias_std_mps2, time_s, grows);
         [
             model(1e-3, f64::INFINITY, false),
             model(1.0, f64::INFINITY, false),

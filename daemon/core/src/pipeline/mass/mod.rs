@@ -3,17 +3,29 @@
 //! - [`MassKalman`]: Kalman filters [v, 1/m, bias]
 
 pub mod bias_bank;
+pub mod bias_model;
+mod descent;
 mod health;
+mod hypothesis;
+pub mod integrals;
 mod joint;
+mod joint_settings;
 mod kalman;
 mod kalman_settings;
 pub mod line_resistance;
 pub mod motion;
+pub mod printed_descent;
+pub mod section;
 pub mod speed_basis;
+mod staged;
+mod staged_settings;
 
-pub use joint::{JointLeastSquares, JointLeastSquaresSettings};
+pub use joint::JointLeastSquares;
+pub use joint_settings::JointLeastSquaresSettings;
 pub use kalman::MassKalman;
 pub use kalman_settings::MassKalmanSettings;
+pub use staged::StagedDescent;
+pub use staged_settings::{DescentVariant, MassRegression, StagedDescentSettings};
 
 use super::settings::{SettingError, require};
 

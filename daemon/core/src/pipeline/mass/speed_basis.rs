@@ -20,6 +20,11 @@ impl SpeedBasis {
         SpeedBasis { scale_mps }
     }
 
+    /// Speed in m/s that the basis is normalised by.
+    pub fn scale_mps(&self) -> f64 {
+        self.scale_mps
+    }
+
     /// The three polynomials at a speed in m/s.
     pub fn at(&self, speed_mps: f64) -> Vector3<f64> {
         let x = speed_mps / self.scale_mps;
