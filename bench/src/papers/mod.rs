@@ -3,6 +3,7 @@
 pub mod row;
 pub mod statistics;
 pub mod table;
+pub mod wang;
 
 pub use row::Row;
 

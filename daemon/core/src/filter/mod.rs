@@ -8,9 +8,13 @@
 //! - [`triangular`]: least-squares rows gathered in a triangular factor by Householder reflections
 //! - [`levenberg_marquardt`]: small nonlinear least squares in a box
 //! - [`square_root`]: covariance as a triangular factor, updated by one measurement at a time
+//! - [`drifting_level`]: least squares beside a level that may drift, as square-root information
+//! - [`joseph`]: a small Kalman filter in Joseph's form
 
 mod bounded;
+pub mod drifting_level;
 mod information;
+pub mod joseph;
 pub mod levenberg_marquardt;
 mod line;
 mod median;
@@ -21,7 +25,9 @@ pub mod triangular;
 mod whitening;
 
 pub use bounded::{Bounded, bounded_minimum};
+pub use drifting_level::DriftingLevel;
 pub use information::SquareRootInformation;
+pub use joseph::JosephFilter;
 pub use line::Line;
 pub use median::RunningMedian;
 pub use mils::{Mils, Penalty};

@@ -6,6 +6,7 @@
 mod echo;
 mod estimator;
 mod innovation;
+pub mod mass;
 pub mod output;
 pub mod resistance;
 pub mod settings;

@@ -18,12 +18,8 @@ pub struct Noise {
 
 impl Noise {
     /// Where an estimation starts.
-    pub const START: Noise = Noise {
-        measurement_var: 1e-4,
-        white_density: 1e-6,
-        fading_var: 1e-5,
-        fading_s: 20.0,
-    };
+    pub const START: Noise =
+        Noise { measurement_var: 1e-4, white_density: 1e-6, fading_var: 1e-5, fading_s: 20.0 };
 
     fn to_logs(self) -> [f64; 4] {
         [self.measurement_var, self.white_density, self.fading_var, self.fading_s].map(f64::ln)
@@ -149,7 +145,8 @@ impl Whitener {
 
     /// Robust -2 log likelihood of the innovations, up to a constant.
     pub fn minus_two_log_likelihood(&self, innovations: &[f64]) -> f64 {
-        self.log_determinant + innovations.iter().map(|&nu| super::fit::robust_loss(nu)).sum::<f64>()
+        self.log_determinant
+            + innovations.iter().map(|&nu| super::fit::robust_loss(nu)).sum::<f64>()
     }
 
     /// Innovations that carry information.

@@ -1,0 +1,4 @@
+//! Wang 2022.
+
+pub mod sensor;
+pub mod shuttle;

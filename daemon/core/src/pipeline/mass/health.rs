@@ -1,0 +1,70 @@
+//! How well the input of an estimator serves it.
+
+use dynocar_shared::{Reason, RejectionReason};
+
+use crate::force::ResolvedSample;
+use crate::pipeline::InnovationMonitor;
+
+/// Samples over which refusals are counted.
+const MEMORY: f64 = 500.0;
+/// Share of refused samples above which the input is called bad.
+const BAD_SHARE: f64 = 0.3;
+/// Mean square of normalised innovations above which they are too large.
+const SQUARE_MAX: f64 = 2.0;
+/// Lag-1 correlation of the innovations above which the model lacks something.
+const CORRELATION_MAX: f64 = 0.4;
+/// Innovations that such a judgement rests on.
+const JUDGED_FROM: f64 = 100.0;
+
+/// Which samples were refused lately, and for want of what.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct InputHealth {
+    refused_share: f64,
+    want: Option<Reason>,
+    used: u64,
+}
+
+impl InputHealth {
+    /// A sample was used.
+    pub fn accept(&mut self) {
+        self.used += 1;
+        self.refused_share -= self.refused_share / MEMORY;
+    }
+
+    /// A sample was refused.
+    pub fn refuse(&mut self, reason: RejectionReason, sample: &ResolvedSample) {
+        self.refused_share += (1.0 - self.refused_share) / MEMORY;
+        self.want = match reason {
+            RejectionReason::Missing if sample.gradient_permille.is_none() => {
+                Some(Reason::GradientUnknown)
+            }
+            RejectionReason::Missing => Some(Reason::MissingQuantity),
+            _ => None,
+        };
+    }
+
+    /// Samples used so far.
+    pub fn used(&self) -> u64 {
+        self.used
+    }
+
+    /// What is wrong with the input, if anything.
+    pub fn complaint(&self) -> Option<Reason> {
+        let is_starved = self.used == 0 && self.want.is_some();
+        (is_starved || self.refused_share > BAD_SHARE)
+            .then(|| self.want.unwrap_or(Reason::BadInput))
+    }
+}
+
+/// What the innovations say against the model, if anything.
+pub fn innovation_complaint(monitor: &InnovationMonitor) -> Option<Reason> {
+    if monitor.effective_count() < JUDGED_FROM {
+        None
+    } else if monitor.mean_square() > SQUARE_MAX {
+        Some(Reason::InnovationsTooLarge)
+    } else if monitor.correlation() > CORRELATION_MAX {
+        Some(Reason::InnovationsNotWhite)
+    } else {
+        None
+    }
+}

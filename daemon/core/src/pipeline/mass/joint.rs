@@ -1,0 +1,345 @@
+//! Resistance and mass together, by least squares on integrals of motion.
+
+use std::sync::Arc;
+
+use dynocar_shared::{
+    Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status,
+};
+use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3, Vector4};
+
+use super::health::{InputHealth, innovation_complaint};
+use super::hypothesis::Hypothesis;
+use super::integrals::{INVERSE_MASS, Integrals, POLYNOMIALS, Regressors, Row, UNKNOWNS};
+use super::joint_settings::{JOINT_MODELS, JointLeastSquaresSettings};
+use super::line_resistance::LineResistance;
+use super::motion::{Motion, StopWatch};
+use super::section::Section;
+use crate::filter::drifting_level::BIAS;
+use crate::force::ResolvedSample;
+use crate::pipeline::output::{write_innovations, write_parameters, write_status};
+use crate::pipeline::settings::SettingError;
+use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
+use crate::train::{Davis, TrainModel};
+
+/// A normalised innovation beyond which the speed is not believed.
+const OUTLIER: f64 = 8.0;
+/// A normalised innovation beyond which a speed counts less (Huber 1964).
+const HUBER: f64 = 3.0;
+/// After so many outliers in a row the measured speed is believed and the model's is not.
+const OUTLIERS_BEFORE_RESTART: u32 = 5;
+/// Used samples below which nothing is said.
+const SAMPLES_MIN: u64 = 50;
+/// Shares of the highest speed at which a, b and c are judged.
+const JUDGED_AT: [f64; 3] = [0.1, 0.5, 0.9];
+
+/// Learns z1, z2, z3 and the mass together, see [`super::integrals`].
+///
+/// Levels and, at stops, the mass are marginalised exactly; what the legs told of the
+/// resistances adds up. Several assumptions on the unexplained acceleration run side by side,
+/// and the one with the most evidence is published.
+#[derive(Clone, Debug)]
+pub struct JointLeastSquares {
+    settings: JointLeastSquaresSettings,
+    regressors: Regressors,
+    initial: [Hypothesis; JOINT_MODELS],
+    hypotheses: [Hypothesis; JOINT_MODELS],
+    best: usize,
+    stops: StopWatch,
+    last: Option<(Motion, Integrals)>,
+    integrals: Integrals,
+    outliers_in_a_row: u32,
+    monitor: InnovationMonitor,
+    health: InputHealth,
+    speed_mps: f64,
+    speed_range_mps: Option<(f64, f64)>,
+    is_fresh_reset: bool,
+    generation: u64,
+}
+
+impl JointLeastSquares {
+    /// An estimator for a train.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn new(
+        settings: JointLeastSquaresSettings,
+        train: &Arc<TrainModel>,
+    ) -> Result<Self, SettingError> {
+        settings.check()?;
+        let regressors = Regressors::new(train, settings.reference_radius_m);
+        let mut mean = Row::zeros();
+        mean[INVERSE_MASS] = 1.0;
+        let basic = regressors.basis.of_davis(&train.resistance);
+        mean.fixed_rows_mut::<3>(POLYNOMIALS[0]).copy_from(&basic);
+        mean[POLYNOMIALS[1]] = train.curve_constant_n_per_kn_m / settings.reference_radius_m;
+        let mut std = Row::repeat(settings.resistance_std_n_per_kn);
+        std[INVERSE_MASS] = 0.01 * settings.mass_std_percent;
+        let initial = settings.bias_models().map(|model| Hypothesis::new(model, &mean, &std));
+        Ok(JointLeastSquares {
+            settings,
+            regressors,
+            hypotheses: initial.clone(),
+            initial,
+            best: 0,
+            stops: StopWatch::new(settings.stop_min_s),
+            last: None,
+            integrals: Integrals::zero(),
+            outliers_in_a_row: 0,
+            monitor: InnovationMonitor::new(500),
+            health: InputHealth::default(),
+            speed_mps: 0.0,
+            speed_range_mps: None,
+            is_fresh_reset: false,
+            generation: 0,
+        })
+    }
+    /// z1, z2 and z3; `None` when the regression is not sound.
+    pub fn resistance(&self) -> Option<LineResistance> {
+        let solution = self.hypotheses[self.best].regression().solve()?;
+        let [basic, curve, tunnel] = Section::ALL.map(|section| self.davis(&solution, section));
+        Some(LineResistance {
+            basic,
+            curve: Some(curve),
+            tunnel: Some(tunnel),
+            reference_radius_m: self.regressors.reference_radius_m,
+        })
+    }
+
+    /// Covariance of [a, b, c] of one polynomial; `None` when the regression is not sound.
+    pub fn resistance_covariance(&self, section: Section) -> Option<Matrix3<f64>> {
+        let places = [0, 1, 2].map(|i| POLYNOMIALS[section as usize] + i);
+        let own = self.covariance(&self.covariance_root()?, places);
+        let to_davis = self.regressors.basis.to_davis_matrix();
+        Some(to_davis * own * to_davis.transpose())
+    }
+
+    /// Mass in kg and its standard deviation; `None` when the regression is not sound.
+    pub fn mass_kg(&self) -> Option<(f64, f64)> {
+        let inverse = self.hypotheses[self.best].regression().solve()?[INVERSE_MASS];
+        let std = self.covariance_root()?.row(INVERSE_MASS).norm();
+        let mass_kg = self.regressors.reference_mass_kg / inverse;
+        Some((mass_kg, mass_kg / inverse * std))
+    }
+
+    /// Standard deviation of the measured speed in m/s, as learned.
+    pub fn speed_noise_mps(&self) -> f64 {
+        self.settings.speed_noise_mps * self.hypotheses[self.best].noise_scale().sqrt()
+    }
+
+    fn davis(&self, solution: &Row, section: Section) -> Davis {
+        let at = POLYNOMIALS[section as usize];
+        self.regressors.basis.to_davis(&solution.fixed_rows::<3>(at).into_owned())
+    }
+
+    fn covariance_root(&self) -> Option<SMatrix<f64, UNKNOWNS, UNKNOWNS>> {
+        let best = &self.hypotheses[self.best];
+        Some(best.regression().covariance_root()? * best.noise_scale().sqrt())
+    }
+
+    /// Covariance of some unknowns from the square root of the whole.
+    fn covariance<const K: usize>(
+        &self,
+        root: &SMatrix<f64, UNKNOWNS, UNKNOWNS>,
+        places: [usize; K],
+    ) -> SMatrix<f64, K, K> {
+        SMatrix::from_fn(|i, j| root.row(places[i]).dot(&root.row(places[j])))
+    }
+
+    fn begin(&mut self, motion: Motion) -> Outcome {
+        self.integrals = Integrals::zero();
+        let (row, value) = self.integrals.equation(motion.speed_mps);
+        for hypothesis in &mut self.hypotheses {
+            hypothesis.free_level();
+            hypothesis.absorb(&row, value, self.settings.speed_noise_mps.powi(-2));
+        }
+        self.monitor.break_here();
+        self.last = Some((motion, self.regressors.rates(&motion)));
+        Outcome::Used
+    }
+
+    fn advance(&mut self, last: (Motion, Integrals), motion: Motion, step_s: f64) -> Outcome {
+        let rates = self.regressors.rates(&motion);
+        self.integrals.add(&last.1, &rates, step_s);
+        let (row, value) = self.integrals.equation(motion.speed_mps);
+        let weight = self.settings.speed_noise_mps.powi(-2);
+        for hypothesis in &mut self.hypotheses {
+            hypothesis.propagate(step_s, last.0.speed_mps);
+        }
+        let normalised = self.hypotheses[self.best].innovation(&row, value, weight);
+        if !normalised.is_finite() {
+            self.reset();
+            return self.begin(motion);
+        }
+        if normalised.abs() > OUTLIER {
+            self.outliers_in_a_row += 1;
+            if self.outliers_in_a_row >= OUTLIERS_BEFORE_RESTART {
+                self.outliers_in_a_row = 0;
+                return self.begin(motion);
+            }
+            self.last = Some((motion, rates));
+            return Outcome::Rejected(RejectionReason::Outlier);
+        }
+        self.outliers_in_a_row = 0;
+        self.monitor.push(normalised);
+        let trust = (HUBER / normalised.abs()).min(1.0);
+        for hypothesis in &mut self.hypotheses {
+            hypothesis.absorb(&row, value, trust * weight);
+        }
+        self.choose();
+        let (low, high) = self.speed_range_mps.unwrap_or((motion.speed_mps, motion.speed_mps));
+        self.speed_range_mps = Some((low.min(motion.speed_mps), high.max(motion.speed_mps)));
+        self.last = Some((motion, rates));
+        Outcome::Updated
+    }
+
+    fn choose(&mut self) {
+        for (i, hypothesis) in self.hypotheses.iter().enumerate() {
+            if hypothesis.evidence() > self.hypotheses[self.best].evidence() {
+                self.best = i;
+            }
+        }
+    }
+
+    fn reset(&mut self) {
+        self.hypotheses.clone_from(&self.initial);
+        self.best = 0;
+        self.is_fresh_reset = true;
+        self.generation += 1;
+    }
+
+    fn status(&self, is_mass_known: bool, is_resistance_known: bool) -> (Status, Reason) {
+        if self.is_fresh_reset && !is_mass_known {
+            return (Status::Invalid, Reason::NumericalFailure);
+        }
+        let some = is_mass_known || is_resistance_known;
+        let lacking = if some { Status::Degraded } else { Status::Unestimated };
+        if let Some(reason) = self.health.complaint() {
+            return (lacking, reason);
+        }
+        if self.health.used() < SAMPLES_MIN {
+            return (Status::Unestimated, Reason::TooFewSamples);
+        }
+        if !(is_mass_known && is_resistance_known) {
+            return (lacking, Reason::WeakExcitation);
+        }
+        match innovation_complaint(&self.monitor) {
+            Some(reason) => (Status::Degraded, reason),
+            None => (Status::Estimated, Reason::None),
+        }
+    }
+
+    /// Writes values and covariance of [a, b, c, mass in t]; gives the relative standard
+    /// deviation of the mass.
+    fn write_estimate(
+        &self,
+        solution: &Row,
+        root: &SMatrix<f64, UNKNOWNS, UNKNOWNS>,
+        snapshot: &mut ParameterSnapshot,
+    ) -> f64 {
+        let davis = self.davis(solution, Section::Basic);
+        let inverse = solution[INVERSE_MASS];
+        let mass_t = 1e-3 * self.regressors.reference_mass_kg / inverse;
+        let first = POLYNOMIALS[Section::Basic as usize];
+        let own = self.covariance(root, [first, first + 1, first + 2, INVERSE_MASS]);
+        let mut to_units = Matrix4::zeros();
+        let to_davis = self.regressors.basis.to_davis_matrix();
+        to_units.fixed_view_mut::<3, 3>(0, 0).copy_from(&to_davis);
+        to_units[(3, 3)] = -mass_t / inverse;
+        write_parameters(
+            snapshot,
+            [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC, Parameter::Mass],
+            &Vector4::new(davis.a, davis.b, davis.c, mass_t),
+            &(to_units * own * to_units.transpose()),
+        );
+        own[(3, 3)].sqrt() / inverse.abs()
+    }
+
+    /// Standard deviations of the basic resistance in N/kN at low, middle and high speed.
+    fn resistance_stds(&self, root: &SMatrix<f64, UNKNOWNS, UNKNOWNS>) -> [f64; 3] {
+        let first = POLYNOMIALS[Section::Basic as usize];
+        let own = self.covariance(root, [first, first + 1, first + 2]);
+        JUDGED_AT.map(|share| {
+            let phi: Vector3<f64> =
+                self.regressors.basis.at(share * self.regressors.basis.scale_mps());
+            phi.dot(&(own * phi)).max(0.0).sqrt()
+        })
+    }
+}
+
+impl Estimator for JointLeastSquares {
+    fn kind(&self) -> PipelineKind {
+        PipelineKind::JointLeastSquares
+    }
+
+    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+        if self.stops.departs(sample.time_ns, sample.stretch, sample.speed_mps) {
+            for hypothesis in &mut self.hypotheses {
+                hypothesis.reopen(0.01 * self.settings.mass_change_std_percent);
+            }
+            self.last = None;
+        }
+        if sample.speed_mps < self.settings.speed_min_mps {
+            self.last = None;
+            return Outcome::Used;
+        }
+        let motion = match Motion::of(sample) {
+            Ok(motion) => motion,
+            Err(reason) => {
+                if reason == RejectionReason::WheelSlide {
+                    self.last = None;
+                }
+                self.health.refuse(reason, sample);
+                return Outcome::Rejected(reason);
+            }
+        };
+        self.speed_mps = motion.speed_mps;
+        let step = self.last.and_then(|last| Some((last, motion.step_from(&last.0)?)));
+        let outcome = match step {
+            Some((last, step_s)) => self.advance(last, motion, step_s),
+            None => self.begin(motion),
+        };
+        match outcome {
+            Outcome::Rejected(reason) => self.health.refuse(reason, sample),
+            Outcome::Used | Outcome::Updated => self.health.accept(),
+        }
+        outcome
+    }
+
+    fn write(&self, snapshot: &mut ParameterSnapshot) {
+        snapshot.generation = self.generation;
+        write_innovations(snapshot, &self.monitor);
+        let best = &self.hypotheses[self.best];
+        let (Some(solution), Some(root)) = (best.regression().solve(), self.covariance_root())
+        else {
+            snapshot.parameter_count = 0;
+            write_status(snapshot, Status::Invalid, Reason::NumericalFailure);
+            return;
+        };
+        let mass_std = self.write_estimate(&solution, &root, snapshot);
+        let is_mass_known = mass_std <= 0.01 * self.settings.usable_std_percent;
+        let usable = self.settings.usable_std_n_per_kn;
+        let known = self.resistance_stds(&root).map(|std| std <= usable);
+        let manoeuvres = [
+            (known[0], Manoeuvre::CoastSlow),
+            (known[1], Manoeuvre::VarySpeed),
+            (known[2], Manoeuvre::CoastFast),
+            (is_mass_known, Manoeuvre::Accelerate),
+        ];
+        snapshot.excited = 0;
+        snapshot.missing_manoeuvres = 0;
+        for (i, (is_known, manoeuvre)) in manoeuvres.into_iter().enumerate() {
+            snapshot.excited |= u32::from(is_known) << i;
+            snapshot.missing_manoeuvres |= if is_known { 0 } else { manoeuvre.bit() };
+        }
+        let (status, reason) = self.status(is_mass_known, known[1]);
+        write_status(snapshot, status, reason);
+        let inertia_kg = self.regressors.reference_mass_kg / solution[INVERSE_MASS]
+            * self.regressors.inertia_factor;
+        let shape = best.shape(self.speed_mps);
+        snapshot.unexplained_force_n = -shape * solution[BIAS] * inertia_kg;
+        snapshot.unexplained_force_std_n = shape * root.row(BIAS).norm() * inertia_kg;
+        (snapshot.speed_min_mps, snapshot.speed_max_mps) =
+            self.speed_range_mps.unwrap_or((0.0, 0.0));
+    }
+}

@@ -1,0 +1,327 @@
+//! Mass by Kalman filters [v, 1/m, bias].
+
+use std::sync::Arc;
+
+use dynocar_shared::{
+    Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status,
+};
+use nalgebra::{Matrix2, Vector2};
+
+use super::bias_bank::{BiasBank, Dynamics, MODELS, Moments, SPEED};
+use super::health::{InputHealth, innovation_complaint};
+use super::kalman_settings::MassKalmanSettings;
+use super::motion::{Motion, StopWatch};
+use crate::force::ResolvedSample;
+use crate::pipeline::output::{write_innovations, write_parameters, write_status};
+use crate::pipeline::settings::SettingError;
+use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
+use crate::train::TrainModel;
+
+/// A normalised innovation beyond which the speed is not believed.
+const OUTLIER: f64 = 8.0;
+/// A normalised innovation beyond which a speed counts less (Huber 1964).
+const HUBER: f64 = 3.0;
+/// After so many outliers in a row the measured speed is believed and the filters' is not.
+const OUTLIERS_BEFORE_RESTART: u32 = 5;
+/// Innovations over which the speed noise is learned.
+const NOISE_MEMORY: f64 = 1000.0;
+/// Innovations that the speed noise of the settings counts for.
+const NOISE_PRIOR_COUNT: f64 = 2.0;
+/// Least variance of the speed noise in (m/s)².
+const NOISE_VARIANCE_MIN: f64 = 1e-6;
+/// Samples over which the evidence for a behaviour of the bias is remembered.
+const EVIDENCE_MEMORY: f64 = 3000.0;
+/// Used samples below which nothing is said of the mass.
+const SAMPLES_MIN: u64 = 50;
+/// Share by which a declared mass has to change to be followed; load weighing is not steadier.
+const DECLARED_CHANGE_MIN: f64 = 0.02;
+
+/// Learns a train's mass while it drives or brakes.
+///
+/// The state is [v, reference mass / mass, bias acceleration]; between two samples
+///
+/// ```text
+/// dv/dt = F u / (m_ref (1 + gamma)) - g (w(v) + gradient) / (1000 (1 + gamma)) + bias
+/// ```
+///
+/// which is linear in u. Resistance and gradient act per weight, so that a train that coasts
+/// moves alike at any mass: the published mass changes only under force. At a stop the mass
+/// may change, and its variance is opened.
+#[derive(Clone, Debug)]
+pub struct MassKalman {
+    settings: MassKalmanSettings,
+    reference_mass_kg: f64,
+    inertia_factor: f64,
+    initial_bank: BiasBank,
+    bank: BiasBank,
+    stops: StopWatch,
+    last: Option<Motion>,
+    /// Inverse mass as known when force last acted, bias as known now.
+    moments: Moments,
+    declared_mass_kg: f64,
+    noise_variance: f64,
+    noise_count: f64,
+    outliers_in_a_row: u32,
+    monitor: InnovationMonitor,
+    health: InputHealth,
+    speed_range_mps: Option<(f64, f64)>,
+    was_known: bool,
+    is_fresh_reset: bool,
+    generation: u64,
+}
+
+impl MassKalman {
+    /// An estimator for a train.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn new(
+        settings: MassKalmanSettings,
+        train: &Arc<TrainModel>,
+    ) -> Result<Self, SettingError> {
+        settings.check()?;
+        let bank = BiasBank::new(
+            Dynamics::new(train, settings.line_resistance(train)),
+            settings.bias_models(),
+            (1.0, 0.01 * settings.mass_std_percent),
+            EVIDENCE_MEMORY,
+        );
+        Ok(MassKalman {
+            settings,
+            reference_mass_kg: train.mass_kg,
+            inertia_factor: 1.0 + train.rotating_mass_factor,
+            initial_bank: bank,
+            bank,
+            stops: StopWatch::new(settings.stop_min_s),
+            last: None,
+            moments: bank.moments(),
+            declared_mass_kg: train.mass_kg,
+            noise_variance: settings.speed_noise_mps.powi(2),
+            noise_count: NOISE_PRIOR_COUNT,
+            outliers_in_a_row: 0,
+            monitor: InnovationMonitor::new(500),
+            health: InputHealth::default(),
+            speed_range_mps: None,
+            was_known: false,
+            is_fresh_reset: false,
+            generation: 0,
+        })
+    }
+
+    /// Mass in kg and its standard deviation, as known when force last acted.
+    pub fn mass_kg(&self) -> (f64, f64) {
+        let inverse = self.moments.inverse_mass;
+        let mass_kg = self.reference_mass_kg / inverse;
+        (mass_kg, mass_kg / inverse * self.moments.inverse_mass_variance.sqrt())
+    }
+
+    /// Standard deviation of the measured speed in m/s, as learned.
+    pub fn speed_noise_mps(&self) -> f64 {
+        self.noise_variance.sqrt()
+    }
+
+    /// Share of the evidence for each behaviour of the bias, in the order of
+    /// [`MassKalmanSettings::bias_models`].
+    pub fn bias_weights(&self) -> [f64; MODELS] {
+        self.bank.weights()
+    }
+
+    /// Opens the mass after a stop; a declared mass that changed moves it by as much.
+    fn reopen(&mut self, declared_mass_kg: f64) {
+        let ratio = declared_mass_kg / self.declared_mass_kg;
+        if ratio.is_finite() && ratio > 0.0 && (ratio - 1.0).abs() > DECLARED_CHANGE_MIN {
+            self.declared_mass_kg = declared_mass_kg;
+            self.moments.inverse_mass /= ratio;
+        }
+        let relative_std = 0.01 * self.settings.mass_change_std_percent;
+        let change = relative_std * self.moments.inverse_mass;
+        self.moments.inverse_mass_variance += change * change;
+        self.bank.reopen(self.moments.inverse_mass, self.moments.inverse_mass_variance);
+    }
+
+    /// Takes over the mass that the first sample declares, if it declares another.
+    fn begin_with(&mut self, declared_mass_kg: f64) {
+        let ratio = declared_mass_kg / self.reference_mass_kg;
+        if !(ratio.is_finite() && ratio > 0.0) {
+            return;
+        }
+        self.declared_mass_kg = declared_mass_kg;
+        let std = 0.01 * self.settings.mass_std_percent / ratio;
+        self.initial_bank.reopen(1.0 / ratio, std * std);
+        self.bank = self.initial_bank;
+        self.moments = self.bank.moments();
+    }
+
+    fn begin(&mut self, motion: Motion) -> Outcome {
+        self.bank.restart_speed(motion.speed_mps, self.noise_variance);
+        self.monitor.break_here();
+        self.last = Some(motion);
+        Outcome::Used
+    }
+
+    fn advance(&mut self, from: Motion, motion: Motion, step_s: f64) -> Outcome {
+        self.bank.predict(&from, &motion, step_s);
+        let expected = self.bank.best().innovation(SPEED, motion.speed_mps, self.noise_variance);
+        let normalised = expected.value / expected.variance.sqrt();
+        if !normalised.is_finite() {
+            self.reset();
+            return self.begin(motion);
+        }
+        if normalised.abs() > OUTLIER {
+            self.outliers_in_a_row += 1;
+            if self.outliers_in_a_row >= OUTLIERS_BEFORE_RESTART {
+                self.outliers_in_a_row = 0;
+                return self.begin(motion);
+            }
+            // The filters have moved on; only the speed is not believed.
+            self.last = Some(motion);
+            return Outcome::Rejected(RejectionReason::Outlier);
+        }
+        self.outliers_in_a_row = 0;
+        let weight = (HUBER / normalised.abs()).min(1.0);
+        self.bank.measure(motion.speed_mps, self.noise_variance / weight);
+        if !self.bank.is_sound() {
+            self.reset();
+            return self.begin(motion);
+        }
+        self.monitor.push(normalised);
+        self.learn_noise(motion.speed_mps, weight);
+        self.last = Some(motion);
+        self.widen_speed_range(motion.speed_mps);
+        self.publish(0.5 * (from.force_n + motion.force_n).abs())
+    }
+
+    /// Takes the mass over under force; the bias always.
+    fn publish(&mut self, force_n: f64) -> Outcome {
+        let now = self.bank.moments();
+        let weight_kn = TrainModel::weight_kn(self.reference_mass_kg);
+        if force_n >= self.settings.force_min_n_per_kn * weight_kn {
+            self.moments = now;
+            let is_known = self.is_known();
+            self.was_known |= is_known;
+            self.is_fresh_reset &= !is_known;
+            return Outcome::Updated;
+        }
+        self.moments.bias_mps2 = now.bias_mps2;
+        self.moments.bias_variance = now.bias_variance;
+        Outcome::Used
+    }
+
+    /// Learns the noise R from E[r²] + P = R, with the residual r after an update and the
+    /// variance P of the speed after it.
+    fn learn_noise(&mut self, speed_mps: f64, weight: f64) {
+        let filter = self.bank.best();
+        let residual = speed_mps - filter.state[SPEED];
+        let seen = weight * residual * residual + filter.covariance[(SPEED, SPEED)];
+        self.noise_count = (self.noise_count + 1.0).min(NOISE_MEMORY);
+        self.noise_variance += (seen - self.noise_variance) / self.noise_count;
+        self.noise_variance = self.noise_variance.max(NOISE_VARIANCE_MIN);
+    }
+
+    fn widen_speed_range(&mut self, speed_mps: f64) {
+        let (low, high) = self.speed_range_mps.unwrap_or((speed_mps, speed_mps));
+        self.speed_range_mps = Some((low.min(speed_mps), high.max(speed_mps)));
+    }
+
+    fn reset(&mut self) {
+        self.bank = self.initial_bank;
+        self.moments = self.bank.moments();
+        self.noise_variance = self.settings.speed_noise_mps.powi(2);
+        self.noise_count = NOISE_PRIOR_COUNT;
+        self.was_known = false;
+        self.is_fresh_reset = true;
+        self.generation += 1;
+    }
+
+    fn is_known(&self) -> bool {
+        let (mass_kg, std_kg) = self.mass_kg();
+        std_kg <= 0.01 * self.settings.usable_std_percent * mass_kg
+    }
+
+    fn status(&self) -> (Status, Reason) {
+        let without = if self.was_known { Status::Degraded } else { Status::Unestimated };
+        if self.is_fresh_reset {
+            return (Status::Invalid, Reason::NumericalFailure);
+        }
+        let is_known = self.is_known();
+        if let Some(reason) = self.health.complaint() {
+            return (if is_known { Status::Degraded } else { without }, reason);
+        }
+        if self.health.used() < SAMPLES_MIN {
+            return (without, Reason::TooFewSamples);
+        }
+        if !is_known {
+            return (without, Reason::WeakExcitation);
+        }
+        match innovation_complaint(&self.monitor) {
+            Some(reason) => (Status::Degraded, reason),
+            None => (Status::Estimated, Reason::None),
+        }
+    }
+}
+
+impl Estimator for MassKalman {
+    fn kind(&self) -> PipelineKind {
+        PipelineKind::MassKalman
+    }
+
+    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+        if self.stops.is_first() {
+            self.begin_with(sample.mass_kg);
+        }
+        if self.stops.departs(sample.time_ns, sample.stretch, sample.speed_mps) {
+            self.reopen(sample.mass_kg);
+        }
+        if sample.speed_mps < self.settings.speed_min_mps {
+            self.last = None;
+            return Outcome::Used;
+        }
+        let motion = match Motion::of(sample) {
+            Ok(motion) => motion,
+            Err(reason) => {
+                if reason == RejectionReason::WheelSlide {
+                    self.last = None;
+                }
+                self.health.refuse(reason, sample);
+                return Outcome::Rejected(reason);
+            }
+        };
+        let step = self.last.and_then(|last| Some((last, motion.step_from(&last)?)));
+        let outcome = match step {
+            Some((last, step_s)) => self.advance(last, motion, step_s),
+            None => self.begin(motion),
+        };
+        match outcome {
+            Outcome::Rejected(reason) => self.health.refuse(reason, sample),
+            Outcome::Used | Outcome::Updated => self.health.accept(),
+        }
+        outcome
+    }
+
+    fn write(&self, snapshot: &mut ParameterSnapshot) {
+        let (mass_kg, mass_std_kg) = self.mass_kg();
+        let mass_std_t = 1e-3 * mass_std_kg;
+        let (bias_mps2, bias_std) = (self.moments.bias_mps2, self.moments.bias_variance.sqrt());
+        // The mass falls as its inverse grows.
+        let cross = -self.moments.correlation * mass_std_t * bias_std;
+        write_parameters(
+            snapshot,
+            [Parameter::Mass, Parameter::AccelerationBias],
+            &Vector2::new(1e-3 * mass_kg, bias_mps2),
+            &Matrix2::new(mass_std_t * mass_std_t, cross, cross, bias_std * bias_std),
+        );
+        let is_known = self.is_known();
+        snapshot.excited = u32::from(is_known) | 2 * u32::from(self.health.used() > SAMPLES_MIN);
+        snapshot.missing_manoeuvres = if is_known { 0 } else { Manoeuvre::Accelerate.bit() };
+        let (status, reason) = self.status();
+        write_status(snapshot, status, reason);
+        write_innovations(snapshot, &self.monitor);
+        let inertia_kg = mass_kg * self.inertia_factor;
+        snapshot.unexplained_force_n = -bias_mps2 * inertia_kg;
+        snapshot.unexplained_force_std_n = bias_std * inertia_kg;
+        (snapshot.speed_min_mps, snapshot.speed_max_mps) =
+            self.speed_range_mps.unwrap_or((0.0, 0.0));
+        snapshot.generation = self.generation;
+    }
+}

@@ -1,0 +1,40 @@
+//! Mass, and the resistances that have to be known for it (Wang 2022).
+//!
+//! - [`MassKalman`]: Kalman filters [v, 1/m, bias]
+
+pub mod bias_bank;
+pub mod bias_model;
+mod descent;
+mod health;
+mod hypothesis;
+pub mod integrals;
+mod joint;
+mod joint_settings;
+mod kalman;
+mod kalman_settings;
+pub mod line_resistance;
+pub mod motion;
+pub mod printed_descent;
+pub mod section;
+pub mod speed_basis;
+mod staged;
+mod staged_settings;
+
+pub use joint::JointLeastSquares;
+pub use joint_settings::JointLeastSquaresSettings;
+pub use kalman::MassKalman;
+pub use kalman_settings::MassKalmanSettings;
+pub use staged::StagedDescent;
+pub use staged_settings::{DescentVariant, MassRegression, StagedDescentSettings};
+
+use super::settings::{SettingError, require};
+
+/// Refuses a setting that is not finite or lies outside its range.
+fn within(
+    key: &'static str,
+    value: f64,
+    (low, high): (f64, f64),
+    allowed: &'static str,
+) -> Result<(), SettingError> {
+    require((low..=high).contains(&value), key, value, allowed)
+}

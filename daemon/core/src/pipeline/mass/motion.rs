@@ -1,0 +1,177 @@
+//! What the estimators of mass take from a sample, and when the mass may have changed.
+
+use dynocar_shared::RejectionReason;
+
+use crate::force::ResolvedSample;
+
+/// Speed in m/s up to which a train counts as standing; below it a wheel sensor sees nothing.
+pub const STANDING_MPS: f64 = 0.3;
+
+/// Time in s over which missing forces are bridged by the mean of the forces around them.
+pub const BRIDGE_MAX_S: f64 = 1.0;
+
+/// The known quantities of a moving train at a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// Measurement time in ns.
+    pub time_ns: i64,
+    /// Number of the stretch of unbroken motion.
+    pub stretch: u32,
+    /// Speed in m/s.
+    pub speed_mps: f64,
+    /// Traction minus brake in N.
+    pub force_n: f64,
+    /// Gradient along the travel in ‰.
+    pub gradient_permille: f64,
+    /// Declared curve resistance in N/kN.
+    pub declared_curve_n_per_kn: f64,
+    /// Declared tunnel resistance in N/kN.
+    pub declared_tunnel_n_per_kn: f64,
+    /// Mean of 1/R along the train in 1/m; 0 where no curves are known.
+    pub curvature_per_m: f64,
+    /// Share of the train inside tunnels; 0 where no tunnels are known.
+    pub tunnel_share: f64,
+}
+
+impl Motion {
+    /// The motion at a sample.
+    ///
+    /// # Errors
+    ///
+    /// `WheelSlide` while the speed is not the train's, `Missing` without force or gradient,
+    /// `NotFinite` for a number that is none.
+    pub fn of(sample: &ResolvedSample) -> Result<Self, RejectionReason> {
+        if sample.is_sliding {
+            return Err(RejectionReason::WheelSlide);
+        }
+        let force_n = sample.control_force_n().ok_or(RejectionReason::Missing)?;
+        let gradient_permille = sample.gradient_permille.ok_or(RejectionReason::Missing)?;
+        let motion = Motion {
+            time_ns: sample.time_ns,
+            stretch: sample.stretch,
+            speed_mps: sample.speed_mps,
+            force_n,
+            gradient_permille,
+            declared_curve_n_per_kn: sample.curve_n_per_kn,
+            declared_tunnel_n_per_kn: sample.tunnel_n_per_kn,
+            curvature_per_m: sample.curvature_per_m.unwrap_or(0.0),
+            tunnel_share: sample.tunnel_share.unwrap_or(0.0),
+        };
+        let numbers = [
+            motion.speed_mps,
+            motion.force_n,
+            motion.gradient_permille,
+            motion.declared_curve_n_per_kn,
+            motion.declared_tunnel_n_per_kn,
+            motion.curvature_per_m,
+            motion.tunnel_share,
+        ];
+        if numbers.iter().all(|number| number.is_finite()) {
+            Ok(motion)
+        } else {
+            Err(RejectionReason::NotFinite)
+        }
+    }
+
+    /// Time in s since an earlier sample of the same stretch; `None` when forces and speed
+    /// between the two are not known well enough to integrate.
+    pub fn step_from(&self, earlier: &Motion) -> Option<f64> {
+        let step_s = self.time_ns.saturating_sub(earlier.time_ns) as f64 * 1e-9;
+        (self.stretch == earlier.stretch && step_s > 0.0 && step_s <= BRIDGE_MAX_S)
+            .then_some(step_s)
+    }
+}
+
+/// Tells when passengers or freight may have changed the mass.
+///
+/// That is after a standstill of some length, after a gap as long, and in a new run. A run that
+/// a clock set back has cut is one, too: nothing is known of the time between.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StopWatch {
+    stop_min_ns: i64,
+    last: Option<(i64, u32)>,
+    standing_since_ns: Option<i64>,
+    is_due: bool,
+}
+
+impl StopWatch {
+    /// A stop counts from `stop_min_s`.
+    pub fn new(stop_min_s: f64) -> Self {
+        let stop_min_ns = (stop_min_s * 1e9) as i64;
+        StopWatch { stop_min_ns, last: None, standing_since_ns: None, is_due: false }
+    }
+
+    /// True before the first sample.
+    pub fn is_first(&self) -> bool {
+        self.last.is_none()
+    }
+
+    /// Takes one sample in; true at the first moving sample after the mass may have changed.
+    pub fn departs(&mut self, time_ns: i64, stretch: u32, speed_mps: f64) -> bool {
+        if let Some((last_ns, last_stretch)) = self.last
+            && last_stretch != stretch
+        {
+            let gap_ns = time_ns.saturating_sub(last_ns);
+            self.is_due |= gap_ns >= self.stop_min_ns || gap_ns <= 0;
+        }
+        self.last = Some((time_ns, stretch));
+        if speed_mps <= STANDING_MPS {
+            let since_ns = *self.standing_since_ns.get_or_insert(time_ns);
+            self.is_due |= time_ns.saturating_sub(since_ns) >= self.stop_min_ns;
+            return false;
+        }
+        self.standing_since_ns = None;
+        std::mem::take(&mut self.is_due)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND_NS: i64 = 1_000_000_000;
+
+    #[test]
+    fn a_stop_is_reported_once_at_departure_and_a_short_one_never() {
+        let mut stops = StopWatch::new(5.0);
+        let mut departures = Vec::new();
+        for second in 0..60 {
+            let is_standing = (10..13).contains(&second) || (30..40).contains(&second);
+            let speed_mps = if is_standing { 0.0 } else { 10.0 };
+            if stops.departs(second * SECOND_NS, 1, speed_mps) {
+                departures.push(second);
+            }
+        }
+        assert_eq!(departures, [40]);
+    }
+
+    #[test]
+    fn a_long_gap_and_a_clock_set_back_count_as_stops_and_a_short_gap_does_not() {
+        let mut stops = StopWatch::new(5.0);
+        assert!(!stops.departs(0, 1, 10.0));
+        assert!(!stops.departs(3 * SECOND_NS, 2, 10.0), "three seconds");
+        assert!(stops.departs(9 * SECOND_NS, 3, 10.0), "six seconds");
+        assert!(stops.departs(SECOND_NS, 4, 10.0), "set back");
+        assert!(!stops.departs(2 * SECOND_NS, 4, 10.0));
+    }
+
+    #[test]
+    fn forces_are_bridged_for_a_second_within_a_stretch() {
+        let motion = |time_ns, stretch| Motion {
+            time_ns,
+            stretch,
+            speed_mps: 10.0,
+            force_n: 0.0,
+            gradient_permille: 0.0,
+            declared_curve_n_per_kn: 0.0,
+            declared_tunnel_n_per_kn: 0.0,
+            curvature_per_m: 0.0,
+            tunnel_share: 0.0,
+        };
+        let earlier = motion(0, 1);
+        assert_eq!(motion(SECOND_NS / 2, 1).step_from(&earlier), Some(0.5));
+        assert_eq!(motion(2 * SECOND_NS, 1).step_from(&earlier), None);
+        assert_eq!(motion(SECOND_NS / 2, 2).step_from(&earlier), None);
+        assert_eq!(motion(0, 1).step_from(&earlier), None);
+    }
+}

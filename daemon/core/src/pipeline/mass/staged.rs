@@ -1,0 +1,294 @@
+//! Staged learning of resistance and then mass, as Wang 2022.
+
+use std::sync::Arc;
+
+use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::{
+    Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status,
+};
+use nalgebra::{Matrix4, SVector, Vector4};
+
+use super::descent::MeanSquare;
+use super::health::InputHealth;
+use super::line_resistance::LineResistance;
+use super::motion::{Motion, StopWatch};
+use super::printed_descent::PrintedDescent;
+use super::section::Section;
+use super::speed_basis::SpeedBasis;
+use super::staged_settings::{DescentVariant, MassRegression, StagedDescentSettings};
+use crate::force::ResolvedSample;
+use crate::pipeline::output::{write_parameters, write_status};
+use crate::pipeline::settings::SettingError;
+use crate::pipeline::{Estimator, Outcome};
+use crate::train::{Davis, TrainModel};
+
+/// Used samples below which nothing is said.
+const SAMPLES_MIN: f64 = 50.0;
+/// Samples under force from which a mass is published.
+const MASS_SAMPLES_MIN: f64 = 25.0;
+
+/// One stage: its samples and its coefficients.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Stage<const N: usize> {
+    sums: MeanSquare<N>,
+    coefficients: SVector<f64, N>,
+}
+
+impl<const N: usize> Stage<N> {
+    fn new(coefficients: SVector<f64, N>) -> Self {
+        Stage { sums: MeanSquare::default(), coefficients }
+    }
+}
+
+/// Learns z1 on open track, z2 in curves, z3 in tunnels at the declared mass, and then the mass.
+///
+/// The acceleration is the differentiated speed, as in the paper's section 3. z2 and z3 are
+/// what their samples leave over z1 (Algorithm 1, lines 11 to 13).
+#[derive(Clone, Debug)]
+pub struct StagedDescent {
+    settings: StagedDescentSettings,
+    basis: SpeedBasis,
+    nominal_mass_kg: f64,
+    inertia_factor: f64,
+    /// z1 on the open track.
+    basic: Stage<3>,
+    /// z1, which is known by then, and z2.
+    curve: Stage<6>,
+    /// z1, which is known by then, and z3.
+    tunnel: Stage<6>,
+    printed: PrintedDescent,
+    mass: Stage<1>,
+    learned: u64,
+    stops: StopWatch,
+    last: Option<Motion>,
+    health: InputHealth,
+    speed_range_mps: Option<(f64, f64)>,
+}
+
+impl StagedDescent {
+    /// An estimator for a train.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn new(
+        settings: StagedDescentSettings,
+        train: &Arc<TrainModel>,
+    ) -> Result<Self, SettingError> {
+        settings.check()?;
+        let basis = SpeedBasis::new(train.speed_max_mps().filter(|&v| v > 5.0).unwrap_or(40.0));
+        Ok(StagedDescent {
+            settings,
+            basis,
+            nominal_mass_kg: train.mass_kg,
+            inertia_factor: 1.0 + train.rotating_mass_factor,
+            basic: Stage::new(basis.of_davis(&train.resistance)),
+            curve: Stage::new(SVector::zeros()),
+            tunnel: Stage::new(SVector::zeros()),
+            printed: PrintedDescent::new(settings.printed_speed_unit, &train.resistance),
+            mass: Stage::new(SVector::from([1.0])),
+            learned: 0,
+            stops: StopWatch::new(settings.stop_min_s),
+            last: None,
+            health: InputHealth::default(),
+            speed_range_mps: None,
+        })
+    }
+
+    /// z1, z2 and z3 as learned so far.
+    pub fn resistance(&self) -> LineResistance {
+        let [basic, curve, tunnel] = Section::ALL.map(|section| self.davis(section));
+        LineResistance {
+            basic,
+            curve: Some(curve),
+            tunnel: Some(tunnel),
+            reference_radius_m: self.settings.reference_radius_m,
+        }
+    }
+
+    /// Mass in kg; the declared one before the last stage.
+    pub fn mass_kg(&self) -> f64 {
+        match self.settings.mass_regression {
+            MassRegression::ForceOnAcceleration => self.nominal_mass_kg * self.mass.coefficients[0],
+            MassRegression::AccelerationOnForce => self.nominal_mass_kg / self.mass.coefficients[0],
+        }
+    }
+
+    /// The number of steps after which the printed variant had diverged.
+    pub fn diverged_after(&self) -> Option<u64> {
+        self.printed.diverged_after()
+    }
+
+    fn davis(&self, section: Section) -> Davis {
+        if self.settings.variant == DescentVariant::Printed {
+            return self.printed.davis(section);
+        }
+        let rest = |stage: &Stage<6>| stage.coefficients.fixed_rows::<3>(3).into_owned();
+        self.basis.to_davis(&match section {
+            Section::Basic => self.basic.coefficients,
+            Section::Curve => rest(&self.curve),
+            Section::Tunnel => rest(&self.tunnel),
+        })
+    }
+
+    fn learn(&mut self, from: &Motion, to: &Motion, step_s: f64) -> Outcome {
+        let speed_mps = 0.5 * (from.speed_mps + to.speed_mps);
+        let force_n = 0.5 * (from.force_n + to.force_n);
+        let gradient = 0.5 * (from.gradient_permille + to.gradient_permille);
+        let acceleration_mps2 = (to.speed_mps - from.speed_mps) / step_s;
+        let inertia_mps2 = self.inertia_factor * acceleration_mps2;
+        let (low, high) = self.speed_range_mps.unwrap_or((speed_mps, speed_mps));
+        self.speed_range_mps = Some((low.min(speed_mps), high.max(speed_mps)));
+        if self.learned >= self.settings.resistance_samples {
+            let at = Motion { speed_mps, ..*to };
+            let w = self.resistance().w_n_per_kn(&at, speed_mps) + gradient;
+            return self.learn_mass(force_n, inertia_mps2 + 1e-3 * STANDARD_GRAVITY_MPS2 * w);
+        }
+        self.learned += 1;
+        let Some(section) = Section::of(from, to) else { return Outcome::Used };
+        // Eq. (11), (12) and (18), uphill positive where the text has it negative, G in N and
+        // the resistance per kN of it, and the rotating mass that (18) leaves out.
+        let specific_mps2 = force_n / self.nominal_mass_kg - inertia_mps2;
+        let target = 1e3 * specific_mps2 / STANDARD_GRAVITY_MPS2 - gradient;
+        match self.settings.variant {
+            DescentVariant::Normalised => self.descend(section, speed_mps, target, to),
+            DescentVariant::Printed => self.printed.learn(section, speed_mps, target),
+        }
+        Outcome::Updated
+    }
+
+    fn descend(&mut self, section: Section, speed_mps: f64, target: f64, at: &Motion) {
+        let (steps, rate) = (self.settings.steps_per_sample, self.settings.rate);
+        let phi = self.basis.at(speed_mps);
+        let (stage, share) = match section {
+            Section::Basic => {
+                self.basic.sums.add(&phi, target);
+                for _ in 0..steps {
+                    self.basic.sums.step(&mut self.basic.coefficients, 0, rate);
+                }
+                return;
+            }
+            Section::Curve => {
+                (&mut self.curve, self.settings.reference_radius_m * at.curvature_per_m)
+            }
+            Section::Tunnel => (&mut self.tunnel, at.tunnel_share),
+        };
+        let mut features = SVector::<f64, 6>::zeros();
+        features.fixed_rows_mut::<3>(0).copy_from(&phi);
+        features.fixed_rows_mut::<3>(3).copy_from(&(phi * share));
+        stage.sums.add(&features, target);
+        stage.coefficients.fixed_rows_mut::<3>(0).copy_from(&self.basic.coefficients);
+        for _ in 0..steps {
+            stage.sums.step(&mut stage.coefficients, 3, rate);
+        }
+    }
+
+    /// `specific_mps2` is force over mass as the motion shows it.
+    fn learn_mass(&mut self, force_n: f64, specific_mps2: f64) -> Outcome {
+        let push_mps2 = force_n / self.nominal_mass_kg;
+        if push_mps2.abs() < 1e-3 * STANDARD_GRAVITY_MPS2 * self.settings.force_min_n_per_kn {
+            return Outcome::Used;
+        }
+        match self.settings.mass_regression {
+            MassRegression::ForceOnAcceleration => {
+                self.mass.sums.add(&SVector::from([specific_mps2]), push_mps2);
+            }
+            MassRegression::AccelerationOnForce => {
+                self.mass.sums.add(&SVector::from([push_mps2]), specific_mps2);
+            }
+        }
+        for _ in 0..self.settings.steps_per_sample {
+            self.mass.sums.step(&mut self.mass.coefficients, 0, self.settings.rate);
+        }
+        Outcome::Updated
+    }
+}
+
+impl StagedDescent {
+    /// Standard deviation of the mass in kg by the textbook formula.
+    fn mass_std_kg(&self) -> Option<f64> {
+        if self.mass.sums.count() < MASS_SAMPLES_MIN {
+            return None;
+        }
+        let variance = self.mass.sums.covariance(&self.mass.coefficients)?[0];
+        Some(self.mass_kg() * variance.sqrt() / self.mass.coefficients[0].abs())
+    }
+
+    fn status(&self, is_mass_known: bool) -> (Status, Reason) {
+        if self.printed.diverged_after().is_some() {
+            return (Status::Invalid, Reason::NumericalFailure);
+        }
+        let is_begun = self.basic.sums.count() >= SAMPLES_MIN || is_mass_known;
+        let some = if is_begun { Status::Degraded } else { Status::Unestimated };
+        if let Some(reason) = self.health.complaint() {
+            (some, reason)
+        } else if self.learned < self.settings.resistance_samples {
+            (some, Reason::TooFewSamples)
+        } else if is_mass_known {
+            (Status::Estimated, Reason::None)
+        } else {
+            (some, Reason::WeakExcitation)
+        }
+    }
+}
+
+impl Estimator for StagedDescent {
+    fn kind(&self) -> PipelineKind {
+        PipelineKind::StagedDescent
+    }
+
+    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+        if self.stops.departs(sample.time_ns, sample.stretch, sample.speed_mps) {
+            self.mass.sums = MeanSquare::default();
+        }
+        if sample.speed_mps < self.settings.speed_min_mps {
+            self.last = None;
+            return Outcome::Used;
+        }
+        let motion = match Motion::of(sample) {
+            Ok(motion) => motion,
+            Err(reason) => {
+                if reason == RejectionReason::WheelSlide {
+                    self.last = None;
+                }
+                self.health.refuse(reason, sample);
+                return Outcome::Rejected(reason);
+            }
+        };
+        self.health.accept();
+        let step = self.last.and_then(|last| Some((last, motion.step_from(&last)?)));
+        self.last = Some(motion);
+        match step {
+            Some((last, step_s)) => self.learn(&last, &motion, step_s),
+            None => Outcome::Used,
+        }
+    }
+
+    fn write(&self, snapshot: &mut ParameterSnapshot) {
+        let davis = self.davis(Section::Basic);
+        let mass_std_kg = self.mass_std_kg();
+        let mut covariance = Matrix4::zeros();
+        let basic = self.basic.sums.covariance(&self.basic.coefficients);
+        if let Some(own) = basic {
+            let to_davis = self.basis.to_davis_matrix();
+            let block = to_davis * own * to_davis.transpose();
+            covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&block);
+        }
+        covariance[(3, 3)] = mass_std_kg.map_or(0.0, |std| 1e-6 * std * std);
+        write_parameters(
+            snapshot,
+            [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC, Parameter::Mass],
+            &Vector4::new(davis.a, davis.b, davis.c, 1e-3 * self.mass_kg()),
+            &covariance,
+        );
+        let is_basic_known = basic.is_some() && self.basic.sums.count() >= SAMPLES_MIN;
+        snapshot.excited = if is_basic_known { 0b111 } else { 0 };
+        snapshot.excited |= u32::from(mass_std_kg.is_some()) << 3;
+        snapshot.missing_manoeuvres =
+            if mass_std_kg.is_some() { 0 } else { Manoeuvre::Accelerate.bit() };
+        let (status, reason) = self.status(mass_std_kg.is_some());
+        write_status(snapshot, status, reason);
+        (snapshot.speed_min_mps, snapshot.speed_max_mps) =
+            self.speed_range_mps.unwrap_or((0.0, 0.0));
+    }
+}
