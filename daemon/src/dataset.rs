@@ -3,7 +3,9 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use dynocar_core::dataset::{Dataset, DatasetError, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE};
+use dynocar_core::dataset::{
+    Dataset, DatasetError, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE,
+};
 
 /// Why a path leads to no dataset.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -139,13 +141,15 @@ mod tests {
         let dataset = load(folder.path()).unwrap();
         assert_eq!(dataset.runs[0].samples.len(), 2);
         assert_eq!(load(&folder.path().join("dataset.toml")).unwrap(), dataset);
-        std::fs::rename(folder.path().join("dataset.toml"), folder.path().join("other.toml")).unwrap();
+        std::fs::rename(folder.path().join("dataset.toml"), folder.path().join("other.toml"))
+            .unwrap();
         assert_eq!(load(&folder.path().join("other.toml")).unwrap(), dataset);
     }
 
     #[test]
     fn paths_without_a_dataset_are_told_apart() {
-        let folder = folder(&[("dataset.toml", MANIFEST.as_bytes()), ("latin.toml", b"# a\n# \xb0C\n")]);
+        let folder =
+            folder(&[("dataset.toml", MANIFEST.as_bytes()), ("latin.toml", b"# a\n# \xb0C\n")]);
         let path = folder.path();
         let shown = path.display();
         assert_eq!(refusal(&path.join("no")), format!("{shown}/no: no such file or folder"));
@@ -166,9 +170,11 @@ mod tests {
     #[test]
     fn a_run_that_is_a_folder_is_named_where_it_is_listed() {
         let manifest = MANIFEST.replace("runs/1.csv", "runs");
-        let folder = folder(&[("dataset.toml", manifest.as_bytes()), ("train.toml", TRAIN.as_bytes())]);
+        let folder =
+            folder(&[("dataset.toml", manifest.as_bytes()), ("train.toml", TRAIN.as_bytes())]);
         let shown = folder.path().display();
-        let message = format!("{shown}/dataset.toml:8: {shown}/runs: expected a file, found a folder");
+        let message =
+            format!("{shown}/dataset.toml:8: {shown}/runs: expected a file, found a folder");
         assert_eq!(refusal(folder.path()), message);
     }
 }

@@ -3,6 +3,10 @@
 //! Messages for people go to standard error, results to standard output. Exit status: 0 done,
 //! 1 the work failed, 2 the command line or an input file is wrong.
 
+pub mod check;
+pub mod output;
+pub mod text;
+
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -16,7 +20,9 @@ struct Arguments {
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {}
+enum Command {
+    Check(check::CheckArguments),
+}
 
 /// Why a command ended without a result; says which exit status follows.
 #[derive(Debug)]
@@ -30,7 +36,9 @@ pub enum Failure {
 /// Parses the command line, runs the command, reports a failure on standard error.
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let result: Result<(), Failure> = match arguments.command {};
+    let result: Result<(), Failure> = match arguments.command {
+        Command::Check(arguments) => check::run(&arguments),
+    };
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(Failure::Input(message)) => {
