@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use dynocar_core::dataset::{
-    DatasetError, DatasetHead, Manifest, Place, Problem, Run, parse_track, parse_train, top_keys,
+    DatasetError, DatasetHead, Place, Problem, Run, parse_track, parse_train, top_keys,
 };
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
@@ -38,8 +38,8 @@ enum Kind {
 /// What was understood.
 enum Understood {
     Dataset(Box<DatasetHead>, Vec<Result<Run, DatasetError>>),
-    Train(TrainModel),
-    Track(Track),
+    Train(Box<TrainModel>),
+    Track(Box<Track>),
 }
 
 /// Runs `dynocar check`.
@@ -101,16 +101,13 @@ fn read(path: &Path) -> Result<Understood, String> {
         return Err(format!("{label}: not a TOML file; {EXPECTED}"));
     }
     let keys = top_keys(&label, &text).map_err(|error| error.to_string())?;
-    match kind_of(&keys) {
-        Some(Kind::Dataset) => read_dataset(path),
-        Some(Kind::Train) => {
-            Ok(Understood::Train(parse_train(&label, &text).map_err(|error| error.to_string())?))
-        }
-        Some(Kind::Track) => {
-            Ok(Understood::Track(parse_track(&label, &text).map_err(|error| error.to_string())?))
-        }
-        None => Err(format!("{label}: {}; {EXPECTED}", found(&keys))),
-    }
+    let understood = match kind_of(&keys) {
+        Some(Kind::Dataset) => return read_dataset(path),
+        Some(Kind::Train) => parse_train(&label, &text).map(Box::new).map(Understood::Train),
+        Some(Kind::Track) => parse_track(&label, &text).map(Box::new).map(Understood::Track),
+        None => return Err(format!("{label}: {}; {EXPECTED}", found(&keys))),
+    };
+    understood.map_err(|error| error.to_string())
 }
 
 const EXPECTED: &str = "expected a dataset's folder or its dataset.toml (with a table [dataset]), \
@@ -120,13 +117,11 @@ const EXPECTED: &str = "expected a dataset's folder or its dataset.toml (with a 
 /// same names, so that `[dataset]` decides first; with `[daemon]` it is none of the three.
 fn kind_of(keys: &[String]) -> Option<Kind> {
     let has = |name: &str| keys.iter().any(|key| key == name);
-    match () {
-        () if has("daemon") => None,
-        () if has("dataset") => Some(Kind::Dataset),
-        () if has("train") => Some(Kind::Train),
-        () if has("track") => Some(Kind::Track),
-        () => None,
+    if has("daemon") {
+        return None;
     }
+    let kinds = [("dataset", Kind::Dataset), ("train", Kind::Train), ("track", Kind::Track)];
+    kinds.into_iter().find(|(table, _)| has(table)).map(|(_, kind)| kind)
 }
 
 fn found(keys: &[String]) -> String {
@@ -145,9 +140,4 @@ fn read_dataset(path: &Path) -> Result<Understood, String> {
     })?;
     let runs = (0..head.manifest.runs.len()).map(|index| head.read_run(&folder, index)).collect();
     Ok(Understood::Dataset(Box::new(head), runs))
-}
-
-/// The name of a run's file for a failed run too.
-fn run_file(manifest: &Manifest, index: usize) -> &str {
-    &manifest.runs[index].file
 }

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use dynocar_core::dataset::{
-    DatasetError, DatasetHead, ForceSource, GradientSource, Manifest, PositionSource, Quantity,
-    Remark, Role, Run, RunQuality,
+    ColumnMapping, DatasetError, DatasetHead, ForceSource, GradientSource, Manifest,
+    PositionSource, Quantity, Remark, Role, Run, RunEntry, RunQuality,
 };
 use dynocar_core::track::Track;
 use dynocar_core::train::{EffortCurve, TrainModel};
@@ -120,8 +120,8 @@ pub(super) fn answer<'a>(path: &Path, understood: &'a Understood) -> Answer<'a> 
             let DatasetHead { manifest, train, track } = &**head;
             (Some(dataset(manifest, runs)), Some(&**train), track.as_deref())
         }
-        Understood::Train(train) => (None, Some(train), None),
-        Understood::Track(track) => (None, None, Some(track)),
+        Understood::Train(train) => (None, Some(&**train), None),
+        Understood::Track(track) => (None, None, Some(&**track)),
     };
     Answer {
         path: path.display().to_string(),
@@ -135,34 +135,31 @@ pub(super) fn answer<'a>(path: &Path, understood: &'a Understood) -> Answer<'a> 
 }
 
 fn dataset<'a>(manifest: &'a Manifest, runs: &'a [Result<Run, DatasetError>]) -> DatasetAnswer<'a> {
-    let column = |mapping: &'a dynocar_core::dataset::ColumnMapping| ColumnAnswer {
+    let column = |mapping: &'a ColumnMapping| ColumnAnswer {
         quantity: mapping.quantity,
         column: &mapping.column,
         unit: mapping.unit.name(),
         scale: mapping.scale,
         offset: mapping.offset,
     };
-    let run =
-        |(entry, run): (&'a dynocar_core::dataset::RunEntry, &'a Result<Run, DatasetError>)| {
-            RunAnswer {
-                file: &entry.file,
-                role: entry.role,
-                direction: entry.direction,
-                outcome: match run {
-                    Err(error) => RunOutcome::Failed { error: error.to_string() },
-                    Ok(run) => RunOutcome::Read {
-                        mass_kg: run.mass_kg,
-                        samples: run.samples.len(),
-                        position_source: run.position_source,
-                        gradient_source: run.gradient_source,
-                        traction_source: run.traction_source,
-                        brake_source: run.brake_source,
-                        quality: &run.quality,
-                        remarks: &run.remarks,
-                    },
-                },
-            }
-        };
+    let run = |(entry, run): (&'a RunEntry, &'a Result<Run, DatasetError>)| RunAnswer {
+        file: &entry.file,
+        role: entry.role,
+        direction: entry.direction,
+        outcome: match run {
+            Err(error) => RunOutcome::Failed { error: error.to_string() },
+            Ok(run) => RunOutcome::Read {
+                mass_kg: run.mass_kg,
+                samples: run.samples.len(),
+                position_source: run.position_source,
+                gradient_source: run.gradient_source,
+                traction_source: run.traction_source,
+                brake_source: run.brake_source,
+                quality: &run.quality,
+                remarks: &run.remarks,
+            },
+        },
+    };
     DatasetAnswer {
         name: &manifest.name,
         description: manifest.description.as_deref(),

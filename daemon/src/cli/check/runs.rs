@@ -6,7 +6,6 @@ use dynocar_core::dataset::{
 };
 
 use super::report::WIDTH;
-use super::run_file;
 use crate::cli::text::{TextTable, short, wrap};
 
 type Read = Result<Run, DatasetError>;
@@ -34,7 +33,7 @@ fn motion_table(manifest: &Manifest, runs: &[Read]) -> TextTable {
     let mut table = TextTable::new(&header, &[1, 2]);
     for (index, run) in runs.iter().enumerate() {
         let entry = &manifest.runs[index];
-        let mut row = vec![(index + 1).to_string(), run_file(manifest, index).into()];
+        let mut row = vec![(index + 1).to_string(), manifest.runs[index].file.clone()];
         row.push(entry.role.name().into());
         row.push(format!("{:+}", entry.direction));
         match run {
