@@ -3,12 +3,14 @@
 //! Messages for people go to standard error, results to standard output. Exit status: 0 done,
 //! 1 the work failed, 2 the command line or an input file is wrong.
 
+mod check;
 mod demo;
 mod explain;
 mod identify;
 mod output;
 mod replay;
 mod run;
+mod text;
 
 use std::process::ExitCode;
 
@@ -27,6 +29,7 @@ enum Command {
     Demo(demo::DemoArguments),
     Explain(explain::ExplainArguments),
     Run(run::RunArguments),
+    Check(check::CheckArguments),
     Replay(replay::ReplayArguments),
     Identify(identify::IdentifyArguments),
 }
@@ -47,6 +50,7 @@ pub fn main() -> ExitCode {
         Command::Demo(arguments) => demo::execute(arguments),
         Command::Explain(arguments) => explain::execute(arguments),
         Command::Run(arguments) => run::execute(arguments),
+        Command::Check(arguments) => check::run(arguments),
         Command::Replay(arguments) => replay::execute(arguments),
         Command::Identify(arguments) => identify::execute(arguments),
     };

@@ -6,6 +6,16 @@ use toml::de::{DeTable, DeValue};
 use super::error::{DatasetError, Place, Problem};
 use super::names::Choices;
 
+/// The names of the tables and keys at the top of a TOML file, in the order of the file.
+///
+/// # Errors
+///
+/// When the text is not TOML.
+pub fn top_keys(label: &str, text: &str) -> Result<Vec<String>, DatasetError> {
+    let document = Document::parse(label, text)?;
+    Ok(document.root().keys().into_iter().map(|(name, _)| name.into()).collect())
+}
+
 /// A TOML file with its name, for messages.
 pub(super) struct Document<'t> {
     label: &'t str,

@@ -25,7 +25,7 @@ impl Place {
 
     /// A problem at this place.
     pub fn problem(self, problem: Problem) -> DatasetError {
-        DatasetError { place: self, problem }
+        DatasetError { place: self, problem: Box::new(problem) }
     }
 }
 
@@ -45,7 +45,7 @@ pub struct DatasetError {
     /// File and line.
     pub place: Place,
     /// What is wrong there.
-    pub problem: Problem,
+    pub problem: Box<Problem>,
 }
 
 /// Why a file's text cannot be had.

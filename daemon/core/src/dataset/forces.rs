@@ -11,7 +11,9 @@ use crate::train::{EffortCurve, TrainModel};
 /// A force below zero by no more than this share of the greatest force is noise around zero.
 const NOISE_SHARE: f64 = 0.02;
 /// A difference from the neighbours by less than this share of the greatest force is no spike.
-const SPIKE_SHARE: f64 = 0.15;
+const SPIKE_SHARE: f64 = 0.3;
+/// Rows further apart than this many s cannot tell a spike from a short application.
+const SPIKE_STEP_MAX_S: f64 = 0.5;
 /// A handle outside 0 to 1 by no more than this is noise around the stop.
 const HANDLE_NOISE: f64 = 0.02;
 /// The greatest force of a run is its quantile at this share, so that spikes do not set it.
@@ -90,7 +92,10 @@ impl Forces {
             .fold(0.0, f64::max);
         exchange_noise(&mut traction, &mut brake, NOISE_SHARE * greatest_n);
         for force in [&mut traction, &mut brake] {
-            force.is_spike = spikes(&force.force_n, &order.in_order, SPIKE_SHARE * greatest_n);
+            force.is_spike = match order.counts.step_s <= SPIKE_STEP_MAX_S {
+                true => spikes::<3>(&force.force_n, &order.in_order, SPIKE_SHARE * greatest_n),
+                false => vec![false; force.force_n.len()],
+            };
         }
         Forces { traction, brake, greatest_n }
     }
@@ -105,25 +110,26 @@ impl Force {
     ) -> Self {
         match (force, handle, curve) {
             (Some(column), _, _) => Force::new(column.to_vec(), ForceSource::Column),
-            (None, Some(handle), Some(curve)) => {
-                let mut out_of_range = 0;
-                let force = handle.iter().zip(speed_mps).map(|(&handle, &speed)| {
-                    if handle < -HANDLE_NOISE || handle > 1.0 + HANDLE_NOISE {
-                        out_of_range += 1;
-                        return f64::NAN;
-                    }
-                    if speed.is_nan() {
-                        f64::NAN
-                    } else {
-                        handle.clamp(0.0, 1.0) * curve.force_n(speed)
-                    }
-                });
-                let mut force = Force::new(force.collect(), ForceSource::Handle);
-                force.handle_out_of_range = out_of_range;
-                force
-            }
+            (None, Some(handle), Some(curve)) => Force::by_handle(handle, curve, speed_mps),
             _ => Force::new(vec![f64::NAN; speed_mps.len()], ForceSource::None),
         }
+    }
+
+    fn by_handle(handle: &[f64], curve: &EffortCurve, speed_mps: &[f64]) -> Self {
+        let mut out_of_range = 0;
+        let force = handle.iter().zip(speed_mps).map(|(&handle, &speed)| {
+            if handle.is_nan() || speed.is_nan() {
+                return f64::NAN;
+            }
+            if !(-HANDLE_NOISE..=1.0 + HANDLE_NOISE).contains(&handle) {
+                out_of_range += 1;
+                return f64::NAN;
+            }
+            handle.clamp(0.0, 1.0) * curve.force_n(speed)
+        });
+        let mut force = Force::new(force.collect(), ForceSource::Handle);
+        force.handle_out_of_range = out_of_range;
+        force
     }
 
     fn new(force_n: Vec<f64>, source: ForceSource) -> Self {
@@ -186,7 +192,8 @@ mod tests {
         );
         let manifest = Manifest::parse("dataset.toml", &text).unwrap();
         let table = Table::parse("a.csv", csv, &manifest).unwrap();
-        let order = TimeOrder::of(table.column(Quantity::Time).unwrap());
+        let times = table.column(Quantity::Time).unwrap();
+        let order = TimeOrder::of(times, &vec![0; times.len()]);
         let train = parse_train("train.toml", TRAIN).unwrap();
         Forces::of(&table, table.column(Quantity::Speed).unwrap(), &train, &order)
     }

@@ -39,6 +39,7 @@ pub mod units;
 #[cfg(test)]
 mod tests;
 
+pub use document::top_keys;
 pub use error::{DatasetError, FileProblem, Place, Problem};
 pub use forces::ForceSource;
 pub use manifest::{ColumnMapping, FileEntry, Manifest, PositionReference, Role, RunEntry};

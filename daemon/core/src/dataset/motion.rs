@@ -50,7 +50,7 @@ impl Speeds {
             }
         }
         let least = SPEED_SPIKE_LEAST_MPS + SPEED_BEND_MPS2 * order.counts.step_s;
-        let is_spike = spikes(&speed_mps, &order.in_order, least);
+        let is_spike = spikes::<5>(&speed_mps, &order.in_order, least);
         Speeds { speed_mps, is_spike, zeroed, negative }
     }
 }
@@ -139,7 +139,7 @@ mod tests {
     }
 
     fn integrated(placement: Placement, times: &[f64], column: &[f64]) -> Vec<f64> {
-        let order = TimeOrder::of(times);
+        let order = TimeOrder::of(times, &vec![0; times.len()]);
         placement.integrate(times, &Speeds::of(column, &order), &order)
     }
 
@@ -172,7 +172,7 @@ mod tests {
 
     #[test]
     fn only_the_noise_of_standstill_is_set_to_zero() {
-        let order = TimeOrder::of(&[0.0, 1.0, 2.0]);
+        let order = TimeOrder::of(&[0.0, 1.0, 2.0], &[0; 3]);
         let speeds = Speeds::of(&[-0.05, -3.0, 1.0], &order);
         assert_eq!(speeds.speed_mps, [0.0, -3.0, 1.0]);
         assert_eq!((speeds.zeroed, speeds.negative), (1, 1));

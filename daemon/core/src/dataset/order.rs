@@ -17,8 +17,9 @@ const REGULAR_SHARE: f64 = 0.8;
 pub(super) struct TimeOrder {
     /// True for the rows of the longest selection whose time grows.
     pub in_order: Vec<bool>,
-    /// Rows missing before each row, by the time that passed.
-    pub missing_before: Vec<u64>,
+    /// Rows of the recorder that are not in the file before each row: those that are missing by
+    /// the time that passed, and those without a time.
+    pub lost_before: Vec<u64>,
     /// The counts.
     pub counts: OrderCounts,
 }
@@ -34,53 +35,73 @@ pub struct OrderCounts {
     pub out_of_order: usize,
     /// Rows with the time of a row before them.
     pub repeated: usize,
-    /// Steps longer than rows without a gap have.
+    /// Longer steps than usual that no row out of order fills.
     pub gaps: usize,
     /// Longest gap in s; 0 without one.
     pub longest_gap_s: f64,
-    /// Rows missing in the gaps; counted when the rows are regular.
+    /// Rows missing in the gaps, besides those without a time; counted when the rows are regular.
     pub missing_rows: u64,
 }
 
 impl TimeOrder {
-    /// Looks at the rows' times in s, all finite.
-    pub fn of(times_s: &[f64]) -> Self {
+    /// Looks at the rows' times in s, all finite; `timeless_before` counts the rows without a
+    /// time that stood before each of them in the file.
+    pub fn of(times_s: &[f64], timeless_before: &[u64]) -> Self {
         let in_order = longest_increasing(times_s);
         let ordered: Vec<usize> = (0..times_s.len()).filter(|&row| in_order[row]).collect();
         let mut counts = OrderCounts::default();
-        for (row, time) in times_s.iter().enumerate() {
-            if !in_order[row] {
-                let at = ordered.binary_search_by(|&other| times_s[other].total_cmp(time));
-                match at {
-                    Ok(_) => counts.repeated += 1,
-                    Err(_) => counts.out_of_order += 1,
-                }
+        let mut displaced_s: Vec<f64> = Vec::new();
+        for (row, time) in times_s.iter().enumerate().filter(|(row, _)| !in_order[*row]) {
+            match ordered.binary_search_by(|&other| times_s[other].total_cmp(time)) {
+                Ok(_) => counts.repeated += 1,
+                Err(_) => displaced_s.push(times_s[row]),
             }
         }
-        let steps: Vec<f64> =
-            ordered.windows(2).map(|pair| times_s[pair[1]] - times_s[pair[0]]).collect();
-        counts.step_s = quantile(steps.clone(), 0.5).unwrap_or(0.0);
-        let alike = |step: &&f64| (**step - counts.step_s).abs() <= 0.25 * counts.step_s;
-        let alike = steps.iter().filter(alike).count();
-        counts.is_regular = alike as f64 >= REGULAR_SHARE * steps.len() as f64;
-        let mut missing_before = vec![0; times_s.len()];
-        for (pair, &step_s) in ordered.windows(2).zip(&steps) {
-            if !counts.is_gap(step_s) {
-                continue;
-            }
-            counts.gaps += 1;
-            counts.longest_gap_s = counts.longest_gap_s.max(step_s);
-            if counts.is_regular && step_s <= CLOCK_JUMP_S {
-                let missing = ((step_s / counts.step_s).round() - 1.0).max(0.0) as u64;
-                missing_before[pair[1]] = missing;
-                counts.missing_rows += missing;
-            }
+        counts.out_of_order = displaced_s.len();
+        displaced_s.sort_unstable_by(f64::total_cmp);
+        let steps = ordered.windows(2).map(|pair| times_s[pair[1]] - times_s[pair[0]]);
+        counts.judge_steps(steps.collect());
+        let mut lost_before = timeless_before.to_vec();
+        for pair in ordered.windows(2) {
+            let (from_s, to_s) = (times_s[pair[0]], times_s[pair[1]]);
+            let until = |time: f64| displaced_s.partition_point(|&displaced| displaced < time);
+            let displaced = (until(to_s) - until(from_s)) as u64;
+            let timeless = timeless_before[pair[0] + 1..=pair[1]].iter().sum();
+            lost_before[pair[1]] += counts.count_gap(to_s - from_s, displaced, timeless);
         }
-        TimeOrder { in_order, missing_before, counts }
+        TimeOrder { in_order, lost_before, counts }
     }
 }
 
 impl OrderCounts {
+    fn judge_steps(&mut self, steps_s: Vec<f64>) {
+        self.step_s = quantile(steps_s.clone(), 0.5).unwrap_or(0.0);
+        let is_alike = |step: &&f64| (**step - self.step_s).abs() <= 0.25 * self.step_s;
+        let alike = steps_s.iter().filter(is_alike).count();
+        self.is_regular = alike as f64 >= REGULAR_SHARE * steps_s.len() as f64;
+    }
+
+    /// Counts a step, when it is a gap, and gives the rows missing in it. Rows `displaced` out
+    /// of it and rows without a time that stand in it are not missing.
+    fn count_gap(&mut self, step_s: f64, displaced: u64, timeless: u64) -> u64 {
+        if !self.is_gap(step_s) {
+            return 0;
+        }
+        let is_counted = self.is_regular && step_s <= CLOCK_JUMP_S;
+        let absent = match is_counted {
+            true => ((step_s / self.step_s).round() as u64).saturating_sub(1 + displaced),
+            false => 0,
+        };
+        if is_counted && absent == 0 {
+            return 0;
+        }
+        self.gaps += 1;
+        self.longest_gap_s = self.longest_gap_s.max(step_s);
+        let missing = absent.saturating_sub(timeless);
+        self.missing_rows += missing;
+        missing
+    }
+
     /// True when rows are missing within a step of so many s.
     pub fn is_gap(&self, step_s: f64) -> bool {
         let steps = if self.is_regular { GAP_STEPS } else { IRREGULAR_GAP_STEPS };
@@ -129,10 +150,14 @@ pub(super) fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
+    fn order_of(times_s: &[f64]) -> TimeOrder {
+        TimeOrder::of(times_s, &vec![0; times_s.len()])
+    }
+
     #[test]
     fn steady_rows_have_nothing_to_remark() {
         let times: Vec<f64> = (0..100).map(|i| 1000.0 + 0.2 * f64::from(i)).collect();
-        let order = TimeOrder::of(&times);
+        let order = order_of(&times);
         assert!(order.in_order.iter().all(|&mark| mark));
         assert!((order.counts.step_s - 0.2).abs() < 1e-9);
         let clean =
@@ -142,49 +167,58 @@ mod tests {
 
     #[test]
     fn missing_rows_are_counted_where_they_are() {
-        let order = TimeOrder::of(&[0.0, 1.0, 2.0, 6.0, 7.0, 8.0, 10.0, 11.0, 12.0, 13.0, 14.0]);
+        let order = order_of(&[0.0, 1.0, 2.0, 6.0, 7.0, 8.0, 10.0, 11.0, 12.0, 13.0, 14.0]);
         assert_eq!((order.counts.gaps, order.counts.longest_gap_s), (2, 4.0));
         assert_eq!(order.counts.missing_rows, 4);
-        assert_eq!((order.missing_before[3], order.missing_before[6]), (3, 1));
+        assert_eq!((order.lost_before[3], order.lost_before[6]), (3, 1));
     }
 
     #[test]
     fn rows_that_change_places_are_out_of_order_and_leave_no_gap() {
-        let order = TimeOrder::of(&[0.0, 1.0, 2.0, 4.0, 3.0, 5.0, 6.0, 7.0, 8.0]);
+        let order = order_of(&[0.0, 1.0, 2.0, 4.0, 3.0, 5.0, 6.0, 7.0, 8.0]);
         assert_eq!((order.counts.out_of_order, order.counts.repeated), (1, 0));
+        assert_eq!((order.counts.gaps, order.counts.missing_rows), (0, 0));
         assert_eq!(order.in_order.iter().filter(|&&mark| mark).count(), 8);
     }
 
     #[test]
+    fn a_row_without_a_time_is_lost_once() {
+        let times = [0.0, 1.0, 2.0, 5.0, 6.0, 7.0, 8.0];
+        let order = TimeOrder::of(&times, &[0, 0, 0, 1, 0, 0, 0]);
+        assert_eq!((order.counts.gaps, order.counts.missing_rows), (1, 1));
+        assert_eq!(order.lost_before[3], 2, "one without a time, one not there");
+    }
+
+    #[test]
     fn repeated_rows_are_told_from_disorder() {
-        let order = TimeOrder::of(&[0.0, 1.0, 1.0, 2.0, 3.0, 0.0, 4.0]);
+        let order = order_of(&[0.0, 1.0, 1.0, 2.0, 3.0, 0.0, 4.0]);
         assert_eq!((order.counts.out_of_order, order.counts.repeated), (0, 2));
         assert_eq!(order.in_order, [true, true, false, true, true, false, true]);
     }
 
     #[test]
     fn one_wild_time_does_not_condemn_the_rows_after_it() {
-        let order = TimeOrder::of(&[0.0, 1.0, 1e9, 2.0, 3.0, 4.0, -7.0, 5.0]);
+        let order = order_of(&[0.0, 1.0, 1e9, 2.0, 3.0, 4.0, -7.0, 5.0]);
         assert_eq!(order.counts.out_of_order, 2);
         assert_eq!(order.counts.gaps, 0);
     }
 
     #[test]
     fn of_two_rows_that_contradict_each_other_the_first_is_kept() {
-        let order = TimeOrder::of(&[0.0, 1.0, 0.5, 2.0]);
+        let order = order_of(&[0.0, 1.0, 0.5, 2.0]);
         assert_eq!(order.in_order, [true, true, false, true]);
     }
 
     #[test]
     fn irregular_rows_have_gaps_but_no_count_of_missing_rows() {
-        let order = TimeOrder::of(&[0.0, 1.0, 2.5, 6.0, 7.2, 11.0, 100.0, 101.0]);
+        let order = order_of(&[0.0, 1.0, 2.5, 6.0, 7.2, 11.0, 100.0, 101.0]);
         assert!(!order.counts.is_regular);
         assert_eq!((order.counts.gaps, order.counts.missing_rows), (1, 0));
     }
 
     #[test]
     fn few_rows_have_no_step() {
-        assert_eq!(TimeOrder::of(&[]).counts.step_s, 0.0);
-        assert_eq!(TimeOrder::of(&[3.0]).in_order, [true]);
+        assert_eq!(order_of(&[]).counts.step_s, 0.0);
+        assert_eq!(order_of(&[3.0]).in_order, [true]);
     }
 }

@@ -12,7 +12,7 @@ use super::run::{Context, GradientSource, Resolved};
 const DISTANCE_MIN_M: f64 = 200.0;
 /// Position and integrated speed may differ by this share: wheel wear, balises, gaps.
 const DISTANCE_TOLERANCE: f64 = 0.05;
-/// So far in m off the line's ends a train's centre may be.
+/// So far in m off the line's ends a train's end may be.
 const LINE_TOLERANCE_M: f64 = 50.0;
 /// Median time steps in s of recordings that make sense.
 const USUAL_STEP_S: (f64, f64) = (0.0005, 60.0);
@@ -178,8 +178,10 @@ fn of_position(context: Context, run: &Resolved, quality: &RunQuality, remarks: 
         remarks.push(Remark::DistanceMismatch { position_m, speed_m });
     }
     let length_m = context.track.and_then(|track| track.length_m);
+    // A train may stop with its head at the line's end and its centre half a length outside.
+    let beyond_m = LINE_TOLERANCE_M + 0.5 * context.train.length_m;
     if let (Some(length_m), Some((from_m, to_m))) = (length_m, quality.position_range_m)
-        && (from_m < -LINE_TOLERANCE_M || to_m > length_m + LINE_TOLERANCE_M)
+        && (from_m < -beyond_m || to_m > length_m + beyond_m)
     {
         remarks.push(Remark::OffTheLine { from_m, to_m, length_m });
     }

@@ -106,8 +106,6 @@ pub(super) struct Resolved<'d> {
     pub position_source: PositionSource,
     pub gradient_permille: Option<Vec<f64>>,
     pub gradient_source: GradientSource,
-    /// Rows without a time before each row.
-    timeless_before: Vec<u64>,
 }
 
 /// Reads one run from the text of its file; `number` is its place in the manifest, from 1.
@@ -151,7 +149,7 @@ impl<'d> Resolved<'d> {
         let (timeless_before, rows_without_time) = drop_timeless(&mut table);
         let column = |quantity| table.column(quantity).unwrap_or_default();
         let times_s = column(Quantity::Time).to_vec();
-        let order = TimeOrder::of(&times_s);
+        let order = TimeOrder::of(&times_s, &timeless_before);
         let speeds = Speeds::of(column(Quantity::Speed), &order);
         let forces = Forces::of(&table, &speeds.speed_mps, context.train, &order);
         let placement = Placement {
@@ -179,7 +177,6 @@ impl<'d> Resolved<'d> {
             position_source,
             gradient_permille,
             gradient_source,
-            timeless_before,
             table,
         }
     }
@@ -206,7 +203,7 @@ impl<'d> Resolved<'d> {
         let mut sequence = 0;
         (0..self.times_s.len())
             .map(|row| {
-                sequence += 1 + self.order.missing_before[row].max(self.timeless_before[row]);
+                sequence += 1 + self.order.lost_before[row];
                 let mut sample = TrainSample::empty(DATASET_TRAIN);
                 sample.time_ns = (self.times_s[row] * 1e9).round() as i64;
                 sample.sequence = sequence;

@@ -3,36 +3,35 @@
 use super::order::quantile;
 
 /// The spread of a run's values around their neighbours is this quantile of the differences:
-/// above the median, since a centre that is itself the median of five differs by nothing, and
+/// above the median, since a centre that is itself the median differs by nothing, and
 /// low enough for one value in ten, with its neighbours, to be an outlier.
 const SPREAD_QUANTILE: f64 = 0.75;
 /// So many spreads make a spike; about eight standard deviations of white noise.
 const SPIKE_SPREADS: f64 = 8.0;
 
-/// Marks values that stick out from the median of the five around them (Hampel's filter, with
-/// the spread taken over the whole run).
+/// Marks values that stick out from the median of the `N` around them (Hampel's filter, with
+/// the spread taken over the whole run). `N` is odd: with 5, up to two rows in a row can be told,
+/// with 3 a single one.
 ///
-/// Only rows marked in `usable` and not `NaN` take part; the first and the last two have too
-/// few neighbours to be told. `least` is the difference below which nothing is a spike.
-pub(super) fn spikes(values: &[f64], usable: &[bool], least: f64) -> Vec<bool> {
+/// Only rows marked in `usable` and not `NaN` take part; the first and last few have too few
+/// neighbours to be told. `least` is the difference below which nothing is a spike.
+pub(super) fn spikes<const N: usize>(values: &[f64], usable: &[bool], least: f64) -> Vec<bool> {
     let mut marks = vec![false; values.len()];
     let rows: Vec<usize> =
         (0..values.len()).filter(|&row| usable[row] && !values[row].is_nan()).collect();
-    let differences: Vec<f64> = rows
-        .windows(5)
-        .map(|window| {
-            let mut around = [0.0; 5];
-            for (slot, &row) in around.iter_mut().zip(window) {
-                *slot = values[row];
-            }
-            around.sort_unstable_by(f64::total_cmp);
-            (values[window[2]] - around[2]).abs()
-        })
-        .collect();
+    let difference = |window: &[usize]| {
+        let mut around = [0.0; N];
+        for (slot, &row) in around.iter_mut().zip(window) {
+            *slot = values[row];
+        }
+        around.sort_unstable_by(f64::total_cmp);
+        (values[window[N / 2]] - around[N / 2]).abs()
+    };
+    let differences: Vec<f64> = rows.windows(N).map(difference).collect();
     let spread = quantile(differences.clone(), SPREAD_QUANTILE).unwrap_or(0.0);
     let bound = least.max(SPIKE_SPREADS * spread);
-    for (difference, window) in differences.iter().zip(rows.windows(5)) {
-        marks[window[2]] = *difference > bound;
+    for (difference, window) in differences.iter().zip(rows.windows(N)) {
+        marks[window[N / 2]] = *difference > bound;
     }
     marks
 }
@@ -42,7 +41,7 @@ mod tests {
     use super::*;
 
     fn marked(values: &[f64], least: f64) -> Vec<usize> {
-        let marks = spikes(values, &vec![true; values.len()], least);
+        let marks = spikes::<5>(values, &vec![true; values.len()], least);
         (0..values.len()).filter(|&row| marks[row]).collect()
     }
 
@@ -57,8 +56,9 @@ mod tests {
     #[test]
     fn two_spikes_in_a_row_are_both_marked() {
         let mut values = vec![5.0; 20];
-        (values[8], values[9]) = (90.0, 80.0);
+        (values[8], values[9]) = (90.0, 90.0);
         assert_eq!(marked(&values, 0.5), [8, 9]);
+        assert!(spikes::<3>(&values, &[true; 20], 0.5).iter().all(|&mark| !mark));
     }
 
     #[test]
@@ -72,6 +72,6 @@ mod tests {
     fn rows_that_are_not_usable_are_no_neighbours() {
         let values = [1.0, 1.0, 900.0, 900.0, 900.0, 1.0, 1.0, 1.0, 1.0];
         let usable = [true, true, false, false, false, true, true, true, true];
-        assert!(spikes(&values, &usable, 0.5).iter().all(|&mark| !mark));
+        assert!(spikes::<5>(&values, &usable, 0.5).iter().all(|&mark| !mark));
     }
 }

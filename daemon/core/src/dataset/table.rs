@@ -107,7 +107,8 @@ struct Column<'m> {
 
 enum Flaw {
     Short,
-    Error(DatasetError),
+    /// The last cell is no number, but may be the beginning of one.
+    CutNumber(DatasetError),
 }
 
 impl<'m> Rows<'m> {
@@ -143,22 +144,19 @@ impl<'m> Rows<'m> {
         self.pending = (record.len() < self.width).then_some(Flaw::Short);
         for column in &mut self.columns {
             let cell = record.get(column.index).unwrap_or(b"").trim_ascii();
-            let value = match parse_cell(cell, self.decimal) {
-                Some(value) => held(column.mapping, value),
-                None => {
-                    let printable = |letter: char| if letter.is_control() { ' ' } else { letter };
-                    let text = lossy(cell).chars().take(60).map(printable).collect();
-                    let hint = hint_for(cell, self.decimal);
-                    let name = column.mapping.column.clone();
-                    let problem = Problem::NotANumber { column: name, text, hint };
-                    let error = Place::line(self.label, line).problem(problem);
-                    if !matches!(self.pending, Some(Flaw::Error(_))) {
-                        self.pending = Some(Flaw::Error(error));
-                    }
-                    f64::NAN
-                }
-            };
-            column.values.push(value);
+            let value = parse_cell(cell, self.decimal);
+            column.values.push(value.map_or(f64::NAN, |value| held(column.mapping, value)));
+            if value.is_some() {
+                continue;
+            }
+            let error = place().problem(not_a_number(column.mapping, cell, self.decimal));
+            // What is left of a number where a file breaks off is such a cell.
+            let may_be_cut = column.index + 1 == record.len()
+                && cell.iter().all(|letter| b"0123456789+-.,eE".contains(letter));
+            if !may_be_cut {
+                return Err(error);
+            }
+            self.pending = Some(Flaw::CutNumber(error));
         }
         self.lines.rows += 1;
         Ok(())
@@ -173,7 +171,7 @@ impl<'m> Rows<'m> {
                 self.lines.short += 1;
                 Ok(())
             }
-            Some(Flaw::Error(error)) => Err(error),
+            Some(Flaw::CutNumber(error)) => Err(error),
         }
     }
 
@@ -244,13 +242,14 @@ fn held(mapping: &ColumnMapping, cell: f64) -> f64 {
     if value.is_finite() { value } else { f64::NAN }
 }
 
-fn hint_for(cell: &[u8], decimal: u8) -> &'static str {
+fn not_a_number(mapping: &ColumnMapping, cell: &[u8], decimal: u8) -> Problem {
+    let printable = |letter: char| if letter.is_control() { ' ' } else { letter };
+    let text = lossy(cell).chars().take(60).map(printable).collect();
     let with_point: Vec<u8> =
         cell.iter().map(|&letter| if letter == b',' { b'.' } else { letter }).collect();
-    if decimal == b'.' && cell.contains(&b',') && parse_cell(&with_point, b'.').is_some() {
-        return "; for decimal commas set decimal = \",\" in [dataset]";
-    }
-    ""
+    let is_comma = decimal == b'.' && parse_cell(&with_point, b'.').is_some();
+    let hint = if is_comma { "; for decimal commas set decimal = \",\" in [dataset]" } else { "" };
+    Problem::NotANumber { column: mapping.column.clone(), text, hint }
 }
 
 fn lossy(bytes: &[u8]) -> std::borrow::Cow<'_, str> {

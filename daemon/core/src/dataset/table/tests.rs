@@ -66,6 +66,10 @@ fn a_cell_that_is_no_number_is_named_with_line_and_column() {
         "a.csv:2: column 'v': expected a number or an empty cell, got '1,5'; for decimal \
          commas set decimal = \",\" in [dataset]"
     );
+    let message = table("", "t,v\n0,1\n1,fast").unwrap_err();
+    assert!(message.contains("got 'fast'"), "a word is no number that was cut off: {message}");
+    let message = table("", "t,v\n0,1e\n1,2\n").unwrap_err();
+    assert!(message.starts_with("a.csv:2: column 'v'"), "{message}");
     let message = table("", "t,v\n0,1\n1,2,5\n").unwrap_err();
     assert_eq!(message, "a.csv:3: 3 cells, but the header has 2 columns");
     let message = table("", "t,v\n0,1\n1,\"2\n2,3\n").unwrap_err();

@@ -1,0 +1,203 @@
+//! What was understood, machine-readable. Units are SI and part of the keys.
+
+use std::path::Path;
+
+use dynocar_core::dataset::{
+    ColumnMapping, DatasetError, DatasetHead, ForceSource, GradientSource, Manifest,
+    PositionSource, Quantity, Remark, Role, Run, RunEntry, RunQuality,
+};
+use dynocar_core::track::Track;
+use dynocar_core::train::{EffortCurve, TrainModel};
+use serde::Serialize;
+
+use super::{Kind, Understood};
+
+/// The answer of `dynocar check --json`.
+#[derive(Debug, Serialize)]
+pub(super) struct Answer<'a> {
+    path: String,
+    kind: Option<Kind>,
+    valid: bool,
+    errors: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dataset: Option<DatasetAnswer<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    train: Option<TrainAnswer<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    track: Option<TrackAnswer<'a>>,
+}
+
+#[derive(Debug, Serialize)]
+struct DatasetAnswer<'a> {
+    name: &'a str,
+    description: Option<&'a str>,
+    columns: Vec<ColumnAnswer<'a>>,
+    runs: Vec<RunAnswer<'a>>,
+}
+
+#[derive(Debug, Serialize)]
+struct ColumnAnswer<'a> {
+    quantity: Quantity,
+    column: &'a str,
+    unit: &'static str,
+    scale: f64,
+    offset: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct RunAnswer<'a> {
+    file: &'a str,
+    role: Role,
+    direction: i8,
+    #[serde(flatten)]
+    outcome: RunOutcome<'a>,
+}
+
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+enum RunOutcome<'a> {
+    Read {
+        mass_kg: f64,
+        samples: usize,
+        position_source: PositionSource,
+        gradient_source: GradientSource,
+        traction_source: ForceSource,
+        brake_source: ForceSource,
+        quality: &'a RunQuality,
+        remarks: &'a [Remark],
+    },
+    Failed {
+        error: String,
+    },
+}
+
+#[derive(Debug, Serialize)]
+struct TrainAnswer<'a> {
+    name: &'a str,
+    mass_kg: f64,
+    length_m: f64,
+    cars: u32,
+    rotating_mass_factor: f64,
+    a: f64,
+    b: f64,
+    c: f64,
+    curve_constant_n_per_kn_m: f64,
+    tunnel_constant_n_per_kn_m: f64,
+    /// Points (m/s, N).
+    traction_effort: Option<&'a [(f64, f64)]>,
+    brake_effort: Option<&'a [(f64, f64)]>,
+}
+
+#[derive(Debug, Serialize)]
+struct TrackAnswer<'a> {
+    name: &'a str,
+    length_m: Option<f64>,
+    /// `null`: not known.
+    gradients: Option<usize>,
+    gradient_range_permille: Option<(f64, f64)>,
+    curves: Option<usize>,
+    tunnels: Option<usize>,
+}
+
+/// The answer when nothing could be understood.
+pub(super) fn refusal(path: &Path, message: &str) -> Answer<'static> {
+    Answer {
+        path: path.display().to_string(),
+        kind: None,
+        valid: false,
+        errors: vec![message.into()],
+        dataset: None,
+        train: None,
+        track: None,
+    }
+}
+
+/// The answer to what was understood.
+pub(super) fn answer<'a>(path: &Path, understood: &'a Understood) -> Answer<'a> {
+    let errors = understood.errors();
+    let (dataset, train, track) = match understood {
+        Understood::Dataset(head, runs) => {
+            let DatasetHead { manifest, train, track } = &**head;
+            (Some(dataset(manifest, runs)), Some(&**train), track.as_deref())
+        }
+        Understood::Train(train) => (None, Some(&**train), None),
+        Understood::Track(track) => (None, None, Some(&**track)),
+    };
+    Answer {
+        path: path.display().to_string(),
+        kind: Some(understood.kind()),
+        valid: errors.is_empty(),
+        errors,
+        dataset,
+        train: train.map(train_answer),
+        track: track.map(track_answer),
+    }
+}
+
+fn dataset<'a>(manifest: &'a Manifest, runs: &'a [Result<Run, DatasetError>]) -> DatasetAnswer<'a> {
+    let column = |mapping: &'a ColumnMapping| ColumnAnswer {
+        quantity: mapping.quantity,
+        column: &mapping.column,
+        unit: mapping.unit.name(),
+        scale: mapping.scale,
+        offset: mapping.offset,
+    };
+    let run = |(entry, run): (&'a RunEntry, &'a Result<Run, DatasetError>)| RunAnswer {
+        file: &entry.file,
+        role: entry.role,
+        direction: entry.direction,
+        outcome: match run {
+            Err(error) => RunOutcome::Failed { error: error.to_string() },
+            Ok(run) => RunOutcome::Read {
+                mass_kg: run.mass_kg,
+                samples: run.samples.len(),
+                position_source: run.position_source,
+                gradient_source: run.gradient_source,
+                traction_source: run.traction_source,
+                brake_source: run.brake_source,
+                quality: &run.quality,
+                remarks: &run.remarks,
+            },
+        },
+    };
+    DatasetAnswer {
+        name: &manifest.name,
+        description: manifest.description.as_deref(),
+        columns: manifest.columns.iter().map(column).collect(),
+        runs: manifest.runs.iter().zip(runs).map(run).collect(),
+    }
+}
+
+fn train_answer(train: &TrainModel) -> TrainAnswer<'_> {
+    TrainAnswer {
+        name: &train.name,
+        mass_kg: train.mass_kg,
+        length_m: train.length_m,
+        cars: train.cars,
+        rotating_mass_factor: train.rotating_mass_factor,
+        a: train.resistance.a,
+        b: train.resistance.b,
+        c: train.resistance.c,
+        curve_constant_n_per_kn_m: train.curve_constant_n_per_kn_m,
+        tunnel_constant_n_per_kn_m: train.tunnel_constant_n_per_kn_m,
+        traction_effort: train.traction.as_ref().map(EffortCurve::points),
+        brake_effort: train.brake.as_ref().map(EffortCurve::points),
+    }
+}
+
+fn track_answer(track: &Track) -> TrackAnswer<'_> {
+    let gradient = track.gradient();
+    let range = gradient.map(|profile| {
+        profile.entries().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, permille)| {
+            (low.min(permille), high.max(permille))
+        })
+    });
+    TrackAnswer {
+        name: &track.name,
+        length_m: track.length_m,
+        gradients: gradient.map(|profile| profile.entries().len()),
+        gradient_range_permille: range,
+        curves: track.knows_curves().then(|| track.curves().len()),
+        tunnels: track.knows_tunnels().then(|| track.tunnels().len()),
+    }
+}

@@ -1,0 +1,216 @@
+//! What was understood, in words and columns.
+
+use dynocar_core::dataset::{Manifest, PositionReference, Quantity};
+use dynocar_core::track::Track;
+use dynocar_core::train::{BrakeGear, EffortCurve, TrainModel};
+
+use super::{Understood, runs};
+use crate::cli::text::{short, wrap};
+
+/// Widest line of running text.
+pub(super) const WIDTH: usize = 96;
+/// Width of the keys of an entry.
+const KEY_WIDTH: usize = 12;
+
+/// The whole report.
+pub(super) fn report(understood: &Understood) -> String {
+    match understood {
+        Understood::Train(model) => train(model),
+        Understood::Track(line) => track(line),
+        Understood::Dataset(head, read) => {
+            let track = match &head.track {
+                Some(line) => track(line),
+                None => "track    not known\n".into(),
+            };
+            let parts = [
+                dataset(&head.manifest),
+                train(&head.train),
+                track,
+                columns(&head.manifest),
+                runs::report(&head.manifest, read),
+            ];
+            parts.join("\n")
+        }
+    }
+}
+
+/// A line of an entry.
+fn line(key: &str, value: &str) -> String {
+    let mut lines = wrap(value, WIDTH - KEY_WIDTH).into_iter();
+    let first = lines.next().unwrap_or_default();
+    let rest = lines.map(|line| format!("  {:KEY_WIDTH$}{line}\n", ""));
+    format!("  {key:KEY_WIDTH$}{first}\n{}", rest.collect::<String>())
+}
+
+fn dataset(manifest: &Manifest) -> String {
+    let mut text = format!("dataset  {}\n", manifest.name);
+    if let Some(description) = &manifest.description {
+        for line in wrap(description, WIDTH) {
+            text += &format!("  {line}\n");
+        }
+    }
+    text
+}
+
+fn train(train: &TrainModel) -> String {
+    let davis = &train.resistance;
+    let signed = |coefficient: f64| {
+        let sign = if coefficient < 0.0 { '-' } else { '+' };
+        format!("{sign} {}", short(coefficient.abs(), 8))
+    };
+    let resistance = format!(
+        "w0 = {} {} v {} v² N/kN, v in m/s",
+        short(davis.a, 6),
+        signed(davis.b),
+        signed(davis.c)
+    );
+    let mut text = format!("train    {}\n", train.name);
+    let mass_t = short(train.mass_kg / 1000.0, 3);
+    let gamma = short(train.rotating_mass_factor, 6);
+    text += &line("mass", &format!("{mass_t} t, rotating-mass factor {gamma}"));
+    let cars = if train.cars == 1 { "1 car".into() } else { format!("{} cars", train.cars) };
+    text += &line("length", &format!("{} m, {cars}", short(train.length_m, 3)));
+    text += &line("resistance", &resistance);
+    text += &line("", &resistance_at_speeds(train));
+    text += &line(
+        "in curves",
+        &match train.curve_constant_n_per_kn_m {
+            0.0 => "none declared".into(),
+            constant => format!("{} / R N/kN, R in m", short(constant, 3)),
+        },
+    );
+    text += &line(
+        "in tunnels",
+        &match train.tunnel_constant_n_per_kn_m {
+            0.0 => "none declared".into(),
+            constant => format!("{} N/kN per m of tunnel", short(constant, 8)),
+        },
+    );
+    text += &line("traction", &effort(train.traction.as_ref()));
+    text += &line("brake", &effort(train.brake.as_ref()));
+    if train.brake_gear != BrakeGear::default() {
+        text += &line("brake gear", &brake_gear(&train.brake_gear));
+    }
+    text
+}
+
+/// The declared resistance in kN at a few speeds, which tells of a wrong unit at a glance.
+fn resistance_at_speeds(train: &TrainModel) -> String {
+    let top_mps = train.speed_max_mps().filter(|&speed| speed > 0.0).unwrap_or(120.0 / 3.6);
+    let weight_kn = TrainModel::weight_kn(train.mass_kg);
+    let at = |share: f64| {
+        let speed_mps = share * top_mps;
+        let force_kn = train.resistance.w0_n_per_kn(speed_mps) * weight_kn / 1000.0;
+        format!("{} kN at {} km/h", short(force_kn, 2), short(speed_mps * 3.6, 0))
+    };
+    [0.0, 0.5, 1.0].map(at).join(", ")
+}
+
+fn effort(curve: Option<&EffortCurve>) -> String {
+    let Some(curve) = curve else { return "not declared".into() };
+    let most_kn = short(curve.force_max_n() / 1000.0, 3);
+    match curve.points() {
+        [_] => format!("{most_kn} kN at any speed"),
+        points => {
+            let (speed_mps, force_n) = points[points.len() - 1];
+            let (speed_kmh, force_kn) = (short(speed_mps * 3.6, 1), short(force_n / 1000.0, 3));
+            let count = points.len();
+            format!("up to {most_kn} kN, {force_kn} kN at {speed_kmh} km/h ({count} points)")
+        }
+    }
+}
+
+fn brake_gear(gear: &BrakeGear) -> String {
+    let parts = [
+        (gear.cylinder_diameter_mm, "cylinder diameter", " mm"),
+        (gear.disc_radius_mm, "disc radius", " mm"),
+        (gear.wheel_radius_mm, "wheel radius", " mm"),
+        (gear.efficiency, "efficiency", ""),
+        (gear.ratio, "ratio", ""),
+        (gear.friction, "friction", ""),
+        (gear.pads, "pads", ""),
+    ];
+    let shown = parts.iter().filter_map(|(value, name, unit)| {
+        value.map(|value| format!("{name} {}{unit}", short(value, 4)))
+    });
+    shown.collect::<Vec<_>>().join(", ")
+}
+
+fn track(track: &Track) -> String {
+    let mut text = format!("track    {}\n", track.name);
+    let length = track.length_m.map(|length| format!("{} km", short(length / 1000.0, 3)));
+    text += &line("length", length.as_deref().unwrap_or("not declared"));
+    text += &line(
+        "gradient",
+        &match track.gradient() {
+            None => "not known".into(),
+            Some(profile) => {
+                let (low, high) = range(profile.entries().map(|(_, permille)| permille));
+                let from_km = profile.entries().next().map_or(0.0, |entry| entry.0) / 1000.0;
+                let to_km = profile.entries().last().map_or(0.0, |entry| entry.0) / 1000.0;
+                let (low, high) = (short(low, 2), short(high, 2));
+                let (from, to) = (short(from_km, 3), short(to_km, 3));
+                format!("{low} to {high} ‰, {} entries, km {from} to {to}", profile.entries().len())
+            }
+        },
+    );
+    text += &line(
+        "curves",
+        &match (track.knows_curves(), track.curves()) {
+            (false, _) => "not known".into(),
+            (true, []) => "none".into(),
+            (true, curves) => {
+                let (low, high) = range(curves.iter().map(|curve| curve.radius_m));
+                let length_m: f64 = curves.iter().map(|curve| curve.end_m - curve.start_m).sum();
+                let (low, high, km) = (short(low, 1), short(high, 1), short(length_m / 1000.0, 2));
+                format!("{}, {km} km in all, radius {low} to {high} m", curves.len())
+            }
+        },
+    );
+    text += &line(
+        "tunnels",
+        &match (track.knows_tunnels(), track.tunnels()) {
+            (false, _) => "not known".into(),
+            (true, []) => "none".into(),
+            (true, tunnels) => {
+                let (_, longest) =
+                    range(tunnels.iter().map(|tunnel| tunnel.end_m - tunnel.start_m));
+                let length_m: f64 =
+                    tunnels.iter().map(|tunnel| tunnel.end_m - tunnel.start_m).sum();
+                let (longest, km) = (short(longest, 1), short(length_m / 1000.0, 2));
+                format!("{}, {km} km in all, the longest {longest} m", tunnels.len())
+            }
+        },
+    );
+    text
+}
+
+fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+        (low.min(value), high.max(value))
+    })
+}
+
+fn columns(manifest: &Manifest) -> String {
+    let mut text = match (manifest.mapping(Quantity::Position), manifest.position_reference) {
+        (None, _) => "columns\n".into(),
+        (_, PositionReference::Centre) => String::from("columns  position of the train's centre\n"),
+        (_, PositionReference::Head) => "columns  position of the train's head\n".into(),
+    };
+    let width = manifest.columns.iter().map(|mapping| mapping.quantity.name().len()).max();
+    for mapping in &manifest.columns {
+        let scale = match mapping.scale {
+            1.0 => String::new(),
+            scale => format!(" * {scale}"),
+        };
+        let offset = match mapping.offset {
+            0.0 => String::new(),
+            offset if offset < 0.0 => format!(" - {}", -offset),
+            offset => format!(" + {offset}"),
+        };
+        let (name, width) = (mapping.quantity.name(), width.unwrap_or(0));
+        let (column, unit) = (&mapping.column, mapping.unit.name());
+        text += &format!("  {name:width$}  '{column}'{scale}{offset} in {unit}\n");
+    }
+    text
+}

@@ -1,0 +1,221 @@
+//! The runs of a dataset: what the train did, what the data are like, what to know.
+
+use dynocar_core::dataset::quality::QuantityCount;
+use dynocar_core::dataset::{
+    DatasetError, ForceSource, GradientSource, Manifest, PositionSource, Role, Run,
+};
+
+use super::report::WIDTH;
+use crate::cli::text::{TextTable, short, wrap};
+
+type Read = Result<Run, DatasetError>;
+
+/// The tables and notes of all runs.
+pub(super) fn report(manifest: &Manifest, runs: &[Read]) -> String {
+    let count = |role| manifest.runs.iter().filter(|run| run.role == role).count();
+    let (fit, holdout) = (count(Role::Fit), count(Role::Holdout));
+    let mut text = format!("runs     {}: {fit} to fit, {holdout} held out\n", runs.len());
+    text += &motion_table(manifest, runs).to_string();
+    text += "  km/h is the top speed; standing to unknown are seconds\n";
+    text += "\ndata\n";
+    text += &data_table(runs).to_string();
+    text.push('\n');
+    text += &sources(runs);
+    text += &notes(runs);
+    text
+}
+
+fn motion_table(manifest: &Manifest, runs: &[Read]) -> TextTable {
+    let header = [
+        "run", "file", "role", "dir", "t", "from s", "for s", "km", "km/h", "standing", "coasting",
+        "traction", "braking", "unknown",
+    ];
+    let mut table = TextTable::new(&header, &[1, 2]);
+    for (index, run) in runs.iter().enumerate() {
+        let entry = &manifest.runs[index];
+        let mut row = vec![(index + 1).to_string(), manifest.runs[index].file.clone()];
+        row.push(entry.role.name().into());
+        row.push(format!("{:+}", entry.direction));
+        match run {
+            Err(_) => row.push("error".into()),
+            Ok(run) => {
+                let quality = &run.quality;
+                let top = quality.speed_range_mps.map(|(_, high)| format!("{:.1}", 3.6 * high));
+                row.push(tonnes(run.mass_kg));
+                row.push(format!("{:.1}", quality.start_s));
+                row.push(format!("{:.1}", quality.duration_s));
+                row.push(format!("{:.2}", quality.distance_m / 1000.0));
+                row.push(top.unwrap_or_else(|| "-".into()));
+                let phases = &quality.phases;
+                for seconds in [
+                    phases.standstill_s,
+                    phases.coasting_s,
+                    phases.traction_s,
+                    phases.braking_s,
+                    phases.unknown_s,
+                ] {
+                    row.push(if seconds == 0.0 { "-".into() } else { format!("{seconds:.0}") });
+                }
+            }
+        }
+        table.push(row);
+    }
+    table
+}
+
+/// A mass with the decimals that its size deserves.
+fn tonnes(mass_kg: f64) -> String {
+    if mass_kg < 10_000.0 {
+        format!("{:.3}", mass_kg / 1000.0)
+    } else {
+        format!("{:.1}", mass_kg / 1000.0)
+    }
+}
+
+fn data_table(runs: &[Read]) -> TextTable {
+    let header = [
+        "run",
+        "rows",
+        "step s",
+        "gaps",
+        "longest s",
+        "rows missing",
+        "out of order",
+        "repeated",
+        "cells missing",
+        "outliers",
+        "refused",
+    ];
+    let mut table = TextTable::new(&header, &[]);
+    for run in runs.iter().flatten() {
+        let quality = &run.quality;
+        let total =
+            |counts: &[QuantityCount]| counts.iter().map(|count| count.count).sum::<usize>();
+        let order = &quality.order;
+        let mut row = vec![run.number.to_string(), quality.lines.rows.to_string()];
+        row.push(if order.is_regular {
+            short(order.step_s, 4)
+        } else {
+            format!("~{}", short(order.step_s, 4))
+        });
+        let counts = [
+            order.gaps.to_string(),
+            short(order.longest_gap_s, 1),
+            (order.missing_rows + quality.rows_without_time as u64).to_string(),
+            order.out_of_order.to_string(),
+            order.repeated.to_string(),
+            total(&quality.missing).to_string(),
+            total(&quality.outliers).to_string(),
+            quality.refused_in_all().to_string(),
+        ];
+        row.extend(counts.into_iter().map(|count| if count == "0" { "-".into() } else { count }));
+        table.push(row);
+    }
+    table
+}
+
+/// Where position, gradient and forces come from, with the runs where that differs.
+fn sources(runs: &[Read]) -> String {
+    let position = |run: &Run| match run.position_source {
+        PositionSource::Column => "as recorded",
+        PositionSource::IntegratedSpeed => "integrated from the speed",
+    };
+    let gradient = |run: &Run| match run.gradient_source {
+        GradientSource::Track => "from the track",
+        GradientSource::Column => "as recorded",
+        GradientSource::SpecificForce => "from the accelerometer: specific_force minus dv/dt",
+        GradientSource::Altitude => "from the altitude",
+        GradientSource::Unknown => "unknown",
+    };
+    let force = |source: ForceSource| match source {
+        ForceSource::Column => "as recorded",
+        ForceSource::ControlForce => "from the signed control_force",
+        ForceSource::Handle => "from the handle's share of the effort curve",
+        ForceSource::None => "not recorded",
+    };
+    let mut text = String::from("sources\n");
+    text += &source("position", runs, position);
+    text += &source("gradient", runs, gradient);
+    text += &source("traction", runs, |run| force(run.traction_source));
+    text += &source("brake", runs, |run| force(run.brake_source));
+    text
+}
+
+fn source(name: &str, runs: &[Read], of: impl Fn(&Run) -> &'static str) -> String {
+    let mut groups: Vec<(&str, Vec<String>)> = Vec::new();
+    for run in runs.iter().flatten() {
+        let words = of(run);
+        match groups.iter_mut().find(|(other, _)| *other == words) {
+            Some((_, numbers)) => numbers.push(run.number.to_string()),
+            None => groups.push((words, vec![run.number.to_string()])),
+        }
+    }
+    let parts: Vec<String> = match &groups[..] {
+        [(words, _)] => vec![(*words).into()],
+        groups => {
+            let with_runs = |(words, numbers): &(&str, Vec<String>)| {
+                format!("{words} (runs {})", numbers.join(", "))
+            };
+            groups.iter().map(with_runs).collect()
+        }
+    };
+    format!("  {name:12}{}\n", parts.join("; "))
+}
+
+/// What to know of single runs, each note once with its runs; nothing when all is well.
+fn notes(runs: &[Read]) -> String {
+    let mut notes: Vec<(String, Vec<String>)> = Vec::new();
+    for (index, run) in runs.iter().enumerate() {
+        let of_run = match run {
+            Ok(run) => notes_on(run),
+            Err(error) => vec![error.to_string()],
+        };
+        let number = (index + 1).to_string();
+        for note in of_run {
+            match notes.iter_mut().find(|(other, _)| *other == note) {
+                Some((_, numbers)) => numbers.push(number.clone()),
+                None => notes.push((note, vec![number.clone()])),
+            }
+        }
+    }
+    let mut text = String::new();
+    for (note, numbers) in notes {
+        let plural = if numbers.len() > 1 { "s" } else { "" };
+        let lines = wrap(&format!("run{plural} {}: {note}", numbers.join(", ")), WIDTH);
+        text += &format!("  {}\n", lines.join("\n    "));
+    }
+    if text.is_empty() { text } else { format!("\nnotes\n{text}") }
+}
+
+fn notes_on(run: &Run) -> Vec<String> {
+    let quality = &run.quality;
+    let mut notes = Vec::new();
+    let mut list = |counts: Vec<String>, what: &str| {
+        if !counts.is_empty() {
+            notes.push(format!("{what}: {}", counts.join(", ")));
+        }
+    };
+    let by_quantity = |counts: &[QuantityCount]| {
+        counts.iter().map(|count| format!("{} {}", count.quantity, count.count)).collect()
+    };
+    list(by_quantity(&quality.missing), "cells missing");
+    list(by_quantity(&quality.outliers), "outliers");
+    list(by_quantity(&quality.noise_below_zero), "below zero by noise, set right");
+    let refused =
+        quality.refused.iter().map(|refused| format!("{} {}", refused.reason, refused.count));
+    list(refused.collect(), "refused by validation");
+    if quality.rows_without_time > 0 {
+        notes.push(format!("rows without a time, not usable: {}", quality.rows_without_time));
+    }
+    if quality.lines.short > 0 {
+        notes.push(format!("rows with fewer cells than the header: {}", quality.lines.short));
+    }
+    if quality.lines.truncated {
+        notes.push("the file breaks off within its last line, which is not used".into());
+    }
+    if !quality.order.is_regular {
+        notes.push("the time step varies, so that missing rows cannot be counted".into());
+    }
+    notes.extend(run.remarks.iter().map(ToString::to_string));
+    notes
+}
