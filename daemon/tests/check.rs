@@ -72,7 +72,11 @@ fn dataset(run_2: &str) -> tempfile::TempDir {
         ("track.toml", TRACK),
         ("1.csv", RUN_1),
         ("2.csv", run_2),
-        ("daemon.toml", "[daemon]\n[train]\n"),
+        ("other.toml", "[settings]\n[more]\n"),
+        (
+            "daemon.toml",
+            "[[trains]]\nid = 4\nfile = \"train.toml\"\n[[pipelines]]\nkind = \"rls\"\n",
+        ),
     ];
     for (name, text) in files {
         std::fs::write(folder.path().join(name), text).unwrap();
@@ -213,18 +217,35 @@ fn what_is_no_dataset_is_refused_with_what_was_expected() {
     let folder = dataset(RUN_2);
     std::fs::create_dir(folder.path().join("empty")).unwrap();
     let expected = "expected a dataset's folder or its dataset.toml (with a table [dataset]), a \
-                    train.toml ([train]) or a track.toml ([track])\n";
+                    train.toml ([train]), a track.toml ([track]) or a daemon.toml ([trains] and \
+                    [pipelines])\n";
     let cases = [
         ("empty", "empty: not a dataset: the folder holds no dataset.toml; "),
         ("1.csv", "1.csv: not a TOML file; "),
-        (
-            "daemon.toml",
-            "daemon.toml: not a file that can be checked: it holds [daemon], [train]; ",
-        ),
+        ("other.toml", "other.toml: not a file that can be checked: it holds [more], [settings]; "),
     ];
     for (path, message) in cases {
         let output = check(folder.path(), &[path]);
         assert_eq!(text(&output.stderr), format!("dynocar: {message}{expected}"));
         assert_eq!((text(&output.stdout), output.status.code()), ("", Some(2)));
     }
+}
+
+#[test]
+fn a_daemon_configuration_is_told_with_its_pipelines_or_refused_with_key_and_range() {
+    let folder = dataset(RUN_2);
+    let output = check(folder.path(), &["daemon.toml", "--json", "-"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let answer: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(answer["kind"], "daemon");
+    assert_eq!(answer["daemon"]["trains"][0]["id"], 4);
+    assert_eq!(answer["daemon"]["pipelines"][0]["kind"], "rls");
+
+    let config = std::fs::read_to_string(folder.path().join("daemon.toml")).unwrap();
+    let wrong = config + "settings = { forgetting = 7.5 }\n";
+    std::fs::write(folder.path().join("daemon.toml"), wrong).unwrap();
+    let output = check(folder.path(), &["daemon.toml"]);
+    assert_eq!(output.status.code(), Some(2));
+    let message = text(&output.stderr);
+    assert!(message.contains("pipelines.rls.settings.forgetting = 7.5: expected"), "{message}");
 }

@@ -1,5 +1,7 @@
-//! `dynocar check`: reads a dataset, a train or a track and says what it understood.
+//! `dynocar check`: reads a dataset, a train, a track or a daemon configuration and says what it
+//! understood.
 
+mod daemon;
 mod json;
 mod report;
 mod runs;
@@ -14,12 +16,13 @@ use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
 
 use super::{Failure, output};
+use crate::config::DaemonConfig;
 use crate::dataset::{self, LoadError, read_text};
 
-/// Validate a train, track or dataset and say what was understood.
+/// Validate a dataset, train, track or daemon configuration and say what was understood.
 #[derive(Clone, Debug, Args)]
 pub struct CheckArguments {
-    /// A dataset's folder or its dataset.toml, a train.toml or a track.toml.
+    /// A dataset's folder or its dataset.toml, a train.toml, a track.toml or a daemon.toml.
     path: PathBuf,
     /// Also write the result as JSON; '-' for standard output.
     #[arg(long, value_name = "FILE")]
@@ -33,6 +36,7 @@ enum Kind {
     Dataset,
     Train,
     Track,
+    Daemon,
 }
 
 /// What was understood.
@@ -40,6 +44,7 @@ enum Understood {
     Dataset(Box<DatasetHead>, Vec<Result<Run, DatasetError>>),
     Train(Box<TrainModel>),
     Track(Box<Track>),
+    Daemon(Box<DaemonConfig>),
 }
 
 /// Runs `dynocar check`.
@@ -76,6 +81,7 @@ impl Understood {
             Understood::Dataset(..) => Kind::Dataset,
             Understood::Train(_) => Kind::Train,
             Understood::Track(_) => Kind::Track,
+            Understood::Daemon(_) => Kind::Daemon,
         }
     }
 
@@ -85,7 +91,7 @@ impl Understood {
             Understood::Dataset(_, runs) => {
                 runs.iter().filter_map(|run| run.as_ref().err()).map(ToString::to_string).collect()
             }
-            Understood::Train(_) | Understood::Track(_) => Vec::new(),
+            Understood::Train(_) | Understood::Track(_) | Understood::Daemon(_) => Vec::new(),
         }
     }
 }
@@ -105,22 +111,27 @@ fn read(path: &Path) -> Result<Understood, String> {
         Some(Kind::Dataset) => return read_dataset(path),
         Some(Kind::Train) => parse_train(&label, &text).map(Box::new).map(Understood::Train),
         Some(Kind::Track) => parse_track(&label, &text).map(Box::new).map(Understood::Track),
+        Some(Kind::Daemon) => return daemon::read(path),
         None => return Err(format!("{label}: {}; {EXPECTED}", found(&keys))),
     };
     understood.map_err(|error| error.to_string())
 }
 
 const EXPECTED: &str = "expected a dataset's folder or its dataset.toml (with a table [dataset]), \
-                        a train.toml ([train]) or a track.toml ([track])";
+                        a train.toml ([train]), a track.toml ([track]) or a daemon.toml ([trains] \
+                        and [pipelines])";
 
 /// What a TOML file is, by its tables. A dataset names its train and track in tables of the
-/// same names, so that `[dataset]` decides first; with `[daemon]` it is none of the three.
+/// same names, so that `[dataset]` decides first.
 fn kind_of(keys: &[String]) -> Option<Kind> {
     let has = |name: &str| keys.iter().any(|key| key == name);
-    if has("daemon") {
-        return None;
-    }
-    let kinds = [("dataset", Kind::Dataset), ("train", Kind::Train), ("track", Kind::Track)];
+    let kinds = [
+        ("dataset", Kind::Dataset),
+        ("daemon", Kind::Daemon),
+        ("pipelines", Kind::Daemon),
+        ("train", Kind::Train),
+        ("track", Kind::Track),
+    ];
     kinds.into_iter().find(|(table, _)| has(table)).map(|(_, kind)| kind)
 }
 

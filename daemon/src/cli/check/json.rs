@@ -10,6 +10,7 @@ use dynocar_core::track::Track;
 use dynocar_core::train::{EffortCurve, TrainModel};
 use serde::Serialize;
 
+use super::daemon::{self, DaemonAnswer};
 use super::{Kind, Understood};
 
 /// The answer of `dynocar check --json`.
@@ -25,6 +26,8 @@ pub(super) struct Answer<'a> {
     train: Option<TrainAnswer<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     track: Option<TrackAnswer<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    daemon: Option<DaemonAnswer<'a>>,
 }
 
 #[derive(Debug, Serialize)]
@@ -109,6 +112,7 @@ pub(super) fn refusal(path: &Path, message: &str) -> Answer<'static> {
         dataset: None,
         train: None,
         track: None,
+        daemon: None,
     }
 }
 
@@ -122,6 +126,7 @@ pub(super) fn answer<'a>(path: &Path, understood: &'a Understood) -> Answer<'a> 
         }
         Understood::Train(train) => (None, Some(&**train), None),
         Understood::Track(track) => (None, None, Some(&**track)),
+        Understood::Daemon(_) => (None, None, None),
     };
     Answer {
         path: path.display().to_string(),
@@ -131,6 +136,10 @@ pub(super) fn answer<'a>(path: &Path, understood: &'a Understood) -> Answer<'a> 
         dataset,
         train: train.map(train_answer),
         track: track.map(track_answer),
+        daemon: match understood {
+            Understood::Daemon(config) => Some(daemon::answer(config)),
+            _ => None,
+        },
     }
 }
 

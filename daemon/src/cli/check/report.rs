@@ -4,7 +4,7 @@ use dynocar_core::dataset::{Manifest, PositionReference, Quantity};
 use dynocar_core::track::Track;
 use dynocar_core::train::{BrakeGear, EffortCurve, TrainModel};
 
-use super::{Understood, runs};
+use super::{Understood, daemon, runs};
 use crate::cli::text::{short, wrap};
 
 /// Widest line of running text.
@@ -17,6 +17,7 @@ pub(super) fn report(understood: &Understood) -> String {
     match understood {
         Understood::Train(model) => train(model),
         Understood::Track(line) => track(line),
+        Understood::Daemon(config) => daemon::report(config),
         Understood::Dataset(head, read) => {
             let track = match &head.track {
                 Some(line) => track(line),
@@ -35,7 +36,7 @@ pub(super) fn report(understood: &Understood) -> String {
 }
 
 /// A line of an entry.
-fn line(key: &str, value: &str) -> String {
+pub(super) fn line(key: &str, value: &str) -> String {
     let mut lines = wrap(value, WIDTH - KEY_WIDTH).into_iter();
     let first = lines.next().unwrap_or_default();
     let rest = lines.map(|line| format!("  {:KEY_WIDTH$}{line}\n", ""));

@@ -1,0 +1,112 @@
+//! A daemon configuration: what it serves, with which estimators, on which threads.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::Understood;
+use super::report::line;
+use crate::cli::text::{TextTable, short};
+use crate::config::DaemonConfig;
+
+/// Reads a configuration with the train and track files it names, and builds every estimator, so
+/// that a setting out of range is found here and not when the daemon starts.
+pub(super) fn read(path: &Path) -> Result<Understood, String> {
+    let config = DaemonConfig::load(path).map_err(|error| error.to_string())?;
+    for pipeline in &config.pipelines {
+        for train in config.trains.iter().filter(|train| pipeline.trains.contains(&train.id)) {
+            pipeline.estimator.build(&train.model).map_err(|error| {
+                format!("{}: pipelines.{}.settings.{error}", path.display(), pipeline.name)
+            })?;
+        }
+    }
+    Ok(Understood::Daemon(Box::new(config)))
+}
+
+/// The configuration in words and columns.
+pub(super) fn report(config: &DaemonConfig) -> String {
+    let mut text = String::from("daemon\n");
+    let root = config.root.as_ref().map(|root| root.display().to_string());
+    text += &line("root", root.as_deref().unwrap_or("DYNOCAR_ROOT, else /tmp/dynocar-<user>"));
+    text += &line("adaptive", &format!("looks for samples for {} µs, then sleeps", config.spin_us));
+    text += &line("heartbeat", &format!("every {} ms", config.heartbeat_ms));
+
+    let mut trains = TextTable::new(&["train", "name", "mass t", "line"], &[1, 3]);
+    for train in &config.trains {
+        let track = train.track.as_ref().map_or("not known", |track| &track.name);
+        let mass_t = short(train.model.mass_kg / 1000.0, 3);
+        trains.push(vec![train.id.to_string(), train.model.name.clone(), mass_t, track.into()]);
+    }
+    let mut pipelines = TextTable::new(
+        &["pipeline", "name", "kind", "thread", "core", "idle", "trains"],
+        &[1, 2, 3, 5, 6],
+    );
+    for (index, pipeline) in config.pipelines.iter().enumerate() {
+        let thread = &config.threads[pipeline.thread];
+        let trains: Vec<_> = pipeline.trains.iter().map(ToString::to_string).collect();
+        pipelines.push(vec![
+            index.to_string(),
+            pipeline.name.clone(),
+            pipeline.estimator.kind().to_string(),
+            thread.name.clone(),
+            thread.core.map_or("any".into(), |core| core.to_string()),
+            thread.idle.to_string(),
+            trains.join(" "),
+        ]);
+    }
+    format!("{text}\n{trains}\n{pipelines}")
+}
+
+/// A daemon configuration, machine-readable.
+#[derive(Debug, Serialize)]
+pub(super) struct DaemonAnswer<'a> {
+    trains: Vec<DaemonTrainAnswer<'a>>,
+    pipelines: Vec<PipelineAnswer<'a>>,
+}
+
+#[derive(Debug, Serialize)]
+struct DaemonTrainAnswer<'a> {
+    id: u64,
+    name: &'a str,
+    track: Option<&'a str>,
+}
+
+#[derive(Debug, Serialize)]
+struct PipelineAnswer<'a> {
+    name: &'a str,
+    kind: &'static str,
+    thread: &'a str,
+    core: Option<usize>,
+    idle: String,
+    trains: Vec<u64>,
+}
+
+/// The machine-readable form of a configuration.
+pub(super) fn answer(config: &DaemonConfig) -> DaemonAnswer<'_> {
+    DaemonAnswer {
+        trains: config
+            .trains
+            .iter()
+            .map(|train| DaemonTrainAnswer {
+                id: train.id.0,
+                name: &train.model.name,
+                track: train.track.as_ref().map(|track| track.name.as_str()),
+            })
+            .collect(),
+        pipelines: config
+            .pipelines
+            .iter()
+            .map(|pipeline| {
+                let thread = &config.threads[pipeline.thread];
+                PipelineAnswer {
+                    name: &pipeline.name,
+                    kind: pipeline.estimator.kind().name(),
+                    thread: &thread.name,
+                    core: thread.core,
+                    idle: thread.idle.to_string(),
+                    trains: pipeline.trains.iter().map(|train| train.0).collect(),
+                }
+            })
+            .collect(),
+    }
+}
