@@ -222,7 +222,7 @@ fn what_is_no_dataset_is_refused_with_what_was_expected() {
     let cases = [
         ("empty", "empty: not a dataset: the folder holds no dataset.toml; "),
         ("1.csv", "1.csv: not a TOML file; "),
-        ("other.toml", "other.toml: not a file that can be checked: it holds [more], [settings]; "),
+        ("other.toml", "other.toml: not a file that can be checked: it holds [settings], [more]; "),
     ];
     for (path, message) in cases {
         let output = check(folder.path(), &[path]);
