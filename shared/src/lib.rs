@@ -11,17 +11,25 @@
 //! - [`vocabulary`]: pipelines, parameters, statuses, reasons, effects: the numbers on the wire
 //! - [`snapshot`]: what the daemon answers, [`ParameterSnapshot`]
 //! - [`resistance`]: resistance at a speed, with its standard deviation, from a snapshot
+//! - [`adhesion`]: adhesion laws over speed
+//! - [`stopping`]: braking distance and time from a speed, with a bound
+//! - [`quantile`]: quantiles of the normal distribution
 //! - [`services`]: names, prefix and schema version of the channels
 
+pub mod adhesion;
 pub mod layout;
+pub mod quantile;
 pub mod resistance;
 pub mod sample;
 pub mod services;
 pub mod snapshot;
+pub mod stopping;
 pub mod vocabulary;
 
+pub use adhesion::{RailCondition, Uncertain};
 pub use resistance::ResistanceEstimate;
 pub use sample::{SampleField, TrainId, TrainSample};
 pub use services::SCHEMA_MAJOR;
 pub use snapshot::ParameterSnapshot;
+pub use stopping::{EffortPoint, RailAdhesion, Stop, StoppingError, StoppingEstimate};
 pub use vocabulary::{Manoeuvre, Parameter, PipelineKind, Reason, RejectionReason, Status};
