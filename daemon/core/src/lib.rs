@@ -9,8 +9,10 @@
 //! - [`train`], [`track`]: what is declared of the train and the line
 //! - [`validation`]: which samples are fit for use, and why the others are not
 //! - [`force`]: the known forces on the train at a sample
+//! - [`filter`]: state estimation without physics
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
 
+pub mod filter;
 pub mod force;
 pub mod pipeline;
 pub mod track;

@@ -8,6 +8,7 @@ use dynocar_shared::PipelineKind;
 use serde::Deserialize;
 
 use super::Estimator;
+use super::braking::settings::{EkfSettings, EmSettings, LawSettings, SmootherSettings};
 use super::echo::Echo;
 use crate::train::TrainModel;
 
@@ -48,6 +49,20 @@ pub struct NoSettings {}
 pub enum EstimatorSettings {
     /// No estimate: the latency floor.
     Echo(NoSettings),
+    /// Adhesion by sliding-window EM.
+    AdhesionEm(EmSettings),
+    /// Adhesion by extended Kalman filter.
+    AdhesionEkf(EkfSettings),
+    /// Adhesion by fixed-lag smoothing.
+    AdhesionSmoother(SmootherSettings),
+    /// Adhesion as the scale of a known law.
+    AdhesionLaw(LawSettings),
+    /// Disc friction or braking ratio by sliding-window EM.
+    BrakeEm(EmSettings),
+    /// Disc friction or braking ratio by extended Kalman filter.
+    BrakeEkf(EkfSettings),
+    /// Disc friction or braking ratio by fixed-lag smoothing.
+    BrakeSmoother(SmootherSettings),
 }
 
 impl EstimatorSettings {
@@ -55,6 +70,21 @@ impl EstimatorSettings {
     pub fn default_of(kind: PipelineKind) -> Option<Self> {
         match kind {
             PipelineKind::Echo => Some(EstimatorSettings::Echo(NoSettings {})),
+            PipelineKind::AdhesionEm => Some(EstimatorSettings::AdhesionEm(EmSettings::default())),
+            PipelineKind::AdhesionEkf => {
+                Some(EstimatorSettings::AdhesionEkf(EkfSettings::default()))
+            }
+            PipelineKind::AdhesionSmoother => {
+                Some(EstimatorSettings::AdhesionSmoother(SmootherSettings::default()))
+            }
+            PipelineKind::AdhesionLaw => {
+                Some(EstimatorSettings::AdhesionLaw(LawSettings::default()))
+            }
+            PipelineKind::BrakeEm => Some(EstimatorSettings::BrakeEm(EmSettings::default())),
+            PipelineKind::BrakeEkf => Some(EstimatorSettings::BrakeEkf(EkfSettings::default())),
+            PipelineKind::BrakeSmoother => {
+                Some(EstimatorSettings::BrakeSmoother(SmootherSettings::default()))
+            }
             _ => None,
         }
     }
@@ -63,6 +93,13 @@ impl EstimatorSettings {
     pub fn kind(&self) -> PipelineKind {
         match self {
             EstimatorSettings::Echo(_) => PipelineKind::Echo,
+            EstimatorSettings::AdhesionEm(_) => PipelineKind::AdhesionEm,
+            EstimatorSettings::AdhesionEkf(_) => PipelineKind::AdhesionEkf,
+            EstimatorSettings::AdhesionSmoother(_) => PipelineKind::AdhesionSmoother,
+            EstimatorSettings::AdhesionLaw(_) => PipelineKind::AdhesionLaw,
+            EstimatorSettings::BrakeEm(_) => PipelineKind::BrakeEm,
+            EstimatorSettings::BrakeEkf(_) => PipelineKind::BrakeEkf,
+            EstimatorSettings::BrakeSmoother(_) => PipelineKind::BrakeSmoother,
         }
     }
 
@@ -71,9 +108,16 @@ impl EstimatorSettings {
     /// # Errors
     ///
     /// When a setting lies outside its range.
-    pub fn build(&self, _train: &Arc<TrainModel>) -> Result<Box<dyn Estimator>, SettingError> {
+    pub fn build(&self, train: &Arc<TrainModel>) -> Result<Box<dyn Estimator>, SettingError> {
         match self {
             EstimatorSettings::Echo(_) => Ok(Box::new(Echo)),
+            EstimatorSettings::AdhesionEm(settings) => settings.build_adhesion(train),
+            EstimatorSettings::AdhesionEkf(settings) => settings.build_adhesion(train),
+            EstimatorSettings::AdhesionSmoother(settings) => settings.build_adhesion(train),
+            EstimatorSettings::AdhesionLaw(settings) => settings.build_adhesion(train),
+            EstimatorSettings::BrakeEm(settings) => settings.build_brake(train),
+            EstimatorSettings::BrakeEkf(settings) => settings.build_brake(train),
+            EstimatorSettings::BrakeSmoother(settings) => settings.build_brake(train),
         }
     }
 }
