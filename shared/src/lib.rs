@@ -12,19 +12,27 @@
 //! - [`snapshot`]: what the daemon answers, [`ParameterSnapshot`]
 //! - [`resistance`]: resistance at a speed, with its standard deviation, from a snapshot
 //! - [`sleeper`]: which pipeline threads want to be woken
+//! - [`adhesion`]: adhesion laws over speed
+//! - [`stopping`]: braking distance and time from a speed, with a bound
+//! - [`quantile`]: quantiles of the normal distribution
 //! - [`services`]: names, prefix and schema version of the channels
 
+pub mod adhesion;
 pub mod layout;
+pub mod quantile;
 pub mod resistance;
 pub mod sample;
 pub mod services;
 pub mod sleeper;
 pub mod snapshot;
+pub mod stopping;
 pub mod vocabulary;
 
+pub use adhesion::{RailCondition, Uncertain};
 pub use resistance::ResistanceEstimate;
 pub use sample::{SampleField, TrainId, TrainSample};
 pub use services::SCHEMA_MAJOR;
 pub use sleeper::SleeperState;
 pub use snapshot::ParameterSnapshot;
+pub use stopping::{EffortPoint, RailAdhesion, Stop, StoppingError, StoppingEstimate};
 pub use vocabulary::{Manoeuvre, Parameter, PipelineKind, Reason, RejectionReason, Status};

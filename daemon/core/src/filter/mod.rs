@@ -10,16 +10,27 @@
 //! - [`square_root`]: covariance as a triangular factor, updated by one measurement at a time
 //! - [`drifting_level`]: least squares beside a level that may drift, as square-root information
 //! - [`joseph`]: a small Kalman filter in Joseph's form
+//! - [`kalman`]: Gaussian state, scalar measurements in Joseph form
+//! - [`fixed_lag`]: what later measurements say of an earlier state, without a backward pass
+//! - [`rts`]: fixed-interval smoothing by Rauch, Tung and Striebel
+//! - [`particle`], [`random`]: particle filter, marginal particle smoother and their seeded generator
+//! - [`lanes`]: sums and powers over slices
 
 mod bounded;
 pub mod drifting_level;
+pub mod fixed_lag;
 mod information;
 pub mod joseph;
+pub mod kalman;
+pub mod lanes;
 pub mod levenberg_marquardt;
 mod line;
 mod median;
 mod mils;
+pub mod particle;
+pub mod random;
 mod rls;
+pub mod rts;
 pub mod square_root;
 pub mod triangular;
 mod whitening;

@@ -8,6 +8,7 @@ use dynocar_shared::PipelineKind;
 use serde::Deserialize;
 
 use super::Estimator;
+use super::braking::settings::{EkfSettings, EmSettings, LawSettings, SmootherSettings};
 use super::echo::Echo;
 use super::mass::{
     JointLeastSquares, JointLeastSquaresSettings, MassKalman, MassKalmanSettings, StagedDescent,
@@ -84,14 +85,7 @@ macro_rules! estimator_kinds {
             ) -> Result<Box<dyn Estimator>, SettingError> {
                 match self {
                     $( EstimatorSettings::$variant(settings) => {
-                        fn call<S, E: Estimator + 'static>(
-                            build: impl Fn(&Arc<TrainModel>, &S) -> Result<E, SettingError>,
-                            train: &Arc<TrainModel>,
-                            settings: &S,
-                        ) -> Result<Box<dyn Estimator>, SettingError> {
-                            Ok(Box::new(build(train, settings)?))
-                        }
-                        call($build, train, settings)
+                        call($build, settings, train)
                     } )*
                 }
             }
@@ -99,24 +93,53 @@ macro_rules! estimator_kinds {
     };
 }
 
+type Built = Result<Box<dyn Estimator>, SettingError>;
+
+/// Calls a kind's way of building; names the closure's types.
+fn call<S>(
+    build: impl Fn(&S, &Arc<TrainModel>) -> Built,
+    settings: &S,
+    train: &Arc<TrainModel>,
+) -> Built {
+    build(settings, train)
+}
+
+fn boxed<E: Estimator + 'static>(built: Result<E, SettingError>) -> Built {
+    Ok(Box::new(built?))
+}
+
 estimator_kinds! {
     /// No estimate: the latency floor.
-    Echo(NoSettings) = Echo, |_, _| Ok(Echo);
+    Echo(NoSettings) = Echo, |_, _| boxed(Ok(Echo));
     /// Regularised least squares over all rows.
-    Ls(LsSettings) = LeastSquares, |t, s| resistance::ls(t, s);
+    Ls(LsSettings) = LeastSquares, |s, t| boxed(resistance::ls(t, s));
     /// Recursive least squares with directional forgetting.
-    Rls(RlsSettings) = Rls, |t, s| resistance::rls(t, s);
+    Rls(RlsSettings) = Rls, |s, t| boxed(resistance::rls(t, s));
     /// Regularised recursive least squares.
-    RegularisedRls(MilsSettings) = RegularisedRls, |t, s| resistance::regularised_rls(t, s);
+    RegularisedRls(MilsSettings) = RegularisedRls, |s, t| boxed(resistance::regularised_rls(t, s));
     /// Regularised multi-innovation least squares.
-    Mils(MilsSettings) = Mils, |t, s| resistance::mils(t, s);
+    Mils(MilsSettings) = Mils, |s, t| boxed(resistance::mils(t, s));
     /// Interval-varying, regularised multi-innovation least squares.
-    VMils(MilsSettings) = VMils, |t, s| resistance::v_mils(t, s);
+    VMils(MilsSettings) = VMils, |s, t| boxed(resistance::v_mils(t, s));
     /// Staged gradient descent for resistance and mass.
-    StagedDescent(StagedDescentSettings) = StagedDescent, |t, s| StagedDescent::new(*s, t);
+    StagedDescent(StagedDescentSettings) = StagedDescent, |s, t| boxed(StagedDescent::new(*s, t));
     /// Joint integral least squares for resistance and mass.
     JointLeastSquares(JointLeastSquaresSettings) = JointLeastSquares,
-        |t, s| JointLeastSquares::new(*s, t);
+        |s, t| boxed(JointLeastSquares::new(*s, t));
     /// Kalman filters [v, 1/m, bias] for mass.
-    MassKalman(MassKalmanSettings) = MassKalman, |t, s| MassKalman::new(*s, t);
+    MassKalman(MassKalmanSettings) = MassKalman, |s, t| boxed(MassKalman::new(*s, t));
+    /// Adhesion by sliding-window EM.
+    AdhesionEm(EmSettings) = AdhesionEm, |s, t| s.build_adhesion(t);
+    /// Adhesion by extended Kalman filter.
+    AdhesionEkf(EkfSettings) = AdhesionEkf, |s, t| s.build_adhesion(t);
+    /// Adhesion by fixed-lag smoothing.
+    AdhesionSmoother(SmootherSettings) = AdhesionSmoother, |s, t| s.build_adhesion(t);
+    /// Adhesion as the scale of a known law.
+    AdhesionLaw(LawSettings) = AdhesionLaw, |s, t| s.build_adhesion(t);
+    /// Disc friction or braking ratio by sliding-window EM.
+    BrakeEm(EmSettings) = BrakeEm, |s, t| s.build_brake(t);
+    /// Disc friction or braking ratio by extended Kalman filter.
+    BrakeEkf(EkfSettings) = BrakeEkf, |s, t| s.build_brake(t);
+    /// Disc friction or braking ratio by fixed-lag smoothing.
+    BrakeSmoother(SmootherSettings) = BrakeSmoother, |s, t| s.build_brake(t);
 }

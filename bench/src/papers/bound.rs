@@ -1,0 +1,184 @@
+//! Posterior Cramér–Rao bound of a braking coefficient.
+//!
+//! For a linear model with Gaussian noise the recursion of Tichavský, Muravchik and Nehorai
+//! (1998) is the Riccati recursion of the covariance, run here along the noise-free braking and
+//! independently of the filters that it judges. The process noise of the scenario is uniform; a
+//! Gaussian of the same variance carries the least information, so that a filter that used the
+//! uniform shape could in principle fall below.
+
+use nalgebra::{Matrix4, RowVector4, Vector4};
+
+use super::braking::{
+    Braking, Moment, POSITION_NOISE_M, POSITION_STD_M, SPEED_NOISE_MPS, STEP_S, Sought, declared,
+    disc_friction, train,
+};
+use dynocar_core::train::TrainModel;
+use dynocar_shared::RailCondition;
+
+/// What is known of the coefficient beforehand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Knowledge {
+    /// The share of the declared brake force drifts.
+    Drift {
+        /// Standard deviation of the drift in 1/s.
+        std_per_s: f64,
+        /// Time in s after which it is forgotten.
+        time_s: f64,
+    },
+    /// The share walks at random, gaining this standard deviation in 1 s.
+    Walk(f64),
+    /// The curve over speed is known but for a constant scale, of this standard deviation
+    /// beforehand.
+    Law(f64),
+}
+
+/// The bound at one moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoundAt {
+    /// The true coefficient.
+    pub truth: f64,
+    /// Least standard deviation of its estimate.
+    pub std: f64,
+}
+
+const SCALE: usize = 2;
+const DRIFT: usize = 3;
+
+/// One step of the recursion.
+struct Step {
+    predicted: Matrix4<f64>,
+    filtered: Matrix4<f64>,
+    jacobian: Matrix4<f64>,
+}
+
+/// The bound at every scored moment, given the measurements up to `lag_steps` later.
+pub fn bound(braking: &Braking, knowledge: Knowledge, lag_steps: usize) -> Vec<BoundAt> {
+    let moments = braking.nominal();
+    let steps = forward(braking, knowledge, &moments);
+    let mut bounds = Vec::new();
+    for (k, moment) in moments.iter().enumerate() {
+        let end = k + lag_steps;
+        if !moment.is_scored || end >= steps.len() {
+            continue;
+        }
+        let mut smoothed = steps[end].filtered;
+        for step in (k..end).rev() {
+            let next = &steps[step + 1];
+            let inverse = next.predicted.try_inverse().expect("an invertible covariance");
+            let gain = steps[step].filtered * next.jacobian.transpose() * inverse;
+            smoothed = steps[step].filtered + gain * (smoothed - next.predicted) * gain.transpose();
+        }
+        let row = coefficient_row(braking, knowledge, moment);
+        let std = (row * smoothed * row.transpose())[0].sqrt();
+        bounds.push(BoundAt { truth: moment.truth, std });
+    }
+    bounds
+}
+
+/// The known curve and its slope by speed, in units of the declared value.
+fn shape(braking: &Braking, knowledge: Knowledge, speed_mps: f64) -> (f64, f64) {
+    let declared = declared(braking.sought);
+    match (knowledge, braking.sought) {
+        (Knowledge::Law(_), Sought::Adhesion) => (
+            RailCondition::Wet.adhesion(speed_mps) / declared,
+            RailCondition::Wet.adhesion_slope_s_per_m(speed_mps) / declared,
+        ),
+        (Knowledge::Law(_), Sought::Friction) => {
+            let difference = disc_friction(speed_mps + 1e-4) - disc_friction(speed_mps - 1e-4);
+            (disc_friction(speed_mps) / declared, difference / 2e-4 / declared)
+        }
+        _ => (1.0, 0.0),
+    }
+}
+
+/// How the coefficient depends on the state.
+fn coefficient_row(braking: &Braking, knowledge: Knowledge, moment: &Moment) -> RowVector4<f64> {
+    let (value, slope) = shape(braking, knowledge, moment.speed_mps);
+    RowVector4::new(0.0, slope, value, 0.0) * declared(braking.sought)
+}
+
+fn forward(braking: &Braking, knowledge: Knowledge, moments: &[Moment]) -> Vec<Step> {
+    let (scale_std, drift_std) = match knowledge {
+        Knowledge::Drift { std_per_s, .. } => (1.0, std_per_s),
+        Knowledge::Walk(_) => (1.0, 0.0),
+        Knowledge::Law(scale_std) => (scale_std, 0.0),
+    };
+    let first_speed_std = SPEED_NOISE_MPS / 3.0_f64.sqrt();
+    let prior = Vector4::new(POSITION_STD_M, first_speed_std, scale_std, drift_std);
+    let mut covariance = Matrix4::from_diagonal(&prior.component_mul(&prior));
+    let added = added_noise(knowledge);
+    let mut steps = Vec::with_capacity(moments.len());
+    for k in 0..moments.len() {
+        let jacobian = match k {
+            0 => Matrix4::identity(),
+            _ => transition(braking, knowledge, &moments[k - 1]),
+        };
+        if k > 0 {
+            covariance = jacobian * covariance * jacobian.transpose() + added;
+        }
+        let predicted = covariance;
+        if k > 0 {
+            let column = covariance.column(0).into_owned();
+            covariance -=
+                column * column.transpose() / (column[0] + POSITION_STD_M * POSITION_STD_M);
+        }
+        steps.push(Step { predicted: regular(predicted), filtered: covariance, jacobian });
+    }
+    steps
+}
+
+/// A covariance made invertible where a component is known exactly.
+fn regular(mut covariance: Matrix4<f64>) -> Matrix4<f64> {
+    if covariance[(DRIFT, DRIFT)] == 0.0 {
+        covariance[(DRIFT, DRIFT)] = 1.0;
+    }
+    covariance
+}
+
+fn transition(braking: &Braking, knowledge: Knowledge, moment: &Moment) -> Matrix4<f64> {
+    let davis = train().resistance;
+    let gravity_mps2 = 1000.0 * TrainModel::weight_kn(1.0);
+    let full_mps2 = declared(Sought::Adhesion) * gravity_mps2;
+    let (value, slope) = shape(braking, knowledge, moment.speed_mps);
+    let resistance_slope = 1e-3 * gravity_mps2 * (davis.b + 2.0 * davis.c * moment.speed_mps);
+    let mut jacobian = Matrix4::identity();
+    jacobian[(1, 1)] = 1.0 - STEP_S * (resistance_slope + full_mps2 * slope);
+    jacobian[(1, SCALE)] = -STEP_S * full_mps2 * value;
+    jacobian[(0, 1)] = 0.5 * STEP_S * (1.0 + jacobian[(1, 1)]);
+    jacobian[(0, SCALE)] = 0.5 * STEP_S * jacobian[(1, SCALE)];
+    if let Knowledge::Drift { time_s, .. } = knowledge {
+        jacobian[(SCALE, DRIFT)] = STEP_S;
+        jacobian[(DRIFT, DRIFT)] = (-STEP_S / time_s).exp();
+    }
+    jacobian
+}
+
+fn added_noise(knowledge: Knowledge) -> Matrix4<f64> {
+    let (scale, drift) = match knowledge {
+        Knowledge::Drift { std_per_s, time_s } => {
+            (0.0, std_per_s * std_per_s * -(-2.0 * STEP_S / time_s).exp_m1())
+        }
+        Knowledge::Walk(std_after_1_s) => (std_after_1_s * std_after_1_s * STEP_S, 0.0),
+        Knowledge::Law(_) => (0.0, 0.0),
+    };
+    // A uniform step of half width w has variance w² / 3.
+    let third = |half_width: f64| half_width * half_width / 3.0;
+    Matrix4::from_diagonal(&Vector4::new(
+        third(POSITION_NOISE_M),
+        third(SPEED_NOISE_MPS),
+        scale,
+        drift,
+    ))
+}
+
+/// Root of the mean variance.
+pub fn root_mean_square(bounds: &[BoundAt]) -> f64 {
+    let sum: f64 = bounds.iter().map(|bound| bound.std * bound.std).sum();
+    (sum / bounds.len() as f64).sqrt()
+}
+
+/// Mean of |error| / truth in % of a Gaussian error at the bound.
+pub fn mean_relative_percent(bounds: &[BoundAt]) -> f64 {
+    let sum: f64 = bounds.iter().map(|bound| bound.std / bound.truth).sum();
+    100.0 * (2.0 / std::f64::consts::PI).sqrt() * sum / bounds.len() as f64
+}

@@ -1,0 +1,169 @@
+//! A Gaussian belief about a state, moved by a linearised model and scalar measurements.
+
+use nalgebra::{SMatrix, SVector};
+
+/// Why a step of a filter failed; the belief is unchanged.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum FilterError {
+    /// The variance of an innovation is not a positive number.
+    #[error("expected an innovation variance above 0, got {variance}")]
+    InnovationVariance {
+        /// The variance.
+        variance: f64,
+    },
+    /// A covariance cannot be factorised.
+    #[error("the covariance of step {step} is not positive definite")]
+    NotPositiveDefinite {
+        /// Number of the step, from 0.
+        step: usize,
+    },
+}
+
+/// Mean and covariance of a state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GaussianState<const N: usize> {
+    /// Mean.
+    pub mean: SVector<f64, N>,
+    /// Covariance, symmetric.
+    pub covariance: SMatrix<f64, N, N>,
+}
+
+/// What a scalar measurement did to a [`GaussianState`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScalarUpdate<const N: usize> {
+    /// Measured minus predicted value.
+    pub innovation: f64,
+    /// Predicted variance of the innovation.
+    pub variance: f64,
+    /// The measurement's share of it.
+    pub noise_variance: f64,
+    /// Gain.
+    pub gain: SVector<f64, N>,
+    /// The row of the measurement.
+    pub row: SVector<f64, N>,
+}
+
+impl<const N: usize> ScalarUpdate<N> {
+    /// Innovation over its predicted standard deviation.
+    pub fn normalised(&self) -> f64 {
+        self.innovation / self.variance.sqrt()
+    }
+
+    /// Logarithm of the predicted density of the measured value.
+    pub fn log_likelihood(&self) -> f64 {
+        let normalised_square = self.innovation * self.innovation / self.variance;
+        -0.5 * (normalised_square + (std::f64::consts::TAU * self.variance).ln())
+    }
+}
+
+impl<const N: usize> GaussianState<N> {
+    /// A belief with independent components of the given standard deviations.
+    pub fn independent(mean: SVector<f64, N>, std: SVector<f64, N>) -> Self {
+        let variances = std.component_mul(&std);
+        GaussianState { mean, covariance: SMatrix::from_diagonal(&variances) }
+    }
+
+    /// Moves the belief to a mean computed by the caller, with the Jacobian of that move.
+    pub fn predict(
+        &mut self,
+        mean: SVector<f64, N>,
+        jacobian: &SMatrix<f64, N, N>,
+        process_noise: &SMatrix<f64, N, N>,
+    ) {
+        self.mean = mean;
+        let moved = jacobian * self.covariance * jacobian.transpose() + process_noise;
+        self.covariance = (moved + moved.transpose()) * 0.5;
+    }
+
+    /// Innovation and gain of measuring `row` times the state, without applying them.
+    ///
+    /// # Errors
+    ///
+    /// When the innovation's variance is not positive and finite.
+    pub fn innovation(
+        &self,
+        row: SVector<f64, N>,
+        measured: f64,
+        noise_variance: f64,
+    ) -> Result<ScalarUpdate<N>, FilterError> {
+        let cross = self.covariance * row;
+        let variance = row.dot(&cross) + noise_variance;
+        // Also refuses NaN.
+        if !(variance > 0.0 && variance.is_finite()) {
+            return Err(FilterError::InnovationVariance { variance });
+        }
+        let innovation = measured - row.dot(&self.mean);
+        Ok(ScalarUpdate { innovation, variance, noise_variance, gain: cross / variance, row })
+    }
+
+    /// Applies a measurement in Joseph form, which keeps the covariance positive.
+    pub fn apply(&mut self, update: &ScalarUpdate<N>) {
+        self.mean += update.gain * update.innovation;
+        let keep = SMatrix::<f64, N, N>::identity() - update.gain * update.row.transpose();
+        let joseph = keep * self.covariance * keep.transpose()
+            + update.gain * update.gain.transpose() * update.noise_variance;
+        self.covariance = (joseph + joseph.transpose()) * 0.5;
+    }
+
+    /// Standard deviation of one component.
+    pub fn std(&self, component: usize) -> f64 {
+        self.covariance[(component, component)].max(0.0).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Matrix2;
+
+    /// Constant speed, position measured; against the batch least-squares solution.
+    #[test]
+    fn filtering_a_straight_line_equals_batch_least_squares() {
+        let measured = [0.1, 1.2, 1.9, 3.2, 3.9, 5.1];
+        let prior =
+            GaussianState::independent(SVector::from([0.5, 0.8]), SVector::from([2.0, 1.0]));
+        let mut belief = prior;
+        let jacobian = Matrix2::new(1.0, 1.0, 0.0, 1.0);
+        for (k, &value) in measured.iter().enumerate() {
+            if k > 0 {
+                belief.predict(jacobian * belief.mean, &jacobian, &SMatrix::zeros());
+            }
+            let update = belief.innovation(SVector::from([1.0, 0.0]), value, 0.04).unwrap();
+            belief.apply(&update);
+        }
+        let mut information = prior.covariance.try_inverse().unwrap();
+        let mut weighted = information * prior.mean;
+        for (k, &value) in measured.iter().enumerate() {
+            let row = SVector::from([1.0, k as f64]);
+            information += row * row.transpose() / 0.04;
+            weighted += row * (value / 0.04);
+        }
+        let covariance = information.try_inverse().unwrap();
+        let start = covariance * weighted;
+        let end = jacobian.pow(5);
+        assert!((belief.mean - end * start).norm() < 1e-12);
+        assert!((belief.covariance - end * covariance * end.transpose()).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_measurement_without_variance_is_refused() {
+        let belief =
+            GaussianState::independent(SVector::from([0.0, 0.0]), SVector::from([0.0, 1.0]));
+        let refused = belief.innovation(SVector::from([1.0, 0.0]), 1.0, 0.0);
+        assert_eq!(refused, Err(FilterError::InnovationVariance { variance: 0.0 }));
+        assert!(belief.innovation(SVector::from([1.0, 0.0]), 1.0, f64::NAN).is_err());
+    }
+
+    #[test]
+    fn ten_thousand_precise_measurements_leave_the_covariance_positive() {
+        let mut belief =
+            GaussianState::independent(SVector::from([0.0, 0.0]), SVector::from([1e4, 1e4]));
+        let jacobian = Matrix2::new(1.0, 0.01, 0.0, 1.0);
+        for _ in 0..10_000 {
+            belief.predict(jacobian * belief.mean, &jacobian, &SMatrix::zeros());
+            let update = belief.innovation(SVector::from([1.0, 0.0]), 0.0, 1e-12).unwrap();
+            belief.apply(&update);
+            assert!(belief.covariance.cholesky().is_some());
+        }
+    }
+}

@@ -1,0 +1,310 @@
+//! Bootstrap particle filter and marginal particle smoother (Doucet, Godsill, Andrieu 2000;
+//! Xie 2019, eq. 24-27; Jin 2020, eq. 22-25).
+
+use std::f64::consts::LOG2_E;
+
+use super::lanes;
+use super::random::Random;
+
+/// A Markov model of a state of `D` components, observed at every step.
+pub trait ParticleModel<const D: usize> {
+    /// Draws a state of the first step.
+    fn draw_initial(&self, random: &mut Random) -> [f64; D];
+
+    /// The next step's state without process noise.
+    fn advance(&self, step: usize, state: &[f64; D]) -> [f64; D];
+
+    /// Draws the process noise of the move that starts at `step`.
+    fn draw_noise(&self, step: usize, random: &mut Random) -> [f64; D];
+
+    /// Transition densities, up to a common factor, from every advanced state (row) to every
+    /// successor (column); states come as one slice for each component.
+    fn transition_densities(
+        &self,
+        step: usize,
+        advanced: [&[f64]; D],
+        successors: [&[f64]; D],
+        densities: &mut [f64],
+    );
+
+    /// Logarithm of the density of the step's measurement given the state.
+    fn log_likelihood(&self, step: usize, state: &[f64; D]) -> f64;
+}
+
+/// Why particles cannot represent the state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ParticleError {
+    /// No particle explains the measurement, or a weight is not finite.
+    #[error("no particle explains the measurement of step {step}")]
+    Degenerate {
+        /// Number of the step, from 0.
+        step: usize,
+    },
+}
+
+/// Particles over a window of steps, with filtered and smoothed weights.
+#[derive(Clone, Debug)]
+pub struct ParticleSmoother<const D: usize> {
+    particles: usize,
+    steps_max: usize,
+    /// Steps of the last run.
+    steps: usize,
+    /// By component, then step, then particle.
+    states: [Vec<f64>; D],
+    advanced: [Vec<f64>; D],
+    /// By step, then particle.
+    filtered: Vec<f64>,
+    smoothed: Vec<f64>,
+    /// Densities from each particle (row) to each successor.
+    densities: Vec<f64>,
+    /// Smoothed weight of a successor over its predicted density.
+    ratios: Vec<f64>,
+    cumulative: Vec<f64>,
+}
+
+impl<const D: usize> ParticleSmoother<D> {
+    /// Room for a number of particles over at most `steps_max` steps; at least one of each.
+    pub fn new(particles: usize, steps_max: usize) -> Self {
+        let (particles, steps_max) = (particles.max(1), steps_max.max(1));
+        let all = || vec![0.0; particles * steps_max];
+        ParticleSmoother {
+            particles,
+            steps_max,
+            steps: 0,
+            states: std::array::from_fn(|_| all()),
+            advanced: std::array::from_fn(|_| all()),
+            filtered: all(),
+            smoothed: all(),
+            densities: vec![0.0; particles * particles],
+            ratios: vec![0.0; particles],
+            cumulative: vec![0.0; particles],
+        }
+    }
+
+    /// Runs the filter forward over `steps` steps, resampling systematically at each.
+    ///
+    /// # Errors
+    ///
+    /// When all weights of a step vanish.
+    ///
+    /// # Panics
+    ///
+    /// When there is room for fewer steps.
+    ///
+    /// # Real-time
+    ///
+    /// Allocates nothing; `steps * particles` operations.
+    pub fn filter(
+        &mut self,
+        model: &impl ParticleModel<D>,
+        steps: usize,
+        random: &mut Random,
+    ) -> Result<(), ParticleError> {
+        assert!(steps <= self.steps_max, "room for {} steps, not {steps}", self.steps_max);
+        self.steps = 0;
+        for step in 0..steps {
+            let here = step * self.particles;
+            if step > 0 {
+                self.resample_and_move(model, step, random);
+            } else {
+                for particle in 0..self.particles {
+                    let drawn = model.draw_initial(random);
+                    self.set_state(particle, drawn);
+                }
+            }
+            for particle in 0..self.particles {
+                let state = self.state(here + particle);
+                self.filtered[here + particle] = model.log_likelihood(step, &state);
+            }
+            normalise_logarithms(&mut self.filtered[here..here + self.particles])
+                .ok_or(ParticleError::Degenerate { step })?;
+        }
+        self.steps = steps;
+        Ok(())
+    }
+
+    fn resample_and_move(
+        &mut self,
+        model: &impl ParticleModel<D>,
+        step: usize,
+        random: &mut Random,
+    ) {
+        let before = (step - 1) * self.particles;
+        let mut sum = 0.0;
+        for particle in 0..self.particles {
+            let place = before + particle;
+            let advanced = model.advance(step - 1, &self.state(place));
+            for (component, value) in advanced.into_iter().enumerate() {
+                self.advanced[component][place] = value;
+            }
+            sum += self.filtered[place];
+            self.cumulative[particle] = sum;
+        }
+        // Weights sum to 1 but for rounding, and so do the levels.
+        let spacing = sum / self.particles as f64;
+        let mut level = random.uniform() * spacing;
+        let mut ancestor = 0;
+        let here = step * self.particles;
+        for particle in 0..self.particles {
+            while ancestor + 1 < self.particles && self.cumulative[ancestor] <= level {
+                ancestor += 1;
+            }
+            level += spacing;
+            let noise = model.draw_noise(step - 1, random);
+            for (component, value) in noise.into_iter().enumerate() {
+                self.states[component][here + particle] =
+                    self.advanced[component][before + ancestor] + value;
+            }
+        }
+    }
+
+    /// Weighs the filtered particles by the later measurements, newest step first.
+    ///
+    /// The smoothed weight of a pair of particles (Xie 2019, eq. 27) is the filtered weight of
+    /// the first, times the transition density, times the smoothed weight of the second over its
+    /// predicted density; summed over the second it is the smoothed weight of the first.
+    ///
+    /// # Errors
+    ///
+    /// When a particle has no possible predecessor.
+    ///
+    /// # Real-time
+    ///
+    /// Allocates nothing; `steps * particles²` operations.
+    pub fn smooth(&mut self, model: &impl ParticleModel<D>) -> Result<(), ParticleError> {
+        let n = self.particles;
+        let Some(last) = self.steps.checked_sub(1) else { return Ok(()) };
+        self.smoothed[last * n..(last + 1) * n]
+            .copy_from_slice(&self.filtered[last * n..(last + 1) * n]);
+        for step in (0..last).rev() {
+            let here = step * n;
+            self.fill_densities(model, step);
+            self.fill_ratios(step)?;
+            for (particle, row) in self.densities.chunks_exact(n).enumerate() {
+                let place = here + particle;
+                self.smoothed[place] = self.filtered[place] * lanes::dot(row, &self.ratios);
+            }
+        }
+        Ok(())
+    }
+
+    fn fill_densities(&mut self, model: &impl ParticleModel<D>, step: usize) {
+        let n = self.particles;
+        let (here, next) = (step * n, (step + 1) * n);
+        let successors: [&[f64]; D] =
+            std::array::from_fn(|component| &self.states[component][next..next + n]);
+        let advanced: [&[f64]; D] =
+            std::array::from_fn(|component| &self.advanced[component][here..here + n]);
+        model.transition_densities(step, advanced, successors, &mut self.densities);
+    }
+
+    /// Divides each successor's smoothed weight by its predicted density, the denominator of
+    /// eq. (27).
+    fn fill_ratios(&mut self, step: usize) -> Result<(), ParticleError> {
+        let n = self.particles;
+        let (here, next) = (step * n, (step + 1) * n);
+        self.ratios.fill(0.0);
+        for (row, filtered) in self.densities.chunks_exact(n).zip(&self.filtered[here..here + n]) {
+            for (predicted, density) in self.ratios.iter_mut().zip(row) {
+                *predicted += filtered * density;
+            }
+        }
+        for (ratio, smoothed) in self.ratios.iter_mut().zip(&self.smoothed[next..next + n]) {
+            // A successor of weight zero needs no predecessor.
+            *ratio = if *smoothed > 0.0 { smoothed / *ratio } else { 0.0 };
+            if !ratio.is_finite() {
+                return Err(ParticleError::Degenerate { step: step + 1 });
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of particles.
+    pub fn particles(&self) -> usize {
+        self.particles
+    }
+
+    /// Mean and covariance of the particles of a step before its measurement was weighed in;
+    /// `None` unless the last run reached the step.
+    pub fn predicted_moments(&self, step: usize) -> Option<([f64; D], [[f64; D]; D])> {
+        (step < self.steps).then(|| self.moments(step, |_| 1.0 / self.particles as f64))
+    }
+
+    /// Mean and covariance of the particles of a step given every measurement; valid after
+    /// [`ParticleSmoother::smooth`], `None` unless the last run reached the step.
+    pub fn smoothed_moments(&self, step: usize) -> Option<([f64; D], [[f64; D]; D])> {
+        (step < self.steps).then(|| self.moments(step, |place| self.smoothed[place]))
+    }
+
+    /// By how much the next step's state exceeds, on average given every measurement, where this
+    /// step's state moves without noise; valid after [`ParticleSmoother::smooth`], `None` at the
+    /// last step and beyond.
+    ///
+    /// Summed over the pair weights of eq. (27), a difference of the two states falls apart into
+    /// the two smoothed means, so that no sum over pairs is left.
+    pub fn mean_deviation(&self, step: usize) -> Option<[f64; D]> {
+        if step + 1 >= self.steps {
+            return None;
+        }
+        let n = self.particles;
+        let (here, next) = (step * n..(step + 1) * n, (step + 1) * n..(step + 2) * n);
+        Some(std::array::from_fn(|component| {
+            let after = &self.states[component][next.clone()];
+            let moved = &self.advanced[component][here.clone()];
+            lanes::dot(&self.smoothed[next.clone()], after)
+                - lanes::dot(&self.smoothed[here.clone()], moved)
+        }))
+    }
+
+    fn moments(&self, step: usize, weight: impl Fn(usize) -> f64) -> ([f64; D], [[f64; D]; D]) {
+        let places = step * self.particles..(step + 1) * self.particles;
+        let mut mean = [0.0; D];
+        for place in places.clone() {
+            for (mean, states) in mean.iter_mut().zip(&self.states) {
+                *mean += weight(place) * states[place];
+            }
+        }
+        let mut covariance = [[0.0; D]; D];
+        for place in places {
+            for (i, row) in covariance.iter_mut().enumerate() {
+                for (j, entry) in row.iter_mut().enumerate() {
+                    *entry += weight(place)
+                        * (self.states[i][place] - mean[i])
+                        * (self.states[j][place] - mean[j]);
+                }
+            }
+        }
+        (mean, covariance)
+    }
+
+    fn state(&self, place: usize) -> [f64; D] {
+        std::array::from_fn(|component| self.states[component][place])
+    }
+
+    fn set_state(&mut self, place: usize, state: [f64; D]) {
+        for (component, value) in state.into_iter().enumerate() {
+            self.states[component][place] = value;
+        }
+    }
+}
+
+/// Turns logarithms of weights into weights of sum 1; `None` when that cannot be done.
+fn normalise_logarithms(weights: &mut [f64]) -> Option<()> {
+    let greatest = weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if !greatest.is_finite() {
+        return None;
+    }
+    for weight in weights.iter_mut() {
+        *weight = lanes::exp2_nonpositive((*weight - greatest) * LOG2_E);
+    }
+    let sum = lanes::sum(weights);
+    if !(sum > 0.0 && sum.is_finite()) {
+        return None;
+    }
+    let scale = 1.0 / sum;
+    weights.iter_mut().for_each(|weight| *weight *= scale);
+    Some(())
+}
+
+#[cfg(test)]
+mod tests;

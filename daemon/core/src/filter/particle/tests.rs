@@ -1,0 +1,145 @@
+use super::*;
+use crate::filter::kalman::GaussianState;
+use crate::filter::rts::{self, ForwardStep, SmoothedStep};
+use nalgebra::{Matrix2, SVector};
+
+const STEPS: usize = 8;
+
+/// Position and speed with independent Gaussian noise, position measured.
+struct Drifting {
+    measured: [f64; STEPS],
+}
+
+const NOISE_STD: [f64; 2] = [0.3, 0.2];
+const MEASURED_STD: f64 = 0.5;
+
+fn drifting() -> Drifting {
+    Drifting { measured: [0.2, 1.4, 1.9, 3.5, 3.6, 5.4, 5.8, 7.3] }
+}
+
+impl ParticleModel<2> for Drifting {
+    fn draw_initial(&self, random: &mut Random) -> [f64; 2] {
+        [random.normal(), 1.0 + 0.5 * random.normal()]
+    }
+
+    fn advance(&self, _step: usize, state: &[f64; 2]) -> [f64; 2] {
+        [state[0] + state[1], state[1]]
+    }
+
+    fn draw_noise(&self, _step: usize, random: &mut Random) -> [f64; 2] {
+        NOISE_STD.map(|std| std * random.normal())
+    }
+
+    fn transition_densities(
+        &self,
+        _step: usize,
+        advanced: [&[f64]; 2],
+        successors: [&[f64]; 2],
+        densities: &mut [f64],
+    ) {
+        let count = advanced[0].len();
+        for (place, density) in densities.iter_mut().enumerate() {
+            let (from, to) = (place / count, place % count);
+            let square = |c: usize| {
+                let off = (successors[c][to] - advanced[c][from]) / NOISE_STD[c];
+                off * off
+            };
+            *density = (-0.5 * (square(0) + square(1))).exp();
+        }
+    }
+
+    fn log_likelihood(&self, step: usize, state: &[f64; 2]) -> f64 {
+        let off = (self.measured[step] - state[0]) / MEASURED_STD;
+        -0.5 * off * off
+    }
+}
+
+fn exact() -> Vec<SmoothedStep<2>> {
+    let mut state =
+        GaussianState::independent(SVector::from([0.0, 1.0]), SVector::from([1.0, 0.5]));
+    let jacobian = Matrix2::new(1.0, 1.0, 0.0, 1.0);
+    let noise = Matrix2::from_diagonal(&SVector::from(NOISE_STD.map(|std| std * std)));
+    let mut forward = Vec::new();
+    for (step, &measured) in drifting().measured.iter().enumerate() {
+        if step > 0 {
+            state.predict(jacobian * state.mean, &jacobian, &noise);
+        }
+        let predicted = state;
+        let row = SVector::from([1.0, 0.0]);
+        let variance = MEASURED_STD * MEASURED_STD;
+        let update = state.innovation(row, measured, variance).unwrap();
+        state.apply(&update);
+        forward.push(ForwardStep { predicted, filtered: state, jacobian });
+    }
+    let mut smoothed = vec![SmoothedStep::empty(); STEPS];
+    rts::smooth(&forward, &mut smoothed).unwrap();
+    smoothed
+}
+
+#[test]
+fn many_particles_agree_with_the_exact_kalman_smoother() {
+    let mut smoother = ParticleSmoother::new(1500, STEPS);
+    let mut random = Random::new(11);
+    smoother.filter(&drifting(), STEPS, &mut random).unwrap();
+    smoother.smooth(&drifting()).unwrap();
+    for (step, exact) in exact().iter().enumerate() {
+        let (mean, covariance) = smoother.smoothed_moments(step).unwrap();
+        for i in 0..2 {
+            let std = exact.state.covariance[(i, i)].sqrt();
+            assert!((mean[i] - exact.state.mean[i]).abs() < 0.15 * std, "mean at {step}");
+            let variance = exact.state.covariance[(i, i)];
+            assert!((covariance[i][i] / variance - 1.0).abs() < 0.25, "variance at {step}");
+        }
+    }
+}
+
+#[test]
+fn the_mean_deviation_is_the_sum_over_the_pair_weights_of_equation_27() {
+    let mut smoother = ParticleSmoother::new(20, STEPS);
+    smoother.filter(&drifting(), STEPS, &mut Random::new(2)).unwrap();
+    smoother.smooth(&drifting()).unwrap();
+    let n = smoother.particles;
+    for step in 0..STEPS - 1 {
+        smoother.fill_densities(&drifting(), step);
+        let mut sum = [0.0; 2];
+        for j in 0..n {
+            let predicted: f64 = (0..n)
+                .map(|l| smoother.filtered[step * n + l] * smoother.densities[l * n + j])
+                .sum();
+            for i in 0..n {
+                let weight = smoother.filtered[step * n + i]
+                    * smoother.smoothed[(step + 1) * n + j]
+                    * smoother.densities[i * n + j]
+                    / predicted;
+                for (component, sum) in sum.iter_mut().enumerate() {
+                    let after = smoother.states[component][(step + 1) * n + j];
+                    *sum += weight * (after - smoother.advanced[component][step * n + i]);
+                }
+            }
+        }
+        let found = smoother.mean_deviation(step).unwrap();
+        assert!((found[0] - sum[0]).abs() < 1e-12 && (found[1] - sum[1]).abs() < 1e-12);
+    }
+    assert_eq!(smoother.mean_deviation(STEPS - 1), None);
+}
+
+#[test]
+fn equal_seeds_give_equal_bits() {
+    let run = || {
+        let mut smoother = ParticleSmoother::new(20, STEPS);
+        smoother.filter(&drifting(), STEPS, &mut Random::new(4)).unwrap();
+        smoother.smooth(&drifting()).unwrap();
+        smoother.smoothed_moments(0).unwrap()
+    };
+    assert_eq!(run(), run());
+}
+
+#[test]
+fn a_measurement_that_no_particle_explains_is_an_error_with_its_step() {
+    let mut model = drifting();
+    model.measured[3] = f64::NAN;
+    let mut smoother = ParticleSmoother::new(20, STEPS);
+    let failed = smoother.filter(&model, STEPS, &mut Random::new(4));
+    assert_eq!(failed, Err(ParticleError::Degenerate { step: 3 }));
+    assert_eq!(smoother.smoothed_moments(0), None, "a failed run leaves nothing behind");
+}

@@ -1,0 +1,282 @@
+//! The window and its iterations.
+
+use dynocar_shared::Uncertain;
+use nalgebra::{SMatrix, SVector};
+
+use super::expectation::{Expectation, Statistics};
+use crate::filter::kalman::GaussianState;
+use crate::pipeline::braking::engine::{Engine, EngineError, Estimate, Observation, Step};
+use crate::pipeline::braking::law::Law;
+use crate::pipeline::braking::motion::{self, MotionNoise, StepInputs, Walk};
+use crate::pipeline::braking::tracker::{Prior, TrackerModel, measure};
+
+/// What does not change from window to window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EmModel {
+    /// Noise of motion and measurement; speeds are not used.
+    pub noise: MotionNoise,
+    /// Observations in a window (S).
+    pub window_steps: usize,
+    /// Observations by which the window slides (L), at most `window_steps`.
+    pub slide_steps: usize,
+    /// Most iterations in a window.
+    pub iterations: usize,
+    /// Iterations end when the coefficient changes by less.
+    pub tolerance: f64,
+    /// The coefficient before the first window.
+    pub initial: f64,
+    /// Standard deviation in m/s of the speed before the first window.
+    pub initial_speed_std_mps: f64,
+    /// True for the printed model, in which the coefficient acts only up to the demand.
+    pub has_printed_cap: bool,
+}
+
+/// One observation with the step that led to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Entry {
+    /// The known motion since the entry before.
+    pub inputs: StepInputs,
+    /// What was measured.
+    pub observed: Observation,
+    /// The process noise of that step.
+    pub noise: MoveNoise,
+}
+
+/// Process noise of distance and speed over one step, ready for use.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MoveNoise {
+    /// Variances in m² and (m/s)².
+    pub variances: [f64; 2],
+    /// Their roots.
+    pub stds: [f64; 2],
+    /// Their inverses.
+    pub precisions: [f64; 2],
+}
+
+impl MoveNoise {
+    /// The noise of a step; of no step, nothing that could be divided by zero.
+    pub fn over(noise: &MotionNoise, step_s: f64) -> Self {
+        let variances = [noise.distance_m2_per_s, noise.speed_m2_per_s3].map(|rate| rate * step_s);
+        let precisions =
+            variances.map(|variance| if variance > 0.0 { 1.0 / variance } else { 0.0 });
+        MoveNoise { variances, stds: variances.map(f64::sqrt), precisions }
+    }
+}
+
+/// Observations of a window and the belief about its first state.
+#[derive(Clone, Debug)]
+pub struct Window {
+    /// In order of time; the first entry's inputs lead into the window.
+    pub entries: Vec<Entry>,
+    /// Distance in m and speed in m/s at the first entry, before its measurement.
+    pub first: GaussianState<2>,
+}
+
+/// A window with a value of the coefficient: what an E-step needs.
+#[derive(Clone, Copy, Debug)]
+pub struct WindowModel<'a> {
+    /// The window.
+    pub window: &'a Window,
+    /// Noise of motion and measurement.
+    pub noise: &'a MotionNoise,
+    /// The coefficient.
+    pub coefficient: f64,
+    /// See [`EmModel::has_printed_cap`].
+    pub has_printed_cap: bool,
+}
+
+impl WindowModel<'_> {
+    /// The coefficient that acts over the move that starts at `step`, and its derivative by the
+    /// coefficient.
+    pub fn acting(&self, step: usize) -> (f64, f64) {
+        let demand = self.window.entries[step + 1].inputs.demand;
+        if self.has_printed_cap && self.coefficient >= demand {
+            (demand, 0.0)
+        } else {
+            (self.coefficient, 1.0)
+        }
+    }
+
+    /// Distance and speed after the move that starts at `step`, without noise, and the
+    /// derivative of the final speed by the first.
+    pub fn advance(&self, step: usize, state: [f64; 2]) -> ([f64; 2], f64) {
+        let inputs = &self.window.entries[step + 1].inputs;
+        let moved = motion::advance(inputs, &Law::Constant, state[1], self.acting(step).0);
+        ([state[0] + moved.travelled_m, moved.speed_mps], moved.speed_by_speed)
+    }
+
+    /// Derivatives of distance and speed after a move by the coefficient.
+    pub fn by_coefficient(&self, step: usize) -> [f64; 2] {
+        let inputs = &self.window.entries[step + 1].inputs;
+        let speed = -inputs.step_s * inputs.gain_mps2 * self.acting(step).1;
+        [0.5 * inputs.step_s * speed, speed]
+    }
+
+    /// The process noise of the move that starts at `step`.
+    pub fn move_noise(&self, step: usize) -> &MoveNoise {
+        &self.window.entries[step + 1].noise
+    }
+
+    /// Adds to the M-step by how much the states deviate, on average over the E-step, from the
+    /// noise-free move that starts at `step`.
+    pub fn accumulate(&self, step: usize, deviation: [f64; 2], into: &mut Statistics) {
+        let slopes = self.by_coefficient(step);
+        let precisions = self.move_noise(step).precisions;
+        for ((slope, precision), deviation) in slopes.into_iter().zip(precisions).zip(deviation) {
+            into.curvature += slope * slope * precision;
+            into.gradient += slope * deviation * precision;
+        }
+    }
+}
+
+/// Sliding-window EM with an interchangeable E-step.
+#[derive(Clone, Debug)]
+pub struct EmWindow<E> {
+    model: EmModel,
+    expectation: E,
+    window: Window,
+    coefficient: f64,
+    estimate: Option<Estimate>,
+}
+
+impl<E: Expectation> EmWindow<E> {
+    /// An estimator with an E-step made for windows of `model.window_steps`.
+    pub fn new(model: EmModel, expectation: E) -> Self {
+        let first = GaussianState { mean: SVector::zeros(), covariance: SMatrix::zeros() };
+        let entries = Vec::with_capacity(model.window_steps);
+        EmWindow {
+            model,
+            expectation,
+            window: Window { entries, first },
+            coefficient: model.initial,
+            estimate: None,
+        }
+    }
+
+    /// Runs the iterations of a full window.
+    fn maximise(&mut self) -> Result<(), EngineError> {
+        // The last iterates scatter by the particles' randomness; their spread is part of the error.
+        let (mut scatter, mut scatter_count) = (0.0, 0.0);
+        for iteration in 0..self.model.iterations {
+            let statistics = {
+                let model = WindowModel {
+                    window: &self.window,
+                    noise: &self.model.noise,
+                    coefficient: self.coefficient,
+                    has_printed_cap: self.model.has_printed_cap,
+                };
+                self.expectation.expect(&model)?
+            };
+            let change = statistics.newton_step();
+            self.coefficient += change;
+            if !self.coefficient.is_finite() {
+                return Err(EngineError::NotFinite { value: self.coefficient });
+            }
+            if 2 * iteration >= self.model.iterations {
+                scatter += change * change;
+                scatter_count += 1.0;
+            }
+            if change.abs() <= self.model.tolerance {
+                break;
+            }
+        }
+        // Successive iterates differ by two independent draws.
+        let scatter_variance =
+            if scatter_count > 0.0 { 0.5 * scatter / scatter_count } else { 0.0 };
+        let std = (self.information_variance()? + scatter_variance).sqrt();
+        let value = Uncertain::new(self.coefficient, std);
+        let middle = self.window.entries[self.window.entries.len() / 2];
+        self.estimate = Some(Estimate {
+            coefficient: value,
+            scale: value,
+            covariance: std * std,
+            demand: middle.observed.demand,
+            brake_limited: None,
+        });
+        Ok(())
+    }
+
+    /// Variance of the coefficient given the window alone, by a Kalman filter in which it is
+    /// constant and unknown beforehand.
+    fn information_variance(&self) -> Result<f64, EngineError> {
+        let scale = Uncertain::new(self.coefficient, 1.0);
+        let model = TrackerModel {
+            law: Law::Constant,
+            noise: MotionNoise { measured_speed_m2_per_s2: None, ..self.model.noise },
+            walk: Walk::Scale(0.0),
+            prior: Prior { speed_std_mps: 1.0, scale },
+        };
+        let first = &self.window.first;
+        let mut state = GaussianState::independent(
+            SVector::from([first.mean[0], first.mean[1], scale.value, 0.0]),
+            SVector::from([0.0, 0.0, scale.std, 0.0]),
+        );
+        state.covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&first.covariance);
+        for (step, entry) in self.window.entries.iter().enumerate() {
+            if step > 0 {
+                let (mean, jacobian) =
+                    motion::predict(&entry.inputs, &model.law, model.walk, &state.mean);
+                let added = motion::process_noise(&model.noise, model.walk, entry.inputs.step_s);
+                state.predict(mean, &jacobian, &added);
+            }
+            measure(&model, &mut state, &entry.observed)?;
+        }
+        Ok(state.covariance[(motion::State::Scale as usize, motion::State::Scale as usize)])
+    }
+
+    /// Moves the window on, with the filter's prediction as belief about its new first state.
+    fn slide(&mut self) {
+        let by = self.model.slide_steps;
+        let noise = &self.model.noise;
+        if let Some(mut first) = self.expectation.predicted(by) {
+            // A handful of particles may collapse; one step's noise is the least uncertainty.
+            let step_s = self.window.entries[by.min(self.window.entries.len() - 1)].inputs.step_s;
+            first.covariance[(0, 0)] += noise.distance_m2_per_s * step_s;
+            first.covariance[(1, 1)] += noise.speed_m2_per_s3 * step_s;
+            self.window.first = first;
+        }
+        self.window.entries.drain(..by.min(self.window.entries.len()));
+    }
+}
+
+impl<E: Expectation> Engine for EmWindow<E> {
+    fn start(&mut self, first: &Observation) {
+        self.window.entries.clear();
+        self.coefficient = self.model.initial;
+        self.estimate = None;
+        let std = SVector::from([
+            self.model.noise.measured_distance_m2.sqrt(),
+            self.model.initial_speed_std_mps,
+        ]);
+        self.window.first =
+            GaussianState::independent(SVector::from([first.distance_m, first.speed_mps]), std);
+        let inputs = StepInputs {
+            step_s: 0.0,
+            gain_mps2: 0.0,
+            demand: first.demand,
+            tied_mps2: 0.0,
+            basic_mps2: [0.0; 3],
+        };
+        let noise = MoveNoise::over(&self.model.noise, inputs.step_s);
+        self.window.entries.push(Entry { inputs, observed: *first, noise });
+    }
+
+    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Result<Step, EngineError> {
+        if self.window.entries.is_empty() {
+            self.start(observed);
+            return Ok(Step::Restarted);
+        }
+        let noise = MoveNoise::over(&self.model.noise, inputs.step_s);
+        self.window.entries.push(Entry { inputs: *inputs, observed: *observed, noise });
+        if self.window.entries.len() < self.model.window_steps {
+            return Ok(Step::Collected);
+        }
+        self.maximise()?;
+        self.slide();
+        Ok(Step::Updated { normalised_innovation: None })
+    }
+
+    fn estimate(&self) -> Option<Estimate> {
+        self.estimate
+    }
+}

@@ -1,0 +1,224 @@
+//! From the train's samples to the observations and steps of a braking.
+
+use dynocar_shared::{Reason, RejectionReason};
+
+use super::engine::Observation;
+use super::gear::DeclaredGear;
+use super::motion::StepInputs;
+use crate::force::ResolvedSample;
+use crate::train::{Davis, TrainModel};
+
+/// The coefficient that is looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Adhesion: brake force over weight.
+    Adhesion,
+    /// Disc friction, the declared braking ratio held.
+    Friction,
+    /// Braking ratio, the declared friction held.
+    Ratio,
+}
+
+/// When samples are taken and what a braking is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IntakeSettings {
+    /// Shortest time in s between two observations.
+    pub interval_s: f64,
+    /// A longer time in s between two observations ends the braking.
+    pub gap_max_s: f64,
+    /// Least brake force per weight that counts as braking.
+    pub braking_min_per_weight: f64,
+    /// Slowest speed in m/s at which the model is trusted.
+    pub speed_min_mps: f64,
+    /// True when the position does not come from the braked wheels.
+    pub position_is_wheel_independent: bool,
+}
+
+/// What became of a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Intake {
+    /// The train does not brake.
+    NotBraking,
+    /// The sample is part of the step that is being collected.
+    Collected,
+    /// The sample, or the train's description, lacks something.
+    Missing(Reason),
+    /// The sample cannot be used.
+    Refused(RejectionReason),
+    /// A braking starts here.
+    Start(Observation),
+    /// A step ends here.
+    Step(StepInputs, Observation),
+}
+
+/// What the model knows at one sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Known {
+    gain_mps2: f64,
+    demand: f64,
+    tied_mps2: f64,
+    basic_mps2: [f64; 3],
+}
+
+/// Sums over the samples of a step, by the trapezoidal rule.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Collected {
+    last: Known,
+    step_s: f64,
+    gain: f64,
+    demand: f64,
+    tied: f64,
+}
+
+impl Collected {
+    fn from(first: Known) -> Self {
+        Collected { last: first, step_s: 0.0, gain: 0.0, demand: 0.0, tied: 0.0 }
+    }
+
+    fn add(&mut self, known: Known, step_s: f64) {
+        let mean = |from: f64, to: f64| 0.5 * (from + to) * step_s;
+        self.gain += mean(self.last.gain_mps2, known.gain_mps2);
+        self.demand += mean(self.last.demand, known.demand);
+        self.tied += mean(self.last.tied_mps2, known.tied_mps2);
+        self.step_s += step_s;
+        self.last = known;
+    }
+
+    fn inputs(&self) -> StepInputs {
+        StepInputs {
+            step_s: self.step_s,
+            gain_mps2: self.gain / self.step_s,
+            demand: self.demand / self.step_s,
+            tied_mps2: self.tied / self.step_s,
+            basic_mps2: self.last.basic_mps2,
+        }
+    }
+}
+
+/// Picks observations and collects the known motion between them.
+#[derive(Clone, Debug)]
+pub struct BrakingIntake {
+    quantity: Quantity,
+    settings: IntakeSettings,
+    gear: Option<DeclaredGear>,
+    resistance: Davis,
+    braking: Option<Braking>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Braking {
+    stretch: u32,
+    origin_m: f64,
+    collected: Collected,
+}
+
+impl BrakingIntake {
+    /// An intake for a train as declared.
+    pub fn new(quantity: Quantity, settings: IntakeSettings, train: &TrainModel) -> Self {
+        let gear = DeclaredGear::of(&train.brake_gear);
+        BrakingIntake { quantity, settings, gear, resistance: train.resistance, braking: None }
+    }
+
+    /// Takes the next sample.
+    ///
+    /// # Real-time
+    ///
+    /// Allocates nothing.
+    pub fn take(&mut self, sample: &ResolvedSample) -> Intake {
+        let known = match self.known(sample) {
+            Ok(known) => known,
+            Err(reason) => {
+                self.braking = None;
+                return Intake::Missing(reason);
+            }
+        };
+        let Some(known) = known.filter(|_| sample.speed_mps >= self.settings.speed_min_mps) else {
+            self.braking = None;
+            return Intake::NotBraking;
+        };
+        let Some(position_m) = sample.position_m else {
+            self.braking = None;
+            return Intake::Missing(Reason::MissingQuantity);
+        };
+        let along_m = sample.direction * position_m;
+        let is_continued = self.braking.is_some_and(|braking| {
+            let collected_s = braking.collected.step_s + sample.step_s;
+            braking.stretch == sample.stretch && collected_s <= self.settings.gap_max_s
+        });
+        let is_untrusted = sample.is_sliding && !self.settings.position_is_wheel_independent;
+        let Some(braking) = self.braking.as_mut().filter(|_| is_continued) else {
+            self.braking = None;
+            if is_untrusted {
+                return Intake::Refused(RejectionReason::WheelSlide);
+            }
+            let (stretch, collected) = (sample.stretch, Collected::from(known));
+            self.braking = Some(Braking { stretch, origin_m: along_m, collected });
+            return Intake::Start(observation(sample, 0.0, &known));
+        };
+        braking.collected.add(known, sample.step_s);
+        if is_untrusted {
+            return Intake::Refused(RejectionReason::WheelSlide);
+        }
+        // A little less, so that jitter of the clock does not halve the rate.
+        if braking.collected.step_s < 0.9 * self.settings.interval_s {
+            return Intake::Collected;
+        }
+        let inputs = braking.collected.inputs();
+        braking.collected = Collected::from(known);
+        Intake::Step(inputs, observation(sample, along_m - braking.origin_m, &known))
+    }
+
+    /// Forgets the braking in progress.
+    pub fn reset(&mut self) {
+        self.braking = None;
+    }
+
+    /// What the model knows at a sample; `Ok(None)` while the train does not brake.
+    fn known(&self, sample: &ResolvedSample) -> Result<Option<Known>, Reason> {
+        let weight_n = 1000.0 * sample.weight_kn;
+        let inertial_mass_kg = sample.inertial_mass_kg;
+        let brake_force_n = self.brake_force_n(sample).ok_or(Reason::MissingQuantity)?;
+        let gradient_permille = sample.gradient_permille.ok_or(Reason::GradientUnknown)?;
+        let is_pulling = sample.traction_force_n.is_some_and(|force_n| force_n > 0.0);
+        if is_pulling || brake_force_n < self.settings.braking_min_per_weight * weight_n {
+            return Ok(None);
+        }
+        let (gain_n, demand) = match (self.quantity, self.gear) {
+            (Quantity::Adhesion, _) => (weight_n, brake_force_n / weight_n),
+            (Quantity::Friction, Some(gear)) => (brake_force_n / gear.friction, gear.friction),
+            (Quantity::Ratio, Some(gear)) => (brake_force_n / gear.ratio, gear.ratio),
+            (_, None) => return Err(Reason::MissingQuantity),
+        };
+        let per_n_per_kn = sample.weight_kn / inertial_mass_kg;
+        let tied_n_per_kn = gradient_permille + sample.curve_n_per_kn + sample.tunnel_n_per_kn;
+        let Davis { a, b, c } = self.resistance;
+        Ok(Some(Known {
+            gain_mps2: gain_n / inertial_mass_kg,
+            demand,
+            tied_mps2: per_n_per_kn * tied_n_per_kn,
+            basic_mps2: [a, b, c].map(|coefficient| per_n_per_kn * coefficient),
+        }))
+    }
+
+    /// The force that the brake exerts as far as the rail carries it: from the cylinder pressure
+    /// and the declared gear; for adhesion else the reported brake force.
+    fn brake_force_n(&self, sample: &ResolvedSample) -> Option<f64> {
+        let by_pressure = self
+            .gear
+            .zip(sample.brake_cylinder_pressure_pa)
+            .map(|(gear, pressure_pa)| gear.declared_force_n(pressure_pa));
+        match self.quantity {
+            Quantity::Adhesion => by_pressure.or(sample.brake_force_n),
+            Quantity::Friction | Quantity::Ratio => by_pressure,
+        }
+    }
+}
+
+fn observation(sample: &ResolvedSample, distance_m: f64, known: &Known) -> Observation {
+    Observation {
+        distance_m,
+        speed_mps: sample.speed_mps,
+        is_speed_valid: !sample.is_sliding,
+        demand: known.demand,
+    }
+}

@@ -1,0 +1,25 @@
+//! Coefficients that only braking tells: adhesion (Xie 2019), disc friction and braking ratio
+//! (Jin 2020).
+//!
+//! # Layout
+//!
+//! - [`gear`], [`law`], [`motion`]: the braking train
+//! - [`intake`]: from the train's samples to observations and steps of a braking
+//! - [`engine`]: what the estimators have in common
+//! - [`em`]: the papers' sliding-window expectation maximisation
+//! - [`tracker`]: the papers' extended Kalman filter, and our fixed-lag smoother
+//! - [`law_bank`]: known laws, scaled and weighed by evidence
+//! - [`report`], [`estimator`]: from an engine to a snapshot
+//! - [`settings`]: the pipelines by name
+
+pub mod em;
+pub mod engine;
+pub mod estimator;
+pub mod gear;
+pub mod intake;
+pub mod law;
+pub mod law_bank;
+pub mod motion;
+pub mod report;
+pub mod settings;
+pub mod tracker;

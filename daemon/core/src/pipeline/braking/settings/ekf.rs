@@ -1,0 +1,97 @@
+//! Settings of the extended Kalman filter.
+
+use dynocar_shared::{PipelineKind, Uncertain};
+use serde::Deserialize;
+
+use super::{
+    ADHESION_REFERENCE, BrakeFactor, BrakingSettings, declared, initial_or_declared,
+    require_positive,
+};
+use crate::pipeline::Estimator;
+use crate::pipeline::braking::intake::Quantity;
+use crate::pipeline::braking::law::Law;
+use crate::pipeline::braking::motion::Walk;
+use crate::pipeline::braking::tracker::{Prior, Tracker, TrackerModel};
+use crate::pipeline::settings::SettingError;
+use crate::train::TrainModel;
+
+/// Settings of the extended Kalman filter with a random walk of the coefficient.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EkfSettings {
+    /// Motion, measurement and braking.
+    pub braking: BrakingSettings,
+    /// The coefficient before the first observation; as for EM when absent.
+    pub initial: Option<f64>,
+    /// Its standard deviation over the declared value (over 0.1 for adhesion).
+    pub initial_relative_std: f64,
+    /// Standard deviation that it gains in 1 s, over the same; when absent, what serves best in
+    /// the papers' scenarios.
+    pub relative_walk: Option<f64>,
+    /// What a brake pipeline reports; no meaning for adhesion.
+    pub reports: BrakeFactor,
+}
+
+impl Default for EkfSettings {
+    fn default() -> Self {
+        EkfSettings {
+            braking: BrakingSettings::default(),
+            initial: None,
+            initial_relative_std: 1.0,
+            relative_walk: None,
+            reports: BrakeFactor::Friction,
+        }
+    }
+}
+
+impl EkfSettings {
+    fn relative_walk(&self, quantity: Quantity) -> f64 {
+        self.relative_walk.unwrap_or(match quantity {
+            Quantity::Adhesion => 0.018,
+            Quantity::Friction => 0.03,
+            Quantity::Ratio => 0.004,
+        })
+    }
+
+    fn build(
+        &self,
+        kind: PipelineKind,
+        quantity: Quantity,
+        train: &TrainModel,
+    ) -> Result<Box<dyn Estimator>, SettingError> {
+        self.braking.check()?;
+        require_positive("initial_relative_std", self.initial_relative_std)?;
+        let relative_walk = self.relative_walk(quantity);
+        require_positive("relative_walk", relative_walk)?;
+        let reference = declared(quantity, train).unwrap_or(ADHESION_REFERENCE);
+        let initial = initial_or_declared(self.initial, quantity, train)?;
+        let model = TrackerModel {
+            law: Law::Constant,
+            noise: self.braking.noise(),
+            walk: Walk::Scale((relative_walk * reference).powi(2)),
+            prior: Prior {
+                speed_std_mps: self.braking.first_speed_std_mps,
+                scale: Uncertain::new(initial, self.initial_relative_std * reference),
+            },
+        };
+        Ok(self.braking.estimator(kind, quantity, train, Tracker::new(model, 0.0, 0, false)))
+    }
+
+    /// Builds `adhesion_ekf`.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn build_adhesion(&self, train: &TrainModel) -> Result<Box<dyn Estimator>, SettingError> {
+        self.build(PipelineKind::AdhesionEkf, Quantity::Adhesion, train)
+    }
+
+    /// Builds `brake_ekf`.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn build_brake(&self, train: &TrainModel) -> Result<Box<dyn Estimator>, SettingError> {
+        self.build(PipelineKind::BrakeEkf, self.reports.quantity(), train)
+    }
+}

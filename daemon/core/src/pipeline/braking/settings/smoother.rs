@@ -1,0 +1,151 @@
+//! Settings of the fixed-lag smoother.
+
+use dynocar_shared::{PipelineKind, Uncertain};
+use serde::Deserialize;
+
+use super::{BrakeFactor, BrakingSettings, require_positive};
+use crate::pipeline::Estimator;
+use crate::pipeline::braking::intake::Quantity;
+use crate::pipeline::braking::law::{Law, SpeedTable};
+use crate::pipeline::braking::motion::Walk;
+use crate::pipeline::braking::tracker::{Prior, Tracker, TrackerModel};
+use crate::pipeline::settings::{SettingError, require};
+use crate::train::TrainModel;
+
+/// How the achieved share of the declared brake force wanders.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum WalkSettings {
+    /// It drifts, and the drift comes and goes.
+    Drift {
+        /// Standard deviation of the drift in 1/s.
+        std_per_s: f64,
+        /// Time in s after which the drift is forgotten.
+        time_s: f64,
+    },
+    /// It walks at random.
+    Scale {
+        /// Standard deviation that it gains in 1 s.
+        std_after_1_s: f64,
+    },
+}
+
+/// Settings of the fixed-lag smoother.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SmootherSettings {
+    /// Motion, measurement and braking.
+    pub braking: BrakingSettings,
+    /// The estimate lies this many seconds back; 0 for the present.
+    pub lag_s: f64,
+    /// How the achieved share of the declared brake force wanders; see [`WalkSettings`] and
+    /// `SmootherSettings::walk` for what holds when absent.
+    pub walk: Option<WalkSettings>,
+    /// What a brake pipeline reports; no meaning for adhesion.
+    pub reports: BrakeFactor,
+    /// A known curve of disc friction, [speed in m/s, friction]; only its scale is estimated.
+    pub friction_law: Option<Vec<(f64, f64)>>,
+}
+
+impl Default for SmootherSettings {
+    fn default() -> Self {
+        SmootherSettings {
+            braking: BrakingSettings::default(),
+            lag_s: 5.0,
+            walk: None,
+            reports: BrakeFactor::Friction,
+            friction_law: None,
+        }
+    }
+}
+
+/// The share beforehand: anything from none of the declared force to three times as much. It is
+/// wide enough to be forgotten within seconds, and no setting moves it.
+const SHARE_PRIOR: Uncertain = Uncertain::new(1.0, 1.0);
+
+impl SmootherSettings {
+    /// How the share wanders.
+    ///
+    /// Unless set: adhesion drifts as both rail laws do at full braking, by about half a percent
+    /// of the demand per second in one direction throughout; disc friction drifts faster and by
+    /// turns; a braking ratio, and the scale of a known friction curve, hardly move.
+    pub fn walk(&self, quantity: Quantity) -> WalkSettings {
+        self.walk.unwrap_or(match quantity {
+            Quantity::Adhesion => WalkSettings::Drift { std_per_s: 0.005, time_s: 120.0 },
+            Quantity::Friction if self.friction_law.is_some() => {
+                WalkSettings::Scale { std_after_1_s: 0.0005 }
+            }
+            Quantity::Friction => WalkSettings::Drift { std_per_s: 0.012, time_s: 5.0 },
+            Quantity::Ratio => WalkSettings::Scale { std_after_1_s: 0.004 },
+        })
+    }
+
+    fn checked_walk(&self, quantity: Quantity) -> Result<Walk, SettingError> {
+        match self.walk(quantity) {
+            WalkSettings::Drift { std_per_s, time_s } => {
+                require_positive("walk.std_per_s", std_per_s)?;
+                require_positive("walk.time_s", time_s)?;
+                Ok(Walk::Drift { std_per_s, time_s })
+            }
+            WalkSettings::Scale { std_after_1_s } => {
+                require_positive("walk.std_after_1_s", std_after_1_s)?;
+                Ok(Walk::Scale(std_after_1_s.powi(2)))
+            }
+        }
+    }
+
+    fn law(&self, quantity: Quantity) -> Result<Law, SettingError> {
+        match (&self.friction_law, quantity) {
+            (Some(points), Quantity::Friction) => {
+                SpeedTable::new(points.clone()).map(Law::Table).map_err(|_| SettingError {
+                    key: "friction_law",
+                    value: points.len() as f64,
+                    allowed: "two or more [speed, friction], speeds rising, friction above 0",
+                })
+            }
+            (Some(points), _) => Err(SettingError {
+                key: "friction_law",
+                value: points.len() as f64,
+                allowed: "a curve only where disc friction is reported",
+            }),
+            (None, _) => Ok(Law::Demand),
+        }
+    }
+
+    fn build(
+        &self,
+        kind: PipelineKind,
+        quantity: Quantity,
+        train: &TrainModel,
+    ) -> Result<Box<dyn Estimator>, SettingError> {
+        self.braking.check()?;
+        require((0.0..=60.0).contains(&self.lag_s), "lag_s", self.lag_s, "0 to 60")?;
+        let model = TrackerModel {
+            law: self.law(quantity)?,
+            noise: self.braking.noise(),
+            walk: self.checked_walk(quantity)?,
+            prior: Prior { speed_std_mps: self.braking.first_speed_std_mps, scale: SHARE_PRIOR },
+        };
+        let most_moments = (self.lag_s / (0.9 * self.braking.interval_s)).ceil() as usize;
+        let tracker = Tracker::new(model, self.lag_s, most_moments, true);
+        Ok(self.braking.estimator(kind, quantity, train, tracker))
+    }
+
+    /// Builds `adhesion_smoother`.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn build_adhesion(&self, train: &TrainModel) -> Result<Box<dyn Estimator>, SettingError> {
+        self.build(PipelineKind::AdhesionSmoother, Quantity::Adhesion, train)
+    }
+
+    /// Builds `brake_smoother`.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn build_brake(&self, train: &TrainModel) -> Result<Box<dyn Estimator>, SettingError> {
+        self.build(PipelineKind::BrakeSmoother, self.reports.quantity(), train)
+    }
+}

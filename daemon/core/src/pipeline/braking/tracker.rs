@@ -1,0 +1,258 @@
+//! Kalman filter of distance, speed and scale, with a fixed-lag smoother of the scale.
+//!
+//! With a random walk of the scale it is the extended Kalman filter that both papers compare
+//! with; with an integrated random walk and a lag it is our smoother.
+
+use dynocar_shared::Uncertain;
+use nalgebra::SVector;
+
+use super::engine::{Engine, EngineError, Estimate, Observation, Step};
+use super::law::Law;
+use super::motion::{self, MotionNoise, STATES, State, StepInputs, Walk};
+use crate::filter::fixed_lag::FixedLagSmoother;
+use crate::filter::kalman::{FilterError, GaussianState};
+
+const SPEED: usize = State::Speed as usize;
+const SCALE: usize = State::Scale as usize;
+
+/// What is believed before the first observation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prior {
+    /// Standard deviation of the first speed in m/s.
+    pub speed_std_mps: f64,
+    /// The scale.
+    pub scale: Uncertain,
+}
+
+/// A model of the motion with everything but the state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrackerModel {
+    /// Shape of the coefficient.
+    pub law: Law,
+    /// Noise of motion and measurement.
+    pub noise: MotionNoise,
+    /// How the scale wanders.
+    pub walk: Walk,
+    /// Belief before the first observation.
+    pub prior: Prior,
+}
+
+impl TrackerModel {
+    /// The belief after a first observation.
+    pub fn initial(&self, first: &Observation) -> GaussianState<STATES> {
+        let prior = &self.prior;
+        GaussianState::independent(
+            SVector::from([first.distance_m, first.speed_mps, prior.scale.value, 0.0]),
+            SVector::from([
+                self.noise.measured_distance_m2.sqrt(),
+                prior.speed_std_mps,
+                prior.scale.std,
+                self.walk.drift_std_per_s(),
+            ]),
+        )
+    }
+
+    /// Measurement rows with measured values and noise variances, in order.
+    pub fn measurements(
+        &self,
+        observed: &Observation,
+    ) -> [Option<(SVector<f64, STATES>, f64, f64)>; 2] {
+        let distance = (
+            SVector::from([1.0, 0.0, 0.0, 0.0]),
+            observed.distance_m,
+            self.noise.measured_distance_m2,
+        );
+        let speed =
+            self.noise.measured_speed_m2_per_s2.filter(|_| observed.is_speed_valid).map(
+                |variance| (SVector::from([0.0, 1.0, 0.0, 0.0]), observed.speed_mps, variance),
+            );
+        [Some(distance), speed]
+    }
+
+    /// The estimate that a belief about the state implies.
+    pub fn estimate(&self, state: &GaussianState<STATES>, demand: f64) -> Estimate {
+        let (shape, shape_slope) = self.law.at(state.mean[SPEED], demand);
+        let scale = state.mean[SCALE];
+        let mut row = SVector::<f64, STATES>::zeros();
+        (row[SPEED], row[SCALE]) = (shape_slope * scale, shape);
+        let cross = state.covariance * row;
+        Estimate {
+            coefficient: Uncertain::new(shape * scale, row.dot(&cross).max(0.0).sqrt()),
+            scale: Uncertain::new(scale, state.std(SCALE)),
+            covariance: cross[SCALE],
+            demand,
+            brake_limited: None,
+        }
+    }
+}
+
+/// What belongs to a remembered moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Moment {
+    /// Time in s since the start.
+    time_s: f64,
+    shape: f64,
+    demand: f64,
+}
+
+/// An innovation beyond so many standard deviations is refused.
+const OUTLIER_GATE: f64 = 5.0;
+/// After so many refusals in a row the motion has changed.
+const OUTLIERS_BEFORE_RESTART: u32 = 3;
+/// Forgetting factor of the mean innovation that tells of a sudden change.
+const CHANGE_FORGETTING: f64 = 0.8;
+/// A mean innovation beyond so many of its standard deviations is a change.
+const CHANGE_GATE: f64 = 5.0;
+
+/// Tracks the scale of one law.
+#[derive(Clone, Debug)]
+pub struct Tracker {
+    model: TrackerModel,
+    state: Option<GaussianState<STATES>>,
+    smoother: FixedLagSmoother<STATES, Moment>,
+    /// True when sudden changes restart the tracker.
+    detects_changes: bool,
+    lag_s: f64,
+    /// Time in s since the start.
+    time_s: f64,
+    outliers_in_a_row: u32,
+    /// Forgotten mean of the normalised distance innovations, of unit variance when white.
+    change: f64,
+}
+
+impl Tracker {
+    /// A tracker whose estimate lies `lag_s` back, with room for `lag_moments` observations in
+    /// that time.
+    pub fn new(model: TrackerModel, lag_s: f64, lag_moments: usize, detects_changes: bool) -> Self {
+        Tracker {
+            model,
+            state: None,
+            smoother: FixedLagSmoother::new(lag_moments + 1),
+            detects_changes,
+            lag_s,
+            time_s: 0.0,
+            outliers_in_a_row: 0,
+            change: 0.0,
+        }
+    }
+
+    /// The belief about the present state.
+    pub fn state(&self) -> Option<&GaussianState<STATES>> {
+        self.state.as_ref()
+    }
+
+    fn remember(&mut self, demand: f64) {
+        if let Some(state) = &self.state {
+            let (shape, _) = self.model.law.at(state.mean[SPEED], demand);
+            let row = SVector::from([0.0, 0.0, 1.0, 0.0]);
+            self.smoother.remember(state, row, Moment { time_s: self.time_s, shape, demand });
+        }
+    }
+
+    fn is_change(&mut self, normalised: f64) -> bool {
+        let own = (1.0 - CHANGE_FORGETTING * CHANGE_FORGETTING).sqrt();
+        self.change = CHANGE_FORGETTING * self.change + own * normalised;
+        self.detects_changes && self.change.abs() > CHANGE_GATE
+    }
+
+    /// Starts anew from here, with the belief about the speed kept but opened.
+    fn restart(&mut self, observed: &Observation) {
+        let speed_mps = match self.state {
+            Some(state) if !observed.is_speed_valid => state.mean[SPEED],
+            _ => observed.speed_mps,
+        };
+        self.smoother.freeze();
+        self.state = Some(self.model.initial(&Observation { speed_mps, ..*observed }));
+        self.outliers_in_a_row = 0;
+        self.change = 0.0;
+        self.remember(observed.demand);
+    }
+}
+
+impl Engine for Tracker {
+    fn start(&mut self, first: &Observation) {
+        self.smoother.clear();
+        self.state = None;
+        self.time_s = 0.0;
+        self.restart(first);
+    }
+
+    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Result<Step, EngineError> {
+        let Some(state) = &mut self.state else {
+            self.start(observed);
+            return Ok(Step::Restarted);
+        };
+        self.time_s += inputs.step_s;
+        let (mean, jacobian) =
+            motion::predict(inputs, &self.model.law, self.model.walk, &state.mean);
+        let added = motion::process_noise(&self.model.noise, self.model.walk, inputs.step_s);
+        state.predict(mean, &jacobian, &added);
+        self.smoother.predict(&jacobian);
+        let mut first_innovation = None;
+        for (row, measured, variance) in self.model.measurements(observed).into_iter().flatten() {
+            let update = state.innovation(row, measured, variance)?;
+            let normalised = update.normalised();
+            if first_innovation.is_none() && normalised.abs() > OUTLIER_GATE {
+                self.outliers_in_a_row += 1;
+                if self.outliers_in_a_row >= OUTLIERS_BEFORE_RESTART {
+                    self.restart(observed);
+                    return Ok(Step::Restarted);
+                }
+                return Ok(Step::Outlier);
+            }
+            state.apply(&update);
+            self.smoother.apply(&update);
+            first_innovation.get_or_insert(normalised);
+        }
+        self.outliers_in_a_row = 0;
+        let value = state.mean[SCALE];
+        if !value.is_finite() {
+            return Err(EngineError::NotFinite { value });
+        }
+        if first_innovation.is_some_and(|normalised| self.is_change(normalised)) {
+            self.restart(observed);
+            return Ok(Step::Restarted);
+        }
+        self.remember(observed.demand);
+        Ok(Step::Updated { normalised_innovation: first_innovation })
+    }
+
+    fn estimate(&self) -> Option<Estimate> {
+        // Half a millisecond of tolerance for the rounding of summed steps.
+        let until_s = self.time_s - self.lag_s + 5e-4;
+        let lagged = self
+            .smoother
+            .newest_first()
+            .find(|moment| moment.tag.time_s <= until_s)
+            .or_else(|| self.smoother.oldest())?;
+        let Moment { shape, demand, .. } = lagged.tag;
+        let std = lagged.variance.max(0.0).sqrt();
+        Some(Estimate {
+            coefficient: Uncertain::new(shape * lagged.mean, shape.abs() * std),
+            scale: Uncertain::new(lagged.mean, std),
+            covariance: shape * lagged.variance.max(0.0),
+            demand,
+            brake_limited: None,
+        })
+    }
+}
+
+/// Log-likelihood of an observation under a belief, applying it.
+///
+/// # Errors
+///
+/// When an innovation's variance is not positive.
+pub fn measure(
+    model: &TrackerModel,
+    state: &mut GaussianState<STATES>,
+    observed: &Observation,
+) -> Result<(f64, f64), FilterError> {
+    let (mut log_likelihood, mut first_normalised) = (0.0, None);
+    for (row, measured, variance) in model.measurements(observed).into_iter().flatten() {
+        let update = state.innovation(row, measured, variance)?;
+        log_likelihood += update.log_likelihood();
+        first_normalised.get_or_insert(update.normalised());
+        state.apply(&update);
+    }
+    Ok((log_likelihood, first_normalised.unwrap_or(0.0)))
+}

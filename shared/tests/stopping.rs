@@ -1,0 +1,175 @@
+//! Stopping distances against closed forms, the papers' figures and sampled stops.
+
+use dynocar_shared::quantile::normal_quantile;
+use dynocar_shared::{
+    EffortPoint, RailAdhesion, RailCondition, Stop, StoppingError, StoppingEstimate, Uncertain,
+};
+
+const NO_RESISTANCE: [f64; 3] = [0.0, 0.0, 0.0];
+const KMH: f64 = 1.0 / 3.6;
+
+fn constant(force_n: f64) -> [EffortPoint; 1] {
+    [EffortPoint { speed_mps: 0.0, force_n }]
+}
+
+/// CRH3 Davis coefficients, given in km/h.
+const CRH3_DAVIS: [f64; 3] = [0.79, 0.0064 * 3.6, 0.000_115 * 3.6 * 3.6];
+const CRH3_MASS_KG: f64 = 536_000.0;
+
+/// Brake force in N by Xie 2019, eq. (4), table 1, with 95 pads.
+fn crh3_brake_n(friction: f64) -> f64 {
+    let area_mm2 = std::f64::consts::FRAC_PI_4 * 203.0 * 203.0;
+    297.6 / 460.0 * area_mm2 * 410.0 * 0.85 * 2.55 * friction * 95.0 * 1e-3
+}
+
+fn xie(from_kmh: f64, to_kmh: f64, adhesion: RailAdhesion) -> StoppingEstimate {
+    let effort = constant(crh3_brake_n(0.28));
+    let stop = Stop {
+        to_speed_mps: to_kmh * KMH,
+        adhesion,
+        gravity_mps2: 9.8,
+        ..Stop::level(from_kmh * KMH, CRH3_MASS_KG, CRH3_DAVIS, &effort)
+    };
+    stop.estimate(0.95).unwrap()
+}
+
+#[test]
+fn constant_deceleration_gives_the_textbook_distance_and_time() {
+    let effort = constant(100_000.0);
+    let stop = Stop {
+        gradient_permille: 20.0,
+        rotating_mass_factor: 0.1,
+        ..Stop::level(40.0, 100_000.0, NO_RESISTANCE, &effort)
+    };
+    let deceleration = (1.0 + 0.020 * 9.81) / 1.1;
+    let found = stop.estimate(0.95).unwrap();
+    assert!((found.distance_m - 800.0 / deceleration).abs() < 1e-9);
+    assert!((found.time_s - 40.0 / deceleration).abs() < 1e-10);
+    assert_eq!(found.distance_bound_m, found.distance_m);
+}
+
+#[test]
+fn air_drag_gives_the_closed_form() {
+    // dv/dt = -(d + k v²): distance ln(1 + k v²/d) / 2k, time atan(v sqrt(k/d)) / sqrt(k d).
+    let (d, k) = (0.6_f64, 2e-4_f64);
+    let effort = constant(d * 50_000.0);
+    let davis = [0.0, 0.0, k * 1000.0 / 9.81];
+    let found = Stop::level(90.0, 50_000.0, davis, &effort).estimate(0.9).unwrap();
+    assert!((found.distance_m - (1.0 + k * 8100.0 / d).ln() / (2.0 * k)).abs() < 1e-6);
+    assert!((found.time_s - (90.0 * (k / d).sqrt()).atan() / (k * d).sqrt()).abs() < 1e-7);
+}
+
+#[test]
+fn stops_of_xie_2019_figures_10_and_11_follow() {
+    // Figures of an independent integration in time; in brackets what the paper states.
+    let cases = [
+        (RailAdhesion::Coefficient(Uncertain::exact(0.1542)), 3085.5, 56.0), // 3060.7, 56.1
+        (RailAdhesion::Coefficient(Uncertain::exact(0.0726)), 3916.4, 71.3), // 3946.7, 71.7
+        (RailAdhesion::Law(RailCondition::Wet, Uncertain::exact(1.0)), 3525.5, 62.6), // 3481.1, 62.8
+    ];
+    for (adhesion, distance_m, time_s) in cases {
+        let found = xie(300.0, 100.0, adhesion);
+        assert!((found.distance_m - distance_m).abs() < 0.2, "{found:?}");
+        assert!((found.time_s - time_s).abs() < 0.05, "{found:?}");
+    }
+}
+
+#[test]
+fn stop_of_jin_2020_figure_8_follows() {
+    // 94.2 s and 4647.16 m in the paper, with the friction curve reconstructed from its figure 2.
+    let effort: Vec<EffortPoint> = (0..=350)
+        .map(|kmh| {
+            let kmh = f64::from(kmh);
+            let notch = 0.06 * (-((kmh - 180.0) / 28.0).powi(2)).exp();
+            let friction = 0.30331 - 0.03846 * (kmh - 175.0) / 175.0 - notch;
+            EffortPoint { speed_mps: kmh * KMH, force_n: crh3_brake_n(friction) }
+        })
+        .collect();
+    let stop =
+        Stop { gravity_mps2: 9.8, ..Stop::level(350.0 * KMH, CRH3_MASS_KG, CRH3_DAVIS, &effort) };
+    let found = stop.estimate(0.95).unwrap();
+    assert!((found.distance_m - 4647.2).abs() < 0.2, "{found:?}");
+    assert!((found.time_s - 94.20).abs() < 0.02, "{found:?}");
+}
+
+#[test]
+fn the_bound_holds_with_the_chosen_confidence() {
+    let adhesion = Uncertain::new(0.08, 0.01);
+    let confidence = 0.95;
+    let bound_m = xie(300.0, 0.0, RailAdhesion::Coefficient(adhesion)).distance_bound_m;
+    let draws = 2000;
+    let held = (0..draws)
+        .filter(|&i| {
+            // Stratified draws from the distribution of the coefficient.
+            let z = normal_quantile((f64::from(i) + 0.5) / f64::from(draws)).unwrap();
+            let drawn = Uncertain::exact(adhesion.value + z * adhesion.std);
+            xie(300.0, 0.0, RailAdhesion::Coefficient(drawn)).distance_m <= bound_m
+        })
+        .count();
+    assert!((held as f64 / f64::from(draws) - confidence).abs() < 1e-3, "{held}");
+}
+
+#[test]
+fn two_uncertain_quantities_are_bounded_together() {
+    // The rail and the brake are equally strong on average, the worst case for a linear bound.
+    let weight_n = CRH3_MASS_KG * 9.81;
+    let effort = constant(0.08 * weight_n);
+    let given = |brake, adhesion| Stop {
+        brake_scale: brake,
+        adhesion: RailAdhesion::Coefficient(adhesion),
+        ..Stop::level(80.0, CRH3_MASS_KG, CRH3_DAVIS, &effort)
+    };
+    let bound_m = given(Uncertain::new(1.0, 0.1), Uncertain::new(0.08, 0.008))
+        .estimate(0.95)
+        .unwrap()
+        .distance_bound_m;
+    let grid: Vec<f64> =
+        (0..40).map(|i| normal_quantile((f64::from(i) + 0.5) / 40.0).unwrap()).collect();
+    let held = grid
+        .iter()
+        .flat_map(|&x| grid.iter().map(move |&y| (x, y)))
+        .filter(|&(x, y)| {
+            let drawn = given(Uncertain::exact(1.0 + 0.1 * x), Uncertain::exact(0.08 + 0.008 * y));
+            drawn.estimate(0.95).unwrap().distance_m <= bound_m
+        })
+        .count();
+    let share = held as f64 / 1600.0;
+    assert!((0.95..0.96).contains(&share), "{share}");
+}
+
+#[test]
+fn bad_input_is_named() {
+    let effort = constant(100_000.0);
+    let good = Stop::level(40.0, 100_000.0, NO_RESISTANCE, &effort);
+    let named = |stop: Stop<'_>| match stop.estimate(0.95) {
+        Err(StoppingError::BadInput { name, .. }) => name,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(named(Stop { from_speed_mps: f64::NAN, ..good }), "from_speed_mps");
+    assert_eq!(named(Stop { to_speed_mps: 50.0, ..good }), "from_speed_mps");
+    assert_eq!(named(Stop { mass_kg: 0.0, ..good }), "mass_kg");
+    assert_eq!(named(Stop { brake_effort: &[], ..good }), "brake_effort");
+    assert_eq!(named(Stop { brake_scale: Uncertain::new(1.0, f64::NAN), ..good }), "brake_scale");
+    let backwards = [effort[0], EffortPoint { speed_mps: -1.0, force_n: 0.0 }];
+    assert_eq!(named(Stop { brake_effort: &backwards, ..good }), "brake_effort");
+    assert!(good.estimate(1.0).is_err());
+}
+
+#[test]
+fn a_train_that_does_not_slow_down_has_no_stopping_distance() {
+    let effort = constant(100_000.0);
+    let downhill =
+        Stop { gradient_permille: -120.0, ..Stop::level(40.0, 100_000.0, NO_RESISTANCE, &effort) };
+    let error = downhill.estimate(0.95).unwrap_err();
+    assert_eq!(error, StoppingError::DoesNotStop { speed_mps: 0.0, in_bound: false });
+    let uncertain = Stop {
+        brake_scale: Uncertain::new(1.0, 0.5),
+        ..Stop::level(40.0, 100_000.0, NO_RESISTANCE, &effort)
+    };
+    let error = uncertain.estimate(0.99).unwrap_err();
+    assert_eq!(error, StoppingError::DoesNotStop { speed_mps: 0.0, in_bound: true });
+    assert_eq!(
+        error.to_string(),
+        "the train does not slow down at 0 m/s at the edge of the confidence bound"
+    );
+}
