@@ -4,8 +4,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
+use dynocar_shared::vocabulary::EffectKind;
 use serde::Serialize;
 
+use crate::explain::matrix;
 use crate::papers::{self, Row, table};
 
 /// Measures Dynocar: accuracy against the statistical bound, speed against peers.
@@ -18,6 +20,7 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Explain(ExplainArguments),
     Papers(PapersArguments),
 }
 
@@ -38,6 +41,30 @@ struct PapersArguments {
     markdown: Option<PathBuf>,
 }
 
+/// Every kind of undeclared effect, and nulls, over simulated datasets: power, false alarms,
+/// confusions, localisation, parameters and their coverage.
+#[derive(Debug, Args)]
+struct ExplainArguments {
+    /// Simulated datasets for each kind
+    #[arg(long, default_value_t = 20)]
+    seeds: usize,
+    /// The first seed
+    #[arg(long, default_value_t = 1)]
+    first_seed: u64,
+    /// Only this kind, as tunnel_drag; none for nulls; may be repeated
+    #[arg(long = "kind", value_name = "NAME")]
+    kinds: Vec<String>,
+    /// Datasets at a time
+    #[arg(long, default_value_t = 2)]
+    threads: usize,
+    /// Tell the outcome of every dataset on standard error
+    #[arg(long)]
+    verbose: bool,
+    /// Write the result for machines; - for standard output
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
 #[derive(Serialize)]
 struct PapersAnswer<'a> {
     rows: &'a [Row],
@@ -52,6 +79,7 @@ const QUICK_SEEDS: usize = 8;
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let result = match &arguments.command {
+        Command::Explain(arguments) => explain(arguments),
         Command::Papers(arguments) => papers(arguments),
     };
     match result {
@@ -95,6 +123,53 @@ fn papers(arguments: &PapersArguments) -> Result<(), (String, u8)> {
     if let Some(file) = &arguments.markdown {
         write(file, &table::for_documentation(&rows))?;
     }
+    Ok(())
+}
+
+fn explain(arguments: &ExplainArguments) -> Result<(), (String, u8)> {
+    let mut kinds = EffectKind::ALL.to_vec();
+    if !arguments.kinds.is_empty() {
+        let chosen = arguments.kinds.iter().map(|name| {
+            let names: Vec<_> = EffectKind::ALL.iter().map(|kind| kind.name()).collect();
+            EffectKind::from_name(name)
+                .ok_or((format!("--kind {name}: expected one of {}", names.join(", ")), 2))
+        });
+        kinds = chosen.collect::<Result<_, _>>()?;
+    }
+    let (seeds, first) = (arguments.seeds, arguments.first_seed);
+    let matrix = matrix::run(&kinds, seeds, first, arguments.threads.max(1), &|case, grade| {
+        if arguments.verbose {
+            let kinds: Vec<_> = case.kinds.iter().map(|kind| kind.name()).collect();
+            let parameters: Vec<String> = grade
+                .parameters
+                .iter()
+                .map(|p| format!("{} {:+.3} ({:+.1} sd)", p.name, p.error, p.z))
+                .collect();
+            eprintln!(
+                "{} seed {}: {} {} {} iou {:?} share {:?} {}",
+                if grade.is_right { "right" } else { "WRONG" },
+                case.seed,
+                kinds.join("+"),
+                grade.verdict,
+                grade.named.join("+"),
+                grade.iou,
+                grade.share,
+                parameters.join(", ")
+            );
+        }
+    });
+    match &arguments.json {
+        Some(file) => {
+            let text = serde_json::to_string_pretty(&matrix).map_err(|e| (e.to_string(), 1))?;
+            if file.as_os_str() == "-" {
+                println!("{text}");
+                return Ok(());
+            }
+            write(file, &(text + "\n"))?;
+        }
+        None => {}
+    }
+    print!("{}", matrix::table(&matrix));
     Ok(())
 }
 

@@ -1,0 +1,233 @@
+//! An answer against the truth.
+
+use dynocar_core::explain::Explanation;
+use dynocar_core::explain::answer::Verdict;
+use dynocar_tests::simulator::oracle::score;
+use dynocar_tests::simulator::{Effect, SimulatedDataset};
+use serde_json::Value;
+
+/// How good an answer is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grade {
+    /// The kinds that the answer names, strongest first; empty for none.
+    pub named: Vec<String>,
+    /// The verdict in a word.
+    pub verdict: String,
+    /// True when verdict and kinds are right.
+    pub is_right: bool,
+    /// Intersection over union of the places, where the effect has one.
+    pub iou: Option<f64>,
+    /// Relative errors of the parameters and whether their 95 % intervals hold the truth.
+    pub parameters: Vec<ParameterGrade>,
+    /// Share of the attainable reduction of the error on the holdout runs.
+    pub share: Option<f64>,
+}
+
+/// One parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParameterGrade {
+    /// Its name.
+    pub name: String,
+    /// Error over the size of the effect.
+    pub error: f64,
+    /// Error over the standard deviation.
+    pub z: f64,
+}
+
+/// Grades an explanation.
+pub fn grade(simulated: &SimulatedDataset, explanation: &Explanation) -> Grade {
+    let answer = &explanation.answer;
+    let named: Vec<String> = answer.effects.iter().map(|effect| effect.kind.into()).collect();
+    let mut expected: Vec<&str> =
+        simulated.effects.iter().map(|effect| effect.kind().name()).collect();
+    expected.sort_unstable();
+    let mut found: Vec<&str> = named.iter().map(String::as_str).collect();
+    found.sort_unstable();
+    let verdict = match answer.verdict {
+        Verdict::None => "none",
+        Verdict::Effect => "effect",
+        Verdict::Ambiguous => "ambiguous",
+        Verdict::Unknown => "unknown",
+        Verdict::InsufficientData => "insufficient_data",
+    };
+    let is_right = match simulated.verdict() {
+        "unknown" => verdict == "unknown",
+        right => verdict == right && expected == found,
+    };
+    let json = serde_json::to_value(answer).unwrap_or(Value::Null);
+    let (mut iou, mut parameters) = (None, Vec::new());
+    for effect in &simulated.effects {
+        let own = json["effects"].as_array().into_iter().flatten();
+        let own = own.clone().find(|answer| answer["kind"] == effect.kind().name());
+        if let Some(own) = own {
+            iou = place_iou(effect, own, simulated).or(iou);
+            parameters.extend(graded(effect, own, simulated));
+        }
+    }
+    Grade { named, verdict: verdict.into(), is_right, iou, parameters, share: share(simulated, explanation) }
+}
+
+fn share(simulated: &SimulatedDataset, explanation: &Explanation) -> Option<f64> {
+    if simulated.effects.is_empty() {
+        return None;
+    }
+    let oracle = score(simulated).full_run.true_mps;
+    let (before, after) = (explanation.answer.rmse_before?, explanation.answer.rmse_after?);
+    (before > 1.2 * oracle).then(|| (before - after) / (before - oracle))
+}
+
+/// Total length of intervals that are cut into disjoint pieces by sampling.
+fn interval_iou(one: &[[f64; 2]], other: &[[f64; 2]]) -> f64 {
+    let ends = one.iter().chain(other).flatten().copied();
+    let low = ends.clone().fold(f64::INFINITY, f64::min);
+    let high = ends.fold(f64::NEG_INFINITY, f64::max);
+    let inside = |set: &[[f64; 2]], at: f64| set.iter().any(|[from, to]| (*from..*to).contains(&at));
+    let (mut both, mut either) = (0, 0);
+    const POINTS: usize = 20_000;
+    for k in 0..POINTS {
+        let at = low + (high - low) * (k as f64 + 0.5) / POINTS as f64;
+        let (here, there) = (inside(one, at), inside(other, at));
+        both += usize::from(here && there);
+        either += usize::from(here || there);
+    }
+    both as f64 / either.max(1) as f64
+}
+
+fn pairs(value: &Value) -> Vec<[f64; 2]> {
+    let list = value.as_array().cloned().unwrap_or_default();
+    list.iter().filter_map(|pair| Some([pair[0].as_f64()?, pair[1].as_f64()?])).collect()
+}
+
+fn place_iou(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Option<f64> {
+    match effect {
+        Effect::LocalResistance { intervals_m, .. } | Effect::LowAdhesion { intervals_m, .. }
+            if !intervals_m.is_empty() =>
+        {
+            let truth: Vec<[f64; 2]> = intervals_m.iter().map(|&(from, to)| [from, to]).collect();
+            Some(interval_iou(&truth, &pairs(&own["where"]["intervals_m"])))
+        }
+        Effect::DraggingBrake { windows, .. } => {
+            let mut truth = Vec::new();
+            let mut found = Vec::new();
+            for (number, run) in simulated.runs.iter().enumerate() {
+                if run.plan.is_holdout {
+                    continue;
+                }
+                // One axis for all runs, each far from the next.
+                let offset = 1e5 * number as f64;
+                let of_run = windows.iter().filter(|window| window.run == number);
+                truth.extend(of_run.map(|w| [offset + w.start_s, offset + w.end_s]));
+                let listed = own["where"]["windows"].as_array().into_iter().flatten();
+                for window in listed.filter(|window| window["run"] == run.plan.file()) {
+                    if let (Some(from), Some(to)) =
+                        (window["t_start_s"].as_f64(), window["t_end_s"].as_f64())
+                    {
+                        found.push([offset + from, offset + to]);
+                    }
+                }
+            }
+            Some(run_windows_iou(&truth, &found))
+        }
+        _ => None,
+    }
+}
+
+fn run_windows_iou(truth: &[[f64; 2]], found: &[[f64; 2]]) -> f64 {
+    let length = |set: &[[f64; 2]]| set.iter().map(|[from, to]| to - from).sum::<f64>();
+    let both: f64 = truth
+        .iter()
+        .flat_map(|[from, to]| {
+            found.iter().map(move |[start, end]| (to.min(*end) - from.max(*start)).max(0.0))
+        })
+        .sum();
+    both / (length(truth) + length(found) - both)
+}
+
+/// Parameters that have a single true number; the size of an effect is its distance from none.
+fn graded(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Vec<ParameterGrade> {
+    let declared = simulated.declared_train();
+    let number = |name: &str| own["parameters"][name].as_f64();
+    let deviation = |name: &str| own["std"][name].as_f64();
+    let one = |name: &str, truth: f64, none: f64| {
+        let (value, deviation) = (number(name)?, deviation(name)?);
+        let error = (value - truth) / (truth - none);
+        Some(ParameterGrade { name: name.into(), error, z: (value - truth) / deviation })
+    };
+    let list = match effect {
+        Effect::TunnelDrag { c_factor } => vec![one("c_factor", *c_factor, 1.0)],
+        Effect::CurveResistance { k_n_per_kn_m } => {
+            vec![one("k_n_per_kn_m", *k_n_per_kn_m, declared.curve_constant_n_per_kn_m)]
+        }
+        Effect::Wind { wind_plus_mps, .. } => vec![one("wind_plus_mps", *wind_plus_mps, 0.0)],
+        Effect::DraggingBrake { force_n, .. } => vec![one("force_n", *force_n, 0.0)],
+        Effect::WheelDiameter { speed_scale } => vec![one("speed_scale", *speed_scale, 1.0)],
+        Effect::GradientShift { shift_m } => vec![one("shift_m", *shift_m, 0.0)],
+        Effect::TractionGain { gain } => vec![one("gain", *gain, 1.0)],
+        Effect::ActuatorDelay { delay_s, lag_s } => {
+            vec![one("delay_s", *delay_s, 0.0), one("lag_s", *lag_s, 0.0)]
+        }
+        Effect::RotatingMass { rotating_mass_factor } => vec![one(
+            "rotating_mass_factor",
+            *rotating_mass_factor,
+            declared.rotating_mass_factor,
+        )],
+        Effect::BearingTemperature { delta_a_n_per_kn, tau_s } => vec![
+            one("delta_a_n_per_kn", *delta_a_n_per_kn, 0.0),
+            one("tau_s", *tau_s, 0.0),
+        ],
+        Effect::AmbientTemperature { w0_per_k, .. } => vec![one("w0_per_k", *w0_per_k, 0.0)],
+        Effect::LocalResistance { extra_n_per_kn, .. } => {
+            vec![one("extra_n_per_kn", *extra_n_per_kn, 0.0)]
+        }
+        Effect::LowAdhesion { adhesion, .. } => vec![one("adhesion", *adhesion, 0.0)],
+        Effect::MassChangeSections(_) | Effect::MassChangeWindows(_) | Effect::SpeedBand { .. } => {
+            mass_factors(effect, own)
+        }
+    };
+    list.into_iter().flatten().collect()
+}
+
+/// Every true factor against the factor found where it holds longest.
+fn mass_factors(effect: &Effect, own: &Value) -> Vec<Option<ParameterGrade>> {
+    let graded = |list: &str, truth: f64, overlap: &dyn Fn(&Value) -> f64| {
+        let found = own["parameters"][list].as_array()?;
+        let (at, best) = found
+            .iter()
+            .enumerate()
+            .max_by(|one, other| overlap(one.1).total_cmp(&overlap(other.1)))?;
+        (overlap(best) > 0.0).then_some(())?;
+        let (value, deviation) =
+            (best["mass_factor"].as_f64()?, own["std"][list][at].as_f64()?);
+        let error = (value - truth) / (truth - 1.0);
+        Some(ParameterGrade { name: "mass_factor".into(), error, z: (value - truth) / deviation })
+    };
+    let length = |entry: &Value, keys: (&str, &str), (from, to): (f64, f64)| {
+        let low = entry[keys.0].as_f64().unwrap_or(0.0).max(from);
+        (entry[keys.1].as_f64().unwrap_or(0.0).min(to) - low).max(0.0)
+    };
+    match effect {
+        Effect::MassChangeSections(sections) => sections
+            .iter()
+            .map(|section| {
+                graded("sections", section.mass_factor, &|entry| {
+                    let same = entry["direction"].as_f64() == Some(section.direction);
+                    let range = (section.from_m, section.to_m);
+                    if same { length(entry, ("from_m", "to_m"), range) } else { 0.0 }
+                })
+            })
+            .collect(),
+        Effect::MassChangeWindows(windows) => windows
+            .iter()
+            .map(|(window, factor)| {
+                let file = dynocar_tests::simulator::run_maker::run_file(window.run);
+                graded("windows", *factor, &|entry| {
+                    let range = (window.start_s, window.end_s);
+                    let same = entry["run"] == file.as_str();
+                    if same { length(entry, ("t_start_s", "t_end_s"), range) } else { 0.0 }
+                })
+            })
+            .collect(),
+        _ => Vec::new(),
+    }
+}
+

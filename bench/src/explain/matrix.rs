@@ -1,0 +1,150 @@
+//! All kinds over all seeds.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use dynocar_shared::vocabulary::EffectKind;
+use serde::Serialize;
+
+use super::case::{Case, explained};
+use super::grade::{Grade, grade};
+
+/// What came out for one kind.
+#[derive(Clone, Debug, Serialize)]
+pub struct KindRow {
+    /// The kind that acts; `none` for nulls.
+    pub kind: String,
+    /// Simulated datasets.
+    pub runs: usize,
+    /// Answers with the right verdict and the right kind.
+    pub right: usize,
+    /// What was named instead.
+    pub confused_with: BTreeMap<String, usize>,
+    /// Median intersection over union of the place.
+    pub iou: Option<f64>,
+    /// Median relative error of the parameters.
+    pub parameter_error: Option<f64>,
+    /// Share of the 95 % intervals that hold the truth.
+    pub coverage: Option<f64>,
+    /// Median share of the attainable reduction of the error on the holdout runs.
+    pub error_reduction_share: Option<f64>,
+}
+
+/// False alarms on nulls.
+#[derive(Clone, Debug, Serialize)]
+pub struct FalseAlarms {
+    /// Datasets without any effect.
+    pub runs: usize,
+    /// Those for which an effect was named.
+    pub raised: usize,
+}
+
+/// The result.
+#[derive(Clone, Debug, Serialize)]
+pub struct Matrix {
+    /// By kind.
+    pub kinds: Vec<KindRow>,
+    /// On nulls.
+    pub false_alarms: FalseAlarms,
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    values.sort_unstable_by(f64::total_cmp);
+    Some(values[values.len() / 2])
+}
+
+/// Runs the matrix: each kind over seeds from `first_seed`, on `threads` threads. Every finished
+/// case is told to `tell`.
+pub fn run(
+    kinds: &[EffectKind],
+    seeds: usize,
+    first_seed: u64,
+    threads: usize,
+    tell: &(dyn Fn(&Case, &Grade) + Sync),
+) -> Matrix {
+    let cases: Vec<Case> = kinds
+        .iter()
+        .flat_map(|&kind| {
+            let kinds = if kind == EffectKind::None { Vec::new() } else { vec![kind] };
+            (0..seeds).map(move |k| Case { kinds: kinds.clone(), seed: first_seed + k as u64 })
+        })
+        .collect();
+    let grades: Mutex<Vec<Option<Grade>>> = Mutex::new(vec![None; cases.len()]);
+    let next = AtomicUsize::new(0);
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                while let Some((at, case)) =
+                    Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|at| Some((at, cases.get(at)?)))
+                {
+                    let simulated = case.simulate();
+                    let graded = grade(&simulated, &explained(&simulated));
+                    tell(case, &graded);
+                    grades.lock().unwrap_or_else(PoisonError::into_inner)[at] = Some(graded);
+                }
+            });
+        }
+    });
+    let grades: Vec<Grade> =
+        grades.into_inner().unwrap_or_else(PoisonError::into_inner).into_iter().flatten().collect();
+    let rows = kinds.iter().zip(grades.chunks(seeds.max(1)));
+    let nulls = rows.clone().filter(|(kind, _)| **kind == EffectKind::None);
+    let raised = nulls.clone().map(|(_, grades)| grades.iter().filter(|g| !g.is_right).count());
+    Matrix {
+        false_alarms: FalseAlarms {
+            runs: nulls.map(|(_, grades)| grades.len()).sum(),
+            raised: raised.sum(),
+        },
+        kinds: rows.map(|(kind, grades)| row(kind.name(), grades)).collect(),
+    }
+}
+
+fn row(kind: &str, grades: &[Grade]) -> KindRow {
+    let mut confused_with = BTreeMap::new();
+    for wrong in grades.iter().filter(|grade| !grade.is_right) {
+        let named = format!("{} {}", wrong.verdict, wrong.named.join("+"));
+        *confused_with.entry(named.trim().to_string()).or_insert(0) += 1;
+    }
+    let right: Vec<&Grade> = grades.iter().filter(|grade| grade.is_right).collect();
+    let parameters: Vec<_> = right.iter().flat_map(|grade| &grade.parameters).collect();
+    let covered = parameters.iter().filter(|parameter| parameter.z.abs() < 1.96).count();
+    KindRow {
+        kind: kind.into(),
+        runs: grades.len(),
+        right: right.len(),
+        confused_with,
+        iou: median(right.iter().filter_map(|grade| grade.iou).collect()),
+        parameter_error: median(parameters.iter().map(|p| p.error.abs()).collect()),
+        coverage: (!parameters.is_empty()).then(|| covered as f64 / parameters.len() as f64),
+        error_reduction_share: median(right.iter().filter_map(|grade| grade.share).collect()),
+    }
+}
+
+/// The matrix as a table for people.
+pub fn table(matrix: &Matrix) -> String {
+    let mut text = String::from(
+        "kind                  right      IoU  error  cover  share  named instead\n",
+    );
+    let shown = |value: Option<f64>| value.map_or("     -".into(), |value| format!("{value:6.3}"));
+    for row in &matrix.kinds {
+        let confused: Vec<String> =
+            row.confused_with.iter().map(|(named, count)| format!("{named} {count}")).collect();
+        text += &format!(
+            "{:20} {:3}/{:<3} {} {} {} {}  {}\n",
+            row.kind,
+            row.right,
+            row.runs,
+            shown(row.iou),
+            shown(row.parameter_error),
+            shown(row.coverage),
+            shown(row.error_reduction_share),
+            confused.join(", ")
+        );
+    }
+    let FalseAlarms { runs, raised } = matrix.false_alarms;
+    text + &format!("false alarms: {raised} of {runs}\n")
+}
