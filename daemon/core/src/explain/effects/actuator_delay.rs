@@ -74,6 +74,10 @@ impl Hypothesis for DelayAndLag {
         &PARAMETERS
     }
 
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        parameters[0] + parameters[1] > 0.15
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         let time_s = run.recording.time_s();
         let [delay_s, lag_s] = [parameters[0], parameters[1]];

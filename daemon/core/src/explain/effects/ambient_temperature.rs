@@ -60,6 +60,10 @@ impl Hypothesis for Linear {
         &PARAMETERS
     }
 
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        parameters[0].abs() > 0.001
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         let mut degc = mean_degc(run).unwrap_or(REFERENCE_DEGC);
         for (force, sample) in forces.iter_mut().zip(run.samples()) {

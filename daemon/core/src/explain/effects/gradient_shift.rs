@@ -82,6 +82,10 @@ impl Hypothesis for Shift {
         2.0 * 20f64.ln()
     }
 
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        parameters[0].abs() > 5.0
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         for (i, force) in forces.iter_mut().enumerate() {
             if let Some(gradient) = self.gradient_permille(run, i, parameters[0]) {

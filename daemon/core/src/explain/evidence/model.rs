@@ -150,28 +150,34 @@ impl GrownModel {
         bins: &mut Vec<f64>,
     ) {
         self.forces(run, theta, forces);
-        let (time_s, per_scale) = (run.recording.time_s(), 1.0 / forces.speed_scale);
-        bins.clear();
-        let mut segment = usize::MAX;
-        let (mut gained, mut last) = (0.0, (0.0, 0.0));
-        for bin in &run.bins {
-            let mut sum = 0.0;
-            for i in bin.first..bin.end {
-                let here = (
-                    time_s[i],
-                    forces.acceleration_mps2(i, run.smooth_mps[i] * per_scale),
-                );
-                if bin.segment == segment || i > bin.first {
-                    gained += 0.5 * (here.0 - last.0) * (here.1 + last.1);
-                } else {
-                    gained = 0.0;
-                }
-                last = here;
-                sum += gained;
+        let per_scale = 1.0 / forces.speed_scale;
+        let acceleration = |i: usize| {
+            forces.speed_scale * forces.acceleration_mps2(i, run.smooth_mps[i] * per_scale)
+        };
+        integrate_bins(run, acceleration, bins);
+    }
+}
+
+/// Integral of an acceleration in m/s² over each segment of motion, averaged over the bins.
+pub fn integrate_bins(run: &RunData, acceleration: impl Fn(usize) -> f64, bins: &mut Vec<f64>) {
+    let time_s = run.recording.time_s();
+    bins.clear();
+    let mut segment = usize::MAX;
+    let (mut gained, mut last) = (0.0, (0.0, 0.0));
+    for bin in &run.bins {
+        let mut sum = 0.0;
+        for i in bin.first..bin.end {
+            let here = (time_s[i], acceleration(i));
+            if bin.segment == segment || i > bin.first {
+                gained += 0.5 * (here.0 - last.0) * (here.1 + last.1);
+            } else {
+                gained = 0.0;
             }
-            segment = bin.segment;
-            bins.push(forces.speed_scale * sum / (bin.end - bin.first) as f64);
+            last = here;
+            sum += gained;
         }
+        segment = bin.segment;
+        bins.push(sum / (bin.end - bin.first) as f64);
     }
 }
 

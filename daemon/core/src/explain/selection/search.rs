@@ -188,7 +188,11 @@ impl Search<'_> {
 
     /// Whether the last effect of a trial is more than chance and large enough to matter.
     fn is_accepted(&self, base: &Fit, trial: &Trial) -> bool {
-        trial.evidence > ACCEPT && self.reduction(base, &trial.fit) > REDUCTION_MIN
+        let last = trial.fit.model.effects.len() - 1;
+        let parameters = trial.fit.effect_parameters(last);
+        trial.evidence > ACCEPT
+            && trial.fit.model.effects[last].is_material(parameters, trial.fit.theta[2])
+            && self.reduction(base, &trial.fit) > REDUCTION_MIN
     }
 
     /// Share of the open-loop error of the fit runs that the larger model takes away, over whole
