@@ -156,6 +156,9 @@ fn explain(arguments: &ExplainArguments) -> Result<(), (String, u8)> {
                 grade.share,
                 parameters.join(", ")
             );
+            for detail in &grade.details {
+                eprintln!("    {detail}");
+            }
         }
     });
     match &arguments.json {

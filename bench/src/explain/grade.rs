@@ -19,6 +19,8 @@ pub struct Grade {
     pub iou: Option<f64>,
     /// Relative errors of the parameters and whether their 95 % intervals hold the truth.
     pub parameters: Vec<ParameterGrade>,
+    /// Evidence, error reduction and parameters of the named effects, for people.
+    pub details: Vec<String>,
     /// Share of the attainable reduction of the error on the holdout runs.
     pub share: Option<f64>,
 }
@@ -64,7 +66,15 @@ pub fn grade(simulated: &SimulatedDataset, explanation: &Explanation) -> Grade {
             parameters.extend(graded(effect, own, simulated));
         }
     }
-    Grade { named, verdict: verdict.into(), is_right, iou, parameters, share: share(simulated, explanation) }
+    let details = answer
+        .effects
+        .iter()
+        .map(|effect| {
+            let parameters = serde_json::to_string(&effect.parameters).unwrap_or_default();
+            format!("{} -{:.3} p {:.1e} {parameters}", effect.kind, effect.error_reduction, effect.p_value)
+        })
+        .collect();
+    Grade { details, named, verdict: verdict.into(), is_right, iou, parameters, share: share(simulated, explanation) }
 }
 
 fn share(simulated: &SimulatedDataset, explanation: &Explanation) -> Option<f64> {

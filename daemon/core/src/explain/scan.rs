@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::evidence::{Fit, FitProblem, RunData, robust_weight};
+use super::evidence::{Fit, FitProblem, RunData};
 use crate::force::ResolvedSample;
 use crate::track::Track;
 use crate::train::TrainModel;
@@ -122,13 +122,15 @@ impl<'a> Scan<'a> {
         }
         let mut column = Vec::with_capacity(shape.len());
         self.fit.whiteners[index].whiten(&gained, &mut column);
+        let (innovations, columns) = (&self.fit.innovations[index], &self.fit.columns[index]);
+        let filter = &self.fit.filters[index];
+        let free = filter.remove(&column, &filter.factors(&column));
         // The filter forgets what is long past.
         let until = (last + 200).min(column.len());
-        let (innovations, columns) = (&self.fit.innovations[index], &self.fit.columns[index]);
-        for k in first.saturating_sub(1)..until {
-            let weighted = robust_weight(innovations[k]) * column[k];
+        for (k, weight) in filter.weights().iter().enumerate().take(until).skip(first.max(1) - 1) {
+            let weighted = weight * column[k];
             tuple.score += weighted * innovations[k];
-            tuple.square += weighted * column[k];
+            tuple.square += weighted * free[k];
             for (cross, other) in tuple.cross.iter_mut().zip(columns) {
                 *cross += weighted * other[k];
             }

@@ -6,8 +6,10 @@ use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 
-const PARAMETERS: [Parameter; 2] =
-    [Parameter::new("delay_s", (0.0, 6.0), 0.05), Parameter::new("lag_s", (0.0, 8.0), 0.05)];
+const PARAMETERS: [Parameter; 2] = [
+    Parameter::new("delay_s", (0.0, 6.0), 0.05),
+    Parameter::new("lag_s", (0.0, 8.0), 0.05),
+];
 
 /// The kind.
 pub struct ActuatorDelay;
@@ -70,6 +72,10 @@ impl Hypothesis for DelayAndLag {
 
     fn parameters(&self) -> &[Parameter] {
         &PARAMETERS
+    }
+
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        parameters[0] + parameters[1] > 0.15
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {

@@ -37,9 +37,7 @@ impl Effect for AmbientTemperature {
     fn propose(&self, scan: &Scan) -> Proposal {
         let means: Option<Vec<f64>> = scan.problem.runs.iter().map(mean_degc).collect();
         let Some(means) = means else {
-            return Proposal::NotTestable(
-                "ambient_temperature is not recorded in every run".into(),
-            );
+            return Proposal::NotTestable("ambient_temperature is not recorded in every run".into());
         };
         let low = means.iter().copied().fold(f64::INFINITY, f64::min);
         let high = means.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -60,6 +58,10 @@ impl Hypothesis for Linear {
 
     fn parameters(&self) -> &[Parameter] {
         &PARAMETERS
+    }
+
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        parameters[0].abs() > 0.001
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {

@@ -51,6 +51,10 @@ impl Hypothesis for Curves {
         &PARAMETERS
     }
 
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        (parameters[0] - self.declared_k).abs() > 100.0
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         let excess = parameters[0] - self.declared_k;
         for (force, sample) in forces.iter_mut().zip(run.samples()) {

@@ -10,7 +10,8 @@ use crate::explain::scan::Scan;
 use crate::track::Track;
 
 const SHIFT_MAX_M: f64 = 800.0;
-const PARAMETERS: [Parameter; 1] = [Parameter::new("shift_m", (-SHIFT_MAX_M, SHIFT_MAX_M), 2.0)];
+const PARAMETERS: [Parameter; 1] =
+    [Parameter::new("shift_m", (-SHIFT_MAX_M, SHIFT_MAX_M), 2.0)];
 /// Shifts that a search starts from are this far apart in m.
 const GRID_M: f64 = 25.0;
 
@@ -79,6 +80,10 @@ impl Hypothesis for Shift {
     fn choice_cost(&self) -> f64 {
         // About so many shifts are as different as independent ones.
         2.0 * 20f64.ln()
+    }
+
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        parameters[0].abs() > 5.0
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {

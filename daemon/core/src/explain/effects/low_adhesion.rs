@@ -137,6 +137,10 @@ impl Hypothesis for Slippery {
         self.choice_cost
     }
 
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        self.form == Form::Cap || parameters[0] < 0.97
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         if self.runs.as_ref().is_some_and(|runs| !runs.contains(&run.file)) {
             return;
@@ -158,6 +162,10 @@ impl Hypothesis for Slippery {
     }
 
     fn place(&self) -> Place {
-        Place { runs: self.runs.clone(), intervals_m: self.intervals_m.clone(), ..Place::default() }
+        Place {
+            runs: self.runs.clone(),
+            intervals_m: self.intervals_m.clone(),
+            ..Place::default()
+        }
     }
 }

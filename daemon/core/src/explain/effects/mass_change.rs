@@ -19,6 +19,9 @@ const PARTS_MAX: usize = 5;
 /// What another section must explain beyond its choice.
 const GAIN_MIN: f64 = 8.0;
 
+/// A smaller change of mass is not worth a word.
+const MATERIAL: f64 = 0.012;
+
 /// The kind.
 pub struct MassChange;
 
@@ -45,7 +48,8 @@ impl Part {
                     && sample.position_m.is_some_and(|at| (*from_m..*to_m).contains(&at))
             }
             Part::Window { run: file, from_s, to_s, .. } => {
-                *file == run.file && (*from_s..=*to_s).contains(&run.recording.time_s()[index])
+                *file == run.file
+                    && (*from_s..=*to_s).contains(&run.recording.time_s()[index])
             }
         }
     }
@@ -186,11 +190,15 @@ fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Option<Candidate> {
                 let (gain, estimate) = scan.gain(&tuple);
                 (gain, estimate, part)
             })
+            .filter(|(_, estimate, _)| estimate.abs() > MATERIAL)
             .max_by(|one, other| one.0.total_cmp(&other.0))
     };
     let (_, estimate, part) = best(scan, &mut parts.iter().cloned())?;
-    let mut masses =
-        Masses { parts: vec![part], parameters: vec![PARAMETER], choice_cost: part_cost };
+    let mut masses = Masses {
+        parts: vec![part],
+        parameters: vec![PARAMETER],
+        choice_cost: part_cost,
+    };
     let mut start = vec![(1.0 + estimate).clamp(0.7, 1.5)];
     while masses.parts.len() < PARTS_MAX {
         let hypothesis = std::sync::Arc::new(masses.clone());
@@ -209,7 +217,9 @@ fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Option<Candidate> {
             (part.clone(), next.tuple(masked))
         });
         match best(&next, &mut fresh) {
-            Some((gain, estimate, part)) if gain > part_cost + GAIN_MIN => {
+            Some((gain, estimate, part))
+                if gain > part_cost + GAIN_MIN && estimate.abs() > MATERIAL =>
+            {
                 masses.parts.push(part);
                 masses.parameters.push(PARAMETER);
                 masses.choice_cost += part_cost;
@@ -257,6 +267,10 @@ impl Hypothesis for Masses {
 
     fn choice_cost(&self) -> f64 {
         self.choice_cost
+    }
+
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        parameters.iter().any(|factor| (factor - 1.0).abs() > MATERIAL)
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {

@@ -133,6 +133,11 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         0.0
     }
 
+    /// Whether the effect is larger than what declared figures are usually good for.
+    fn is_material(&self, _parameters: &[f64], _c: f64) -> bool {
+        true
+    }
+
     /// Parameters by the names of the answer.
     fn report(&self, context: &ReportContext) -> Reported {
         let mut reported = Reported::default();

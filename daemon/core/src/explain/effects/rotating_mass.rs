@@ -14,7 +14,9 @@ const PARAMETERS: [Parameter; 1] = [Parameter::new("rotating_mass_factor", (0.0,
 pub struct RotatingMass;
 
 #[derive(Debug)]
-struct Gamma;
+struct Gamma {
+    declared: f64,
+}
 
 impl Effect for RotatingMass {
     fn kind(&self) -> EffectKind {
@@ -23,7 +25,7 @@ impl Effect for RotatingMass {
 
     fn propose(&self, scan: &Scan) -> Proposal {
         let declared = scan.train.rotating_mass_factor;
-        Proposal::Candidates(vec![Candidate::new(Gamma, vec![declared])])
+        Proposal::Candidates(vec![Candidate::new(Gamma { declared }, vec![declared])])
     }
 }
 
@@ -34,6 +36,10 @@ impl Hypothesis for Gamma {
 
     fn parameters(&self) -> &[Parameter] {
         &PARAMETERS
+    }
+
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        (parameters[0] - self.declared).abs() > 0.01
     }
 
     fn apply(&self, parameters: &[f64], _run: &RunData, forces: &mut [SampleForces]) {

@@ -38,6 +38,10 @@ impl Hypothesis for Gain {
         &PARAMETERS
     }
 
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        (parameters[0] - 1.0).abs() > 0.01
+    }
+
     fn apply(&self, parameters: &[f64], _run: &RunData, forces: &mut [SampleForces]) {
         for force in forces {
             force.traction_n /= parameters[0];

@@ -75,6 +75,10 @@ impl Hypothesis for Tunnels {
         self.choice_cost
     }
 
+    fn is_material(&self, parameters: &[f64], c: f64) -> bool {
+        parameters[0] > 0.08 * c
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         for (force, sample) in forces.iter_mut().zip(run.samples()) {
             let share = match &self.found_m {

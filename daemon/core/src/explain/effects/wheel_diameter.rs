@@ -38,6 +38,10 @@ impl Hypothesis for Scale {
         &PARAMETERS
     }
 
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        (parameters[0] - 1.0).abs() > 0.003
+    }
+
     fn apply(&self, _parameters: &[f64], _run: &RunData, _forces: &mut [SampleForces]) {}
 
     fn speed_scale(&self, parameters: &[f64]) -> f64 {

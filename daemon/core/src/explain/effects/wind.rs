@@ -11,6 +11,8 @@ use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 
 const SPEED_MAX_MPS: f64 = 35.0;
+/// Less wind than this is in the noise of any day.
+const MATERIAL_MPS: f64 = 1.0;
 
 /// The kind.
 pub struct Wind;
@@ -47,7 +49,8 @@ impl Effect for Wind {
             runs: runs.iter().map(|run| (run.file.clone(), run.direction)).collect(),
             parameters: vec![parameter(); runs.len()],
         };
-        let mut candidates = vec![Candidate::new(Steady { parameters: [parameter()] }, vec![0.0])];
+        let mut candidates =
+            vec![Candidate::new(Steady { parameters: [parameter()] }, vec![0.0])];
         if runs.len() >= 3 {
             candidates.push(Candidate::new(by_run, vec![0.0; runs.len()]));
         }
@@ -72,6 +75,10 @@ impl Hypothesis for Steady {
         &self.parameters
     }
 
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        parameters[0].abs() > MATERIAL_MPS
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         blow(parameters[0], run, forces);
     }
@@ -84,6 +91,10 @@ impl Hypothesis for ByRun {
 
     fn parameters(&self) -> &[Parameter] {
         &self.parameters
+    }
+
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        parameters.iter().any(|wind| wind.abs() > MATERIAL_MPS)
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {

@@ -1,10 +1,11 @@
 //! The joint fit of a, b, c and the parameters of all effects.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
 
 use super::model::{GrownForces, GrownModel};
 use super::noise::{Noise, Whitener};
 use super::run_data::RunData;
+use super::run_scatter::{RunScatter, ScatterFilter, WeightedFilter, scatter_columns};
 use crate::train::Davis;
 
 /// Innovations beyond this many standard deviations count linearly (Huber).
@@ -26,7 +27,7 @@ pub(super) fn robust_loss(nu: f64) -> f64 {
 
 /// Weight of an innovation in a normal equation.
 #[inline]
-pub fn robust_weight(nu: f64) -> f64 {
+pub(super) fn robust_weight(nu: f64) -> f64 {
     let size = nu.abs();
     if size <= HUBER { 1.0 } else { HUBER / size }
 }
@@ -38,6 +39,8 @@ pub struct FitProblem {
     pub runs: Vec<RunData>,
     declared: Davis,
     prior_deviation: [f64; 3],
+    /// Columns of the runs' own factors.
+    scatter_columns: Vec<[Vec<f64>; 2]>,
     /// Measured way over way by integrated speed, with its standard deviation.
     pub way_ratio: Option<(f64, f64)>,
 }
@@ -68,14 +71,50 @@ pub struct Fit {
     pub runs: Vec<RunNormal>,
     /// Information of prior and way ratio.
     pub prior_information: DMatrix<f64>,
-    /// White innovations by run.
+    /// White innovations by run, less the runs' own factors.
     pub innovations: Vec<Vec<f64>>,
-    /// Whitened regressors by run and parameter.
+    /// Whitened regressors by run and parameter, less what the runs' own factors would explain.
     pub columns: Vec<Vec<Vec<f64>>>,
     /// Differences of the bins by run, not whitened.
     pub residuals: Vec<Vec<f64>>,
     /// The filters by run.
     pub whiteners: Vec<Whitener>,
+    /// The filters of the runs' own factors, with the weights of the innovations.
+    pub filters: Vec<WeightedFilter>,
+    /// The runs' own factors less 1, with their covariance.
+    factors: Vec<(Vector2<f64>, Matrix2<f64>)>,
+}
+
+/// The filters of one run under a noise.
+#[derive(Clone)]
+struct RunFilters {
+    whitener: Whitener,
+    scatter: ScatterFilter,
+}
+
+/// Innovations of one run and what follows from them.
+struct Whitened {
+    innovations: Vec<f64>,
+    filter: WeightedFilter,
+    factors: Vector2<f64>,
+    cost: f64,
+}
+
+impl RunFilters {
+    /// Robust innovations of a series of bin differences.
+    fn whitened(&self, residual: &[f64], scratch: &mut Vec<f64>) -> Whitened {
+        self.whitener.whiten(residual, scratch);
+        let weights = |series: &[f64]| series.iter().map(|&nu| robust_weight(nu)).collect();
+        let rough = self.scatter.weighted(weights(scratch));
+        let less = rough.remove(scratch, &rough.factors(scratch));
+        let filter = self.scatter.weighted(weights(&less));
+        let factors = filter.factors(scratch);
+        let innovations = filter.remove(scratch, &factors);
+        let cost = self.whitener.minus_two_log_likelihood(&innovations)
+            + self.scatter.prior_cost(&factors)
+            + filter.log_determinant;
+        Whitened { innovations, filter, factors, cost }
+    }
 }
 
 impl Fit {
@@ -118,7 +157,8 @@ impl FitProblem {
         let prior_deviation =
             std::array::from_fn(|i| PRIOR_SHARE[i] * sizes[i].abs().max(least[i]));
         let way_ratio = pooled_way_ratio(&runs);
-        FitProblem { runs, declared, prior_deviation, way_ratio }
+        let scatter_columns = runs.iter().map(|run| scatter_columns(run, declared)).collect();
+        FitProblem { runs, declared, prior_deviation, scatter_columns, way_ratio }
     }
 
     /// The model with a, b, c as declared and the effects at given parameters.
@@ -129,13 +169,12 @@ impl FitProblem {
 
     /// Fits a model from a start under a noise.
     pub fn fit(&self, model: &GrownModel, start: Vec<f64>, noise: Noise) -> Fit {
-        let whiteners: Vec<Whitener> =
-            self.runs.iter().map(|run| Whitener::new(run, noise)).collect();
+        let filters = self.filters(noise);
         let mut scratch = Scratch::default();
-        let mut fit = self.linearised(model, start, noise, whiteners, &mut scratch);
+        let mut fit = self.linearised(model, start, noise, &filters, &mut scratch);
         for _ in 0..STEPS_MAX {
             let score = self.score(&fit);
-            let Some(next) = self.descend(&fit, &score, &mut scratch) else { break };
+            let Some(next) = self.descend(&fit, &score, &filters, &mut scratch) else { break };
             let gained = fit.cost - next.cost;
             fit = next;
             if gained < DECREASE_MIN {
@@ -148,21 +187,50 @@ impl FitProblem {
     /// Fits a model and the noise by turns.
     pub fn fit_with_noise(&self, model: &GrownModel, start: Vec<f64>, noise: Noise) -> Fit {
         let fit = self.fit(model, start, noise);
-        let noise = Noise::estimate(&self.runs, &fit.residuals, noise);
+        let scatter = RunScatter::updated(&fit.factors);
+        let residuals: Vec<Vec<f64>> = fit
+            .residuals
+            .iter()
+            .zip(&self.scatter_columns)
+            .zip(&fit.factors)
+            .map(|((residual, [force, resistance]), (factors, _))| {
+                let columns = force.iter().zip(resistance);
+                let less = residual.iter().zip(columns);
+                less.map(|(value, (f, r))| value - factors[0] * f - factors[1] * r).collect()
+            })
+            .collect();
+        let noise = Noise::estimate(&self.runs, &residuals, Noise { scatter, ..noise });
         self.fit(model, fit.theta, noise)
+    }
+
+    fn filters(&self, noise: Noise) -> Vec<RunFilters> {
+        self.runs
+            .iter()
+            .zip(&self.scatter_columns)
+            .map(|(run, columns)| {
+                let whitener = Whitener::new(run, noise);
+                let scatter = ScatterFilter::new(columns, &whitener, noise.scatter);
+                RunFilters { whitener, scatter }
+            })
+            .collect()
     }
 
     /// A step of Levenberg and Marquardt within the bounds, damped until the cost falls; `None`
     /// when no step promises or brings a decrease.
-    fn descend(&self, fit: &Fit, score: &DVector<f64>, scratch: &mut Scratch) -> Option<Fit> {
+    fn descend(
+        &self,
+        fit: &Fit,
+        score: &DVector<f64>,
+        filters: &[RunFilters],
+        scratch: &mut Scratch,
+    ) -> Option<Fit> {
         for damping in [0.0, 0.01, 0.3, 10.0, 300.0] {
             let (theta, promised) = self.bounded_step(fit, score, damping)?;
             if promised < DECREASE_MIN {
                 return None;
             }
-            if self.cost(&fit.model, &theta, &fit.whiteners, scratch) < fit.cost {
-                let whiteners = fit.whiteners.clone();
-                return Some(self.linearised(&fit.model, theta, fit.noise, whiteners, scratch));
+            if self.cost(&fit.model, &theta, filters, scratch) < fit.cost {
+                return Some(self.linearised(&fit.model, theta, fit.noise, filters, scratch));
             }
         }
         None
@@ -266,17 +334,16 @@ impl FitProblem {
         &self,
         model: &GrownModel,
         theta: &[f64],
-        whiteners: &[Whitener],
+        filters: &[RunFilters],
         scratch: &mut Scratch,
     ) -> f64 {
         let mut total = self.prior(model, theta).2;
-        for (run, whitener) in self.runs.iter().zip(whiteners) {
+        for (run, filters) in self.runs.iter().zip(filters) {
             model.predict_bins(run, theta, &mut scratch.forces, &mut scratch.bins);
             for (value, bin) in scratch.bins.iter_mut().zip(&run.bins) {
                 *value = bin.speed_mps - *value;
             }
-            whitener.whiten(&scratch.bins, &mut scratch.whitened);
-            total += whitener.minus_two_log_likelihood(&scratch.whitened);
+            total += filters.whitened(&scratch.bins, &mut scratch.whitened).cost;
         }
         total
     }
@@ -287,7 +354,7 @@ impl FitProblem {
         model: &GrownModel,
         theta: Vec<f64>,
         noise: Noise,
-        whiteners: Vec<Whitener>,
+        filters: &[RunFilters],
         scratch: &mut Scratch,
     ) -> Fit {
         let steps = self.difference_steps(model, &theta);
@@ -301,15 +368,16 @@ impl FitProblem {
             innovations: Vec::new(),
             columns: Vec::new(),
             residuals: Vec::new(),
-            whiteners: Vec::new(),
+            whiteners: filters.iter().map(|filters| filters.whitener.clone()).collect(),
+            filters: Vec::new(),
+            factors: Vec::new(),
             theta,
         };
-        for (run, whitener) in self.runs.iter().zip(&whiteners) {
+        for (run, filters) in self.runs.iter().zip(filters) {
             model.predict_bins(run, &fit.theta, &mut scratch.forces, &mut scratch.bins);
             let residual: Vec<f64> =
                 run.bins.iter().zip(&scratch.bins).map(|(bin, p)| bin.speed_mps - p).collect();
-            let mut innovations = Vec::new();
-            whitener.whiten(&residual, &mut innovations);
+            let whitened = filters.whitened(&residual, &mut scratch.whitened);
             let columns: Vec<Vec<f64>> = steps
                 .iter()
                 .enumerate()
@@ -321,19 +389,24 @@ impl FitProblem {
                         *moved = (*moved - base) / step;
                     }
                     let mut column = Vec::new();
-                    whitener.whiten(&scratch.moved, &mut column);
+                    filters.whitener.whiten(&scratch.moved, &mut column);
                     column
                 })
                 .collect();
-            let run_cost = whitener.minus_two_log_likelihood(&innovations);
+            let Whitened { innovations, filter, factors, cost: run_cost } = whitened;
             cost += run_cost;
-            fit.runs.push(normal_equations(&columns, &innovations, run_cost));
+            let free: Vec<Vec<f64>> = columns
+                .iter()
+                .map(|column| filter.remove(column, &filter.factors(column)))
+                .collect();
+            fit.runs.push(normal_equations(&columns, &free, &innovations, filter.weights(), run_cost));
             fit.innovations.push(innovations);
-            fit.columns.push(columns);
+            fit.columns.push(free);
             fit.residuals.push(residual);
+            fit.factors.push((factors, filter.covariance));
+            fit.filters.push(filter);
         }
         fit.cost = cost;
-        fit.whiteners = whiteners;
         fit
     }
 
@@ -350,16 +423,24 @@ impl FitProblem {
     }
 }
 
-fn normal_equations(columns: &[Vec<f64>], innovations: &[f64], cost: f64) -> RunNormal {
+/// `free` are the columns less what the run's own factors would explain.
+fn normal_equations(
+    columns: &[Vec<f64>],
+    free: &[Vec<f64>],
+    innovations: &[f64],
+    weights: &[f64],
+    cost: f64,
+) -> RunNormal {
     let count = columns.len();
-    let weights: Vec<f64> = innovations.iter().map(|&nu| robust_weight(nu)).collect();
+    let product = |one: &[f64], other: &[f64]| -> f64 {
+        one.iter().zip(other).zip(weights).map(|((one, other), weight)| weight * one * other).sum()
+    };
     let mut information = DMatrix::zeros(count, count);
     let mut score = DVector::zeros(count);
     for i in 0..count {
-        let weighted = |k: usize| weights[k] * columns[i][k];
-        score[i] = (0..weights.len()).map(|k| weighted(k) * innovations[k]).sum();
+        score[i] = product(&columns[i], innovations);
         for j in 0..=i {
-            let sum: f64 = (0..weights.len()).map(|k| weighted(k) * columns[j][k]).sum();
+            let sum = product(&columns[i], &free[j]);
             (information[(i, j)], information[(j, i)]) = (sum, sum);
         }
     }
@@ -376,13 +457,10 @@ fn pooled_way_ratio(runs: &[RunData]) -> Option<(f64, f64)> {
     }
     ratios.sort_unstable_by(f64::total_cmp);
     let middle = ratios.len() / 2;
-    let median = if ratios.len() % 2 == 1 {
-        ratios[middle]
-    } else {
-        0.5 * (ratios[middle - 1] + ratios[middle])
-    };
-    let mean_var: f64 = runs.iter().filter_map(|run| Some(run.way_ratio?.1.powi(2))).sum::<f64>()
-        / ratios.len() as f64;
+    let median =
+        if ratios.len() % 2 == 1 { ratios[middle] } else { 0.5 * (ratios[middle - 1] + ratios[middle]) };
+    let mean_var: f64 =
+        runs.iter().filter_map(|run| Some(run.way_ratio?.1.powi(2))).sum::<f64>() / ratios.len() as f64;
     let deviation = (mean_var / ratios.len() as f64 + COMMON * COMMON).sqrt();
     Some((median, deviation))
 }

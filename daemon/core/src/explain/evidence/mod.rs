@@ -12,8 +12,10 @@ mod fit;
 mod model;
 mod noise;
 mod run_data;
+mod run_scatter;
 
-pub use fit::{Fit, FitProblem, RunNormal, robust_weight};
+pub use fit::{Fit, FitProblem, RunNormal};
 pub use model::{GrownForces, GrownModel, SampleForces, SharedHypothesis};
 pub use noise::{Noise, Whitener};
+pub use run_scatter::{RunScatter, WeightedFilter};
 pub use run_data::{Bin, RunData, RunDataError, prepare};

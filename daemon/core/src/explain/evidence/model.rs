@@ -61,7 +61,8 @@ impl SampleForces {
     /// is c (v + w) |v + w|, whose sign is taken at that speed.
     #[inline]
     fn polynomial(&self, sample: &ResolvedSample, davis: Davis, speed_mps: f64) -> [f64; 3] {
-        let per_kg = 1.0 / (sample.mass_kg * self.mass_factor * (1.0 + self.rotating_mass_factor));
+        let per_kg =
+            1.0 / (sample.mass_kg * self.mass_factor * (1.0 + self.rotating_mass_factor));
         let weight_kn = sample.weight_kn * self.mass_factor;
         let c = davis.c + self.c_extra;
         let wind = self.headwind_mps;
@@ -70,8 +71,7 @@ impl SampleForces {
         let other_n_per_kn = self.gradient_permille + self.tied_n_per_kn + self.extra_n_per_kn;
         let force_n = self.traction_n - self.brake_n - self.extra_n;
         [
-            per_kg * (force_n - weight_kn * other_n_per_kn)
-                - factor * (davis.a + air * wind * wind),
+            per_kg * (force_n - weight_kn * other_n_per_kn) - factor * (davis.a + air * wind * wind),
             -factor * (davis.b + 2.0 * air * wind),
             -factor * air,
         ]
@@ -134,12 +134,9 @@ impl GrownModel {
         forces.polynomials.clear();
         let per_scale = 1.0 / forces.speed_scale;
         forces.polynomials.extend(
-            forces
-                .samples
-                .iter()
-                .zip(samples)
-                .zip(&run.smooth_mps)
-                .map(|((state, sample), speed)| state.polynomial(sample, davis, speed * per_scale)),
+            forces.samples.iter().zip(samples).zip(&run.smooth_mps).map(
+                |((state, sample), speed)| state.polynomial(sample, davis, speed * per_scale),
+            ),
         );
     }
 
@@ -153,25 +150,34 @@ impl GrownModel {
         bins: &mut Vec<f64>,
     ) {
         self.forces(run, theta, forces);
-        let (time_s, per_scale) = (run.recording.time_s(), 1.0 / forces.speed_scale);
-        bins.clear();
-        let mut segment = usize::MAX;
-        let (mut gained, mut last) = (0.0, (0.0, 0.0));
-        for bin in &run.bins {
-            let mut sum = 0.0;
-            for i in bin.first..bin.end {
-                let here = (time_s[i], forces.acceleration_mps2(i, run.smooth_mps[i] * per_scale));
-                if bin.segment == segment || i > bin.first {
-                    gained += 0.5 * (here.0 - last.0) * (here.1 + last.1);
-                } else {
-                    gained = 0.0;
-                }
-                last = here;
-                sum += gained;
+        let per_scale = 1.0 / forces.speed_scale;
+        let acceleration = |i: usize| {
+            forces.speed_scale * forces.acceleration_mps2(i, run.smooth_mps[i] * per_scale)
+        };
+        integrate_bins(run, acceleration, bins);
+    }
+}
+
+/// Integral of an acceleration in m/s² over each segment of motion, averaged over the bins.
+pub fn integrate_bins(run: &RunData, acceleration: impl Fn(usize) -> f64, bins: &mut Vec<f64>) {
+    let time_s = run.recording.time_s();
+    bins.clear();
+    let mut segment = usize::MAX;
+    let (mut gained, mut last) = (0.0, (0.0, 0.0));
+    for bin in &run.bins {
+        let mut sum = 0.0;
+        for i in bin.first..bin.end {
+            let here = (time_s[i], acceleration(i));
+            if bin.segment == segment || i > bin.first {
+                gained += 0.5 * (here.0 - last.0) * (here.1 + last.1);
+            } else {
+                gained = 0.0;
             }
-            segment = bin.segment;
-            bins.push(forces.speed_scale * sum / (bin.end - bin.first) as f64);
+            last = here;
+            sum += gained;
         }
+        segment = bin.segment;
+        bins.push(sum / (bin.end - bin.first) as f64);
     }
 }
 
@@ -194,3 +200,4 @@ impl ForceModel for GrownForces {
         self.speed_scale
     }
 }
+

@@ -1,6 +1,7 @@
 //! The process that is left when the model is right, and its whitening.
 
 use super::run_data::RunData;
+use super::run_scatter::RunScatter;
 
 /// Noise of the bins: white measurement noise, a white force, and a force that fades with a time
 /// constant (Ornstein-Uhlenbeck), as gusts or a rough map leave it.
@@ -14,24 +15,32 @@ pub struct Noise {
     pub fading_var: f64,
     /// Its time constant in s.
     pub fading_s: f64,
+    /// What differs from run to run.
+    pub scatter: RunScatter,
 }
 
 impl Noise {
     /// Where an estimation starts.
-    pub const START: Noise =
-        Noise { measurement_var: 1e-4, white_density: 1e-6, fading_var: 1e-5, fading_s: 20.0 };
+    pub const START: Noise = Noise {
+        measurement_var: 1e-4,
+        white_density: 1e-6,
+        fading_var: 1e-5,
+        fading_s: 20.0,
+        scatter: RunScatter::USUAL,
+    };
 
     fn to_logs(self) -> [f64; 4] {
         [self.measurement_var, self.white_density, self.fading_var, self.fading_s].map(f64::ln)
     }
 
-    fn from_logs(logs: [f64; 4]) -> Self {
+    fn from_logs(logs: [f64; 4], scatter: RunScatter) -> Self {
         let bounded = |value: f64, low: f64, high: f64| value.exp().clamp(low, high);
         Noise {
             measurement_var: bounded(logs[0], 1e-8, 1.0),
             white_density: bounded(logs[1], 1e-9, 1e-2),
             fading_var: bounded(logs[2], 1e-10, 1e-2),
             fading_s: bounded(logs[3], 4.0, 400.0),
+            scatter,
         }
     }
 
@@ -40,7 +49,7 @@ impl Noise {
     pub fn estimate(runs: &[RunData], residuals: &[Vec<f64>], start: Noise) -> Noise {
         let mut whitened = Vec::new();
         let mut cost = |logs: [f64; 4]| -> f64 {
-            let noise = Noise::from_logs(logs);
+            let noise = Noise::from_logs(logs, start.scatter);
             let outside: f64 = logs
                 .iter()
                 .zip(noise.to_logs())
@@ -54,7 +63,7 @@ impl Noise {
             }
             total
         };
-        Noise::from_logs(nelder_mead(start.to_logs(), &mut cost))
+        Noise::from_logs(nelder_mead(start.to_logs(), &mut cost), start.scatter)
     }
 }
 
@@ -80,7 +89,7 @@ impl Whitener {
     /// The filter of one run: level of the speed difference and fading acceleration. Each segment
     /// of motion starts with an unknown level; the fading acceleration lives through stops.
     pub fn new(run: &RunData, noise: Noise) -> Self {
-        let Noise { measurement_var, white_density, fading_var, fading_s } = noise;
+        let Noise { measurement_var, white_density, fading_var, fading_s, .. } = noise;
         // Covariance of (level, fading acceleration).
         let (mut pll, mut plf, mut pff) = (0.0, 0.0, fading_var);
         let mut log_determinant = 0.0;
@@ -145,8 +154,7 @@ impl Whitener {
 
     /// Robust -2 log likelihood of the innovations, up to a constant.
     pub fn minus_two_log_likelihood(&self, innovations: &[f64]) -> f64 {
-        self.log_determinant
-            + innovations.iter().map(|&nu| super::fit::robust_loss(nu)).sum::<f64>()
+        self.log_determinant + innovations.iter().map(|&nu| super::fit::robust_loss(nu)).sum::<f64>()
     }
 
     /// Innovations that carry information.

@@ -71,8 +71,12 @@ impl Search<'_> {
         let start = self.problem.start(&[]);
         let first = self.problem.fit_with_noise(&declared, start, Noise::START);
         let base = self.problem.fit_with_noise(&declared, first.theta, first.noise);
-        let mut outcome =
-            Outcome { base: base.clone(), fit: base, rounds: Vec::new(), not_testable: Vec::new() };
+        let mut outcome = Outcome {
+            base: base.clone(),
+            fit: base,
+            rounds: Vec::new(),
+            not_testable: Vec::new(),
+        };
         if outcome.base.observations() < OBSERVATIONS_MIN {
             return outcome;
         }
@@ -118,7 +122,8 @@ impl Search<'_> {
                 }
             }
         }
-        let by_evidence = |one: &Trial, other: &Trial| other.evidence.total_cmp(&one.evidence);
+        let by_evidence =
+            |one: &Trial, other: &Trial| other.evidence.total_cmp(&one.evidence);
         trials.sort_by(|one, other| by_evidence(&one.0, &other.0));
         let mut finished: Vec<Trial> = trials
             .into_iter()
@@ -183,7 +188,11 @@ impl Search<'_> {
 
     /// Whether the last effect of a trial is more than chance and large enough to matter.
     fn is_accepted(&self, base: &Fit, trial: &Trial) -> bool {
-        trial.evidence > ACCEPT && self.reduction(base, &trial.fit) > REDUCTION_MIN
+        let last = trial.fit.model.effects.len() - 1;
+        let parameters = trial.fit.effect_parameters(last);
+        trial.evidence > ACCEPT
+            && trial.fit.model.effects[last].is_material(parameters, trial.fit.theta[2])
+            && self.reduction(base, &trial.fit) > REDUCTION_MIN
     }
 
     /// Share of the open-loop error of the fit runs that the larger model takes away, over whole

@@ -1,0 +1,143 @@
+//! What differs from run to run without being an effect: the reading of the force sensors and the
+//! resistance of the day.
+//!
+//! Each run has a factor of its own on the control force and on the basic resistance, near 1 with
+//! a standard deviation that the runs tell themselves. They are integrated out of every fit, so
+//! that what is common to all runs is judged by the scatter between them.
+
+use nalgebra::{Matrix2, Vector2};
+
+use super::model::integrate_bins;
+use super::noise::Whitener;
+use super::run_data::RunData;
+use crate::train::Davis;
+
+/// Standard deviations of the runs' own factors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RunScatter {
+    /// Of the factor on the control force.
+    pub force: f64,
+    /// Of the factor on the basic resistance.
+    pub resistance: f64,
+}
+
+/// So many runs with the usual scatter are added to those seen.
+const PRIOR_RUNS: f64 = 4.0;
+/// Beyond these a factor is an effect and no scatter.
+const FORCE_MAX: f64 = 0.008;
+const RESISTANCE_MAX: f64 = 0.03;
+
+impl RunScatter {
+    /// What well-kept force sensors and ordinary weather give.
+    pub const USUAL: RunScatter = RunScatter { force: 0.003, resistance: 0.012 };
+
+    fn precision(self) -> Matrix2<f64> {
+        Matrix2::new(self.force.powi(-2), 0.0, 0.0, self.resistance.powi(-2))
+    }
+
+    /// The scatter under which the factors of the runs are likeliest (one step of expectation
+    /// maximisation), shrunk towards the usual one.
+    pub fn updated(factors: &[(Vector2<f64>, Matrix2<f64>)]) -> Self {
+        let usual = RunScatter::USUAL;
+        let count = factors.len() as f64 + PRIOR_RUNS;
+        let mean_square = |k: usize, usual: f64| {
+            let seen: f64 = factors.iter().map(|(u, m)| u[k] * u[k] + m[(k, k)]).sum();
+            ((seen + PRIOR_RUNS * usual * usual) / count).sqrt()
+        };
+        RunScatter {
+            force: mean_square(0, usual.force).min(FORCE_MAX),
+            resistance: mean_square(1, usual.resistance).min(RESISTANCE_MAX),
+        }
+    }
+}
+
+/// Speeds in m/s at the bins that a factor of 2 instead of 1 would add: control force, basic
+/// resistance.
+pub fn scatter_columns(run: &RunData, davis: Davis) -> [Vec<f64>; 2] {
+    let samples = run.samples();
+    let mut columns = [Vec::new(), Vec::new()];
+    let force = |i: usize| samples[i].control_force_n().unwrap_or(0.0) / samples[i].inertial_mass_kg;
+    integrate_bins(run, force, &mut columns[0]);
+    let resistance = |i: usize| {
+        let per_unit = samples[i].weight_kn / samples[i].inertial_mass_kg;
+        -per_unit * davis.w0_n_per_kn(run.smooth_mps[i])
+    };
+    integrate_bins(run, resistance, &mut columns[1]);
+    columns
+}
+
+/// Removes the runs' own factors from whitened series of one run.
+#[derive(Clone, Debug)]
+pub struct ScatterFilter {
+    columns: [Vec<f64>; 2],
+    precision: Matrix2<f64>,
+}
+
+/// The filter with the weights of the innovations.
+#[derive(Clone, Debug)]
+pub struct WeightedFilter {
+    columns: [Vec<f64>; 2],
+    weights: Vec<f64>,
+    /// Covariance of the factors after the run.
+    pub covariance: Matrix2<f64>,
+    /// Logarithm of the determinant that the factors add.
+    pub log_determinant: f64,
+}
+
+impl ScatterFilter {
+    /// The filter of a run from its columns under a noise.
+    pub fn new(columns: &[Vec<f64>; 2], whitener: &Whitener, scatter: RunScatter) -> Self {
+        let mut whitened = [Vec::new(), Vec::new()];
+        for (column, out) in columns.iter().zip(&mut whitened) {
+            whitener.whiten(column, out);
+        }
+        ScatterFilter { columns: whitened, precision: scatter.precision() }
+    }
+
+    /// The filter with given weights of the innovations.
+    pub fn weighted(&self, weights: Vec<f64>) -> WeightedFilter {
+        let product = |i: usize, j: usize| -> f64 {
+            let pairs = self.columns[i].iter().zip(&self.columns[j]).zip(&weights);
+            pairs.map(|((one, other), weight)| weight * one * other).sum()
+        };
+        let cross = product(0, 1);
+        let information =
+            self.precision + Matrix2::new(product(0, 0), cross, cross, product(1, 1));
+        // A sum of a positive definite and a positive semidefinite matrix.
+        let covariance = information.try_inverse().unwrap_or_else(Matrix2::zeros);
+        let log_determinant = (information.determinant() / self.precision.determinant()).ln();
+        WeightedFilter { columns: self.columns.clone(), weights, covariance, log_determinant }
+    }
+
+    /// Cost of the factors themselves.
+    pub fn prior_cost(&self, factors: &Vector2<f64>) -> f64 {
+        factors.dot(&(self.precision * factors))
+    }
+}
+
+impl WeightedFilter {
+    /// The factors, less 1, that fit a whitened series best.
+    pub fn factors(&self, series: &[f64]) -> Vector2<f64> {
+        let product = |column: &[f64]| -> f64 {
+            column.iter().zip(series).zip(&self.weights).map(|((c, s), w)| w * c * s).sum()
+        };
+        self.covariance * Vector2::new(product(&self.columns[0]), product(&self.columns[1]))
+    }
+
+    /// The series less what the factors explain.
+    pub fn remove(&self, series: &[f64], factors: &Vector2<f64>) -> Vec<f64> {
+        let columns = self.columns[0].iter().zip(&self.columns[1]);
+        series
+            .iter()
+            .zip(columns)
+            .map(|(value, (force, resistance))| {
+                value - factors[0] * force - factors[1] * resistance
+            })
+            .collect()
+    }
+
+    /// Weights of the innovations.
+    pub fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+}
