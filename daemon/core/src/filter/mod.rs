@@ -5,6 +5,7 @@
 
 mod bounded;
 mod information;
+mod joint_state;
 mod line;
 mod median;
 mod mils;
@@ -13,6 +14,7 @@ mod whitening;
 
 pub use bounded::{Bounded, bounded_minimum};
 pub use information::SquareRootInformation;
+pub use joint_state::JointState;
 pub use line::Line;
 pub use median::RunningMedian;
 pub use mils::{Mils, Penalty};

@@ -10,7 +10,7 @@ use serde::Deserialize;
 use super::Estimator;
 use super::echo::Echo;
 use super::resistance;
-use super::resistance::settings::{LsSettings, MilsSettings, RlsSettings};
+use super::resistance::settings::{KalmanSettings, LsSettings, MilsSettings, RlsSettings};
 use crate::train::TrainModel;
 
 /// A setting outside its allowed range.
@@ -60,6 +60,8 @@ pub enum EstimatorSettings {
     Mils(MilsSettings),
     /// Interval-varying, regularised multi-innovation least squares.
     VMils(MilsSettings),
+    /// Robust resistance filter with a disturbance state.
+    ResistanceKalman(KalmanSettings),
 }
 
 impl EstimatorSettings {
@@ -74,6 +76,9 @@ impl EstimatorSettings {
             }
             PipelineKind::Mils => Some(EstimatorSettings::Mils(MilsSettings::default())),
             PipelineKind::VMils => Some(EstimatorSettings::VMils(MilsSettings::default())),
+            PipelineKind::ResistanceKalman => {
+                Some(EstimatorSettings::ResistanceKalman(KalmanSettings::default()))
+            }
             _ => None,
         }
     }
@@ -87,6 +92,7 @@ impl EstimatorSettings {
             EstimatorSettings::RegularisedRls(_) => PipelineKind::RegularisedRls,
             EstimatorSettings::Mils(_) => PipelineKind::Mils,
             EstimatorSettings::VMils(_) => PipelineKind::VMils,
+            EstimatorSettings::ResistanceKalman(_) => PipelineKind::ResistanceKalman,
         }
     }
 
@@ -106,6 +112,9 @@ impl EstimatorSettings {
             EstimatorSettings::Mils(settings) => Ok(Box::new(resistance::mils(train, settings)?)),
             EstimatorSettings::VMils(settings) => {
                 Ok(Box::new(resistance::v_mils(train, settings)?))
+            }
+            EstimatorSettings::ResistanceKalman(settings) => {
+                Ok(Box::new(resistance::kalman(train, settings)?))
             }
         }
     }
