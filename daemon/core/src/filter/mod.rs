@@ -9,6 +9,7 @@
 //! - [`levenberg_marquardt`]: small nonlinear least squares in a box
 //! - [`square_root`]: covariance as a triangular factor, updated by one measurement at a time
 //! - [`drifting_level`]: least squares beside a level that may drift, as square-root information
+//! - `joint_state`: a state beside constant parameters, in square-root form
 //! - [`joseph`]: a small Kalman filter in Joseph's form
 //! - [`kalman`]: Gaussian state, scalar measurements in Joseph form
 //! - [`fixed_lag`]: what later measurements say of an earlier state, without a backward pass
@@ -24,6 +25,7 @@ pub mod joseph;
 pub mod kalman;
 pub mod lanes;
 pub mod levenberg_marquardt;
+mod joint_state;
 mod line;
 mod median;
 mod mils;
@@ -39,6 +41,7 @@ pub use bounded::{Bounded, bounded_minimum};
 pub use drifting_level::DriftingLevel;
 pub use information::SquareRootInformation;
 pub use joseph::JosephFilter;
+pub use joint_state::JointState;
 pub use line::Line;
 pub use median::RunningMedian;
 pub use mils::{Mils, Penalty};

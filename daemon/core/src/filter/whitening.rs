@@ -66,6 +66,15 @@ impl<const S: usize, const C: usize> Whitener<S, C> {
         self.covariance = (moved + moved.transpose()) * 0.5;
     }
 
+    /// Adds variance to state `i`: it may have jumped.
+    ///
+    /// # Panics
+    ///
+    /// When there is no state `i`.
+    pub fn loosen(&mut self, i: usize, variance: f64) {
+        self.covariance[(i, i)] += variance;
+    }
+
     /// The innovation's columns and its variance, before [`Whitener::correct`].
     pub fn innovation(&self, sighting: &Sighting<S, C>) -> (SVector<f64, C>, f64) {
         let predicted = self.state.transpose() * sighting.direction;

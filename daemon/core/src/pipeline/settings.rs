@@ -15,7 +15,7 @@ use super::mass::{
     StagedDescentSettings,
 };
 use super::resistance;
-use super::resistance::settings::{LsSettings, MilsSettings, RlsSettings};
+use super::resistance::settings::{KalmanSettings, LsSettings, MilsSettings, RlsSettings};
 use crate::train::TrainModel;
 
 /// A setting outside its allowed range.
@@ -121,6 +121,8 @@ estimator_kinds! {
     Mils(MilsSettings) = Mils, |s, t| boxed(resistance::mils(t, s));
     /// Interval-varying, regularised multi-innovation least squares.
     VMils(MilsSettings) = VMils, |s, t| boxed(resistance::v_mils(t, s));
+    /// Robust Kalman filter of resistance beside a disturbance.
+    ResistanceKalman(KalmanSettings) = ResistanceKalman, |s, t| boxed(resistance::kalman(t, s));
     /// Staged gradient descent for resistance and mass.
     StagedDescent(StagedDescentSettings) = StagedDescent, |s, t| boxed(StagedDescent::new(*s, t));
     /// Joint integral least squares for resistance and mass.

@@ -12,7 +12,7 @@ use dynocar_shared::RejectionReason;
 use super::regression::{CoastingSegment, Columns, PARAMETERS, SPEED_SCALE_MPS};
 use super::sample::{SpeedWatch, UnitSample, resistance_integral, trapezoids};
 use super::settings::DataSettings;
-use super::speed::SpeedVerdict;
+use super::speed::{SpeedNoise, SpeedVerdict};
 use crate::filter::Line;
 use crate::train::Davis;
 
@@ -59,6 +59,11 @@ impl CoastingSegments {
     /// A builder without samples.
     pub fn new(settings: DataSettings) -> Self {
         CoastingSegments { settings, watch: SpeedWatch::new(settings.spike_mps), chain: None }
+    }
+
+    /// Noise of the speed so far.
+    pub fn noise(&self) -> &SpeedNoise {
+        &self.watch.noise
     }
 
     /// Ends the chain: the next sample starts a new one.
@@ -154,6 +159,7 @@ impl Chain {
             row_before: row_before.unwrap_or_default(),
             variance: now.inertia.powi(2) * speed_variance / before.spread(&closed),
             step_s: closed.start_s - before.start_s,
+            time_ns: now.time_ns,
             speed_mps: row[2] * SPEED_SCALE_MPS,
         })
     }

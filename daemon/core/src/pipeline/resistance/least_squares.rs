@@ -7,10 +7,11 @@ use super::coasting::CoastingSegments;
 use super::momentum::MomentumBlocks;
 use super::noise_bank::{NoiseBank, WhiteRow};
 use super::regression::{Observation, PARAMETERS, Unknowns, scaled, unscaling};
-use super::report::{DrivenSpeeds, Report};
+use super::report::{DrivenSpeeds, Evidence, Report};
 use super::sample::UnitSample;
 use super::settings::{DataSettings, DataSource};
 use super::solver::{Solution, Solver, bank_penalty};
+use super::speed::SpeedNoise;
 use crate::filter::RunningMedian;
 use crate::force::ResolvedSample;
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
@@ -27,13 +28,15 @@ const SCALE_ROWS_MIN: usize = 8;
 const NORMAL_MEDIAN: f64 = 0.6745;
 /// Robust standard deviations beyond which a row is refused.
 const REFUSED_BEYOND: f64 = 5.0;
+/// Rows refused one after the other before a force is taken to have come to stay.
+const REFUSALS_BEFORE_JUMP: u32 = 3;
 /// Rows before the solution replaces the declared resistance in telling outliers.
 const ROWS_BEFORE_OWN: f64 = 12.0;
 
 #[derive(Clone, Debug)]
 enum Source {
     Momentum(MomentumBlocks),
-    Coasting(CoastingSegments),
+    Coasting(Box<CoastingSegments>),
 }
 
 /// Davis coefficients by one of the least-squares recursions of Liu 2018.
@@ -57,6 +60,8 @@ pub struct ResistanceLeastSquares {
     speeds: DrivenSpeeds,
     report: Report,
     obstacle: Option<Reason>,
+    refused_in_a_row: u32,
+    jump_n_per_kn: Option<f64>,
     disturbance: (f64, f64),
     weight_kn: f64,
     resets: u64,
@@ -80,7 +85,7 @@ impl ResistanceLeastSquares {
             settings,
             source: match settings.source {
                 DataSource::Momentum => Source::Momentum(MomentumBlocks::new(settings)),
-                DataSource::Coasting => Source::Coasting(CoastingSegments::new(settings)),
+                DataSource::Coasting => Source::Coasting(Box::new(CoastingSegments::new(settings))),
             },
             bank,
             fresh: solver.clone(),
@@ -94,6 +99,8 @@ impl ResistanceLeastSquares {
             speeds: DrivenSpeeds::default(),
             report: Report::unestimated(&declared, Reason::TooFewSamples),
             obstacle: None,
+            refused_in_a_row: 0,
+            jump_n_per_kn: None,
             disturbance: (0.0, 0.0),
             weight_kn: TrainModel::weight_kn(train.mass_kg),
             resets: 0,
@@ -125,7 +132,7 @@ impl ResistanceLeastSquares {
 
     /// The innovation of a row over its standard deviation.
     fn normalised(&self, row: &WhiteRow) -> f64 {
-        let own = self.solution.filter(|_| self.bank.count() >= ROWS_BEFORE_OWN);
+        let own = self.solution.filter(|_| self.is_warm());
         let Solution { estimate, covariance } = own.unwrap_or(self.declared);
         let variance = 1.0 + row.features.dot(&(covariance * row.features));
         (row.observed - row.features.dot(&estimate)) / variance.sqrt()
@@ -146,11 +153,10 @@ impl ResistanceLeastSquares {
         let is_bad = normalised.abs() > self.solver.bad_beyond(REFUSED_BEYOND) * self.robust_std();
         self.refused_share += (f64::from(is_bad) - self.refused_share) / f64::from(MONITOR_ROWS);
         if is_bad {
-            self.bank.refuse(observation);
-            self.solver.skip();
-            self.monitor.break_here();
+            self.refuse(observation, &row);
             return Outcome::Rejected(RejectionReason::Outlier);
         }
+        self.refused_in_a_row = 0;
         let is_other_noise = self.bank.accept(observation);
         if self.solver.take(&row).is_err() {
             self.reset();
@@ -159,12 +165,29 @@ impl ResistanceLeastSquares {
         if is_other_noise {
             self.solver.restart(&self.bank);
         }
-        if self.bank.count() >= ROWS_BEFORE_OWN {
+        if self.is_warm() {
             self.monitor.push(normalised);
         }
         self.speeds.push(speed_mps);
         self.judge();
         Outcome::Updated
+    }
+
+    /// Leaves a row out. After a few in a row it is a force that has come to stay: the
+    /// disturbance is let go, and the next rows tell how large it is.
+    fn refuse(&mut self, observation: &Observation, row: &WhiteRow) {
+        self.bank.refuse(observation);
+        self.solver.skip();
+        self.monitor.break_here();
+        self.refused_in_a_row += 1;
+        let estimate = self.solution.unwrap_or(self.declared).estimate;
+        let rest = row.observed - row.features.dot(&estimate);
+        let jump_n_per_kn = rest / row.features[0];
+        if self.refused_in_a_row >= REFUSALS_BEFORE_JUMP && jump_n_per_kn.is_finite() {
+            self.refused_in_a_row = 0;
+            self.bank.loosen(jump_n_per_kn);
+            self.jump_n_per_kn = Some(jump_n_per_kn);
+        }
     }
 
     /// Robust standard deviation of the normalised innovations, never below 1.
@@ -180,22 +203,77 @@ impl ResistanceLeastSquares {
         }
     }
 
+    /// The noise bank.
+    pub(super) fn bank(&self) -> &NoiseBank {
+        &self.bank
+    }
+
+    /// The declared resistance as a start.
+    pub(super) fn declared(&self) -> &Solution {
+        &self.declared
+    }
+
+    /// The report on its own solution.
+    pub(super) fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// Noise of the speed so far.
+    pub(super) fn speed_noise(&self) -> &SpeedNoise {
+        match &self.source {
+            Source::Momentum(blocks) => blocks.noise(),
+            Source::Coasting(segments) => segments.noise(),
+        }
+    }
+
+    /// Weight in kN of the newest sample's train.
+    pub(super) fn weight_kn(&self) -> f64 {
+        self.weight_kn
+    }
+
+    /// True when the newest row was refused.
+    pub(super) fn has_refused_row(&self) -> bool {
+        self.refused_in_a_row > 0 || self.jump_n_per_kn.is_some()
+    }
+
+    /// How far the disturbance has been let go by the newest sample, in N/kN.
+    pub(super) fn jump_n_per_kn(&self) -> Option<f64> {
+        self.jump_n_per_kn
+    }
+
+    /// True once there are rows enough for an own solution.
+    pub(super) fn is_warm(&self) -> bool {
+        self.bank.count() >= ROWS_BEFORE_OWN
+    }
+
+    /// Judges a solution from the same samples, with the disturbance now and its standard
+    /// deviation in N/kN.
+    pub(super) fn judged(
+        &self,
+        solution: &Solution,
+        monitor: &InnovationMonitor,
+        disturbance: (f64, f64),
+    ) -> Option<Report> {
+        let evidence = Evidence {
+            disturbed: self.bank.disturbed(),
+            disturbance_n_per_kn: disturbance.0,
+            disturbance_std_n_per_kn: disturbance.1,
+            innovations: monitor,
+            speeds: &self.speeds,
+            rows: self.bank.count(),
+            refused_share: self.refused_share,
+        };
+        Report::judge(solution, &evidence)
+    }
+
     fn judge(&mut self) {
         self.solution = self.solver.solution(&self.bank);
         let Some(solution) = self.solution else { return };
         self.disturbance = self.bank.disturbance(&solution.estimate);
-        let judged = Report::judge(
-            &solution,
-            &self.bank.disturbed(),
-            &self.monitor,
-            &self.speeds,
-            self.bank.count(),
-            self.refused_share,
-        );
-        match judged {
+        match self.judged(&solution, &self.monitor, self.disturbance) {
             Some(report) => {
                 self.report = report;
-                if self.bank.count() >= ROWS_BEFORE_OWN {
+                if self.is_warm() {
                     self.known = report.davis();
                 }
             }
@@ -216,6 +294,41 @@ impl ResistanceLeastSquares {
     }
 }
 
+impl ResistanceLeastSquares {
+    /// Writes a report on these samples.
+    pub(super) fn write_with(
+        &self,
+        report: &Report,
+        monitor: &InnovationMonitor,
+        snapshot: &mut ParameterSnapshot,
+    ) {
+        let reason = match self.obstacle {
+            // Without a single row, what is missing tells more than that rows are few.
+            Some(obstacle) if self.bank.count() == 0.0 => obstacle,
+            _ => report.reason,
+        };
+        write_status(snapshot, report.status, reason);
+        let factors = unscaling();
+        let covariance =
+            Matrix3::from_diagonal(&factors) * report.covariance * Matrix3::from_diagonal(&factors);
+        write_parameters(
+            snapshot,
+            [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC],
+            &report.estimate.component_mul(&factors),
+            &covariance,
+        );
+        write_innovations(snapshot, monitor);
+        snapshot.generation = self.resets;
+        snapshot.excited = report.excited;
+        snapshot.missing_manoeuvres = report.missing_manoeuvres;
+        // The disturbance acts against the motion as resistance does.
+        snapshot.unexplained_force_n = self.disturbance.0 * self.weight_kn;
+        snapshot.unexplained_force_std_n = self.disturbance.1 * self.weight_kn;
+        snapshot.speed_min_mps = self.speeds.min_mps;
+        snapshot.speed_max_mps = self.speeds.max_mps;
+    }
+}
+
 impl Estimator for ResistanceLeastSquares {
     fn kind(&self) -> PipelineKind {
         self.kind
@@ -223,6 +336,7 @@ impl Estimator for ResistanceLeastSquares {
 
     fn update(&mut self, sample: &ResolvedSample) -> Outcome {
         self.weight_kn = sample.weight_kn;
+        self.jump_n_per_kn = None;
         let observed = UnitSample::of(sample).and_then(|now| self.observe(&now));
         match observed {
             Ok(observation) => {
@@ -248,31 +362,7 @@ impl Estimator for ResistanceLeastSquares {
     }
 
     fn write(&self, snapshot: &mut ParameterSnapshot) {
-        let report = &self.report;
-        let reason = match self.obstacle {
-            // Without a single row, what is missing tells more than that rows are few.
-            Some(obstacle) if self.bank.count() == 0.0 => obstacle,
-            _ => report.reason,
-        };
-        write_status(snapshot, report.status, reason);
-        let factors = unscaling();
-        let covariance =
-            Matrix3::from_diagonal(&factors) * report.covariance * Matrix3::from_diagonal(&factors);
-        write_parameters(
-            snapshot,
-            [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC],
-            &report.estimate.component_mul(&factors),
-            &covariance,
-        );
-        write_innovations(snapshot, &self.monitor);
-        snapshot.generation = self.resets;
-        snapshot.excited = report.excited;
-        snapshot.missing_manoeuvres = report.missing_manoeuvres;
-        // The disturbance acts against the motion as resistance does.
-        snapshot.unexplained_force_n = self.disturbance.0 * self.weight_kn;
-        snapshot.unexplained_force_std_n = self.disturbance.1 * self.weight_kn;
-        snapshot.speed_min_mps = self.speeds.min_mps;
-        snapshot.speed_max_mps = self.speeds.max_mps;
+        self.write_with(&self.report, &self.monitor, snapshot);
     }
 }
 

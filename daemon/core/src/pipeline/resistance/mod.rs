@@ -8,8 +8,10 @@
 //! - `solver`: the recursions
 //! - `report`: bounds, excitation, status
 //! - `least_squares`: the pipeline around all of it
+//! - `kalman`: the robust filter over every sample, with a least-squares pipeline beside it
 
 mod coasting;
+mod kalman;
 mod least_squares;
 mod momentum;
 mod noise_bank;
@@ -17,14 +19,19 @@ mod regression;
 mod report;
 mod sample;
 pub mod settings;
+#[cfg(test)]
+mod simulation;
 mod solver;
 mod speed;
+#[cfg(test)]
+mod tests;
 
+pub use kalman::ResistanceKalman;
 pub use least_squares::ResistanceLeastSquares;
 
 use dynocar_shared::PipelineKind;
 
-use self::settings::{LsSettings, MilsSettings, RlsSettings};
+use self::settings::{KalmanSettings, LsSettings, MilsSettings, RlsSettings};
 use self::solver::Solver;
 use super::settings::SettingError;
 use crate::train::TrainModel;
@@ -96,6 +103,20 @@ pub fn v_mils(
     settings: &MilsSettings,
 ) -> Result<ResistanceLeastSquares, SettingError> {
     regularised(PipelineKind::VMils, train, settings, Solver::v_mils(settings))
+}
+
+/// A robust Kalman filter with a disturbance state.
+///
+/// # Errors
+///
+/// When a setting lies outside its range.
+pub fn kalman(
+    train: &TrainModel,
+    settings: &KalmanSettings,
+) -> Result<ResistanceKalman, SettingError> {
+    settings.check()?;
+    let beside = ls(train, &LsSettings { data: settings.data, ..LsSettings::default() })?;
+    Ok(ResistanceKalman::new(train, *settings, beside))
 }
 
 fn regularised(

@@ -11,7 +11,7 @@ use dynocar_shared::RejectionReason;
 use super::regression::{BRAKE_SCALE, Columns, FORCE_DELAY, MomentumBlock, TRACTION_SCALE};
 use super::sample::{SpeedWatch, UnitSample, resistance_integral, trapezoids};
 use super::settings::DataSettings;
-use super::speed::SpeedVerdict;
+use super::speed::{SpeedNoise, SpeedVerdict};
 use crate::filter::Line;
 use crate::train::Davis;
 
@@ -56,6 +56,11 @@ impl MomentumBlocks {
     /// A builder without samples.
     pub fn new(settings: DataSettings) -> Self {
         MomentumBlocks { settings, watch: SpeedWatch::new(settings.spike_mps), chain: None }
+    }
+
+    /// Noise of the speed so far.
+    pub fn noise(&self) -> &SpeedNoise {
+        &self.watch.noise
     }
 
     /// Ends the chain: the next sample starts a new one.
@@ -148,6 +153,7 @@ impl Chain {
             momentum_variance: inertia * inertia * speed_variance,
             impulse: mean_integral,
             impulse_variance: 0.5 * (variance + self.variance_before.unwrap_or(variance)),
+            time_ns: self.last.time_ns,
             speed_mps: block.speed_sum / count,
         };
         self.integral -= mean_integral;

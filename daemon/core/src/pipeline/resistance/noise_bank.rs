@@ -9,7 +9,8 @@
 use nalgebra::SMatrix;
 
 use super::regression::{
-    Disturbance, Observation, RowWhitener, UNKNOWNS, Unknowns, disturbance_of,
+    Disturbance, Observation, PARAMETERS, RowWhitener, UNKNOWNS, Unknowns, disturbance_of,
+    loosen_disturbance,
 };
 use super::solver::Solution;
 use crate::filter::SquareRootInformation;
@@ -55,6 +56,17 @@ pub struct Disturbed {
     pub evidence: f64,
 }
 
+/// The likeliest noise model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LikeliestNoise {
+    /// Its place in the bank.
+    pub member: usize,
+    /// Its disturbance, scaled as the rows say.
+    pub disturbance: Disturbance,
+    /// Variance of its rows: 1 when all is as modelled.
+    pub scale: f64,
+}
+
 /// Disturbance models side by side.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NoiseBank {
@@ -63,6 +75,8 @@ pub struct NoiseBank {
     forgetting: f64,
     likeliest: usize,
     rows_since_renewal: u32,
+    last_time_ns: Option<i64>,
+    mixture: Option<Solution>,
 }
 
 impl NoiseBank {
@@ -87,6 +101,8 @@ impl NoiseBank {
             forgetting,
             likeliest: LIKELIEST_AT_FIRST,
             rows_since_renewal: 0,
+            last_time_ns: None,
+            mixture: None,
         }
     }
 
@@ -102,8 +118,13 @@ impl NoiseBank {
     ///
     /// Bounded work, no allocation.
     pub fn predict(&mut self, observation: &Observation) -> Option<WhiteRow> {
+        let gap_s = self
+            .last_time_ns
+            .replace(observation.time_ns())
+            .map(|last_ns| observation.time_ns().saturating_sub(last_ns) as f64 * 1e-9)
+            .filter(|&gap_s| gap_s > 0.0);
         if observation.is_first() {
-            self.restart(observation);
+            self.restart(observation, gap_s);
             if matches!(observation, Observation::Block(_)) {
                 return None;
             }
@@ -135,6 +156,7 @@ impl NoiseBank {
         }
         let before = self.likeliest;
         self.weigh();
+        self.mixture = self.mix();
         before != self.likeliest
     }
 
@@ -148,13 +170,21 @@ impl NoiseBank {
     /// whose momentum may have truly changed.
     pub fn refuse(&mut self, observation: &Observation) {
         if matches!(observation, Observation::Block(_)) {
-            self.restart(observation);
+            self.restart(observation, Some(0.0));
         }
     }
 
-    fn restart(&mut self, observation: &Observation) {
+    /// Lets the disturbance have jumped, by so much in N/kN.
+    pub fn loosen(&mut self, std_n_per_kn: f64) {
         for member in &mut self.members {
-            member.whitener = observation.start(&member.disturbance);
+            let root = member.scale().sqrt();
+            loosen_disturbance(&mut member.whitener, std_n_per_kn / root);
+        }
+    }
+
+    fn restart(&mut self, observation: &Observation, gap_s: Option<f64>) {
+        for member in &mut self.members {
+            member.whitener.propagate(&observation.restart(&member.disturbance, gap_s));
         }
     }
 
@@ -163,11 +193,29 @@ impl NoiseBank {
         self.members[0].information.count()
     }
 
-    /// What widens the variance of an estimate from these rows, since their own variance is
-    /// estimated; `None` while that has no freedom.
+    /// The likeliest noise model.
+    pub fn likeliest_noise(&self) -> LikeliestNoise {
+        let member = &self.members[self.likeliest];
+        let scale = member.scale();
+        let std_n_per_kn = member.disturbance.std_n_per_kn * scale.sqrt();
+        LikeliestNoise {
+            member: self.likeliest,
+            disturbance: Disturbance { std_n_per_kn, time_s: member.disturbance.time_s },
+            scale,
+        }
+    }
+
+    /// What widens the covariance of an estimate from the likeliest member's rows, for the noise
+    /// is itself estimated: the mean ratio of the mixture's variances of a, b, c to that
+    /// member's. `None` while there is no mixture.
     pub fn interval_factor(&self) -> Option<f64> {
-        let freedom = self.freedom();
-        (freedom >= 1.0).then(|| student_factor(freedom + PRIOR_ROWS))
+        let davis = |solution: &Solution| {
+            solution.covariance.fixed_view::<PARAMETERS, PARAMETERS>(0, 0).into_owned()
+        };
+        let mixed = davis(self.mixture.as_ref()?);
+        let own = davis(&self.likeliest_solution()?).cholesky()?;
+        let ratio = own.solve(&mixed).trace() / PARAMETERS as f64;
+        Some(ratio.max(student_factor(self.freedom() + PRIOR_ROWS)))
     }
 
     /// The disturbance now, in N/kN for given parameters and their covariance, with its
@@ -179,11 +227,12 @@ impl NoiseBank {
     }
 
     /// The mixture of all members; `None` while the rows do not determine the parameters.
-    ///
-    /// # Real-time
-    ///
-    /// One small factorisation for each member of weight, no allocation.
     pub fn mixture(&self) -> Option<Solution> {
+        self.mixture
+    }
+
+    /// One small factorisation for each member of weight.
+    fn mix(&self) -> Option<Solution> {
         let factor = student_factor(self.freedom() + PRIOR_ROWS);
         let mut estimate = Unknowns::zeros();
         let mut second = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();

@@ -78,6 +78,8 @@ pub struct MomentumBlock {
     pub impulse: Columns,
     /// Variance of the integral of f.
     pub impulse_variance: f64,
+    /// Time of the newest sample in ns.
+    pub time_ns: i64,
     /// Mean speed in m/s.
     pub speed_mps: f64,
 }
@@ -95,6 +97,8 @@ pub struct CoastingSegment {
     pub variance: f64,
     /// Time in s from the segment before.
     pub step_s: f64,
+    /// Time of the newest sample in ns.
+    pub time_ns: i64,
     /// Mean speed in m/s.
     pub speed_mps: f64,
 }
@@ -121,44 +125,58 @@ impl Observation {
         }
     }
 
-    /// A whitener at this observation, the first of a chain; a block is then used up.
-    pub fn start(&self, disturbance: &Disturbance) -> RowWhitener {
-        let mut state = SMatrix::zeros();
-        let mut covariance = SMatrix::zeros();
-        covariance[(DISTURBANCE, DISTURBANCE)] = disturbance.std_n_per_kn.powi(2);
+    /// Time of the newest sample in ns.
+    pub fn time_ns(&self) -> i64 {
         match self {
-            Observation::Block(block) => {
-                state[(MOMENTUM, 0)] = block.momentum;
-                covariance[(MOMENTUM, MOMENTUM)] = block.momentum_variance;
-            }
-            // No segment before, so nothing is brought over.
-            Observation::Segment(_) => {}
+            Observation::Block(block) => block.time_ns,
+            Observation::Segment(segment) => segment.time_ns,
         }
-        Whitener::new(state, covariance)
+    }
+
+    /// How the error moves to the first observation of a chain: momentum is new, and the
+    /// disturbance has gone on for `gap_s`; unknown for how long when `None`. A block is used up
+    /// by it.
+    pub fn restart(
+        &self,
+        disturbance: &Disturbance,
+        gap_s: Option<f64>,
+    ) -> Propagation<STATES, COLUMNS> {
+        let mut step = self.decay(disturbance, gap_s.unwrap_or(f64::INFINITY));
+        if let Observation::Block(block) = self {
+            step.input[(MOMENTUM, 0)] = block.momentum;
+            step.noise[(MOMENTUM, MOMENTUM)] = block.momentum_variance;
+        }
+        step
     }
 
     /// How the error moves from the observation before to this one.
     pub fn propagation(&self, disturbance: &Disturbance) -> Propagation<STATES, COLUMNS> {
-        let mut step: Propagation<STATES, COLUMNS> = Propagation {
-            transition: SMatrix::zeros(),
-            input: SMatrix::zeros(),
-            noise: SMatrix::zeros(),
-        };
-        let duration_s = match self {
+        match self {
             Observation::Block(block) => {
+                let mut step = self.decay(disturbance, block.impulse[1]);
                 step.transition[(MOMENTUM, MOMENTUM)] = 1.0;
+                step.transition[(MOMENTUM, DISTURBANCE)] = -block.impulse[1];
                 step.input.set_row(MOMENTUM, &block.impulse.transpose());
                 step.noise[(MOMENTUM, MOMENTUM)] = block.impulse_variance;
-                step.transition[(MOMENTUM, DISTURBANCE)] = -block.impulse[1];
-                block.impulse[1]
+                step
             }
             Observation::Segment(segment) => {
                 // The new error of the row before is that row less its other parts.
+                let mut step = self.decay(disturbance, segment.step_s);
                 step.transition[(MOMENTUM, MOMENTUM)] = -OVERLAP;
                 step.transition[(MOMENTUM, DISTURBANCE)] = -OVERLAP;
                 step.input.set_row(MOMENTUM, &(segment.row_before * OVERLAP).transpose());
-                segment.step_s
+                step
             }
+        }
+    }
+
+    /// The disturbance over a time, and nothing else.
+    fn decay(&self, disturbance: &Disturbance, duration_s: f64) -> Propagation<STATES, COLUMNS> {
+        let mut step = Propagation {
+            transition: SMatrix::<f64, STATES, STATES>::zeros(),
+            input: SMatrix::zeros(),
+            noise: SMatrix::zeros(),
         };
         let kept = (-duration_s / disturbance.time_s).exp();
         step.transition[(DISTURBANCE, DISTURBANCE)] = kept;
@@ -182,6 +200,11 @@ impl Observation {
             },
         }
     }
+}
+
+/// Lets the disturbance have jumped, by so much in N/kN.
+pub fn loosen_disturbance(whitener: &mut RowWhitener, std_n_per_kn: f64) {
+    whitener.loosen(DISTURBANCE, std_n_per_kn * std_n_per_kn);
 }
 
 /// The disturbance in N/kN for given parameters, with its variance in units of the errors'.

@@ -20,6 +20,8 @@ const EXCITED_SHARE: f64 = 0.25;
 const DISTURBANCE_SHARE_MAX: f64 = 0.1;
 /// Twice the log-likelihood ratio beyond which that force is no chance.
 const DISTURBANCE_EVIDENCE_MIN: f64 = 10.0;
+/// Standard deviations beyond which the force now is no chance.
+const DISTURBANCE_STDS_MAX: f64 = 4.0;
 /// Mean square of normalised innovations beyond which they are too large.
 const MEAN_SQUARE_MAX: f64 = 4.0;
 /// Innovations before their mean square counts.
@@ -53,6 +55,25 @@ impl DrivenSpeeds {
     pub fn mean_mps(&self) -> f64 {
         if self.count > 0.0 { self.sum_mps / self.count } else { 0.0 }
     }
+}
+
+/// What speaks for and against a solution.
+#[derive(Clone, Copy, Debug)]
+pub struct Evidence<'a> {
+    /// The slow force that the model does not know, over all rows.
+    pub disturbed: Disturbed,
+    /// That force now, retarding, in N/kN.
+    pub disturbance_n_per_kn: f64,
+    /// Its standard deviation now.
+    pub disturbance_std_n_per_kn: f64,
+    /// Innovation statistics.
+    pub innovations: &'a InnovationMonitor,
+    /// Speeds behind the rows.
+    pub speeds: &'a DrivenSpeeds,
+    /// Rows taken in.
+    pub rows: f64,
+    /// Share of the rows lately that did not fit.
+    pub refused_share: f64,
 }
 
 /// Resistance as a snapshot tells it.
@@ -90,14 +111,7 @@ impl Report {
     /// # Real-time
     ///
     /// A few factorisations of order 3, no allocation.
-    pub fn judge(
-        solution: &Solution,
-        disturbed: &Disturbed,
-        monitor: &InnovationMonitor,
-        speeds: &DrivenSpeeds,
-        rows: f64,
-        refused_share: f64,
-    ) -> Option<Self> {
+    pub fn judge(solution: &Solution, evidence: &Evidence) -> Option<Self> {
         let free = solution.estimate.fixed_rows::<PARAMETERS>(0).into_owned();
         let covariance =
             solution.covariance.fixed_view::<PARAMETERS, PARAMETERS>(0, 0).into_owned();
@@ -110,29 +124,10 @@ impl Report {
             let powers = Vector3::from(regressors(speed_mps));
             (powers.dot(&estimate), powers.dot(&(covariance * powers)).max(0.0).sqrt())
         };
-        let (w0, w0_std) = at(speeds.mean_mps());
+        let speeds = evidence.speeds;
         let excited = excited(&covariance, at(speeds.max_mps).0, speeds.max_mps);
-        let (status, reason) = if rows < ROWS_MIN {
-            (Status::Unestimated, Reason::TooFewSamples)
-        } else if w0_std > SHARE_STD_MAX * w0 {
-            (Status::Unestimated, Reason::WeakExcitation)
-        } else if disturbed.std_n_per_kn > DISTURBANCE_SHARE_MAX * w0
-            && disturbed.evidence > DISTURBANCE_EVIDENCE_MIN
-        {
-            (Status::Degraded, Reason::InnovationsNotWhite)
-        } else if monitor.mean_square() > MEAN_SQUARE_MAX
-            && monitor.effective_count() > INNOVATIONS_MIN
-        {
-            (Status::Degraded, Reason::InnovationsTooLarge)
-        } else if refused_share > REFUSED_SHARE_MAX {
-            (Status::Degraded, Reason::BadInput)
-        } else if excited != (1 << PARAMETERS) - 1 {
-            (Status::Estimated, Reason::WeakExcitation)
-        } else if bounded.at_bound != 0 {
-            (Status::Estimated, Reason::AtBound)
-        } else {
-            (Status::Estimated, Reason::None)
-        };
+        let (status, reason) =
+            verdict(evidence, at(speeds.mean_mps()), excited, bounded.at_bound != 0);
         let missing_manoeuvres = missing_manoeuvres(excited);
         Some(Report { status, reason, estimate, covariance, excited, missing_manoeuvres })
     }
@@ -141,6 +136,41 @@ impl Report {
     pub fn davis(&self) -> Davis {
         let values = self.estimate.component_mul(&unscaling());
         Davis { a: values[0], b: values[1], c: values[2] }
+    }
+}
+
+/// Status and reason, by w0 at the mean speed with its standard deviation.
+fn verdict(
+    evidence: &Evidence,
+    (w0, w0_std): (f64, f64),
+    excited: u32,
+    is_at_bound: bool,
+) -> (Status, Reason) {
+    let Evidence { disturbed, innovations, .. } = evidence;
+    let now = evidence.disturbance_n_per_kn.abs();
+    if evidence.rows < ROWS_MIN {
+        (Status::Unestimated, Reason::TooFewSamples)
+    } else if disturbed.std_n_per_kn > DISTURBANCE_SHARE_MAX * w0
+        && disturbed.evidence > DISTURBANCE_EVIDENCE_MIN
+    {
+        // Before weak excitation: structure makes the intervals wide, and says why.
+        (Status::Degraded, Reason::InnovationsNotWhite)
+    } else if w0_std > SHARE_STD_MAX * w0 {
+        (Status::Unestimated, Reason::WeakExcitation)
+    } else if (innovations.mean_square() > MEAN_SQUARE_MAX
+        && innovations.effective_count() > INNOVATIONS_MIN)
+        || (now > DISTURBANCE_SHARE_MAX * w0
+            && now > DISTURBANCE_STDS_MAX * evidence.disturbance_std_n_per_kn)
+    {
+        (Status::Degraded, Reason::InnovationsTooLarge)
+    } else if evidence.refused_share > REFUSED_SHARE_MAX {
+        (Status::Degraded, Reason::BadInput)
+    } else if excited != (1 << PARAMETERS) - 1 {
+        (Status::Estimated, Reason::WeakExcitation)
+    } else if is_at_bound {
+        (Status::Estimated, Reason::AtBound)
+    } else {
+        (Status::Estimated, Reason::None)
     }
 }
 

@@ -135,6 +135,16 @@ least_squares_settings! {
     }
 }
 
+least_squares_settings! {
+    /// Settings of `resistance_kalman`.
+    KalmanSettings {
+        /// Degrees of freedom of Student's t for the speed's noise.
+        student_freedom: f64 = 5.0,
+        /// Random walk of each scaled coefficient in N/kN over an hour of motion: weather, wear.
+        drift_n_per_kn_per_sqrt_h: f64 = 0.01,
+    }
+}
+
 /// The longest innovation length.
 pub const INNOVATION_LENGTH_MAX: usize = 8;
 
@@ -168,6 +178,22 @@ impl RlsSettings {
         let forgetting = self.forgetting;
         require((0.5..=1.0).contains(&forgetting), "forgetting", forgetting, "0.5 to 1")?;
         check_start(self.start_variance)?;
+        self.data.check()
+    }
+}
+
+impl KalmanSettings {
+    /// Checks every range.
+    ///
+    /// # Errors
+    ///
+    /// Names the setting, its value and the allowed range.
+    pub fn check(&self) -> Result<(), SettingError> {
+        let freedom = self.student_freedom;
+        require((1.0..=1e6).contains(&freedom), "student_freedom", freedom, "1 to 1e6")?;
+        let drift = self.drift_n_per_kn_per_sqrt_h;
+        let key = "drift_n_per_kn_per_sqrt_h";
+        require((0.0..=10.0).contains(&drift), key, drift, "0 to 10 N/kN")?;
         self.data.check()
     }
 }

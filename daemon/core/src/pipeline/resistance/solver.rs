@@ -125,17 +125,14 @@ impl Solver {
 
     /// The solution so far; `None` while there is none.
     pub fn solution(&self, bank: &NoiseBank) -> Option<Solution> {
-        let factor = bank.interval_factor()?;
-        match self {
-            Solver::Batch => bank.mixture(),
-            Solver::Rls(rls) => {
-                Some(Solution { estimate: *rls.estimate(), covariance: rls.covariance() * factor })
+        let (estimate, covariance) = match self {
+            Solver::Batch => return bank.mixture(),
+            Solver::Rls(rls) => (*rls.estimate(), *rls.covariance()),
+            Solver::Mils(recursion) | Solver::VMils { recursion, .. } => {
+                (*recursion.estimate(), recursion.covariance())
             }
-            Solver::Mils(recursion) | Solver::VMils { recursion, .. } => Some(Solution {
-                estimate: *recursion.estimate(),
-                covariance: recursion.covariance() * factor,
-            }),
-        }
+        };
+        Some(Solution { estimate, covariance: covariance * bank.interval_factor()? })
     }
 }
 

@@ -49,6 +49,10 @@ pub struct SpeedNoise {
 const MEMORY: f64 = 2_000.0;
 /// A scatter beyond this many times the known variance counts as so many times only.
 const CLIP: f64 = 9.0;
+/// No speed is known better, in (m/s)².
+const VARIANCE_MIN: f64 = 1e-10;
+/// The most samples that are taken to share one rounding error.
+const ALIKE_MAX: f64 = 20.0;
 /// Degrees of freedom before the scatter is clipped.
 const FREEDOM_BEFORE_CLIP: f64 = 20.0;
 
@@ -96,7 +100,14 @@ impl SpeedNoise {
     pub fn variance_of_mean(&self, count: f64, range_mps: f64) -> f64 {
         let steps = if self.quantum_mps.is_finite() { range_mps / self.quantum_mps } else { count };
         let rounding = self.rounding_variance() / count.min(1.0 + steps);
-        (self.variance() / count).max(rounding)
+        (self.variance() / count).max(rounding).max(VARIANCE_MIN)
+    }
+
+    /// Variance of one value, such that one may treat it as independent of its neighbours;
+    /// `per_step_mps` is how far the speed moves from one sample to the next.
+    pub fn variance_of_sample(&self, per_step_mps: f64) -> f64 {
+        let alike = (self.quantum_mps / per_step_mps).clamp(1.0, ALIKE_MAX);
+        self.variance().max(self.rounding_variance() * alike).max(VARIANCE_MIN)
     }
 
     /// Variance of rounding to the quantum in (m/s)².

@@ -1,0 +1,307 @@
+//! The pipeline `resistance_kalman`: a robust filter over every sample.
+//!
+//! States are speed, disturbance and the unknowns of the regression. Where the least-squares
+//! pipelines wait for a block of samples, this one corrects at every sample, weighs each speed by
+//! Student's t, lets the coefficients drift, and follows the disturbance as it comes. How noisy
+//! the data are it takes from a least-squares estimator that runs beside it.
+
+use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason};
+use nalgebra::{SMatrix, SVector};
+
+use super::least_squares::ResistanceLeastSquares;
+use super::noise_bank::LikeliestNoise;
+use super::regression::{
+    BRAKE_SCALE, Disturbance, FORCE_DELAY, PARAMETERS, TRACTION_SCALE, UNKNOWNS, regressors,
+};
+use super::report::Report;
+use super::sample::UnitSample;
+use super::settings::KalmanSettings;
+use super::solver::Solution;
+use crate::filter::JointState;
+use crate::force::ResolvedSample;
+use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
+use crate::train::TrainModel;
+
+const SPEED: usize = 0;
+const DISTURBANCE: usize = 1;
+/// Where the regression's unknowns begin.
+const FIRST_UNKNOWN: usize = 2;
+const STATES: usize = FIRST_UNKNOWN + UNKNOWNS;
+
+type State = SVector<f64, STATES>;
+
+/// How long a change of force is remembered, in s.
+const FORCE_RATE_MEMORY_S: f64 = 0.5;
+/// Samples that the innovation statistics look back over.
+const MONITOR_SAMPLES: u32 = 600;
+
+/// Davis coefficients by a robust Kalman filter with a disturbance state.
+#[derive(Clone, Debug)]
+pub struct ResistanceKalman {
+    settings: KalmanSettings,
+    train_length_m: f64,
+    beside: ResistanceLeastSquares,
+    filter: JointState<STATES>,
+    last: Option<UnitSample>,
+    last_time_ns: Option<i64>,
+    noise: LikeliestNoise,
+    /// The fastest change of force lately, in N/kN per s.
+    force_rate: f64,
+    monitor: InnovationMonitor,
+    report: Report,
+    resets: u64,
+}
+
+impl ResistanceKalman {
+    /// A filter for a train; `beside` learns the noise.
+    pub fn new(
+        train: &TrainModel,
+        settings: KalmanSettings,
+        beside: ResistanceLeastSquares,
+    ) -> Self {
+        let declared = beside.declared();
+        ResistanceKalman {
+            settings,
+            train_length_m: train.length_m,
+            filter: filter_at(declared),
+            last: None,
+            last_time_ns: None,
+            noise: beside.bank().likeliest_noise(),
+            force_rate: 0.0,
+            monitor: InnovationMonitor::new(MONITOR_SAMPLES),
+            report: *beside.report(),
+            resets: 0,
+            beside,
+        }
+    }
+
+    /// Starts a stretch of motion at a sample: the speed anew, the disturbance as far as it
+    /// lasts.
+    fn start(&mut self, now: &UnitSample) {
+        let variance = self.beside.speed_noise().variance_of_sample(0.0);
+        self.filter.replace(SPEED, now.speed_mps, variance);
+        let gap_s = self
+            .last_time_ns
+            .map(|last_ns| now.time_ns.saturating_sub(last_ns) as f64 * 1e-9)
+            .filter(|&gap_s| gap_s > 0.0);
+        self.decay(gap_s.unwrap_or(f64::INFINITY));
+        self.monitor.break_here();
+        self.last = Some(*now);
+    }
+
+    /// The disturbance after a time without a sight of it.
+    fn decay(&mut self, duration_s: f64) {
+        let Disturbance { std_n_per_kn, time_s } = self.noise.disturbance;
+        let kept = (-duration_s / time_s).exp();
+        let mut gradient = State::zeros();
+        gradient[DISTURBANCE] = kept;
+        let value = kept * self.filter.mean()[DISTURBANCE];
+        let renewed = std_n_per_kn.powi(2) * (1.0 - kept * kept);
+        self.filter.rewrite(DISTURBANCE, value, &gradient, renewed);
+    }
+
+    /// The speed by the forces over a step, by Heun's rule, and the states' noise.
+    fn propagate(&mut self, before: &UnitSample, now: &UnitSample) {
+        let step_s = now.seconds_since(before);
+        let inertia = now.inertia;
+        let state = *self.filter.mean();
+        let unknown = |index: usize| state[FIRST_UNKNOWN + index];
+        let traction = 0.5 * step_s * (before.traction + now.traction);
+        let brake = 0.5 * step_s * (before.brake + now.brake);
+        let change = (now.traction - now.brake) - (before.traction - before.brake);
+        let impulse = 0.5 * step_s * (before.driving + now.driving)
+            + unknown(TRACTION_SCALE) * traction
+            - unknown(BRAKE_SCALE) * brake
+            - unknown(FORCE_DELAY) * change;
+        let resistance = |powers: &[f64; PARAMETERS]| -> f64 {
+            (0..PARAMETERS).map(|i| powers[i] * unknown(i)).sum()
+        };
+        let at_start = regressors(state[SPEED]);
+        let lost = |w0: f64| (impulse - step_s * (w0 + state[DISTURBANCE])) / inertia;
+        let end_mps = state[SPEED] + lost(resistance(&at_start));
+        let at_end = regressors(end_mps);
+        let mean: [f64; PARAMETERS] = std::array::from_fn(|i| 0.5 * (at_start[i] + at_end[i]));
+
+        let mut gradient = State::zeros();
+        let slope = (resistance(&at_end) - resistance(&at_start)) / (end_mps - state[SPEED]);
+        let slope = if slope.is_finite() { slope } else { 0.0 };
+        gradient[SPEED] = 1.0 - step_s * slope / inertia;
+        gradient[DISTURBANCE] = -step_s / inertia;
+        for i in 0..PARAMETERS {
+            gradient[FIRST_UNKNOWN + i] = -step_s * mean[i] / inertia;
+        }
+        gradient[FIRST_UNKNOWN + TRACTION_SCALE] = traction / inertia;
+        gradient[FIRST_UNKNOWN + BRAKE_SCALE] = -brake / inertia;
+        gradient[FIRST_UNKNOWN + FORCE_DELAY] = -change / inertia;
+        let speed_mps = state[SPEED] + lost(resistance(&mean));
+        let variance = self.impulse_variance(before, now, change) / (inertia * inertia);
+        self.filter.rewrite(SPEED, speed_mps, &gradient, variance);
+
+        self.decay(step_s);
+        let drift = self.settings.drift_n_per_kn_per_sqrt_h.powi(2) * step_s / 3600.0;
+        for i in 0..PARAMETERS {
+            self.filter.disturb(FIRST_UNKNOWN + i, drift);
+        }
+    }
+
+    /// Variance of the impulse by what is not known of when and where the forces acted.
+    fn impulse_variance(&self, before: &UnitSample, now: &UnitSample, change: f64) -> f64 {
+        let data = &self.settings.data;
+        let step_s = now.seconds_since(before);
+        let speed_mps = now.speed_mps.max(data.speed_min_mps);
+        let place_s = data.position_std_m / speed_mps;
+        let bend = now.gradient_permille - before.gradient_permille;
+        // A change of gradient passes under the train in many steps, all early or all late.
+        let steps = (self.train_length_m / (speed_mps * step_s)).max(1.0);
+        self.noise.scale * ((step_s * change).powi(2) / 12.0 + steps * (place_s * bend).powi(2))
+    }
+
+    /// Takes a speed into the filter, weighed by Student's t; false when it is sound for
+    /// nothing.
+    fn correct(&mut self, before: &UnitSample, now: &UnitSample) -> bool {
+        let per_step_mps = (now.speed_mps - before.speed_mps)
+            .abs()
+            .max((self.filter.mean()[SPEED] - before.speed_mps).abs());
+        let white = self.beside.speed_noise().variance_of_sample(per_step_mps);
+        let variance = white + self.transient_variance(before, now);
+        let step = self.filter.innovation(SPEED, now.speed_mps, variance);
+        let freedom = self.settings.student_freedom;
+        let square = step.innovation * step.innovation / step.variance;
+        let weight = ((freedom + 1.0) / (freedom + square)).min(1.0);
+        let corrected = self.filter.correct(SPEED, now.speed_mps, variance / weight);
+        if self.beside.is_warm() {
+            self.monitor.push((square * weight).sqrt().copysign(step.innovation));
+        }
+        corrected.is_ok()
+    }
+
+    /// Variance of the speed in (m/s)² while a force that acts later by d changes: its impulse
+    /// is taken as d times the change at once, and is off by half d² times the rate until then.
+    fn transient_variance(&mut self, before: &UnitSample, now: &UnitSample) -> f64 {
+        let step_s = now.seconds_since(before);
+        let change = (now.traction - now.brake) - (before.traction - before.brake);
+        let faded = self.force_rate * (-step_s / FORCE_RATE_MEMORY_S).exp();
+        self.force_rate = faded.max((change / step_s).abs());
+        let place = FIRST_UNKNOWN + FORCE_DELAY;
+        let delay = self.filter.mean()[place];
+        let delay_square = delay * delay + self.filter.covariance()[(place, place)];
+        (0.5 * delay_square * self.force_rate / now.inertia).powi(2)
+    }
+
+    fn judge(&mut self) {
+        let noise = self.beside.bank().likeliest_noise();
+        let is_other_model = noise.member != self.noise.member;
+        self.noise = noise;
+        if is_other_model && let Some(solution) = self.beside.bank().likeliest_solution() {
+            self.take_over(&solution);
+        }
+        let Some(factor) = self.beside.bank().interval_factor() else { return };
+        let solution = self.solution(factor);
+        if let Some(report) = self.beside.judged(&solution, &self.monitor, self.disturbance()) {
+            self.report = report;
+        } else {
+            self.reset();
+        }
+    }
+
+    /// Goes on with the unknowns of another solution.
+    fn take_over(&mut self, solution: &Solution) {
+        let mut mean = *self.filter.mean();
+        let mut covariance = SMatrix::<f64, STATES, STATES>::zeros();
+        covariance
+            .fixed_view_mut::<FIRST_UNKNOWN, FIRST_UNKNOWN>(0, 0)
+            .copy_from(&self.filter.covariance().fixed_view::<FIRST_UNKNOWN, FIRST_UNKNOWN>(0, 0));
+        mean.fixed_rows_mut::<UNKNOWNS>(FIRST_UNKNOWN).copy_from(&solution.estimate);
+        covariance
+            .fixed_view_mut::<UNKNOWNS, UNKNOWNS>(FIRST_UNKNOWN, FIRST_UNKNOWN)
+            .copy_from(&solution.covariance);
+        self.filter = JointState::new(mean, covariance);
+    }
+
+    /// The disturbance now with its standard deviation, in N/kN.
+    fn disturbance(&self) -> (f64, f64) {
+        let variance = self.filter.covariance()[(DISTURBANCE, DISTURBANCE)];
+        (self.filter.mean()[DISTURBANCE], variance.max(0.0).sqrt())
+    }
+
+    fn solution(&self, factor: f64) -> Solution {
+        Solution {
+            estimate: self.filter.mean().fixed_rows::<UNKNOWNS>(FIRST_UNKNOWN).into_owned(),
+            covariance: self
+                .filter
+                .covariance()
+                .fixed_view::<UNKNOWNS, UNKNOWNS>(FIRST_UNKNOWN, FIRST_UNKNOWN)
+                * factor,
+        }
+    }
+
+    /// Starts anew after a numerical failure.
+    fn reset(&mut self) {
+        self.filter = filter_at(self.beside.declared());
+        self.last = None;
+        self.resets += 1;
+    }
+}
+
+fn filter_at(solution: &Solution) -> JointState<STATES> {
+    let mut mean = State::zeros();
+    let mut covariance = SMatrix::<f64, STATES, STATES>::identity();
+    mean.fixed_rows_mut::<UNKNOWNS>(FIRST_UNKNOWN).copy_from(&solution.estimate);
+    covariance
+        .fixed_view_mut::<UNKNOWNS, UNKNOWNS>(FIRST_UNKNOWN, FIRST_UNKNOWN)
+        .copy_from(&solution.covariance);
+    JointState::new(mean, covariance)
+}
+
+impl Estimator for ResistanceKalman {
+    fn kind(&self) -> PipelineKind {
+        PipelineKind::ResistanceKalman
+    }
+
+    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+        let outcome = self.beside.update(sample);
+        let now = match (outcome, UnitSample::of(sample)) {
+            (Outcome::Rejected(RejectionReason::Outlier), Ok(now)) => {
+                // A single spike is left out; after a row that does not fit, the speed is anew.
+                if self.beside.has_refused_row() {
+                    self.start(&now);
+                }
+                if let Some(jump_n_per_kn) = self.beside.jump_n_per_kn() {
+                    self.filter.disturb(DISTURBANCE, jump_n_per_kn.powi(2));
+                }
+                return outcome;
+            }
+            (_, Ok(now)) if now.speed_mps >= self.settings.data.speed_min_mps => now,
+            _ => {
+                self.last = None;
+                return outcome;
+            }
+        };
+        match self.last.filter(|last| last.stretch == now.stretch) {
+            Some(before) => {
+                self.propagate(&before, &now);
+                if self.correct(&before, &now) {
+                    self.last = Some(now);
+                } else {
+                    self.reset();
+                }
+            }
+            None => self.start(&now),
+        }
+        self.last_time_ns = Some(now.time_ns);
+        if outcome == Outcome::Updated {
+            self.judge();
+        }
+        // Every sample corrects the filter.
+        if outcome == Outcome::Used { Outcome::Updated } else { outcome }
+    }
+
+    fn write(&self, snapshot: &mut ParameterSnapshot) {
+        self.beside.write_with(&self.report, &self.monitor, snapshot);
+        snapshot.generation += self.resets;
+        let weight_kn = self.beside.weight_kn();
+        let (value, std) = self.disturbance();
+        snapshot.unexplained_force_n = value * weight_kn;
+        snapshot.unexplained_force_std_n = std * weight_kn;
+    }
+}
