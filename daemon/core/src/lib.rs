@@ -10,8 +10,10 @@
 //! - [`validation`]: which samples are fit for use, and why the others are not
 //! - [`force`]: the known forces on the train at a sample
 //! - [`filter`]: linear estimators that the pipelines share
+//! - [`energy`]: traction energy of a run
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
 
+pub mod energy;
 pub mod filter;
 pub mod force;
 pub mod pipeline;
