@@ -19,5 +19,5 @@ pub struct Source {
 
 /// Every paper, by year.
 pub fn sources() -> Vec<Source> {
-    vec![]
+    vec![Source { name: "wang", rows: wang::rows }]
 }

@@ -11,12 +11,14 @@
 //! - [`validation`]: which samples are fit for use, and why the others are not
 //! - [`force`]: the known forces on the train at a sample
 //! - [`filter`]: recursive estimators of fixed size, without knowledge of trains
+//! - [`energy`]: traction energy of a run
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
 //! - [`simulate`]: the speed that a force model predicts, over a recorded run or with a driver
 //! - [`explain`]: which undeclared effect explains what the declared model leaves
 
 pub mod dataset;
 pub mod explain;
+pub mod energy;
 pub mod filter;
 pub mod force;
 pub mod pipeline;

@@ -25,10 +25,22 @@ pub fn normal(random: &mut ChaCha8Rng) -> f64 {
 }
 
 /// The samples of a drive with noise and rounding, through validation and force resolution.
-pub fn measure(
+pub fn measure(shuttle: &Shuttle, ride: &[Instant], random: &mut ChaCha8Rng) -> Vec<ResolvedSample> {
+    observe(shuttle, ride, |speed_mps| {
+        let noisy = speed_mps + SPEED_STD_MPS * normal(random);
+        ((noisy / SPEED_QUANTUM_MPS).round() * SPEED_QUANTUM_MPS).max(0.0)
+    })
+}
+
+/// The samples of a drive without noise.
+pub fn exact(shuttle: &Shuttle, ride: &[Instant]) -> Vec<ResolvedSample> {
+    observe(shuttle, ride, |speed_mps| speed_mps)
+}
+
+fn observe(
     shuttle: &Shuttle,
     ride: &[Instant],
-    random: &mut ChaCha8Rng,
+    mut sensor: impl FnMut(f64) -> f64,
 ) -> Vec<ResolvedSample> {
     let train = &shuttle.train;
     let limits = ValidationLimits::for_train(train.mass_kg);
@@ -36,9 +48,8 @@ pub fn measure(
     let mut resolver = ForceResolver::new(train.clone(), Some(shuttle.track.clone()));
     let mut resolved = Vec::with_capacity(ride.len());
     for (index, instant) in ride.iter().enumerate() {
-        let noisy = instant.speed_mps + SPEED_STD_MPS * normal(random);
-        let rounded = (noisy / SPEED_QUANTUM_MPS).round() * SPEED_QUANTUM_MPS;
-        let speed_mps = if instant.speed_mps > 0.0 { rounded.max(0.0) } else { 0.0 };
+        let is_standing = instant.speed_mps <= 0.0;
+        let speed_mps = if is_standing { 0.0 } else { sensor(instant.speed_mps) };
         let mut sample = TrainSample::empty(TrainId(1))
             .with(SampleField::Speed, speed_mps)
             .with(SampleField::Position, instant.position_m)

@@ -6,25 +6,23 @@
 
 use std::sync::Arc;
 
-use dynocar_core::track::{Curve, Track, Tunnel};
+use dynocar_core::track::Track;
 use dynocar_core::train::{BrakeGear, Davis, EffortCurve, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use super::driver::{Driver, LimitDriver};
+use super::line::{CURVE_RADIUS_M, STATIONS_M, curves, gradients, tunnels};
 
 /// Time in s between two samples: the controller's period of the paper.
 pub const PERIOD_S: f64 = 0.2;
 /// Mass in kg of the empty train, Table 1.
 pub const EMPTY_MASS_KG: f64 = 110_000.0;
-/// Radius in m of every curve of the line: z2 knows no radius.
-pub const CURVE_RADIUS_M: f64 = 500.0;
-/// Where the train stops, chainage in m.
-pub const STATIONS_M: [f64; 4] = [100.0, 3_100.0, 21_300.0, 27_900.0];
 
-const KMH: f64 = 1.0 / 3.6;
+/// m/s of one km/h.
+pub const KMH: f64 = 1.0 / 3.6;
+/// Greatest brake force in N.
+pub const BRAKE_MAX_N: f64 = 110_000.0;
 const SUBSTEPS: usize = 4;
 const FORCE_SLEW_N_PER_S: f64 = 80_000.0;
-const SERVICE_BRAKE_MPS2: f64 = 0.7;
 
 /// Basic, curve and tunnel resistance as functions of speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,6 +72,8 @@ pub struct Shuttle {
     pub track: Arc<Track>,
     /// The resistances that act.
     pub truth: Curves,
+    /// 1 + gamma as it is; the train is declared with gamma = 0.
+    pub inertia_factor: f64,
 }
 
 /// A state of the train.
@@ -128,7 +128,7 @@ impl Shuttle {
             curve_constant_n_per_kn_m: 0.0,
             tunnel_constant_n_per_kn_m: 0.0,
             traction: EffortCurve::new(effort),
-            brake: EffortCurve::new(vec![(0.0, 110_000.0)]),
+            brake: EffortCurve::new(vec![(0.0, BRAKE_MAX_N)]),
             brake_gear: BrakeGear::default(),
         };
         let track = Track::new(
@@ -139,7 +139,7 @@ impl Shuttle {
             Some(tunnels()),
         )
         .expect("ordered lists");
-        Shuttle { train: Arc::new(train), track: Arc::new(track), truth }
+        Shuttle { train: Arc::new(train), track: Arc::new(track), truth, inertia_factor: 1.0 }
     }
 
     /// Shares of the train in curves and tunnels.
@@ -158,12 +158,12 @@ impl Shuttle {
         let w = self.truth.w_n_per_kn(at.speed_mps, self.shares(at.position_m))
             + at.direction * gradient.unwrap_or(0.0)
             + extra_n_per_kn;
-        force_n / at.mass_kg - 1e-3 * STANDARD_GRAVITY_MPS2 * w
+        (force_n / at.mass_kg - 1e-3 * STANDARD_GRAVITY_MPS2 * w) / self.inertia_factor
     }
 
     /// One sampling period further, the force linear between `from.force_n` and `to_n`; by
     /// Runge and Kutta's fourth order on a quarter of the period.
-    fn advance(&self, from: &Instant, to_n: f64, disturbance: &mut dyn Disturbance) -> Instant {
+    pub fn advance(&self, from: &Instant, to_n: f64, disturbance: &mut dyn Disturbance) -> Instant {
         let extra = disturbance.resistance_n_per_kn(from.time_s, from.speed_mps);
         let step_s = PERIOD_S / SUBSTEPS as f64;
         let slew = (to_n - from.force_n) / PERIOD_S;
@@ -190,10 +190,7 @@ impl Shuttle {
         now
     }
 
-    /// Drives from standstill at `from_m` to standstill at `to_m`, then stands for `dwell_s`.
-    ///
-    /// The driver powers to the limit, lets the speed fall by 6 km/h while coasting, and brakes
-    /// for lower limits and the stop.
+    /// Drives like [`LimitDriver`].
     pub fn drive(
         &self,
         start: &Instant,
@@ -201,9 +198,20 @@ impl Shuttle {
         dwell_s: f64,
         disturbance: &mut dyn Disturbance,
     ) -> Vec<Instant> {
+        self.drive_with(&mut LimitDriver::new(), start, to_m, dwell_s, disturbance)
+    }
+
+    /// Drives from standstill to standstill at `to_m`, then stands for `dwell_s`.
+    pub fn drive_with(
+        &self,
+        driver: &mut dyn Driver,
+        start: &Instant,
+        to_m: f64,
+        dwell_s: f64,
+        disturbance: &mut dyn Disturbance,
+    ) -> Vec<Instant> {
         let mut now = Instant { speed_mps: 0.0, force_n: 0.0, ..*start };
         now.direction = (to_m - now.position_m).signum();
-        let mut driver = Driver { is_powering: true, is_stopping: false };
         let mut ride = vec![now];
         loop {
             let wanted_n = driver.force_n(self, &now, to_m);
@@ -250,108 +258,13 @@ impl Shuttle {
 
     /// The train at rest.
     pub fn standing_at(&self, position_m: f64, mass_kg: f64) -> Instant {
-        Instant { time_s: 0.0, position_m, speed_mps: 0.0, force_n: 0.0, direction: 1.0, mass_kg }
-    }
-}
-
-struct Driver {
-    is_powering: bool,
-    is_stopping: bool,
-}
-
-impl Driver {
-    fn force_n(&mut self, shuttle: &Shuttle, now: &Instant, to_m: f64) -> f64 {
-        let brake_n = |deceleration: f64| (-now.mass_kg * deceleration).max(-110_000.0);
-        let stop_m = (now.direction * (to_m - now.position_m)).max(1.0);
-        let stop_mps2 = now.speed_mps * now.speed_mps / (2.0 * stop_m);
-        self.is_stopping |= stop_mps2 > SERVICE_BRAKE_MPS2;
-        if self.is_stopping {
-            return brake_n(stop_mps2.clamp(0.5, 1.0));
-        }
-        let (needed_mps2, limit_mps) = limit_need(now);
-        if needed_mps2 > SERVICE_BRAKE_MPS2 || now.speed_mps > limit_mps + 2.0 * KMH {
-            self.is_powering = false;
-            return brake_n(needed_mps2.clamp(0.4, 1.0));
-        }
-        if now.speed_mps < limit_mps - 6.0 * KMH {
-            self.is_powering = true;
-        } else if now.speed_mps > limit_mps - 0.5 * KMH {
-            self.is_powering = false;
-        }
-        let is_near = needed_mps2.max(stop_mps2) > 0.6 * SERVICE_BRAKE_MPS2;
-        match &shuttle.train.traction {
-            Some(effort) if self.is_powering && !is_near => 0.95 * effort.force_n(now.speed_mps),
-            _ => 0.0,
+        Instant {
+            time_s: 0.0,
+            position_m,
+            speed_mps: 0.0,
+            force_n: 0.0,
+            direction: 1.0,
+            mass_kg,
         }
     }
-}
-
-/// Greatest deceleration in m/s² that a lower limit ahead asks for, and the limit here in m/s.
-fn limit_need(now: &Instant) -> (f64, f64) {
-    let mut needed = 0.0_f64;
-    let mut here_mps = f64::INFINITY;
-    for (start_m, end_m, limit_kmh) in limits() {
-        let limit_mps = limit_kmh * KMH;
-        if (start_m..end_m).contains(&now.position_m) {
-            here_mps = limit_mps;
-        }
-        let entry_m = if now.direction > 0.0 { start_m } else { end_m };
-        let ahead_m = now.direction * (entry_m - now.position_m);
-        if ahead_m > 0.0 && now.speed_mps > limit_mps {
-            let surplus = now.speed_mps * now.speed_mps - limit_mps * limit_mps;
-            needed = needed.max(surplus / (2.0 * ahead_m.max(0.5)));
-        }
-    }
-    (needed, here_mps)
-}
-
-fn limits() -> [(f64, f64, f64); 8] {
-    [
-        (-1e9, 3_100.0, 80.0),
-        (3_100.0, 7_500.0, 105.0),
-        (7_500.0, 10_000.0, 70.0),
-        (10_000.0, 15_000.0, 100.0),
-        (15_000.0, 17_500.0, 55.0),
-        (17_500.0, 21_300.0, 90.0),
-        (21_300.0, 25_000.0, 75.0),
-        (25_000.0, 1e9, 60.0),
-    ]
-}
-
-fn gradients() -> Vec<(f64, f64)> {
-    let mut random = ChaCha8Rng::seed_from_u64(28_000);
-    let mut list = vec![(0.0, 0.0)];
-    let mut at_m = 250.0;
-    while at_m < 27_700.0 {
-        list.push((at_m, (240.0 * random.random::<f64>() - 120.0).round() / 10.0));
-        at_m += (300.0 + 600.0 * random.random::<f64>()).round();
-    }
-    list.push((27_750.0, 0.0));
-    list
-}
-
-fn curves(curve_in_tunnel: bool) -> Vec<Curve> {
-    let mut random = ChaCha8Rng::seed_from_u64(28_001);
-    let mut list = Vec::new();
-    let mut start_m = 400.0;
-    while start_m < 27_000.0 {
-        let end_m = start_m + (250.0 + 350.0 * random.random::<f64>()).round();
-        let overlaps =
-            |tunnel: &Tunnel| start_m < tunnel.end_m + 80.0 && end_m > tunnel.start_m - 80.0;
-        if !tunnels().iter().any(overlaps) {
-            list.push(Curve { start_m, end_m, radius_m: CURVE_RADIUS_M });
-        }
-        start_m = end_m + (400.0 + 700.0 * random.random::<f64>()).round();
-    }
-    if curve_in_tunnel {
-        list.push(Curve { start_m: 11_700.0, end_m: 12_300.0, radius_m: CURVE_RADIUS_M });
-        list.push(Curve { start_m: 23_000.0, end_m: 23_400.0, radius_m: CURVE_RADIUS_M });
-    }
-    list
-}
-
-fn tunnels() -> Vec<Tunnel> {
-    [(900.0, 2_300.0), (11_200.0, 12_900.0), (18_500.0, 19_600.0), (22_600.0, 24_000.0)]
-        .map(|(start_m, end_m)| Tunnel { start_m, end_m })
-        .to_vec()
 }

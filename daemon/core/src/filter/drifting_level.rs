@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! y_k       = level_k + x_k · theta + e_k
-//! level_k+1 = level_k + h_k bias_k
+//! level_k+1 = level_k + gain_k bias_k + n_k
 //! bias_k+1  = keep_k bias_k + w_k
 //! ```
 //!
@@ -41,6 +41,8 @@ pub struct DriftStep {
     pub keep: f64,
     /// Variance of what comes to the bias.
     pub noise_variance: f64,
+    /// Variance of what comes to the level besides.
+    pub level_noise_variance: f64,
 }
 
 /// Square-root information of a level, its bias and N - 2 parameters.
@@ -85,10 +87,7 @@ impl<const N: usize> DriftingLevel<N> {
         self.restart_bias(bias_std);
         let root = self.root[PARAMETERS][PARAMETERS];
         let scale = 1.0 / (1.0 + variance * root * root).sqrt();
-        for entry in &mut self.root[PARAMETERS] {
-            *entry *= scale;
-        }
-        self.target[PARAMETERS] *= scale;
+        self.scale_row(PARAMETERS, scale);
     }
 
     /// Moves level and bias on by one step of time.
@@ -96,14 +95,30 @@ impl<const N: usize> DriftingLevel<N> {
         let old_level = self.root[LEVEL][LEVEL];
         self.root[LEVEL][BIAS] = (self.root[LEVEL][BIAS] - step.gain * old_level) / step.keep;
         self.root[BIAS][BIAS] /= step.keep;
-        if step.noise_variance <= 0.0 {
-            return;
+        if step.noise_variance > 0.0 {
+            self.admit_bias_noise(step.noise_variance);
         }
+        if step.level_noise_variance > 0.0 {
+            // Only the first row holds the level: its equation grows less certain by that much.
+            let root = self.root[LEVEL][LEVEL];
+            let scale = 1.0 / (1.0 + step.level_noise_variance * root * root).sqrt();
+            self.scale_row(LEVEL, scale);
+        }
+    }
+
+    fn scale_row(&mut self, row: usize, scale: f64) {
+        for entry in &mut self.root[row] {
+            *entry *= scale;
+        }
+        self.target[row] *= scale;
+    }
+
+    fn admit_bias_noise(&mut self, variance: f64) {
         // The noise w is an unknown of its own, known to be 0 with its variance. Two rotations
         // take it out of both rows; the row left over only tells of w and is dropped.
         let mut noise = [0.0; N];
         let mut noise_target = 0.0;
-        let mut noise_root = 1.0 / step.noise_variance.sqrt();
+        let mut noise_root = 1.0 / variance.sqrt();
         for i in [BIAS, LEVEL] {
             let own = -self.root[i][BIAS];
             let length = (noise_root * noise_root + own * own).sqrt();
@@ -213,7 +228,8 @@ mod tests {
 
     fn step(k: usize) -> DriftStep {
         let noise_variance = [0.0, 0.02, 0.1][k % 3];
-        DriftStep { gain: 0.1 + 0.05 * (k % 4) as f64, keep: 0.9, noise_variance }
+        let level_noise_variance = [0.0, 0.0, 0.03, 0.2][k % 4];
+        DriftStep { gain: 0.1 + 0.05 * (k % 4) as f64, keep: 0.9, noise_variance, level_noise_variance }
     }
 
     /// Weighted least squares with the level and the bias of every instant unknowns of their
@@ -236,11 +252,12 @@ mod tests {
             add(&[(2 * k, 1.0), (theta, row[2]), (theta + 1, row[3])], *value, 1.0);
             if k > 0 {
                 let (level, bias) = (2 * k, 2 * k + 1);
-                let DriftStep { gain, keep, noise_variance } = step(k);
+                let DriftStep { gain, keep, noise_variance, level_noise_variance } = step(k);
                 // Exact relations as very heavy ones.
-                add(&[(level, 1.0), (level - 2, -1.0), (bias - 2, -gain)], 0.0, 1e9);
-                let weight = if noise_variance > 0.0 { 1.0 / noise_variance } else { 1e9 };
-                add(&[(bias, 1.0), (bias - 2, -keep)], 0.0, weight);
+                let weight = |variance: f64| if variance > 0.0 { 1.0 / variance } else { 1e9 };
+                let level_weight = weight(level_noise_variance);
+                add(&[(level, 1.0), (level - 2, -1.0), (bias - 2, -gain)], 0.0, level_weight);
+                add(&[(bias, 1.0), (bias - 2, -keep)], 0.0, weight(noise_variance));
             }
         }
         for (at, i) in [(1, BIAS), (theta, 2), (theta + 1, 3)] {

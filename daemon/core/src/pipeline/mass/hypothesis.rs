@@ -8,6 +8,15 @@ use crate::filter::drifting_level::DriftStep;
 /// Innovations that the speed noise of the settings counts for.
 const NOISE_PRIOR_COUNT: f64 = 4.0;
 
+/// What a measured speed looks like to a regression.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Expectation {
+    /// Measured minus predicted speed over the estimated standard deviation.
+    pub normalised: f64,
+    /// Measured minus predicted speed in m/s.
+    pub error_mps: f64,
+}
+
 /// The regression with the evidence for its assumption.
 ///
 /// The speed noise is assumed at first; its true variance is estimated from the innovations and
@@ -61,20 +70,27 @@ impl Hypothesis {
         self.regression.widen_first_parameter(variance, self.model.std_mps2);
     }
 
-    /// Moves on by a step of time.
-    pub fn propagate(&mut self, step_s: f64, speed_mps: f64) {
+    /// Moves on by a step of time, with a variance in (m/s)² of what comes to the
+    /// level besides.
+    pub fn propagate(&mut self, step_s: f64, speed_mps: f64, level_noise_variance: f64) {
         let keep = self.model.keep(step_s);
         self.regression.propagate(&DriftStep {
             gain: step_s * self.model.shape(speed_mps),
             keep,
             noise_variance: self.model.noise_variance(keep),
+            level_noise_variance,
         });
     }
 
-    /// The innovation that an equation would have, over its estimated deviation.
-    pub fn innovation(&self, row: &Row, value: f64, weight: f64) -> f64 {
-        let innovation = self.regression.clone().absorb(row, value, weight);
-        innovation.normalised.unwrap_or(0.0) / self.noise_scale().sqrt()
+    /// What an equation of a measured speed with a noise deviation would bring.
+    pub fn expect(&self, row: &Row, value: f64, noise_mps: f64) -> Expectation {
+        let innovation = self.regression.clone().absorb(row, value, noise_mps.powi(-2));
+        let normalised = innovation.normalised.unwrap_or(0.0);
+        let root_ratio = (0.5 * innovation.log_variance_ratio).exp();
+        Expectation {
+            normalised: normalised / self.noise_scale().sqrt(),
+            error_mps: normalised * noise_mps * root_ratio,
+        }
     }
 
     /// Absorbs an equation.

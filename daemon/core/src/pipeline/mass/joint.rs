@@ -9,7 +9,9 @@ use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3, Vector4};
 
 use super::health::{InputHealth, innovation_complaint};
 use super::hypothesis::Hypothesis;
-use super::integrals::{INVERSE_MASS, Integrals, POLYNOMIALS, Regressors, Row, UNKNOWNS};
+use super::integrals::{
+    INVERSE_MASS, Integrals, POLYNOMIALS, Regressors, Row, UNKNOWNS, missed_variance,
+};
 use super::joint_settings::{JOINT_MODELS, JointLeastSquaresSettings};
 use super::line_resistance::LineResistance;
 use super::motion::{Motion, StopWatch};
@@ -29,6 +31,8 @@ const HUBER: f64 = 3.0;
 const OUTLIERS_BEFORE_RESTART: u32 = 5;
 /// Used samples below which nothing is said.
 const SAMPLES_MIN: u64 = 50;
+/// Updates between two looks at the slope of the resistance.
+const REFRESH_EVERY: u32 = 50;
 /// Shares of the highest speed at which a, b and c are judged.
 const JUDGED_AT: [f64; 3] = [0.1, 0.5, 0.9];
 
@@ -47,6 +51,11 @@ pub struct JointLeastSquares {
     stops: StopWatch,
     last: Option<(Motion, Integrals)>,
     integrals: Integrals,
+    /// Change of the accelerations tied to the place in the last step, in m/s².
+    tied_change: f64,
+    /// The resistance a while ago, for its slope.
+    latest: LineResistance,
+    updates_since_refresh: u32,
     outliers_in_a_row: u32,
     monitor: InnovationMonitor,
     health: InputHealth,
@@ -85,6 +94,9 @@ impl JointLeastSquares {
             stops: StopWatch::new(settings.stop_min_s),
             last: None,
             integrals: Integrals::zero(),
+            tied_change: 0.0,
+            latest: LineResistance::declared(train),
+            updates_since_refresh: 0,
             outliers_in_a_row: 0,
             monitor: InnovationMonitor::new(500),
             health: InputHealth::default(),
@@ -148,6 +160,7 @@ impl JointLeastSquares {
 
     fn begin(&mut self, motion: Motion) -> Outcome {
         self.integrals = Integrals::zero();
+        self.tied_change = 0.0;
         let (row, value) = self.integrals.equation(motion.speed_mps);
         for hypothesis in &mut self.hypotheses {
             hypothesis.free_level();
@@ -163,34 +176,57 @@ impl JointLeastSquares {
         self.integrals.add(&last.1, &rates, step_s);
         let (row, value) = self.integrals.equation(motion.speed_mps);
         let weight = self.settings.speed_noise_mps.powi(-2);
+        let level_noise = self.level_noise_variance(&last, &rates, step_s);
         for hypothesis in &mut self.hypotheses {
-            hypothesis.propagate(step_s, last.0.speed_mps);
+            hypothesis.propagate(step_s, last.0.speed_mps, level_noise);
         }
-        let normalised = self.hypotheses[self.best].innovation(&row, value, weight);
-        if !normalised.is_finite() {
+        let noise_mps = self.settings.speed_noise_mps;
+        let expected = self.hypotheses[self.best].expect(&row, value, noise_mps);
+        if !expected.normalised.is_finite() {
             self.reset();
             return self.begin(motion);
         }
-        if normalised.abs() > OUTLIER {
+        if expected.normalised.abs() > OUTLIER {
             self.outliers_in_a_row += 1;
             if self.outliers_in_a_row >= OUTLIERS_BEFORE_RESTART {
                 self.outliers_in_a_row = 0;
                 return self.begin(motion);
             }
-            self.last = Some((motion, rates));
+            self.bridge(motion, &rates, expected.error_mps, step_s);
             return Outcome::Rejected(RejectionReason::Outlier);
         }
         self.outliers_in_a_row = 0;
-        self.monitor.push(normalised);
-        let trust = (HUBER / normalised.abs()).min(1.0);
+        self.monitor.push(expected.normalised);
+        let trust = (HUBER / expected.normalised.abs()).min(1.0);
         for hypothesis in &mut self.hypotheses {
             hypothesis.absorb(&row, value, trust * weight);
         }
         self.choose();
+        self.refresh();
         let (low, high) = self.speed_range_mps.unwrap_or((motion.speed_mps, motion.speed_mps));
         self.speed_range_mps = Some((low.min(motion.speed_mps), high.max(motion.speed_mps)));
         self.last = Some((motion, rates));
         Outcome::Updated
+    }
+
+    /// Ends a step at the expected speed in place of one that is not believed.
+    fn bridge(&mut self, motion: Motion, measured: &Integrals, error_mps: f64, step_s: f64) {
+        let expected = Motion { speed_mps: (motion.speed_mps - error_mps).max(0.0), ..motion };
+        let rates = self.regressors.rates(&expected);
+        self.integrals.correct(measured, &rates, step_s);
+        self.last = Some((expected, rates));
+    }
+
+    /// Variance in (m/s)² of what comes to the level in a step beside the bias: what the
+    /// trapezoid misses, and what the noise of the speed does in the features. There it moves
+    /// the resistance, and with it the integral, by a random walk.
+    fn level_noise_variance(&mut self, last: &(Motion, Integrals), rates: &Integrals, step_s: f64) -> f64 {
+        let change = Integrals::tied_change(&last.1, rates);
+        let missed = missed_variance(self.tied_change, change, step_s);
+        self.tied_change = change;
+        let slope = self.latest.slope(&last.0, last.0.speed_mps);
+        let walk_mps = step_s * self.regressors.mps2_per_n_per_kn() * slope * self.speed_noise_mps();
+        missed + walk_mps * walk_mps
     }
 
     fn choose(&mut self) {
@@ -198,6 +234,15 @@ impl JointLeastSquares {
             if hypothesis.evidence() > self.hypotheses[self.best].evidence() {
                 self.best = i;
             }
+        }
+    }
+
+    /// Takes the latest resistance over once in a while; it changes slowly.
+    fn refresh(&mut self) {
+        self.updates_since_refresh += 1;
+        if self.updates_since_refresh >= REFRESH_EVERY {
+            self.updates_since_refresh = 0;
+            self.latest = self.resistance().unwrap_or(self.latest);
         }
     }
 

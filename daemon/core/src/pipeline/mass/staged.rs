@@ -106,6 +106,19 @@ impl StagedDescent {
         }
     }
 
+    /// Takes over resistances that were learned before; the mass is learned from the next
+    /// sample on.
+    pub fn resume(&mut self, resistance: &LineResistance) {
+        let zero = Davis { a: 0.0, b: 0.0, c: 0.0 };
+        let rest = |davis: Option<Davis>| self.basis.of_davis(&davis.unwrap_or(zero));
+        let (curve, tunnel) = (rest(resistance.curve), rest(resistance.tunnel));
+        self.basic.coefficients = self.basis.of_davis(&resistance.basic);
+        self.curve.coefficients.fixed_rows_mut::<3>(3).copy_from(&curve);
+        self.tunnel.coefficients.fixed_rows_mut::<3>(3).copy_from(&tunnel);
+        self.settings.reference_radius_m = resistance.reference_radius_m;
+        self.learned = self.settings.resistance_samples;
+    }
+
     /// Mass in kg; the declared one before the last stage.
     pub fn mass_kg(&self) -> f64 {
         match self.settings.mass_regression {
