@@ -17,8 +17,8 @@
 //! - [`explain`]: which undeclared effect explains what the declared model leaves
 
 pub mod dataset;
-pub mod explain;
 pub mod energy;
+pub mod explain;
 pub mod filter;
 pub mod force;
 pub mod pipeline;

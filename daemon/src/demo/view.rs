@@ -29,11 +29,11 @@ impl View {
     /// A view of the replay of a dataset with so many samples.
     pub fn new(dataset: &Dataset, total: u64, rate: f64) -> Self {
         eprintln!(
-            "controller, daemon and client as three processes; {} recorded runs of {} at {rate} \
-             times their speed",
-            dataset.runs.len(),
-            dataset.train.name
+            "{}: {} recorded runs at {rate} times their speed",
+            dataset.train.name,
+            dataset.runs.len()
         );
+        eprintln!("controller, daemon and client are three processes; ± is a 95 % interval");
         let bars = std::io::stderr().is_terminal().then(|| Bars::new(total));
         View { total, bars, last_plain: None }
     }

@@ -12,8 +12,8 @@ use rand_chacha::ChaCha8Rng;
 use super::PAPER;
 use super::bound::{Information, mass_std_in_wind};
 use super::disturbance::{GradientError, Wind};
-use super::sensor::measure;
 use super::line::{CURVE_RADIUS_M, STATIONS_M};
+use super::sensor::measure;
 use super::shuttle::{Calm, Disturbance, EMPTY_MASS_KG, Instant, PERIOD_S, Shuttle};
 use crate::papers::row::Row;
 use crate::papers::statistics::{mean, root_mean_square};
@@ -59,7 +59,8 @@ pub fn rows(seeds: usize) -> Vec<Row> {
         let errors = run(&shuttle, mass_kg, Condition::Calm, 1.0, seeds);
         let leg = leg(&shuttle, mass_kg, &mut Calm);
         let bound = 100.0 * Information::of(&shuttle, &leg).mass_std();
-        let quantity = format!("mass of {:.1} t after one leg of 3 km, newly loaded", 1e-3 * mass_kg);
+        let quantity =
+            format!("mass of {:.1} t after one leg of 3 km, newly loaded", 1e-3 * mass_kg);
         rows.push(error_row(quantity, Some(published), &errors, Some(bound), seeds));
     }
     let (mass_kg, published) = TABLE_3[1];

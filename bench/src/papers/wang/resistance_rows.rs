@@ -106,7 +106,8 @@ fn printed_rows(shuttle: &Shuttle, ride: &[Instant], seeds: usize) -> [Row; 2] {
         let samples = measure(shuttle, ride, &mut ChaCha8Rng::seed_from_u64(seed as u64));
         let mut in_kmh =
             staged_descent(shuttle, DescentVariant::Printed, SpeedUnit::KilometresPerHour);
-        let mut in_mps = staged_descent(shuttle, DescentVariant::Printed, SpeedUnit::MetresPerSecond);
+        let mut in_mps =
+            staged_descent(shuttle, DescentVariant::Printed, SpeedUnit::MetresPerSecond);
         let start = in_mps.resistance().basic.a;
         for sample in &samples {
             in_kmh.update(sample);
@@ -131,7 +132,11 @@ fn printed_rows(shuttle: &Shuttle, ride: &[Instant], seeds: usize) -> [Row; 2] {
     };
     [
         row("learning rate 1e-7, speed in km/h: samples until it has diverged", "1", mean(&until)),
-        row("learning rate 1e-7, speed in m/s: change of alpha_1 in 28,000 samples", "N/kN", mean(&moved)),
+        row(
+            "learning rate 1e-7, speed in m/s: change of alpha_1 in 28,000 samples",
+            "N/kN",
+            mean(&moved),
+        ),
     ]
 }
 

@@ -220,12 +220,18 @@ impl JointLeastSquares {
     /// Variance in (m/s)² of what comes to the level in a step beside the bias: what the
     /// trapezoid misses, and what the noise of the speed does in the features. There it moves
     /// the resistance, and with it the integral, by a random walk.
-    fn level_noise_variance(&mut self, last: &(Motion, Integrals), rates: &Integrals, step_s: f64) -> f64 {
+    fn level_noise_variance(
+        &mut self,
+        last: &(Motion, Integrals),
+        rates: &Integrals,
+        step_s: f64,
+    ) -> f64 {
         let change = Integrals::tied_change(&last.1, rates);
         let missed = missed_variance(self.tied_change, change, step_s);
         self.tied_change = change;
         let slope = self.latest.slope(&last.0, last.0.speed_mps);
-        let walk_mps = step_s * self.regressors.mps2_per_n_per_kn() * slope * self.speed_noise_mps();
+        let walk_mps =
+            step_s * self.regressors.mps2_per_n_per_kn() * slope * self.speed_noise_mps();
         missed + walk_mps * walk_mps
     }
 

@@ -1,11 +1,6 @@
-//! Checks Dynocar against a folder of recorded and simulated data: every dataset loads, and the
-//! resistance that `dynocar identify` finds is the true one where the truth is known.
-//!
-//! `dynocar-check-data FOLDER`, with the folders `practice`, `practice-truth`, `independent` and
-//! `measured` in it. Exit status 1 when a check fails.
+//! The resistance that the pipelines find, against the true one.
 
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::path::Path;
 
 use dynocar::dataset;
 use dynocar::identify::{default_estimators, identify, published_samples};
@@ -13,68 +8,23 @@ use dynocar_core::train::{Davis, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Status, TrainId};
 use serde_json::Value;
 
+use super::report::Report;
+
 /// Share of the driven speed range that counts as its thinly driven ends, at each end.
 const THIN_END: f64 = 0.1;
 
-fn main() -> ExitCode {
-    let Some(folder) = std::env::args_os().nth(1).map(PathBuf::from) else {
-        eprintln!("expected: dynocar-check-data FOLDER");
-        return ExitCode::from(2);
-    };
-    let mut report = Report::default();
-    for dataset in dataset_folders(&folder) {
-        let outcome = dataset::load(&dataset).map(|it| format!("{} runs", it.runs.len()));
-        report.note(&format!("{} loads", dataset.display()), outcome.map_err(|it| it.to_string()));
-    }
-    match practice_truth(&folder) {
-        Some(truth) => check_resistance(&mut report, &folder.join("practice/p01"), truth, 0.03),
+/// Checks every dataset whose true resistance is known, and one whose model lacks an effect.
+pub fn check(report: &mut Report, folder: &Path) {
+    match practice_truth(folder) {
+        Some(truth) => check_resistance(report, &folder.join("practice/p01"), truth, 0.03),
         None => report.note("practice-truth/p01.json", Err("no true resistance found".into())),
     }
     // The simulators' own resistance, in N over the train's mass (the data's README).
     let intermodal = davis_of_force([82_273.0, 0.0, 294.0], 8_580.0);
-    check_resistance(&mut report, &folder.join("independent/intermodal"), intermodal, 0.01);
+    check_resistance(report, &folder.join("independent/intermodal"), intermodal, 0.01);
     let metro = davis_of_force([3_947.6, 0.0, 28.893], 278.0);
-    check_resistance(&mut report, &folder.join("independent/yizhuang-metro"), metro, 0.03);
-    check_flagged(&mut report, &folder.join("independent/ses-crossing"));
-    report.finish()
-}
-
-#[derive(Default)]
-struct Report {
-    passed: usize,
-    failed: usize,
-}
-
-impl Report {
-    fn note(&mut self, what: &str, outcome: Result<String, String>) {
-        match outcome {
-            Ok(detail) => {
-                self.passed += 1;
-                println!("ok    {what}: {detail}");
-            }
-            Err(detail) => {
-                self.failed += 1;
-                println!("FAIL  {what}: {detail}");
-            }
-        }
-    }
-
-    fn finish(self) -> ExitCode {
-        println!("{} passed, {} failed", self.passed, self.failed);
-        if self.failed == 0 && self.passed > 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
-    }
-}
-
-fn dataset_folders(folder: &Path) -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    for group in ["practice", "independent", "measured"] {
-        let entries = std::fs::read_dir(folder.join(group)).into_iter().flatten().flatten();
-        found.extend(
-            entries.map(|entry| entry.path()).filter(|it| it.join("dataset.toml").is_file()),
-        );
-    }
-    found.sort();
-    found
+    check_resistance(report, &folder.join("independent/yizhuang-metro"), metro, 0.03);
+    check_flagged(report, &folder.join("independent/ses-crossing"));
 }
 
 /// The true resistance of practice run p01, from its truth file.

@@ -1,0 +1,50 @@
+//! Checks Dynocar against a folder of recorded and simulated data: every dataset loads, the
+//! resistance that `dynocar identify` finds is the true one where the truth is known, and the
+//! forward simulation comes out where other simulators do.
+//!
+//! `dynocar-check-data FOLDER`, with the folders `practice`, `practice-truth`, `independent` and
+//! `measured` in it. Exit status 1 when a check fails.
+
+mod report;
+mod resistance;
+mod simulation;
+mod trainruns;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use dynocar::dataset;
+
+use report::Report;
+
+fn main() -> ExitCode {
+    let Some(folder) = std::env::args_os().nth(1).map(PathBuf::from) else {
+        eprintln!("expected: dynocar-check-data FOLDER");
+        return ExitCode::from(2);
+    };
+    let mut report = Report::default();
+    check_loading(&mut report, &folder);
+    resistance::check(&mut report, &folder);
+    simulation::check(&mut report, &folder);
+    trainruns::check(&mut report, &folder.join("independent/trainruns"));
+    report.finish()
+}
+
+fn check_loading(report: &mut Report, folder: &Path) {
+    for path in dataset_folders(folder) {
+        let outcome = dataset::load(&path).map(|it| format!("{} runs", it.runs.len()));
+        report.note(&format!("{} loads", path.display()), outcome.map_err(|it| it.to_string()));
+    }
+}
+
+fn dataset_folders(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for group in ["practice", "independent", "measured"] {
+        let entries = std::fs::read_dir(folder.join(group)).into_iter().flatten().flatten();
+        found.extend(
+            entries.map(|entry| entry.path()).filter(|it| it.join("dataset.toml").is_file()),
+        );
+    }
+    found.sort();
+    found
+}
