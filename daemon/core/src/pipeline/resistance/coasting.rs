@@ -197,3 +197,76 @@ impl Half {
         self.rest.joined(&next.rest).spread()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::regression::scaled;
+    use super::super::sample::tests::driven;
+    use super::super::simulation::normal;
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    const DAVIS: Davis = Davis { a: 2.2, b: 0.09, c: 0.0168 };
+
+    fn segments_of(samples: &[UnitSample]) -> Vec<CoastingSegment> {
+        let mut builder = CoastingSegments::new(DataSettings::default());
+        samples.iter().filter_map(|sample| builder.push(sample, &DAVIS).unwrap()).collect()
+    }
+
+    /// The resistance of a segment over the true one of its regressors, less one.
+    fn relative_error(segment: &CoastingSegment) -> f64 {
+        let truth: f64 = (0..PARAMETERS).map(|i| scaled(&DAVIS)[i] * segment.row[i + 1]).sum();
+        segment.row[0] / truth - 1.0
+    }
+
+    #[test]
+    fn a_segment_of_a_noiseless_train_gives_its_resistance() {
+        let segments = segments_of(&driven(&DAVIS, 20.0, 0.0, 0.2));
+        assert!(segments.len() > 20);
+        assert!(segments[0].is_first && segments[1..].iter().all(|segment| !segment.is_first));
+        for segment in &segments {
+            assert!(relative_error(segment).abs() < 1e-3);
+        }
+        for pair in segments.windows(2) {
+            assert_eq!(pair[1].row_before, pair[0].row);
+        }
+    }
+
+    #[test]
+    fn noise_neither_biases_segments_nor_correlates_them_otherwise_than_modelled() {
+        let clean = driven(&DAVIS, 20.0, 0.0, 0.2);
+        let mut random = ChaCha8Rng::seed_from_u64(8);
+        let (mut sum, mut square, mut product, mut count) = (0.0, 0.0, 0.0, 0.0);
+        for _ in 0..60 {
+            let noisy: Vec<_> = clean
+                .iter()
+                .map(|sample| UnitSample {
+                    speed_mps: sample.speed_mps + 0.014 * normal(&mut random),
+                    ..*sample
+                })
+                .collect();
+            let errors: Vec<_> = segments_of(&noisy).iter().map(relative_error).collect();
+            for pair in errors.windows(2) {
+                sum += pair[1];
+                square += pair[1] * pair[1];
+                product += pair[0] * pair[1];
+                count += 1.0;
+            }
+        }
+        let std_of_mean = (square / count).sqrt() / f64::sqrt(count);
+        assert!((sum / count).abs() < 3.5 * std_of_mean.max(1e-3), "bias {}", sum / count);
+        let correlation = product / square;
+        assert!((correlation + 0.25).abs() < 0.07, "correlation {correlation}");
+    }
+
+    #[test]
+    fn forces_end_a_chain_and_the_next_one_settles_first() {
+        let mut samples = driven(&DAVIS, 20.0, 0.0, 0.2);
+        samples[100].brake = 5.0;
+        let segments = segments_of(&samples);
+        let firsts: Vec<_> = segments.iter().filter(|segment| segment.is_first).collect();
+        assert_eq!(firsts.len(), 2);
+        assert!(firsts[1].time_ns > samples[100].time_ns + 3_000_000_000);
+    }
+}

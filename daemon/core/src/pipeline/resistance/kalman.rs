@@ -190,7 +190,7 @@ impl ResistanceKalman {
 
     fn judge(&mut self) {
         let noise = self.beside.bank().likeliest_noise();
-        let is_other_model = noise.member != self.noise.member;
+        let is_other_model = noise.place != self.noise.place;
         self.noise = noise;
         if is_other_model && let Some(solution) = self.beside.bank().likeliest_solution() {
             self.take_over(&solution);

@@ -3,14 +3,14 @@
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason};
 use nalgebra::{Matrix3, SMatrix};
 
-use super::coasting::CoastingSegments;
-use super::momentum::MomentumBlocks;
-use super::noise_bank::{NoiseBank, WhiteRow};
+use super::noise_bank::NoiseBank;
+use super::noise_model::WhiteRow;
 use super::regression::{Observation, PARAMETERS, Unknowns, scaled, unscaling};
 use super::report::{DrivenSpeeds, Evidence, Report};
 use super::sample::UnitSample;
-use super::settings::{DataSettings, DataSource};
+use super::settings::DataSettings;
 use super::solver::{Solution, Solver, bank_penalty};
+use super::source::RowSource;
 use super::speed::SpeedNoise;
 use crate::filter::RunningMedian;
 use crate::force::ResolvedSample;
@@ -33,21 +33,14 @@ const REFUSALS_BEFORE_JUMP: u32 = 3;
 /// Rows before the solution replaces the declared resistance in telling outliers.
 const ROWS_BEFORE_OWN: f64 = 12.0;
 
-#[derive(Clone, Debug)]
-enum Source {
-    Momentum(MomentumBlocks),
-    Coasting(Box<CoastingSegments>),
-}
-
 /// Davis coefficients by one of the least-squares recursions of Liu 2018.
 ///
-/// Samples become rows ([`MomentumBlocks`] or [`CoastingSegments`]), the [`NoiseBank`] makes
+/// Samples become observations ([`RowSource`]), the [`NoiseBank`] makes
 /// them independent and says how noisy they are, a [`Solver`] takes them in.
 #[derive(Clone, Debug)]
 pub struct ResistanceLeastSquares {
     kind: PipelineKind,
-    settings: DataSettings,
-    source: Source,
+    source: RowSource,
     bank: NoiseBank,
     fresh: Solver,
     solver: Solver,
@@ -82,11 +75,7 @@ impl ResistanceLeastSquares {
         let declared = declared_solution(train, &settings);
         ResistanceLeastSquares {
             kind,
-            settings,
-            source: match settings.source {
-                DataSource::Momentum => Source::Momentum(MomentumBlocks::new(settings)),
-                DataSource::Coasting => Source::Coasting(Box::new(CoastingSegments::new(settings))),
-            },
+            source: RowSource::new(settings),
             bank,
             fresh: solver.clone(),
             solver,
@@ -104,29 +93,6 @@ impl ResistanceLeastSquares {
             disturbance: (0.0, 0.0),
             weight_kn: TrainModel::weight_kn(train.mass_kg),
             resets: 0,
-        }
-    }
-
-    fn observe(&mut self, now: &UnitSample) -> Result<Option<(Observation, f64)>, RejectionReason> {
-        if now.speed_mps < self.settings.speed_min_mps {
-            // A holding brake may be reported, and static friction is no Davis resistance.
-            self.break_chain();
-            return Ok(None);
-        }
-        Ok(match &mut self.source {
-            Source::Momentum(blocks) => blocks
-                .push(now, &self.known)?
-                .map(|block| (Observation::Block(block), block.speed_mps)),
-            Source::Coasting(segments) => segments
-                .push(now, &self.known)?
-                .map(|segment| (Observation::Segment(segment), segment.speed_mps)),
-        })
-    }
-
-    fn break_chain(&mut self) {
-        match &mut self.source {
-            Source::Momentum(blocks) => blocks.break_chain(),
-            Source::Coasting(segments) => segments.break_chain(),
         }
     }
 
@@ -220,10 +186,7 @@ impl ResistanceLeastSquares {
 
     /// Noise of the speed so far.
     pub(super) fn speed_noise(&self) -> &SpeedNoise {
-        match &self.source {
-            Source::Momentum(blocks) => blocks.noise(),
-            Source::Coasting(segments) => segments.noise(),
-        }
+        self.source.noise()
     }
 
     /// Weight in kN of the newest sample's train.
@@ -288,7 +251,7 @@ impl ResistanceLeastSquares {
         self.bank.clear();
         self.solver.clone_from(&self.fresh);
         self.solution = None;
-        self.break_chain();
+        self.source.break_chain();
         self.resets += 1;
         self.report = Report::unestimated(&self.declared, Reason::NumericalFailure);
     }
@@ -337,7 +300,7 @@ impl Estimator for ResistanceLeastSquares {
     fn update(&mut self, sample: &ResolvedSample) -> Outcome {
         self.weight_kn = sample.weight_kn;
         self.jump_n_per_kn = None;
-        let observed = UnitSample::of(sample).and_then(|now| self.observe(&now));
+        let observed = UnitSample::of(sample).and_then(|now| self.source.push(&now, &self.known));
         match observed {
             Ok(observation) => {
                 self.obstacle = None;
@@ -348,7 +311,7 @@ impl Estimator for ResistanceLeastSquares {
             }
             Err(reason) => {
                 if reason != RejectionReason::Outlier {
-                    self.break_chain();
+                    self.source.break_chain();
                 }
                 if reason == RejectionReason::Missing {
                     self.obstacle = Some(match sample.gradient_permille {

@@ -4,7 +4,7 @@
 //!
 //! - `sample`, `speed`: forces per weight; spikes refused, noise of the speed learned
 //! - `momentum`, `coasting`: samples to observations of the regression in `regression`
-//! - `noise_bank`: observations to independent rows, and how noisy they are
+//! - `noise_model`, `noise_bank`: observations to independent rows, and how noisy they are
 //! - `solver`: the recursions
 //! - `report`: bounds, excitation, status
 //! - `least_squares`: the pipeline around all of it
@@ -15,6 +15,7 @@ mod kalman;
 mod least_squares;
 mod momentum;
 mod noise_bank;
+mod noise_model;
 mod regression;
 mod report;
 mod sample;
@@ -22,6 +23,7 @@ pub mod settings;
 #[cfg(test)]
 mod simulation;
 mod solver;
+mod source;
 mod speed;
 #[cfg(test)]
 mod tests;

@@ -193,3 +193,92 @@ impl Block {
         self.edge_variance + place * place
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::regression::scaled;
+    use super::super::sample::tests::{driven, unit_sample};
+    use super::*;
+    use crate::pipeline::resistance::regression::PARAMETERS;
+
+    const DAVIS: Davis = Davis { a: 1.5, b: 0.04, c: 0.003 };
+
+    fn blocks_of(samples: &[UnitSample]) -> Vec<MomentumBlock> {
+        let mut builder = MomentumBlocks::new(DataSettings::default());
+        samples.iter().filter_map(|sample| builder.push(sample, &DAVIS).unwrap()).collect()
+    }
+
+    #[test]
+    fn the_change_of_momentum_is_the_impulse_less_the_resistance() {
+        for (speed_mps, driving) in [(25.0, 0.0), (8.0, 12.0), (28.0, -9.0)] {
+            let blocks = blocks_of(&driven(&DAVIS, speed_mps, driving, 0.2));
+            assert!(blocks.len() >= 10);
+            for pair in blocks.windows(2) {
+                let resistance: f64 =
+                    (0..PARAMETERS).map(|i| scaled(&DAVIS)[i] * pair[1].impulse[i + 1]).sum();
+                let gained = pair[1].momentum - pair[0].momentum;
+                let balance = gained - (pair[1].impulse[0] - resistance);
+                assert!(balance.abs() < 2e-4 * resistance, "off by {balance} N/kN s");
+            }
+        }
+    }
+
+    #[test]
+    fn a_new_stretch_of_motion_starts_a_new_chain() {
+        let mut samples = driven(&DAVIS, 25.0, 0.0, 0.2);
+        for sample in &mut samples[150..] {
+            sample.stretch = 2;
+            sample.speed_mps -= 3.0;
+        }
+        let blocks = blocks_of(&samples);
+        let firsts: Vec<_> = blocks.iter().filter(|block| block.is_first).collect();
+        assert_eq!(firsts.len(), 2);
+        assert!(firsts[1].time_ns >= samples[150].time_ns);
+    }
+
+    #[test]
+    fn a_force_that_comes_later_shows_in_the_column_of_the_delay() {
+        let mut samples = driven(&DAVIS, 15.0, 0.0, 0.2);
+        for sample in &mut samples[100..] {
+            sample.traction = 10.0;
+        }
+        let gathered: f64 =
+            blocks_of(&samples).iter().skip(1).map(|block| block.impulse[1 + FORCE_DELAY]).sum();
+        assert!((gathered - 10.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_spike_is_left_out_and_the_force_through_it_is_kept() {
+        let samples = driven(&DAVIS, 25.0, 5.0, 0.2);
+        let clean = blocks_of(&samples);
+        let mut builder = MomentumBlocks::new(DataSettings::default());
+        let mut blocks = Vec::new();
+        for (index, sample) in samples.iter().enumerate() {
+            let mut seen = *sample;
+            if index == 40 {
+                seen.speed_mps += 2.0;
+                assert_eq!(builder.push(&seen, &DAVIS), Err(RejectionReason::Outlier));
+            } else {
+                blocks.extend(builder.push(&seen, &DAVIS).unwrap());
+            }
+        }
+        let last = |blocks: &[MomentumBlock]| blocks[blocks.len() - 1].momentum;
+        assert!((last(&blocks) - last(&clean)).abs() < 0.01 * last(&clean));
+        assert_eq!(blocks.iter().filter(|block| block.is_first).count(), 1);
+    }
+
+    #[test]
+    fn a_change_of_gradient_and_of_force_makes_the_impulse_less_certain() {
+        let mut samples: Vec<_> =
+            (0..100).map(|i| unit_sample(0.2 * f64::from(i), 20.0, 1.0)).collect();
+        for sample in &mut samples[40..] {
+            sample.gradient_permille = 8.0;
+        }
+        let variances: Vec<_> =
+            blocks_of(&samples).iter().map(|block| block.impulse_variance).collect();
+        assert_eq!(variances[0], 0.0);
+        // 3 m at 20 m/s, 8 ‰; half of it in each of the two rows around.
+        let most = variances.iter().fold(0.0, |most: f64, value| most.max(*value));
+        assert!((most - 0.5 * (3.0 / 20.0 * 8.0_f64).powi(2)).abs() < 1e-9);
+    }
+}

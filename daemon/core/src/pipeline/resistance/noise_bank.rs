@@ -2,50 +2,26 @@
 //!
 //! How much of a residual is noise of the speed and how much a slow force that the model does
 //! not know (wind, errors of the gradient profile) decides both the weights of the rows and what
-//! the estimate is worth. A small bank of disturbance models runs side by side; each keeps the
-//! generalised least squares of its rows and its restricted likelihood (Patterson and Thompson
-//! 1971), and their mixture is weighted by it.
+//! the estimate is worth. A small bank of noise models runs side by side, and their solutions
+//! are mixed by their likelihood.
 
 use nalgebra::SMatrix;
 
-use super::regression::{
-    Disturbance, Observation, PARAMETERS, RowWhitener, UNKNOWNS, Unknowns, disturbance_of,
-    loosen_disturbance,
-};
+use super::noise_model::{NoiseModel, PRIOR_ROWS, WhiteRow};
+use super::regression::{Disturbance, Observation, PARAMETERS, UNKNOWNS, Unknowns};
 use super::solver::Solution;
-use crate::filter::SquareRootInformation;
 
 /// Standard deviations of the disturbance in N/kN: from nothing to as large as resistance itself.
 const STDS_N_PER_KN: [f64; 6] = [0.01, 0.03, 0.1, 0.3, 1.0, 3.0];
 /// Correlation times in s: a gust, a gradient section, a change of wind or weather.
 const TIMES_S: [f64; 3] = [10.0, 60.0, 400.0];
-const MEMBERS: usize = 1 + STDS_N_PER_KN.len() * TIMES_S.len();
+const MODELS: usize = 1 + STDS_N_PER_KN.len() * TIMES_S.len();
 /// Until the rows tell: a disturbance of 0.1 N/kN over 60 s.
 const LIKELIEST_AT_FIRST: usize = 1 + 2 * TIMES_S.len() + 1;
-/// Rows for which the noise model as declared counts beside the rows seen.
-const PRIOR_ROWS: f64 = 3.0;
 /// Rows after which the penalty, which forgetting takes off too, is made up for.
 const RENEWAL_ROWS: u32 = 50;
-/// Members of less weight than this are left out of the mixture.
+/// Models of less weight than this are left out of the mixture.
 const WEIGHT_MIN: f64 = 1e-4;
-
-#[derive(Clone, Debug, PartialEq)]
-struct Member {
-    disturbance: Disturbance,
-    whitener: RowWhitener,
-    information: SquareRootInformation<UNKNOWNS>,
-    log_variances: f64,
-    weight: f64,
-}
-
-/// A row of the likeliest member, its error of variance 1 as far as the scale is known.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WhiteRow {
-    /// Regressors.
-    pub features: Unknowns,
-    /// What they should add up to.
-    pub observed: f64,
-}
 
 /// The slow force that the model does not know.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,17 +36,18 @@ pub struct Disturbed {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LikeliestNoise {
     /// Its place in the bank.
-    pub member: usize,
+    pub place: usize,
     /// Its disturbance, scaled as the rows say.
     pub disturbance: Disturbance,
     /// Variance of its rows: 1 when all is as modelled.
     pub scale: f64,
 }
 
-/// Disturbance models side by side.
+/// Noise models side by side; the first has no disturbance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NoiseBank {
-    members: [Member; MEMBERS],
+    models: [NoiseModel; MODELS],
+    weights: [f64; MODELS],
     penalty: Unknowns,
     forgetting: f64,
     likeliest: usize,
@@ -80,23 +57,18 @@ pub struct NoiseBank {
 }
 
 impl NoiseBank {
-    /// A bank without rows, every member with the penalty `sum of weight * unknown^2`.
+    /// A bank without rows, every model with the penalty `sum of weight * unknown^2`.
     pub fn new(penalty: &Unknowns, forgetting: f64) -> Self {
-        let member = |index: usize| Member {
-            disturbance: match index.checked_sub(1) {
-                None => Disturbance { std_n_per_kn: 0.0, time_s: TIMES_S[0] },
-                Some(place) => Disturbance {
-                    std_n_per_kn: STDS_N_PER_KN[place / TIMES_S.len()],
-                    time_s: TIMES_S[place % TIMES_S.len()],
-                },
+        let disturbance = |index: usize| match index.checked_sub(1) {
+            None => Disturbance { std_n_per_kn: 0.0, time_s: TIMES_S[0] },
+            Some(place) => Disturbance {
+                std_n_per_kn: STDS_N_PER_KN[place / TIMES_S.len()],
+                time_s: TIMES_S[place % TIMES_S.len()],
             },
-            whitener: RowWhitener::new(nalgebra::zero(), nalgebra::zero()),
-            information: SquareRootInformation::new(penalty, &Unknowns::zeros()),
-            log_variances: 0.0,
-            weight: 0.0,
         };
         NoiseBank {
-            members: std::array::from_fn(member),
+            models: std::array::from_fn(|index| NoiseModel::new(disturbance(index), penalty)),
+            weights: [0.0; MODELS],
             penalty: *penalty,
             forgetting,
             likeliest: LIKELIEST_AT_FIRST,
@@ -111,103 +83,97 @@ impl NoiseBank {
         *self = NoiseBank::new(&self.penalty, self.forgetting);
     }
 
-    /// Moves every member to an observation; gives the row, not yet taken in. `None` for the
-    /// first block of a chain, which makes no row.
+    /// Moves every model to an observation; gives the likeliest model's row, not yet taken in.
+    /// `None` for the first block of a chain, which makes no row.
     ///
     /// # Real-time
     ///
     /// Bounded work, no allocation.
     pub fn predict(&mut self, observation: &Observation) -> Option<WhiteRow> {
+        let time_ns = observation.time_ns();
         let gap_s = self
             .last_time_ns
-            .replace(observation.time_ns())
-            .map(|last_ns| observation.time_ns().saturating_sub(last_ns) as f64 * 1e-9)
+            .replace(time_ns)
+            .map(|last_ns| time_ns.saturating_sub(last_ns) as f64 * 1e-9)
             .filter(|&gap_s| gap_s > 0.0);
-        if observation.is_first() {
-            self.restart(observation, gap_s);
-            if matches!(observation, Observation::Block(_)) {
-                return None;
-            }
-        } else {
-            for member in &mut self.members {
-                member.whitener.propagate(&observation.propagation(&member.disturbance));
+        for model in &mut self.models {
+            match observation.is_first() {
+                true => model.restart(observation, gap_s),
+                false => model.propagate(observation),
             }
         }
-        let likeliest = &self.members[self.likeliest];
-        let (row, _) = likeliest.row(observation)?;
-        let root = likeliest.scale().sqrt();
-        Some(WhiteRow { features: row.features / root, observed: row.observed / root })
+        match observation {
+            Observation::Block(block) if block.is_first => None,
+            _ => self.models[self.likeliest].row(observation),
+        }
     }
 
-    /// Takes the predicted observation into every member; true when another member is the
-    /// likeliest now.
+    /// Takes the predicted observation into every model; true when another one is the likeliest
+    /// now.
+    ///
+    /// # Real-time
+    ///
+    /// One small factorisation for each model of weight, no allocation.
     pub fn accept(&mut self, observation: &Observation) -> bool {
-        self.rows_since_renewal += 1;
-        let renewal = (self.forgetting < 1.0 && self.rows_since_renewal == RENEWAL_ROWS)
-            .then(|| self.penalty * (1.0 - self.forgetting.powi(RENEWAL_ROWS as i32)));
-        if renewal.is_some() {
-            self.rows_since_renewal = 0;
+        for model in &mut self.models {
+            model.accept(observation, self.forgetting);
         }
-        for member in &mut self.members {
-            member.accept(observation, self.forgetting);
-            if let Some(weights) = &renewal {
-                member.information.add_penalty(weights);
-            }
-        }
+        self.renew_penalty();
         let before = self.likeliest;
         self.weigh();
         self.mixture = self.mix();
         before != self.likeliest
     }
 
-    /// The likeliest member's own solution; `None` while the rows do not determine it.
-    pub fn likeliest_solution(&self) -> Option<Solution> {
-        let (estimate, covariance) = self.members[self.likeliest].solution()?;
-        Some(Solution { estimate, covariance })
-    }
-
     /// Goes on without the predicted observation: as the start of a new chain for a block,
     /// whose momentum may have truly changed.
     pub fn refuse(&mut self, observation: &Observation) {
         if matches!(observation, Observation::Block(_)) {
-            self.restart(observation, Some(0.0));
+            for model in &mut self.models {
+                model.restart(observation, Some(0.0));
+            }
         }
     }
 
     /// Lets the disturbance have jumped, by so much in N/kN.
     pub fn loosen(&mut self, std_n_per_kn: f64) {
-        for member in &mut self.members {
-            let root = member.scale().sqrt();
-            loosen_disturbance(&mut member.whitener, std_n_per_kn / root);
-        }
-    }
-
-    fn restart(&mut self, observation: &Observation, gap_s: Option<f64>) {
-        for member in &mut self.members {
-            member.whitener.propagate(&observation.restart(&member.disturbance, gap_s));
+        for model in &mut self.models {
+            model.loosen(std_n_per_kn);
         }
     }
 
     /// Rows taken in, the forgotten ones in part.
     pub fn count(&self) -> f64 {
-        self.members[0].information.count()
+        self.models[0].count()
+    }
+
+    /// The likeliest model's own solution; `None` while the rows do not determine it.
+    pub fn likeliest_solution(&self) -> Option<Solution> {
+        self.models[self.likeliest].solution()
     }
 
     /// The likeliest noise model.
     pub fn likeliest_noise(&self) -> LikeliestNoise {
-        let member = &self.members[self.likeliest];
-        let scale = member.scale();
-        let std_n_per_kn = member.disturbance.std_n_per_kn * scale.sqrt();
-        LikeliestNoise {
-            member: self.likeliest,
-            disturbance: Disturbance { std_n_per_kn, time_s: member.disturbance.time_s },
-            scale,
-        }
+        let model = &self.models[self.likeliest];
+        let scale = model.scale();
+        let Disturbance { std_n_per_kn, time_s } = *model.disturbance();
+        let disturbance = Disturbance { std_n_per_kn: std_n_per_kn * scale.sqrt(), time_s };
+        LikeliestNoise { place: self.likeliest, disturbance, scale }
     }
 
-    /// What widens the covariance of an estimate from the likeliest member's rows, for the noise
+    /// The disturbance now, in N/kN for given unknowns, with its standard deviation.
+    pub fn disturbance(&self, unknowns: &Unknowns) -> (f64, f64) {
+        self.models[self.likeliest].disturbance_now(unknowns)
+    }
+
+    /// The mixture of all models; `None` while the rows do not determine the parameters.
+    pub fn mixture(&self) -> Option<Solution> {
+        self.mixture
+    }
+
+    /// What widens the covariance of an estimate from the likeliest model's rows, for the noise
     /// is itself estimated: the mean ratio of the mixture's variances of a, b, c to that
-    /// member's. `None` while there is no mixture.
+    /// model's. `None` while there is no mixture.
     pub fn interval_factor(&self) -> Option<f64> {
         let davis = |solution: &Solution| {
             solution.covariance.fixed_view::<PARAMETERS, PARAMETERS>(0, 0).into_owned()
@@ -215,33 +181,38 @@ impl NoiseBank {
         let mixed = davis(self.mixture.as_ref()?);
         let own = davis(&self.likeliest_solution()?).cholesky()?;
         let ratio = own.solve(&mixed).trace() / PARAMETERS as f64;
-        Some(ratio.max(student_factor(self.freedom() + PRIOR_ROWS)))
+        Some(ratio.max(self.student_factor()))
     }
 
-    /// The disturbance now, in N/kN for given parameters and their covariance, with its
-    /// standard deviation.
-    pub fn disturbance(&self, parameters: &Unknowns) -> (f64, f64) {
-        let member = &self.members[self.likeliest];
-        let (value, variance) = disturbance_of(&member.whitener, parameters);
-        (value, (variance * member.scale()).max(0.0).sqrt())
+    /// The slow force that the model does not know, over all models.
+    pub fn disturbed(&self) -> Disturbed {
+        if self.mixture.is_none() {
+            return Disturbed { std_n_per_kn: 0.0, evidence: 0.0 };
+        }
+        let variance: f64 = self
+            .weighty()
+            .map(|(model, weight)| {
+                weight * model.scale() * model.disturbance().std_n_per_kn.powi(2)
+            })
+            .sum();
+        let likelihood = |index: usize| self.models[index].log_likelihood();
+        Disturbed {
+            std_n_per_kn: variance.sqrt(),
+            evidence: 2.0 * (likelihood(self.likeliest) - likelihood(0)),
+        }
     }
 
-    /// The mixture of all members; `None` while the rows do not determine the parameters.
-    pub fn mixture(&self) -> Option<Solution> {
-        self.mixture
-    }
-
-    /// One small factorisation for each member of weight.
     fn mix(&self) -> Option<Solution> {
-        let factor = student_factor(self.freedom() + PRIOR_ROWS);
+        let factor = self.student_factor();
         let mut estimate = Unknowns::zeros();
         let mut second = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
-        for member in self.weighty() {
-            let (own, covariance) = member.solution()?;
-            estimate += own * member.weight;
-            second += (covariance * factor + own * own.transpose()) * member.weight;
+        let mut total = 0.0;
+        for (model, weight) in self.weighty() {
+            let own = model.solution()?;
+            estimate += own.estimate * weight;
+            second += (own.covariance * factor + own.estimate * own.estimate.transpose()) * weight;
+            total += weight;
         }
-        let total = self.total_weight();
         if total <= 0.0 {
             return None;
         }
@@ -249,99 +220,133 @@ impl NoiseBank {
         Some(Solution { estimate, covariance: second / total - estimate * estimate.transpose() })
     }
 
-    /// The slow force that the model does not know, over all members.
-    pub fn disturbed(&self) -> Disturbed {
-        let freedom = self.freedom();
-        let total = self.total_weight();
-        if freedom < 1.0 || total <= 0.0 {
-            return Disturbed { std_n_per_kn: 0.0, evidence: 0.0 };
-        }
-        let variance: f64 =
-            self.weighty().map(|m| m.weight * m.scale() * m.disturbance.std_n_per_kn.powi(2)).sum();
-        let likelihood = |index: usize| self.members[index].log_likelihood(freedom);
-        Disturbed {
-            std_n_per_kn: (variance / total).sqrt(),
-            evidence: 2.0 * (likelihood(self.likeliest) - likelihood(0)),
-        }
-    }
-
-    fn weighty(&self) -> impl Iterator<Item = &Member> {
-        self.members.iter().filter(|member| member.weight > WEIGHT_MIN)
-    }
-
-    fn total_weight(&self) -> f64 {
-        self.weighty().map(|member| member.weight).sum()
-    }
-
-    fn freedom(&self) -> f64 {
-        self.count() - 3.0
+    fn weighty(&self) -> impl Iterator<Item = (&NoiseModel, f64)> {
+        self.models.iter().zip(self.weights).filter(|(_, weight)| *weight > WEIGHT_MIN)
     }
 
     fn weigh(&mut self) {
-        let freedom = self.freedom();
-        if freedom < 1.0 {
+        if self.models[0].freedom() < 1.0 {
             return;
         }
-        let mut best = f64::NEG_INFINITY;
-        for (i, member) in self.members.iter_mut().enumerate() {
-            let likelihood = member.log_likelihood(freedom);
-            member.weight = likelihood;
-            if likelihood > best {
-                (best, self.likeliest) = (likelihood, i);
+        let likelihoods: [f64; MODELS] =
+            std::array::from_fn(|index| self.models[index].log_likelihood());
+        for (index, likelihood) in likelihoods.iter().enumerate() {
+            if *likelihood > likelihoods[self.likeliest] {
+                self.likeliest = index;
             }
         }
-        let mut sum = 0.0;
-        for member in &mut self.members {
-            member.weight = (member.weight - best).exp();
-            sum += member.weight;
+        let best = likelihoods[self.likeliest];
+        self.weights = likelihoods.map(|likelihood| (likelihood - best).exp());
+        let sum: f64 = self.weights.iter().sum();
+        self.weights = self.weights.map(|weight| weight / sum);
+    }
+
+    /// Every so many rows, gives back what forgetting took off the priors.
+    fn renew_penalty(&mut self) {
+        self.rows_since_renewal += 1;
+        if self.forgetting < 1.0 && self.rows_since_renewal == RENEWAL_ROWS {
+            self.rows_since_renewal = 0;
+            let weights = self.penalty * (1.0 - self.forgetting.powi(RENEWAL_ROWS as i32));
+            for model in &mut self.models {
+                model.add_penalty(&weights);
+            }
         }
-        for member in &mut self.members {
-            member.weight /= sum;
-        }
+    }
+
+    /// Widens a variance so that 1.96 standard deviations hold 95 % although the variance itself
+    /// is estimated with few degrees of freedom (Student's t).
+    fn student_factor(&self) -> f64 {
+        let freedom = self.models[0].freedom() + PRIOR_ROWS;
+        1.0 + 2.5 / (freedom - 1.2).max(0.8)
     }
 }
 
-impl Member {
-    fn row(&self, observation: &Observation) -> Option<(WhiteRow, f64)> {
-        let (columns, variance) = self.whitener.innovation(&observation.sighting());
-        if !(variance > 0.0 && variance.is_finite()) {
-            return None;
+#[cfg(test)]
+mod tests {
+    use super::super::regression::{Columns, MomentumBlock};
+    use super::super::simulation::normal;
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+
+    /// Blocks of 5 s with a disturbance and white noise; w0 = 2 + 0.5 (v/20) + 1 (v/20)².
+    fn blocks(count: usize, disturbance: Disturbance, noise: f64) -> Vec<Observation> {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(6);
+        let kept = (-5.0 / disturbance.time_s).exp();
+        let (mut momentum, mut force) = (500.0, disturbance.std_n_per_kn * normal(&mut random));
+        (0..count)
+            .map(|index| {
+                let v = 0.2 + random.random::<f64>();
+                let mut impulse = Columns::zeros();
+                (impulse[1], impulse[2], impulse[3]) = (5.0, 5.0 * v, 5.0 * v * v);
+                momentum -= impulse[1] * (2.0 + force) + 0.5 * impulse[2] + impulse[3];
+                force = kept * force
+                    + disturbance.std_n_per_kn * (1.0 - kept * kept).sqrt() * normal(&mut random);
+                Observation::Block(MomentumBlock {
+                    is_first: index == 0,
+                    momentum: momentum + noise * normal(&mut random),
+                    momentum_variance: noise * noise,
+                    impulse,
+                    impulse_variance: 0.0,
+                    time_ns: 5_000_000_000 * index as i64,
+                    speed_mps: 20.0 * v,
+                })
+            })
+            .collect()
+    }
+
+    fn after(blocks: &[Observation]) -> NoiseBank {
+        let mut bank = NoiseBank::new(&Unknowns::repeat(1e-3), 1.0);
+        for block in blocks {
+            if bank.predict(block).is_some() {
+                bank.accept(block);
+            }
         }
-        let root = variance.sqrt();
-        let features = columns.fixed_rows::<UNKNOWNS>(1) / root;
-        Some((WhiteRow { features, observed: columns[0] / root }, variance))
+        bank
     }
 
-    fn accept(&mut self, observation: &Observation, forgetting: f64) {
-        let Some((row, variance)) = self.row(observation) else { return };
-        self.information.forget(forgetting);
-        self.log_variances = forgetting * self.log_variances + variance.ln();
-        self.information.update(&row.features, row.observed);
-        let corrected = self.whitener.correct(&observation.sighting());
-        debug_assert!(corrected.is_ok(), "the row's variance was positive");
+    #[test]
+    fn the_bank_recognises_the_disturbance_that_made_its_rows() {
+        let disturbance = Disturbance { std_n_per_kn: 0.3, time_s: 60.0 };
+        let bank = after(&blocks(1500, disturbance, 0.3));
+        let found = bank.likeliest_noise().disturbance;
+        assert_eq!(found.time_s, 60.0);
+        assert!((found.std_n_per_kn / 0.3 - 1.0).abs() < 0.2);
+        assert!(bank.disturbed().evidence > 100.0);
+        assert!((bank.likeliest_noise().scale - 1.0).abs() < 0.2);
     }
 
-    /// Restricted log-likelihood with the scale profiled out, up to a constant.
-    fn log_likelihood(&self, freedom: f64) -> f64 {
-        -0.5 * (freedom + PRIOR_ROWS) * self.scale().ln()
-            - 0.5 * self.log_variances
-            - 0.5 * self.information.log_determinant()
+    #[test]
+    fn rows_of_white_noise_alone_give_no_evidence_of_a_disturbance() {
+        let none = Disturbance { std_n_per_kn: 0.0, time_s: 10.0 };
+        let bank = after(&blocks(800, none, 0.4));
+        assert!(bank.disturbed().evidence < 4.0);
+        assert!(bank.disturbed().std_n_per_kn < 0.05);
+        let mixture = bank.mixture().unwrap();
+        let truth = [2.0, 0.5, 1.0];
+        for (i, value) in truth.iter().enumerate() {
+            let std = mixture.covariance[(i, i)].sqrt();
+            assert!((mixture.estimate[i] - value).abs() < 3.5 * std);
+        }
     }
 
-    /// Residual variance of unit-variance rows, the model itself counting for some.
-    fn scale(&self) -> f64 {
-        let freedom = (self.information.count() - 3.0).max(0.0);
-        (self.information.residual_sum() + PRIOR_ROWS) / (freedom + PRIOR_ROWS)
+    #[test]
+    fn a_refused_block_leaves_no_trace_in_the_rows() {
+        let none = Disturbance { std_n_per_kn: 0.0, time_s: 10.0 };
+        let mut blocks = blocks(300, none, 0.4);
+        let Observation::Block(bad) = &mut blocks[150] else { panic!("blocks only") };
+        bad.momentum += 1000.0;
+        let mut bank = NoiseBank::new(&Unknowns::repeat(1e-3), 1.0);
+        for (index, block) in blocks.iter().enumerate() {
+            let row = bank.predict(block);
+            match index {
+                0 => assert!(row.is_none()),
+                // The spike itself, and the step back from it.
+                150 | 151 => bank.refuse(block),
+                _ => drop(bank.accept(block)),
+            }
+        }
+        let mixture = bank.mixture().unwrap();
+        assert!((mixture.estimate[0] - 2.0).abs() < 4.0 * mixture.covariance[(0, 0)].sqrt());
+        assert_eq!(bank.count(), 297.0);
     }
-
-    fn solution(&self) -> Option<(Unknowns, SMatrix<f64, UNKNOWNS, UNKNOWNS>)> {
-        let estimate = self.information.solve().ok()?;
-        Some((estimate, self.information.covariance().ok()? * self.scale()))
-    }
-}
-
-/// Widens a variance so that 1.96 standard deviations hold 95 % although the variance itself
-/// is estimated with so many degrees of freedom (Student's t).
-fn student_factor(freedom: f64) -> f64 {
-    1.0 + 2.5 / (freedom - 1.2).max(0.8)
 }

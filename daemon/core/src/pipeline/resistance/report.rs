@@ -186,3 +186,70 @@ fn missing_manoeuvres(excited: u32) -> u32 {
     let wanted = [Manoeuvre::CoastSlow, Manoeuvre::VarySpeed, Manoeuvre::CoastFast];
     (0..PARAMETERS).filter(|i| excited & (1 << i) == 0).fold(0, |bits, i| bits | wanted[i].bit())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::SMatrix;
+
+    fn judged(
+        estimate: [f64; 3],
+        stds: [f64; 3],
+        change: impl FnOnce(&mut Evidence<'_>),
+    ) -> Report {
+        let mut solution =
+            Solution { estimate: nalgebra::zero(), covariance: SMatrix::identity() * 1e-4 };
+        for i in 0..PARAMETERS {
+            solution.estimate[i] = estimate[i];
+            solution.covariance[(i, i)] = stds[i] * stds[i];
+        }
+        let innovations = InnovationMonitor::new(60);
+        let mut speeds = DrivenSpeeds::default();
+        speeds.push(5.0);
+        speeds.push(30.0);
+        let mut evidence = Evidence {
+            disturbed: Disturbed { std_n_per_kn: 0.02, evidence: 50.0 },
+            disturbance_n_per_kn: 0.0,
+            disturbance_std_n_per_kn: 0.1,
+            innovations: &innovations,
+            speeds: &speeds,
+            rows: 200.0,
+            refused_share: 0.0,
+        };
+        change(&mut evidence);
+        Report::judge(&solution, &evidence).unwrap()
+    }
+
+    const GOOD: [f64; 3] = [1.5, 0.4, 1.2];
+    const SMALL: [f64; 3] = [0.05, 0.05, 0.05];
+
+    #[test]
+    fn every_reservation_has_its_reason() {
+        let reason = |report: Report| (report.status, report.reason);
+        assert_eq!(reason(judged(GOOD, SMALL, |_| {})), (Status::Estimated, Reason::None));
+        let few = judged(GOOD, SMALL, |evidence| evidence.rows = 5.0);
+        assert_eq!(reason(few), (Status::Unestimated, Reason::TooFewSamples));
+        let wide = judged(GOOD, [3.0, 0.1, 0.1], |_| {});
+        assert_eq!(reason(wide), (Status::Unestimated, Reason::WeakExcitation));
+        let structured = judged(GOOD, SMALL, |evidence| evidence.disturbed.std_n_per_kn = 0.9);
+        assert_eq!(reason(structured), (Status::Degraded, Reason::InnovationsNotWhite));
+        let dragging = judged(GOOD, SMALL, |evidence| evidence.disturbance_n_per_kn = 1.5);
+        assert_eq!(reason(dragging), (Status::Degraded, Reason::InnovationsTooLarge));
+        let refusing = judged(GOOD, SMALL, |evidence| evidence.refused_share = 0.5);
+        assert_eq!(reason(refusing), (Status::Degraded, Reason::BadInput));
+    }
+
+    #[test]
+    fn a_negative_coefficient_is_brought_to_its_bound_and_named() {
+        let report = judged([1.5, -0.02, 1.2], SMALL, |_| {});
+        assert_eq!((report.status, report.reason), (Status::Estimated, Reason::AtBound));
+        assert_eq!(report.estimate[1], 0.0);
+    }
+
+    #[test]
+    fn an_unexcited_coefficient_names_the_manoeuvre_that_would_excite_it() {
+        let report = judged(GOOD, [0.05, 0.05, 1.5], |_| {});
+        assert_eq!(report.excited, 0b011);
+        assert_eq!(report.missing_manoeuvres, Manoeuvre::CoastFast.bit());
+    }
+}

@@ -107,3 +107,56 @@ impl SpeedWatch {
 pub fn resistance_integral(known: &Davis, regressor_integrals: &[f64]) -> f64 {
     scaled(known).iter().zip(regressor_integrals).map(|(value, integral)| value * integral).sum()
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A sample of a train with s = 100 N/kN per m/s².
+    pub fn unit_sample(time_s: f64, speed_mps: f64, driving: f64) -> UnitSample {
+        UnitSample {
+            time_ns: (time_s * 1e9).round() as i64,
+            stretch: 1,
+            speed_mps,
+            driving,
+            traction: driving.max(0.0),
+            brake: (-driving).max(0.0),
+            gradient_permille: 0.0,
+            inertia: 100.0,
+        }
+    }
+
+    /// Speeds of a train under constant driving force, every `step_s`, by small Euler steps.
+    pub fn driven(davis: &Davis, speed_mps: f64, driving: f64, step_s: f64) -> Vec<UnitSample> {
+        let mut speed_mps = speed_mps;
+        let ticks = 1000;
+        (0..300)
+            .map(|index| {
+                let sample = unit_sample(step_s * f64::from(index), speed_mps, driving);
+                for _ in 0..ticks {
+                    let rate = (driving - davis.w0_n_per_kn(speed_mps)) / 100.0;
+                    speed_mps += rate * step_s / f64::from(ticks);
+                }
+                sample
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_change_of_force_within_the_step_is_no_spike() {
+        let known = Davis { a: 2.0, b: 0.0, c: 0.0 };
+        let mut watch = SpeedWatch::new(0.15);
+        let before = unit_sample(0.0, 10.0, 0.0);
+        // Full traction from just after the first sample on.
+        let now = unit_sample(1.0, 10.98, 100.0);
+        assert_eq!(watch.judge(&before, &now, &known), SpeedVerdict::Continues);
+        let coasting = unit_sample(1.0, 10.98, 0.0);
+        assert_eq!(watch.judge(&before, &coasting, &known), SpeedVerdict::Spike);
+    }
+
+    #[test]
+    fn trapezoids_are_exact_for_linear_forces_and_regressors() {
+        let areas = trapezoids(&unit_sample(0.0, 10.0, 4.0), &unit_sample(0.5, 20.0, 8.0));
+        assert_eq!(areas[..3], [3.0, 0.5, 0.375]);
+    }
+}

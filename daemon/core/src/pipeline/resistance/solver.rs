@@ -2,7 +2,8 @@
 
 use nalgebra::SMatrix;
 
-use super::noise_bank::{NoiseBank, WhiteRow};
+use super::noise_bank::NoiseBank;
+use super::noise_model::WhiteRow;
 use super::regression::{PARAMETERS, UNKNOWNS, Unknowns};
 use super::settings::{DataSettings, INNOVATION_LENGTH_MAX, MilsSettings, RlsSettings};
 use crate::filter::{Forgetting, Mils, NotPositiveDefinite, Penalty, Rls};

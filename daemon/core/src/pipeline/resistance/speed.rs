@@ -115,3 +115,45 @@ impl SpeedNoise {
         if self.quantum_mps.is_finite() { self.quantum_mps.powi(2) / 12.0 } else { 0.0 }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_single_spike_is_refused_and_a_new_level_is_believed() {
+        let mut gate = SpeedGate::default();
+        assert_eq!(gate.judge(0.05, 0.15), SpeedVerdict::Continues);
+        assert_eq!(gate.judge(-0.9, 0.15), SpeedVerdict::Spike);
+        assert_eq!(gate.judge(0.01, 0.15), SpeedVerdict::Continues);
+        let verdicts = [(); 4].map(|()| gate.judge(0.9, 0.15));
+        use SpeedVerdict::{Restart, Spike};
+        assert_eq!(verdicts, [Spike, Spike, Restart, Spike]);
+    }
+
+    #[test]
+    fn rounding_of_a_steady_speed_does_not_average_out() {
+        let mut noise = SpeedNoise::default();
+        for speed_mps in [5.0, 5.1, 5.1, 5.2] {
+            noise.see(speed_mps);
+        }
+        let rounding = 0.1_f64.powi(2) / 12.0;
+        assert!((noise.rounding_variance() - rounding).abs() < 1e-12);
+        assert!((noise.variance_of_mean(25.0, 0.0) - rounding).abs() < 1e-9);
+        assert!((noise.variance_of_mean(25.0, 10.0) - rounding / 25.0).abs() < 1e-9);
+        assert!((noise.variance_of_sample(0.2) - rounding).abs() < 1e-9);
+        assert!((noise.variance_of_sample(0.01) - 10.0 * rounding).abs() < 1e-9);
+    }
+
+    #[test]
+    fn one_wild_scatter_hardly_moves_the_variance() {
+        let mut noise = SpeedNoise::default();
+        for _ in 0..50 {
+            noise.take(10.0 * 4e-4, 10.0);
+        }
+        noise.take(10.0 * 4.0, 10.0);
+        assert!(noise.variance() < 6e-4);
+        noise.take(f64::NAN, 10.0);
+        assert!(noise.variance() < 6e-4);
+    }
+}
