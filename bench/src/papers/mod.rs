@@ -2,6 +2,7 @@
 
 pub mod bound;
 pub mod braking;
+pub mod liu;
 pub mod row;
 pub mod statistics;
 pub mod table;

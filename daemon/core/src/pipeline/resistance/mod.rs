@@ -8,6 +8,7 @@
 //! - `solver`: the recursions
 //! - `report`: bounds, excitation, status
 //! - `least_squares`: the pipeline around all of it
+//! - [`output_error`]: the fit of whole runs at once, for data at rest
 //! - `kalman`: the robust filter over every sample, with a least-squares pipeline beside it
 
 mod coasting;
@@ -16,6 +17,7 @@ mod least_squares;
 mod momentum;
 mod noise_bank;
 mod noise_model;
+pub mod output_error;
 mod regression;
 mod report;
 mod sample;
@@ -25,6 +27,7 @@ mod simulation;
 mod solver;
 mod source;
 mod speed;
+mod speed_run;
 #[cfg(test)]
 mod tests;
 

@@ -1,0 +1,182 @@
+//! The Cramér-Rao bound of the coasting scenario, computed.
+//!
+//! The speeds are noisy, sometimes wild, and rounded: a sample is the number of the step that it
+//! falls on. Its Fisher information about the true speed is the sum over steps of
+//! (dp/dspeed)² / p, averaged over where in a step the true speed lies.
+
+use dynocar_core::train::Davis;
+use nalgebra::{DMatrix, Matrix3, Vector3};
+
+use super::scenario::{
+    COMPARED_KMH, Condition, NOISE_KMH, OUTLIER_KMH, QUANTUM_KMH, RUNS_KMH, STEP_S,
+    true_speeds_kmh, truth,
+};
+
+/// Fisher information of one rounded speed about the true speed, in 1/(km/h)².
+pub fn sample_information(outlier_share: f64) -> f64 {
+    let phases = 40;
+    let steps = ((OUTLIER_KMH.1 + 8.0 * NOISE_KMH) / QUANTUM_KMH).ceil() as i64 + 1;
+    let mut sum = 0.0;
+    for phase in 0..phases {
+        let speed_kmh = QUANTUM_KMH * ((f64::from(phase) + 0.5) / f64::from(phases) - 0.5);
+        for step in -steps..=steps {
+            let low = QUANTUM_KMH * (step as f64 - 0.5) - speed_kmh;
+            let high = low + QUANTUM_KMH;
+            let probability = distribution(high, outlier_share) - distribution(low, outlier_share);
+            // The error's distribution shifts against the speed.
+            let slope = density(low, outlier_share) - density(high, outlier_share);
+            if probability > 1e-300 {
+                sum += slope * slope / probability;
+            }
+        }
+    }
+    sum / f64::from(phases)
+}
+
+/// Probability that the error before rounding lies below `error_kmh`.
+fn distribution(error_kmh: f64, outlier_share: f64) -> f64 {
+    let sound = normal_distribution(error_kmh / NOISE_KMH);
+    // An outlier is the noise moved by a size between two bounds, up or down.
+    let (low, high) = OUTLIER_KMH;
+    let moved = |shift: f64| normal_integral((error_kmh - shift) / NOISE_KMH);
+    let up = (moved(low) - moved(high)) * NOISE_KMH / (high - low);
+    let down = (moved(-high) - moved(-low)) * NOISE_KMH / (high - low);
+    (1.0 - outlier_share) * sound + outlier_share * 0.5 * (up + down)
+}
+
+fn density(error_kmh: f64, outlier_share: f64) -> f64 {
+    let sound = normal_density(error_kmh / NOISE_KMH) / NOISE_KMH;
+    let (low, high) = OUTLIER_KMH;
+    let below = |shift: f64| normal_distribution((error_kmh - shift) / NOISE_KMH);
+    let up = (below(low) - below(high)) / (high - low);
+    let down = (below(-high) - below(-low)) / (high - low);
+    (1.0 - outlier_share) * sound + outlier_share * 0.5 * (up + down)
+}
+
+fn normal_density(x: f64) -> f64 {
+    (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt()
+}
+
+/// The standard normal distribution, by the continued fraction or series of its tail
+/// (Abramowitz and Stegun 1964, 26.2.10 and 26.2.14).
+fn normal_distribution(x: f64) -> f64 {
+    let size = x.abs();
+    let upper = if size < 3.0 {
+        let (mut term, mut sum, mut n) = (size, size, 1.0);
+        while term.abs() > 1e-17 * sum.abs() && n < 200.0 {
+            term *= size * size / (2.0 * n + 1.0);
+            sum += term;
+            n += 1.0;
+        }
+        0.5 - normal_density(size) * sum
+    } else {
+        let mut fraction = size;
+        for k in (1..60).rev() {
+            fraction = size + f64::from(k) / fraction;
+        }
+        normal_density(size) / fraction
+    };
+    if x > 0.0 { 1.0 - upper } else { upper }
+}
+
+/// The integral of the standard normal distribution up to x.
+fn normal_integral(x: f64) -> f64 {
+    x * normal_distribution(x) + normal_density(x)
+}
+
+/// Bound of the covariance of a, b, c (for speeds in m/s), with each run's start speed unknown;
+/// `is_kept` tells which samples of a run there are.
+pub fn covariance(condition: Condition, is_kept: impl Fn(usize, usize) -> bool) -> Matrix3<f64> {
+    // Per (m/s)².
+    let weight = sample_information(condition.outlier_share()) * 3.6 * 3.6;
+    let unknowns = 3 + RUNS_KMH.len();
+    let mut information = DMatrix::<f64>::zeros(unknowns, unknowns);
+    for (run, speeds_kmh) in RUNS_KMH.iter().enumerate() {
+        let count = true_speeds_kmh(*speeds_kmh, &truth()).len();
+        let start_mps = speeds_kmh.0 / 3.6;
+        let rows = derivatives(start_mps, count);
+        for (index, row) in rows.iter().enumerate() {
+            if !is_kept(run, index) {
+                continue;
+            }
+            let mut full = vec![0.0; unknowns];
+            full[..3].copy_from_slice(&row[..3]);
+            full[3 + run] = row[3];
+            for i in 0..unknowns {
+                for j in 0..unknowns {
+                    information[(i, j)] += weight * full[i] * full[j];
+                }
+            }
+        }
+    }
+    let inverse = information.cholesky().expect("two long runs determine five unknowns").inverse();
+    inverse.fixed_view::<3, 3>(0, 0).into_owned()
+}
+
+/// Central differences of the speed in m/s by a, b, c and the start speed, at every sample.
+fn derivatives(start_mps: f64, count: usize) -> Vec<[f64; 4]> {
+    let changes = [1e-4, 1e-5, 1e-6, 1e-4];
+    let moved = |place: usize, change: f64| {
+        let Davis { a, b, c } = truth();
+        let mut values = [a, b, c, start_mps];
+        values[place] += change;
+        let davis = Davis { a: values[0], b: values[1], c: values[2] };
+        let mut speeds = true_speeds_kmh((values[3] * 3.6, 20.0), &davis);
+        speeds.truncate(count);
+        speeds
+    };
+    let mut rows = vec![[0.0; 4]; count];
+    for (place, change) in changes.into_iter().enumerate() {
+        let (up, down) = (moved(place, change), moved(place, -change));
+        for (row, (up, down)) in rows.iter_mut().zip(up.iter().zip(&down)) {
+            row[place] = (up - down) / 3.6 / (2.0 * change);
+        }
+    }
+    debug_assert!(rows.len() as f64 * STEP_S > 10.0);
+    rows
+}
+
+/// Root of the mean variance of w0 over the compared speeds, in N/kN.
+pub fn root_mean_variance(covariance: &Matrix3<f64>) -> f64 {
+    let variances: Vec<f64> = COMPARED_KMH
+        .map(|kmh| {
+            let speed_mps = f64::from(kmh) / 3.6;
+            let powers = Vector3::new(1.0, speed_mps, speed_mps * speed_mps);
+            powers.dot(&(covariance * powers))
+        })
+        .collect();
+    (variances.iter().sum::<f64>() / variances.len() as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_normal_distribution_is_as_tabled() {
+        for (x, expected) in [(0.0, 0.5), (1.0, 0.841_344_746), (-1.96, 0.024_997_895)] {
+            assert!((normal_distribution(x) - expected).abs() < 1e-9);
+        }
+        assert!((normal_distribution(3.5) - 0.999_767_371).abs() < 1e-9);
+        let slope = (normal_integral(0.71) - normal_integral(0.69)) / 0.02;
+        assert!((slope - normal_distribution(0.7)).abs() < 1e-5);
+    }
+
+    #[test]
+    fn rounding_costs_about_its_variance_and_outliers_about_their_share() {
+        let plain = 1.0 / (NOISE_KMH * NOISE_KMH);
+        let rounded = sample_information(0.0);
+        let approximate = 1.0 / (NOISE_KMH.powi(2) + QUANTUM_KMH.powi(2) / 12.0);
+        assert!(rounded < plain && (rounded / approximate - 1.0).abs() < 0.05);
+        let wild = sample_information(0.05);
+        assert!(wild < 0.96 * rounded && wild > 0.9 * rounded);
+    }
+
+    #[test]
+    fn fewer_samples_allow_less() {
+        let all = root_mean_variance(&covariance(Condition::Clean, |_, _| true));
+        let half = root_mean_variance(&covariance(Condition::Clean, |_, index| index % 2 == 0));
+        assert!((half / all - 2.0_f64.sqrt()).abs() < 0.03);
+        assert!(all > 0.006 && all < 0.009, "{all} N/kN");
+    }
+}

@@ -1,0 +1,196 @@
+//! The paper's methods as printed, in km/h, with eq. 5 and 6 corrected.
+
+use dynocar_core::filter::{Mils, Penalty, RunningMedian, SquareRootInformation};
+use nalgebra::Vector3;
+
+use super::scenario::{Measured, ROTATING_MASS_FACTOR};
+
+/// p0 of eq. 11.
+const START_VARIANCE: f64 = 1e6;
+/// Change of speed over a segment in km/h (section 2.2).
+const SEGMENT_KMH: f64 = 0.5;
+/// V-MILS: innovations beyond this many robust standard deviations are bad data; the paper has
+/// no rule.
+const BAD_BEYOND: f64 = 3.5;
+/// The median of |x| for a standard normal x.
+const NORMAL_MEDIAN: f64 = 0.6745;
+
+/// A segment: mean speed in km/h and w0 in N/kN.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segment {
+    /// Mean speed in km/h.
+    pub speed_kmh: f64,
+    /// Resistance in N/kN on level track.
+    pub w0_n_per_kn: f64,
+}
+
+impl Segment {
+    fn features(&self) -> Vector3<f64> {
+        Vector3::new(1.0, self.speed_kmh, self.speed_kmh * self.speed_kmh)
+    }
+}
+
+/// Half-overlapping segments of figure 2: a segment ends where the speed has fallen by 0.5 km/h,
+/// the next starts in its middle; the acceleration is the least-squares slope.
+pub fn segments(runs: &[Vec<Measured>]) -> Vec<Segment> {
+    runs.iter().flat_map(|run| segments_of(run)).collect()
+}
+
+fn segments_of(run: &[Measured]) -> Vec<Segment> {
+    let mut segments = Vec::new();
+    let mut start = 0;
+    while let Some(length) = run[start..]
+        .iter()
+        .position(|sample| sample.speed_kmh <= run[start].speed_kmh - SEGMENT_KMH)
+    {
+        let samples = &run[start..=start + length];
+        segments.extend(segment(samples));
+        start += (length / 2).max(1);
+    }
+    segments
+}
+
+fn segment(samples: &[Measured]) -> Option<Segment> {
+    let count = samples.len() as f64;
+    if samples.len() < 2 {
+        return None;
+    }
+    let mean_s = samples.iter().map(|sample| sample.time_s).sum::<f64>() / count;
+    let mean_kmh = samples.iter().map(|sample| sample.speed_kmh).sum::<f64>() / count;
+    let (mut product, mut spread) = (0.0, 0.0);
+    for sample in samples {
+        product += (sample.time_s - mean_s) * (sample.speed_kmh - mean_kmh);
+        spread += (sample.time_s - mean_s).powi(2);
+    }
+    let acceleration_mps2 = product / spread / 3.6;
+    let w0_n_per_kn = -1000.0 * (1.0 + ROTATING_MASS_FACTOR) / 9.81 * acceleration_mps2;
+    Some(Segment { speed_kmh: mean_kmh, w0_n_per_kn })
+}
+
+/// A method of Table 1, or V-MILS of section 4.2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Plain least squares, figure 3.
+    LeastSquares,
+    /// Recursive least squares, eq. 9-11.
+    Rls,
+    /// Multi-innovation least squares of an innovation length.
+    Mils(usize),
+    /// Interval-varying multi-innovation least squares of an innovation length.
+    VMils(usize),
+}
+
+impl Method {
+    /// Every method that is compared.
+    pub const ALL: [Method; 6] = [
+        Method::LeastSquares,
+        Method::Rls,
+        Method::Mils(2),
+        Method::Mils(4),
+        Method::Mils(6),
+        Method::VMils(4),
+    ];
+
+    /// The paper's name.
+    pub fn name(self) -> String {
+        match self {
+            Method::LeastSquares => "LS".into(),
+            Method::Rls => "RLS".into(),
+            Method::Mils(length) => format!("MILS p = {length}"),
+            Method::VMils(length) => format!("V-MILS p = {length}"),
+        }
+    }
+
+    /// a, b, c for speeds in km/h; `None` when the segments do not determine them.
+    pub fn estimate(self, segments: &[Segment]) -> Option<[f64; 3]> {
+        let estimate = match self {
+            Method::LeastSquares => {
+                let none = Vector3::zeros();
+                let mut information = SquareRootInformation::<3>::new(&none, &none);
+                for segment in segments {
+                    information.update(&segment.features(), segment.w0_n_per_kn);
+                }
+                information.solve().ok()?
+            }
+            Method::Rls => recursion(segments, 1, None)?,
+            Method::Mils(length) => recursion(segments, length, None)?,
+            Method::VMils(length) => recursion(segments, length, Some(BAD_BEYOND))?,
+        };
+        Some(estimate.into())
+    }
+}
+
+/// The recursion of section 3; with a limit, the instants t_s at which it updates are those
+/// whose newest p innovations are all good.
+fn recursion(segments: &[Segment], length: usize, bad_beyond: Option<f64>) -> Option<Vector3<f64>> {
+    let start = Vector3::repeat(1.0 / START_VARIANCE);
+    let variances = Vector3::repeat(START_VARIANCE);
+    let mut mils = Mils::<3, 8>::new(start, &variances, length, Penalty::none());
+    let mut sizes = RunningMedian::<31>::default();
+    for segment in segments {
+        let features = segment.features();
+        if let Some(beyond) = bad_beyond {
+            let size = (segment.w0_n_per_kn - features.dot(mils.estimate())).abs();
+            sizes.push(size);
+            let median = sizes.median()?;
+            if sizes.count() > 8 && size > beyond * median / NORMAL_MEDIAN {
+                mils.forget_rows();
+                continue;
+            }
+        }
+        mils.update(&features, segment.w0_n_per_kn).ok()?;
+    }
+    Some(*mils.estimate())
+}
+
+/// Variance of the segments' residuals in (N/kN)², Table 1's last column.
+pub fn residual_variance(segments: &[Segment], theta_kmh: [f64; 3]) -> f64 {
+    let theta = Vector3::from(theta_kmh);
+    let sum: f64 = segments
+        .iter()
+        .map(|segment| (segment.w0_n_per_kn - segment.features().dot(&theta)).powi(2))
+        .sum();
+    sum / segments.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::scenario::{Condition, RUNS_KMH, STEP_S, THETA_KMH, measure, truth};
+    use super::*;
+
+    #[test]
+    fn segments_of_true_speeds_give_the_true_resistance_by_every_method() {
+        let runs: Vec<Vec<Measured>> = RUNS_KMH
+            .iter()
+            .map(|run| {
+                let speeds = super::super::scenario::true_speeds_kmh(*run, &truth());
+                speeds
+                    .iter()
+                    .enumerate()
+                    .map(|(i, &speed_kmh)| Measured { time_s: STEP_S * i as f64, speed_kmh })
+                    .collect()
+            })
+            .collect();
+        let segments = segments(&runs);
+        assert!(segments.len() > 150);
+        for method in Method::ALL {
+            let [a, b, c] = method.estimate(&segments).unwrap();
+            for kmh in [45.0, 60.0, 70.0] {
+                let w0 = a + b * kmh + c * kmh * kmh;
+                let [a, b, c] = THETA_KMH;
+                let expected = a + b * kmh + c * kmh * kmh;
+                assert!((w0 / expected - 1.0).abs() < 5e-3, "{} at {kmh}", method.name());
+            }
+        }
+    }
+
+    #[test]
+    fn the_gate_of_v_mils_lessens_the_harm_of_outliers() {
+        let segments = segments(&measure(Condition::Outliers, 1));
+        let error = |method: Method| {
+            let [a, b, c] = method.estimate(&segments).unwrap();
+            (a + b * 55.0 + c * 55.0 * 55.0 - 7.5075).abs()
+        };
+        assert!(error(Method::VMils(4)) < 0.5 * error(Method::Mils(4)));
+    }
+}
