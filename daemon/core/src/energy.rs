@@ -44,7 +44,8 @@ impl TractionEnergy {
         }
         match (last.traction_force_n, sample.traction_force_n) {
             (Some(from_n), Some(to_n)) if from_n.is_finite() && to_n.is_finite() => {
-                self.energy_j += step_s * mean_product(from_n, to_n, last.speed_mps, sample.speed_mps);
+                self.energy_j +=
+                    step_s * mean_product(from_n, to_n, last.speed_mps, sample.speed_mps);
             }
             _ => self.unknown_time_s += step_s,
         }
@@ -136,16 +137,20 @@ mod tests {
     #[test]
     fn a_force_and_a_speed_that_both_change_are_integrated_exactly() {
         // F = 1000 t, v = t over 2 s: ∫ 1000 t² dt = 8000/3.
-        let samples: Vec<_> = (0..=10)
-            .map(|k| (0.2 * f64::from(k), Some(200.0 * f64::from(k))))
-            .collect();
+        let samples: Vec<_> =
+            (0..=10).map(|k| (0.2 * f64::from(k), Some(200.0 * f64::from(k)))).collect();
         assert!((run(&samples).energy_j() - 8000.0 / 3.0).abs() < 1e-6);
     }
 
     #[test]
     fn missing_forces_are_unknown_time_and_standing_is_no_running_time() {
         let mut samples = vec![(0.0, Some(0.0)); 6];
-        samples.extend([(0.1, Some(1000.0)), (0.2, None), (0.3, Some(1000.0)), (0.4, Some(1000.0))]);
+        samples.extend([
+            (0.1, Some(1000.0)),
+            (0.2, None),
+            (0.3, Some(1000.0)),
+            (0.4, Some(1000.0)),
+        ]);
         let energy = run(&samples);
         assert!((energy.unknown_time_s() - 0.4).abs() < 1e-9);
         assert!((energy.running_time_s() - 0.8).abs() < 1e-9);

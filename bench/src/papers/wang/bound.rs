@@ -96,7 +96,8 @@ fn leg_information(
     }
     // The start is nobody's question: its Schur complement is left.
     let cross = whole.fixed_view::<UNKNOWNS, 1>(0, UNKNOWNS).into_owned();
-    whole.fixed_view::<UNKNOWNS, UNKNOWNS>(0, 0) - cross * cross.transpose() / whole[(UNKNOWNS, UNKNOWNS)]
+    whole.fixed_view::<UNKNOWNS, UNKNOWNS>(0, 0)
+        - cross * cross.transpose() / whole[(UNKNOWNS, UNKNOWNS)]
 }
 
 /// Posterior Cramér–Rao bound of the mass, relative, under the scenario's wind: the covariance

@@ -34,8 +34,8 @@ impl Wind {
 impl Disturbance for Wind {
     fn resistance_n_per_kn(&mut self, _time_s: f64, speed_mps: f64) -> f64 {
         let keep = (-PERIOD_S / GUST_TIME_S).exp();
-        self.gust_mps =
-            keep * self.gust_mps + GUST_STD_MPS * (1.0 - keep * keep).sqrt() * normal(&mut self.random);
+        self.gust_mps = keep * self.gust_mps
+            + GUST_STD_MPS * (1.0 - keep * keep).sqrt() * normal(&mut self.random);
         let air_mps = speed_mps + self.mean_mps + self.gust_mps;
         self.quadratic * (air_mps * air_mps.abs() - speed_mps * speed_mps)
     }

@@ -29,9 +29,8 @@ pub fn curves(curve_in_tunnel: bool) -> Vec<Curve> {
     let mut start_m = 400.0;
     while start_m < 27_000.0 {
         let end_m = start_m + (250.0 + 350.0 * random.random::<f64>()).round();
-        let is_near = |tunnel: &Tunnel| {
-            start_m < tunnel.end_m + 80.0 && end_m > tunnel.start_m - 80.0
-        };
+        let is_near =
+            |tunnel: &Tunnel| start_m < tunnel.end_m + 80.0 && end_m > tunnel.start_m - 80.0;
         if !tunnels().iter().any(is_near) {
             list.push(Curve { start_m, end_m, radius_m: CURVE_RADIUS_M });
         }

@@ -25,7 +25,11 @@ pub fn normal(random: &mut ChaCha8Rng) -> f64 {
 }
 
 /// The samples of a drive with noise and rounding, through validation and force resolution.
-pub fn measure(shuttle: &Shuttle, ride: &[Instant], random: &mut ChaCha8Rng) -> Vec<ResolvedSample> {
+pub fn measure(
+    shuttle: &Shuttle,
+    ride: &[Instant],
+    random: &mut ChaCha8Rng,
+) -> Vec<ResolvedSample> {
     observe(shuttle, ride, |speed_mps| {
         let noisy = speed_mps + SPEED_STD_MPS * normal(random);
         ((noisy / SPEED_QUANTUM_MPS).round() * SPEED_QUANTUM_MPS).max(0.0)

@@ -6,11 +6,11 @@
 
 use std::sync::Arc;
 
+use super::driver::{Driver, LimitDriver};
+use super::line::{CURVE_RADIUS_M, STATIONS_M, curves, gradients, tunnels};
 use dynocar_core::track::Track;
 use dynocar_core::train::{BrakeGear, Davis, EffortCurve, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
-use super::driver::{Driver, LimitDriver};
-use super::line::{CURVE_RADIUS_M, STATIONS_M, curves, gradients, tunnels};
 
 /// Time in s between two samples: the controller's period of the paper.
 pub const PERIOD_S: f64 = 0.2;
@@ -258,13 +258,6 @@ impl Shuttle {
 
     /// The train at rest.
     pub fn standing_at(&self, position_m: f64, mass_kg: f64) -> Instant {
-        Instant {
-            time_s: 0.0,
-            position_m,
-            speed_mps: 0.0,
-            force_n: 0.0,
-            direction: 1.0,
-            mass_kg,
-        }
+        Instant { time_s: 0.0, position_m, speed_mps: 0.0, force_n: 0.0, direction: 1.0, mass_kg }
     }
 }

@@ -229,7 +229,12 @@ mod tests {
     fn step(k: usize) -> DriftStep {
         let noise_variance = [0.0, 0.02, 0.1][k % 3];
         let level_noise_variance = [0.0, 0.0, 0.03, 0.2][k % 4];
-        DriftStep { gain: 0.1 + 0.05 * (k % 4) as f64, keep: 0.9, noise_variance, level_noise_variance }
+        DriftStep {
+            gain: 0.1 + 0.05 * (k % 4) as f64,
+            keep: 0.9,
+            noise_variance,
+            level_noise_variance,
+        }
     }
 
     /// Weighted least squares with the level and the bias of every instant unknowns of their

@@ -71,8 +71,8 @@ impl<const N: usize> JosephFilter<N> {
         for i in 0..N {
             keep[(i, index)] -= gain[i];
         }
-        let covariance = keep * self.covariance * keep.transpose()
-            + gain * gain.transpose() * noise_variance;
+        let covariance =
+            keep * self.covariance * keep.transpose() + gain * gain.transpose() * noise_variance;
         self.covariance = 0.5 * (covariance + covariance.transpose());
         innovation
     }

@@ -63,7 +63,12 @@ impl JointLeastSquaresSettings {
         within("mass_std_percent", self.mass_std_percent, (1e-4, 50.0), "0.0001 to 50")?;
         within("mass_change_std_percent", self.mass_change_std_percent, (0.0, 50.0), "0 to 50")?;
         within("stop_min_s", self.stop_min_s, (0.0, 3600.0), "0 to 3600")?;
-        within("resistance_std_n_per_kn", self.resistance_std_n_per_kn, (1e-3, 100.0), "0.001 to 100")?;
+        within(
+            "resistance_std_n_per_kn",
+            self.resistance_std_n_per_kn,
+            (1e-3, 100.0),
+            "0.001 to 100",
+        )?;
         within("speed_noise_mps", self.speed_noise_mps, (1e-3, 1.0), "0.001 to 1")?;
         within("bias_std_mps2", self.bias_std_mps2, (1e-4, 0.5), "0.0001 to 0.5")?;
         within("speed_min_mps", self.speed_min_mps, (0.3, 20.0), "0.3 to 20")?;

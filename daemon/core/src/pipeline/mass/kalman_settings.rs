@@ -112,7 +112,8 @@ impl MassKalmanSettings {
     /// The behaviours of the bias: none; constant; constant and slow in proportion to speed;
     /// small and large, each slow and gusty.
     pub fn bias_models(&self) -> [BiasModel; MODELS] {
-        let model = |share: f64, time_s, grows| BiasModel::new(share * self.bias_std_mps2, time_s, grows);
+        let model =
+            |share: f64, time_s, grows| BiasModel::new(share * self.bias_std_mps2, time_s, grows);
         [
             model(1e-3, f64::INFINITY, false),
             model(1.0, f64::INFINITY, false),

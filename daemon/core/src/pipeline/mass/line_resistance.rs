@@ -46,9 +46,9 @@ impl LineResistance {
     /// Derivative of the resistance after speed, in N/kN per m/s.
     pub fn slope(&self, motion: &Motion, speed_mps: f64) -> f64 {
         let slope = |davis: Davis| davis.b + 2.0 * davis.c * speed_mps;
-        let curve = self.curve.map_or(0.0, |curve| {
-            self.reference_radius_m * motion.curvature_per_m * slope(curve)
-        });
+        let curve = self
+            .curve
+            .map_or(0.0, |curve| self.reference_radius_m * motion.curvature_per_m * slope(curve));
         let tunnel = self.tunnel.map_or(0.0, |tunnel| motion.tunnel_share * slope(tunnel));
         slope(self.basic) + curve + tunnel
     }
