@@ -1,6 +1,6 @@
 //! Wang 2022: staged learning of resistance and mass, traction energy.
 //!
-//! - [`line`], [`shuttle`], [`driver`], [`disturbance`], [`sensor`]: the scenario, from line to
+//! - [`mod@line`], [`shuttle`], [`driver`], [`disturbance`], [`sensor`]: the scenario, from line to
 //!   samples
 //! - [`bound`]: what no estimator can beat
 //! - [`resistance_rows`], [`leg`], [`mass_rows`], [`step_row`], [`energy_rows`]: the comparison

@@ -83,8 +83,8 @@ mod tests {
 
     #[test]
     fn innovations_are_judged_by_size_and_by_likeness() {
-        let sign = |k: u32| if k % 2 == 0 { 1.0 } else { -1.0 };
-        let slow = |k: u32| if (k / 20) % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = |k: u32| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let slow = |k: u32| if (k / 20).is_multiple_of(2) { 1.0 } else { -1.0 };
         assert_eq!(innovation_complaint(&InnovationMonitor::new(500)), None, "none yet");
         assert_eq!(innovation_complaint(&monitor(sign)), None);
         let large = innovation_complaint(&monitor(|k| 2.0 * sign(k)));
