@@ -12,8 +12,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::PAPER;
 use super::driver::Driver;
+use super::leg::{kalman, known_resistance, leg};
 use super::line::STATIONS_M;
-use super::mass_rows::{kalman, leg};
 use super::sensor::{exact, measure};
 use super::shuttle::{BRAKE_MAX_N, Calm, EMPTY_MASS_KG, Instant, PERIOD_S, Shuttle};
 use crate::papers::row::Row;
@@ -145,7 +145,7 @@ fn energy_at_time(shuttle: &Shuttle, case: &Case, time_s: f64) -> f64 {
 /// What the filter knows after the leg before.
 fn learned_mass_kg(shuttle: &Shuttle, seed: u64) -> f64 {
     let ride = leg(shuttle, EMPTY_MASS_KG, &mut Calm);
-    let mut filter = kalman(shuttle);
+    let mut filter = kalman(shuttle, &known_resistance(shuttle));
     for sample in measure(shuttle, &ride, &mut ChaCha8Rng::seed_from_u64(seed)) {
         filter.update(&sample);
     }
@@ -178,11 +178,11 @@ struct PlanFollower {
 impl Driver for PlanFollower {
     fn force_n(&mut self, shuttle: &Shuttle, now: &Instant, to_m: f64) -> f64 {
         let left_m = (to_m - now.position_m).abs();
-        // Wherever the plan has led, the train has to stop at the platform.
+        // Wherever the plan has led, the train has to stop at the platform; no mass is assumed.
         let stop_mps2 = now.speed_mps * now.speed_mps / (2.0 * left_m.max(1.0));
         self.is_stopping |= stop_mps2 > BRAKING_MPS2;
         if self.is_stopping {
-            return -self.case.assumed_kg * stop_mps2.clamp(0.5, 1.0);
+            return -now.mass_kg * stop_mps2.clamp(0.5, 1.0);
         }
         let travelled_m = (now.position_m - STATIONS_M[1]).abs();
         let rising_mps = (2.0 * ACCELERATION_MPS2 * travelled_m).sqrt();

@@ -89,6 +89,8 @@ pub struct BiasBank {
     filters: [JosephFilter<3>; MODELS],
     log_weights: [f64; MODELS],
     forgetting: f64,
+    /// Change of the force's acceleration on the reference mass in the last step, in m/s².
+    push_change: f64,
 }
 
 impl BiasBank {
@@ -107,11 +109,19 @@ impl BiasBank {
             )
         });
         let log_weights = [0.0; MODELS];
-        BiasBank { dynamics, models, filters, log_weights, forgetting: 1.0 - 1.0 / memory }
+        BiasBank {
+            dynamics,
+            models,
+            filters,
+            log_weights,
+            forgetting: 1.0 - 1.0 / memory,
+            push_change: 0.0,
+        }
     }
 
     /// Starts anew at a measured speed; mass and bias stay as they are.
     pub fn restart_speed(&mut self, speed_mps: f64, noise_variance: f64) {
+        self.push_change = 0.0;
         for filter in &mut self.filters {
             filter.replace(SPEED, speed_mps, noise_variance);
         }
@@ -129,6 +139,8 @@ impl BiasBank {
     pub fn predict(&mut self, from: &Motion, to: &Motion, step_s: f64) {
         let dynamics = &self.dynamics;
         let (push_from, push_to) = (dynamics.push_mps2(from), dynamics.push_mps2(to));
+        let jump = push_to - push_from - self.push_change;
+        self.push_change = push_to - push_from;
         for (filter, model) in self.filters.iter_mut().zip(&self.models) {
             let [speed, inverse_mass, bias] = filter.state.into();
             let shape = model.shape(speed);
@@ -146,7 +158,8 @@ impl BiasBank {
             );
             let next =
                 Vector3::new(speed + 0.5 * step_s * (start + end), inverse_mass, keep * bias);
-            let noise = Vector3::new(0.0, 0.0, model.noise_variance(keep));
+            let jump_variance = model.jump_variance(jump * inverse_mass, step_s);
+            let noise = Vector3::new(jump_variance, 0.0, model.noise_variance(keep));
             filter.predict(next, &transition, &noise);
         }
     }
@@ -215,5 +228,117 @@ impl BiasBank {
     pub fn is_sound(&self) -> bool {
         self.filters.iter().all(JosephFilter::is_sound)
             && self.log_weights.iter().all(|weight| weight.is_finite())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix2, Vector2};
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+    use crate::train::Davis;
+
+    const REFERENCE_KG: f64 = 100_000.0;
+    const STEP_S: f64 = 0.2;
+    const NOISE_VARIANCE: f64 = 4e-4;
+
+    fn dynamics() -> Dynamics {
+        let basic = Davis { a: 2.0, b: 0.0, c: 0.0 };
+        Dynamics {
+            resistance: LineResistance {
+                basic,
+                curve: None,
+                tunnel: None,
+                reference_radius_m: 500.0,
+            },
+            reference_mass_kg: REFERENCE_KG,
+            inertia_factor: 1.05,
+        }
+    }
+
+    fn motion(k: i64, force_n: f64) -> Motion {
+        Motion {
+            time_ns: k * 200_000_000,
+            stretch: 1,
+            speed_mps: 0.0,
+            force_n,
+            gradient_permille: 3.0,
+            declared_curve_n_per_kn: 0.0,
+            declared_tunnel_n_per_kn: 0.0,
+            curvature_per_m: 0.0,
+            tunnel_share: 0.0,
+        }
+    }
+
+    #[test]
+    fn without_bias_the_filters_equal_their_batch_least_squares_twin() {
+        let calm = BiasModel::new(1e-9, f64::INFINITY, false);
+        let mut bank = BiasBank::new(dynamics(), [calm; MODELS], (1.0, 0.2), 1000.0);
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(8);
+        let mut measured = |speed: f64| speed + 0.04 * (random.random::<f64>() - 0.5);
+        // v = v0 + u ∫ push dt - drag t: normal equations in [v0, u], with u known to 0.2.
+        let mut normal = Matrix2::new(0.0, 0.0, 0.0, 1.0 / 0.04);
+        let mut moment = Vector2::new(0.0, 1.0 / 0.04);
+        let drag_mps2 = dynamics().mps2_per_n_per_kn() * (2.0 + 3.0);
+        let (truth, mut push_mps) = (0.9, 0.0);
+        let force = |k: i64| if k < 60 { 1_000.0 * k as f64 } else { 0.0 };
+        for k in 0..120 {
+            if k > 0 {
+                let (from, to) = (motion(k - 1, force(k - 1)), motion(k, force(k)));
+                bank.predict(&from, &to, STEP_S);
+                push_mps +=
+                    0.5 * STEP_S * (dynamics().push_mps2(&from) + dynamics().push_mps2(&to));
+            }
+            let known = -drag_mps2 * STEP_S * k as f64;
+            let speed = measured(5.0 + truth * push_mps + known);
+            if k == 0 {
+                bank.restart_speed(speed, NOISE_VARIANCE);
+            } else {
+                bank.measure(speed, NOISE_VARIANCE);
+            }
+            let row = Vector2::new(1.0, push_mps);
+            normal += row * row.transpose() / NOISE_VARIANCE;
+            moment += row * (speed - known) / NOISE_VARIANCE;
+        }
+        let covariance = normal.try_inverse().unwrap();
+        let batch = covariance * moment;
+        let moments = bank.moments();
+        assert!((moments.inverse_mass - batch[1]).abs() < 1e-7);
+        assert!((moments.inverse_mass_variance / covariance[(1, 1)] - 1.0).abs() < 1e-5);
+        assert!((moments.inverse_mass - truth).abs() < 4.0 * covariance[(1, 1)].sqrt());
+    }
+
+    #[test]
+    fn evidence_goes_to_the_behaviour_that_acts() {
+        let calm = BiasModel::new(1e-5, f64::INFINITY, false);
+        let constant = BiasModel::new(0.02, f64::INFINITY, false);
+        for (acting_mps2, expected) in [(0.0, 0), (0.02, 1)] {
+            let mut models = [calm; MODELS];
+            models[1..].fill(constant);
+            let mut bank = BiasBank::new(dynamics(), models, (1.0, 1e-3), 1e6);
+            let mut speed = 20.0;
+            bank.restart_speed(speed, NOISE_VARIANCE);
+            for k in 1..300 {
+                bank.predict(&motion(k - 1, 0.0), &motion(k, 0.0), STEP_S);
+                speed += STEP_S * (acting_mps2 - dynamics().mps2_per_n_per_kn() * 5.0);
+                bank.measure(speed, NOISE_VARIANCE);
+            }
+            let weights = bank.weights();
+            assert!(weights[expected] > weights[1 - expected], "{acting_mps2}: {weights:?}");
+            assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            assert!((bank.moments().bias_mps2 - acting_mps2).abs() < 2e-3);
+        }
+    }
+
+    #[test]
+    fn opening_the_mass_gives_every_behaviour_the_same_one() {
+        let models = [BiasModel::new(0.01, 60.0, true); MODELS];
+        let mut bank = BiasBank::new(dynamics(), models, (1.0, 0.2), 1000.0);
+        bank.reopen(0.8, 0.01);
+        let moments = bank.moments();
+        assert!((moments.inverse_mass - 0.8).abs() < 1e-12);
+        assert!((moments.inverse_mass_variance - 0.01).abs() < 1e-12);
+        assert_eq!((moments.bias_mps2, moments.correlation), (0.0, 0.0));
     }
 }

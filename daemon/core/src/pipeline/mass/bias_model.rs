@@ -21,6 +21,16 @@ impl BiasModel {
         BiasModel { std_mps2, time_s, grows_with_speed }
     }
 
+    /// Variance in (m/s)² of what a step misses because the force may jump between two
+    /// samples, from the second difference of its acceleration.
+    ///
+    /// A jump by a at some time in a step h makes the trapezoid err by up to a h / 2 either way,
+    /// with a mean square of a² h² / 12, and shows in the second differences of two steps. A
+    /// behaviour that lasts for ever also believes that force runs straight between samples.
+    pub fn jump_variance(&self, second_difference_mps2: f64, step_s: f64) -> f64 {
+        if self.time_s.is_finite() { (second_difference_mps2 * step_s).powi(2) / 24.0 } else { 0.0 }
+    }
+
     /// Share of the bias that is left after a time in s.
     pub fn keep(&self, step_s: f64) -> f64 {
         (-step_s / self.time_s).exp()

@@ -11,8 +11,10 @@ const MEMORY: f64 = 500.0;
 const BAD_SHARE: f64 = 0.3;
 /// Mean square of normalised innovations above which they are too large.
 const SQUARE_MAX: f64 = 2.0;
-/// Lag-1 correlation of the innovations above which the model lacks something.
-const CORRELATION_MAX: f64 = 0.4;
+/// Lag-1 covariance of the normalised innovations above which the model lacks something; where
+/// they are far smaller than expected, as with a perfect sensor, it does not matter that they
+/// are alike.
+const COVARIANCE_MAX: f64 = 0.4;
 /// Innovations that such a judgement rests on.
 const JUDGED_FROM: f64 = 100.0;
 
@@ -62,9 +64,32 @@ pub fn innovation_complaint(monitor: &InnovationMonitor) -> Option<Reason> {
         None
     } else if monitor.mean_square() > SQUARE_MAX {
         Some(Reason::InnovationsTooLarge)
-    } else if monitor.correlation() > CORRELATION_MAX {
+    } else if monitor.correlation() * monitor.mean_square() > COVARIANCE_MAX {
         Some(Reason::InnovationsNotWhite)
     } else {
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn monitor(innovation: impl Fn(u32) -> f64) -> InnovationMonitor {
+        let mut monitor = InnovationMonitor::new(500);
+        (0..1_000).for_each(|k| monitor.push(innovation(k)));
+        monitor
+    }
+
+    #[test]
+    fn innovations_are_judged_by_size_and_by_likeness() {
+        let sign = |k: u32| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let slow = |k: u32| if (k / 20).is_multiple_of(2) { 1.0 } else { -1.0 };
+        assert_eq!(innovation_complaint(&InnovationMonitor::new(500)), None, "none yet");
+        assert_eq!(innovation_complaint(&monitor(sign)), None);
+        let large = innovation_complaint(&monitor(|k| 2.0 * sign(k)));
+        assert_eq!(large, Some(Reason::InnovationsTooLarge));
+        assert_eq!(innovation_complaint(&monitor(slow)), Some(Reason::InnovationsNotWhite));
+        assert_eq!(innovation_complaint(&monitor(|k| 0.3 * slow(k))), None, "small");
     }
 }

@@ -5,29 +5,38 @@ use super::integrals::{Row, UNKNOWNS};
 use crate::filter::DriftingLevel;
 use crate::filter::drifting_level::DriftStep;
 
-/// Innovations that the speed noise of the settings counts for.
-const NOISE_PRIOR_COUNT: f64 = 4.0;
+/// A step of time between two samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Its length in s.
+    pub step_s: f64,
+    /// Speed in m/s at its start.
+    pub speed_mps: f64,
+    /// Second difference of the force's acceleration in m/s².
+    pub jump_mps2: f64,
+    /// Variance in (m/s)² of what comes to the level under any assumption.
+    pub noise_variance: f64,
+}
 
 /// What a measured speed looks like to a regression.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expectation {
-    /// Measured minus predicted speed over the estimated standard deviation.
+    /// Measured minus predicted speed over its standard deviation.
     pub normalised: f64,
     /// Measured minus predicted speed in m/s.
     pub error_mps: f64,
+    /// Measured minus filtered speed in m/s.
+    pub residual_mps: f64,
+    /// Variance of the filtered speed in (m/s)².
+    pub filtered_variance: f64,
 }
 
 /// The regression with the evidence for its assumption.
-///
-/// The speed noise is assumed at first; its true variance is estimated from the innovations and
-/// scales the covariance.
 #[derive(Clone, Debug)]
 pub struct Hypothesis {
     model: BiasModel,
     regression: DriftingLevel<UNKNOWNS>,
-    squares: f64,
-    count: f64,
-    log_ratios: f64,
+    log_likelihood: f64,
 }
 
 impl Hypothesis {
@@ -35,7 +44,7 @@ impl Hypothesis {
     pub fn new(model: BiasModel, mean: &Row, std: &Row) -> Self {
         let mut regression = DriftingLevel::new(mean, std);
         regression.restart_bias(model.std_mps2);
-        Hypothesis { model, regression, squares: 0.0, count: 0.0, log_ratios: 0.0 }
+        Hypothesis { model, regression, log_likelihood: 0.0 }
     }
 
     /// The regression.
@@ -48,15 +57,10 @@ impl Hypothesis {
         self.model.shape(speed_mps)
     }
 
-    /// Estimated over assumed variance of the measured speed.
-    pub fn noise_scale(&self) -> f64 {
-        (NOISE_PRIOR_COUNT + self.squares) / (NOISE_PRIOR_COUNT + self.count)
-    }
-
-    /// Logarithm of the likelihood with the noise variance at its estimate.
+    /// Logarithm of the likelihood of all measurements, up to what is common to all
+    /// assumptions.
     pub fn evidence(&self) -> f64 {
-        let count = NOISE_PRIOR_COUNT + self.count;
-        -0.5 * (self.log_ratios + count * self.noise_scale().ln())
+        self.log_likelihood
     }
 
     /// Forgets the level after a gap.
@@ -66,30 +70,33 @@ impl Hypothesis {
 
     /// Opens the mass by a standard deviation relative to the reference.
     pub fn reopen(&mut self, relative_std: f64) {
-        let variance = relative_std * relative_std / self.noise_scale();
+        let variance = relative_std * relative_std;
         self.regression.widen_first_parameter(variance, self.model.std_mps2);
     }
 
-    /// Moves on by a step of time, with a variance in (m/s)² of what comes to the
-    /// level besides.
-    pub fn propagate(&mut self, step_s: f64, speed_mps: f64, level_noise_variance: f64) {
-        let keep = self.model.keep(step_s);
+    /// Moves on by a step of time.
+    pub fn propagate(&mut self, step: &Step) {
+        let keep = self.model.keep(step.step_s);
+        let jump_variance = self.model.jump_variance(step.jump_mps2, step.step_s);
         self.regression.propagate(&DriftStep {
-            gain: step_s * self.model.shape(speed_mps),
+            gain: step.step_s * self.model.shape(step.speed_mps),
             keep,
             noise_variance: self.model.noise_variance(keep),
-            level_noise_variance,
+            level_noise_variance: step.noise_variance + jump_variance,
         });
     }
 
-    /// What an equation of a measured speed with a noise deviation would bring.
-    pub fn expect(&self, row: &Row, value: f64, noise_mps: f64) -> Expectation {
-        let innovation = self.regression.clone().absorb(row, value, noise_mps.powi(-2));
+    /// What an equation of a measured speed with a noise variance would bring.
+    pub fn expect(&self, row: &Row, value: f64, noise_variance: f64) -> Expectation {
+        let innovation = self.regression.clone().absorb(row, value, 1.0 / noise_variance);
         let normalised = innovation.normalised.unwrap_or(0.0);
-        let root_ratio = (0.5 * innovation.log_variance_ratio).exp();
+        let variance_ratio = innovation.log_variance_ratio.exp();
+        let error_mps = normalised * (noise_variance * variance_ratio).sqrt();
         Expectation {
-            normalised: normalised / self.noise_scale().sqrt(),
-            error_mps: normalised * noise_mps * root_ratio,
+            normalised,
+            error_mps,
+            residual_mps: error_mps / variance_ratio,
+            filtered_variance: noise_variance * (1.0 - 1.0 / variance_ratio),
         }
     }
 
@@ -97,9 +104,7 @@ impl Hypothesis {
     pub fn absorb(&mut self, row: &Row, value: f64, weight: f64) {
         let innovation = self.regression.absorb(row, value, weight);
         if let Some(normalised) = innovation.normalised {
-            self.squares += normalised * normalised;
-            self.count += 1.0;
-            self.log_ratios += innovation.log_variance_ratio;
+            self.log_likelihood -= 0.5 * (normalised * normalised + innovation.log_variance_ratio);
         }
     }
 }

@@ -21,16 +21,16 @@ use crate::train::TrainModel;
 /// Resistance in N/kN that a curve or a tunnel typically adds.
 const TYPICAL_N_PER_KN: f64 = 5.0;
 
-/// Variance in (m/s)² of what the trapezoid misses in a step of time, from the change of the
-/// rate in this step and in the one before.
+/// Variance in (m/s)² of what the trapezoid misses in a step of time, from the second
+/// difference of the rate.
 ///
 /// A gradient acts over the length of the train, so that its rate is a polygon. Where the slope
 /// of the rate jumps by s, at a share f of a step h, the trapezoid errs by s h² f (1 - f) / 2,
 /// and the second differences of the two steps are s h (1 - f) and s h f. Over f from 0 to 1
 /// the mean square of the error is s² h⁴ / 120, and h²/80 of the sum of the squared second
 /// differences.
-pub fn missed_variance(change_before: f64, change: f64, step_s: f64) -> f64 {
-    (step_s * (change - change_before)).powi(2) / 80.0
+pub fn missed_variance(second_difference_mps2: f64, step_s: f64) -> f64 {
+    (step_s * second_difference_mps2).powi(2) / 80.0
 }
 
 /// Number of unknowns: level, bias, inverse mass, z1, z2, z3.
@@ -115,9 +115,10 @@ impl Integrals {
         self.row += (rates.row - instead_of.row) * (0.5 * step_s);
     }
 
-    /// Change of the accelerations tied to the place between two rates, in m/s².
-    pub fn tied_change(from: &Integrals, to: &Integrals) -> f64 {
-        to.tied_mps - from.tied_mps
+    /// Changes between two rates, in m/s²: of the accelerations tied to the place, and of the
+    /// force's on the reference mass.
+    pub fn changes(from: &Integrals, to: &Integrals) -> [f64; 2] {
+        [to.tied_mps - from.tied_mps, to.row[INVERSE_MASS] - from.row[INVERSE_MASS]]
     }
 
     /// The equation of a measured speed: row and value.
@@ -144,7 +145,7 @@ mod tests {
             squares += (0.5 * step_s * rate(step_s) - exact).powi(2);
             for at in 2..5 {
                 let (before, now) = (rates[at - 1] - rates[at - 2], rates[at] - rates[at - 1]);
-                variance += missed_variance(before, now, step_s);
+                variance += missed_variance(now - before, step_s);
             }
         }
         assert!((variance / squares - 1.0).abs() < 1e-3, "{variance} and {squares}");

@@ -2,13 +2,11 @@
 
 use std::sync::Arc;
 
-use dynocar_shared::{
-    Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status,
-};
-use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3, Vector4};
+use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason};
+use nalgebra::{Matrix3, SMatrix};
 
-use super::health::{InputHealth, innovation_complaint};
-use super::hypothesis::Hypothesis;
+use super::health::InputHealth;
+use super::hypothesis::{Hypothesis, Step};
 use super::integrals::{
     INVERSE_MASS, Integrals, POLYNOMIALS, Regressors, Row, UNKNOWNS, missed_variance,
 };
@@ -16,9 +14,8 @@ use super::joint_settings::{JOINT_MODELS, JointLeastSquaresSettings};
 use super::line_resistance::LineResistance;
 use super::motion::{Motion, StopWatch};
 use super::section::Section;
-use crate::filter::drifting_level::BIAS;
+use super::speed_noise::SpeedNoise;
 use crate::force::ResolvedSample;
-use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 use crate::train::{Davis, TrainModel};
@@ -29,12 +26,8 @@ const OUTLIER: f64 = 8.0;
 const HUBER: f64 = 3.0;
 /// After so many outliers in a row the measured speed is believed and the model's is not.
 const OUTLIERS_BEFORE_RESTART: u32 = 5;
-/// Used samples below which nothing is said.
-const SAMPLES_MIN: u64 = 50;
 /// Updates between two looks at the slope of the resistance.
 const REFRESH_EVERY: u32 = 50;
-/// Shares of the highest speed at which a, b and c are judged.
-const JUDGED_AT: [f64; 3] = [0.1, 0.5, 0.9];
 
 /// Learns z1, z2, z3 and the mass together, see [`super::integrals`].
 ///
@@ -43,26 +36,27 @@ const JUDGED_AT: [f64; 3] = [0.1, 0.5, 0.9];
 /// and the one with the most evidence is published.
 #[derive(Clone, Debug)]
 pub struct JointLeastSquares {
-    settings: JointLeastSquaresSettings,
-    regressors: Regressors,
+    pub(super) settings: JointLeastSquaresSettings,
+    pub(super) regressors: Regressors,
     initial: [Hypothesis; JOINT_MODELS],
-    hypotheses: [Hypothesis; JOINT_MODELS],
-    best: usize,
+    pub(super) hypotheses: [Hypothesis; JOINT_MODELS],
+    pub(super) best: usize,
     stops: StopWatch,
     last: Option<(Motion, Integrals)>,
     integrals: Integrals,
-    /// Change of the accelerations tied to the place in the last step, in m/s².
-    tied_change: f64,
+    /// Changes of tied acceleration and push in the last step, in m/s².
+    changes: [f64; 2],
     /// The resistance a while ago, for its slope.
     latest: LineResistance,
     updates_since_refresh: u32,
+    noise: SpeedNoise,
     outliers_in_a_row: u32,
-    monitor: InnovationMonitor,
-    health: InputHealth,
-    speed_mps: f64,
-    speed_range_mps: Option<(f64, f64)>,
-    is_fresh_reset: bool,
-    generation: u64,
+    pub(super) monitor: InnovationMonitor,
+    pub(super) health: InputHealth,
+    pub(super) speed_mps: f64,
+    pub(super) speed_range_mps: Option<(f64, f64)>,
+    pub(super) is_fresh_reset: bool,
+    pub(super) generation: u64,
 }
 
 impl JointLeastSquares {
@@ -94,9 +88,10 @@ impl JointLeastSquares {
             stops: StopWatch::new(settings.stop_min_s),
             last: None,
             integrals: Integrals::zero(),
-            tied_change: 0.0,
+            changes: [0.0; 2],
             latest: LineResistance::declared(train),
             updates_since_refresh: 0,
+            noise: SpeedNoise::new(settings.speed_noise_mps),
             outliers_in_a_row: 0,
             monitor: InnovationMonitor::new(500),
             health: InputHealth::default(),
@@ -136,21 +131,20 @@ impl JointLeastSquares {
 
     /// Standard deviation of the measured speed in m/s, as learned.
     pub fn speed_noise_mps(&self) -> f64 {
-        self.settings.speed_noise_mps * self.hypotheses[self.best].noise_scale().sqrt()
+        self.noise.variance().sqrt()
     }
 
-    fn davis(&self, solution: &Row, section: Section) -> Davis {
+    pub(super) fn davis(&self, solution: &Row, section: Section) -> Davis {
         let at = POLYNOMIALS[section as usize];
         self.regressors.basis.to_davis(&solution.fixed_rows::<3>(at).into_owned())
     }
 
-    fn covariance_root(&self) -> Option<SMatrix<f64, UNKNOWNS, UNKNOWNS>> {
-        let best = &self.hypotheses[self.best];
-        Some(best.regression().covariance_root()? * best.noise_scale().sqrt())
+    pub(super) fn covariance_root(&self) -> Option<SMatrix<f64, UNKNOWNS, UNKNOWNS>> {
+        self.hypotheses[self.best].regression().covariance_root()
     }
 
     /// Covariance of some unknowns from the square root of the whole.
-    fn covariance<const K: usize>(
+    pub(super) fn covariance<const K: usize>(
         &self,
         root: &SMatrix<f64, UNKNOWNS, UNKNOWNS>,
         places: [usize; K],
@@ -160,11 +154,11 @@ impl JointLeastSquares {
 
     fn begin(&mut self, motion: Motion) -> Outcome {
         self.integrals = Integrals::zero();
-        self.tied_change = 0.0;
+        self.changes = [0.0; 2];
         let (row, value) = self.integrals.equation(motion.speed_mps);
         for hypothesis in &mut self.hypotheses {
             hypothesis.free_level();
-            hypothesis.absorb(&row, value, self.settings.speed_noise_mps.powi(-2));
+            hypothesis.absorb(&row, value, 1.0 / self.noise.variance());
         }
         self.monitor.break_here();
         self.last = Some((motion, self.regressors.rates(&motion)));
@@ -175,13 +169,12 @@ impl JointLeastSquares {
         let rates = self.regressors.rates(&motion);
         self.integrals.add(&last.1, &rates, step_s);
         let (row, value) = self.integrals.equation(motion.speed_mps);
-        let weight = self.settings.speed_noise_mps.powi(-2);
-        let level_noise = self.level_noise_variance(&last, &rates, step_s);
+        let step = self.step(&last, &rates, step_s);
         for hypothesis in &mut self.hypotheses {
-            hypothesis.propagate(step_s, last.0.speed_mps, level_noise);
+            hypothesis.propagate(&step);
         }
-        let noise_mps = self.settings.speed_noise_mps;
-        let expected = self.hypotheses[self.best].expect(&row, value, noise_mps);
+        let variance = self.noise.variance();
+        let expected = self.hypotheses[self.best].expect(&row, value, variance);
         if !expected.normalised.is_finite() {
             self.reset();
             return self.begin(motion);
@@ -199,8 +192,9 @@ impl JointLeastSquares {
         self.monitor.push(expected.normalised);
         let trust = (HUBER / expected.normalised.abs()).min(1.0);
         for hypothesis in &mut self.hypotheses {
-            hypothesis.absorb(&row, value, trust * weight);
+            hypothesis.absorb(&row, value, trust / variance);
         }
+        self.noise.learn(expected.residual_mps, expected.filtered_variance, trust);
         self.choose();
         self.refresh();
         let (low, high) = self.speed_range_mps.unwrap_or((motion.speed_mps, motion.speed_mps));
@@ -217,22 +211,21 @@ impl JointLeastSquares {
         self.last = Some((expected, rates));
     }
 
-    /// Variance in (m/s)² of what comes to the level in a step beside the bias: what the
-    /// trapezoid misses, and what the noise of the speed does in the features. There it moves
-    /// the resistance, and with it the integral, by a random walk.
-    fn level_noise_variance(
-        &mut self,
-        last: &(Motion, Integrals),
-        rates: &Integrals,
-        step_s: f64,
-    ) -> f64 {
-        let change = Integrals::tied_change(&last.1, rates);
-        let missed = missed_variance(self.tied_change, change, step_s);
-        self.tied_change = change;
+    /// A step with what comes to the level beside the bias: what the trapezoid misses, and what
+    /// the noise of the speed does in the features. There it moves the resistance, and with it
+    /// the integral, by a random walk.
+    fn step(&mut self, last: &(Motion, Integrals), rates: &Integrals, step_s: f64) -> Step {
+        let [tied, push] = Integrals::changes(&last.1, rates);
+        let [tied_before, push_before] = std::mem::replace(&mut self.changes, [tied, push]);
         let slope = self.latest.slope(&last.0, last.0.speed_mps);
         let walk_mps =
             step_s * self.regressors.mps2_per_n_per_kn() * slope * self.speed_noise_mps();
-        missed + walk_mps * walk_mps
+        Step {
+            step_s,
+            speed_mps: last.0.speed_mps,
+            jump_mps2: push - push_before,
+            noise_variance: missed_variance(tied - tied_before, step_s) + walk_mps * walk_mps,
+        }
     }
 
     fn choose(&mut self) {
@@ -255,66 +248,9 @@ impl JointLeastSquares {
     fn reset(&mut self) {
         self.hypotheses.clone_from(&self.initial);
         self.best = 0;
+        self.noise.reset();
         self.is_fresh_reset = true;
         self.generation += 1;
-    }
-
-    fn status(&self, is_mass_known: bool, is_resistance_known: bool) -> (Status, Reason) {
-        if self.is_fresh_reset && !is_mass_known {
-            return (Status::Invalid, Reason::NumericalFailure);
-        }
-        let some = is_mass_known || is_resistance_known;
-        let lacking = if some { Status::Degraded } else { Status::Unestimated };
-        if let Some(reason) = self.health.complaint() {
-            return (lacking, reason);
-        }
-        if self.health.used() < SAMPLES_MIN {
-            return (Status::Unestimated, Reason::TooFewSamples);
-        }
-        if !(is_mass_known && is_resistance_known) {
-            return (lacking, Reason::WeakExcitation);
-        }
-        match innovation_complaint(&self.monitor) {
-            Some(reason) => (Status::Degraded, reason),
-            None => (Status::Estimated, Reason::None),
-        }
-    }
-
-    /// Writes values and covariance of [a, b, c, mass in t]; gives the relative standard
-    /// deviation of the mass.
-    fn write_estimate(
-        &self,
-        solution: &Row,
-        root: &SMatrix<f64, UNKNOWNS, UNKNOWNS>,
-        snapshot: &mut ParameterSnapshot,
-    ) -> f64 {
-        let davis = self.davis(solution, Section::Basic);
-        let inverse = solution[INVERSE_MASS];
-        let mass_t = 1e-3 * self.regressors.reference_mass_kg / inverse;
-        let first = POLYNOMIALS[Section::Basic as usize];
-        let own = self.covariance(root, [first, first + 1, first + 2, INVERSE_MASS]);
-        let mut to_units = Matrix4::zeros();
-        let to_davis = self.regressors.basis.to_davis_matrix();
-        to_units.fixed_view_mut::<3, 3>(0, 0).copy_from(&to_davis);
-        to_units[(3, 3)] = -mass_t / inverse;
-        write_parameters(
-            snapshot,
-            [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC, Parameter::Mass],
-            &Vector4::new(davis.a, davis.b, davis.c, mass_t),
-            &(to_units * own * to_units.transpose()),
-        );
-        own[(3, 3)].sqrt() / inverse.abs()
-    }
-
-    /// Standard deviations of the basic resistance in N/kN at low, middle and high speed.
-    fn resistance_stds(&self, root: &SMatrix<f64, UNKNOWNS, UNKNOWNS>) -> [f64; 3] {
-        let first = POLYNOMIALS[Section::Basic as usize];
-        let own = self.covariance(root, [first, first + 1, first + 2]);
-        JUDGED_AT.map(|share| {
-            let phi: Vector3<f64> =
-                self.regressors.basis.at(share * self.regressors.basis.scale_mps());
-            phi.dot(&(own * phi)).max(0.0).sqrt()
-        })
     }
 }
 
@@ -358,39 +294,6 @@ impl Estimator for JointLeastSquares {
     }
 
     fn write(&self, snapshot: &mut ParameterSnapshot) {
-        snapshot.generation = self.generation;
-        write_innovations(snapshot, &self.monitor);
-        let best = &self.hypotheses[self.best];
-        let (Some(solution), Some(root)) = (best.regression().solve(), self.covariance_root())
-        else {
-            snapshot.parameter_count = 0;
-            write_status(snapshot, Status::Invalid, Reason::NumericalFailure);
-            return;
-        };
-        let mass_std = self.write_estimate(&solution, &root, snapshot);
-        let is_mass_known = mass_std <= 0.01 * self.settings.usable_std_percent;
-        let usable = self.settings.usable_std_n_per_kn;
-        let known = self.resistance_stds(&root).map(|std| std <= usable);
-        let manoeuvres = [
-            (known[0], Manoeuvre::CoastSlow),
-            (known[1], Manoeuvre::VarySpeed),
-            (known[2], Manoeuvre::CoastFast),
-            (is_mass_known, Manoeuvre::Accelerate),
-        ];
-        snapshot.excited = 0;
-        snapshot.missing_manoeuvres = 0;
-        for (i, (is_known, manoeuvre)) in manoeuvres.into_iter().enumerate() {
-            snapshot.excited |= u32::from(is_known) << i;
-            snapshot.missing_manoeuvres |= if is_known { 0 } else { manoeuvre.bit() };
-        }
-        let (status, reason) = self.status(is_mass_known, known[1]);
-        write_status(snapshot, status, reason);
-        let inertia_kg = self.regressors.reference_mass_kg / solution[INVERSE_MASS]
-            * self.regressors.inertia_factor;
-        let shape = best.shape(self.speed_mps);
-        snapshot.unexplained_force_n = -shape * solution[BIAS] * inertia_kg;
-        snapshot.unexplained_force_std_n = shape * root.row(BIAS).norm() * inertia_kg;
-        (snapshot.speed_min_mps, snapshot.speed_max_mps) =
-            self.speed_range_mps.unwrap_or((0.0, 0.0));
+        self.write_snapshot(snapshot);
     }
 }

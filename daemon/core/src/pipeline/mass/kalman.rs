@@ -11,6 +11,7 @@ use super::bias_bank::{BiasBank, Dynamics, MODELS, Moments, SPEED};
 use super::health::{InputHealth, innovation_complaint};
 use super::kalman_settings::MassKalmanSettings;
 use super::motion::{Motion, StopWatch};
+use super::speed_noise::SpeedNoise;
 use crate::force::ResolvedSample;
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::settings::SettingError;
@@ -23,12 +24,6 @@ const OUTLIER: f64 = 8.0;
 const HUBER: f64 = 3.0;
 /// After so many outliers in a row the measured speed is believed and the filters' is not.
 const OUTLIERS_BEFORE_RESTART: u32 = 5;
-/// Innovations over which the speed noise is learned.
-const NOISE_MEMORY: f64 = 1000.0;
-/// Innovations that the speed noise of the settings counts for.
-const NOISE_PRIOR_COUNT: f64 = 2.0;
-/// Least variance of the speed noise in (m/s)².
-const NOISE_VARIANCE_MIN: f64 = 1e-6;
 /// Samples over which the evidence for a behaviour of the bias is remembered.
 const EVIDENCE_MEMORY: f64 = 3000.0;
 /// Used samples below which nothing is said of the mass.
@@ -59,8 +54,7 @@ pub struct MassKalman {
     /// Inverse mass as known when force last acted, bias as known now.
     moments: Moments,
     declared_mass_kg: f64,
-    noise_variance: f64,
-    noise_count: f64,
+    noise: SpeedNoise,
     outliers_in_a_row: u32,
     monitor: InnovationMonitor,
     health: InputHealth,
@@ -97,8 +91,7 @@ impl MassKalman {
             last: None,
             moments: bank.moments(),
             declared_mass_kg: train.mass_kg,
-            noise_variance: settings.speed_noise_mps.powi(2),
-            noise_count: NOISE_PRIOR_COUNT,
+            noise: SpeedNoise::new(settings.speed_noise_mps),
             outliers_in_a_row: 0,
             monitor: InnovationMonitor::new(500),
             health: InputHealth::default(),
@@ -118,7 +111,7 @@ impl MassKalman {
 
     /// Standard deviation of the measured speed in m/s, as learned.
     pub fn speed_noise_mps(&self) -> f64 {
-        self.noise_variance.sqrt()
+        self.noise.variance().sqrt()
     }
 
     /// Share of the evidence for each behaviour of the bias, in the order of
@@ -154,7 +147,7 @@ impl MassKalman {
     }
 
     fn begin(&mut self, motion: Motion) -> Outcome {
-        self.bank.restart_speed(motion.speed_mps, self.noise_variance);
+        self.bank.restart_speed(motion.speed_mps, self.noise.variance());
         self.monitor.break_here();
         self.last = Some(motion);
         Outcome::Used
@@ -162,7 +155,7 @@ impl MassKalman {
 
     fn advance(&mut self, from: Motion, motion: Motion, step_s: f64) -> Outcome {
         self.bank.predict(&from, &motion, step_s);
-        let expected = self.bank.best().innovation(SPEED, motion.speed_mps, self.noise_variance);
+        let expected = self.bank.best().innovation(SPEED, motion.speed_mps, self.noise.variance());
         let normalised = expected.value / expected.variance.sqrt();
         if !normalised.is_finite() {
             self.reset();
@@ -180,13 +173,15 @@ impl MassKalman {
         }
         self.outliers_in_a_row = 0;
         let weight = (HUBER / normalised.abs()).min(1.0);
-        self.bank.measure(motion.speed_mps, self.noise_variance / weight);
+        self.bank.measure(motion.speed_mps, self.noise.variance() / weight);
         if !self.bank.is_sound() {
             self.reset();
             return self.begin(motion);
         }
         self.monitor.push(normalised);
-        self.learn_noise(motion.speed_mps, weight);
+        let filter = self.bank.best();
+        let residual_mps = motion.speed_mps - filter.state[SPEED];
+        self.noise.learn(residual_mps, filter.covariance[(SPEED, SPEED)], weight);
         self.last = Some(motion);
         self.widen_speed_range(motion.speed_mps);
         self.publish(0.5 * (from.force_n + motion.force_n).abs())
@@ -208,17 +203,6 @@ impl MassKalman {
         Outcome::Used
     }
 
-    /// Learns the noise R from E[r²] + P = R, with the residual r after an update and the
-    /// variance P of the speed after it.
-    fn learn_noise(&mut self, speed_mps: f64, weight: f64) {
-        let filter = self.bank.best();
-        let residual = speed_mps - filter.state[SPEED];
-        let seen = weight * residual * residual + filter.covariance[(SPEED, SPEED)];
-        self.noise_count = (self.noise_count + 1.0).min(NOISE_MEMORY);
-        self.noise_variance += (seen - self.noise_variance) / self.noise_count;
-        self.noise_variance = self.noise_variance.max(NOISE_VARIANCE_MIN);
-    }
-
     fn widen_speed_range(&mut self, speed_mps: f64) {
         let (low, high) = self.speed_range_mps.unwrap_or((speed_mps, speed_mps));
         self.speed_range_mps = Some((low.min(speed_mps), high.max(speed_mps)));
@@ -227,8 +211,7 @@ impl MassKalman {
     fn reset(&mut self) {
         self.bank = self.initial_bank;
         self.moments = self.bank.moments();
-        self.noise_variance = self.settings.speed_noise_mps.powi(2);
-        self.noise_count = NOISE_PRIOR_COUNT;
+        self.noise.reset();
         self.was_known = false;
         self.is_fresh_reset = true;
         self.generation += 1;
@@ -312,7 +295,8 @@ impl Estimator for MassKalman {
             &Matrix2::new(mass_std_t * mass_std_t, cross, cross, bias_std * bias_std),
         );
         let is_known = self.is_known();
-        snapshot.excited = u32::from(is_known) | 2 * u32::from(self.health.used() > SAMPLES_MIN);
+        let is_bias_known = self.health.used() >= SAMPLES_MIN;
+        snapshot.excited = u32::from(is_known) | (u32::from(is_bias_known) << 1);
         snapshot.missing_manoeuvres = if is_known { 0 } else { Manoeuvre::Accelerate.bit() };
         let (status, reason) = self.status();
         write_status(snapshot, status, reason);

@@ -10,6 +10,7 @@ mod hypothesis;
 pub mod integrals;
 mod joint;
 mod joint_settings;
+mod joint_snapshot;
 mod kalman;
 mod kalman_settings;
 pub mod line_resistance;
@@ -17,6 +18,7 @@ pub mod motion;
 pub mod printed_descent;
 pub mod section;
 pub mod speed_basis;
+mod speed_noise;
 mod staged;
 mod staged_settings;
 

@@ -7,8 +7,9 @@ use crate::force::ResolvedSample;
 /// Speed in m/s up to which a train counts as standing; below it a wheel sensor sees nothing.
 pub const STANDING_MPS: f64 = 0.3;
 
-/// Time in s over which missing forces are bridged by the mean of the forces around them.
-pub const BRIDGE_MAX_S: f64 = 1.0;
+/// Longest step in s that is integrated: missing forces are bridged by the mean of the forces
+/// around them, and records at 1 Hz are used.
+pub const STEP_MAX_S: f64 = 2.5;
 
 /// The known quantities of a moving train at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +40,7 @@ impl Motion {
     /// # Errors
     ///
     /// `WheelSlide` while the speed is not the train's, `Missing` without force or gradient,
-    /// `NotFinite` for a number that is none.
+    /// `NotFinite` for a number that is none, `OutOfRange` for one that no train has.
     pub fn of(sample: &ResolvedSample) -> Result<Self, RejectionReason> {
         if sample.is_sliding {
             return Err(RejectionReason::WheelSlide);
@@ -57,28 +58,27 @@ impl Motion {
             curvature_per_m: sample.curvature_per_m.unwrap_or(0.0),
             tunnel_share: sample.tunnel_share.unwrap_or(0.0),
         };
-        let numbers = [
-            motion.speed_mps,
-            motion.force_n,
-            motion.gradient_permille,
-            motion.declared_curve_n_per_kn,
-            motion.declared_tunnel_n_per_kn,
-            motion.curvature_per_m,
-            motion.tunnel_share,
+        let bounds = [
+            (motion.speed_mps, 0.0, 200.0),
+            (motion.force_n, -1e8, 1e8),
+            (motion.gradient_permille, -500.0, 500.0),
+            (motion.declared_curve_n_per_kn, 0.0, 500.0),
+            (motion.declared_tunnel_n_per_kn, 0.0, 500.0),
+            (motion.curvature_per_m, 0.0, 1.0),
+            (motion.tunnel_share, 0.0, 1.0 + 1e-9),
         ];
-        if numbers.iter().all(|number| number.is_finite()) {
-            Ok(motion)
-        } else {
-            Err(RejectionReason::NotFinite)
+        if bounds.iter().any(|(number, _, _)| !number.is_finite()) {
+            return Err(RejectionReason::NotFinite);
         }
+        let is_possible = bounds.iter().all(|&(number, low, high)| number >= low && number <= high);
+        if is_possible { Ok(motion) } else { Err(RejectionReason::OutOfRange) }
     }
 
     /// Time in s since an earlier sample of the same stretch; `None` when forces and speed
     /// between the two are not known well enough to integrate.
     pub fn step_from(&self, earlier: &Motion) -> Option<f64> {
         let step_s = self.time_ns.saturating_sub(earlier.time_ns) as f64 * 1e-9;
-        (self.stretch == earlier.stretch && step_s > 0.0 && step_s <= BRIDGE_MAX_S)
-            .then_some(step_s)
+        (self.stretch == earlier.stretch && step_s > 0.0 && step_s <= STEP_MAX_S).then_some(step_s)
     }
 }
 
@@ -108,6 +108,9 @@ impl StopWatch {
 
     /// Takes one sample in; true at the first moving sample after the mass may have changed.
     pub fn departs(&mut self, time_ns: i64, stretch: u32, speed_mps: f64) -> bool {
+        if !speed_mps.is_finite() {
+            return false;
+        }
         if let Some((last_ns, last_stretch)) = self.last
             && last_stretch != stretch
         {
@@ -156,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn forces_are_bridged_for_a_second_within_a_stretch() {
+    fn forces_are_bridged_for_seconds_within_a_stretch() {
         let motion = |time_ns, stretch| Motion {
             time_ns,
             stretch,
@@ -170,7 +173,7 @@ mod tests {
         };
         let earlier = motion(0, 1);
         assert_eq!(motion(SECOND_NS / 2, 1).step_from(&earlier), Some(0.5));
-        assert_eq!(motion(2 * SECOND_NS, 1).step_from(&earlier), None);
+        assert_eq!(motion(3 * SECOND_NS, 1).step_from(&earlier), None);
         assert_eq!(motion(SECOND_NS / 2, 2).step_from(&earlier), None);
         assert_eq!(motion(0, 1).step_from(&earlier), None);
     }

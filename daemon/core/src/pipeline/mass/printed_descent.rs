@@ -107,7 +107,7 @@ mod tests {
     fn pull_away(descent: &mut PrintedDescent, section: Section, samples: u32) {
         for k in 0..samples {
             let speed_mps = (0.2 * f64::from(k)).min(27.0);
-            let scatter = if k % 2 == 0 { 10.0 } else { -10.0 };
+            let scatter = if k.is_multiple_of(2) { 10.0 } else { -10.0 };
             descent.learn(section, speed_mps, table_1().w0_n_per_kn(speed_mps) + 0.5 + scatter);
         }
     }
