@@ -229,8 +229,7 @@ impl Stop<'_> {
         for i in 0..=2 * STEPS {
             let speed_mps = self.to_speed_mps + i as f64 * step_mps;
             let deceleration_mps2 = self.deceleration_mps2(speed_mps, shift);
-            // Also false for NaN.
-            if !(deceleration_mps2 > 0.0) {
+            if deceleration_mps2.is_nan() || deceleration_mps2 <= 0.0 {
                 return Err(speed_mps);
             }
             let weight = match i {

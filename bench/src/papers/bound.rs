@@ -182,3 +182,45 @@ pub fn mean_relative_percent(bounds: &[BoundAt]) -> f64 {
     let sum: f64 = bounds.iter().map(|bound| bound.std / bound.truth).sum();
     100.0 * (2.0 / std::f64::consts::PI).sqrt() * sum / bounds.len() as f64
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::papers::braking::{JIN_TABLE_3, XIE_TABLE_2};
+    use crate::papers::braking_run::run;
+    use crate::papers::braking_score::{LAG_S, LAG_STEPS, smoother, smoother_knowledge};
+
+    #[test]
+    fn later_measurements_and_a_known_law_lower_the_bound() {
+        for braking in [XIE_TABLE_2, JIN_TABLE_3] {
+            let knowledge = smoother_knowledge(braking.sought);
+            let at = |lag_steps| root_mean_square(&bound(&braking, knowledge, lag_steps));
+            assert!(at(25) < at(10) && at(10) < at(0));
+            let known = root_mean_square(&bound(&braking, Knowledge::Law(0.25), 0));
+            assert!(known < at(25), "{known}");
+        }
+    }
+
+    #[test]
+    fn the_bound_of_a_law_falls_with_what_is_known_of_its_scale() {
+        let at = |std| root_mean_square(&bound(&XIE_TABLE_2, Knowledge::Law(std), 0));
+        assert!(at(0.01) < at(0.1) && at(0.1) < at(1.0));
+    }
+
+    #[test]
+    fn the_filter_claims_what_the_independent_recursion_allows() {
+        for braking in [XIE_TABLE_2, JIN_TABLE_3] {
+            let moments = braking.nominal();
+            let knowledge = smoother_knowledge(braking.sought);
+            for (lag_s, lag_steps) in [(0.0, 0), (LAG_S, LAG_STEPS)] {
+                let [scored] = run(&smoother(braking.sought, lag_s), &moments, [lag_steps]);
+                let bounds = bound(&braking, knowledge, lag_steps);
+                assert_eq!(scored.len(), bounds.len());
+                for (scored, bound) in scored.iter().zip(&bounds) {
+                    assert_eq!(scored.truth, bound.truth);
+                    assert!((scored.std / bound.std - 1.0).abs() < 0.01, "{scored:?} {bound:?}");
+                }
+            }
+        }
+    }
+}

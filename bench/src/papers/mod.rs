@@ -2,11 +2,17 @@
 
 pub mod bound;
 pub mod braking;
+pub mod braking_run;
+pub mod braking_score;
+pub mod braking_table;
+pub mod jin;
+pub mod literal_em;
 pub mod liu;
 pub mod row;
 pub mod statistics;
 pub mod table;
 pub mod wang;
+pub mod xie;
 
 pub use row::Row;
 
@@ -20,5 +26,10 @@ pub struct Source {
 
 /// Every paper, by year.
 pub fn sources() -> Vec<Source> {
-    vec![Source { name: "wang", rows: wang::rows }]
+    vec![
+        Source { name: "liu", rows: liu::rows },
+        Source { name: "xie", rows: xie::rows },
+        Source { name: "jin", rows: jin::rows },
+        Source { name: "wang", rows: wang::rows },
+    ]
 }

@@ -14,6 +14,7 @@ use super::motion::{self, STATES, State, StepInputs};
 use super::tracker::{TrackerModel, measure};
 use crate::filter::kalman::GaussianState;
 
+const SPEED: usize = State::Speed as usize;
 const SCALE: usize = State::Scale as usize;
 const DRIFT: usize = State::Drift as usize;
 
@@ -85,7 +86,8 @@ impl LawBank {
         let switch = self.switch_probability(step_s);
         let stay = 1.0 - switch * (self.hypotheses.len() - 1) as f64;
         for to in 0..self.hypotheses.len() {
-            let prior = self.hypotheses[to].model.prior;
+            let target = &self.hypotheses[to];
+            let prior = target.model.prior_scale(target.state.mean[SPEED], self.demand);
             let weight_of = |from: usize, hypothesis: &Hypothesis| {
                 hypothesis.probability * if from == to { stay } else { switch }
             };
@@ -93,7 +95,7 @@ impl LawBank {
                 self.hypotheses.iter().enumerate().map(|(from, h)| weight_of(from, h)).sum();
             let total = total.max(f64::MIN_POSITIVE);
             let reopened = |from: usize, state: &GaussianState<STATES>| {
-                if from == to { *state } else { reopen(state, prior.scale) }
+                if from == to { *state } else { reopen(state, prior) }
             };
             let mut mean = SVector::<f64, STATES>::zeros();
             for (from, hypothesis) in self.hypotheses.iter().enumerate() {

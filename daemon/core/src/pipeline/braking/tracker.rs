@@ -21,7 +21,16 @@ pub struct Prior {
     /// Standard deviation of the first speed in m/s.
     pub speed_std_mps: f64,
     /// The scale.
-    pub scale: Uncertain,
+    pub scale: PriorScale,
+}
+
+/// What is believed of the scale beforehand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PriorScale {
+    /// The scale itself.
+    OfLaw(Uncertain),
+    /// The coefficient, law times scale, at the first observation.
+    OfCoefficient(Uncertain),
 }
 
 /// A model of the motion with everything but the state.
@@ -38,15 +47,27 @@ pub struct TrackerModel {
 }
 
 impl TrackerModel {
+    /// The belief about the scale beforehand, at a speed in m/s and a demand.
+    pub fn prior_scale(&self, speed_mps: f64, demand: f64) -> Uncertain {
+        match self.prior.scale {
+            PriorScale::OfLaw(scale) => scale,
+            PriorScale::OfCoefficient(coefficient) => {
+                let (shape, _) = self.law.at(speed_mps, demand);
+                Uncertain::new(coefficient.value / shape, coefficient.std / shape)
+            }
+        }
+    }
+
     /// The belief after a first observation.
     pub fn initial(&self, first: &Observation) -> GaussianState<STATES> {
         let prior = &self.prior;
+        let scale = self.prior_scale(first.speed_mps, first.demand);
         GaussianState::independent(
-            SVector::from([first.distance_m, first.speed_mps, prior.scale.value, 0.0]),
+            SVector::from([first.distance_m, first.speed_mps, scale.value, 0.0]),
             SVector::from([
                 self.noise.measured_distance_m2.sqrt(),
                 prior.speed_std_mps,
-                prior.scale.std,
+                scale.std,
                 self.walk.drift_std_per_s(),
             ]),
         )
@@ -99,10 +120,27 @@ struct Moment {
 const OUTLIER_GATE: f64 = 5.0;
 /// After so many refusals in a row the motion has changed.
 const OUTLIERS_BEFORE_RESTART: u32 = 3;
-/// Forgetting factor of the mean innovation that tells of a sudden change.
-const CHANGE_FORGETTING: f64 = 0.8;
+/// Forgetting factors of the mean innovations that tell of a change: one for a sudden one, one
+/// for a small one.
+const CHANGE_FORGETTING: [f64; 2] = [0.8, 0.95];
 /// A mean innovation beyond so many of its standard deviations is a change.
 const CHANGE_GATE: f64 = 5.0;
+
+/// Forgotten means of white numbers of unit variance, scaled to unit variance.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct ChangeDetector {
+    means: [f64; 2],
+}
+
+impl ChangeDetector {
+    /// Takes in a normalised innovation; true when the innovations no longer have mean zero.
+    fn push(&mut self, normalised: f64) -> bool {
+        for (mean, forgetting) in self.means.iter_mut().zip(CHANGE_FORGETTING) {
+            *mean = forgetting * *mean + (1.0 - forgetting * forgetting).sqrt() * normalised;
+        }
+        self.means.iter().any(|mean| mean.abs() > CHANGE_GATE)
+    }
+}
 
 /// Tracks the scale of one law.
 #[derive(Clone, Debug)]
@@ -116,8 +154,8 @@ pub struct Tracker {
     /// Time in s since the start.
     time_s: f64,
     outliers_in_a_row: u32,
-    /// Forgotten mean of the normalised distance innovations, of unit variance when white.
-    change: f64,
+    /// One for each measured quantity.
+    changes: [ChangeDetector; 2],
 }
 
 impl Tracker {
@@ -132,7 +170,7 @@ impl Tracker {
             lag_s,
             time_s: 0.0,
             outliers_in_a_row: 0,
-            change: 0.0,
+            changes: Default::default(),
         }
     }
 
@@ -149,12 +187,6 @@ impl Tracker {
         }
     }
 
-    fn is_change(&mut self, normalised: f64) -> bool {
-        let own = (1.0 - CHANGE_FORGETTING * CHANGE_FORGETTING).sqrt();
-        self.change = CHANGE_FORGETTING * self.change + own * normalised;
-        self.detects_changes && self.change.abs() > CHANGE_GATE
-    }
-
     /// Starts anew from here, with the belief about the speed kept but opened.
     fn restart(&mut self, observed: &Observation) {
         let speed_mps = match self.state {
@@ -164,7 +196,7 @@ impl Tracker {
         self.smoother.freeze();
         self.state = Some(self.model.initial(&Observation { speed_mps, ..*observed }));
         self.outliers_in_a_row = 0;
-        self.change = 0.0;
+        self.changes = Default::default();
         self.remember(observed.demand);
     }
 }
@@ -189,7 +221,10 @@ impl Engine for Tracker {
         state.predict(mean, &jacobian, &added);
         self.smoother.predict(&jacobian);
         let mut first_innovation = None;
-        for (row, measured, variance) in self.model.measurements(observed).into_iter().flatten() {
+        let mut is_change = false;
+        let measurements = self.model.measurements(observed).into_iter();
+        for (measurement, changes) in measurements.zip(&mut self.changes) {
+            let Some((row, measured, variance)) = measurement else { continue };
             let update = state.innovation(row, measured, variance)?;
             let normalised = update.normalised();
             if first_innovation.is_none() && normalised.abs() > OUTLIER_GATE {
@@ -202,6 +237,7 @@ impl Engine for Tracker {
             }
             state.apply(&update);
             self.smoother.apply(&update);
+            is_change |= changes.push(normalised);
             first_innovation.get_or_insert(normalised);
         }
         self.outliers_in_a_row = 0;
@@ -209,7 +245,7 @@ impl Engine for Tracker {
         if !value.is_finite() {
             return Err(EngineError::NotFinite { value });
         }
-        if first_innovation.is_some_and(|normalised| self.is_change(normalised)) {
+        if is_change && self.detects_changes {
             self.restart(observed);
             return Ok(Step::Restarted);
         }

@@ -12,9 +12,9 @@ use crate::filter::random::Random;
 use crate::filter::rts::{self, ForwardStep, SmoothedStep};
 use crate::pipeline::braking::engine::EngineError;
 
-/// What the M-step needs of the E-step: dQ/d coefficient and -d²Q/d coefficient² at the present
-/// value. Only I_2, the moves, depends on the coefficient (Xie 2019, eq. 30-32: I_1 and I_3
-/// vanish).
+/// What the M-step needs of the E-step: dQ/d share and -d²Q/d share² at the present value, the
+/// share being the coefficient over the demand. Only I_2, the moves, depends on it (Xie 2019,
+/// eq. 30-32: I_1 and I_3 vanish).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Statistics {
     /// Gradient of Q.
@@ -24,7 +24,7 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// The step to the maximum: Q is quadratic in the coefficient, so that the papers' gradient
+    /// The step to the maximum: Q is quadratic in the share, so that the papers' gradient
     /// search (Xie 2019, eq. 33; Jin 2020, eq. 29) ends after this one step. 0 where Q does not
     /// depend on the coefficient.
     pub fn newton_step(&self) -> f64 {
@@ -34,7 +34,7 @@ impl Statistics {
 
 /// A way to take the expectation.
 pub trait Expectation: Send {
-    /// Gradient and curvature of Q at the model's coefficient.
+    /// Gradient and curvature of Q at the model's share.
     ///
     /// # Errors
     ///

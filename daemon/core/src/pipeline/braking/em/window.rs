@@ -8,7 +8,7 @@ use crate::filter::kalman::GaussianState;
 use crate::pipeline::braking::engine::{Engine, EngineError, Estimate, Observation, Step};
 use crate::pipeline::braking::law::Law;
 use crate::pipeline::braking::motion::{self, MotionNoise, StepInputs, Walk};
-use crate::pipeline::braking::tracker::{Prior, TrackerModel, measure};
+use crate::pipeline::braking::tracker::{Prior, PriorScale, TrackerModel, measure};
 
 /// What does not change from window to window.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,10 +21,10 @@ pub struct EmModel {
     pub slide_steps: usize,
     /// Most iterations in a window.
     pub iterations: usize,
-    /// Iterations end when the coefficient changes by less.
+    /// Iterations end when the coefficient changes by less, as a share of the demand.
     pub tolerance: f64,
-    /// The coefficient before the first window.
-    pub initial: f64,
+    /// The coefficient before the first window; `None` for the demand.
+    pub initial: Option<f64>,
     /// Standard deviation in m/s of the speed before the first window.
     pub initial_speed_std_mps: f64,
     /// True for the printed model, in which the coefficient acts only up to the demand.
@@ -73,42 +73,40 @@ pub struct Window {
 }
 
 /// A window with a value of the coefficient: what an E-step needs.
+///
+/// The coefficient is kept as its share of the demand, which is the same thing while the cylinder
+/// pressure is constant, as in the papers, and stays constant while the brake is being applied.
 #[derive(Clone, Copy, Debug)]
 pub struct WindowModel<'a> {
     /// The window.
     pub window: &'a Window,
     /// Noise of motion and measurement.
     pub noise: &'a MotionNoise,
-    /// The coefficient.
-    pub coefficient: f64,
+    /// The coefficient over the demand.
+    pub share: f64,
     /// See [`EmModel::has_printed_cap`].
     pub has_printed_cap: bool,
 }
 
 impl WindowModel<'_> {
-    /// The coefficient that acts over the move that starts at `step`, and its derivative by the
-    /// coefficient.
-    pub fn acting(&self, step: usize) -> (f64, f64) {
-        let demand = self.window.entries[step + 1].inputs.demand;
-        if self.has_printed_cap && self.coefficient >= demand {
-            (demand, 0.0)
-        } else {
-            (self.coefficient, 1.0)
-        }
+    /// The share that acts, and its derivative by the share: above 1 the printed cap lets the
+    /// demand act, whatever the share.
+    pub fn acting(&self) -> (f64, f64) {
+        if self.has_printed_cap && self.share >= 1.0 { (1.0, 0.0) } else { (self.share, 1.0) }
     }
 
     /// Distance and speed after the move that starts at `step`, without noise, and the
     /// derivative of the final speed by the first.
     pub fn advance(&self, step: usize, state: [f64; 2]) -> ([f64; 2], f64) {
         let inputs = &self.window.entries[step + 1].inputs;
-        let moved = motion::advance(inputs, &Law::Constant, state[1], self.acting(step).0);
+        let moved = motion::advance(inputs, &Law::Demand, state[1], self.acting().0);
         ([state[0] + moved.travelled_m, moved.speed_mps], moved.speed_by_speed)
     }
 
-    /// Derivatives of distance and speed after a move by the coefficient.
-    pub fn by_coefficient(&self, step: usize) -> [f64; 2] {
+    /// Derivatives of distance and speed after a move by the share.
+    pub fn by_share(&self, step: usize) -> [f64; 2] {
         let inputs = &self.window.entries[step + 1].inputs;
-        let speed = -inputs.step_s * inputs.gain_mps2 * self.acting(step).1;
+        let speed = -inputs.step_s * inputs.gain_mps2 * inputs.demand * self.acting().1;
         [0.5 * inputs.step_s * speed, speed]
     }
 
@@ -120,7 +118,7 @@ impl WindowModel<'_> {
     /// Adds to the M-step by how much the states deviate, on average over the E-step, from the
     /// noise-free move that starts at `step`.
     pub fn accumulate(&self, step: usize, deviation: [f64; 2], into: &mut Statistics) {
-        let slopes = self.by_coefficient(step);
+        let slopes = self.by_share(step);
         let precisions = self.move_noise(step).precisions;
         for ((slope, precision), deviation) in slopes.into_iter().zip(precisions).zip(deviation) {
             into.curvature += slope * slope * precision;
@@ -135,7 +133,7 @@ pub struct EmWindow<E> {
     model: EmModel,
     expectation: E,
     window: Window,
-    coefficient: f64,
+    share: f64,
     estimate: Option<Estimate>,
 }
 
@@ -148,33 +146,36 @@ impl<E: Expectation> EmWindow<E> {
             model,
             expectation,
             window: Window { entries, first },
-            coefficient: model.initial,
+            share: 1.0,
             estimate: None,
         }
     }
 
     /// Runs the iterations of a full window.
     fn maximise(&mut self) -> Result<(), EngineError> {
-        // The last iterates scatter by the particles' randomness; their spread is part of the error.
-        let (mut scatter, mut scatter_count) = (0.0, 0.0);
+        // The iterates of the second half scatter by the particles' randomness, and go on moving
+        // where they have not converged: both are part of the error.
+        let (mut scatter, mut scatter_count, mut halfway) = (0.0, 0.0, self.share);
         for iteration in 0..self.model.iterations {
             let statistics = {
                 let model = WindowModel {
                     window: &self.window,
                     noise: &self.model.noise,
-                    coefficient: self.coefficient,
+                    share: self.share,
                     has_printed_cap: self.model.has_printed_cap,
                 };
                 self.expectation.expect(&model)?
             };
             let change = statistics.newton_step();
-            self.coefficient += change;
-            if !self.coefficient.is_finite() {
-                return Err(EngineError::NotFinite { value: self.coefficient });
-            }
             if 2 * iteration >= self.model.iterations {
                 scatter += change * change;
                 scatter_count += 1.0;
+            } else {
+                halfway = self.share + change;
+            }
+            self.share += change;
+            if !self.share.is_finite() {
+                return Err(EngineError::NotFinite { value: self.share });
             }
             if change.abs() <= self.model.tolerance {
                 break;
@@ -183,28 +184,28 @@ impl<E: Expectation> EmWindow<E> {
         // Successive iterates differ by two independent draws.
         let scatter_variance =
             if scatter_count > 0.0 { 0.5 * scatter / scatter_count } else { 0.0 };
-        let std = (self.information_variance()? + scatter_variance).sqrt();
-        let value = Uncertain::new(self.coefficient, std);
-        let middle = self.window.entries[self.window.entries.len() / 2];
+        let trend = self.share - halfway;
+        let std = (self.information_variance()? + scatter_variance + trend * trend).sqrt();
+        let demand = self.window.entries[self.window.entries.len() / 2].observed.demand;
         self.estimate = Some(Estimate {
-            coefficient: value,
-            scale: value,
-            covariance: std * std,
-            demand: middle.observed.demand,
+            coefficient: Uncertain::new(demand * self.share, demand * std),
+            scale: Uncertain::new(self.share, std),
+            covariance: demand * std * std,
+            demand,
             brake_limited: None,
         });
         Ok(())
     }
 
-    /// Variance of the coefficient given the window alone, by a Kalman filter in which it is
+    /// Variance of the share given the window alone, by a Kalman filter in which it is
     /// constant and unknown beforehand.
     fn information_variance(&self) -> Result<f64, EngineError> {
-        let scale = Uncertain::new(self.coefficient, 1.0);
+        let scale = Uncertain::new(self.share, 10.0);
         let model = TrackerModel {
-            law: Law::Constant,
+            law: Law::Demand,
             noise: MotionNoise { measured_speed_m2_per_s2: None, ..self.model.noise },
             walk: Walk::Scale(0.0),
-            prior: Prior { speed_std_mps: 1.0, scale },
+            prior: Prior { speed_std_mps: 1.0, scale: PriorScale::OfLaw(scale) },
         };
         let first = &self.window.first;
         let mut state = GaussianState::independent(
@@ -242,7 +243,7 @@ impl<E: Expectation> EmWindow<E> {
 impl<E: Expectation> Engine for EmWindow<E> {
     fn start(&mut self, first: &Observation) {
         self.window.entries.clear();
-        self.coefficient = self.model.initial;
+        self.share = self.model.initial.map_or(1.0, |initial| initial / first.demand);
         self.estimate = None;
         let std = SVector::from([
             self.model.noise.measured_distance_m2.sqrt(),

@@ -3,16 +3,13 @@
 use dynocar_shared::{PipelineKind, Uncertain};
 use serde::Deserialize;
 
-use super::{
-    ADHESION_REFERENCE, BrakeFactor, BrakingSettings, declared, initial_or_declared,
-    require_positive,
-};
+use super::{ADHESION_REFERENCE, BrakeFactor, BrakingSettings, declared, require_positive};
 use crate::pipeline::Estimator;
 use crate::pipeline::braking::intake::Quantity;
 use crate::pipeline::braking::law::Law;
 use crate::pipeline::braking::motion::Walk;
-use crate::pipeline::braking::tracker::{Prior, Tracker, TrackerModel};
-use crate::pipeline::settings::SettingError;
+use crate::pipeline::braking::tracker::{Prior, PriorScale, Tracker, TrackerModel};
+use crate::pipeline::settings::{SettingError, require};
 use crate::train::TrainModel;
 
 /// Settings of the extended Kalman filter with a random walk of the coefficient.
@@ -21,11 +18,12 @@ use crate::train::TrainModel;
 pub struct EkfSettings {
     /// Motion, measurement and braking.
     pub braking: BrakingSettings,
-    /// The coefficient before the first observation; as for EM when absent.
+    /// The coefficient before the first observation; the declared one, or an adhesion of 0.1, when
+    /// absent.
     pub initial: Option<f64>,
     /// Its standard deviation over the declared value (over 0.1 for adhesion).
     pub initial_relative_std: f64,
-    /// Standard deviation that it gains in 1 s, over the same; when absent, what serves best in
+    /// Standard deviation that it gains in 1 s, over the demand; when absent, what serves best in
     /// the papers' scenarios.
     pub relative_walk: Option<f64>,
     /// What a brake pipeline reports; no meaning for adhesion.
@@ -64,14 +62,16 @@ impl EkfSettings {
         let relative_walk = self.relative_walk(quantity);
         require_positive("relative_walk", relative_walk)?;
         let reference = declared(quantity, train).unwrap_or(ADHESION_REFERENCE);
-        let initial = initial_or_declared(self.initial, quantity, train)?;
+        let initial_std = self.initial_relative_std * reference;
+        let initial = self.initial.unwrap_or(reference);
+        require(initial >= 0.0 && initial.is_finite(), "initial", initial, "0 or more")?;
         let model = TrackerModel {
-            law: Law::Constant,
+            law: Law::Demand,
             noise: self.braking.noise(),
-            walk: Walk::Scale((relative_walk * reference).powi(2)),
+            walk: Walk::Scale(relative_walk.powi(2)),
             prior: Prior {
                 speed_std_mps: self.braking.first_speed_std_mps,
-                scale: Uncertain::new(initial, self.initial_relative_std * reference),
+                scale: PriorScale::OfCoefficient(Uncertain::new(initial, initial_std)),
             },
         };
         Ok(self.braking.estimator(kind, quantity, train, Tracker::new(model, 0.0, 0, false)))

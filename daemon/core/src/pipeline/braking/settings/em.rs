@@ -3,7 +3,7 @@
 use dynocar_shared::PipelineKind;
 use serde::Deserialize;
 
-use super::{BrakeFactor, BrakingSettings, initial_or_declared};
+use super::{BrakeFactor, BrakingSettings};
 use crate::pipeline::Estimator;
 use crate::pipeline::braking::em::{EmModel, EmWindow, KalmanExpectation, ParticleExpectation};
 use crate::pipeline::braking::intake::Quantity;
@@ -36,10 +36,10 @@ pub struct EmSettings {
     pub window: usize,
     /// Observations by which the window slides (L).
     pub slide: usize,
-    /// Iterations end when the coefficient changes by less.
+    /// Iterations end when the coefficient changes by less, as a share of the demand.
     pub tolerance: f64,
-    /// The coefficient before the first window; the declared one, or an adhesion of 0.08, when
-    /// absent.
+    /// The coefficient before the first window; when absent the declared one, and for adhesion
+    /// what the brake would need.
     pub initial: Option<f64>,
     /// Seed of the particles.
     pub seed: u64,
@@ -80,6 +80,8 @@ impl EmSettings {
         at_least("window", self.window, 3, "3 or more")?;
         let slides = self.slide >= 1 && self.slide < self.window;
         require(slides, "slide", self.slide as f64, "at least 1 and below window")?;
+        let initial = self.initial.unwrap_or(0.0);
+        require(initial >= 0.0 && initial.is_finite(), "initial", initial, "0 or more")?;
         require(self.tolerance >= 0.0, "tolerance", self.tolerance, "0 or more")
     }
 
@@ -96,7 +98,7 @@ impl EmSettings {
             slide_steps: self.slide,
             iterations: self.iterations,
             tolerance: self.tolerance,
-            initial: initial_or_declared(self.initial, quantity, train)?,
+            initial: self.initial,
             initial_speed_std_mps: self.braking.first_speed_std_mps,
             has_printed_cap: self.has_printed_cap,
         };

@@ -9,7 +9,7 @@ use crate::pipeline::braking::intake::Quantity;
 use crate::pipeline::braking::law::Law;
 use crate::pipeline::braking::law_bank::LawBank;
 use crate::pipeline::braking::motion::Walk;
-use crate::pipeline::braking::tracker::{Prior, TrackerModel};
+use crate::pipeline::braking::tracker::{Prior, PriorScale, TrackerModel};
 use crate::pipeline::settings::SettingError;
 use crate::train::TrainModel;
 
@@ -55,7 +55,7 @@ impl LawSettings {
             walk: Walk::Scale(self.scale_walk.powi(2)),
             prior: Prior {
                 speed_std_mps: self.braking.first_speed_std_mps,
-                scale: Uncertain::new(1.0, std),
+                scale: PriorScale::OfLaw(Uncertain::new(1.0, std)),
             },
         };
         let hypotheses = vec![

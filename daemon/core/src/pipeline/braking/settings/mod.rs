@@ -161,12 +161,10 @@ impl BrakeFactor {
     }
 }
 
-/// Adhesion that an estimator starts from unless told otherwise.
-const ADHESION_INITIAL: f64 = 0.08;
-/// Adhesion that relative settings refer to.
+/// Adhesion that stands for a declared one where nothing is declared.
 const ADHESION_REFERENCE: f64 = 0.1;
 
-/// The value that initial and relative settings of a quantity refer to.
+/// The declared value of a quantity.
 fn declared(quantity: Quantity, train: &TrainModel) -> Option<f64> {
     let gear = DeclaredGear::of(&train.brake_gear);
     match quantity {
@@ -174,17 +172,6 @@ fn declared(quantity: Quantity, train: &TrainModel) -> Option<f64> {
         Quantity::Friction => gear.map(|gear| gear.friction),
         Quantity::Ratio => gear.map(|gear| gear.ratio),
     }
-}
-
-/// The value that an estimator starts from unless told otherwise.
-fn initial_or_declared(
-    initial: Option<f64>,
-    quantity: Quantity,
-    train: &TrainModel,
-) -> Result<f64, SettingError> {
-    let value = initial.or(declared(quantity, train)).unwrap_or(ADHESION_INITIAL);
-    require(value >= 0.0 && value.is_finite(), "initial", value, "a finite number, 0 or more")?;
-    Ok(value)
 }
 
 fn require_positive(key: &'static str, value: f64) -> Result<(), SettingError> {

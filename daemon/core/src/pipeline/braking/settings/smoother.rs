@@ -8,7 +8,7 @@ use crate::pipeline::Estimator;
 use crate::pipeline::braking::intake::Quantity;
 use crate::pipeline::braking::law::{Law, SpeedTable};
 use crate::pipeline::braking::motion::Walk;
-use crate::pipeline::braking::tracker::{Prior, Tracker, TrackerModel};
+use crate::pipeline::braking::tracker::{Prior, PriorScale, Tracker, TrackerModel};
 use crate::pipeline::settings::{SettingError, require};
 use crate::train::TrainModel;
 
@@ -124,7 +124,10 @@ impl SmootherSettings {
             law: self.law(quantity)?,
             noise: self.braking.noise(),
             walk: self.checked_walk(quantity)?,
-            prior: Prior { speed_std_mps: self.braking.first_speed_std_mps, scale: SHARE_PRIOR },
+            prior: Prior {
+                speed_std_mps: self.braking.first_speed_std_mps,
+                scale: PriorScale::OfLaw(SHARE_PRIOR),
+            },
         };
         let most_moments = (self.lag_s / (0.9 * self.braking.interval_s)).ceil() as usize;
         let tracker = Tracker::new(model, self.lag_s, most_moments, true);

@@ -1,0 +1,172 @@
+//! The rows that every braking table has.
+
+use dynocar_core::pipeline::braking::settings::EStep;
+
+use super::bound::{BoundAt, Knowledge, bound, mean_relative_percent, root_mean_square};
+use super::braking::{Braking, Sought};
+use super::braking_score::{
+    LAG_S, LAG_STEPS, MIDDLE_STEPS, Score, drawn_braking, ekf, em, known_law, score, smoother,
+    smoother_knowledge,
+};
+use super::row::Row;
+
+/// One of the papers' tables, and what is measured for it.
+pub struct Table {
+    /// Short name of the paper.
+    pub paper: &'static str,
+    /// Its table.
+    pub table: &'static str,
+    /// What is looked for, in words.
+    pub name: &'static str,
+    /// The braking.
+    pub braking: Braking,
+    /// Initial values that the paper tries; run number k starts from the k-th, in turn.
+    pub initials: &'static [f64],
+    /// The paper's mean relative error in %.
+    pub published_percent: f64,
+    /// The paper's mean relative error of its baseline in %.
+    pub published_baseline_percent: f64,
+}
+
+impl Table {
+    /// The initial value of a run.
+    pub fn initial(&self, seed: u64) -> f64 {
+        self.initials[seed as usize % self.initials.len()]
+    }
+
+    /// A row without figures.
+    pub fn row(&self, what: &str, unit: &'static str, seeds: usize) -> Row {
+        Row {
+            paper: self.paper,
+            table: self.table,
+            quantity: format!("{}, {what}", self.name),
+            unit,
+            published: None,
+            paper_method: None,
+            baseline: None,
+            ours: None,
+            bound: None,
+            seeds,
+            coverage: None,
+            nees: None,
+        }
+    }
+
+    /// The rows that every table has: the present, 5 s back, and the baseline on its own.
+    pub fn comparison(&self, seeds: usize) -> Vec<Row> {
+        let sought = self.braking.sought;
+        let lags = [0, MIDDLE_STEPS];
+        let [em_end, em_middle] = score(&self.braking, seeds, lags, |seed| {
+            em(sought, self.initial(seed), seed, EStep::Particle)
+        });
+        let [_, exact_middle] = score(&self.braking, seeds, lags, |seed| {
+            em(sought, self.initial(seed), seed, EStep::Kalman)
+        });
+        let [ekf] = score(&self.braking, seeds, [0], |seed| ekf(sought, self.initial(seed)));
+        let [present] = score(&self.braking, seeds, [0], |_| smoother(sought, 0.0));
+        let [back] = score(&self.braking, seeds, [LAG_STEPS], |_| smoother(sought, LAG_S));
+        let knowledge = smoother_knowledge(sought);
+        let mut rows = Vec::new();
+        rows.extend(self.pair(
+            "the present",
+            (Some(em_end), Some(ekf), present),
+            &bound(&self.braking, knowledge, 0),
+            seeds,
+        ));
+        rows.extend(self.pair(
+            "5 s back (EM: middle of the window)",
+            (Some(em_middle), None, back),
+            &bound(&self.braking, knowledge, LAG_STEPS),
+            seeds,
+        ));
+        rows.push(Row {
+            paper_method: Some(exact_middle.relative_percent),
+            ..self.row("EM with exact E-step, middle of the window", "%", seeds)
+        });
+        rows.push(Row {
+            published: Some(self.published_baseline_percent),
+            baseline: Some(ekf.relative_percent),
+            ..self.row("the present, the baseline's figure", "%", seeds)
+        });
+        rows
+    }
+
+    /// The rows where the curve over speed is known but for its scale.
+    pub fn known_law(&self, scale_std: f64, seeds: usize) -> Vec<Row> {
+        let sought = self.braking.sought;
+        let [score] = score(&self.braking, seeds, [0], |_| known_law(sought));
+        let bounds = bound(&self.braking, Knowledge::Law(scale_std), 0);
+        self.pair(
+            "the present, the law known but for its scale",
+            (None, None, score),
+            &bounds,
+            seeds,
+        )
+    }
+
+    /// A row of mean relative errors and one of root mean square errors.
+    fn pair(
+        &self,
+        what: &str,
+        (em, ekf, ours): (Option<Score>, Option<Score>, Score),
+        bounds: &[BoundAt],
+        seeds: usize,
+    ) -> Vec<Row> {
+        let row = |what: &str, unit| Row {
+            coverage: Some(ours.coverage),
+            nees: Some(ours.nees),
+            ..self.row(what, unit, seeds)
+        };
+        vec![
+            Row {
+                published: Some(self.published_percent),
+                paper_method: em.map(|score| score.relative_percent),
+                baseline: ekf.map(|score| score.relative_percent),
+                ours: Some(ours.relative_percent),
+                bound: Some(mean_relative_percent(bounds)),
+                ..row(&format!("mean relative error, {what}"), "%")
+            },
+            Row {
+                paper_method: em.map(|score| score.rmse),
+                baseline: ekf.map(|score| score.rmse),
+                ours: Some(ours.rmse),
+                bound: Some(root_mean_square(bounds)),
+                ..row(&format!("root mean square error, {what}"), "1")
+            },
+        ]
+    }
+}
+
+/// Rows in which the coefficient is drawn from the very model of the smoother, so that bound,
+/// coverage and NEES apply without reservation.
+pub fn drawn_rows(
+    paper: &'static str,
+    sought: Sought,
+    name: &'static str,
+    seeds: usize,
+) -> Vec<Row> {
+    let braking = drawn_braking(sought);
+    let table = Table {
+        paper,
+        table: "drawn coefficients",
+        name,
+        braking,
+        initials: &[],
+        published_percent: f64::NAN,
+        published_baseline_percent: f64::NAN,
+    };
+    let knowledge = smoother_knowledge(sought);
+    [("the present", 0.0, 0), ("5 s back", LAG_S, LAG_STEPS)]
+        .into_iter()
+        .map(|(what, lag_s, lag_steps)| {
+            let [score] = score(&braking, seeds, [lag_steps], |_| smoother(sought, lag_s));
+            Row {
+                ours: Some(score.rmse),
+                bound: Some(root_mean_square(&bound(&braking, knowledge, lag_steps))),
+                coverage: Some(score.coverage),
+                nees: Some(score.nees),
+                ..table.row(&format!("root mean square error, {what}"), "1", seeds)
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,129 @@
+//! Jin 2020: disc friction and braking ratio of a braking train.
+
+use dynocar_core::pipeline::braking::gear::DeclaredGear;
+use dynocar_shared::{EffortPoint, Stop};
+
+use super::braking::{
+    JIN_TABLE_3, JIN_TABLE_4, MPS_PER_KMH, PRESSURE_PA, Sought, declared, disc_friction, train,
+};
+use super::braking_score::{over_seeds, score, smoother};
+use super::braking_table::{Table, drawn_rows};
+use super::row::Row;
+use super::statistics::mean;
+use super::xie::{PAPER_GRAVITY_MPS2, stop_in_steps, stop_rows};
+
+const FRICTION: Table = Table {
+    paper: "Jin 2020",
+    table: "3",
+    name: "disc friction",
+    braking: JIN_TABLE_3,
+    initials: &[0.15, 0.20, 0.25, 0.30, 0.35, 0.40],
+    published_percent: 2.4807,
+    published_baseline_percent: 4.9278,
+};
+
+const RATIO: Table = Table {
+    paper: "Jin 2020",
+    table: "4",
+    name: "braking ratio",
+    braking: JIN_TABLE_4,
+    initials: &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0],
+    published_percent: 1.3154,
+    published_baseline_percent: 1.7799,
+};
+
+/// Standard deviation of the scale of a known friction curve beforehand, as in the estimator.
+const SCALE_STD: f64 = 1.0;
+
+/// Tables 3 and 4, and the stop of figure 8.
+pub fn rows(seeds: usize) -> Vec<Row> {
+    let mut rows = FRICTION.comparison(seeds);
+    rows.extend(FRICTION.known_law(SCALE_STD, seeds));
+    rows.extend(RATIO.comparison(seeds));
+    rows.extend(ratio_extras(seeds));
+    rows.extend(drawn_rows("Jin 2020", Sought::Friction, "disc friction", seeds));
+    rows.extend(stop());
+    rows
+}
+
+/// A ratio that hardly moves gains from a window of 40 s, and the declared value is hard to beat.
+fn ratio_extras(seeds: usize) -> Vec<Row> {
+    // 10 s back, the random walk of 0.4 % after 1 s remembers about as long on either side.
+    let [back] = score(&RATIO.braking, seeds, [50], |_| smoother(Sought::Ratio, 10.0));
+    let nominal = over_seeds(seeds, |seed| {
+        let moments = RATIO.braking.simulate(seed);
+        let scored = moments.iter().filter(|moment| moment.is_scored);
+        let declared = declared(Sought::Ratio);
+        let errors = scored.map(|moment| 100.0 * (declared / moment.truth - 1.0).abs());
+        mean(&errors.collect::<Vec<_>>())
+    });
+    vec![Row {
+        published: Some(RATIO.published_percent),
+        baseline: Some(mean(&nominal)),
+        ours: Some(back.relative_percent),
+        coverage: Some(back.coverage),
+        nees: Some(back.nees),
+        ..RATIO.row(
+            "mean relative error, 10 s back (baseline: always the declared 2.55)",
+            "%",
+            seeds,
+        )
+    }]
+}
+
+/// The stop from 350 km/h of figure 8.
+fn stop() -> Vec<Row> {
+    let train = train();
+    let gear = DeclaredGear::of(&train.brake_gear).expect("a declared gear");
+    let force_n = |speed_mps: f64| gear.force_n(PRESSURE_PA, disc_friction(speed_mps), gear.ratio);
+    let effort: Vec<EffortPoint> = (0..=350)
+        .map(|kmh| {
+            let speed_mps = f64::from(kmh) * MPS_PER_KMH;
+            EffortPoint { speed_mps, force_n: force_n(speed_mps) }
+        })
+        .collect();
+    let davis = [train.resistance.a, train.resistance.b, train.resistance.c];
+    let stop = Stop {
+        gravity_mps2: PAPER_GRAVITY_MPS2,
+        ..Stop::level(350.0 * MPS_PER_KMH, train.mass_kg, davis, &effort)
+    };
+    let ours = stop.estimate(0.95).expect("a stop");
+    stop_rows(
+        "Jin 2020",
+        "figure 8",
+        "350 km/h to standstill",
+        (4647.16, 94.2),
+        stop_in_steps(&train, &stop, force_n),
+        (ours.distance_m, ours.time_s),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_stop_of_figure_8_is_reproduced() {
+        for row in stop() {
+            let (published, ours) = (row.published.unwrap(), row.ours.unwrap());
+            assert!((ours / published - 1.0).abs() < 1e-4, "{row:?}");
+            assert!((row.paper_method.unwrap() / ours - 1.0).abs() < 1e-3, "{row:?}");
+        }
+    }
+
+    #[test]
+    fn drawn_friction_is_found_at_the_bound_with_honest_intervals() {
+        for row in drawn_rows("Jin 2020", Sought::Friction, "disc friction", 60) {
+            let ratio = row.ours.unwrap() / row.bound.unwrap();
+            assert!((0.9..1.1).contains(&ratio), "{row:?}");
+            assert!((0.92..0.98).contains(&row.coverage.unwrap()), "{row:?}");
+        }
+    }
+
+    #[test]
+    fn a_known_curve_is_worth_more_than_a_lag() {
+        let lagged = FRICTION.comparison(6)[2].ours.unwrap();
+        let known = FRICTION.known_law(SCALE_STD, 6)[0].ours.unwrap();
+        assert!(known < 0.6 * lagged, "{known} against {lagged}");
+    }
+}

@@ -1,0 +1,6 @@
+//! The braking pipelines from the controller's samples to snapshots.
+
+mod adhesion;
+mod brake;
+mod input;
+mod simulation;
