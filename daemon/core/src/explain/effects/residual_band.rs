@@ -176,6 +176,15 @@ impl Hypothesis for Band {
         self.choice_cost
     }
 
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        let least = match self.covariate {
+            Covariate::Chainage => 0.3,
+            Covariate::TractionForce | Covariate::BrakeForce => 0.02,
+            _ => 0.1,
+        };
+        parameters[0].abs() > least
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         for (i, force) in forces.iter_mut().enumerate() {
             let value = self.covariate.value(run, i, &self.files);
