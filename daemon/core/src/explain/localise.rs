@@ -8,6 +8,12 @@ use crate::force::ResolvedSample;
 const SHORTEST_M: f64 = 150.0;
 /// Ends are refined to so many m.
 const FINEST_M: f64 = 10.0;
+/// What is tied to a place shows in so many runs; less is an event.
+const PLACE_RUNS_MIN: usize = 2;
+/// A chosen run must show the force by itself.
+const RUN_GAIN_MIN: f64 = 6.0;
+/// A further interval must add this share of what the others explain.
+const FURTHER_SHARE: f64 = 0.05;
 /// Intervals of one effect at most.
 const INTERVALS_MAX: usize = 6;
 
@@ -72,9 +78,11 @@ pub type Shape<'s> = &'s dyn Fn(&RunData, usize) -> f64;
 fn tuples(scan: &Scan, shape: Shape, inside: Inside, interval_m: [f64; 2]) -> Vec<Tuple> {
     (0..scan.problem.runs.len())
         .map(|index| {
-            scan.run_tuple(index, |run, i| match inside.share(&run.samples()[i], &[interval_m]) {
-                0.0 => 0.0,
-                share => share * shape(run, i),
+            scan.run_tuple(index, |run, i| {
+                match inside.share(&run.samples()[i], &[interval_m]) {
+                    0.0 => 0.0,
+                    share => share * shape(run, i),
+                }
             })
         })
         .collect()
@@ -111,33 +119,49 @@ fn cells(scan: &Scan, shape: Shape, inside: Inside, [low, high]: [f64; 2]) -> Ve
 }
 
 /// The runs, as a set of numbers, whose common factor explains most after the cost of choosing.
-fn best_runs(scan: &Scan, tuples: &[Tuple], positive: bool) -> (Option<Vec<usize>>, f64, f64, f64) {
-    let mut order: Vec<(usize, f64)> = tuples
+fn best_runs(
+    scan: &Scan,
+    tuples: &[Tuple],
+    positive: bool,
+    runs_min: usize,
+) -> (Option<Vec<usize>>, f64, f64, f64) {
+    let mut order: Vec<(usize, f64, f64)> = tuples
         .iter()
         .enumerate()
         .filter(|(_, tuple)| tuple.square > 0.0)
-        .map(|(index, tuple)| (index, scan.gain(tuple).1))
+        .map(|(index, tuple)| {
+            let (gain, estimate) = scan.gain(tuple);
+            (index, gain, estimate)
+        })
         .collect();
-    order.sort_by(|one, other| other.1.abs().total_cmp(&one.1.abs()));
+    order.sort_by(|one, other| other.1.total_cmp(&one.1));
     let passing = order.len();
     let mut best = (None, 0.0, 0.0, 0.0);
+    if passing < runs_min {
+        return best;
+    }
     let signs: &[f64] = if positive { &[1.0] } else { &[1.0, -1.0] };
     for &sign in signs {
         let mut sum = Tuple::zero(scan.fit.theta.len());
         let mut chosen = Vec::new();
-        let ordered = order.iter().filter(|(_, estimate)| estimate * sign > 0.0);
-        let others = order.iter().filter(|(_, estimate)| estimate * sign <= 0.0);
-        for &(index, _) in ordered.chain(others) {
+        let tells = |own: &&(usize, f64, f64)| own.1 > RUN_GAIN_MIN && own.2 * sign > 0.0;
+        for &(index, _, _) in order.iter().filter(tells) {
             sum.add(&tuples[index]);
             chosen.push(index);
             let (gain, estimate) = scan.gain(&sum);
-            let all = chosen.len() == passing;
-            let cost = if all { 0.0 } else { subset_cost(passing, chosen.len()) };
-            if estimate * sign > 0.0 && gain - cost > best.1 - best.3 {
+            let cost = subset_cost(passing, chosen.len());
+            let is_set = chosen.len() >= runs_min && chosen.len() < passing;
+            if is_set && estimate * sign > 0.0 && gain - cost > best.1 - best.3 {
                 let mut runs = chosen.clone();
                 runs.sort_unstable();
-                best = ((!all).then_some(runs), gain, estimate, cost);
+                best = (Some(runs), gain, estimate, cost);
             }
+        }
+        let mut all = Tuple::zero(scan.fit.theta.len());
+        order.iter().for_each(|&(index, _, _)| all.add(&tuples[index]));
+        let (gain, estimate) = scan.gain(&all);
+        if estimate * sign > 0.0 && gain > best.1 - best.3 {
+            best = (None, gain, estimate, 0.0);
         }
     }
     best
@@ -145,13 +169,14 @@ fn best_runs(scan: &Scan, tuples: &[Tuple], positive: bool) -> (Option<Vec<usize
 
 /// The runs in which a common positive factor on a shape explains most, wherever they are.
 pub fn best_of_runs(scan: &Scan, tuples: &[Tuple]) -> Found {
-    let (runs, gain, estimate, choice_cost) = best_runs(scan, tuples, true);
+    let (runs, gain, estimate, choice_cost) = best_runs(scan, tuples, true, 1);
     Found { intervals_m: Vec::new(), runs, gain, estimate, choice_cost }
 }
 
 /// Twice the logarithm of the number of ways to take `taken` of `count` runs.
 pub fn subset_cost(count: usize, taken: usize) -> f64 {
-    let ways: f64 = (0..taken).map(|k| ((count - k) as f64 / (k + 1) as f64).ln()).sum::<f64>();
+    let ways: f64 =
+        (0..taken).map(|k| ((count - k) as f64 / (k + 1) as f64).ln()).sum::<f64>();
     2.0 * (ways + (count.max(1) as f64).ln())
 }
 
@@ -165,7 +190,7 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside, positive: bool) -> Option
     let interval_cost = 2.0 * (cells.len().max(2) as f64).ln();
     let best = cells
         .iter()
-        .map(|cell| (cell, best_runs(scan, &cell.runs, positive)))
+        .map(|cell| (cell, best_runs(scan, &cell.runs, positive, PLACE_RUNS_MIN)))
         .max_by(|one, other| (one.1.1 - one.1.3).total_cmp(&(other.1.1 - other.1.3)))?;
     let (cell, (runs, gain, _, subset)) = best;
     if gain <= 0.0 {
@@ -180,10 +205,8 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside, positive: bool) -> Option
     };
     polish(scan, shape, inside, &mut found, positive);
     while found.intervals_m.len() < INTERVALS_MAX {
-        let Some(added) = with_another(scan, &cells, shape, inside, &found, positive) else {
-            break;
-        };
-        if added.gain - found.gain < interval_cost + 6.0 {
+        let Some(added) = with_another(scan, &cells, shape, inside, &found, positive) else { break };
+        if added.gain - found.gain < (interval_cost + 6.0).max(FURTHER_SHARE * found.gain) {
             break;
         }
         found = Found { choice_cost: found.choice_cost + interval_cost, ..added };
@@ -261,7 +284,7 @@ fn polish(scan: &Scan, shape: Shape, inside: Inside, found: &mut Found, positive
         };
         let better = tries
             .into_iter()
-            .filter(|&interval| interval[1] - interval[0] >= 50.0 && apart(interval))
+            .filter(|&interval| interval[1] - interval[0] >= 100.0 && apart(interval))
             .map(|interval| (interval, value(interval)))
             .max_by(|one, other| one.1.0.total_cmp(&other.1.0));
         match better {

@@ -162,6 +162,10 @@ impl Hypothesis for Slippery {
     }
 
     fn place(&self) -> Place {
-        Place { runs: self.runs.clone(), intervals_m: self.intervals_m.clone(), ..Place::default() }
+        Place {
+            runs: self.runs.clone(),
+            intervals_m: self.intervals_m.clone(),
+            ..Place::default()
+        }
     }
 }

@@ -95,7 +95,9 @@ impl Covariate {
             Covariate::TractionForce => {
                 sample.traction_force_n.unwrap_or(0.0) / sample.inertial_mass_kg
             }
-            Covariate::BrakeForce => -sample.brake_force_n.unwrap_or(0.0) / sample.inertial_mass_kg,
+            Covariate::BrakeForce => {
+                -sample.brake_force_n.unwrap_or(0.0) / sample.inertial_mass_kg
+            }
             _ => -per_unit,
         }
     }
@@ -172,6 +174,15 @@ impl Hypothesis for Band {
 
     fn choice_cost(&self) -> f64 {
         self.choice_cost
+    }
+
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        let least = match self.covariate {
+            Covariate::Chainage => 0.3,
+            Covariate::TractionForce | Covariate::BrakeForce => 0.02,
+            _ => 0.1,
+        };
+        parameters[0].abs() > least
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {

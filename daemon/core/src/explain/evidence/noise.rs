@@ -29,6 +29,12 @@ impl Noise {
         scatter: RunScatter::USUAL,
     };
 
+    /// The same with a share of the fading force only: under it a lasting force counts in full, which a
+    /// noise estimated beside an undeclared force takes for noise.
+    pub fn stiff(self, share: f64) -> Noise {
+        Noise { fading_var: (share * self.fading_var).max(1e-10), ..self }
+    }
+
     fn to_logs(self) -> [f64; 4] {
         [self.measurement_var, self.white_density, self.fading_var, self.fading_s].map(f64::ln)
     }
@@ -154,8 +160,7 @@ impl Whitener {
 
     /// Robust -2 log likelihood of the innovations, up to a constant.
     pub fn minus_two_log_likelihood(&self, innovations: &[f64]) -> f64 {
-        self.log_determinant
-            + innovations.iter().map(|&nu| super::fit::robust_loss(nu)).sum::<f64>()
+        self.log_determinant + innovations.iter().map(|&nu| super::fit::robust_loss(nu)).sum::<f64>()
     }
 
     /// Innovations that carry information.

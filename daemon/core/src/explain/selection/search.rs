@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
+use super::by_run::leave_one_run_out;
 use super::significance::{ACCEPT, model_penalty, penalty};
 use crate::explain::Progress;
 use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal};
@@ -17,8 +18,10 @@ use crate::train::TrainModel;
 const EFFECTS_MAX: usize = 3;
 /// Kinds that get a noise of their own and a second localisation in each round.
 const FINALISTS: usize = 5;
-/// An effect must take away this share of the open-loop error of the fit runs.
-const REDUCTION_MIN: f64 = 0.03;
+/// The first effect must take away this share of the open-loop error of the fit runs.
+const REDUCTION_MIN: f64 = 0.08;
+/// A further one, or one outside the library, this share of what the others leave.
+const FURTHER_REDUCTION_MIN: f64 = 0.15;
 /// Less observations than this tell nothing.
 pub const OBSERVATIONS_MIN: usize = 80;
 
@@ -71,8 +74,12 @@ impl Search<'_> {
         let start = self.problem.start(&[]);
         let first = self.problem.fit_with_noise(&declared, start, Noise::START);
         let base = self.problem.fit_with_noise(&declared, first.theta, first.noise);
-        let mut outcome =
-            Outcome { base: base.clone(), fit: base, rounds: Vec::new(), not_testable: Vec::new() };
+        let mut outcome = Outcome {
+            base: base.clone(),
+            fit: base,
+            rounds: Vec::new(),
+            not_testable: Vec::new(),
+        };
         if outcome.base.observations() < OBSERVATIONS_MIN {
             return outcome;
         }
@@ -118,7 +125,8 @@ impl Search<'_> {
                 }
             }
         }
-        let by_evidence = |one: &Trial, other: &Trial| other.evidence.total_cmp(&one.evidence);
+        let by_evidence =
+            |one: &Trial, other: &Trial| other.evidence.total_cmp(&one.evidence);
         trials.sort_by(|one, other| by_evidence(&one.0, &other.0));
         let mut finished: Vec<Trial> = trials
             .into_iter()
@@ -165,20 +173,34 @@ impl Search<'_> {
             Trial { kind: trial.kind, fit, decrease, evidence: decrease - price }
         };
         let mut best = refit(&trial);
-        for _ in 0..2 {
-            let sharper = self.problem.fit(&base.model, base.theta.clone(), best.fit.noise);
-            let Some(scan) = self.scan(&sharper) else { break };
-            let Proposal::Candidates(candidates) = effect.propose(&scan) else { break };
-            let again = candidates
-                .into_iter()
-                .map(|candidate| self.attempt(base, &sharper, candidate, true))
-                .max_by(|one, other| one.evidence.total_cmp(&other.evidence));
-            match again {
-                Some(again) if again.evidence > best.evidence + 1.0 => best = again,
-                _ => break,
+        for attempt in 0..3 {
+            let own = best.fit.noise;
+            let noises = [own, own.stiff(0.01), own.stiff(1e-4)];
+            let looks = if attempt == 0 { &noises[..] } else { &noises[..1] };
+            let mut is_better = false;
+            for &noise in looks {
+                let Some(again) = self.look_again(base, noise, effect) else { continue };
+                if again.evidence > best.evidence + 1.0 {
+                    best = again;
+                    is_better = true;
+                }
+            }
+            if !is_better {
+                break;
             }
         }
         best
+    }
+
+    /// The best candidate of a kind when it looks for places and windows under a given noise.
+    fn look_again(&self, base: &Fit, noise: Noise, effect: &dyn Effect) -> Option<Trial> {
+        let onto = self.problem.fit(&base.model, base.theta.clone(), noise);
+        let scan = self.scan(&onto)?;
+        let Proposal::Candidates(candidates) = effect.propose(&scan) else { return None };
+        candidates
+            .into_iter()
+            .map(|candidate| self.attempt(base, &onto, candidate, true))
+            .max_by(|one, other| one.evidence.total_cmp(&other.evidence))
     }
 
     /// Whether the last effect of a trial is more than chance and large enough to matter.
@@ -187,7 +209,29 @@ impl Search<'_> {
         let parameters = trial.fit.effect_parameters(last);
         trial.evidence > ACCEPT
             && trial.fit.model.effects[last].is_material(parameters, trial.fit.theta[2])
-            && self.reduction(base, &trial.fit) > REDUCTION_MIN
+            && self.reduction(base, &trial.fit) > Self::reduction_min(&trial.fit)
+            && self.holds_by_run(base, trial)
+    }
+
+    /// What the last effect of a model must take away.
+    fn reduction_min(fit: &Fit) -> f64 {
+        let effects = &fit.model.effects;
+        let is_unknown = effects.last().is_some_and(|it| it.kind() == EffectKind::Unknown);
+        if effects.len() > 1 || is_unknown { FURTHER_REDUCTION_MIN } else { REDUCTION_MIN }
+    }
+
+    /// For what is not chosen run by run, the runs that took no part in the fit must gain too.
+    fn holds_by_run(&self, base: &Fit, trial: &Trial) -> bool {
+        let sharper = self.problem.fit(&base.model, base.theta.clone(), trial.fit.noise);
+        let held = leave_one_run_out(&sharper, &trial.fit);
+        let own = trial.fit.model.effects[trial.fit.model.effects.len() - 1].place();
+        if own.windows.is_some() || own.runs.is_some() || held.runs < 3 {
+            return true;
+        }
+        if std::env::var("HELD").is_ok() {
+            eprintln!("held {:?} {:?} ev {}", trial.kind, held, trial.evidence);
+        }
+        held.gain > 0.5 * ACCEPT && 2 * held.better > held.runs
     }
 
     /// Share of the open-loop error of the fit runs that the larger model takes away, over whole
