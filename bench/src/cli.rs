@@ -7,6 +7,8 @@ use clap::{Args, Parser, Subcommand};
 use dynocar_shared::vocabulary::EffectKind;
 use serde::Serialize;
 
+use crate::estimators::measure::Effort;
+use crate::estimators::{self, report};
 use crate::explain::matrix;
 use crate::papers::{self, Row, table};
 
@@ -20,8 +22,23 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Estimators(EstimatorsArguments),
     Explain(ExplainArguments),
     Papers(PapersArguments),
+}
+
+/// Speed of every estimator beside peers that do the same work on the same data.
+#[derive(Debug, Args)]
+struct EstimatorsArguments {
+    /// Few rounds: a check that everything runs, not a measurement
+    #[arg(long)]
+    quick: bool,
+    /// Only the cases whose name contains this, as rls
+    #[arg(long, value_name = "TEXT")]
+    case: Option<String>,
+    /// Write the result for machines; - for standard output
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
 }
 
 /// Every table of the five papers over seeded runs: the paper's figure, its method, ours, the bound.
@@ -79,6 +96,7 @@ const QUICK_SEEDS: usize = 8;
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let result = match &arguments.command {
+        Command::Estimators(arguments) => estimators(arguments),
         Command::Explain(arguments) => explain(arguments),
         Command::Papers(arguments) => papers(arguments),
     };
@@ -89,6 +107,35 @@ pub fn main() -> ExitCode {
             ExitCode::from(status)
         }
     }
+}
+
+fn estimators(arguments: &EstimatorsArguments) -> Result<(), (String, u8)> {
+    let effort = if arguments.quick { Effort::QUICK } else { Effort::FULL };
+    let mut cases = estimators::cases().map_err(|error| (error.to_string(), 1))?;
+    if let Some(text) = &arguments.case {
+        cases.retain(|case| case.name.contains(text));
+        if cases.is_empty() {
+            return Err((format!("--case {text}: expected a part of a case's name"), 2));
+        }
+    }
+    let mut times = Vec::with_capacity(cases.len());
+    for case in cases {
+        times.push(case.measure(&effort).map_err(|error| (error.to_string(), 1))?);
+    }
+    let is_json_on_stdout = arguments.json.as_ref().is_some_and(|file| file.as_os_str() == "-");
+    if !is_json_on_stdout {
+        print!("{}", report::table(&times));
+    }
+    if let Some(file) = &arguments.json {
+        let text = serde_json::to_string_pretty(&report::Report::of(&times))
+            .map_err(|error| (error.to_string(), 1))?;
+        if is_json_on_stdout {
+            println!("{text}");
+        } else {
+            write(file, &(text + "\n"))?;
+        }
+    }
+    Ok(())
 }
 
 fn papers(arguments: &PapersArguments) -> Result<(), (String, u8)> {

@@ -1,9 +1,11 @@
 //! The measurements behind every figure that Dynocar's documents state.
 //!
 //! - [`cli`]: the commands of `dynocar-bench`
+//! - [`estimators`]: speed of every estimator beside peers
 //! - [`explain`]: the search for undeclared effects on simulated datasets
 //! - [`papers`]: accuracy of every estimator over seeded runs, beside the statistical bound
 
 pub mod cli;
+pub mod estimators;
 pub mod explain;
 pub mod papers;

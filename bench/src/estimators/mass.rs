@@ -1,0 +1,153 @@
+//! The step of the mass filter: eight behaviours of a bias side by side.
+
+use std::sync::Arc;
+
+use dynocar_core::filter::random::Random;
+use dynocar_core::pipeline::mass::MassKalmanSettings;
+use dynocar_core::pipeline::mass::bias_bank::{
+    BIAS, BiasBank, Dynamics, INVERSE_MASS, MODELS, SPEED,
+};
+use dynocar_core::pipeline::mass::bias_model::BiasModel;
+use dynocar_core::pipeline::mass::line_resistance::LineResistance;
+use dynocar_core::pipeline::mass::motion::Motion;
+use dynocar_core::train::TrainModel;
+use nalgebra::{Matrix3, RowVector3, Vector3};
+
+use super::measure::{Agreement, Case, Contender};
+use super::textbook::TextbookFilter;
+
+const SAMPLES: usize = 1000;
+const STEP_S: f64 = 0.2;
+const SPEED_VARIANCE: f64 = 4e-4;
+const MEMORY: f64 = 3000.0;
+/// Standard deviation of the inverse mass over its reference.
+const INVERSE_MASS_STD: f64 = 0.2;
+
+struct Drive {
+    dynamics: Dynamics,
+    models: [BiasModel; MODELS],
+    motions: Vec<Motion>,
+}
+
+/// Traction, coasting and braking of a train 5 % lighter than declared.
+fn drive(train: &TrainModel) -> Arc<Drive> {
+    let dynamics = Dynamics::new(train, LineResistance::declared(train));
+    let mut random = Random::new(21);
+    let mut speed_mps: f64 = 12.0;
+    let motions = (0..SAMPLES).map(|index| {
+        let force_n = match (index / 50) % 4 {
+            0 | 1 => 0.15 * train.mass_kg,
+            2 => 0.0,
+            _ => -0.12 * train.mass_kg,
+        };
+        let mut motion = Motion {
+            time_ns: (index as f64 * STEP_S * 1e9) as i64,
+            stretch: 0,
+            speed_mps: speed_mps + SPEED_VARIANCE.sqrt() * random.normal(),
+            force_n,
+            gradient_permille: 2.0 * (0.01 * index as f64).sin(),
+            declared_curve_n_per_kn: 0.0,
+            declared_tunnel_n_per_kn: 0.0,
+            curvature_per_m: 0.0,
+            tunnel_share: 0.0,
+        };
+        let drag = dynamics.drag_mps2(&motion, speed_mps);
+        speed_mps += STEP_S * (1.05 * dynamics.push_mps2(&motion) - drag);
+        motion.speed_mps = motion.speed_mps.max(1.0);
+        motion
+    });
+    let motions = motions.collect();
+    Arc::new(Drive { dynamics, models: MassKalmanSettings::default().bias_models(), motions })
+}
+
+/// The cases of this module, for a train.
+pub fn cases(train: &TrainModel) -> Vec<Case> {
+    let drive = drive(train);
+    let of_peer = drive.clone();
+    vec![Case {
+        name: "mass Kalman step, 8 behaviours".into(),
+        target_ns: None,
+        ours: Contender::new("ours", SAMPLES - 1, move || ours(&drive)),
+        peers: vec![Contender::new("textbook EKF bank", SAMPLES - 1, move || textbook(&of_peer))],
+        agreement: Agreement::Relative(1e-6),
+    }]
+}
+
+fn ours(drive: &Drive) -> Vec<f64> {
+    let inverse_mass = (1.0, INVERSE_MASS_STD);
+    let mut bank = BiasBank::new(drive.dynamics, drive.models, inverse_mass, MEMORY);
+    bank.restart_speed(drive.motions[0].speed_mps, SPEED_VARIANCE);
+    for pair in drive.motions.windows(2) {
+        bank.predict(&pair[0], &pair[1], STEP_S);
+        bank.measure(pair[1].speed_mps, SPEED_VARIANCE);
+    }
+    let best = bank.best();
+    vec![best.state[SPEED], best.state[INVERSE_MASS], best.covariance[(INVERSE_MASS, INVERSE_MASS)]]
+}
+
+struct Member {
+    filter: TextbookFilter<3>,
+    model: BiasModel,
+    log_weight: f64,
+}
+
+fn textbook(drive: &Drive) -> Vec<f64> {
+    let member = |model: &BiasModel| {
+        let variances = Vector3::new(
+            SPEED_VARIANCE,
+            INVERSE_MASS_STD * INVERSE_MASS_STD,
+            model.std_mps2 * model.std_mps2,
+        );
+        let mean = Vector3::new(drive.motions[0].speed_mps, 1.0, 0.0);
+        let filter = TextbookFilter { mean, covariance: Matrix3::from_diagonal(&variances) };
+        Member { filter, model: *model, log_weight: 0.0 }
+    };
+    let mut members: Vec<_> = drive.models.iter().map(member).collect();
+    let row = RowVector3::new(1.0, 0.0, 0.0);
+    for pair in drive.motions.windows(2) {
+        for Member { filter, model, log_weight } in &mut members {
+            predict(filter, model, &drive.dynamics, &pair[0], &pair[1]);
+            let said = filter.measure(&row, pair[1].speed_mps, SPEED_VARIANCE);
+            *log_weight = (1.0 - 1.0 / MEMORY) * *log_weight + said.log_likelihood();
+        }
+        let highest =
+            members.iter().map(|member| member.log_weight).fold(f64::NEG_INFINITY, f64::max);
+        for member in &mut members {
+            member.log_weight = (member.log_weight - highest).max(-30.0);
+        }
+    }
+    let best = members
+        .iter()
+        .max_by(|a, b| a.log_weight.total_cmp(&b.log_weight))
+        .expect("there are behaviours");
+    let TextbookFilter { mean, covariance } = &best.filter;
+    vec![mean[SPEED], mean[INVERSE_MASS], covariance[(INVERSE_MASS, INVERSE_MASS)]]
+}
+
+/// Heun's rule with the force linear between the samples, linearised at the start.
+fn predict(
+    filter: &mut TextbookFilter<3>,
+    model: &BiasModel,
+    dynamics: &Dynamics,
+    from: &Motion,
+    to: &Motion,
+) {
+    let (push_from, push_to) = (dynamics.push_mps2(from), dynamics.push_mps2(to));
+    let (speed, inverse_mass, bias) =
+        (filter.mean[SPEED], filter.mean[INVERSE_MASS], filter.mean[BIAS]);
+    let shape = model.shape(speed);
+    let start = push_from * inverse_mass - dynamics.drag_mps2(from, speed) + shape * bias;
+    let ahead = speed + STEP_S * start;
+    let end = push_to * inverse_mass - dynamics.drag_mps2(to, ahead) + shape * bias;
+    let damping = dynamics.mps2_per_n_per_kn() * dynamics.resistance.slope(from, speed);
+    let keep = model.keep(STEP_S);
+    #[rustfmt::skip]
+    let transition = Matrix3::new(
+        1.0 - STEP_S * damping, 0.5 * STEP_S * (push_from + push_to), STEP_S * shape,
+        0.0, 1.0, 0.0,
+        0.0, 0.0, keep,
+    );
+    let mean = Vector3::new(speed + 0.5 * STEP_S * (start + end), inverse_mass, keep * bias);
+    let noise = Vector3::new(0.0, 0.0, model.noise_variance(keep));
+    filter.predict(mean, &transition, &Matrix3::from_diagonal(&noise));
+}

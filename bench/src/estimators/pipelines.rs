@@ -1,0 +1,96 @@
+//! Every kind of pipeline over a run of the demonstration dataset, from sample to snapshot.
+
+use std::sync::Arc;
+
+use dynocar_core::dataset::{DATASET_TRAIN, DatasetError, DatasetHead};
+use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_core::track::Track;
+use dynocar_core::train::{BrakeGear, TrainModel};
+use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
+
+use super::measure::{Agreement, Case, Contender};
+
+/// The files of the dataset that is measured on.
+const FILES: &[(&str, &str)] = &[
+    ("dataset.toml", include_str!("../../../config/demo/dataset.toml")),
+    ("train.toml", include_str!("../../../config/demo/train.toml")),
+    ("track.toml", include_str!("../../../config/demo/track.toml")),
+    ("runs/01.csv", include_str!("../../../config/demo/runs/01.csv")),
+];
+
+/// A run with its train and line.
+pub struct DemoRun {
+    /// The train, with a brake gear, so that brake pipelines have something to learn.
+    pub train: Arc<TrainModel>,
+    track: Option<Arc<Track>>,
+    samples: Vec<TrainSample>,
+}
+
+impl DemoRun {
+    /// The first run of the dataset.
+    ///
+    /// # Errors
+    ///
+    /// When the dataset is wrong.
+    pub fn read() -> Result<Arc<Self>, DatasetError> {
+        let head = DatasetHead::open(FILES)?;
+        let run = head.read_run(FILES, 0)?;
+        let mut train = (*head.train).clone();
+        train.brake_gear = BrakeGear {
+            cylinder_diameter_mm: Some(254.0),
+            disc_radius_mm: Some(240.0),
+            wheel_radius_mm: Some(460.0),
+            efficiency: Some(0.9),
+            ratio: Some(2.55),
+            friction: Some(0.35),
+            pads: Some(48.0),
+        };
+        Ok(Arc::new(DemoRun { train: Arc::new(train), track: head.track, samples: run.samples }))
+    }
+
+    /// Runs a pipeline over all samples.
+    fn process(&self, settings: &EstimatorSettings) -> ParameterSnapshot {
+        let estimator = settings.build(&self.train).expect("default settings are in range");
+        let (train, track) = (self.train.clone(), self.track.clone());
+        let mut pipeline = Pipeline::new(DATASET_TRAIN, 0, train, track, estimator);
+        for sample in &self.samples {
+            std::hint::black_box(pipeline.process(sample));
+        }
+        *pipeline.snapshot()
+    }
+}
+
+/// One case for each kind that can be built.
+pub fn cases(run: &Arc<DemoRun>) -> Vec<Case> {
+    let all = PipelineKind::ALL.iter().filter_map(|&kind| EstimatorSettings::default_of(kind));
+    all.map(|settings| {
+        let run = run.clone();
+        Case {
+            name: format!("pipeline {}", settings.kind()),
+            target_ns: None,
+            ours: Contender::new("ours", run.samples.len(), move || {
+                let snapshot = run.process(&settings);
+                vec![snapshot.samples_used as f64, snapshot.updates as f64]
+            }),
+            peers: Vec::new(),
+            agreement: Agreement::Absolute(0.0),
+        }
+    })
+    .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pipeline_uses_samples_of_the_run() {
+        let run = DemoRun::read().unwrap();
+        let mut cases = cases(&run);
+        assert!(cases.len() > 10);
+        for case in &mut cases {
+            let answer = (case.ours.pass)();
+            assert!(answer[0] > 0.0, "{}: {answer:?}", case.name);
+        }
+    }
+}
