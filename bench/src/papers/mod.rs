@@ -2,3 +2,4 @@
 
 pub mod row;
 pub mod statistics;
+pub mod xia;

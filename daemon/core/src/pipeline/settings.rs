@@ -9,6 +9,8 @@ use serde::Deserialize;
 
 use super::Estimator;
 use super::echo::Echo;
+use super::trajectory::kalman::TrajectoryKalmanSettings;
+use super::trajectory::newton_settings::TrajectoryNewtonSettings;
 use crate::train::TrainModel;
 
 /// A setting outside its allowed range.
@@ -48,6 +50,10 @@ pub struct NoSettings {}
 pub enum EstimatorSettings {
     /// No estimate: the latency floor.
     Echo(NoSettings),
+    /// Trajectory fit over a sliding window.
+    TrajectoryNewton(TrajectoryNewtonSettings),
+    /// Kalman filter [v, a, b, c] with jump hypotheses.
+    TrajectoryKalman(TrajectoryKalmanSettings),
 }
 
 impl EstimatorSettings {
@@ -55,6 +61,12 @@ impl EstimatorSettings {
     pub fn default_of(kind: PipelineKind) -> Option<Self> {
         match kind {
             PipelineKind::Echo => Some(EstimatorSettings::Echo(NoSettings {})),
+            PipelineKind::TrajectoryNewton => {
+                Some(EstimatorSettings::TrajectoryNewton(TrajectoryNewtonSettings::default()))
+            }
+            PipelineKind::TrajectoryKalman => {
+                Some(EstimatorSettings::TrajectoryKalman(TrajectoryKalmanSettings::default()))
+            }
             _ => None,
         }
     }
@@ -63,6 +75,8 @@ impl EstimatorSettings {
     pub fn kind(&self) -> PipelineKind {
         match self {
             EstimatorSettings::Echo(_) => PipelineKind::Echo,
+            EstimatorSettings::TrajectoryNewton(_) => PipelineKind::TrajectoryNewton,
+            EstimatorSettings::TrajectoryKalman(_) => PipelineKind::TrajectoryKalman,
         }
     }
 
@@ -71,9 +85,11 @@ impl EstimatorSettings {
     /// # Errors
     ///
     /// When a setting lies outside its range.
-    pub fn build(&self, _train: &Arc<TrainModel>) -> Result<Box<dyn Estimator>, SettingError> {
+    pub fn build(&self, train: &Arc<TrainModel>) -> Result<Box<dyn Estimator>, SettingError> {
         match self {
             EstimatorSettings::Echo(_) => Ok(Box::new(Echo)),
+            EstimatorSettings::TrajectoryNewton(settings) => Ok(Box::new(settings.build(train)?)),
+            EstimatorSettings::TrajectoryKalman(settings) => Ok(Box::new(settings.build(train)?)),
         }
     }
 }
