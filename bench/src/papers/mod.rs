@@ -12,6 +12,7 @@ pub mod row;
 pub mod statistics;
 pub mod table;
 pub mod wang;
+pub mod xia;
 pub mod xie;
 
 pub use row::Row;
@@ -27,6 +28,7 @@ pub struct Source {
 /// Every paper, by year.
 pub fn sources() -> Vec<Source> {
     vec![
+        Source { name: "xia", rows: xia::rows },
         Source { name: "liu", rows: liu::rows },
         Source { name: "xie", rows: xie::rows },
         Source { name: "jin", rows: jin::rows },

@@ -16,6 +16,8 @@ use super::mass::{
 };
 use super::resistance;
 use super::resistance::settings::{KalmanSettings, LsSettings, MilsSettings, RlsSettings};
+use super::trajectory::kalman::TrajectoryKalmanSettings;
+use super::trajectory::newton_settings::TrajectoryNewtonSettings;
 use crate::train::TrainModel;
 
 /// A setting outside its allowed range.
@@ -123,6 +125,10 @@ estimator_kinds! {
     VMils(MilsSettings) = VMils, |s, t| boxed(resistance::v_mils(t, s));
     /// Robust Kalman filter of resistance beside a disturbance.
     ResistanceKalman(KalmanSettings) = ResistanceKalman, |s, t| boxed(resistance::kalman(t, s));
+    /// Trajectory fit over a sliding window.
+    TrajectoryNewton(TrajectoryNewtonSettings) = TrajectoryNewton, |s, t| boxed(s.build(t));
+    /// Kalman filter [v, a, b, c] with jump hypotheses.
+    TrajectoryKalman(TrajectoryKalmanSettings) = TrajectoryKalman, |s, t| boxed(s.build(t));
     /// Staged gradient descent for resistance and mass.
     StagedDescent(StagedDescentSettings) = StagedDescent, |s, t| boxed(StagedDescent::new(*s, t));
     /// Joint integral least squares for resistance and mass.

@@ -193,3 +193,98 @@ impl JumpBank {
         (Davis { a: mean[0], b: mean[1], c: mean[2] }, covariance)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::noise::LearnedNoise;
+    use super::super::step::resistance_gain;
+    use super::super::test_runs::{FAST, normal, random};
+    use super::*;
+
+    const NOISE_MPS: f64 = 0.05;
+
+    fn bank(capacity: usize) -> JumpBank {
+        let noise = NoiseModel {
+            speed_noise_mps: NOISE_MPS,
+            speed_noise_range_mps: (1e-3, 1.0),
+            disturbance: 1e-4,
+            disturbance_range: (0.0, 1.0),
+            memory: 1000.0,
+            learns_speed_noise: false,
+            learns_disturbance: false,
+        };
+        let std = Vector3::new(0.5, 0.01, 0.0005);
+        let first = Hypothesis::new(&FAST, &std, LearnedNoise::new(&noise));
+        let jumps = JumpModel { evidence: 16.0, std, spacing_s: 1.0 };
+        let mut bank = JumpBank::new(
+            first,
+            capacity,
+            jumps,
+            noise,
+            OutlierModel { share: 0.01, density: 0.5 },
+        );
+        bank.anchor(60.0);
+        bank
+    }
+
+    /// Follows a train whose resistance is that of FAST, times 1.3 from a time on; calls back
+    /// with the time in s after each step.
+    fn follow(bank: &mut JumpBank, steps: u32, jump_s: f64, mut each: impl FnMut(f64, &JumpBank)) {
+        let mut random = random(6);
+        let mut speed_mps = 60.0;
+        for index in 0..steps {
+            let time_s = f64::from(index);
+            let factor = if time_s >= jump_s { 1.3 } else { 1.0 };
+            let truth = Davis { a: factor * FAST.a, b: factor * FAST.b, c: factor * FAST.c };
+            let drive_mps2 = 0.07 + 0.06 * (0.02 * time_s).sin();
+            let step = Step { size: 1.0, drive_mps2, resistance_gain: resistance_gain(0.06) };
+            speed_mps = StepRule::Time.advance(&step, &truth, speed_mps).unwrap().speed_mps;
+            let measured_mps = speed_mps + NOISE_MPS * normal(&mut random);
+            assert!(bank.advance(StepRule::Time, &step, 1.0, measured_mps).is_some());
+            each(time_s + 1.0, bank);
+        }
+    }
+
+    #[test]
+    fn a_jump_is_found_within_seconds_and_dated() {
+        let mut bank = bank(8);
+        let mut found_s = None;
+        follow(&mut bank, 700, 400.0, |time_s, bank| {
+            let since_s = time_s - bank.likeliest().age_s;
+            if found_s.is_none() && time_s > 400.0 && (since_s - 400.0).abs() < 10.0 {
+                found_s = Some(time_s);
+            }
+            assert!(bank.hypotheses().len() <= 8);
+        });
+        let found_s = found_s.expect("the jump is found");
+        assert!(found_s < 425.0, "{found_s}");
+        let (davis, covariance) = bank.davis();
+        let powers = Vector3::new(1.0, 62.0, 62.0 * 62.0);
+        let std = powers.dot(&(covariance * powers)).sqrt();
+        let error = davis.w0_n_per_kn(62.0) - 1.3 * FAST.w0_n_per_kn(62.0);
+        assert!(error.abs() < 3.0 * std && std < 0.1, "{error} ± {std}");
+    }
+
+    #[test]
+    fn without_a_jump_the_first_hypothesis_stays_the_likeliest() {
+        let mut bank = bank(8);
+        follow(&mut bank, 700, f64::INFINITY, |time_s, bank| {
+            assert_eq!(bank.likeliest().age_s, time_s);
+        });
+    }
+
+    #[test]
+    fn a_bank_of_one_looks_for_no_jumps() {
+        let mut bank = bank(1);
+        follow(&mut bank, 450, 400.0, |_, bank| assert_eq!(bank.hypotheses().len(), 1));
+        let error = bank.davis().0.w0_n_per_kn(60.0) - 1.3 * FAST.w0_n_per_kn(60.0);
+        assert!(error < -0.5, "one filter is late: {error}");
+    }
+
+    #[test]
+    fn a_bank_without_a_sound_hypothesis_says_so() {
+        let mut bank = bank(4);
+        let step = Step { size: 1.0, drive_mps2: 0.0, resistance_gain: 0.009 };
+        assert_eq!(bank.advance(StepRule::Time, &step, f64::NAN, 60.0), None);
+    }
+}

@@ -39,11 +39,7 @@ impl TrajectoryData {
                 self.speeds_mps.push(sample.speed_mps);
             }
             Motion::Continue(motion) => {
-                self.steps.push(Step {
-                    size: motion.duration_s,
-                    drive_mps2: motion.drive_mps2,
-                    resistance_gain: motion.resistance_gain,
-                });
+                self.steps.push(Step::from(&motion));
                 self.speeds_mps.push(sample.speed_mps);
             }
             Motion::Standstill => self.end_stretch(),

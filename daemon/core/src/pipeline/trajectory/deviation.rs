@@ -95,18 +95,11 @@ mod tests {
     }
 
     fn moved(davis: &Davis, parameter: usize, by: f64) -> Davis {
-        let mut moved = *davis;
-        [&mut moved.a, &mut moved.b, &mut moved.c][parameter].add_assign_by(by);
-        moved
-    }
-
-    trait AddAssignBy {
-        fn add_assign_by(&mut self, by: f64);
-    }
-
-    impl AddAssignBy for f64 {
-        fn add_assign_by(&mut self, by: f64) {
-            *self += by;
+        let Davis { a, b, c } = *davis;
+        match parameter {
+            0 => Davis { a: a + by, b, c },
+            1 => Davis { a, b: b + by, c },
+            _ => Davis { a, b, c: c + by },
         }
     }
 
@@ -140,26 +133,38 @@ mod tests {
     }
 
     #[test]
-    fn the_printed_signs_and_terms_are_refuted() {
-        // What eq. 14 and 18 print, beside the finite difference of the same recursion.
+    fn the_printed_equations_14_and_18_are_refuted() {
         let (steps, speeds) = example();
-        let at = |x: f64| moved(&TRUTH, 1, x);
-        let simulate = |davis: Davis| {
-            let mut speed = speeds[0];
-            for step in &steps {
-                speed = StepRule::Distance.advance(step, &davis, speed).unwrap().speed_mps;
-            }
-            speed
+        let end = |davis: Davis| {
+            steps.iter().fold(speeds[0], |speed, step| {
+                StepRule::Distance.advance(step, &davis, speed).unwrap().speed_mps
+            })
         };
-        let true_slope = difference(|x| simulate(at(x)), 1e-5);
-        let (mut speed, mut by_a, mut by_b_printed) = (speeds[0], 0.0, 0.0);
+        let by_b = difference(|x| end(moved(&TRUTH, 1, x)), 1e-5);
+        let second = |width: f64| {
+            let at = |x: f64| end(moved(&TRUTH, 0, x));
+            (at(width) - 2.0 * at(0.0) + at(-width)) / (width * width)
+        };
+        let by_a_twice = second(1e-2);
+        let mut speed = speeds[0];
+        let (mut by_a, mut by_b_printed) = (0.0, 0.0);
+        let (mut twice, mut twice_printed) = (0.0, 0.0);
         for step in &steps {
             let advance = StepRule::Distance.advance(step, &TRUTH, speed).unwrap();
+            let u = 1.0 / advance.speed_mps;
+            let q = (1.0 - 2.0 * step.resistance_gain * step.size * TRUTH.c) * u;
             by_b_printed = advance.by_speed * by_a + advance.by_davis[1];
-            by_a = advance.by_speed * by_a + advance.by_davis[0];
-            speed = advance.speed_mps;
+            let next_by_a = advance.by_speed * by_a + advance.by_davis[0];
+            let rest = -u * next_by_a * next_by_a;
+            twice = advance.by_speed * twice + q * by_a * by_a + rest;
+            twice_printed = advance.by_speed * twice_printed - q * by_a * by_a + rest;
+            (by_a, speed) = (next_by_a, advance.speed_mps);
         }
-        assert!((by_b_printed / true_slope - 1.0).abs() > 0.9);
+        // Equation 14 with the derivative with respect to a in it.
+        assert!((by_b_printed / by_b - 1.0).abs() > 0.9, "{by_b_printed} {by_b}");
+        // Equation 18 with + q, and with the printed - q.
+        assert!((twice / by_a_twice - 1.0).abs() < 1e-4, "{twice} {by_a_twice}");
+        assert!((twice_printed / by_a_twice - 1.0).abs() > 5.0, "{twice_printed} {by_a_twice}");
     }
 
     #[test]

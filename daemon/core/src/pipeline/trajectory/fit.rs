@@ -8,9 +8,10 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::integral_start::integral_start;
-use super::residuals::{InitialSpeeds, Pass, Residuals, Weighting};
+use super::residuals::InitialSpeeds;
+use super::search::Search;
 use super::step::{Step, StepRule};
-use crate::filter::levenberg_marquardt::{ParameterBox, Solution, SolverSettings, Stop, minimise};
+use crate::filter::levenberg_marquardt::{ParameterBox, Stop};
 use crate::filter::triangular::TriangularSystem;
 use crate::train::Davis;
 
@@ -68,6 +69,9 @@ pub struct FitSettings {
     pub disturbance: Disturbance,
     /// Residuals beyond so many standard deviations count linearly; infinity for never.
     pub outlier_threshold: f64,
+    /// Decrease of the cost, half the sum of squared standard deviations, that is worth another
+    /// iteration: ε leaves the coefficients within √(2 ε) standard deviations.
+    pub decrease_tolerance: f64,
 }
 
 impl FitSettings {
@@ -81,7 +85,26 @@ impl FitSettings {
             speed_noise_mps: None,
             disturbance: Disturbance::None,
             outlier_threshold: 4.0,
+            decrease_tolerance: 1e-8,
         }
+    }
+
+    fn check(&self) -> Result<(), FitError> {
+        let require = |is_allowed: bool, key, value, allowed| match is_allowed {
+            true => Ok(()),
+            false => Err(FitError::BadSetting { key, value, allowed }),
+        };
+        let noise_mps = self.speed_noise_mps.unwrap_or(1.0);
+        let is_allowed = noise_mps > 0.0 && noise_mps.is_finite();
+        require(is_allowed, "speed_noise_mps", noise_mps, "a finite number above 0")?;
+        let ratio = match self.disturbance {
+            Disturbance::Ratio(ratio) => ratio,
+            Disturbance::None | Disturbance::Estimated => 0.0,
+        };
+        let is_allowed = ratio >= 0.0 && ratio.is_finite();
+        require(is_allowed, "disturbance ratio", ratio, "a finite number, 0 or above")?;
+        let threshold = self.outlier_threshold;
+        require(threshold > 0.0, "outlier_threshold", threshold, "above 0")
     }
 }
 
@@ -104,6 +127,16 @@ pub enum FitError {
         /// Number of the stretch, from 0.
         stretch: usize,
     },
+    /// A setting is out of its range.
+    #[error("{key} = {value}: expected {allowed}")]
+    BadSetting {
+        /// The setting's name.
+        key: &'static str,
+        /// Its value.
+        value: f64,
+        /// The allowed range, in words.
+        allowed: &'static str,
+    },
     /// Fewer samples than parameters.
     #[error("expected at least {need} speeds, got {got}")]
     TooFewSamples {
@@ -122,8 +155,10 @@ pub enum FitError {
 pub struct TrajectoryFit {
     /// The coefficients.
     pub davis: Davis,
-    /// Their covariance, for residuals as the noise model has them.
+    /// Their covariance, widened where the residuals are correlated over tens of seconds.
     pub covariance: Matrix3<f64>,
+    /// Factor by which it was widened, see [`super::long_run`].
+    pub inflation: f64,
     /// Their covariance by the scatter between stretches, which also holds when residuals are
     /// correlated within a stretch (Liang, Zeger 1986); from 4 stretches on, good from 20 on.
     pub cluster_covariance: Option<Matrix3<f64>>,
@@ -133,8 +168,14 @@ pub struct TrajectoryFit {
     pub residual_std_mps: f64,
     /// Density of the disturbing acceleration over the variance of the measured speed, in 1/s.
     pub disturbance_ratio: f64,
+    /// Logarithm of the likelihood, up to a constant of the data; to compare models by.
+    pub log_likelihood: f64,
     /// Root of the mean squared residual in m/s; with exact forces that of the trajectory.
     pub rmse_mps: f64,
+    /// Fitted speed in m/s at the end of the last stretch.
+    pub end_speed_mps: f64,
+    /// Variance of the disturbance in it, over that of the measured speed.
+    pub end_variance: f64,
     /// Speeds behind the fit.
     pub samples: usize,
     /// Residuals beyond the outlier threshold.
@@ -157,22 +198,14 @@ impl TrajectoryFit {
     }
 }
 
-/// The least speed noise in m/s that residuals are divided by; below it the round-off of a long
-/// trajectory would count as a residual.
-const SPEED_NOISE_MIN_MPS: f64 = 1e-8;
 /// Typical sizes of a, b and c.
-const SCALES: [f64; 3] = [1.0, 0.02, 0.001];
-const NOISE_ROUNDS_MAX: u32 = 8;
-/// Decrease of the cost worth a step: 1e-4 standard deviations for the answer, 0.02 for the
-/// comparison of disturbance ratios.
-const FINE_DECREASE: f64 = 1e-8;
-const ROUGH_DECREASE: f64 = 2e-4;
+pub(super) const SCALES: [f64; 3] = [1.0, 0.02, 0.001];
 
 /// Fits trajectories; keeps its buffers between fits.
 #[derive(Clone, Debug, Default)]
 pub struct TrajectoryFitter {
-    initial: InitialSpeeds,
-    residuals: Vec<f64>,
+    pub(super) initial: InitialSpeeds,
+    pub(super) residuals: Vec<f64>,
 }
 
 impl TrajectoryFitter {
@@ -205,6 +238,7 @@ impl TrajectoryFitter {
         start: Option<&Davis>,
         settings: &FitSettings,
     ) -> Result<TrajectoryFit, FitError> {
+        settings.check()?;
         check(stretches)?;
         let prior = settings.prior.map(|prior| prior.rows());
         let mut point = match start {
@@ -227,190 +261,15 @@ impl TrajectoryFitter {
             }
         };
         self.initial.reset(stretches.iter().map(|stretch| stretch.speeds_mps[0]));
-        let mut search = Search {
-            stretches,
-            settings,
-            prior,
-            fitter: self,
-            decrease_tolerance: ROUGH_DECREASE,
-            iterations: 0,
-        };
+        let mut search = Search::new(stretches, settings, prior, self);
         let ratio = match settings.disturbance {
             Disturbance::None => 0.0,
             Disturbance::Ratio(ratio) => ratio,
             Disturbance::Estimated => search.likeliest_ratio(&mut point)?,
         };
-        search.decrease_tolerance = FINE_DECREASE;
+        search.decrease_tolerance = settings.decrease_tolerance;
         let fitted = search.at_ratio(&point, ratio)?;
         search.describe(&fitted, ratio)
-    }
-}
-
-/// The least-squares solution for one disturbance ratio.
-struct Fitted {
-    solution: Solution<3>,
-    pass: Pass,
-    /// Noise that the residuals were divided by.
-    used_noise_mps: f64,
-    /// Noise as given or, if it is to be estimated, as the residuals show it.
-    noise_mps: f64,
-    /// Noise that the residuals show.
-    shown_mps: f64,
-    log_likelihood: f64,
-}
-
-struct Search<'a, 'b> {
-    stretches: &'a [Stretch<'a>],
-    settings: &'a FitSettings,
-    prior: Option<TriangularSystem<3>>,
-    fitter: &'b mut TrajectoryFitter,
-    decrease_tolerance: f64,
-    iterations: u32,
-}
-
-impl Search<'_, '_> {
-    /// Fits for one disturbance ratio; repeats until the noise that weighs the residuals is
-    /// the noise that they show.
-    fn at_ratio(&mut self, start: &Vector3<f64>, ratio: f64) -> Result<Fitted, FitError> {
-        let mut point = *start;
-        let mut noise_mps = match self.settings.speed_noise_mps {
-            Some(known_mps) => known_mps,
-            None => self.median_noise_mps(&point, ratio)?,
-        };
-        let mut rounds = 0;
-        loop {
-            noise_mps = noise_mps.max(SPEED_NOISE_MIN_MPS);
-            rounds += 1;
-            let fitted = self.minimise(&point, ratio, noise_mps)?;
-            let is_settled = (fitted.noise_mps / noise_mps - 1.0).abs() < 0.01
-                || (fitted.noise_mps < SPEED_NOISE_MIN_MPS && noise_mps <= SPEED_NOISE_MIN_MPS);
-            let is_known = self.settings.speed_noise_mps.is_some();
-            if is_known || is_settled || rounds == NOISE_ROUNDS_MAX {
-                return Ok(fitted);
-            }
-            (point, noise_mps) = (fitted.solution.point, fitted.noise_mps);
-        }
-    }
-
-    fn minimise(
-        &mut self,
-        point: &Vector3<f64>,
-        ratio: f64,
-        noise_mps: f64,
-    ) -> Result<Fitted, FitError> {
-        let settings = self.settings;
-        let weighting = Weighting {
-            speed_noise_mps: noise_mps,
-            disturbance_ratio: ratio,
-            outlier_threshold: settings.outlier_threshold,
-        };
-        let start = settings.bounds.clamp(point);
-        let mut residuals = Residuals::new(
-            self.stretches,
-            settings.rule,
-            weighting,
-            self.prior,
-            &mut self.fitter.initial,
-            start,
-        );
-        let solver = SolverSettings {
-            scales: Vector3::from(SCALES),
-            iterations_max: 60,
-            decrease_tolerance: self.decrease_tolerance,
-            relative_tolerance: 1e-14,
-        };
-        let solution = minimise(&mut residuals, &start, &settings.bounds, &solver)
-            .ok_or(FitError::NotFinite { stretch: 0 })?;
-        let pass = *residuals.pass();
-        self.iterations += solution.iterations;
-        let free = pass.count.saturating_sub(3 + self.stretches.len()).max(1) as f64;
-        let shown_mps = noise_mps * (pass.clipped_square / free).sqrt();
-        let count = pass.count as f64;
-        let log_likelihood =
-            -(solution.linearisation.cost + count * noise_mps.ln() + 0.5 * pass.log_variance);
-        Ok(Fitted {
-            solution,
-            pass,
-            used_noise_mps: noise_mps,
-            noise_mps: settings.speed_noise_mps.unwrap_or(shown_mps),
-            shown_mps,
-            log_likelihood,
-        })
-    }
-
-    /// Noise by the median absolute residual, which half the residuals cannot spoil.
-    fn median_noise_mps(&mut self, point: &Vector3<f64>, ratio: f64) -> Result<f64, FitError> {
-        use crate::filter::levenberg_marquardt::LeastSquares;
-        let weighting = Weighting {
-            speed_noise_mps: 1.0,
-            disturbance_ratio: ratio,
-            outlier_threshold: f64::INFINITY,
-        };
-        let start = self.settings.bounds.clamp(point);
-        let TrajectoryFitter { initial, residuals: record } = &mut *self.fitter;
-        let mut residuals =
-            Residuals::new(self.stretches, self.settings.rule, weighting, None, initial, start)
-                .recording(record);
-        residuals.linearise(&start).ok_or(FitError::NotFinite { stretch: 0 })?;
-        record.iter_mut().for_each(|residual| *residual = residual.abs());
-        let middle = record.len() / 2;
-        let (_, median, _) = record.select_nth_unstable_by(middle, f64::total_cmp);
-        // Median of the absolute value of a standard normal variable.
-        Ok(*median / 0.6745)
-    }
-
-    /// The disturbance ratio of greatest likelihood: by decades, then by golden section.
-    fn likeliest_ratio(&mut self, point: &mut Vector3<f64>) -> Result<f64, FitError> {
-        let mut best = (f64::NEG_INFINITY, 0.0_f64);
-        // Downwards, since much disturbance binds the trajectory to the measured speeds.
-        for exponent in (-7..=2).rev().map(f64::from) {
-            let fitted = self.at_ratio(point, 10f64.powf(exponent))?;
-            *point = fitted.solution.point;
-            if fitted.log_likelihood > best.0 {
-                best = (fitted.log_likelihood, exponent);
-            }
-        }
-        let (mut low, mut high) = (best.1 - 1.0, best.1 + 1.0);
-        let share = 0.5 * (5f64.sqrt() - 1.0);
-        while high - low > 0.1 {
-            let (left, right) = (high - share * (high - low), low + share * (high - low));
-            let at_left = self.at_ratio(point, 10f64.powf(left))?;
-            let at_right = self.at_ratio(point, 10f64.powf(right))?;
-            *point = at_left.solution.point;
-            if at_left.log_likelihood > at_right.log_likelihood { high = right } else { low = left }
-        }
-        let ratio = 10f64.powf(0.5 * (low + high));
-        let (with, without) = (self.at_ratio(point, ratio)?, self.at_ratio(point, 0.0)?);
-        // Half a unit of likelihood is what the free ratio gains by chance (Akaike 1974: 1).
-        Ok(if with.log_likelihood > without.log_likelihood + 0.5 { ratio } else { 0.0 })
-    }
-
-    fn describe(&self, fitted: &Fitted, ratio: f64) -> Result<TrajectoryFit, FitError> {
-        let Fitted { solution, pass, .. } = fitted;
-        let shown_over_used = fitted.noise_mps / fitted.used_noise_mps;
-        let raw = solution.linearisation.system.covariance().ok_or(FitError::NotDetermined)?;
-        let stretches = self.stretches.len() as f64;
-        let cluster_covariance = (self.stretches.len() >= 4)
-            .then(|| raw * pass.score_square * raw * (stretches / (stretches - 1.0)));
-        let point = solution.point;
-        let bounds = &self.settings.bounds;
-        Ok(TrajectoryFit {
-            davis: Davis { a: point[0], b: point[1], c: point[2] },
-            covariance: raw * (shown_over_used * shown_over_used),
-            cluster_covariance,
-            speed_noise_mps: fitted.noise_mps,
-            residual_std_mps: fitted.shown_mps,
-            disturbance_ratio: ratio,
-            rmse_mps: (pass.square_mps2 / pass.count as f64).sqrt(),
-            samples: pass.count,
-            outliers: pass.outliers,
-            stalls: pass.stalls,
-            iterations: self.iterations,
-            stop: solution.stop,
-            at_bound: std::array::from_fn(|i| {
-                point[i] == bounds.low[i] || point[i] == bounds.high[i]
-            }),
-        })
     }
 }
 
@@ -436,4 +295,178 @@ fn check(stretches: &[Stretch<'_>]) -> Result<(), FitError> {
     }
     let need = stretches.len() + 3;
     if samples < need { Err(FitError::TooFewSamples { need, got: samples }) } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::RngExt;
+
+    use super::super::step::StepRule;
+    use super::super::test_runs::{FAST, normal, random, speeds, steps};
+    use super::*;
+
+    fn fit(steps: &[Step], speeds_mps: &[f64], settings: &FitSettings) -> TrajectoryFit {
+        let stretches = [Stretch { steps, speeds_mps }];
+        TrajectoryFitter::default().fit(&stretches, None, settings).unwrap()
+    }
+
+    fn free(rule: StepRule) -> FitSettings {
+        let bounds = ParameterBox { low: Vector3::repeat(-1e3), high: Vector3::repeat(1e3) };
+        FitSettings { bounds, ..FitSettings::new(rule) }
+    }
+
+    #[test]
+    fn without_noise_both_rules_give_the_coefficients_up_to_round_off() {
+        for rule in [StepRule::Distance, StepRule::Time] {
+            let steps = steps(rule, 400);
+            let speeds = speeds(rule, &steps, &FAST, 12.0);
+            let fit = fit(&steps, &speeds, &FitSettings::new(rule));
+            assert!((fit.davis.a - FAST.a).abs() < 1e-9, "{rule:?}: {:e}", fit.davis.a - FAST.a);
+            assert!((fit.davis.c - FAST.c).abs() < 1e-12);
+            assert_eq!((fit.stalls, fit.at_bound), (0, [false; 3]));
+        }
+    }
+
+    #[test]
+    fn every_random_start_ends_at_the_same_coefficients() {
+        let steps = steps(StepRule::Distance, 300);
+        let speeds = speeds(StepRule::Distance, &steps, &FAST, 12.0);
+        let stretches = [Stretch { steps: &steps, speeds_mps: &speeds }];
+        let settings = FitSettings::new(StepRule::Distance);
+        let mut random = random(5);
+        for _ in 0..50 {
+            let start = Davis {
+                a: 3.0 * random.random::<f64>(),
+                b: 0.2 * random.random::<f64>(),
+                c: 0.01 * random.random::<f64>(),
+            };
+            let fit = TrajectoryFitter::default().fit(&stretches, Some(&start), &settings).unwrap();
+            assert!((fit.davis.a - FAST.a).abs() < 1e-8, "{start:?}: {fit:?}");
+        }
+    }
+
+    #[test]
+    fn intervals_hold_with_and_without_disturbance() {
+        for (disturbance, noise_mps) in [(0.0, 0.2), (0.01, 0.05)] {
+            let rule = StepRule::Time;
+            let steps = steps(rule, 400);
+            let mut square = 0.0;
+            let seeds = 60;
+            for seed in 0..seeds {
+                let mut random = random(seed);
+                let mut disturbed = steps.clone();
+                for step in &mut disturbed {
+                    step.drive_mps2 += disturbance * normal(&mut random) / step.size.sqrt();
+                }
+                let mut speeds = speeds(rule, &disturbed, &FAST, 12.0);
+                speeds.iter_mut().for_each(|speed| *speed += noise_mps * normal(&mut random));
+                let settings = FitSettings { disturbance: Disturbance::Estimated, ..free(rule) };
+                let fit = fit(&steps, &speeds, &settings);
+                let error =
+                    Vector3::new(fit.davis.a - FAST.a, fit.davis.b - FAST.b, fit.davis.c - FAST.c);
+                let weighed = fit.covariance.cholesky().unwrap().solve(&error);
+                square += error.dot(&weighed) / 3.0;
+                assert!((fit.speed_noise_mps / noise_mps - 1.0).abs() < 0.25);
+            }
+            // 180 squares of standard normal numbers: 1 ± 0.105. The disturbance, estimated from
+            // 400 speeds, is known within a factor of 2, which lengthens the tail.
+            let mean = square / seeds as f64;
+            assert!((0.7..1.4).contains(&mean), "disturbance {disturbance}: {mean}");
+        }
+    }
+
+    #[test]
+    fn the_likelihood_falls_as_the_covariance_says() {
+        let rule = StepRule::Distance;
+        let steps = steps(rule, 300);
+        let mut random = random(9);
+        let mut speeds = speeds(rule, &steps, &FAST, 12.0);
+        speeds.iter_mut().for_each(|speed| *speed += 0.1 * normal(&mut random));
+        for disturbance in [Disturbance::None, Disturbance::Ratio(1e-3)] {
+            let settings = FitSettings {
+                speed_noise_mps: Some(0.1),
+                disturbance,
+                outlier_threshold: f64::INFINITY,
+                ..free(rule)
+            };
+            let best = fit(&steps, &speeds, &settings);
+            let precision = (best.covariance / best.inflation).try_inverse().unwrap();
+            for direction in [Vector3::new(0.1, 0.0, 0.0), Vector3::new(0.02, -1e-3, 1e-5)] {
+                let Davis { a, b, c } = best.davis;
+                let point = Vector3::new(a, b, c) + direction;
+                let bounds = ParameterBox { low: point, high: point };
+                let held = fit(&steps, &speeds, &FitSettings { bounds, ..settings });
+                let fall = best.log_likelihood - held.log_likelihood;
+                let expected = 0.5 * direction.dot(&(precision * direction));
+                assert!((fall / expected - 1.0).abs() < 0.02, "{fall} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_few_wild_speeds_hardly_move_the_fit() {
+        let rule = StepRule::Distance;
+        let steps = steps(rule, 400);
+        let mut random = random(2);
+        let mut speeds = speeds(rule, &steps, &FAST, 12.0);
+        speeds.iter_mut().for_each(|speed| *speed += 0.1 * normal(&mut random));
+        let clean = fit(&steps, &speeds, &free(rule));
+        for index in [40, 41, 120, 200, 333] {
+            speeds[index] += 3.0;
+        }
+        let spoilt = fit(&steps, &speeds, &free(rule));
+        assert_eq!(spoilt.outliers, 5);
+        for speed_mps in [20.0, 50.0, 75.0] {
+            let apart = spoilt.davis.w0_n_per_kn(speed_mps) - clean.davis.w0_n_per_kn(speed_mps);
+            assert!(apart.abs() < clean.w0_std_n_per_kn(speed_mps), "{speed_mps}: {apart}");
+        }
+    }
+
+    #[test]
+    fn a_prior_binds_what_the_data_leave_open() {
+        // Ten steps of cruise at one speed tell w0 there and nothing else.
+        let gain = super::super::step::resistance_gain(0.06);
+        let drive_mps2 = gain * FAST.w0_n_per_kn(80.0);
+        let steps = vec![Step { size: 1.0, drive_mps2, resistance_gain: gain }; 10];
+        let speeds = vec![80.0; 11];
+        let expected = Davis { a: 1.0, b: 0.02, c: 0.0014 };
+        let std = Vector3::new(0.5, 0.01, 0.0005);
+        let settings = FitSettings {
+            prior: Some(DavisPrior { davis: expected, std }),
+            speed_noise_mps: Some(1e-3),
+            ..FitSettings::new(StepRule::Time)
+        };
+        let fit = fit(&steps, &speeds, &settings);
+        assert!((fit.davis.w0_n_per_kn(80.0) - FAST.w0_n_per_kn(80.0)).abs() < 0.01);
+        assert!((fit.davis.a - expected.a).abs() < 0.05);
+        assert!(fit.covariance[(0, 0)].sqrt() > 0.4);
+        assert!(fit.w0_std_n_per_kn(80.0) < 0.05);
+    }
+
+    #[test]
+    fn bad_input_is_refused_with_what_is_wrong() {
+        let steps = steps(StepRule::Distance, 20);
+        let speeds = speeds(StepRule::Distance, &steps, &FAST, 40.0);
+        let settings = FitSettings::new(StepRule::Distance);
+        let error = |steps: &[Step], speeds_mps: &[f64], settings: &FitSettings| {
+            let stretches = [Stretch { steps, speeds_mps }];
+            TrajectoryFitter::default().fit(&stretches, None, settings).unwrap_err()
+        };
+        let mut holed = speeds.clone();
+        holed[7] = f64::NAN;
+        let mut backwards = steps.clone();
+        backwards[3].size = -100.0;
+        assert!(matches!(
+            error(&steps, &speeds[1..], &settings),
+            FitError::LengthMismatch { stretch: 0, steps: 20, speeds: 20 }
+        ));
+        assert_eq!(error(&steps, &holed, &settings), FitError::NotFinite { stretch: 0 });
+        assert_eq!(error(&backwards, &speeds, &settings), FitError::NotFinite { stretch: 0 });
+        assert_eq!(
+            error(&steps[..2], &speeds[..3], &settings),
+            FitError::TooFewSamples { need: 4, got: 3 }
+        );
+        let bad = FitSettings { disturbance: Disturbance::Ratio(f64::NAN), ..settings };
+        assert!(matches!(error(&steps, &speeds, &bad), FitError::BadSetting { .. }));
+    }
 }

@@ -192,3 +192,145 @@ impl Hypothesis {
             && self.factor.is_sound()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::fit::{DavisPrior, Disturbance, FitSettings, Stretch, TrajectoryFitter};
+    use super::super::test_runs::{FAST, normal, random, speeds, steps};
+    use super::*;
+    use crate::filter::levenberg_marquardt::ParameterBox;
+
+    const NOISE_MPS: f64 = 0.1;
+
+    /// R and q as given, and kept.
+    fn noise(disturbance: f64) -> NoiseModel {
+        NoiseModel {
+            speed_noise_mps: NOISE_MPS,
+            speed_noise_range_mps: (1e-3, 1.0),
+            disturbance,
+            disturbance_range: (0.0, 1.0),
+            memory: 1000.0,
+            learns_speed_noise: false,
+            learns_disturbance: false,
+        }
+    }
+
+    fn outliers() -> OutlierModel {
+        OutlierModel { share: 1e-6, density: 0.5 }
+    }
+
+    fn prior_std() -> Vector3<f64> {
+        Vector3::new(0.3, 0.01, 0.0004)
+    }
+
+    fn first(model: &NoiseModel) -> Hypothesis {
+        Hypothesis::new(&FAST, &prior_std(), LearnedNoise::new(model))
+    }
+
+    #[test]
+    fn the_filter_ends_where_its_batch_twin_does() {
+        for (rule, disturbance) in [(StepRule::Distance, 0.0), (StepRule::Time, 0.01)] {
+            let steps = steps(rule, 400);
+            let truth = Davis { a: 1.0, b: 0.02, c: 0.0015 };
+            let mut random = random(8);
+            let mut speeds = speeds(rule, &steps, &truth, 30.0);
+            speeds.iter_mut().for_each(|speed| *speed += NOISE_MPS * normal(&mut random));
+            let model = noise(disturbance);
+            let mut filter = first(&model);
+            filter.anchor(speeds[0]);
+            for (step, &speed_mps) in steps.iter().zip(&speeds[1..]) {
+                let duration_s = match rule {
+                    StepRule::Time => step.size,
+                    StepRule::Distance => step.size / filter.state[SPEED],
+                };
+                filter.predict(rule, step, duration_s);
+                assert!(filter.measure(speed_mps, &model, &outliers()).is_used);
+            }
+            let ratio = (disturbance / NOISE_MPS).powi(2);
+            let settings = FitSettings {
+                prior: Some(DavisPrior { davis: FAST, std: prior_std() }),
+                bounds: ParameterBox { low: Vector3::repeat(-9.0), high: Vector3::repeat(9.0) },
+                speed_noise_mps: Some(NOISE_MPS),
+                disturbance: Disturbance::Ratio(ratio),
+                outlier_threshold: f64::INFINITY,
+                ..FitSettings::new(rule)
+            };
+            let stretches = [Stretch { steps: &steps, speeds_mps: &speeds }];
+            let batch = TrajectoryFitter::default().fit(&stretches, None, &settings).unwrap();
+            let covariance = batch.covariance / batch.inflation;
+            for speed_mps in [20.0, 50.0, 75.0] {
+                let powers = Vector3::new(1.0, speed_mps, speed_mps * speed_mps);
+                let std = |covariance: &Matrix3<f64>| (powers.dot(&(covariance * powers))).sqrt();
+                let apart =
+                    filter.davis().w0_n_per_kn(speed_mps) - batch.davis.w0_n_per_kn(speed_mps);
+                let batch_std = std(&covariance);
+                assert!(apart.abs() < 0.1 * batch_std, "{rule:?} {speed_mps}: {apart:e}");
+                let ratio = std(&filter.davis_covariance()) / batch_std;
+                assert!((0.95..1.05).contains(&ratio), "{rule:?} {speed_mps}: {ratio}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_prediction_moves_the_covariance_by_the_jacobian() {
+        let model = noise(0.02);
+        let mut filter = first(&model);
+        filter.anchor(40.0);
+        let step = steps(StepRule::Time, 8)[2];
+        for _ in 0..3 {
+            let before = filter.factor.covariance();
+            let speed_mps = filter.state[SPEED];
+            let advance = StepRule::Time.advance(&step, &filter.davis(), speed_mps).unwrap();
+            let mut jacobian = nalgebra::Matrix4::identity();
+            for column in [A, B, C] {
+                jacobian[(SPEED, column)] = advance.by_davis[column];
+            }
+            jacobian[(SPEED, SPEED)] = advance.by_speed;
+            let mut expected = jacobian * before * jacobian.transpose();
+            expected[(SPEED, SPEED)] += 0.02 * 0.02 * 2.5;
+            filter.predict(StepRule::Time, &step, 2.5);
+            assert!((filter.factor.covariance() - expected).norm() < 1e-12 * expected.norm());
+        }
+    }
+
+    #[test]
+    fn a_wild_speed_is_left_out_and_a_lasting_one_believed() {
+        let model = noise(0.0);
+        let mut filter = first(&model);
+        filter.anchor(40.0);
+        let gain = super::super::step::resistance_gain(0.06);
+        let drive_mps2 = gain * FAST.w0_n_per_kn(40.0);
+        let hold = Step { size: 0.2, drive_mps2, resistance_gain: gain };
+        for round in 0..60 {
+            filter.predict(StepRule::Time, &hold, 0.2);
+            let speed_mps = if round == 30 { 43.0 } else { 40.0 };
+            let innovation = filter.measure(speed_mps, &model, &outliers());
+            assert_eq!(innovation.is_used, round != 30);
+        }
+        assert!((filter.state[SPEED] - 40.0).abs() < 0.05);
+        let davis = filter.davis();
+        for _ in 0..20 {
+            filter.predict(StepRule::Time, &hold, 0.2);
+            filter.measure(45.0, &model, &outliers());
+        }
+        assert!((filter.state[SPEED] - 45.0).abs() < 0.05);
+        // A jump of the speed says nothing of the resistance.
+        let apart = filter.davis().w0_n_per_kn(40.0) - davis.w0_n_per_kn(40.0);
+        assert!(apart.abs() < 0.01, "{apart}");
+    }
+
+    #[test]
+    fn united_hypotheses_keep_mean_spread_and_weight() {
+        let model = noise(0.0);
+        let mut one = first(&model);
+        let mut other = first(&model);
+        other.state[A] += 1.0;
+        one.log_weight = 0.25_f64.ln();
+        other.log_weight = 0.75_f64.ln();
+        let united = one.united(&other);
+        assert!((united.state[A] - (FAST.a + 0.75)).abs() < 1e-12);
+        let variance = united.davis_covariance()[(A, A)];
+        assert!((variance - (0.09 + 0.75 * 0.25)).abs() < 1e-12);
+        assert!(united.log_weight.abs() < 1e-12);
+    }
+}

@@ -106,3 +106,48 @@ fn integrated_rows(
     }
     rows
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_runs::{FAST, normal, random, speeds, steps};
+    use super::*;
+    use crate::train::Davis;
+
+    fn start(stretches: &[Stretch<'_>], rule: StepRule) -> Vector3<f64> {
+        let bounds = ParameterBox { low: Vector3::repeat(-10.0), high: Vector3::repeat(10.0) };
+        let scales = Vector3::new(1.0, 0.02, 0.001);
+        integral_start(stretches, rule, 0.1, None, &bounds, &scales, &scales).unwrap()
+    }
+
+    #[test]
+    fn the_distance_rule_is_solved_exactly_without_noise() {
+        let steps = steps(StepRule::Distance, 300);
+        let speeds = speeds(StepRule::Distance, &steps, &FAST, 12.0);
+        let (first, second) = speeds.split_at(150);
+        // Two stretches with an initial speed each.
+        let stretches = [
+            Stretch { steps: &steps[..149], speeds_mps: first },
+            Stretch { steps: &steps[150..], speeds_mps: second },
+        ];
+        let found = start(&stretches, StepRule::Distance);
+        assert!((found[0] - FAST.a).abs() < 1e-9);
+        assert!((found[1] - FAST.b).abs() < 1e-11);
+        assert!((found[2] - FAST.c).abs() < 1e-13);
+    }
+
+    #[test]
+    fn noise_leaves_a_start_near_the_answer() {
+        for rule in [StepRule::Distance, StepRule::Time] {
+            let steps = steps(rule, 300);
+            let mut random = random(4);
+            let mut speeds = speeds(rule, &steps, &FAST, 12.0);
+            speeds.iter_mut().for_each(|speed| *speed += 0.1 * normal(&mut random));
+            let found = start(&[Stretch { steps: &steps, speeds_mps: &speeds }], rule);
+            let davis = Davis { a: found[0], b: found[1], c: found[2] };
+            for speed_mps in [20.0, 60.0] {
+                let error = davis.w0_n_per_kn(speed_mps) - FAST.w0_n_per_kn(speed_mps);
+                assert!(error.abs() < 0.3, "{rule:?} {speed_mps}: {error}");
+            }
+        }
+    }
+}

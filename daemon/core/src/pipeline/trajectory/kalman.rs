@@ -12,7 +12,7 @@ use super::index::DAVIS;
 use super::motion::{Motion, MotionStep, MotionTracker};
 use super::noise::NoiseModel;
 use super::online::{OnlineFilter, OnlineSettings};
-use super::quality::{Estimate, SpeedRange, prior_std};
+use super::quality::{Estimate, SpeedRange, missing, prior_std};
 use super::step::{Step, StepRule, resistance_gain};
 use super::unexplained::UnexplainedForce;
 use crate::force::ResolvedSample;
@@ -57,11 +57,11 @@ impl Default for TrajectoryKalmanSettings {
 /// Lowest and highest speed noise that is learned, in m/s.
 const SPEED_NOISE_RANGE_MPS: (f64, f64) = (1e-3, 1.0);
 /// Speed noise before any data, in m/s.
-const SPEED_NOISE_FIRST_MPS: f64 = 0.03;
+const SPEED_NOISE_FIRST_MPS: f64 = 0.2;
 /// Lowest and highest disturbance that is learned, in N/kN √s.
 const DISTURBANCE_RANGE: (f64, f64) = (0.01, 10.0);
 /// Disturbance before any data, in N/kN √s.
-const DISTURBANCE_FIRST: f64 = 0.2;
+const DISTURBANCE_FIRST: f64 = 1.0;
 /// Least time in s between two hypotheses.
 const SPACING_S: f64 = 1.0;
 
@@ -122,7 +122,7 @@ pub struct TrajectoryKalman {
     unexplained: UnexplainedForce,
     speeds: SpeedRange,
     updates: u64,
-    /// Samples in a row, and in all, of which nothing could be used for a reason.
+    /// Why there is no estimate, when something else than the lack of samples is to blame.
     fault: Option<(Status, Reason)>,
 }
 
@@ -152,11 +152,7 @@ impl TrajectoryKalman {
     }
 
     fn take_step(&mut self, motion: &MotionStep, sample: &ResolvedSample) -> Outcome {
-        let step = Step {
-            size: motion.duration_s,
-            drive_mps2: motion.drive_mps2,
-            resistance_gain: motion.resistance_gain,
-        };
+        let step = Step::from(motion);
         let told = self.filter.advance(StepRule::Time, &step, motion.duration_s, sample.speed_mps);
         let Some(innovation) = told else {
             self.fault = Some((Status::Unestimated, Reason::NumericalFailure));
@@ -164,14 +160,13 @@ impl TrajectoryKalman {
             return Outcome::Used;
         };
         self.fault = None;
+        self.unexplained.push(motion, sample, &self.filter.bank().likeliest().davis());
         let Innovation { innovation_mps, deviation_mps, is_used } = innovation;
         if !is_used {
             self.innovations.break_here();
             return Outcome::Rejected(RejectionReason::Outlier);
         }
         self.innovations.push(innovation_mps / deviation_mps);
-        let likeliest = self.filter.bank().likeliest();
-        self.unexplained.push(&step, sample, &likeliest.davis(), likeliest.noise.speed_variance);
         self.speeds.push(sample.speed_mps);
         self.updates += 1;
         Outcome::Updated
@@ -194,16 +189,8 @@ impl Estimator for TrajectoryKalman {
             }
             Motion::Standstill => Outcome::Used,
             Motion::Unusable(reason) => {
-                if reason == RejectionReason::Missing {
-                    let lacks_gradient = sample.gradient_permille.is_none();
-                    self.fault = (self.updates < UPDATES_MIN).then_some((
-                        Status::Unestimated,
-                        if lacks_gradient {
-                            Reason::GradientUnknown
-                        } else {
-                            Reason::MissingQuantity
-                        },
-                    ));
+                if reason == RejectionReason::Missing && self.updates < UPDATES_MIN {
+                    self.fault = Some(missing(sample));
                 }
                 Outcome::Rejected(reason)
             }
@@ -224,7 +211,8 @@ impl Estimator for TrajectoryKalman {
             is_at_bound: false,
         };
         estimate.write(snapshot, self.fault);
-        self.unexplained.write(snapshot);
+        let speed_variance = self.filter.bank().likeliest().noise.speed_variance;
+        self.unexplained.write(snapshot, speed_variance);
         snapshot.generation = self.filter.resets();
     }
 }

@@ -8,18 +8,17 @@
 
 /// Time in s of a block.
 const BLOCK_S: f64 = 30.0;
-/// Blocks that the mean looks back over.
-const MEMORY: f64 = 60.0;
 /// Blocks before the mean counts.
 const BLOCKS_MIN: f64 = 8.0;
 /// Standard deviations by which the mean must exceed 1 to count.
-const SIGNIFICANCE: f64 = 2.6;
+const SIGNIFICANCE: f64 = 1.0;
 /// A block counts for no more than this, so that one jump does not widen the intervals for long.
 const BLOCK_SQUARE_MAX: f64 = 25.0;
 
 /// Mean square of block sums of normalised innovations.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LongRunVariance {
+    memory: f64,
     sum: f64,
     count: f64,
     time_s: f64,
@@ -28,6 +27,18 @@ pub struct LongRunVariance {
 }
 
 impl LongRunVariance {
+    /// A mean that looks back over so many blocks; infinity for all of them.
+    pub fn new(memory_blocks: f64) -> Self {
+        LongRunVariance {
+            memory: memory_blocks,
+            sum: 0.0,
+            count: 0.0,
+            time_s: 0.0,
+            mean_square: 0.0,
+            blocks: 0.0,
+        }
+    }
+
     /// Takes in a normalised innovation after a step of a given time.
     ///
     /// # Real-time
@@ -41,7 +52,7 @@ impl LongRunVariance {
             return;
         }
         let square = (self.sum * self.sum / self.count).min(BLOCK_SQUARE_MAX);
-        self.blocks = (self.blocks + 1.0).min(MEMORY);
+        self.blocks = (self.blocks + 1.0).min(self.memory);
         self.mean_square += (square - self.mean_square) / self.blocks;
         self.break_here();
     }
@@ -73,8 +84,8 @@ mod tests {
     #[test]
     fn white_innovations_widen_nothing_and_lasting_ones_do() {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
-        let mut white = LongRunVariance::default();
-        let mut lasting = LongRunVariance::default();
+        let mut white = LongRunVariance::new(60.0);
+        let mut lasting = LongRunVariance::new(60.0);
         let mut level = 0.0;
         for _ in 0..20_000 {
             let shock = normal(&mut random);
@@ -89,7 +100,7 @@ mod tests {
 
     #[test]
     fn a_gap_drops_the_open_block() {
-        let mut variance = LongRunVariance::default();
+        let mut variance = LongRunVariance::new(60.0);
         for _ in 0..100 {
             variance.push(1.0, 29.0);
             variance.break_here();

@@ -17,10 +17,18 @@ pub mod integral_start;
 pub mod kalman;
 pub mod long_run;
 pub mod motion;
+pub mod newton;
+pub mod newton_settings;
 pub mod noise;
 pub mod online;
+#[cfg(test)]
+mod pipeline_tests;
 pub mod quality;
 pub mod residuals;
+mod search;
 pub mod step;
+#[cfg(test)]
+mod test_runs;
 pub mod unexplained;
+pub mod window;
 pub mod wolfe_newton;

@@ -2,6 +2,7 @@
 
 use dynocar_shared::RejectionReason;
 
+use super::step::Step;
 use crate::force::ResolvedSample;
 
 /// A speed in m/s at and below which a train counts as standing: holding brakes, slack and
@@ -32,6 +33,17 @@ pub struct MotionStep {
     pub drive_mps2: f64,
     /// κ in m/s² per N/kN.
     pub resistance_gain: f64,
+}
+
+impl From<&MotionStep> for Step {
+    /// A step in time.
+    fn from(motion: &MotionStep) -> Step {
+        Step {
+            size: motion.duration_s,
+            drive_mps2: motion.drive_mps2,
+            resistance_gain: motion.resistance_gain,
+        }
+    }
 }
 
 /// Turns the samples of a train into steps.

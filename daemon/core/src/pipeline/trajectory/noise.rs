@@ -41,8 +41,8 @@ const NEWEST: f64 = 32.0;
 /// The newest mean square of normalised innovations below which the noise has shrunk; white
 /// noise hardly ever comes here.
 const SHRUNK_BELOW: f64 = 0.25;
-/// Information on ln R and ln q from before any data: standard deviations of 1.4.
-const PRIOR_INFORMATION: f64 = 0.5;
+/// Information on ln R and ln q from before any data: standard deviations of 3.
+const PRIOR_INFORMATION: f64 = 0.1;
 /// Largest step of ln R and ln q for one innovation.
 const STEP_MAX: f64 = 0.5;
 
@@ -183,8 +183,81 @@ impl LearnedNoise {
         self.speed_variance = variance.clamp(low * low, high * high);
         self.information = Matrix2::from_diagonal_element(PRIOR_INFORMATION);
         self.newest_square = 1.0;
-        self.anchor();
+        // The filter's variance comes from the noise before, not from this one.
+        self.by_speed = Vector2::zeros();
+        self.by_variance = Vector2::zeros();
+        self.exceeded = 0;
         self.exceeded_square = 0.0;
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::hypothesis::{Hypothesis, OutlierModel};
+    use super::super::step::{Step, StepRule, resistance_gain};
+    use super::super::test_runs::{FAST, normal, random};
+    use super::*;
+    use nalgebra::Vector3;
+
+    const OUTLIERS: OutlierModel = OutlierModel { share: 0.01, density: 0.5 };
+
+    fn model() -> NoiseModel {
+        NoiseModel {
+            speed_noise_mps: 0.03,
+            speed_noise_range_mps: (1e-3, 1.0),
+            disturbance: 2e-3,
+            disturbance_range: (1e-5, 0.1),
+            memory: 2000.0,
+            learns_speed_noise: true,
+            learns_disturbance: true,
+        }
+    }
+
+    /// Runs a filter of known coefficients over a train at 5 Hz; noise and disturbance by time.
+    fn run(samples: u32, noise_mps: impl Fn(u32) -> f64, disturbance: f64) -> Hypothesis {
+        let mut random = random(12);
+        let model = model();
+        let certain = Vector3::new(1e-6, 1e-8, 1e-10);
+        let mut filter = Hypothesis::new(&FAST, &certain, LearnedNoise::new(&model));
+        let gain = resistance_gain(0.06);
+        let drive_mps2 = gain * FAST.w0_n_per_kn(60.0);
+        let step = Step { size: 0.2, drive_mps2, resistance_gain: gain };
+        let mut speed_mps = 60.0;
+        filter.anchor(speed_mps);
+        for index in 0..samples {
+            speed_mps = StepRule::Time.advance(&step, &FAST, speed_mps).unwrap().speed_mps;
+            speed_mps += disturbance * 0.2_f64.sqrt() * normal(&mut random);
+            filter.predict(StepRule::Time, &step, 0.2);
+            let measured_mps = speed_mps + noise_mps(index) * normal(&mut random);
+            filter.measure(measured_mps, &model, &OUTLIERS);
+        }
+        filter
+    }
+
+    #[test]
+    fn both_noises_are_learned_from_the_innovations() {
+        for (noise_mps, disturbance) in [(0.02, 2e-3), (0.1, 2e-2), (0.01, 1e-2)] {
+            let noise = run(6000, |_| noise_mps, disturbance).noise;
+            let speed = noise.speed_variance.sqrt() / noise_mps;
+            assert!((0.9..1.1).contains(&speed), "noise {noise_mps}: {speed}");
+            let force = noise.disturbance_density.sqrt() / disturbance;
+            assert!((0.7..1.4).contains(&force), "disturbance {disturbance}: {force}");
+        }
+    }
+
+    #[test]
+    fn noise_that_grows_or_shrinks_tenfold_is_followed_within_seconds() {
+        let grown = run(1030, |index| if index < 1000 { 0.01 } else { 0.1 }, 1e-3).noise;
+        assert!((0.05..0.2).contains(&grown.speed_variance.sqrt()));
+        let shrunk = run(1200, |index| if index < 1000 { 0.1 } else { 0.01 }, 1e-3).noise;
+        assert!((0.005..0.02).contains(&shrunk.speed_variance.sqrt()));
+    }
+
+    #[test]
+    fn noise_stays_within_its_range() {
+        let noise = run(3000, |_| 0.0, 0.0).noise;
+        assert_eq!(noise.speed_variance, 1e-6);
+        assert!(noise.disturbance_density >= 1e-10);
     }
 }

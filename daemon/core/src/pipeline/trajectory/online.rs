@@ -27,6 +27,9 @@ pub struct OnlineSettings {
 /// Outliers: one sample in a hundred, anywhere within ±1 m/s of the prediction.
 const OUTLIERS: OutlierModel = OutlierModel { share: 0.01, density: 0.5 };
 
+/// Blocks of 30 s that the long-run variance of the innovations looks back over.
+const LONG_RUN_BLOCKS: f64 = 60.0;
+
 /// Kalman filters of [a, b, c, v] with jump hypotheses.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OnlineFilter {
@@ -42,7 +45,7 @@ impl OnlineFilter {
         OnlineFilter {
             settings,
             bank: Self::first_bank(&settings),
-            long_run: LongRunVariance::default(),
+            long_run: LongRunVariance::new(LONG_RUN_BLOCKS),
             resets: 0,
         }
     }

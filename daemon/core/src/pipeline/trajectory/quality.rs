@@ -8,6 +8,7 @@ use dynocar_shared::{Manoeuvre, ParameterSnapshot, Reason, Status};
 use nalgebra::{Matrix3, Vector3};
 
 use super::index::{A, B, C};
+use crate::force::ResolvedSample;
 use crate::pipeline::InnovationMonitor;
 use crate::pipeline::output::{write_innovations, write_status};
 use crate::train::{Davis, TrainModel};
@@ -36,6 +37,13 @@ pub fn prior_std(train: &TrainModel, relative: f64) -> Vector3<f64> {
         relative * davis.b.max(typical / speed_mps),
         relative * davis.c.max(typical / (speed_mps * speed_mps)),
     )
+}
+
+/// Status and reason while samples lack a force.
+pub fn missing(sample: &ResolvedSample) -> (Status, Reason) {
+    let is_gradient = sample.gradient_permille.is_none();
+    let reason = if is_gradient { Reason::GradientUnknown } else { Reason::MissingQuantity };
+    (Status::Unestimated, reason)
 }
 
 /// An estimate with what is needed to judge it.

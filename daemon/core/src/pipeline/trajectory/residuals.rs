@@ -12,6 +12,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::fit::Stretch;
+use super::long_run::LongRunVariance;
 use super::step::{Step, StepRule};
 use crate::filter::levenberg_marquardt::{LeastSquares, Linearisation};
 use crate::filter::triangular::{TriangularAccumulator, TriangularSystem};
@@ -68,7 +69,7 @@ impl InitialSpeeds {
 }
 
 /// Sums over all residuals of one pass.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pass {
     /// Residuals.
     pub count: usize,
@@ -82,8 +83,34 @@ pub struct Pass {
     pub square_mps2: f64,
     /// Sum of ln S̃ over the residuals, S̃ = innovation variance over that of the measurement.
     pub log_variance: f64,
+    /// Sum of the logarithms of the eliminated pivots: of the information on initial speeds.
+    pub log_pivots: f64,
     /// Sum over stretches of the outer product of their scores.
     pub score_square: Matrix3<f64>,
+    /// Long-run variance of the residuals in standard deviations.
+    pub long_run: LongRunVariance,
+    /// Speed in m/s at the end of the last stretch, led back to its measurement.
+    pub end_speed_mps: f64,
+    /// Variance of the disturbance in it, over that of the measured speed.
+    pub end_variance: f64,
+}
+
+impl Pass {
+    fn new() -> Self {
+        Pass {
+            count: 0,
+            outliers: 0,
+            stalls: 0,
+            clipped_square: 0.0,
+            square_mps2: 0.0,
+            log_variance: 0.0,
+            log_pivots: 0.0,
+            score_square: Matrix3::zeros(),
+            long_run: LongRunVariance::new(f64::INFINITY),
+            end_speed_mps: 0.0,
+            end_variance: 0.0,
+        }
+    }
 }
 
 /// Trajectories of several stretches as a least-squares problem over (a, b, c).
@@ -95,7 +122,8 @@ pub struct Residuals<'a, 'b> {
     initial: &'b mut InitialSpeeds,
     current_point: Vector3<f64>,
     tried_point: Vector3<f64>,
-    pass: Pass,
+    current_pass: Pass,
+    tried_pass: Pass,
     /// Residuals over √S̃ in m/s of the newest pass, when wanted.
     record: Option<&'b mut Vec<f64>>,
 }
@@ -122,7 +150,8 @@ impl<'a, 'b> Residuals<'a, 'b> {
             initial,
             current_point: point,
             tried_point: point,
-            pass: Pass::default(),
+            current_pass: Pass::new(),
+            tried_pass: Pass::new(),
             record: None,
         }
     }
@@ -133,9 +162,9 @@ impl<'a, 'b> Residuals<'a, 'b> {
         self
     }
 
-    /// Sums of the newest pass.
+    /// Sums of the pass at the current parameters.
     pub fn pass(&self) -> &Pass {
-        &self.pass
+        &self.current_pass
     }
 }
 
@@ -144,7 +173,7 @@ impl LeastSquares<3> for Residuals<'_, '_> {
         let davis = Davis { a: point[0], b: point[1], c: point[2] };
         let change = point - self.current_point;
         self.tried_point = *point;
-        self.pass = Pass::default();
+        self.tried_pass = Pass::new();
         if let Some(record) = &mut self.record {
             record.clear();
         }
@@ -156,7 +185,7 @@ impl LeastSquares<3> for Residuals<'_, '_> {
             let mut rows = StretchRows {
                 weighting: &self.weighting,
                 rows: TriangularAccumulator::default(),
-                pass: &mut self.pass,
+                pass: &mut self.tried_pass,
                 cost: 0.0,
                 record: self.record.as_deref_mut(),
             };
@@ -169,7 +198,8 @@ impl LeastSquares<3> for Residuals<'_, '_> {
                 joint.push(&[row[1], row[2], row[3], row[4]]);
             }
             let score = TriangularSystem::<3>::from_rows(&mut rows.rows).gradient();
-            self.pass.score_square += score * score.transpose();
+            self.tried_pass.log_pivots += factor[0][0].abs().ln();
+            self.tried_pass.score_square += score * score.transpose();
         }
         let mut system = TriangularSystem::from_rows(&mut joint);
         if let Some(prior) = &self.prior {
@@ -184,6 +214,7 @@ impl LeastSquares<3> for Residuals<'_, '_> {
 
     fn accept(&mut self) {
         self.current_point = self.tried_point;
+        self.current_pass = self.tried_pass;
         self.initial.current.copy_from_slice(&self.initial.tried);
     }
 }
@@ -219,7 +250,8 @@ impl StretchRows<'_> {
             by_davis: Vector3::zeros(),
             variance: 0.0,
         };
-        self.add(&mut state, first_mps);
+        self.pass.long_run.break_here();
+        self.add(&mut state, first_mps, 0.0);
         for (step, &measured_mps) in stretch.steps.iter().zip(measured) {
             let duration_s = duration_s(rule, step, state.speed_mps);
             let (advance, is_stalled) = rule.advance_or_crawl(step, davis, state.speed_mps);
@@ -228,12 +260,14 @@ impl StretchRows<'_> {
             state.by_davis = state.by_davis * advance.by_speed + advance.by_davis;
             state.speed_mps = advance.speed_mps;
             state.variance += ratio * duration_s;
-            self.add(&mut state, measured_mps);
+            self.add(&mut state, measured_mps, duration_s);
         }
+        self.pass.end_speed_mps = state.speed_mps;
+        self.pass.end_variance = state.variance;
     }
 
     /// Adds the residual of a measured speed and leads the trace back towards it.
-    fn add(&mut self, state: &mut Trace, measured_mps: f64) {
+    fn add(&mut self, state: &mut Trace, measured_mps: f64, duration_s: f64) {
         let residual_mps = state.speed_mps - measured_mps;
         let spread = 1.0 + state.variance;
         let per_deviation = 1.0 / (self.weighting.speed_noise_mps * spread.sqrt());
@@ -244,6 +278,7 @@ impl StretchRows<'_> {
         let weight = if is_outlier { threshold / size } else { 1.0 };
         let clipped = size.min(threshold);
         self.cost += clipped * (size - 0.5 * clipped);
+        self.pass.long_run.push(normalised.clamp(-threshold, threshold), duration_s);
         self.pass.count += 1;
         self.pass.outliers += usize::from(is_outlier);
         self.pass.clipped_square += clipped * clipped;
@@ -261,11 +296,12 @@ impl StretchRows<'_> {
             residual_mps * scale,
         ]);
         if state.variance > 0.0 {
+            // Outliers lead the trace too: where the gain is large, the disturbance is, and a
+            // large residual is its doing rather than the measurement's.
             let gain = state.variance / spread;
-            state.speed_mps -= gain * weight * residual_mps;
-            let kept = if is_outlier { 1.0 } else { 1.0 - gain };
-            state.by_initial *= kept;
-            state.by_davis *= kept;
+            state.speed_mps -= gain * residual_mps;
+            state.by_initial *= 1.0 - gain;
+            state.by_davis *= 1.0 - gain;
             state.variance *= 1.0 - gain;
         }
     }

@@ -1,0 +1,96 @@
+//! Xia 2023: Davis coefficients by trajectory fit.
+//!
+//! - [`scenario`]: line, driver and truth, seeded
+//! - [`bound`]: the Cramér-Rao bound from the scenario's own numerical Jacobian
+//! - [`offline`]: Table 3 (without noise) and Figure 4 (with noise)
+//! - [`online`]: Table 4 (coefficients that switch on the way)
+
+pub mod bound;
+pub mod offline;
+pub mod online;
+pub mod scenario;
+
+use super::row::Row;
+
+/// Every line of the comparison for this paper.
+///
+/// `seeds` runs each; where the paper's method goes over a whole line of 120 km window by window
+/// it gets a tenth of them, as the line says.
+pub fn rows(seeds: usize) -> Vec<Row> {
+    let mut rows = offline::convergence_rows(seeds);
+    rows.extend(offline::noise_free_rows(seeds));
+    rows.extend(offline::noise_rows(seeds));
+    rows.extend(online::rows(seeds));
+    rows
+}
+
+/// A line of this paper without any figure yet.
+fn row(table: &'static str, quantity: String, unit: &'static str, seeds: usize) -> Row {
+    Row {
+        paper: "Xia 2023",
+        table,
+        quantity,
+        unit,
+        published: None,
+        paper_method: None,
+        baseline: None,
+        ours: None,
+        bound: None,
+        seeds,
+        coverage: None,
+        nees: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::papers::xia::scenario::{CASES, KMH, Profile, drive};
+
+    #[test]
+    fn the_scenarios_keep_to_their_speeds_and_forces() {
+        for (profile, length_m, low_kmh, high_kmh) in
+            [(Profile::Cruise, 120e3, 268.0, 306.0), (Profile::Full, 40e3, 6.9, 301.0)]
+        {
+            for seed in 0..5 {
+                let run = drive(profile, length_m, seed, |_| CASES[0]);
+                assert_eq!(run.speeds_mps.len(), run.steps.len() + 1);
+                for speed_mps in &run.speeds_mps {
+                    let is_within = (low_kmh * KMH..high_kmh * KMH).contains(speed_mps);
+                    assert!(is_within, "{profile:?}, seed {seed}: {speed_mps} m/s");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_bound_is_that_of_the_estimators_own_derivatives() {
+        use dynocar_core::pipeline::trajectory::fit::{FitSettings, Stretch, TrajectoryFitter};
+        use dynocar_core::pipeline::trajectory::step::StepRule;
+        let run = drive(Profile::Full, 25e3, 1, |_| CASES[0]);
+        let numerical = bound::davis_covariance(&run, &CASES[0]);
+        let settings = FitSettings {
+            speed_noise_mps: Some(scenario::SPEED_NOISE_MPS),
+            ..FitSettings::new(StepRule::Distance)
+        };
+        let stretches = [Stretch { steps: &run.steps, speeds_mps: &run.speeds_mps }];
+        let fit = TrajectoryFitter::default().fit(&stretches, None, &settings).unwrap();
+        for i in 0..3 {
+            let ratio = fit.covariance[(i, i)] / numerical[(i, i)];
+            assert!((ratio - 1.0).abs() < 1e-3, "{i}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn a_few_runs_already_show_what_the_full_comparison_does() {
+        let by = |rows: Vec<Row>, unit: &str| -> Vec<f64> {
+            let of_unit = rows.into_iter().filter(|row| row.unit == unit);
+            of_unit.map(|row| row.ours.expect("every line has our figure")).collect()
+        };
+        assert!(by(offline::convergence_rows(2), "%").iter().all(|share| *share == 100.0));
+        assert!(by(offline::noise_free_rows(2), "N/kN").iter().all(|error| *error < 1e-9));
+        let online = online::rows(2);
+        assert!(by(online.clone(), "N/kN")[0] < 0.2);
+        assert!(by(online, "km").iter().all(|settling| *settling < 3.0));
+    }
+}

@@ -1,0 +1,218 @@
+//! Seeded runs of the CRH380C of Xia 2023 with what the paper leaves out: line, forces, noise.
+//!
+//! M = 981.7 t, γ = 0.06, traction up to min(520, 18240 / v) kN, 100 m sampling, white noise of
+//! 0.18 m/s on the speed (a mean square of 0.05 at the truth, the paper's ε1, leaves room for
+//! just that). The truth moves by eq. 7, as the paper's own data do (mean squares of 1e-9).
+
+use dynocar_core::pipeline::trajectory::step::{Step, resistance_gain};
+use dynocar_core::track::{Curve, Track};
+use dynocar_core::train::Davis;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Mass in t.
+pub const MASS_T: f64 = 981.7;
+/// Train length in m.
+pub const LENGTH_M: f64 = 400.47;
+/// Rotating-mass factor γ.
+pub const ROTATING_MASS_FACTOR: f64 = 0.06;
+/// Sampling in m.
+pub const SAMPLING_M: f64 = 100.0;
+/// Standard deviation of the measured speed in m/s.
+pub const SPEED_NOISE_MPS: f64 = 0.18;
+
+/// Standard deviation in N/kN of the resistance's disturbance, where there is one.
+pub const DISTURBANCE_N_PER_KN: f64 = 0.25;
+/// Its correlation time in s.
+pub const DISTURBANCE_S: f64 = 5.0;
+
+const GRAVITY_MPS2: f64 = 9.81;
+/// One km/h in m/s.
+pub const KMH: f64 = 1.0 / 3.6;
+
+/// The truth of Table 3's cases 1 to 4.
+///
+/// In m/s: the usual coefficients for km/h times 3.6 and 12.96.
+pub const CASES: [Davis; 4] = [
+    Davis { a: 0.79, b: 0.0229, c: 0.001493 },
+    Davis { a: 0.2955, b: 0.0242, c: 0.00159 },
+    Davis { a: 1.0501, b: 0.0253, c: 0.00140 },
+    Davis { a: 0.3488, b: 0.0596, c: 0.00112 },
+];
+
+/// How the train is driven.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Profile {
+    /// 273 to 303 km/h.
+    Cruise,
+    /// From 7 km/h to as much as 300 km/h and back, with traction, coasting and braking.
+    Full,
+}
+
+/// A run without noise: one speed more than steps.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// Steps of 100 m.
+    pub steps: Vec<Step>,
+    /// True speeds in m/s.
+    pub speeds_mps: Vec<f64>,
+}
+
+impl Run {
+    /// The speeds with white noise from a step on.
+    pub fn measured_mps(&self, noisy_from: usize, random: &mut ChaCha8Rng) -> Vec<f64> {
+        let noise = |i: usize, random: &mut ChaCha8Rng| {
+            if i >= noisy_from { SPEED_NOISE_MPS * standard_normal(random) } else { 0.0 }
+        };
+        self.speeds_mps.iter().enumerate().map(|(i, v)| v + noise(i, random)).collect()
+    }
+}
+
+impl Run {
+    /// The same reported forces, with a disturbance of the resistance that nobody reports: a
+    /// first-order autoregression of [`DISTURBANCE_N_PER_KN`] and [`DISTURBANCE_S`].
+    pub fn disturbed(&self, davis: &Davis, random: &mut ChaCha8Rng) -> Run {
+        let mut speeds_mps = vec![self.speeds_mps[0]];
+        let mut disturbance = DISTURBANCE_N_PER_KN * standard_normal(random);
+        for (i, step) in self.steps.iter().enumerate() {
+            let disturbed = Davis { a: davis.a + disturbance, ..*davis };
+            speeds_mps.push(next_speed_mps(step, &disturbed, speeds_mps[i]));
+            let kept = (-step.size / (self.speeds_mps[i] * DISTURBANCE_S)).exp();
+            disturbance = kept * disturbance
+                + (1.0 - kept * kept).sqrt() * DISTURBANCE_N_PER_KN * standard_normal(random);
+        }
+        Run { steps: self.steps.clone(), speeds_mps }
+    }
+}
+
+/// A standard normal number (Box, Muller 1958).
+pub fn standard_normal(random: &mut ChaCha8Rng) -> f64 {
+    let radius = (-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt();
+    radius * (std::f64::consts::TAU * random.random::<f64>()).cos()
+}
+
+/// The speed after a step by eq. 7; the truth's own formula, apart from the estimators'.
+fn next_speed_mps(step: &Step, davis: &Davis, speed_mps: f64) -> f64 {
+    let resistance = step.resistance_gain * davis.w0_n_per_kn(speed_mps);
+    (speed_mps * speed_mps + 2.0 * step.size * (step.drive_mps2 - resistance)).sqrt()
+}
+
+/// Speeds in m/s along steps from an initial speed.
+pub fn speeds_mps(steps: &[Step], initial_mps: f64, davis: &Davis) -> Vec<f64> {
+    let mut speeds = Vec::with_capacity(steps.len() + 1);
+    speeds.push(initial_mps);
+    for (i, step) in steps.iter().enumerate() {
+        speeds.push(next_speed_mps(step, davis, speeds[i]));
+    }
+    speeds
+}
+
+/// Drives a run from chainage 0; the same seed gives the same line and driver.
+///
+/// `davis_at` gives the coefficients by chainage in m.
+pub fn drive(profile: Profile, length_m: f64, seed: u64, davis_at: impl Fn(f64) -> Davis) -> Run {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let track = line(&mut random);
+    let (mut speed_mps, phases) = match profile {
+        Profile::Cruise => (288.0 * KMH, vec![]),
+        Profile::Full => (7.0 * KMH, full_profile(length_m)),
+    };
+    let mut driver = Driver { phases, cruise_mps: speed_mps, next_change_m: 0.0 };
+    let count = (length_m / SAMPLING_M) as usize;
+    let mut run = Run { steps: Vec::with_capacity(count), speeds_mps: vec![speed_mps] };
+    for i in 0..count {
+        let centre_m = SAMPLING_M * i as f64;
+        let davis = davis_at(centre_m);
+        let uphill = track.gradient_permille(centre_m, LENGTH_M).unwrap_or(0.0);
+        let curve = 600.0 * track.curvature_per_m(centre_m, LENGTH_M).unwrap_or(0.0);
+        let weight_kn = MASS_T * GRAVITY_MPS2;
+        let resisting_kn = weight_kn * (davis.w0_n_per_kn(speed_mps) + uphill + curve) / 1000.0;
+        let force_kn = driver.force_kn(centre_m, speed_mps, resisting_kn, &mut random);
+        let inertia_t = MASS_T * (1.0 + ROTATING_MASS_FACTOR);
+        let step = Step {
+            size: SAMPLING_M,
+            drive_mps2: (force_kn - weight_kn * (uphill + curve) / 1000.0) / inertia_t,
+            resistance_gain: resistance_gain(ROTATING_MASS_FACTOR),
+        };
+        speed_mps = next_speed_mps(&step, &davis, speed_mps);
+        run.steps.push(step);
+        run.speeds_mps.push(speed_mps);
+    }
+    run
+}
+
+/// Gradients within ±6 ‰ and curves of 7 to 12 km radius, as on a high-speed line.
+fn line(random: &mut ChaCha8Rng) -> Track {
+    let mut gradient = Vec::new();
+    let mut at_m = -1000.0;
+    while at_m < 121_000.0 {
+        gradient.push((at_m, 12.0 * random.random::<f64>() - 6.0));
+        at_m += 800.0 + 2200.0 * random.random::<f64>();
+    }
+    let mut curves = Vec::new();
+    let mut at_m = 2000.0 * random.random::<f64>();
+    while at_m < 118_000.0 {
+        let end_m = at_m + 800.0 + 1500.0 * random.random::<f64>();
+        let radius_m = 7000.0 + 5000.0 * random.random::<f64>();
+        curves.push(Curve { start_m: at_m, end_m, radius_m });
+        at_m = end_m + 1000.0 + 5000.0 * random.random::<f64>();
+    }
+    Track::new("seeded".into(), None, Some(&gradient), Some(curves), None)
+        .expect("ordered, finite entries")
+}
+
+/// What the driver does from a distance on.
+#[derive(Clone, Copy, Debug)]
+enum Phase {
+    Hold { speed_mps: f64 },
+    Coast,
+    Brake { to_mps: f64 },
+}
+
+/// From near standstill to 300 km/h, as far as the length allows, and back.
+fn full_profile(length_m: f64) -> Vec<(f64, Phase)> {
+    vec![
+        (0.0, Phase::Hold { speed_mps: 300.0 * KMH }),
+        (0.6 * length_m, Phase::Coast),
+        (0.75 * length_m, Phase::Hold { speed_mps: 220.0 * KMH }),
+        (0.8 * length_m, Phase::Coast),
+        (length_m - 4000.0, Phase::Brake { to_mps: 7.0 * KMH }),
+    ]
+}
+
+struct Driver {
+    phases: Vec<(f64, Phase)>,
+    cruise_mps: f64,
+    next_change_m: f64,
+}
+
+impl Driver {
+    fn force_kn(
+        &mut self,
+        way_m: f64,
+        speed_mps: f64,
+        resisting_kn: f64,
+        random: &mut ChaCha8Rng,
+    ) -> f64 {
+        let phase = self.phases.iter().rev().find(|(from_m, _)| *from_m <= way_m);
+        let phase = phase.map_or(Phase::Hold { speed_mps: self.cruise_mps }, |phase| phase.1);
+        if self.phases.is_empty() && way_m >= self.next_change_m {
+            self.cruise_mps = (272.0 + 32.0 * random.random::<f64>()) * KMH;
+            self.next_change_m = way_m + 3000.0 + 5000.0 * random.random::<f64>();
+        }
+        let traction_max_kn = f64::min(520.0, 18_240.0 / speed_mps);
+        let inertia_t = MASS_T * (1.0 + ROTATING_MASS_FACTOR);
+        match phase {
+            Phase::Hold { speed_mps: target_mps } => {
+                let wanted_mps2 = (0.04 * (target_mps - speed_mps)).clamp(-0.2, 0.5);
+                (resisting_kn + inertia_t * wanted_mps2).clamp(-300.0, traction_max_kn)
+            }
+            Phase::Coast => 0.0,
+            Phase::Brake { to_mps } => {
+                let energy = to_mps * to_mps - speed_mps * speed_mps;
+                let wanted_mps2 = (0.5 * energy / SAMPLING_M).clamp(-0.4, 0.1);
+                (resisting_kn + inertia_t * wanted_mps2).min(traction_max_kn)
+            }
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! The search behind a trajectory fit: coefficients, noise and disturbance in turn.
+
+use nalgebra::Vector3;
+
+use super::fit::{FitError, FitSettings, SCALES, Stretch, TrajectoryFit, TrajectoryFitter};
+use super::residuals::{Pass, Residuals, Weighting};
+use crate::filter::levenberg_marquardt::{LeastSquares, Solution, SolverSettings, minimise};
+use crate::filter::triangular::TriangularSystem;
+use crate::train::Davis;
+
+/// The least speed noise in m/s that residuals are divided by; below it the round-off of a long
+/// trajectory would count as a residual.
+const SPEED_NOISE_MIN_MPS: f64 = 1e-8;
+const NOISE_ROUNDS_MAX: u32 = 8;
+/// Decrease of the cost worth an iteration when disturbance ratios are compared.
+const ROUGH_DECREASE: f64 = 2e-4;
+
+/// The least-squares solution for one disturbance ratio.
+pub struct Fitted {
+    solution: Solution<3>,
+    pass: Pass,
+    /// Noise that the residuals were divided by.
+    used_noise_mps: f64,
+    /// Noise as given or, if it is to be estimated, as the residuals show it.
+    noise_mps: f64,
+    /// Noise that the residuals show.
+    shown_mps: f64,
+    log_likelihood: f64,
+    /// The likelihood of what the fitted parameters leave over (Patterson, Thompson 1971):
+    /// the greatest likelihood itself takes the slow disturbances that coefficients and initial
+    /// speeds have absorbed for their absence.
+    restricted_log_likelihood: f64,
+}
+
+/// A fit under way.
+pub struct Search<'a, 'b> {
+    stretches: &'a [Stretch<'a>],
+    settings: &'a FitSettings,
+    prior: Option<TriangularSystem<3>>,
+    fitter: &'b mut TrajectoryFitter,
+    /// See [`FitSettings::decrease_tolerance`].
+    pub decrease_tolerance: f64,
+    iterations: u32,
+}
+
+impl<'a, 'b> Search<'a, 'b> {
+    /// A search that compares roughly, from the fitter's initial speeds.
+    pub fn new(
+        stretches: &'a [Stretch<'a>],
+        settings: &'a FitSettings,
+        prior: Option<TriangularSystem<3>>,
+        fitter: &'b mut TrajectoryFitter,
+    ) -> Self {
+        let decrease_tolerance = ROUGH_DECREASE;
+        Search { stretches, settings, prior, fitter, decrease_tolerance, iterations: 0 }
+    }
+
+    /// Fits for one disturbance ratio; repeats until the noise that weighs the residuals is
+    /// the noise that they show.
+    pub fn at_ratio(&mut self, start: &Vector3<f64>, ratio: f64) -> Result<Fitted, FitError> {
+        let mut point = *start;
+        let mut noise_mps = match self.settings.speed_noise_mps {
+            Some(known_mps) => known_mps,
+            None => self.median_noise_mps(&point, ratio)?,
+        };
+        let mut rounds = 0;
+        loop {
+            noise_mps = noise_mps.max(SPEED_NOISE_MIN_MPS);
+            rounds += 1;
+            let fitted = self.minimise(&point, ratio, noise_mps)?;
+            let is_settled = (fitted.noise_mps / noise_mps - 1.0).abs() < 0.01
+                || (fitted.noise_mps < SPEED_NOISE_MIN_MPS && noise_mps <= SPEED_NOISE_MIN_MPS);
+            let is_known = self.settings.speed_noise_mps.is_some();
+            if is_known || is_settled || rounds == NOISE_ROUNDS_MAX {
+                return Ok(fitted);
+            }
+            (point, noise_mps) = (fitted.solution.point, fitted.noise_mps);
+        }
+    }
+
+    fn minimise(
+        &mut self,
+        point: &Vector3<f64>,
+        ratio: f64,
+        noise_mps: f64,
+    ) -> Result<Fitted, FitError> {
+        let settings = self.settings;
+        let weighting = Weighting {
+            speed_noise_mps: noise_mps,
+            disturbance_ratio: ratio,
+            outlier_threshold: settings.outlier_threshold,
+        };
+        let start = settings.bounds.clamp(point);
+        let mut residuals = Residuals::new(
+            self.stretches,
+            settings.rule,
+            weighting,
+            self.prior,
+            &mut self.fitter.initial,
+            start,
+        );
+        let solver = SolverSettings {
+            scales: Vector3::from(SCALES),
+            iterations_max: 60,
+            decrease_tolerance: self.decrease_tolerance,
+            relative_tolerance: 1e-14,
+        };
+        let solution = minimise(&mut residuals, &start, &settings.bounds, &solver)
+            .ok_or(FitError::NotFinite { stretch: 0 })?;
+        let pass = *residuals.pass();
+        self.iterations += solution.iterations;
+        let free = pass.count.saturating_sub(3 + self.stretches.len()).max(1) as f64;
+        let shown_mps = noise_mps * (pass.clipped_square / free).sqrt();
+        let count = pass.count as f64;
+        let log_likelihood =
+            -(solution.linearisation.cost + count * noise_mps.ln() + 0.5 * pass.log_variance);
+        let factor = &solution.linearisation.system.factor;
+        let log_information =
+            pass.log_pivots + (0..3).map(|i| factor[(i, i)].abs().ln()).sum::<f64>();
+        Ok(Fitted {
+            solution,
+            pass,
+            used_noise_mps: noise_mps,
+            noise_mps: settings.speed_noise_mps.unwrap_or(shown_mps),
+            shown_mps,
+            log_likelihood,
+            restricted_log_likelihood: log_likelihood - log_information,
+        })
+    }
+
+    /// Noise by the median absolute residual, which half the residuals cannot spoil.
+    fn median_noise_mps(&mut self, point: &Vector3<f64>, ratio: f64) -> Result<f64, FitError> {
+        let weighting = Weighting {
+            speed_noise_mps: 1.0,
+            disturbance_ratio: ratio,
+            outlier_threshold: f64::INFINITY,
+        };
+        let start = self.settings.bounds.clamp(point);
+        let TrajectoryFitter { initial, residuals: record } = &mut *self.fitter;
+        let mut residuals =
+            Residuals::new(self.stretches, self.settings.rule, weighting, None, initial, start)
+                .recording(record);
+        residuals.linearise(&start).ok_or(FitError::NotFinite { stretch: 0 })?;
+        record.iter_mut().for_each(|residual| *residual = residual.abs());
+        let middle = record.len() / 2;
+        let (_, median, _) = record.select_nth_unstable_by(middle, f64::total_cmp);
+        // Median of the absolute value of a standard normal variable.
+        Ok(*median / 0.6745)
+    }
+
+    /// The disturbance ratio of greatest restricted likelihood: by decades, then by golden section.
+    pub fn likeliest_ratio(&mut self, point: &mut Vector3<f64>) -> Result<f64, FitError> {
+        let mut best = (f64::NEG_INFINITY, 0.0_f64);
+        // Downwards, since much disturbance binds the trajectory to the measured speeds.
+        for exponent in (-7..=2).rev().map(f64::from) {
+            let fitted = self.at_ratio(point, 10f64.powf(exponent))?;
+            *point = fitted.solution.point;
+            if fitted.restricted_log_likelihood > best.0 {
+                best = (fitted.restricted_log_likelihood, exponent);
+            }
+        }
+        let (mut low, mut high) = (best.1 - 1.0, best.1 + 1.0);
+        let share = 0.5 * (5f64.sqrt() - 1.0);
+        while high - low > 0.1 {
+            let (left, right) = (high - share * (high - low), low + share * (high - low));
+            let at_left = self.at_ratio(point, 10f64.powf(left))?;
+            let at_right = self.at_ratio(point, 10f64.powf(right))?;
+            *point = at_left.solution.point;
+            if at_left.restricted_log_likelihood > at_right.restricted_log_likelihood {
+                high = right
+            } else {
+                low = left
+            }
+        }
+        let ratio = 10f64.powf(0.5 * (low + high));
+        let (with, without) = (self.at_ratio(point, ratio)?, self.at_ratio(point, 0.0)?);
+        // Half a unit of likelihood is what the free ratio gains by chance (Akaike 1974: 1).
+        let gain = with.restricted_log_likelihood - without.restricted_log_likelihood;
+        Ok(if gain > 0.5 { ratio } else { 0.0 })
+    }
+
+    /// The fit with covariance and counts.
+    pub fn describe(&self, fitted: &Fitted, ratio: f64) -> Result<TrajectoryFit, FitError> {
+        let Fitted { solution, pass, .. } = fitted;
+        let inflation = pass.long_run.inflation();
+        let shown_over_used = fitted.noise_mps / fitted.used_noise_mps;
+        let raw = solution.linearisation.system.covariance().ok_or(FitError::NotDetermined)?;
+        let stretches = self.stretches.len() as f64;
+        let cluster_covariance = (self.stretches.len() >= 4)
+            .then(|| raw * pass.score_square * raw * (stretches / (stretches - 1.0)));
+        let point = solution.point;
+        let bounds = &self.settings.bounds;
+        Ok(TrajectoryFit {
+            davis: Davis { a: point[0], b: point[1], c: point[2] },
+            covariance: raw * (shown_over_used * shown_over_used * inflation),
+            inflation,
+            cluster_covariance,
+            speed_noise_mps: fitted.noise_mps,
+            residual_std_mps: fitted.shown_mps,
+            disturbance_ratio: ratio,
+            log_likelihood: fitted.log_likelihood,
+            rmse_mps: (pass.square_mps2 / pass.count as f64).sqrt(),
+            end_speed_mps: pass.end_speed_mps,
+            end_variance: pass.end_variance,
+            samples: pass.count,
+            outliers: pass.outliers,
+            stalls: pass.stalls,
+            iterations: self.iterations,
+            stop: solution.stop,
+            at_bound: std::array::from_fn(|i| {
+                point[i] == bounds.low[i] || point[i] == bounds.high[i]
+            }),
+        })
+    }
+}
