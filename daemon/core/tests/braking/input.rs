@@ -101,6 +101,22 @@ fn an_estimate_is_held_after_the_braking_and_grows_stale() {
 }
 
 #[test]
+fn an_estimate_that_is_too_uncertain_is_shown_but_does_not_count() {
+    // No estimate is ever precise enough.
+    let braking = BrakingSettings { relative_std_max: 1e-6, ..Default::default() };
+    let settings = SmootherSettings { braking, ..Default::default() };
+    let mut pipeline = pipeline(&EstimatorSettings::AdhesionSmoother(settings));
+    let mut values = Vec::new();
+    for moment in WET.simulate(11) {
+        let snapshot = pipeline.process(&moment.sample);
+        assert_eq!(snapshot.status(), Status::Unestimated);
+        assert_eq!(snapshot.reason(), Some(Reason::TooFewSamples));
+        values.push(snapshot.values[0]);
+    }
+    assert_ne!(values[100], values[120], "the newest is shown");
+}
+
+#[test]
 fn a_gap_ends_the_braking_and_the_next_stretch_starts_anew() {
     for kind in KINDS {
         let mut moments = WET.simulate(4);
@@ -143,6 +159,28 @@ fn bad_values_are_refused_and_leave_no_trace() {
         assert_eq!(found.parameters[0], expected.parameters[0], "{kind}");
         let std = expected.covariance_at(0, 0).sqrt();
         assert!((found.values[0] - expected.values[0]).abs() < 2.0 * std, "{kind}");
+    }
+}
+
+#[test]
+fn quantities_that_drop_out_now_and_then_do_not_end_the_braking() {
+    for kind in KINDS {
+        let mut moments = WET.simulate(10);
+        for (index, moment) in moments.iter_mut().enumerate() {
+            let field = match index % 12 {
+                5 => SampleField::Position,
+                9 | 10 => SampleField::BrakeCylinderPressure,
+                _ => continue,
+            };
+            moment.sample.valid &= !field.bit();
+        }
+        let expected = after(&mut pipeline(&default_of(kind)), &WET.simulate(10));
+        let found = after(&mut pipeline(&default_of(kind)), &moments);
+        assert!(found.rejected(RejectionReason::Missing) > 30, "{kind}");
+        assert_eq!(found.status(), expected.status(), "{kind}");
+        assert_eq!(found.generation, 0, "{kind}");
+        let std = expected.covariance_at(0, 0).sqrt();
+        assert!((found.values[0] - expected.values[0]).abs() < 2.5 * std, "{kind}");
     }
 }
 

@@ -98,7 +98,8 @@ impl<E: Engine> BrakingEstimator<E> {
     fn hold(&mut self, speed_mps: f64) {
         let Some(estimate) = self.engine.estimate() else { return };
         let counts = self.report.counts(&estimate);
-        if counts || self.is_current || self.held.is_none() {
+        let held_counts = self.held.is_some_and(|held| self.report.counts(&held));
+        if counts || self.is_current || !held_counts {
             if !self.is_current {
                 self.speed_mps = None;
             }

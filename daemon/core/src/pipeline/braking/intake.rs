@@ -65,6 +65,8 @@ struct Known {
 struct Collected {
     last: Known,
     step_s: f64,
+    /// Time in s since the last sample that was added.
+    skipped_s: f64,
     gain: f64,
     demand: f64,
     tied: f64,
@@ -72,10 +74,22 @@ struct Collected {
 
 impl Collected {
     fn from(first: Known) -> Self {
-        Collected { last: first, step_s: 0.0, gain: 0.0, demand: 0.0, tied: 0.0 }
+        Collected { last: first, step_s: 0.0, skipped_s: 0.0, gain: 0.0, demand: 0.0, tied: 0.0 }
+    }
+
+    /// Lets time pass at a sample that lacks something.
+    fn skip(&mut self, step_s: f64) {
+        self.skipped_s += step_s;
+    }
+
+    /// Time in s since the step began.
+    fn span_s(&self) -> f64 {
+        self.step_s + self.skipped_s
     }
 
     fn add(&mut self, known: Known, step_s: f64) {
+        let step_s = self.skipped_s + step_s;
+        self.skipped_s = 0.0;
         let mean = |from: f64, to: f64| 0.5 * (from + to) * step_s;
         self.gain += mean(self.last.gain_mps2, known.gain_mps2);
         self.demand += mean(self.last.demand, known.demand);
@@ -125,40 +139,39 @@ impl BrakingIntake {
     ///
     /// Allocates nothing.
     pub fn take(&mut self, sample: &ResolvedSample) -> Intake {
+        let gap_max_s = self.settings.gap_max_s;
+        self.braking = self.braking.filter(|braking| {
+            let collected_s = braking.collected.span_s() + sample.step_s;
+            braking.stretch == sample.stretch && collected_s <= gap_max_s
+        });
         let known = match self.known(sample) {
-            Ok(known) => known,
-            Err(reason) => {
+            Ok(Some(known)) if sample.speed_mps >= self.settings.speed_min_mps => known,
+            Ok(_) => {
                 self.braking = None;
+                return Intake::NotBraking;
+            }
+            Err(reason) => {
+                if let Some(braking) = &mut self.braking {
+                    braking.collected.skip(sample.step_s);
+                }
                 return Intake::Missing(reason);
             }
         };
-        let Some(known) = known.filter(|_| sample.speed_mps >= self.settings.speed_min_mps) else {
-            self.braking = None;
-            return Intake::NotBraking;
-        };
+        if let Some(braking) = &mut self.braking {
+            braking.collected.add(known, sample.step_s);
+        }
         let Some(position_m) = sample.position_m else {
-            self.braking = None;
             return Intake::Missing(Reason::MissingQuantity);
         };
+        if sample.is_sliding && !self.settings.position_is_wheel_independent {
+            return Intake::Refused(RejectionReason::WheelSlide);
+        }
         let along_m = sample.direction * position_m;
-        let is_continued = self.braking.is_some_and(|braking| {
-            let collected_s = braking.collected.step_s + sample.step_s;
-            braking.stretch == sample.stretch && collected_s <= self.settings.gap_max_s
-        });
-        let is_untrusted = sample.is_sliding && !self.settings.position_is_wheel_independent;
-        let Some(braking) = self.braking.as_mut().filter(|_| is_continued) else {
-            self.braking = None;
-            if is_untrusted {
-                return Intake::Refused(RejectionReason::WheelSlide);
-            }
+        let Some(braking) = &mut self.braking else {
             let (stretch, collected) = (sample.stretch, Collected::from(known));
             self.braking = Some(Braking { stretch, origin_m: along_m, collected });
             return Intake::Start(observation(sample, 0.0, &known));
         };
-        braking.collected.add(known, sample.step_s);
-        if is_untrusted {
-            return Intake::Refused(RejectionReason::WheelSlide);
-        }
         // A little less, so that jitter of the clock does not halve the rate.
         if braking.collected.step_s < 0.9 * self.settings.interval_s {
             return Intake::Collected;
@@ -166,11 +179,6 @@ impl BrakingIntake {
         let inputs = braking.collected.inputs();
         braking.collected = Collected::from(known);
         Intake::Step(inputs, observation(sample, along_m - braking.origin_m, &known))
-    }
-
-    /// Forgets the braking in progress.
-    pub fn reset(&mut self) {
-        self.braking = None;
     }
 
     /// What the model knows at a sample; `Ok(None)` while the train does not brake.

@@ -174,11 +174,6 @@ impl Tracker {
         }
     }
 
-    /// The belief about the present state.
-    pub fn state(&self) -> Option<&GaussianState<STATES>> {
-        self.state.as_ref()
-    }
-
     fn remember(&mut self, demand: f64) {
         if let Some(state) = &self.state {
             let (shape, _) = self.model.law.at(state.mean[SPEED], demand);
@@ -227,7 +222,12 @@ impl Engine for Tracker {
             let Some((row, measured, variance)) = measurement else { continue };
             let update = state.innovation(row, measured, variance)?;
             let normalised = update.normalised();
-            if first_innovation.is_none() && normalised.abs() > OUTLIER_GATE {
+            let is_outlier = normalised.abs() > OUTLIER_GATE;
+            if is_outlier && first_innovation.is_some() {
+                // A speed that the position contradicts is left out on its own.
+                continue;
+            }
+            if is_outlier {
                 self.outliers_in_a_row += 1;
                 if self.outliers_in_a_row >= OUTLIERS_BEFORE_RESTART {
                     self.restart(observed);
