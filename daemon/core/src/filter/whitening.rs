@@ -75,6 +75,15 @@ impl<const S: usize, const C: usize> Whitener<S, C> {
         self.covariance[(i, i)] += variance;
     }
 
+    /// Forgets what parameter `column` takes off the states, for another to take its place.
+    ///
+    /// # Panics
+    ///
+    /// When there is no such column.
+    pub fn clear_column(&mut self, column: usize) {
+        self.state.column_mut(column).fill(0.0);
+    }
+
     /// The innovation's columns and its variance, before [`Whitener::correct`].
     pub fn innovation(&self, sighting: &Sighting<S, C>) -> (SVector<f64, C>, f64) {
         let predicted = self.state.transpose() * sighting.direction;

@@ -8,6 +8,7 @@ mod echo;
 mod estimator;
 mod innovation;
 pub mod mass;
+pub mod monitor;
 pub mod output;
 pub mod resistance;
 pub mod settings;

@@ -14,6 +14,7 @@ use super::mass::{
     JointLeastSquares, JointLeastSquaresSettings, MassKalman, MassKalmanSettings, StagedDescent,
     StagedDescentSettings,
 };
+use super::monitor::{MonitorSettings, ResidualMonitor};
 use super::resistance;
 use super::resistance::settings::{KalmanSettings, LsSettings, MilsSettings, RlsSettings};
 use super::trajectory::kalman::TrajectoryKalmanSettings;
@@ -136,6 +137,9 @@ estimator_kinds! {
         |s, t| boxed(JointLeastSquares::new(*s, t));
     /// Kalman filters [v, 1/m, bias] for mass.
     MassKalman(MassKalmanSettings) = MassKalman, |s, t| boxed(MassKalman::new(*s, t));
+    /// Watches the residual and names what the model may lack.
+    ResidualMonitor(MonitorSettings) = ResidualMonitor,
+        |s, t| boxed(ResidualMonitor::new(*s, t));
     /// Adhesion by sliding-window EM.
     AdhesionEm(EmSettings) = AdhesionEm, |s, t| s.build_adhesion(t);
     /// Adhesion by extended Kalman filter.

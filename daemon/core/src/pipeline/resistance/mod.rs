@@ -14,13 +14,13 @@
 mod coasting;
 mod kalman;
 mod least_squares;
-mod momentum;
+pub(super) mod momentum;
 mod noise_bank;
 mod noise_model;
 pub mod output_error;
-mod regression;
+pub(super) mod regression;
 mod report;
-mod sample;
+pub(super) mod sample;
 pub mod settings;
 #[cfg(test)]
 mod simulation;

@@ -36,6 +36,7 @@ struct Block {
 /// An unbroken row of samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Chain {
+    start_ns: i64,
     last: UnitSample,
     /// What each column gathered since the mean of the block before.
     integral: Columns,
@@ -61,6 +62,11 @@ impl MomentumBlocks {
     /// Noise of the speed so far.
     pub fn noise(&self) -> &SpeedNoise {
         &self.watch.noise
+    }
+
+    /// Time in ns of the first sample of the chain; `None` between chains.
+    pub fn chain_start_ns(&self) -> Option<i64> {
+        self.chain.as_ref().map(|chain| chain.start_ns)
     }
 
     /// Ends the chain: the next sample starts a new one.
@@ -114,6 +120,7 @@ impl MomentumBlocks {
 impl Chain {
     fn start(first: &UnitSample) -> Self {
         let mut chain = Chain {
+            start_ns: first.time_ns,
             last: *first,
             integral: Columns::zeros(),
             block: Block::open(first, 0.0),

@@ -1,0 +1,339 @@
+//! The residual monitor as a pipeline.
+
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
+use nalgebra::{SVector, Vector1};
+
+use super::covariates::{CovariateImpulse, Covariates, RunClock, covariates};
+use super::information::{BaseVector, Information, JOINT};
+use super::onsets::Onsets;
+use super::place_memory::PlaceMemory;
+use super::pressure::ReleasedPressure;
+use super::rows::{Parameters, Rows};
+use super::settings::MonitorSettings;
+use super::suspects::{
+    BANK, BASE, FIRST_ONSET, ONSETS, Place, SUSPECTS, parameter_of, suspect_of,
+};
+use super::verdict::{Evidence, Verdict};
+use crate::force::ResolvedSample;
+use crate::pipeline::output::{write_innovations, write_parameters, write_status};
+use crate::pipeline::resistance::momentum::MomentumBlocks;
+use crate::pipeline::resistance::regression::{
+    BRAKE_SCALE, FORCE_DELAY, MomentumBlock, TRACTION_SCALE, regressors, scaled, unscaling,
+};
+use crate::pipeline::resistance::sample::UnitSample;
+use crate::pipeline::settings::SettingError;
+use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
+use crate::train::{Davis, TrainModel};
+
+/// Rows before anything is called estimated.
+const ROWS_MIN: f64 = 12.0;
+/// Innovations that their statistics look back over.
+const MONITOR_ROWS: u32 = 150;
+/// Below this speed in m/s a train stands.
+const STANDSTILL_MPS: f64 = 0.3;
+
+/// The force that the model does not explain.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Unexplained {
+    n_per_kn: f64,
+    std_n_per_kn: f64,
+}
+
+/// Watches the residual between model and measurement.
+#[derive(Clone, Debug)]
+pub struct ResidualMonitor {
+    settings: MonitorSettings,
+    declared: Davis,
+    /// The declared a, b, c, scaled, as base parameters; the regression is about what they lack.
+    declared_base: BaseVector,
+    base_std: BaseVector,
+    kept_per_row: f64,
+    clock: RunClock,
+    has_stopped: bool,
+    places: PlaceMemory,
+    pressure: ReleasedPressure,
+    blocks: MomentumBlocks,
+    impulse: CovariateImpulse,
+    rows: Rows,
+    onsets: Onsets,
+    information: Information,
+    verdict: Verdict,
+    innovations: InnovationMonitor,
+    /// The model as it is believed: base parameters about the declared ones, and the suspect's.
+    model: Parameters,
+    known: Davis,
+    /// Where and with which momentum the newest block ended.
+    last_block: Option<(Option<f64>, f64)>,
+    unexplained: Unexplained,
+    weight_kn: f64,
+    speed_min_mps: f64,
+    speed_max_mps: f64,
+    resets: u64,
+}
+
+impl ResidualMonitor {
+    /// A monitor of a train.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn new(settings: MonitorSettings, train: &TrainModel) -> Result<Self, SettingError> {
+        settings.check()?;
+        let declared = train.resistance;
+        let coefficients = scaled(&declared);
+        let mut declared_base = BaseVector::zeros();
+        let mut base_std = BaseVector::zeros();
+        for i in 0..coefficients.len() {
+            declared_base[i] = coefficients[i];
+            let least = 0.01 * declared.w0_n_per_kn(10.0).max(0.1);
+            base_std[i] = (settings.davis_std_share * coefficients[i].abs()).max(least);
+        }
+        base_std[TRACTION_SCALE] = settings.data.force_scale_std;
+        base_std[BRAKE_SCALE] = settings.data.force_scale_std;
+        base_std[FORCE_DELAY] = settings.data.force_delay_std_s;
+        let kept_per_row = 1.0 - settings.data.block_s / (3600.0 * settings.memory_h);
+        Ok(ResidualMonitor {
+            settings,
+            declared,
+            declared_base,
+            base_std,
+            kept_per_row,
+            clock: RunClock::default(),
+            has_stopped: false,
+            places: PlaceMemory::new(),
+            pressure: ReleasedPressure::new(),
+            blocks: MomentumBlocks::new(settings.data),
+            impulse: CovariateImpulse::new(),
+            rows: Rows::new(&settings, declared),
+            onsets: Onsets::new(),
+            information: Information::new(&base_std),
+            verdict: Verdict::new(&settings, kept_per_row),
+            innovations: InnovationMonitor::new(MONITOR_ROWS),
+            model: Parameters::zeros(),
+            known: declared,
+            last_block: None,
+            unexplained: Unexplained {
+                n_per_kn: 0.0,
+                std_n_per_kn: settings.davis_std_share * declared.w0_n_per_kn(20.0),
+            },
+            weight_kn: TrainModel::weight_kn(train.mass_kg),
+            speed_min_mps: f64::INFINITY,
+            speed_max_mps: 0.0,
+            resets: 0,
+        })
+    }
+
+    /// A run starts: brakes are released, and whatever dragged is over.
+    fn start_run(&mut self) {
+        let dragged = self.verdict.named_onset();
+        for place in 0..ONSETS {
+            self.retire(FIRST_ONSET + place, dragged == Some(place));
+        }
+        self.onsets = Onsets::new();
+        self.places.next_pass();
+        self.pressure.restart();
+        self.start_leg();
+    }
+
+    /// The train has stopped and moves again: what may change at stops is open anew.
+    fn start_leg(&mut self) {
+        for place in (0..SUSPECTS).filter(|&place| BANK[place].changes_at_stops) {
+            let parameter = BASE + place;
+            self.verdict.hold_over_stop(parameter);
+            self.retire(parameter, self.verdict.is_suspicious(parameter));
+        }
+    }
+
+    fn retire(&mut self, parameter: usize, is_real: bool) {
+        let prior_std = is_real.then(|| suspect_of(parameter).prior_std);
+        self.information.retire(parameter, prior_std);
+        self.rows.clear(parameter);
+        if parameter >= FIRST_ONSET {
+            self.verdict.clear(parameter);
+        }
+        self.model[parameter] = 0.0;
+    }
+
+    fn take_block(&mut self, block: &MomentumBlock, sample: &ResolvedSample) -> bool {
+        let impulse = self.impulse.close();
+        if let Some(place) = self.onsets.open(self.verdict.named_onset()) {
+            self.retire(FIRST_ONSET + place, false);
+        }
+        self.onsets.advance();
+        self.remember_place(block, sample);
+        let (model, declared) = (&self.model, &self.declared_base);
+        let predicted = |features: &Parameters| {
+            features.dot(model) + features.fixed_rows::<BASE>(0).dot(declared)
+        };
+        let Some(mut row) = self.rows.push(block, &impulse, &self.onsets, predicted) else {
+            self.innovations.break_here();
+            return false;
+        };
+        row.observed -= row.features.fixed_rows::<BASE>(0).dot(declared);
+        if self.information.count() >= ROWS_MIN {
+            self.innovations.push(row.observed - row.features.dot(model));
+        }
+        self.information.push(&row, self.kept_per_row);
+        self.speed_min_mps = self.speed_min_mps.min(block.speed_mps);
+        self.speed_max_mps = self.speed_max_mps.max(block.speed_mps);
+        let resistance = self.declared.w0_n_per_kn(block.speed_mps) * block.impulse[1];
+        self.verdict.note_forces(&self.units(&impulse, block.impulse[1]), resistance);
+        self.judge(&(impulse / block.impulse[1]), block.speed_mps);
+        true
+    }
+
+    /// One value for each parameter beyond the base model: the bank's, and `onset` for each
+    /// onset that is open.
+    fn units(&self, bank: &Covariates, onset: f64) -> Parameters {
+        let mut units = Parameters::zeros();
+        units.fixed_rows_mut::<SUSPECTS>(BASE).copy_from(bank);
+        for place in (0..ONSETS).filter(|&place| self.onsets.age(place).is_some()) {
+            units[FIRST_ONSET + place] = onset;
+        }
+        units
+    }
+
+    /// Notes what the base model leaves at this place, unless another suspect explains it.
+    fn remember_place(&mut self, block: &MomentumBlock, sample: &ResolvedSample) {
+        let before = self.last_block.replace((sample.position_m, block.momentum));
+        let has_other_suspect = self.verdict.named().is_some_and(|named| {
+            !matches!(named.effect, EffectKind::LocalResistance | EffectKind::Unknown)
+        });
+        if block.is_first || has_other_suspect {
+            return;
+        }
+        // The row is centred where the block before ended.
+        let Some((Some(position_m), momentum)) = before else { return };
+        let known: f64 = (0..BASE)
+            .map(|i| block.impulse[1 + i] * (self.declared_base[i] + self.model[i]))
+            .sum();
+        let unexplained = block.impulse[0] - known - (block.momentum - momentum);
+        self.places.push(position_m, unexplained / block.impulse[1]);
+    }
+
+    fn judge(&mut self, covariates: &Covariates, speed_mps: f64) {
+        let Ok(base) = self.information.base() else { return self.reset() };
+        self.verdict.judge(&Evidence {
+            information: &self.information,
+            base: &base,
+            onsets: &self.onsets,
+            is_pressure_raised: self.pressure.is_raised(),
+            innovations: &self.innovations,
+        });
+        let suspect = self.verdict.named().and_then(|named| named.parameter);
+        // Without a suspect the joint solution has a parameter that no row sees.
+        let parameter = suspect.unwrap_or(parameter_of(Place::TunnelDrag));
+        let prior_std = if suspect.is_some() { suspect_of(parameter).prior_std } else { 1e-6 };
+        let Ok((values, covariance)) = self.information.joint(parameter, prior_std) else {
+            return self.reset();
+        };
+        self.model = Parameters::zeros();
+        self.model.fixed_rows_mut::<BASE>(0).copy_from(&values.fixed_rows::<BASE>(0));
+        self.model[parameter] = values[BASE];
+        let davis = (self.declared_base + self.model.fixed_rows::<BASE>(0)).fixed_rows::<3>(0)
+            .component_mul(&unscaling());
+        self.known = Davis { a: davis[0], b: davis[1], c: davis[2] };
+
+        let unit = self.units(covariates, 1.0)[parameter];
+        let (known, taken, variance) = self.rows.disturbance();
+        let value = known
+            - taken.dot(&self.model)
+            - taken.fixed_rows::<BASE>(0).dot(&self.declared_base)
+            + unit * values[BASE];
+        let powers = regressors(speed_mps);
+        let gradient = SVector::<f64, JOINT>::from_fn(|i, _| match i {
+            BASE => unit - taken[parameter],
+            i if i < powers.len() => -taken[i] - powers[i],
+            i => -taken[i],
+        });
+        let of_model = gradient.dot(&(covariance * gradient));
+        let total = self.verdict.scale() * (variance + of_model);
+        self.unexplained =
+            Unexplained { n_per_kn: value, std_n_per_kn: total.max(0.0).sqrt() };
+    }
+
+    /// Starts anew after a numerical failure.
+    fn reset(&mut self) {
+        self.information = Information::new(&self.base_std);
+        self.rows = Rows::new(&self.settings, self.declared);
+        self.verdict = Verdict::new(&self.settings, self.kept_per_row);
+        self.onsets = Onsets::new();
+        self.model = Parameters::zeros();
+        self.known = self.declared;
+        self.blocks.break_chain();
+        self.resets += 1;
+    }
+}
+
+impl Estimator for ResidualMonitor {
+    fn kind(&self) -> PipelineKind {
+        PipelineKind::ResidualMonitor
+    }
+
+    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+        self.weight_kn = sample.weight_kn;
+        if self.clock.push(sample.time_ns) {
+            self.start_run();
+        }
+        self.pressure.push(sample);
+        self.has_stopped |= sample.speed_mps < STANDSTILL_MPS;
+        let unit = match UnitSample::of(sample) {
+            Ok(unit) => unit,
+            Err(reason) => {
+                if reason == RejectionReason::WheelSlide {
+                    self.blocks.break_chain();
+                }
+                return Outcome::Rejected(reason);
+            }
+        };
+        if unit.speed_mps < self.settings.data.speed_min_mps {
+            self.blocks.break_chain();
+            return Outcome::Used;
+        }
+        if std::mem::take(&mut self.has_stopped) {
+            self.start_leg();
+        }
+        let closed = match self.blocks.push(&unit, &self.known) {
+            Ok(closed) => closed,
+            Err(reason) => return Outcome::Rejected(reason),
+        };
+        let Some(chain_start_ns) = self.blocks.chain_start_ns() else { return Outcome::Used };
+        let values = covariates(sample, &unit, &self.declared, &self.clock, &self.places);
+        self.impulse.push(chain_start_ns, unit.time_ns, &values);
+        match closed {
+            Some(block) if self.take_block(&block, sample) => Outcome::Updated,
+            _ => Outcome::Used,
+        }
+    }
+
+    fn write(&self, snapshot: &mut ParameterSnapshot) {
+        let force_n = self.unexplained.n_per_kn * self.weight_kn;
+        let std_n = self.unexplained.std_n_per_kn * self.weight_kn;
+        let covariance = Vector1::new(std_n * std_n);
+        write_parameters(
+            snapshot,
+            [Parameter::UnexplainedForce],
+            &Vector1::new(force_n),
+            &covariance,
+        );
+        let named = self.verdict.named();
+        let has_rows = self.information.count() >= ROWS_MIN;
+        match named {
+            _ if !has_rows => write_status(snapshot, Status::Unestimated, Reason::TooFewSamples),
+            Some(_) => write_status(snapshot, Status::Degraded, Reason::InnovationsNotWhite),
+            None => write_status(snapshot, Status::Estimated, Reason::None),
+        }
+        write_innovations(snapshot, &self.innovations);
+        snapshot.generation = self.resets;
+        snapshot.excited = u32::from(has_rows);
+        snapshot.unexplained_force_n = force_n;
+        snapshot.unexplained_force_std_n = std_n;
+        snapshot.suspected_effect = named.map_or(EffectKind::None, |named| named.effect) as u32;
+        snapshot.suspicion_evidence = named.map_or(0.0, |named| named.evidence);
+        if self.speed_max_mps > 0.0 {
+            snapshot.speed_min_mps = self.speed_min_mps;
+            snapshot.speed_max_mps = self.speed_max_mps;
+        }
+    }
+}

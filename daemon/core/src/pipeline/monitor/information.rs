@@ -1,0 +1,166 @@
+//! The likelihood ratio of every suspect against the base model.
+//!
+//! The rows are condensed into their information matrix. Each suspect is an alternative of its
+//! own: the base model and that one parameter, all others being 0. With the base's block
+//! factorised, `S = L_jj - w'w` and `s = h_j - w'u` (the Schur complement and its right side)
+//! give the parameter `s / (S + 1/sigma²)` and twice the log-likelihood ratio
+//! `s² / (S + 1/sigma²)`; `ln(1 + S sigma²)` is what the freedom of its size costs, so that the
+//! difference is twice the logarithm of the Bayes factor.
+
+use nalgebra::{Cholesky, Const, SMatrix, SVector};
+
+use super::rows::{Parameters, Row};
+use super::suspects::{BASE, PARAMETERS};
+use crate::filter::NotPositiveDefinite;
+
+/// One value for each parameter of the base model.
+pub type BaseVector = SVector<f64, BASE>;
+type BaseMatrix = SMatrix<f64, BASE, BASE>;
+
+/// Base parameters and a suspect.
+pub const JOINT: usize = BASE + 1;
+
+/// All rows, condensed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Information {
+    matrix: SMatrix<f64, PARAMETERS, PARAMETERS>,
+    side: Parameters,
+    square_sum: f64,
+    count: f64,
+    base_precision: BaseVector,
+}
+
+/// The base model solved.
+#[derive(Clone, Debug)]
+pub struct BaseSolution {
+    factor: Cholesky<f64, Const<BASE>>,
+    /// L⁻¹ of the right side.
+    reduced: BaseVector,
+}
+
+/// A suspect with the base model refitted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Alternative {
+    /// Its parameter.
+    pub value: f64,
+    /// Twice the log-likelihood ratio.
+    pub ratio: f64,
+    /// What the freedom of its size costs.
+    pub cost: f64,
+}
+
+impl Information {
+    /// No rows, and a prior standard deviation of each base parameter.
+    pub fn new(base_std: &BaseVector) -> Self {
+        Information {
+            matrix: SMatrix::zeros(),
+            side: Parameters::zeros(),
+            square_sum: 0.0,
+            count: 0.0,
+            base_precision: base_std.map(|std| 1.0 / (std * std)),
+        }
+    }
+
+    /// Takes in a row and forgets a little of the others.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    pub fn push(&mut self, row: &Row, kept: f64) {
+        self.matrix *= kept;
+        self.matrix.ger(row.weight, &row.features, &row.features, 1.0);
+        self.side *= kept;
+        self.side.axpy(row.weight * row.observed, &row.features, 1.0);
+        self.square_sum = kept * self.square_sum + row.weight * row.observed * row.observed;
+        self.count = kept * self.count + 1.0;
+    }
+
+    /// Rows taken in, the forgotten ones in part.
+    pub fn count(&self) -> f64 {
+        self.count
+    }
+
+    /// Frees a parameter's place for other rows: either it was 0 all along, or, with a prior
+    /// standard deviation, it was what the rows say and is integrated out.
+    pub fn retire(&mut self, parameter: usize, prior_std: Option<f64>) {
+        if let Some(std) = prior_std {
+            let column: Parameters = self.matrix.column(parameter).into_owned();
+            let pivot = column[parameter] + 1.0 / (std * std);
+            let share = self.side[parameter] / pivot;
+            self.matrix.ger(-1.0 / pivot, &column, &column, 1.0);
+            self.side.axpy(-share, &column, 1.0);
+            self.square_sum -= share * share * pivot;
+        }
+        self.matrix.row_mut(parameter).fill(0.0);
+        self.matrix.column_mut(parameter).fill(0.0);
+        self.side[parameter] = 0.0;
+    }
+
+    /// Solves the base model.
+    ///
+    /// # Errors
+    ///
+    /// When its information matrix is not positive definite.
+    pub fn base(&self) -> Result<BaseSolution, NotPositiveDefinite> {
+        let mut matrix: BaseMatrix = self.matrix.fixed_view::<BASE, BASE>(0, 0).into_owned();
+        for i in 0..BASE {
+            matrix[(i, i)] += self.base_precision[i];
+        }
+        let factor = matrix.cholesky().ok_or(NotPositiveDefinite)?;
+        let side: BaseVector = self.side.fixed_rows::<BASE>(0).into_owned();
+        let reduced =
+            factor.l_dirty().solve_lower_triangular(&side).ok_or(NotPositiveDefinite)?;
+        Ok(BaseSolution { reduced, factor })
+    }
+
+    /// A suspect beside the base model.
+    pub fn alternative(
+        &self,
+        base: &BaseSolution,
+        parameter: usize,
+        prior_std: f64,
+    ) -> Alternative {
+        let none = Alternative { value: 0.0, ratio: 0.0, cost: 0.0 };
+        let column: BaseVector = self.matrix.fixed_view::<BASE, 1>(0, parameter).into_owned();
+        let Some(reduced) = base.factor.l_dirty().solve_lower_triangular(&column) else {
+            return none;
+        };
+        let own = (self.matrix[(parameter, parameter)] - reduced.norm_squared()).max(0.0);
+        let rest = self.side[parameter] - reduced.dot(&base.reduced);
+        let precision = own + 1.0 / (prior_std * prior_std);
+        Alternative {
+            value: rest / precision,
+            ratio: rest * rest / precision,
+            cost: (own * prior_std * prior_std).ln_1p(),
+        }
+    }
+
+    /// Mean square of what base model and a suspect of such a ratio leave of the rows.
+    pub fn mean_square(&self, base: &BaseSolution, ratio: f64, prior_rows: f64) -> f64 {
+        let rest = (self.square_sum - base.reduced.norm_squared() - ratio).max(0.0);
+        (rest + prior_rows) / (self.count + prior_rows)
+    }
+
+    /// Base parameters and one suspect together: values and covariance.
+    ///
+    /// # Errors
+    ///
+    /// When their information matrix is not positive definite.
+    pub fn joint(
+        &self,
+        parameter: usize,
+        prior_std: f64,
+    ) -> Result<(SVector<f64, JOINT>, SMatrix<f64, JOINT, JOINT>), NotPositiveDefinite> {
+        let place = |i: usize| if i < BASE { i } else { parameter };
+        let mut matrix = SMatrix::<f64, JOINT, JOINT>::from_fn(|i, j| {
+            self.matrix[(place(i), place(j))]
+        });
+        for i in 0..BASE {
+            matrix[(i, i)] += self.base_precision[i];
+        }
+        matrix[(BASE, BASE)] += 1.0 / (prior_std * prior_std);
+        let side = SVector::<f64, JOINT>::from_fn(|i, _| self.side[place(i)]);
+        let factor = matrix.cholesky().ok_or(NotPositiveDefinite)?;
+        Ok((factor.solve(&side), factor.inverse()))
+    }
+}

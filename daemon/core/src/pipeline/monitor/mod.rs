@@ -1,0 +1,32 @@
+//! The pipeline `residual_monitor`: which force the model does not explain, and what it may be.
+//!
+//! Momentum blocks make a linear regression in a, b, c and what is not exactly known of the
+//! forces, as in [`crate::pipeline::resistance`]. Each suspect adds one column: what one unit of
+//! it would take off the momentum. All columns go through one whitener and into one information
+//! matrix, from which the likelihood ratio of every suspect against the base model follows at
+//! any time, a, b and c being refitted together with it.
+//!
+//! # Layout, in the order a sample takes
+//!
+//! - `settings`: thresholds and noise
+//! - `suspects`: the effects that are looked for
+//! - `covariates`, `place_memory`, `pressure`: what a sample says of each of them
+//! - `rows`: blocks to independent rows of unit variance
+//! - `onsets`: since when a brake may drag
+//! - `information`: the likelihood ratios
+//! - `verdict`: from ratios to a suspect
+//! - `estimator`: the pipeline around all of it
+
+mod covariates;
+mod estimator;
+mod information;
+mod onsets;
+mod place_memory;
+mod pressure;
+mod rows;
+mod settings;
+mod suspects;
+mod verdict;
+
+pub use estimator::ResidualMonitor;
+pub use settings::MonitorSettings;
