@@ -6,6 +6,7 @@
 //! - [`config`]: the daemon's configuration
 //! - [`dataset`]: recorded runs from disk
 //! - [`identify`]: the pipelines over recorded runs
+//! - [`grown`]: the model with its effects as train and track files
 //! - [`demo`]: the main job as a show
 //! - [`run`]: the daemon, every stage on one screen
 //! - [`runtime`]: its threads
@@ -15,6 +16,7 @@ pub mod cli;
 pub mod config;
 pub mod dataset;
 pub mod demo;
+pub mod grown;
 pub mod identify;
 pub mod replay;
 pub mod run;

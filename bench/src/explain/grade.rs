@@ -92,6 +92,12 @@ fn share(simulated: &SimulatedDataset, explanation: &Explanation) -> Option<f64>
     if simulated.effects.is_empty() {
         return None;
     }
+    // A train too weak for its line stays where it is, and there is nothing to predict.
+    let holdout = simulated.runs.iter().filter(|run| run.plan.is_holdout);
+    let moving = holdout.flat_map(|run| &run.samples).filter(|sample| sample.speed_mps > 0.5);
+    if moving.count() == 0 {
+        return None;
+    }
     let oracle = score(simulated).full_run.true_mps;
     let (before, after) = (explanation.answer.rmse_before?, explanation.answer.rmse_after?);
     (before > 1.2 * oracle).then(|| (before - after) / (before - oracle))

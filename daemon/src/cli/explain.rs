@@ -12,6 +12,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::Failure;
 use super::output::write_json;
 use crate::dataset;
+use crate::grown::write_grown;
 
 /// Find what the declared model leaves, trace it to an effect, and score the grown model.
 #[derive(Debug, Args)]
@@ -24,6 +25,9 @@ pub struct ExplainArguments {
     /// Write the speeds that the model with the effect predicts for the holdout runs
     #[arg(long, value_name = "DIR")]
     predictions: Option<PathBuf>,
+    /// Write the grown model as train.toml and track.toml into this folder
+    #[arg(long, value_name = "DIR")]
+    grown: Option<PathBuf>,
 }
 
 /// Explains a dataset and prints the answer.
@@ -47,6 +51,17 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
     bar.finish_and_clear();
     if let Some(folder) = &arguments.predictions {
         explanation.answer.predictions = write_predictions(folder, &explanation)?;
+    }
+    if let Some(folder) = &arguments.grown {
+        let grown = write_grown(&arguments.dataset, &explanation, folder)
+            .map_err(|error| Failure::Work(error.to_string()))?;
+        for file in &grown.files {
+            eprintln!("grown model: {}", file.display());
+        }
+        if !grown.not_expressed.is_empty() {
+            let kinds = grown.not_expressed.join(", ");
+            eprintln!("the files cannot express {kinds}: use the answer of --json for it");
+        }
     }
     match &arguments.json {
         Some(file) => write_json(file, &explanation.answer)?,

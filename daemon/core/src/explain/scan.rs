@@ -73,13 +73,18 @@ impl<'a> Scan<'a> {
         sample.weight_kn / sample.inertial_mass_kg
     }
 
-    /// Time in s of used motion where a condition holds.
+    /// Time in s of used motion where a condition on the sample holds.
     pub fn seconds_where(&self, condition: impl Fn(&RunData, &ResolvedSample) -> bool) -> f64 {
+        self.bin_seconds_where(|run, i| condition(run, &run.samples()[i]))
+    }
+
+    /// Time in s of used motion where a condition on run and sample number holds.
+    pub fn bin_seconds_where(&self, condition: impl Fn(&RunData, usize) -> bool) -> f64 {
         let mut total_s = 0.0;
         for run in &self.problem.runs {
             let time_s = run.recording.time_s();
             for bin in &run.bins {
-                if condition(run, &run.samples()[bin.middle()]) {
+                if condition(run, bin.middle()) {
                     total_s += time_s[bin.end - 1] - time_s[bin.first];
                 }
             }

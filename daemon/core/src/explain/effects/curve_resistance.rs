@@ -51,6 +51,10 @@ impl Hypothesis for Curves {
         &PARAMETERS
     }
 
+    fn none(&self) -> f64 {
+        self.declared_k
+    }
+
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
         (parameters[0] - self.declared_k).abs() > 100.0
     }

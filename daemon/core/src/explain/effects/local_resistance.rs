@@ -36,15 +36,23 @@ impl Effect for LocalResistance {
         let Some(found) = find(scan, &shape, inside, true) else {
             return Proposal::Candidates(Vec::new());
         };
-        let hypothesis = Local {
-            intervals_m: found.intervals_m,
-            inside,
-            runs: found.runs.map(|runs| {
+        let candidate = |runs: Option<&Vec<usize>>| {
+            let files = |runs: &Vec<usize>| -> Vec<String> {
                 runs.iter().map(|&index| scan.problem.runs[index].file.clone()).collect()
-            }),
-            choice_cost: found.choice_cost,
+            };
+            let hypothesis = Local {
+                intervals_m: found.intervals_m.clone(),
+                inside,
+                runs: runs.map(files),
+                choice_cost: found.choice_cost,
+            };
+            Candidate::new(hypothesis, vec![found.estimate])
         };
-        Proposal::Candidates(vec![Candidate::new(hypothesis, vec![found.estimate])])
+        let mut candidates = vec![candidate(found.runs.as_ref())];
+        if found.runs.is_some() {
+            candidates.push(candidate(None));
+        }
+        Proposal::Candidates(candidates)
     }
 }
 

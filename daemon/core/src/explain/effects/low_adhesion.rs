@@ -117,6 +117,10 @@ fn places(
         && let Some(found) = find(scan, shape, Inside::Centre, true)
     {
         candidates.push(candidate(&found, Some(found.intervals_m.clone())));
+        if found.runs.is_some() {
+            let all = Found { runs: None, ..found };
+            candidates.push(candidate(&all, Some(all.intervals_m.clone())));
+        }
     }
     candidates
 }

@@ -269,6 +269,10 @@ impl Hypothesis for Masses {
         self.choice_cost
     }
 
+    fn none(&self) -> f64 {
+        1.0
+    }
+
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
         parameters.iter().any(|factor| (factor - 1.0).abs() > MATERIAL)
     }

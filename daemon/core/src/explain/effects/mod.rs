@@ -138,6 +138,11 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         true
     }
 
+    /// The value of each parameter at which there is no effect.
+    fn none(&self) -> f64 {
+        0.0
+    }
+
     /// Parameters by the names of the answer.
     fn report(&self, context: &ReportContext) -> Reported {
         let mut reported = Reported::default();

@@ -14,6 +14,8 @@ const GRADIENT: [Parameter; 1] = [Parameter::new("gradient_error_permille", (-30
 const SHARE: [Parameter; 1] = [Parameter::new("force_error_share", (-0.6, 0.6), 0.002)];
 /// Cells into which the range of a covariate is cut.
 const CELLS: usize = 20;
+/// Motion in s that a band must hold.
+const BAND_MIN_S: f64 = 60.0;
 /// The library comes first: a band must explain more than a known kind.
 const OUTSIDE_COST: f64 = 10.0;
 
@@ -145,13 +147,24 @@ fn best_band(scan: &Scan, covariate: Covariate) -> Option<(f64, Candidate)> {
             })
         })
         .collect();
+    let cell_seconds: Vec<f64> = (0..count)
+        .map(|k| {
+            let inside = |run: &RunData, i: usize| {
+                let value = covariate.value(run, i, &files);
+                value.is_some_and(|value| value >= edge(k) && value < edge(k + 1))
+            };
+            scan.bin_seconds_where(inside)
+        })
+        .collect();
     let mut best: Option<(f64, f64, usize, usize)> = None;
     for from in 0..count {
         let mut sum = Tuple::zero(scan.fit.theta.len());
+        let mut seconds_s = 0.0;
         for (to, cell) in cells.iter().enumerate().skip(from) {
             sum.add(cell);
             let (gain, estimate) = scan.gain(&sum);
-            if best.is_none_or(|best| gain > best.0) {
+            seconds_s += cell_seconds[to];
+            if seconds_s > BAND_MIN_S && best.is_none_or(|best| gain > best.0) {
                 best = Some((gain, estimate, from, to + 1));
             }
         }
@@ -182,7 +195,9 @@ impl Hypothesis for Band {
             Covariate::TractionForce | Covariate::BrakeForce => 0.02,
             _ => 0.1,
         };
-        parameters[0].abs() > least
+        // At its bound a band stands for something of another form.
+        let most = 0.9 * self.covariate.parameters()[0].upper;
+        (least..most).contains(&parameters[0].abs())
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {

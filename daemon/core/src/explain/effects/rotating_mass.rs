@@ -38,6 +38,10 @@ impl Hypothesis for Gamma {
         &PARAMETERS
     }
 
+    fn none(&self) -> f64 {
+        self.declared
+    }
+
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
         (parameters[0] - self.declared).abs() > 0.01
     }

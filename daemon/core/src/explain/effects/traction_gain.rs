@@ -38,6 +38,10 @@ impl Hypothesis for Gain {
         &PARAMETERS
     }
 
+    fn none(&self) -> f64 {
+        1.0
+    }
+
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
         (parameters[0] - 1.0).abs() > 0.01
     }

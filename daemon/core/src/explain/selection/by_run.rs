@@ -1,6 +1,7 @@
 //! The run as the unit of evidence.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::explain::evidence::Fit;
 
@@ -44,6 +45,17 @@ pub fn leave_one_run_out(smaller: &Fit, larger: &Fit) -> Held {
     }
 }
 
+/// The form of an effect (a train of one piece, averages over bins) is itself good to this share
+/// of its size.
+const FORM_SHARE: f64 = 0.015;
+
+/// Student's 97.5 % quantile for the runs' degrees of freedom over the normal one, so that
+/// 1.96 standard deviations make a 95 % interval.
+fn few_runs_factor(runs: usize) -> f64 {
+    let freedom = (runs as f64 - 1.0).max(2.0);
+    StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |student| student.inverse_cdf(0.975) / 1.96)
+}
+
 /// Standard deviations of all parameters, and their covariance.
 ///
 /// The likelihood's covariance is enlarged where the scores scatter more from run to run than it
@@ -64,7 +76,15 @@ pub fn deviations(fit: &Fit) -> (Vec<f64>, DMatrix<f64>) {
     let own: Vec<f64> = (0..count).map(|i| robust[(i, i)] / covariance[(i, i)]).collect();
     let pooled = own.iter().sum::<f64>() / count as f64;
     let enlarged: Vec<f64> = own.iter().map(|own| (0.5 * (own + pooled)).max(1.0)).collect();
-    let deviations = (0..count).map(|i| (covariance[(i, i)] * enlarged[i]).sqrt()).collect();
+    let few = few_runs_factor(fit.runs.len());
+    let mut deviations: Vec<f64> =
+        (0..count).map(|i| few * (covariance[(i, i)] * enlarged[i]).sqrt()).collect();
+    for (effect, range) in fit.model.effects.iter().zip(fit.model.ranges()) {
+        for i in range {
+            let form = FORM_SHARE * (fit.theta[i] - effect.none());
+            deviations[i] = deviations[i].hypot(form);
+        }
+    }
     let scaled = DMatrix::from_fn(count, count, |i, j| {
         covariance[(i, j)] * (enlarged[i] * enlarged[j]).sqrt()
     });

@@ -228,9 +228,6 @@ impl Search<'_> {
         if own.windows.is_some() || own.runs.is_some() || held.runs < 3 {
             return true;
         }
-        if std::env::var("HELD").is_ok() {
-            eprintln!("held {:?} {:?} ev {}", trial.kind, held, trial.evidence);
-        }
         held.gain > 0.5 * ACCEPT && 2 * held.better > held.runs
     }
 
