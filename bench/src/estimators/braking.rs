@@ -17,7 +17,7 @@ use nalgebra::RowVector4;
 
 use super::em_peers::{textbook_kalman_em, textbook_particle_em};
 use super::measure::{Agreement, Case, Contender};
-use super::textbook::{TextbookFilter, TextbookStep, smooth};
+use super::textbook::{Said, TextbookFilter, TextbookStep, smooth};
 
 /// Noise of motion and measurement (Xie 2019), as variances.
 pub const NOISE: MotionNoise = MotionNoise {
@@ -156,9 +156,13 @@ fn textbook_first(model: &TrackerModel, first: &Observation) -> TextbookFilter<S
     TextbookFilter { mean, covariance }
 }
 
+/// Which form the textbook's filter takes its measurements in.
+type Measure = fn(&mut TextbookFilter<STATES>, &RowVector4<f64>, f64, f64) -> Said;
+
 /// A step of the textbook's extended Kalman filter, with the same motion.
 fn textbook_step(
     filter: &mut TextbookFilter<STATES>,
+    measure: Measure,
     model: &TrackerModel,
     observed: &Observation,
 ) -> TextbookStep<STATES> {
@@ -167,7 +171,7 @@ fn textbook_step(
     filter.predict(mean, &transition, &added);
     let predicted = *filter;
     let row = RowVector4::new(1.0, 0.0, 0.0, 0.0);
-    filter.measure(&row, observed.distance_m, model.noise.measured_distance_m2);
+    measure(filter, &row, observed.distance_m, model.noise.measured_distance_m2);
     TextbookStep { predicted, filtered: *filter, transition }
 }
 
@@ -195,7 +199,8 @@ fn window_smoother(windows: &Windows) -> Case {
                 transition: nalgebra::SMatrix::identity(),
             }];
             for observed in &window[1..] {
-                forward.push(textbook_step(&mut filter, &of_peer, observed));
+                let measure = TextbookFilter::measure;
+                forward.push(textbook_step(&mut filter, measure, &of_peer, observed));
             }
             let smoothed = smooth(&forward).expect("covariances have inverses");
             let lagged = &smoothed[SAMPLES - 1 - LAG];
@@ -219,19 +224,27 @@ fn filter_step() -> Case {
         }
         tracker.state().expect("it has begun").mean.iter().take(3).copied().collect()
     });
-    let mut peer = contender("textbook EKF", &data, move |window| {
-        let mut filter = textbook_first(&of_peer, &window[0]);
-        for observed in &window[1..] {
-            textbook_step(&mut filter, &of_peer, observed);
-        }
-        filter.mean.iter().take(3).copied().collect()
-    });
-    (ours.updates, peer.updates) = (steps, steps);
+    let peer = |name: &str, measure: Measure| {
+        let model = of_peer.clone();
+        let mut peer = contender(name, &data, move |window| {
+            let mut filter = textbook_first(&model, &window[0]);
+            for observed in &window[1..] {
+                textbook_step(&mut filter, measure, &model, observed);
+            }
+            filter.mean.iter().take(3).copied().collect()
+        });
+        peer.updates = steps;
+        peer
+    };
+    ours.updates = steps;
     Case {
         name: "braking EKF step".into(),
         target_ns: None,
         ours,
-        peers: vec![peer],
+        peers: vec![
+            peer("textbook EKF", TextbookFilter::measure),
+            peer("textbook EKF, Joseph form", TextbookFilter::measure_joseph),
+        ],
         agreement: SAME,
     }
 }

@@ -69,6 +69,7 @@ fn plain(rows: &Rows) -> Case {
         ours: contender("ours", rows, |rows| ours_rls(rows, Forgetting::None)),
         peers: vec![
             contender("textbook, static", rows, textbook_rls),
+            contender("textbook, Joseph form", rows, joseph_rls),
             contender("textbook, dynamic", rows, dynamic_rls),
         ],
         agreement: SAME,
@@ -82,6 +83,19 @@ fn textbook_rls(rows: &[Row]) -> Vector3<f64> {
         let gain = p * features / (1.0 + (features.transpose() * p * features)[0]);
         theta += gain * (observed - features.dot(&theta));
         p = (Matrix3::identity() - gain * features.transpose()) * p;
+    }
+    theta
+}
+
+/// As robust as ours: P = (I - K x') P (I - K x')' + K K'.
+fn joseph_rls(rows: &[Row]) -> Vector3<f64> {
+    let mut theta = Vector3::zeros();
+    let mut p = Matrix3::identity() * START_VARIANCE;
+    for (features, observed) in rows {
+        let gain = p * features / (1.0 + (features.transpose() * p * features)[0]);
+        theta += gain * (observed - features.dot(&theta));
+        let keep = Matrix3::identity() - gain * features.transpose();
+        p = keep * p * keep.transpose() + gain * gain.transpose();
     }
     theta
 }

@@ -3,9 +3,13 @@
 //! Every contender of a case works on the same data. A round times each of them once, in an
 //! order that turns from round to round, so that a busy machine slows all alike; ratios are
 //! taken round by round. Before any timing the answers must agree.
+//!
+//! The clock is the thread's processor time: what other programs take meanwhile does not count.
 
 use std::hint::black_box;
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use rustix::time::{ClockId, clock_gettime};
 
 /// One way to do the work of a case.
 pub struct Contender {
@@ -197,25 +201,30 @@ impl Case {
 /// Passes that fill a slice of time; doubles as the warm-up.
 fn calibrate(contender: &mut Contender, effort: &Effort) -> usize {
     let mut passes = 1;
-    loop {
-        let start = Instant::now();
-        for _ in 0..passes {
-            black_box((contender.pass)());
-        }
-        if start.elapsed() >= effort.slice {
-            return passes;
-        }
+    while processor_time(contender, passes) < effort.slice {
         passes *= 2;
     }
+    passes
 }
 
 /// Time of an update in ns.
 fn time(contender: &mut Contender, passes: usize) -> f64 {
-    let start = Instant::now();
+    let updates = (passes * contender.updates) as f64;
+    processor_time(contender, passes).as_secs_f64() * 1e9 / updates
+}
+
+fn processor_time(contender: &mut Contender, passes: usize) -> Duration {
+    let start = now();
     for _ in 0..passes {
         black_box((contender.pass)());
     }
-    start.elapsed().as_secs_f64() * 1e9 / (passes * contender.updates) as f64
+    now().saturating_sub(start)
+}
+
+/// Processor time of this thread so far.
+fn now() -> Duration {
+    let time = clock_gettime(ClockId::ThreadCPUTime);
+    Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
 }
 
 #[cfg(test)]

@@ -54,6 +54,21 @@ impl<const N: usize> TextbookFilter<N> {
     }
 }
 
+impl<const N: usize> TextbookFilter<N> {
+    /// As [`TextbookFilter::measure`] with P = (I - K H) P (I - K H)' + K R K', as textbooks
+    /// advise where rounding matters.
+    pub fn measure_joseph(&mut self, row: &RowSVector<f64, N>, measured: f64, noise: f64) -> Said {
+        let variance = (row * self.covariance * row.transpose())[0] + noise;
+        let gain = self.covariance * row.transpose() / variance;
+        let innovation = measured - (row * self.mean)[0];
+        self.mean += gain * innovation;
+        let keep = SMatrix::<f64, N, N>::identity() - gain * row;
+        self.covariance =
+            keep * self.covariance * keep.transpose() + gain * gain.transpose() * noise;
+        Said { innovation, variance }
+    }
+}
+
 /// A step of a forward pass: before its measurement, after it, and how it was reached.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextbookStep<const N: usize> {

@@ -105,10 +105,12 @@ impl<const N: usize> JointState<N> {
         let gain = column / step.variance;
         self.mean += gain * step.innovation;
         // (I - K e') P (I - K e')' + K R K', the row and column of P being `column`.
-        let crossed = gain * column.transpose();
-        let joseph = self.covariance - crossed - crossed.transpose()
-            + gain * gain.transpose() * step.variance;
-        self.covariance = joseph;
+        for j in 0..N {
+            for k in 0..N {
+                let crossed = gain[k] * column[j] + column[k] * gain[j];
+                self.covariance[(k, j)] += gain[k] * gain[j] * step.variance - crossed;
+            }
+        }
         Ok(step)
     }
 }

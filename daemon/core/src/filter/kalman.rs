@@ -2,6 +2,8 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use super::rank_one::joseph;
+
 /// Why a step of a filter failed; the belief is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FilterError {
@@ -99,10 +101,8 @@ impl<const N: usize> GaussianState<N> {
     /// Applies a measurement in Joseph form, which keeps the covariance positive.
     pub fn apply(&mut self, update: &ScalarUpdate<N>) {
         self.mean += update.gain * update.innovation;
-        let keep = SMatrix::<f64, N, N>::identity() - update.gain * update.row.transpose();
-        let joseph = keep * self.covariance * keep.transpose()
-            + update.gain * update.gain.transpose() * update.noise_variance;
-        self.covariance = (joseph + joseph.transpose()) * 0.5;
+        let spread = self.covariance * update.row;
+        joseph(&mut self.covariance, &update.row, &spread, &update.gain, update.noise_variance);
     }
 
     /// Standard deviation of one component.

@@ -15,7 +15,7 @@
 //! - [`fixed_lag`]: what later measurements say of an earlier state, without a backward pass
 //! - [`rts`]: fixed-interval smoothing by Rauch, Tung and Striebel
 //! - [`particle`], [`random`]: particle filter, marginal particle smoother and their seeded generator
-//! - [`lanes`]: sums and powers over slices
+//! - [`lanes`]: sums and powers over slices; `rank_one`: the covariance after a scalar measurement
 
 mod bounded;
 pub mod drifting_level;
@@ -31,6 +31,7 @@ mod median;
 mod mils;
 pub mod particle;
 pub mod random;
+mod rank_one;
 mod rls;
 pub mod rts;
 pub mod square_root;

@@ -3,6 +3,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::NotPositiveDefinite;
+use super::rank_one::joseph;
 
 /// How old rows lose weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,14 +92,40 @@ impl<const N: usize> Rls<N> {
         features: &SVector<f64, N>,
         factor: f64,
     ) -> Result<(), NotPositiveDefinite> {
-        let solved = self.covariance.cholesky().ok_or(NotPositiveDefinite)?.solve(features);
-        let held = features.dot(&solved);
+        let held = information_along(&self.covariance, features).ok_or(NotPositiveDefinite)?;
         if held > 0.0 {
             let step = (1.0 - factor) / (factor * held);
             self.covariance.ger(step, features, features, 1.0);
         }
         Ok(())
     }
+}
+
+/// x' P^-1 x by P = L D L'; `None` unless P is positive definite.
+fn information_along<const N: usize>(
+    covariance: &SMatrix<f64, N, N>,
+    along: &SVector<f64, N>,
+) -> Option<f64> {
+    let mut rest = *covariance;
+    let mut solved = *along;
+    let mut held = 0.0;
+    for k in 0..N {
+        let pivot = rest[(k, k)];
+        // Also refuses NaN.
+        if !(pivot > 0.0) {
+            return None;
+        }
+        let inverse = 1.0 / pivot;
+        held += solved[k] * solved[k] * inverse;
+        for j in k + 1..N {
+            let factor = rest[(j, k)] * inverse;
+            solved[j] -= factor * solved[k];
+            for i in j..N {
+                rest[(i, j)] -= factor * rest[(i, k)];
+            }
+        }
+    }
+    Some(held)
 }
 
 /// One row of recursive least squares, in Joseph form: P stays symmetric and positive.
@@ -114,13 +141,9 @@ pub(super) fn scalar_update<const N: usize>(
     if !(variance >= 1.0 && variance.is_finite() && innovation.is_finite()) {
         return Err(NotPositiveDefinite);
     }
-    let gain = spread / variance;
+    let gain = spread * (1.0 / variance);
     *estimate += gain * innovation;
-    // (I - L phi') P (I - L phi')' + L L', expanded by columns of P (I - L phi')'.
-    let reduced = *covariance - spread * gain.transpose();
-    let column = reduced.transpose() * features;
-    let joseph = reduced - gain * column.transpose() + gain * gain.transpose();
-    *covariance = (joseph + joseph.transpose()) * 0.5;
+    joseph(covariance, features, &spread, &gain, 1.0);
     Ok(Step { innovation, variance })
 }
 
@@ -193,6 +216,17 @@ mod tests {
         assert!(spread(&directional) < 1.5 * before, "across the cruise nothing is forgotten");
         assert!(spread(&exponential) > 1e5 * before, "plain forgetting winds up");
         assert!((directional.estimate().dot(&cruise) - 1.7).abs() < 1e-6, "along it all is new");
+    }
+
+    #[test]
+    fn information_along_a_direction_is_that_of_the_inverse() {
+        let covariance = Matrix3::new(4.0, 1.0, -0.5, 1.0, 3.0, 0.7, -0.5, 0.7, 2.0);
+        let along = Vector3::new(0.3, -1.0, 2.0);
+        let expected = (along.transpose() * covariance.try_inverse().unwrap() * along)[0];
+        let found = information_along(&covariance, &along).unwrap();
+        assert!((found - expected).abs() < 1e-12);
+        assert_eq!(information_along(&-covariance, &along), None);
+        assert_eq!(information_along(&(covariance * f64::NAN), &along), None);
     }
 
     #[test]

@@ -60,8 +60,9 @@ impl<const N: usize> CovarianceFactor<N> {
             let weight = along[k];
             let next_sum = sum + weight * weight;
             let next_root = next_sum.sqrt();
-            let shrink = root / next_root;
-            let shift = weight / (root * next_root);
+            let inverse = 1.0 / (root * next_root);
+            let shrink = sum * inverse;
+            let shift = weight * inverse;
             for i in k..N {
                 let entry = lower[(i, k)];
                 lower[(i, k)] = shrink * entry - shift * carried[i];
