@@ -174,6 +174,11 @@ impl Tracker {
         }
     }
 
+    /// The state after the last observation; `None` before the first.
+    pub fn state(&self) -> Option<&GaussianState<STATES>> {
+        self.state.as_ref()
+    }
+
     fn remember(&mut self, demand: f64) {
         if let Some(state) = &self.state {
             let (shape, _) = self.model.law.at(state.mean[SPEED], demand);
