@@ -143,7 +143,7 @@ impl<const N: usize> DriftingLevel<N> {
         let root_weight = weight.sqrt();
         let mut rest: [f64; N] = std::array::from_fn(|i| row[i] * root_weight);
         let mut rest_value = value * root_weight;
-        let (mut log_ratio, mut is_free) = (0.0, false);
+        let (mut cosines, mut is_free) = (1.0, false);
         for i in 0..N {
             if rest[i] == 0.0 {
                 continue;
@@ -156,13 +156,13 @@ impl<const N: usize> DriftingLevel<N> {
             self.target[i] = cosine * own + sine * rest_value;
             rest_value = cosine * rest_value - sine * own;
             if before > 0.0 {
-                log_ratio -= 2.0 * cosine.ln();
+                cosines *= cosine;
             } else {
                 is_free = true;
             }
         }
         let normalised = if is_free { None } else { Some(rest_value) };
-        Innovation { normalised, log_variance_ratio: log_ratio }
+        Innovation { normalised, log_variance_ratio: -2.0 * cosines.ln() }
     }
 
     /// Level, bias and parameters; the level is 0 while it is free.

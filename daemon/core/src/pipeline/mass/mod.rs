@@ -1,6 +1,13 @@
 //! Mass, and the resistances that have to be known for it (Wang 2022).
 //!
-//! - [`MassKalman`]: Kalman filters [v, 1/m, bias]
+//! # Layout
+//!
+//! - [`motion`], [`section`], [`line_resistance`], [`speed_basis`], [`bias_model`]: what a sample
+//!   gives, and the parts of the model
+//! - [`StagedDescent`]: the paper's stages, by normalised gradient descent on sums over all
+//!   samples, or as printed ([`printed_descent`])
+//! - [`JointLeastSquares`]: resistance and mass together, on [`integrals`] of motion
+//! - [`MassKalman`]: mass by Kalman filters [v, 1/m, bias], a [`bias_bank`] of them
 
 pub mod bias_bank;
 pub mod bias_model;
