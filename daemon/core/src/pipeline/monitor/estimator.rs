@@ -11,9 +11,7 @@ use super::place_memory::PlaceMemory;
 use super::pressure::ReleasedPressure;
 use super::rows::{Parameters, Rows};
 use super::settings::MonitorSettings;
-use super::suspects::{
-    BANK, BASE, FIRST_ONSET, ONSETS, Place, SUSPECTS, parameter_of, suspect_of,
-};
+use super::suspects::{BANK, BASE, FIRST_ONSET, ONSETS, Place, SUSPECTS, parameter_of, suspect_of};
 use super::verdict::{Evidence, Verdict};
 use crate::force::ResolvedSample;
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
@@ -205,9 +203,8 @@ impl ResidualMonitor {
         }
         // The row is centred where the block before ended.
         let Some((Some(position_m), momentum)) = before else { return };
-        let known: f64 = (0..BASE)
-            .map(|i| block.impulse[1 + i] * (self.declared_base[i] + self.model[i]))
-            .sum();
+        let known: f64 =
+            (0..BASE).map(|i| block.impulse[1 + i] * (self.declared_base[i] + self.model[i])).sum();
         let unexplained = block.impulse[0] - known - (block.momentum - momentum);
         self.places.push(position_m, unexplained / block.impulse[1]);
     }
@@ -231,16 +228,16 @@ impl ResidualMonitor {
         self.model = Parameters::zeros();
         self.model.fixed_rows_mut::<BASE>(0).copy_from(&values.fixed_rows::<BASE>(0));
         self.model[parameter] = values[BASE];
-        let davis = (self.declared_base + self.model.fixed_rows::<BASE>(0)).fixed_rows::<3>(0)
+        let davis = (self.declared_base + self.model.fixed_rows::<BASE>(0))
+            .fixed_rows::<3>(0)
             .component_mul(&unscaling());
         self.known = Davis { a: davis[0], b: davis[1], c: davis[2] };
 
         let unit = self.units(covariates, 1.0)[parameter];
         let (known, taken, variance) = self.rows.disturbance();
-        let value = known
-            - taken.dot(&self.model)
-            - taken.fixed_rows::<BASE>(0).dot(&self.declared_base)
-            + unit * values[BASE];
+        let value =
+            known - taken.dot(&self.model) - taken.fixed_rows::<BASE>(0).dot(&self.declared_base)
+                + unit * values[BASE];
         let powers = regressors(speed_mps);
         let gradient = SVector::<f64, JOINT>::from_fn(|i, _| match i {
             BASE => unit - taken[parameter],
@@ -249,8 +246,7 @@ impl ResidualMonitor {
         });
         let of_model = gradient.dot(&(covariance * gradient));
         let total = self.verdict.scale() * (variance + of_model);
-        self.unexplained =
-            Unexplained { n_per_kn: value, std_n_per_kn: total.max(0.0).sqrt() };
+        self.unexplained = Unexplained { n_per_kn: value, std_n_per_kn: total.max(0.0).sqrt() };
     }
 
     /// Starts anew after a numerical failure.

@@ -108,8 +108,7 @@ impl Information {
         }
         let factor = matrix.cholesky().ok_or(NotPositiveDefinite)?;
         let side: BaseVector = self.side.fixed_rows::<BASE>(0).into_owned();
-        let reduced =
-            factor.l_dirty().solve_lower_triangular(&side).ok_or(NotPositiveDefinite)?;
+        let reduced = factor.l_dirty().solve_lower_triangular(&side).ok_or(NotPositiveDefinite)?;
         Ok(BaseSolution { reduced, factor })
     }
 
@@ -152,9 +151,8 @@ impl Information {
         prior_std: f64,
     ) -> Result<(SVector<f64, JOINT>, SMatrix<f64, JOINT, JOINT>), NotPositiveDefinite> {
         let place = |i: usize| if i < BASE { i } else { parameter };
-        let mut matrix = SMatrix::<f64, JOINT, JOINT>::from_fn(|i, j| {
-            self.matrix[(place(i), place(j))]
-        });
+        let mut matrix =
+            SMatrix::<f64, JOINT, JOINT>::from_fn(|i, j| self.matrix[(place(i), place(j))]);
         for i in 0..BASE {
             matrix[(i, i)] += self.base_precision[i];
         }

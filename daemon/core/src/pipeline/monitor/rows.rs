@@ -105,11 +105,8 @@ impl Rows {
     ) -> Option<Row> {
         let mut observed = SVector::<f64, COLUMNS>::zeros();
         observed[0] = block.momentum;
-        let sighting = |variance: f64| Sighting {
-            direction: Vector2::new(1.0, 0.0),
-            observed,
-            variance,
-        };
+        let sighting =
+            |variance: f64| Sighting { direction: Vector2::new(1.0, 0.0), observed, variance };
         let (columns, variance) = self.whitener.innovation(&sighting(block.momentum_variance));
         if !(variance > 0.0 && variance.is_finite()) {
             return None;
@@ -130,7 +127,8 @@ impl Rows {
             noise: SMatrix::zeros(),
         };
         let kept = (-duration_s / self.time_s).exp();
-        let std = self.floor_n_per_kn.hypot(self.share * self.declared.w0_n_per_kn(block.speed_mps));
+        let std =
+            self.floor_n_per_kn.hypot(self.share * self.declared.w0_n_per_kn(block.speed_mps));
         step.transition[(DISTURBANCE, DISTURBANCE)] = kept;
         step.noise[(DISTURBANCE, DISTURBANCE)] = std * std * (1.0 - kept * kept);
         step

@@ -198,8 +198,8 @@ impl Verdict {
         let lasted = if is_same(leading, self.candidate.0) { self.candidate.1 + 1 } else { 1 };
         self.candidate = (leading, lasted);
         let before = self.named.and_then(|named| named.parameter);
-        let stays = before
-            .filter(|&parameter| self.net[parameter] > STAYS_SHARE * self.evidence_min);
+        let stays =
+            before.filter(|&parameter| self.net[parameter] > STAYS_SHARE * self.evidence_min);
         let takes_over = leading.filter(|&parameter| {
             let is_ahead =
                 stays.is_none_or(|old| self.net[parameter] > self.net[old] + TAKES_OVER_BY);
