@@ -71,10 +71,21 @@ pub fn grade(simulated: &SimulatedDataset, explanation: &Explanation) -> Grade {
         .iter()
         .map(|effect| {
             let parameters = serde_json::to_string(&effect.parameters).unwrap_or_default();
-            format!("{} -{:.3} p {:.1e} {parameters}", effect.kind, effect.error_reduction, effect.p_value)
+            format!(
+                "{} -{:.3} p {:.1e} {parameters}",
+                effect.kind, effect.error_reduction, effect.p_value
+            )
         })
         .collect();
-    Grade { details, named, verdict: verdict.into(), is_right, iou, parameters, share: share(simulated, explanation) }
+    Grade {
+        details,
+        named,
+        verdict: verdict.into(),
+        is_right,
+        iou,
+        parameters,
+        share: share(simulated, explanation),
+    }
 }
 
 fn share(simulated: &SimulatedDataset, explanation: &Explanation) -> Option<f64> {
@@ -97,7 +108,8 @@ fn interval_iou(one: &[[f64; 2]], other: &[[f64; 2]]) -> f64 {
     let ends = one.iter().chain(other).flatten().copied();
     let low = ends.clone().fold(f64::INFINITY, f64::min);
     let high = ends.fold(f64::NEG_INFINITY, f64::max);
-    let inside = |set: &[[f64; 2]], at: f64| set.iter().any(|[from, to]| (*from..*to).contains(&at));
+    let inside =
+        |set: &[[f64; 2]], at: f64| set.iter().any(|[from, to]| (*from..*to).contains(&at));
     let (mut both, mut either) = (0, 0);
     const POINTS: usize = 20_000;
     for k in 0..POINTS {
@@ -182,15 +194,12 @@ fn graded(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Vec<Par
         Effect::ActuatorDelay { delay_s, lag_s } => {
             vec![one("delay_s", *delay_s, 0.0), one("lag_s", *lag_s, 0.0)]
         }
-        Effect::RotatingMass { rotating_mass_factor } => vec![one(
-            "rotating_mass_factor",
-            *rotating_mass_factor,
-            declared.rotating_mass_factor,
-        )],
-        Effect::BearingTemperature { delta_a_n_per_kn, tau_s } => vec![
-            one("delta_a_n_per_kn", *delta_a_n_per_kn, 0.0),
-            one("tau_s", *tau_s, 0.0),
-        ],
+        Effect::RotatingMass { rotating_mass_factor } => {
+            vec![one("rotating_mass_factor", *rotating_mass_factor, declared.rotating_mass_factor)]
+        }
+        Effect::BearingTemperature { delta_a_n_per_kn, tau_s } => {
+            vec![one("delta_a_n_per_kn", *delta_a_n_per_kn, 0.0), one("tau_s", *tau_s, 0.0)]
+        }
         Effect::AmbientTemperature { w0_per_k, .. } => vec![one("w0_per_k", *w0_per_k, 0.0)],
         Effect::LocalResistance { extra_n_per_kn, .. } => {
             vec![one("extra_n_per_kn", *extra_n_per_kn, 0.0)]
@@ -212,8 +221,7 @@ fn mass_factors(effect: &Effect, own: &Value) -> Vec<Option<ParameterGrade>> {
             .enumerate()
             .max_by(|one, other| overlap(one.1).total_cmp(&overlap(other.1)))?;
         (overlap(best) > 0.0).then_some(())?;
-        let (value, deviation) =
-            (best["mass_factor"].as_f64()?, own["std"][list][at].as_f64()?);
+        let (value, deviation) = (best["mass_factor"].as_f64()?, own["std"][list][at].as_f64()?);
         let error = (value - truth) / (truth - 1.0);
         Some(ParameterGrade { name: "mass_factor".into(), error, z: (value - truth) / deviation })
     };
@@ -246,4 +254,3 @@ fn mass_factors(effect: &Effect, own: &Value) -> Vec<Option<ParameterGrade>> {
         _ => Vec::new(),
     }
 }
-

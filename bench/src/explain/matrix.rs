@@ -78,8 +78,8 @@ pub fn run(
     std::thread::scope(|scope| {
         for _ in 0..threads {
             scope.spawn(|| {
-                while let Some((at, case)) =
-                    Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|at| Some((at, cases.get(at)?)))
+                while let Some((at, case)) = Some(next.fetch_add(1, Ordering::Relaxed))
+                    .and_then(|at| Some((at, cases.get(at)?)))
                 {
                     let simulated = case.simulate();
                     let graded = grade(&simulated, &explained(&simulated));
@@ -126,9 +126,8 @@ fn row(kind: &str, grades: &[Grade]) -> KindRow {
 
 /// The matrix as a table for people.
 pub fn table(matrix: &Matrix) -> String {
-    let mut text = String::from(
-        "kind                  right      IoU  error  cover  share  named instead\n",
-    );
+    let mut text =
+        String::from("kind                  right      IoU  error  cover  share  named instead\n");
     let shown = |value: Option<f64>| value.map_or("     -".into(), |value| format!("{value:6.3}"));
     for row in &matrix.kinds {
         let confused: Vec<String> =

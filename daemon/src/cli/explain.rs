@@ -75,9 +75,8 @@ fn write_predictions(
     folder: &Path,
     explanation: &Explanation,
 ) -> Result<BTreeMap<String, String>, Failure> {
-    let is_holdout = |run: &&PredictedRun| {
-        explanation.holdout.iter().any(|holdout| holdout.file == run.file)
-    };
+    let is_holdout =
+        |run: &&PredictedRun| explanation.holdout.iter().any(|holdout| holdout.file == run.file);
     let mut files = BTreeMap::new();
     for run in explanation.predictions.iter().filter(is_holdout) {
         let name = run.file.rsplit('/').next().unwrap_or(&run.file);
