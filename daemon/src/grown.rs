@@ -60,14 +60,15 @@ pub fn write_grown(
 ) -> Result<GrownFiles, GrownError> {
     let (source, head) = open(dataset)?;
     let table = |path: &str| -> Result<Table, GrownError> {
-        let declared = |problem: String| GrownError::Declared { label: source.label(path), problem };
-        let text = source.read(path).map_err(|problem: FileProblem| declared(problem.to_string()))?;
+        let declared =
+            |problem: String| GrownError::Declared { label: source.label(path), problem };
+        let text =
+            source.read(path).map_err(|problem: FileProblem| declared(problem.to_string()))?;
         text.parse().map_err(|error: toml::de::Error| declared(error.message().to_string()))
     };
     let mut train = table(&head.manifest.train_file.path)?;
     let mut track = head.manifest.track_file.as_ref().map(|file| table(&file.path)).transpose()?;
-    let not_expressed =
-        grow(&explanation.answer, &explanation.grown, &mut train, track.as_mut());
+    let not_expressed = grow(&explanation.answer, &explanation.grown, &mut train, track.as_mut());
     let write = |name: &str, table: &Table, declared: &str| -> Result<PathBuf, GrownError> {
         let path = folder.join(name);
         let failed = |source| GrownError::Write { path: path.clone(), source };
@@ -88,7 +89,12 @@ pub fn write_grown(
 }
 
 /// Changes the tables; gives the kinds that they cannot express.
-fn grow(answer: &Answer, fit: &Fit, train: &mut Table, mut track: Option<&mut Table>) -> Vec<String> {
+fn grow(
+    answer: &Answer,
+    fit: &Fit,
+    train: &mut Table,
+    mut track: Option<&mut Table>,
+) -> Vec<String> {
     let mut not_expressed = Vec::new();
     for (key, value) in ["a", "b", "c"].into_iter().zip(&fit.theta) {
         set(train, "resistance", key, *value);

@@ -63,10 +63,7 @@ pub struct Place {
 impl Place {
     /// A place that is a set of intervals; nothing given for an empty set.
     pub fn of_intervals(intervals_m: Vec<[f64; 2]>) -> Self {
-        Place {
-            intervals_m: (!intervals_m.is_empty()).then_some(intervals_m),
-            ..Place::default()
-        }
+        Place { intervals_m: (!intervals_m.is_empty()).then_some(intervals_m), ..Place::default() }
     }
 }
 

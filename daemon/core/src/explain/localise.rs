@@ -78,11 +78,9 @@ pub type Shape<'s> = &'s dyn Fn(&RunData, usize) -> f64;
 fn tuples(scan: &Scan, shape: Shape, inside: Inside, interval_m: [f64; 2]) -> Vec<Tuple> {
     (0..scan.problem.runs.len())
         .map(|index| {
-            scan.run_tuple(index, |run, i| {
-                match inside.share(&run.samples()[i], &[interval_m]) {
-                    0.0 => 0.0,
-                    share => share * shape(run, i),
-                }
+            scan.run_tuple(index, |run, i| match inside.share(&run.samples()[i], &[interval_m]) {
+                0.0 => 0.0,
+                share => share * shape(run, i),
             })
         })
         .collect()
@@ -175,8 +173,7 @@ pub fn best_of_runs(scan: &Scan, tuples: &[Tuple]) -> Found {
 
 /// Twice the logarithm of the number of ways to take `taken` of `count` runs.
 pub fn subset_cost(count: usize, taken: usize) -> f64 {
-    let ways: f64 =
-        (0..taken).map(|k| ((count - k) as f64 / (k + 1) as f64).ln()).sum::<f64>();
+    let ways: f64 = (0..taken).map(|k| ((count - k) as f64 / (k + 1) as f64).ln()).sum::<f64>();
     2.0 * (ways + (count.max(1) as f64).ln())
 }
 
@@ -205,7 +202,9 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside, positive: bool) -> Option
     };
     polish(scan, shape, inside, &mut found, positive);
     while found.intervals_m.len() < INTERVALS_MAX {
-        let Some(added) = with_another(scan, &cells, shape, inside, &found, positive) else { break };
+        let Some(added) = with_another(scan, &cells, shape, inside, &found, positive) else {
+            break;
+        };
         if added.gain - found.gain < (interval_cost + 6.0).max(FURTHER_SHARE * found.gain) {
             break;
         }

@@ -106,7 +106,9 @@ impl Score {
         let mut state = 0x9e37_79b9_7f4a_7c15_u64;
         let mut draw = || {
             // Knuth's linear congruential generator: a fixed sequence, so that results repeat.
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (state >> 33) as usize % runs
         };
         let mut reductions: Vec<f64> = (0..DRAWS)

@@ -220,14 +220,34 @@ fn separating_run(kind: EffectKind, rivals: &[EffectKind]) -> String {
     };
     let has = |wanted: EffectKind| kind == wanted || rivals.contains(&wanted);
     let pairs: [(EffectKind, EffectKind, &str); 9] = [
-        (MassChange, TractionGain, "coast down a known gradient: a mass is felt there, a gain is not"),
-        (MassChange, RotatingMass, "pass a steep gradient at other loads: the rotating mass does not feel it"),
-        (RotatingMass, TractionGain, "compare accelerating with braking: a gain acts on traction only"),
+        (
+            MassChange,
+            TractionGain,
+            "coast down a known gradient: a mass is felt there, a gain is not",
+        ),
+        (
+            MassChange,
+            RotatingMass,
+            "pass a steep gradient at other loads: the rotating mass does not feel it",
+        ),
+        (
+            RotatingMass,
+            TractionGain,
+            "compare accelerating with braking: a gain acts on traction only",
+        ),
         (RotatingMass, WheelDiameter, "compare the odometer with balises over several kilometres"),
         (TunnelDrag, Wind, "pass the portals in both directions and on another day"),
         (TunnelDrag, LocalResistance, "pass the place at clearly different speeds"),
-        (CurveResistance, GradientShift, "pass the curves in both directions: a gradient changes its sign"),
-        (DraggingBrake, BearingTemperature, "read the brake-cylinder pressure while released, and let the train run on"),
+        (
+            CurveResistance,
+            GradientShift,
+            "pass the curves in both directions: a gradient changes its sign",
+        ),
+        (
+            DraggingBrake,
+            BearingTemperature,
+            "read the brake-cylinder pressure while released, and let the train run on",
+        ),
         (AmbientTemperature, BearingTemperature, "start warm on a cold day and cold on a warm one"),
     ];
     pairs
@@ -253,9 +273,8 @@ fn describe(effect: &EffectAnswer) -> String {
         parts.push(format!("at {}{more}", shown.collect::<Vec<_>>().join(", ")));
     }
     if let Some(windows) = &effect.place.windows {
-        let shown = windows
-            .iter()
-            .map(|w| format!("{} {:.0}–{:.0} s", w.run, w.t_start_s, w.t_end_s));
+        let shown =
+            windows.iter().map(|w| format!("{} {:.0}–{:.0} s", w.run, w.t_start_s, w.t_end_s));
         parts.push(format!("in {}", shown.collect::<Vec<_>>().join(", ")));
     }
     if let Some(runs) = &effect.place.runs {

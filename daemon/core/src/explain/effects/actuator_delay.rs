@@ -6,10 +6,8 @@ use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 
-const PARAMETERS: [Parameter; 2] = [
-    Parameter::new("delay_s", (0.0, 6.0), 0.05),
-    Parameter::new("lag_s", (0.0, 8.0), 0.05),
-];
+const PARAMETERS: [Parameter; 2] =
+    [Parameter::new("delay_s", (0.0, 6.0), 0.05), Parameter::new("lag_s", (0.0, 8.0), 0.05)];
 
 /// The kind.
 pub struct ActuatorDelay;

@@ -37,7 +37,9 @@ impl Effect for AmbientTemperature {
     fn propose(&self, scan: &Scan) -> Proposal {
         let means: Option<Vec<f64>> = scan.problem.runs.iter().map(mean_degc).collect();
         let Some(means) = means else {
-            return Proposal::NotTestable("ambient_temperature is not recorded in every run".into());
+            return Proposal::NotTestable(
+                "ambient_temperature is not recorded in every run".into(),
+            );
         };
         let low = means.iter().copied().fold(f64::INFINITY, f64::min);
         let high = means.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -145,11 +145,7 @@ fn by_speed(scan: &Scan) -> Option<(Vec<RunWindow>, f64, f64)> {
 }
 
 /// Onsets to about a bin, one run after the other.
-fn refined(
-    scan: &Scan,
-    onsets: &[Onsets],
-    chosen: &[Option<usize>],
-) -> (Vec<RunWindow>, f64, f64) {
+fn refined(scan: &Scan, onsets: &[Onsets], chosen: &[Option<usize>]) -> (Vec<RunWindow>, f64, f64) {
     let mut found: Vec<(usize, f64, Tuple)> = Vec::new();
     let mut choice_cost = 0.0;
     for (index, choice) in chosen.iter().enumerate() {

@@ -10,8 +10,7 @@ use crate::explain::scan::Scan;
 use crate::track::Track;
 
 const SHIFT_MAX_M: f64 = 1600.0;
-const PARAMETERS: [Parameter; 1] =
-    [Parameter::new("shift_m", (-SHIFT_MAX_M, SHIFT_MAX_M), 2.0)];
+const PARAMETERS: [Parameter; 1] = [Parameter::new("shift_m", (-SHIFT_MAX_M, SHIFT_MAX_M), 2.0)];
 /// Shifts that a search starts from are this far apart in m.
 const GRID_M: f64 = 25.0;
 

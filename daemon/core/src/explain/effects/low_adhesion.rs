@@ -166,10 +166,6 @@ impl Hypothesis for Slippery {
     }
 
     fn place(&self) -> Place {
-        Place {
-            runs: self.runs.clone(),
-            intervals_m: self.intervals_m.clone(),
-            ..Place::default()
-        }
+        Place { runs: self.runs.clone(), intervals_m: self.intervals_m.clone(), ..Place::default() }
     }
 }

@@ -48,8 +48,7 @@ impl Part {
                     && sample.position_m.is_some_and(|at| (*from_m..*to_m).contains(&at))
             }
             Part::Window { run: file, from_s, to_s, .. } => {
-                *file == run.file
-                    && (*from_s..=*to_s).contains(&run.recording.time_s()[index])
+                *file == run.file && (*from_s..=*to_s).contains(&run.recording.time_s()[index])
             }
         }
     }
@@ -194,11 +193,8 @@ fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Option<Candidate> {
             .max_by(|one, other| one.0.total_cmp(&other.0))
     };
     let (_, estimate, part) = best(scan, &mut parts.iter().cloned())?;
-    let mut masses = Masses {
-        parts: vec![part],
-        parameters: vec![PARAMETER],
-        choice_cost: part_cost,
-    };
+    let mut masses =
+        Masses { parts: vec![part], parameters: vec![PARAMETER], choice_cost: part_cost };
     let mut start = vec![(1.0 + estimate).clamp(0.7, 1.5)];
     while masses.parts.len() < PARTS_MAX {
         let hypothesis = std::sync::Arc::new(masses.clone());

@@ -97,9 +97,7 @@ impl Covariate {
             Covariate::TractionForce => {
                 sample.traction_force_n.unwrap_or(0.0) / sample.inertial_mass_kg
             }
-            Covariate::BrakeForce => {
-                -sample.brake_force_n.unwrap_or(0.0) / sample.inertial_mass_kg
-            }
+            Covariate::BrakeForce => -sample.brake_force_n.unwrap_or(0.0) / sample.inertial_mass_kg,
             _ => -per_unit,
         }
     }

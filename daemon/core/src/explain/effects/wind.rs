@@ -49,8 +49,7 @@ impl Effect for Wind {
             runs: runs.iter().map(|run| (run.file.clone(), run.direction)).collect(),
             parameters: vec![parameter(); runs.len()],
         };
-        let mut candidates =
-            vec![Candidate::new(Steady { parameters: [parameter()] }, vec![0.0])];
+        let mut candidates = vec![Candidate::new(Steady { parameters: [parameter()] }, vec![0.0])];
         if runs.len() >= 3 {
             candidates.push(Candidate::new(by_run, vec![0.0; runs.len()]));
         }

@@ -399,7 +399,13 @@ impl FitProblem {
                 .iter()
                 .map(|column| filter.remove(column, &filter.factors(column)))
                 .collect();
-            fit.runs.push(normal_equations(&columns, &free, &innovations, filter.weights(), run_cost));
+            fit.runs.push(normal_equations(
+                &columns,
+                &free,
+                &innovations,
+                filter.weights(),
+                run_cost,
+            ));
             fit.innovations.push(innovations);
             fit.columns.push(free);
             fit.residuals.push(residual);
@@ -457,10 +463,13 @@ fn pooled_way_ratio(runs: &[RunData]) -> Option<(f64, f64)> {
     }
     ratios.sort_unstable_by(f64::total_cmp);
     let middle = ratios.len() / 2;
-    let median =
-        if ratios.len() % 2 == 1 { ratios[middle] } else { 0.5 * (ratios[middle - 1] + ratios[middle]) };
-    let mean_var: f64 =
-        runs.iter().filter_map(|run| Some(run.way_ratio?.1.powi(2))).sum::<f64>() / ratios.len() as f64;
+    let median = if ratios.len() % 2 == 1 {
+        ratios[middle]
+    } else {
+        0.5 * (ratios[middle - 1] + ratios[middle])
+    };
+    let mean_var: f64 = runs.iter().filter_map(|run| Some(run.way_ratio?.1.powi(2))).sum::<f64>()
+        / ratios.len() as f64;
     let deviation = (mean_var / ratios.len() as f64 + COMMON * COMMON).sqrt();
     Some((median, deviation))
 }

@@ -17,5 +17,5 @@ mod run_scatter;
 pub use fit::{Fit, FitProblem, RunNormal};
 pub use model::{GrownForces, GrownModel, SampleForces, SharedHypothesis};
 pub use noise::{Noise, Whitener};
-pub use run_scatter::{RunScatter, WeightedFilter};
 pub use run_data::{Bin, RunData, RunDataError, prepare};
+pub use run_scatter::{RunScatter, WeightedFilter};

@@ -61,8 +61,7 @@ impl SampleForces {
     /// is c (v + w) |v + w|, whose sign is taken at that speed.
     #[inline]
     fn polynomial(&self, sample: &ResolvedSample, davis: Davis, speed_mps: f64) -> [f64; 3] {
-        let per_kg =
-            1.0 / (sample.mass_kg * self.mass_factor * (1.0 + self.rotating_mass_factor));
+        let per_kg = 1.0 / (sample.mass_kg * self.mass_factor * (1.0 + self.rotating_mass_factor));
         let weight_kn = sample.weight_kn * self.mass_factor;
         let c = davis.c + self.c_extra;
         let wind = self.headwind_mps;
@@ -71,7 +70,8 @@ impl SampleForces {
         let other_n_per_kn = self.gradient_permille + self.tied_n_per_kn + self.extra_n_per_kn;
         let force_n = self.traction_n - self.brake_n - self.extra_n;
         [
-            per_kg * (force_n - weight_kn * other_n_per_kn) - factor * (davis.a + air * wind * wind),
+            per_kg * (force_n - weight_kn * other_n_per_kn)
+                - factor * (davis.a + air * wind * wind),
             -factor * (davis.b + 2.0 * air * wind),
             -factor * air,
         ]
@@ -134,9 +134,12 @@ impl GrownModel {
         forces.polynomials.clear();
         let per_scale = 1.0 / forces.speed_scale;
         forces.polynomials.extend(
-            forces.samples.iter().zip(samples).zip(&run.smooth_mps).map(
-                |((state, sample), speed)| state.polynomial(sample, davis, speed * per_scale),
-            ),
+            forces
+                .samples
+                .iter()
+                .zip(samples)
+                .zip(&run.smooth_mps)
+                .map(|((state, sample), speed)| state.polynomial(sample, davis, speed * per_scale)),
         );
     }
 
@@ -200,4 +203,3 @@ impl ForceModel for GrownForces {
         self.speed_scale
     }
 }
-

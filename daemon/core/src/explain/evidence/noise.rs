@@ -160,7 +160,8 @@ impl Whitener {
 
     /// Robust -2 log likelihood of the innovations, up to a constant.
     pub fn minus_two_log_likelihood(&self, innovations: &[f64]) -> f64 {
-        self.log_determinant + innovations.iter().map(|&nu| super::fit::robust_loss(nu)).sum::<f64>()
+        self.log_determinant
+            + innovations.iter().map(|&nu| super::fit::robust_loss(nu)).sum::<f64>()
     }
 
     /// Innovations that carry information.

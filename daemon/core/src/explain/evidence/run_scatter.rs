@@ -56,7 +56,8 @@ impl RunScatter {
 pub fn scatter_columns(run: &RunData, davis: Davis) -> [Vec<f64>; 2] {
     let samples = run.samples();
     let mut columns = [Vec::new(), Vec::new()];
-    let force = |i: usize| samples[i].control_force_n().unwrap_or(0.0) / samples[i].inertial_mass_kg;
+    let force =
+        |i: usize| samples[i].control_force_n().unwrap_or(0.0) / samples[i].inertial_mass_kg;
     integrate_bins(run, force, &mut columns[0]);
     let resistance = |i: usize| {
         let per_unit = samples[i].weight_kn / samples[i].inertial_mass_kg;
@@ -101,8 +102,7 @@ impl ScatterFilter {
             pairs.map(|((one, other), weight)| weight * one * other).sum()
         };
         let cross = product(0, 1);
-        let information =
-            self.precision + Matrix2::new(product(0, 0), cross, cross, product(1, 1));
+        let information = self.precision + Matrix2::new(product(0, 0), cross, cross, product(1, 1));
         // A sum of a positive definite and a positive semidefinite matrix.
         let covariance = information.try_inverse().unwrap_or_else(Matrix2::zeros);
         let log_determinant = (information.determinant() / self.precision.determinant()).ln();

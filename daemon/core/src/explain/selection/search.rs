@@ -74,12 +74,8 @@ impl Search<'_> {
         let start = self.problem.start(&[]);
         let first = self.problem.fit_with_noise(&declared, start, Noise::START);
         let base = self.problem.fit_with_noise(&declared, first.theta, first.noise);
-        let mut outcome = Outcome {
-            base: base.clone(),
-            fit: base,
-            rounds: Vec::new(),
-            not_testable: Vec::new(),
-        };
+        let mut outcome =
+            Outcome { base: base.clone(), fit: base, rounds: Vec::new(), not_testable: Vec::new() };
         if outcome.base.observations() < OBSERVATIONS_MIN {
             return outcome;
         }
@@ -125,8 +121,7 @@ impl Search<'_> {
                 }
             }
         }
-        let by_evidence =
-            |one: &Trial, other: &Trial| other.evidence.total_cmp(&one.evidence);
+        let by_evidence = |one: &Trial, other: &Trial| other.evidence.total_cmp(&one.evidence);
         trials.sort_by(|one, other| by_evidence(&one.0, &other.0));
         let mut finished: Vec<Trial> = trials
             .into_iter()

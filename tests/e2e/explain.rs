@@ -1,0 +1,120 @@
+//! The explainer on simulated datasets whose truth is known.
+
+use std::path::Path;
+
+use dynocar::dataset;
+use dynocar::grown::write_grown;
+use dynocar_core::explain::answer::{ParameterValue, Verdict};
+use dynocar_core::explain::effects::LIBRARY;
+use dynocar_core::explain::scan::Scan;
+use dynocar_core::explain::{Explanation, explain};
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_tests::simulator::dataset_writer::write_dataset;
+use dynocar_tests::simulator::{
+    Effect, EffectRequest, SimulatedDataset, SimulatorSettings, simulate,
+};
+
+const SEED: u64 = 23;
+
+fn explained(simulated: &SimulatedDataset, folder: &Path) -> Explanation {
+    write_dataset(simulated, folder).expect("a folder to write to");
+    let dataset = dataset::load(folder).expect("a simulated dataset");
+    explain(&dataset, &|_, _| {}).expect("usable runs")
+}
+
+fn with_kinds(kinds: &[EffectKind]) -> SimulatedDataset {
+    simulate(&SimulatorSettings::new(SEED, EffectRequest::Kinds(kinds.to_vec())))
+}
+
+#[test]
+fn nothing_undeclared_is_called_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let explanation = explained(&with_kinds(&[]), folder.path());
+    assert_eq!(explanation.answer.verdict, Verdict::None, "{}", explanation.answer.statement);
+    assert!(explanation.answer.effects.is_empty());
+}
+
+#[test]
+fn a_curve_resistance_is_found_and_the_grown_files_leave_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let simulated = with_kinds(&[EffectKind::CurveResistance]);
+    let explanation = explained(&simulated, folder.path());
+    let answer = &explanation.answer;
+    assert_eq!(answer.verdict, Verdict::Effect, "{}", answer.statement);
+    assert_eq!(answer.effects[0].kind, "curve_resistance");
+    let [Effect::CurveResistance { k_n_per_kn_m: truth }] = simulated.effects[..] else {
+        panic!("the simulator was asked for a curve resistance");
+    };
+    let ParameterValue::Number(found) = answer.effects[0].parameters["k_n_per_kn_m"] else {
+        panic!("k is a number");
+    };
+    assert!((found - truth).abs() < 0.1 * (truth - 600.0), "{found} against {truth}");
+    assert!(answer.rmse_after.unwrap() < 0.7 * answer.rmse_before.unwrap());
+
+    let grown = write_grown(folder.path(), &explanation, folder.path()).unwrap();
+    assert_eq!(grown.not_expressed, [] as [String; 0]);
+    let again = dataset::load(folder.path()).expect("the grown files are read");
+    assert!((again.train.curve_constant_n_per_kn_m - found).abs() < 1e-9);
+    let again = explain(&again, &|_, _| {}).unwrap();
+    assert_eq!(again.answer.verdict, Verdict::None, "{}", again.answer.statement);
+}
+
+#[test]
+fn a_dragging_brake_is_found_in_its_runs_from_its_onset() {
+    let folder = tempfile::tempdir().unwrap();
+    let simulated = with_kinds(&[EffectKind::DraggingBrake]);
+    let explanation = explained(&simulated, folder.path());
+    let effect = &explanation.answer.effects[0];
+    assert_eq!(effect.kind, "dragging_brake", "{}", explanation.answer.statement);
+    let [Effect::DraggingBrake { ref windows, .. }] = simulated.effects[..] else {
+        panic!("the simulator was asked for a dragging brake");
+    };
+    let found = effect.place.windows.as_ref().expect("windows");
+    for window in windows.iter().filter(|window| !simulated.runs[window.run].plan.is_holdout) {
+        let file = simulated.runs[window.run].plan.file();
+        let own = found.iter().find(|found| found.run == file).expect("its run");
+        assert!((own.t_start_s - window.start_s).abs() < 60.0, "{own:?} against {window:?}");
+    }
+}
+
+#[test]
+fn an_effect_outside_the_library_is_called_unknown_and_placed() {
+    let folder = tempfile::tempdir().unwrap();
+    let simulated = with_kinds(&[EffectKind::Unknown]);
+    let explanation = explained(&simulated, folder.path());
+    let answer = &explanation.answer;
+    assert_eq!(answer.verdict, Verdict::Unknown, "{}", answer.statement);
+    let [Effect::SpeedBand { centre_mps, .. }] = simulated.effects[..] else {
+        panic!("the simulator was asked for something unknown");
+    };
+    let unknown = answer.effects.iter().find(|effect| effect.kind == "unknown").unwrap();
+    let [low, high] = unknown.place.speed_range_mps.expect("a range of speeds");
+    assert!(low < centre_mps && centre_mps < high, "{low} to {high} against {centre_mps}");
+}
+
+#[test]
+fn a_scan_foretells_what_a_fit_then_gains() {
+    let folder = tempfile::tempdir().unwrap();
+    let simulated = with_kinds(&[EffectKind::TunnelDrag]);
+    let explanation = explained(&simulated, folder.path());
+    let dataset = dataset::load(folder.path()).unwrap();
+    let (problem, base) = (&explanation.problem, &explanation.base);
+    let scan = Scan::new(problem, &explanation.holdout, &dataset.train, None, base).unwrap();
+    let tuple = scan.tuple(|run, i| {
+        let sample = &run.samples()[i];
+        let speed = run.smooth_mps[i];
+        let share = sample.tunnel_share.unwrap_or(0.0);
+        -scan.per_unit_resistance_mps2(sample) * share * speed * speed
+    });
+    let (_, foretold) = scan.gain(&tuple);
+    let grown = explanation.grown.effect_parameters(0)[0];
+    // The scan is linear and keeps the noise of the smaller model.
+    assert!((foretold - grown).abs() < 0.25 * grown, "{foretold} against {grown}");
+}
+
+#[test]
+fn every_kind_is_in_the_library_once() {
+    for &kind in EffectKind::ALL.iter().filter(|kind| **kind != EffectKind::None) {
+        assert_eq!(LIBRARY.iter().filter(|effect| effect.kind() == kind).count(), 1, "{kind:?}");
+    }
+}
