@@ -122,20 +122,7 @@ fn estimators(arguments: &EstimatorsArguments) -> Result<(), (String, u8)> {
     for case in cases {
         times.push(case.measure(&effort).map_err(|error| (error.to_string(), 1))?);
     }
-    let is_json_on_stdout = arguments.json.as_ref().is_some_and(|file| file.as_os_str() == "-");
-    if !is_json_on_stdout {
-        print!("{}", report::table(&times));
-    }
-    if let Some(file) = &arguments.json {
-        let text = serde_json::to_string_pretty(&report::Report::of(&times))
-            .map_err(|error| (error.to_string(), 1))?;
-        if is_json_on_stdout {
-            println!("{text}");
-        } else {
-            write(file, &(text + "\n"))?;
-        }
-    }
-    Ok(())
+    give(&arguments.json, &report::Report::of(&times), || report::table(&times))
 }
 
 fn papers(arguments: &PapersArguments) -> Result<(), (String, u8)> {
@@ -154,19 +141,7 @@ fn papers(arguments: &PapersArguments) -> Result<(), (String, u8)> {
         eprintln!("{}: {seeds} seeds", source.name);
         rows.extend((source.rows)(seeds));
     }
-    let is_json_on_stdout = arguments.json.as_ref().is_some_and(|file| file.as_os_str() == "-");
-    if !is_json_on_stdout {
-        print!("{}", table::for_terminal(&rows));
-    }
-    if let Some(file) = &arguments.json {
-        let text = serde_json::to_string_pretty(&PapersAnswer { rows: &rows })
-            .map_err(|error| (error.to_string(), 1))?;
-        if is_json_on_stdout {
-            println!("{text}");
-        } else {
-            write(file, &(text + "\n"))?;
-        }
-    }
+    give(&arguments.json, &PapersAnswer { rows: &rows }, || table::for_terminal(&rows))?;
     if let Some(file) = &arguments.markdown {
         write(file, &table::for_documentation(&rows))?;
     }
@@ -208,18 +183,24 @@ fn explain(arguments: &ExplainArguments) -> Result<(), (String, u8)> {
             }
         }
     });
-    match &arguments.json {
-        Some(file) => {
-            let text = serde_json::to_string_pretty(&matrix).map_err(|e| (e.to_string(), 1))?;
-            if file.as_os_str() == "-" {
-                println!("{text}");
-                return Ok(());
-            }
-            write(file, &(text + "\n"))?;
+    give(&arguments.json, &matrix, || matrix::table(&matrix))
+}
+
+/// Writes a result for machines where it is wanted, and for people unless standard output is taken.
+fn give(
+    json: &Option<PathBuf>,
+    result: &impl Serialize,
+    for_people: impl FnOnce() -> String,
+) -> Result<(), (String, u8)> {
+    if let Some(file) = json {
+        let text = serde_json::to_string_pretty(result).map_err(|error| (error.to_string(), 1))?;
+        if file.as_os_str() == "-" {
+            println!("{text}");
+            return Ok(());
         }
-        None => {}
+        write(file, &(text + "\n"))?;
     }
-    print!("{}", matrix::table(&matrix));
+    print!("{}", for_people());
     Ok(())
 }
 

@@ -120,7 +120,7 @@ impl Replayer {
 
     /// Lets the pipelines catch up before the sample channel overflows.
     fn follow(&mut self) {
-        if self.publisher.published() % (AHEAD_MAX / 4) == 0 {
+        if self.publisher.published().is_multiple_of(AHEAD_MAX / 4) {
             self.await_pipelines(AHEAD_MAX);
         }
     }

@@ -11,7 +11,7 @@ use dynocar_core::pipeline::braking::em::{
 use dynocar_core::pipeline::braking::engine::{Engine, Observation};
 use dynocar_core::pipeline::braking::law::Law;
 use dynocar_core::pipeline::braking::motion::{self, MotionNoise, STATES, State, StepInputs, Walk};
-use dynocar_core::pipeline::braking::tracker::{PriorScale, Prior, Tracker, TrackerModel};
+use dynocar_core::pipeline::braking::tracker::{Prior, PriorScale, Tracker, TrackerModel};
 use dynocar_shared::Uncertain;
 use nalgebra::RowVector4;
 
@@ -147,7 +147,10 @@ fn tracker_model(walk: Walk) -> TrackerModel {
         law: Law::Constant,
         noise: NOISE,
         walk,
-        prior: Prior { speed_std_mps: FIRST_SPEED_STD_MPS, scale: PriorScale::OfLaw(Uncertain::new(INITIAL, 0.05)) },
+        prior: Prior {
+            speed_std_mps: FIRST_SPEED_STD_MPS,
+            scale: PriorScale::OfLaw(Uncertain::new(INITIAL, 0.05)),
+        },
     }
 }
 

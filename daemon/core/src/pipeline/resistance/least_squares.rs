@@ -35,8 +35,8 @@ const ROWS_BEFORE_OWN: f64 = 12.0;
 
 /// Davis coefficients by one of the least-squares recursions of Liu 2018.
 ///
-/// Samples become observations ([`RowSource`]), the [`NoiseBank`] makes
-/// them independent and says how noisy they are, a [`Solver`] takes them in.
+/// Samples become observations (`RowSource`), the `NoiseBank` makes
+/// them independent and says how noisy they are, a `Solver` takes them in.
 #[derive(Clone, Debug)]
 pub struct ResistanceLeastSquares {
     kind: PipelineKind,
