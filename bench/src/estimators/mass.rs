@@ -104,9 +104,13 @@ fn textbook(drive: &Drive) -> Vec<f64> {
     };
     let mut members: Vec<_> = drive.models.iter().map(member).collect();
     let row = RowVector3::new(1.0, 0.0, 0.0);
+    let mut last_change = 0.0;
     for pair in drive.motions.windows(2) {
+        let change = drive.dynamics.push_mps2(&pair[1]) - drive.dynamics.push_mps2(&pair[0]);
+        let jump = change - last_change;
+        last_change = change;
         for Member { filter, model, log_weight } in &mut members {
-            predict(filter, model, &drive.dynamics, &pair[0], &pair[1]);
+            predict(filter, model, &drive.dynamics, pair, jump);
             let said = filter.measure(&row, pair[1].speed_mps, SPEED_VARIANCE);
             *log_weight = (1.0 - 1.0 / MEMORY) * *log_weight + said.log_likelihood();
         }
@@ -129,9 +133,10 @@ fn predict(
     filter: &mut TextbookFilter<3>,
     model: &BiasModel,
     dynamics: &Dynamics,
-    from: &Motion,
-    to: &Motion,
+    step: &[Motion],
+    jump_mps2: f64,
 ) {
+    let (from, to) = (&step[0], &step[1]);
     let (push_from, push_to) = (dynamics.push_mps2(from), dynamics.push_mps2(to));
     let (speed, inverse_mass, bias) =
         (filter.mean[SPEED], filter.mean[INVERSE_MASS], filter.mean[BIAS]);
@@ -148,6 +153,7 @@ fn predict(
         0.0, 0.0, keep,
     );
     let mean = Vector3::new(speed + 0.5 * STEP_S * (start + end), inverse_mass, keep * bias);
-    let noise = Vector3::new(0.0, 0.0, model.noise_variance(keep));
+    let jump_variance = model.jump_variance(jump_mps2 * inverse_mass, STEP_S);
+    let noise = Vector3::new(jump_variance, 0.0, model.noise_variance(keep));
     filter.predict(mean, &transition, &Matrix3::from_diagonal(&noise));
 }
