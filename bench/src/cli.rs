@@ -4,12 +4,12 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
-use dynocar_shared::vocabulary::EffectKind;
 use serde::Serialize;
 
 use crate::estimators::measure::Effort;
 use crate::estimators::{self, report};
 use crate::explain::matrix;
+use crate::explain::scenario::Scenario;
 use crate::papers::{self, Row, table};
 
 /// Measures Dynocar: accuracy against the statistical bound, speed against peers.
@@ -68,7 +68,7 @@ struct ExplainArguments {
     /// The first seed
     #[arg(long, default_value_t = 1)]
     first_seed: u64,
-    /// Only this kind, as tunnel_drag; none for nulls; may be repeated
+    /// Only this kind, as tunnel_drag, or none, two_effects, poor_recording; may be repeated
     #[arg(long = "kind", value_name = "NAME")]
     kinds: Vec<String>,
     /// Datasets at a time
@@ -149,19 +149,20 @@ fn papers(arguments: &PapersArguments) -> Result<(), (String, u8)> {
 }
 
 fn explain(arguments: &ExplainArguments) -> Result<(), (String, u8)> {
-    let mut kinds = EffectKind::ALL.to_vec();
+    let mut scenarios = Scenario::all();
     if !arguments.kinds.is_empty() {
         let chosen = arguments.kinds.iter().map(|name| {
-            let names: Vec<_> = EffectKind::ALL.iter().map(|kind| kind.name()).collect();
-            EffectKind::from_name(name)
+            let names: Vec<_> = Scenario::all().iter().map(|scenario| scenario.name()).collect();
+            Scenario::from_name(name)
                 .ok_or((format!("--kind {name}: expected one of {}", names.join(", ")), 2))
         });
-        kinds = chosen.collect::<Result<_, _>>()?;
+        scenarios = chosen.collect::<Result<_, _>>()?;
     }
     let (seeds, first) = (arguments.seeds, arguments.first_seed);
-    let matrix = matrix::run(&kinds, seeds, first, arguments.threads.max(1), &|case, grade| {
+    let matrix = matrix::run(&scenarios, seeds, first, arguments.threads.max(1), &|case, grade| {
         if arguments.verbose {
-            let kinds: Vec<_> = case.kinds.iter().map(|kind| kind.name()).collect();
+            let kinds: Vec<_> =
+                case.scenario.kinds(case.seed).iter().map(|kind| kind.name()).collect();
             let parameters: Vec<String> = grade
                 .parameters
                 .iter()

@@ -2,15 +2,16 @@
 
 use dynocar_core::dataset::Dataset;
 use dynocar_core::explain::{Explanation, explain};
-use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::dataset_files;
-use dynocar_tests::simulator::{EffectRequest, SimulatedDataset, SimulatorSettings, simulate};
+use dynocar_tests::simulator::{SimulatedDataset, simulate};
+
+use super::scenario::Scenario;
 
 /// What is simulated.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Case {
-    /// The undeclared kinds; empty for a null.
-    pub kinds: Vec<EffectKind>,
+    /// The family.
+    pub scenario: Scenario,
     /// The seed.
     pub seed: u64,
 }
@@ -18,8 +19,7 @@ pub struct Case {
 impl Case {
     /// Simulates the case.
     pub fn simulate(&self) -> SimulatedDataset {
-        let request = EffectRequest::Kinds(self.kinds.clone());
-        simulate(&SimulatorSettings::new(self.seed, request))
+        simulate(&self.scenario.settings(self.seed))
     }
 }
 

@@ -66,7 +66,7 @@ pub fn grade(simulated: &SimulatedDataset, explanation: &Explanation) -> Grade {
             parameters.extend(graded(effect, own, simulated));
         }
     }
-    let details = answer
+    let mut details: Vec<String> = answer
         .effects
         .iter()
         .map(|effect| {
@@ -77,6 +77,9 @@ pub fn grade(simulated: &SimulatedDataset, explanation: &Explanation) -> Grade {
             )
         })
         .collect();
+    if !answer.ambiguous_with.is_empty() {
+        details.push(format!("or {}", answer.ambiguous_with.join(", ")));
+    }
     Grade {
         details,
         named,

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use dynocar_shared::vocabulary::EffectKind;
 use serde::Serialize;
 
 use super::case::{Case, explained};
 use super::grade::{Grade, grade};
+use super::scenario::Scenario;
 
 /// What came out for one kind.
 #[derive(Clone, Debug, Serialize)]
@@ -57,20 +57,19 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
     Some(values[values.len() / 2])
 }
 
-/// Runs the matrix: each kind over seeds from `first_seed`, on `threads` threads. Every finished
+/// Runs the matrix: each scenario over seeds from `first_seed`, on `threads` threads. Every finished
 /// case is told to `tell`.
 pub fn run(
-    kinds: &[EffectKind],
+    scenarios: &[Scenario],
     seeds: usize,
     first_seed: u64,
     threads: usize,
     tell: &(dyn Fn(&Case, &Grade) + Sync),
 ) -> Matrix {
-    let cases: Vec<Case> = kinds
+    let cases: Vec<Case> = scenarios
         .iter()
-        .flat_map(|&kind| {
-            let kinds = if kind == EffectKind::None { Vec::new() } else { vec![kind] };
-            (0..seeds).map(move |k| Case { kinds: kinds.clone(), seed: first_seed + k as u64 })
+        .flat_map(|&scenario| {
+            (0..seeds).map(move |k| Case { scenario, seed: first_seed + k as u64 })
         })
         .collect();
     let grades: Mutex<Vec<Option<Grade>>> = Mutex::new(vec![None; cases.len()]);
@@ -91,15 +90,15 @@ pub fn run(
     });
     let grades: Vec<Grade> =
         grades.into_inner().unwrap_or_else(PoisonError::into_inner).into_iter().flatten().collect();
-    let rows = kinds.iter().zip(grades.chunks(seeds.max(1)));
-    let nulls = rows.clone().filter(|(kind, _)| **kind == EffectKind::None);
+    let rows = scenarios.iter().zip(grades.chunks(seeds.max(1)));
+    let nulls = rows.clone().filter(|(scenario, _)| scenario.is_null());
     let raised = nulls.clone().map(|(_, grades)| grades.iter().filter(|g| !g.is_right).count());
     Matrix {
         false_alarms: FalseAlarms {
             runs: nulls.map(|(_, grades)| grades.len()).sum(),
             raised: raised.sum(),
         },
-        kinds: rows.map(|(kind, grades)| row(kind.name(), grades)).collect(),
+        kinds: rows.map(|(scenario, grades)| row(scenario.name(), grades)).collect(),
     }
 }
 

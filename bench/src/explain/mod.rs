@@ -1,5 +1,6 @@
 //! The matrix of `dynocar explain`: every kind of effect and nulls over seeded simulations.
 //!
+//! - [`scenario`]: what is simulated
 //! - [`case`]: one simulated dataset, explained in this process
 //! - [`grade`]: the answer against the truth
 //! - [`matrix`]: all kinds over all seeds, in numbers
@@ -7,3 +8,4 @@
 pub mod case;
 pub mod grade;
 pub mod matrix;
+pub mod scenario;

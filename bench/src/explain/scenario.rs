@@ -1,0 +1,96 @@
+//! What is simulated: one kind, two at once, or a poor recording.
+
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_tests::simulator::{Defects, EffectRequest, SimulatorSettings};
+
+/// A family of datasets; a seed makes one of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scenario {
+    /// One undeclared effect of this kind; [`EffectKind::None`] for a null.
+    Kind(EffectKind),
+    /// Two effects of kinds drawn from the seed.
+    Two,
+    /// A null recorded with gaps, repeats and heavy outliers.
+    PoorNull,
+    /// One effect of a kind drawn from the seed, recorded so.
+    Poor,
+}
+
+/// Pairs that a train meets and that no data of this kind confuse.
+const PAIRS: [[EffectKind; 2]; 10] = {
+    use EffectKind::{
+        ActuatorDelay, BearingTemperature, CurveResistance, DraggingBrake, GradientShift,
+        LocalResistance, MassChange, TractionGain, TunnelDrag, WheelDiameter, Wind,
+    };
+    [
+        [TunnelDrag, Wind],
+        [CurveResistance, TractionGain],
+        [GradientShift, DraggingBrake],
+        [WheelDiameter, TunnelDrag],
+        [MassChange, CurveResistance],
+        [ActuatorDelay, TractionGain],
+        [BearingTemperature, CurveResistance],
+        [LocalResistance, Wind],
+        [TractionGain, DraggingBrake],
+        [GradientShift, WheelDiameter],
+    ]
+};
+
+/// Kinds that a poor recording is tried with.
+const POOR: [EffectKind; 6] = [
+    EffectKind::TunnelDrag,
+    EffectKind::CurveResistance,
+    EffectKind::DraggingBrake,
+    EffectKind::GradientShift,
+    EffectKind::TractionGain,
+    EffectKind::Wind,
+];
+
+/// One row in fifty wildly wrong, beside a little of everything else.
+const HEAVY: Defects = Defects { outliers: 0.02, ..Defects::ALL };
+
+impl Scenario {
+    /// All of them, in the order of the table.
+    pub fn all() -> Vec<Scenario> {
+        let kinds = EffectKind::ALL.iter().copied().map(Scenario::Kind);
+        kinds.chain([Scenario::Two, Scenario::PoorNull, Scenario::Poor]).collect()
+    }
+
+    /// The scenario of this name.
+    pub fn from_name(name: &str) -> Option<Scenario> {
+        Scenario::all().into_iter().find(|scenario| scenario.name() == name)
+    }
+
+    /// Its name on the command line and in the table.
+    pub fn name(self) -> &'static str {
+        match self {
+            Scenario::Kind(kind) => kind.name(),
+            Scenario::Two => "two_effects",
+            Scenario::PoorNull => "none_poor_recording",
+            Scenario::Poor => "poor_recording",
+        }
+    }
+
+    /// True when nothing undeclared acts.
+    pub fn is_null(self) -> bool {
+        matches!(self, Scenario::Kind(EffectKind::None) | Scenario::PoorNull)
+    }
+
+    /// The undeclared kinds of the dataset with this seed.
+    pub fn kinds(self, seed: u64) -> Vec<EffectKind> {
+        let drawn = |count: usize| (seed % count as u64) as usize;
+        match self {
+            Scenario::Kind(EffectKind::None) | Scenario::PoorNull => Vec::new(),
+            Scenario::Kind(kind) => vec![kind],
+            Scenario::Two => PAIRS[drawn(PAIRS.len())].to_vec(),
+            Scenario::Poor => vec![POOR[drawn(POOR.len())]],
+        }
+    }
+
+    /// What the simulator is asked for.
+    pub fn settings(self, seed: u64) -> SimulatorSettings {
+        let ordinary = SimulatorSettings::new(seed, EffectRequest::Kinds(self.kinds(seed)));
+        let is_poor = matches!(self, Scenario::PoorNull | Scenario::Poor);
+        SimulatorSettings { defects: if is_poor { HEAVY } else { Defects::NONE }, ..ordinary }
+    }
+}
