@@ -77,6 +77,9 @@ struct ExplainArguments {
     /// Tell the outcome of every dataset on standard error
     #[arg(long)]
     verbose: bool,
+    /// Write the simulated datasets with their truth into this folder
+    #[arg(long, value_name = "DIR")]
+    write: Option<PathBuf>,
     /// Write the result for machines; - for standard output
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -159,6 +162,11 @@ fn explain(arguments: &ExplainArguments) -> Result<(), (String, u8)> {
         scenarios = chosen.collect::<Result<_, _>>()?;
     }
     let (seeds, first) = (arguments.seeds, arguments.first_seed);
+    if let Some(folder) = &arguments.write {
+        for case in matrix::cases(&scenarios, seeds, first) {
+            case.write(folder).map_err(|error| (format!("{}: {error}", folder.display()), 1))?;
+        }
+    }
     let matrix = matrix::run(&scenarios, seeds, first, arguments.threads.max(1), &|case, grade| {
         if arguments.verbose {
             let kinds: Vec<_> =
@@ -179,6 +187,7 @@ fn explain(arguments: &ExplainArguments) -> Result<(), (String, u8)> {
                 grade.share,
                 parameters.join(", ")
             );
+            eprintln!("    strength {:.2}", grade.strength);
             for detail in &grade.details {
                 eprintln!("    {detail}");
             }

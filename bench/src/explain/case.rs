@@ -1,8 +1,10 @@
 //! One simulated dataset and its explanation.
 
+use std::{io, path::Path};
+
 use dynocar_core::dataset::Dataset;
 use dynocar_core::explain::{Explanation, explain};
-use dynocar_tests::simulator::dataset_writer::dataset_files;
+use dynocar_tests::simulator::dataset_writer::{dataset_files, write_dataset, write_truth};
 use dynocar_tests::simulator::{SimulatedDataset, simulate};
 
 use super::scenario::Scenario;
@@ -20,6 +22,18 @@ impl Case {
     /// Simulates the case.
     pub fn simulate(&self) -> SimulatedDataset {
         simulate(&self.scenario.settings(self.seed))
+    }
+
+    /// Writes the dataset, with its truth beside it, as `<kind>-<seed>` into a folder.
+    ///
+    /// # Errors
+    ///
+    /// When the files cannot be written.
+    pub fn write(&self, folder: &Path) -> io::Result<()> {
+        let name = format!("{}-{}", self.scenario.name(), self.seed);
+        let simulated = self.simulate();
+        write_dataset(&simulated, &folder.join(&name))?;
+        write_truth(&simulated, &folder.join(name + ".truth.json"))
     }
 }
 

@@ -23,6 +23,8 @@ pub struct Grade {
     pub details: Vec<String>,
     /// Share of the attainable reduction of the error on the holdout runs.
     pub share: Option<f64>,
+    /// Greatest strength of a candidate in the first round of the search.
+    pub strength: f64,
 }
 
 /// One parameter.
@@ -88,6 +90,7 @@ pub fn grade(simulated: &SimulatedDataset, explanation: &Explanation) -> Grade {
         iou,
         parameters,
         share: share(simulated, explanation),
+        strength: explanation.strength,
     }
 }
 

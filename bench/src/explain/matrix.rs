@@ -38,6 +38,8 @@ pub struct FalseAlarms {
     pub runs: usize,
     /// Those for which an effect was named.
     pub raised: usize,
+    /// Greatest strength of a candidate: quantiles over the nulls, by share.
+    pub strength_quantiles: Vec<(f64, f64)>,
 }
 
 /// The result.
@@ -57,6 +59,16 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
     Some(values[values.len() / 2])
 }
 
+/// Every scenario with every seed, scenario by scenario.
+pub fn cases(scenarios: &[Scenario], seeds: usize, first_seed: u64) -> Vec<Case> {
+    scenarios
+        .iter()
+        .flat_map(|&scenario| {
+            (0..seeds).map(move |k| Case { scenario, seed: first_seed + k as u64 })
+        })
+        .collect()
+}
+
 /// Runs the matrix: each scenario over seeds from `first_seed`, on `threads` threads. Every finished
 /// case is told to `tell`.
 pub fn run(
@@ -66,12 +78,7 @@ pub fn run(
     threads: usize,
     tell: &(dyn Fn(&Case, &Grade) + Sync),
 ) -> Matrix {
-    let cases: Vec<Case> = scenarios
-        .iter()
-        .flat_map(|&scenario| {
-            (0..seeds).map(move |k| Case { scenario, seed: first_seed + k as u64 })
-        })
-        .collect();
+    let cases = cases(scenarios, seeds, first_seed);
     let grades: Mutex<Vec<Option<Grade>>> = Mutex::new(vec![None; cases.len()]);
     let next = AtomicUsize::new(0);
     std::thread::scope(|scope| {
@@ -93,13 +100,23 @@ pub fn run(
     let rows = scenarios.iter().zip(grades.chunks(seeds.max(1)));
     let nulls = rows.clone().filter(|(scenario, _)| scenario.is_null());
     let raised = nulls.clone().map(|(_, grades)| grades.iter().filter(|g| !g.is_right).count());
+    let strengths = nulls.clone().flat_map(|(_, grades)| grades.iter().map(|g| g.strength));
+    let strengths: Vec<f64> = strengths.collect();
     Matrix {
         false_alarms: FalseAlarms {
             runs: nulls.map(|(_, grades)| grades.len()).sum(),
             raised: raised.sum(),
+            strength_quantiles: quantiles(strengths),
         },
         kinds: rows.map(|(scenario, grades)| row(scenario.name(), grades)).collect(),
     }
+}
+
+fn quantiles(mut values: Vec<f64>) -> Vec<(f64, f64)> {
+    values.sort_unstable_by(f64::total_cmp);
+    let last = values.len().saturating_sub(1) as f64;
+    let at = |share: f64| Some((share, *values.get((share * last).round() as usize)?));
+    [0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 1.0].into_iter().filter_map(at).collect()
 }
 
 fn row(kind: &str, grades: &[Grade]) -> KindRow {
@@ -143,6 +160,10 @@ pub fn table(matrix: &Matrix) -> String {
             confused.join(", ")
         );
     }
-    let FalseAlarms { runs, raised } = matrix.false_alarms;
-    text + &format!("false alarms: {raised} of {runs}\n")
+    let FalseAlarms { runs, raised, strength_quantiles } = &matrix.false_alarms;
+    text += &format!("false alarms: {raised} of {runs}\n");
+    for (share, strength) in strength_quantiles {
+        text += &format!("strength on nulls: {:.0} % below {strength:.2}\n", 100.0 * share);
+    }
+    text
 }

@@ -14,6 +14,8 @@ const PLACE_RUNS_MIN: usize = 2;
 const RUN_GAIN_MIN: f64 = 6.0;
 /// A further interval must add this share of what the others explain.
 const FURTHER_SHARE: f64 = 0.05;
+/// A surveyed gradient is good to this in ‰, which is N/kN.
+const MAP_ERROR_PERMILLE: f64 = 0.1;
 /// Intervals of one effect at most.
 const INTERVALS_MAX: usize = 6;
 
@@ -65,6 +67,8 @@ pub struct Found {
     pub estimate: f64,
     /// Twice the logarithm of the number of structures this was chosen from.
     pub choice_cost: f64,
+    /// Standard deviation of the factor by the error of the gradient map, which all passes share.
+    pub map_error: f64,
 }
 
 struct Cell {
@@ -168,7 +172,7 @@ fn best_runs(
 /// The runs in which a common positive factor on a shape explains most, wherever they are.
 pub fn best_of_runs(scan: &Scan, tuples: &[Tuple]) -> Found {
     let (runs, gain, estimate, choice_cost) = best_runs(scan, tuples, true, 1);
-    Found { intervals_m: Vec::new(), runs, gain, estimate, choice_cost }
+    Found { intervals_m: Vec::new(), runs, gain, estimate, choice_cost, map_error: 0.0 }
 }
 
 /// Twice the logarithm of the number of ways to take `taken` of `count` runs.
@@ -199,6 +203,7 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside, positive: bool) -> Option
         gain,
         estimate: 0.0,
         choice_cost: interval_cost + subset,
+        map_error: 0.0,
     };
     polish(scan, shape, inside, &mut found, positive);
     while found.intervals_m.len() < INTERVALS_MAX {
@@ -211,7 +216,33 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside, positive: bool) -> Option
         found = Found { choice_cost: found.choice_cost + interval_cost, ..added };
     }
     found.intervals_m.sort_by(|one, other| one[0].total_cmp(&other[0]));
+    found.map_error = map_error(scan, shape, inside, &found);
     Some(found)
+}
+
+/// What an error of the gradient map makes of the factor. It slows the train in one direction and
+/// helps it in the other, so that passes in both directions cancel it; a set of runs in one
+/// direction shows it in full, the same in every run.
+fn map_error(scan: &Scan, shape: Shape, inside: Inside, found: &Found) -> f64 {
+    let (mut square, mut leaning, mut resistance, mut full) = (0.0, 0.0, 0.0, 0.0);
+    for (index, run) in scan.problem.runs.iter().enumerate() {
+        if found.runs.as_ref().is_some_and(|runs| !runs.contains(&index)) {
+            continue;
+        }
+        let share = |i: usize| inside.share(&run.samples()[i], &found.intervals_m);
+        let tuple = scan.run_tuple(index, |run, i| share(i) * shape(run, i));
+        square += tuple.square;
+        leaning += run.direction * tuple.square;
+        for i in run.bins.iter().map(super::evidence::Bin::middle) {
+            resistance += share(i) * scan.per_unit_resistance_mps2(&run.samples()[i]);
+            full += (share(i) * shape(run, i)).abs();
+        }
+    }
+    if square <= 0.0 || full <= 0.0 {
+        return 0.0;
+    }
+    let places = found.intervals_m.len().max(1) as f64;
+    MAP_ERROR_PERMILLE * (leaning / square).abs() / places.sqrt() * resistance / full
 }
 
 fn summed(scan: &Scan, tuples: &[Tuple], runs: &Option<Vec<usize>>) -> Tuple {

@@ -49,6 +49,8 @@ pub struct Explanation {
     pub predictions: Vec<PredictedRun>,
     /// What the search found.
     pub outcome: Outcome,
+    /// Greatest strength of a candidate in the first round of the search.
+    pub strength: f64,
 }
 
 /// Told how far the work is: share done, and what is being done.
@@ -78,9 +80,10 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
     let score = Score::of(&problem, &holdout, &outcome.base, &outcome.fit);
     let predictions = score::predictions(&problem, &holdout, &outcome.fit);
     let answer = verdict::answer(&search, &outcome, &score);
+    let strength = search.greatest_strength(&outcome);
     progress(1.0, "done");
     let (base, grown) = (outcome.base.clone(), outcome.fit.clone());
-    Ok(Explanation { answer, base, grown, score, predictions, outcome, problem, holdout })
+    Ok(Explanation { strength, answer, base, grown, score, predictions, outcome, problem, holdout })
 }
 
 /// Where predictions were written, for the answer.

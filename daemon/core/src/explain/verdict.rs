@@ -10,11 +10,11 @@ use super::answer::{
 use super::effects::ReportContext;
 use super::evidence::Fit;
 use super::score::{self, Score};
-use super::selection::{ACCEPT, Outcome, Search, Trial, deviations, p_value};
+use super::selection::{AMBIGUOUS, EVIDENCE_MIN, discounted, Outcome, Search, Trial, deviations, p_value, penalty};
 use crate::simulate::SpeedError;
 
-/// Two kinds whose evidence differs by less than this explain the data equally well.
-const AMBIGUOUS: f64 = 6.0;
+/// A rival takes away this share of what the accepted effect does of the open-loop error.
+const RIVAL_REDUCTION_SHARE: f64 = 0.7;
 /// Moving time in s of the fit runs below which nothing is said.
 const MOVING_MIN_S: f64 = 180.0;
 /// Share of the decrease that the library must explain when something unknown is left too.
@@ -68,7 +68,8 @@ fn effect_answers(
         .enumerate()
         .map(|(index, (effect, range))| {
             let rest = search.without(fit, index);
-            let decrease = rest.cost - fit.cost;
+            let decrease = discounted(fit, index, rest.cost - fit.cost);
+            let reduction = score::reduction_on_fit_runs(search.problem, &rest, fit);
             let weights = search.problem.runs.iter().filter_map(|run| run.samples().first());
             let weight_kn = weights.map(|sample| sample.weight_kn).sum::<f64>()
                 / search.problem.runs.len().max(1) as f64;
@@ -85,8 +86,8 @@ fn effect_answers(
                 place: effect.place(),
                 parameters: reported.values,
                 std: reported.deviations,
-                p_value: p_value(decrease, effect),
-                error_reduction: score::reduction_on_fit_runs(search.problem, &rest, fit),
+                p_value: p_value((decrease - penalty(effect, fit.observations())) * reduction),
+                error_reduction: reduction,
             };
             (decrease, answer)
         })
@@ -96,10 +97,18 @@ fn effect_answers(
 }
 
 /// Kinds that could stand in the place of the effect accepted last.
+///
+/// A rival explains the data as well, takes away about as much of the open-loop error, and has
+/// nothing left to explain once the effect is in: what keeps its evidence acts beside the effect
+/// and not in its place.
 fn rivals(outcome: &Outcome) -> Vec<EffectKind> {
     let Some(accepted) = accepted_round(outcome) else { return Vec::new() };
     let Some(best) = accepted.iter().find(|trial| is_in(&outcome.fit, trial.kind)) else {
         return Vec::new();
+    };
+    let left = |kind: EffectKind| {
+        let last = outcome.rounds.last().into_iter().flatten().find(|trial| trial.kind == kind);
+        last.map_or(0.0, |trial| trial.evidence)
     };
     accepted
         .iter()
@@ -107,7 +116,9 @@ fn rivals(outcome: &Outcome) -> Vec<EffectKind> {
             !is_in(&outcome.fit, trial.kind)
                 && trial.kind != EffectKind::Unknown
                 && trial.evidence > best.evidence - AMBIGUOUS
-                && trial.evidence > ACCEPT
+                && trial.evidence > EVIDENCE_MIN
+                && left(trial.kind) < 0.5 * trial.evidence
+                && trial.reduction > RIVAL_REDUCTION_SHARE * best.reduction
         })
         .map(|trial| trial.kind)
         .collect()
@@ -150,7 +161,7 @@ fn considered(outcome: &Outcome) -> Vec<Considered> {
         for trial in last {
             let remark = if is_in(&outcome.fit, trial.kind) {
                 "found"
-            } else if trial.evidence > ACCEPT {
+            } else if trial.evidence > EVIDENCE_MIN {
                 "explains the data, but less well or too little of the error"
             } else if trial.evidence > 0.0 {
                 "not significant for a search over the whole library"

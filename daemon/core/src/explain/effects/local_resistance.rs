@@ -20,6 +20,7 @@ struct Local {
     /// Files of the runs; `None` for all.
     runs: Option<Vec<String>>,
     choice_cost: f64,
+    map_error: f64,
 }
 
 impl Effect for LocalResistance {
@@ -45,6 +46,7 @@ impl Effect for LocalResistance {
                 inside,
                 runs: runs.map(files),
                 choice_cost: found.choice_cost,
+                map_error: found.map_error,
             };
             Candidate::new(hypothesis, vec![found.estimate])
         };
@@ -67,6 +69,10 @@ impl Hypothesis for Local {
 
     fn choice_cost(&self) -> f64 {
         self.choice_cost
+    }
+
+    fn shared_error(&self) -> f64 {
+        self.map_error
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {

@@ -34,6 +34,7 @@ struct Slippery {
     /// Files of the runs; `None` for all.
     runs: Option<Vec<String>>,
     choice_cost: f64,
+    map_error: f64,
 }
 
 fn weight_n(sample: &ResolvedSample) -> f64 {
@@ -101,9 +102,9 @@ fn places(
             Form::Cap => vec![cap.max(0.006)],
             Form::Ratio => vec![(1.0 - found.estimate).clamp(0.1, 0.99)],
         };
-        let choice_cost = found.choice_cost;
+        let (choice_cost, map_error) = (found.choice_cost, found.map_error);
         let value = found.gain - choice_cost;
-        let hypothesis = Slippery { form, intervals_m, runs, choice_cost };
+        let hypothesis = Slippery { form, intervals_m, runs, choice_cost, map_error };
         (value, form, Candidate::new(hypothesis, start))
     };
     let mut candidates = Vec::new();
@@ -139,6 +140,14 @@ impl Hypothesis for Slippery {
 
     fn choice_cost(&self) -> f64 {
         self.choice_cost
+    }
+
+    fn shared_error(&self) -> f64 {
+        match self.form {
+            // A cap is no factor on a shape, and a map's error is small beside a brake force.
+            Form::Cap => 0.0,
+            Form::Ratio => self.map_error,
+        }
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {

@@ -133,6 +133,12 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         0.0
     }
 
+    /// Standard deviation of the first parameter by errors that all runs share, which no number
+    /// of runs averages out.
+    fn shared_error(&self) -> f64 {
+        0.0
+    }
+
     /// Whether the effect is larger than what declared figures are usually good for.
     fn is_material(&self, _parameters: &[f64], _c: f64) -> bool {
         true

@@ -20,6 +20,7 @@ struct Tunnels {
     found_m: Option<(Vec<[f64; 2]>, Inside)>,
     intervals_m: Vec<[f64; 2]>,
     choice_cost: f64,
+    map_error: f64,
 }
 
 impl Effect for TunnelDrag {
@@ -37,7 +38,7 @@ impl Effect for TunnelDrag {
             let intervals_m = scan.track.map_or_else(Vec::new, |track| {
                 track.tunnels().iter().map(|tunnel| [tunnel.start_m, tunnel.end_m]).collect()
             });
-            let mapped = Tunnels { found_m: None, intervals_m, choice_cost: 0.0 };
+            let mapped = Tunnels { found_m: None, intervals_m, choice_cost: 0.0, map_error: 0.0 };
             return Proposal::Candidates(vec![Candidate::new(mapped, vec![0.0])]);
         }
         if scan.track.is_none() {
@@ -57,6 +58,7 @@ impl Effect for TunnelDrag {
             intervals_m: found.intervals_m,
             // A tunnel that nobody mapped is less likely than some resistance at a place.
             choice_cost: found.choice_cost + 4.0,
+            map_error: found.map_error,
         };
         Proposal::Candidates(vec![Candidate::new(hypothesis, vec![found.estimate])])
     }
@@ -73,6 +75,10 @@ impl Hypothesis for Tunnels {
 
     fn choice_cost(&self) -> f64 {
         self.choice_cost
+    }
+
+    fn shared_error(&self) -> f64 {
+        self.map_error
     }
 
     fn is_material(&self, parameters: &[f64], c: f64) -> bool {

@@ -80,10 +80,11 @@ pub fn deviations(fit: &Fit) -> (Vec<f64>, DMatrix<f64>) {
     let mut deviations: Vec<f64> =
         (0..count).map(|i| few * (covariance[(i, i)] * enlarged[i]).sqrt()).collect();
     for (effect, range) in fit.model.effects.iter().zip(fit.model.ranges()) {
-        for i in range {
+        for i in range.clone() {
             let form = FORM_SHARE * (fit.theta[i] - effect.none());
             deviations[i] = deviations[i].hypot(form);
         }
+        deviations[range.start] = deviations[range.start].hypot(effect.shared_error());
     }
     let scaled = DMatrix::from_fn(count, count, |i, j| {
         covariance[(i, j)] * (enlarged[i] * enlarged[j]).sqrt()

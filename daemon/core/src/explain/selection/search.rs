@@ -5,7 +5,7 @@ use std::sync::Arc;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::by_run::leave_one_run_out;
-use super::significance::{ACCEPT, model_penalty, penalty};
+use super::significance::{AMBIGUOUS, EVIDENCE_MIN, STRENGTH_MIN, discounted, model_penalty, penalty};
 use crate::explain::Progress;
 use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal};
 use crate::explain::evidence::{Fit, FitProblem, GrownModel, Noise, RunData};
@@ -19,7 +19,7 @@ const EFFECTS_MAX: usize = 3;
 /// Kinds that get a noise of their own and a second localisation in each round.
 const FINALISTS: usize = 5;
 /// The first effect must take away this share of the open-loop error of the fit runs.
-const REDUCTION_MIN: f64 = 0.08;
+const REDUCTION_MIN: f64 = 0.12;
 /// A further one, or one outside the library, this share of what the others leave.
 const FURTHER_REDUCTION_MIN: f64 = 0.15;
 /// Less observations than this tell nothing.
@@ -36,6 +36,16 @@ pub struct Trial {
     pub decrease: f64,
     /// The same less the penalty.
     pub evidence: f64,
+    /// Share of the open-loop error of the fit runs that it takes away; 0 where the evidence does
+    /// not ask for it.
+    pub reduction: f64,
+}
+
+impl Trial {
+    /// Evidence times the share of the open-loop error that it takes away.
+    pub fn strength(&self) -> f64 {
+        self.evidence.max(0.0) * self.reduction.max(0.0)
+    }
 }
 
 /// What the search found.
@@ -72,8 +82,7 @@ impl Search<'_> {
         (self.progress)(0.05, "fitting a, b, c");
         let declared = GrownModel::declared(self.train);
         let start = self.problem.start(&[]);
-        let first = self.problem.fit_with_noise(&declared, start, Noise::START);
-        let base = self.problem.fit_with_noise(&declared, first.theta, first.noise);
+        let base = self.problem.fit_with_noise(&declared, start, Noise::START);
         let mut outcome =
             Outcome { base: base.clone(), fit: base, rounds: Vec::new(), not_testable: Vec::new() };
         if outcome.base.observations() < OBSERVATIONS_MIN {
@@ -83,8 +92,7 @@ impl Search<'_> {
             let round = outcome.rounds.len() as f64;
             (self.progress)((0.1 + 0.25 * round).min(0.8), "trying effects");
             let trials = self.round(&outcome.fit, &mut outcome.not_testable);
-            let accepted = trials.iter().find(|trial| self.is_accepted(&outcome.fit, trial));
-            let next = accepted.map(|trial| trial.fit.clone());
+            let next = self.best(&outcome.fit, &trials).map(|trial| trial.fit.clone());
             outcome.rounds.push(trials);
             let Some(next) = next else { break };
             outcome.fit = next;
@@ -95,6 +103,17 @@ impl Search<'_> {
             }
         }
         outcome
+    }
+
+    /// The trial to accept: the one with the strongest evidence, or one with about the same that
+    /// takes away more of the open-loop error.
+    fn best<'t>(&self, base: &Fit, trials: &'t [Trial]) -> Option<&'t Trial> {
+        let mut accepted = trials.iter().filter(|trial| self.is_accepted(base, trial));
+        let strongest = accepted.next()?;
+        accepted
+            .take_while(|trial| trial.evidence > strongest.evidence - AMBIGUOUS)
+            .chain([strongest])
+            .max_by(|one, other| one.reduction.total_cmp(&other.reduction))
     }
 
     /// Tries every kind that the model does not have yet; the strongest first.
@@ -131,6 +150,9 @@ impl Search<'_> {
                 if is_finalist { self.finalist(base, trial, effect) } else { trial }
             })
             .collect();
+        for trial in finished.iter_mut().filter(|trial| trial.evidence > EVIDENCE_MIN) {
+            trial.reduction = self.reduction(base, &trial.fit);
+        }
         finished.sort_by(by_evidence);
         finished
     }
@@ -150,8 +172,12 @@ impl Search<'_> {
         } else {
             self.problem.fit(&model, start, onto.noise)
         };
-        let decrease = base.cost - fit.cost;
-        Trial { kind, fit, decrease, evidence: decrease - price }
+        Self::trial(base, fit, kind, price)
+    }
+
+    fn trial(base: &Fit, fit: Fit, kind: EffectKind, price: f64) -> Trial {
+        let decrease = discounted(&fit, fit.model.effects.len() - 1, base.cost - fit.cost);
+        Trial { kind, fit, decrease, evidence: decrease - price, reduction: 0.0 }
     }
 
     /// Gives a trial the noise that remains under it and lets its kind look again for places and
@@ -163,9 +189,7 @@ impl Search<'_> {
                 trial.fit.theta.clone(),
                 trial.fit.noise,
             );
-            let decrease = base.cost - fit.cost;
-            let price = trial.decrease - trial.evidence;
-            Trial { kind: trial.kind, fit, decrease, evidence: decrease - price }
+            Self::trial(base, fit, trial.kind, trial.decrease - trial.evidence)
         };
         let mut best = refit(&trial);
         for attempt in 0..3 {
@@ -200,12 +224,28 @@ impl Search<'_> {
 
     /// Whether the last effect of a trial is more than chance and large enough to matter.
     fn is_accepted(&self, base: &Fit, trial: &Trial) -> bool {
+        trial.strength() > STRENGTH_MIN
+            && trial.reduction > Self::reduction_min(&trial.fit)
+            && self.is_eligible(base, trial)
+    }
+
+    /// Whether a trial passes what does not depend on its strength.
+    fn is_eligible(&self, base: &Fit, trial: &Trial) -> bool {
         let last = trial.fit.model.effects.len() - 1;
         let parameters = trial.fit.effect_parameters(last);
-        trial.evidence > ACCEPT
+        trial.evidence > EVIDENCE_MIN
             && trial.fit.model.effects[last].is_material(parameters, trial.fit.theta[2])
-            && self.reduction(base, &trial.fit) > Self::reduction_min(&trial.fit)
             && self.holds_by_run(base, trial)
+    }
+
+    /// The greatest strength of all eligible trials of the first round: what is compared with its
+    /// distribution where nothing acts.
+    pub fn greatest_strength(&self, outcome: &Outcome) -> f64 {
+        let first = outcome.rounds.first().into_iter().flatten();
+        first
+            .filter(|trial| self.is_eligible(&outcome.base, trial))
+            .map(Trial::strength)
+            .fold(0.0, f64::max)
     }
 
     /// What the last effect of a model must take away.
@@ -223,7 +263,7 @@ impl Search<'_> {
         if own.windows.is_some() || own.runs.is_some() || held.runs < 3 {
             return true;
         }
-        held.gain > 0.5 * ACCEPT && 2 * held.better > held.runs
+        held.gain > 0.5 * EVIDENCE_MIN && 2 * held.better > held.runs
     }
 
     /// Share of the open-loop error of the fit runs that the larger model takes away, over whole
@@ -241,12 +281,11 @@ impl Search<'_> {
     fn swap(&self, fit: &mut Fit) {
         for index in 0..fit.model.effects.len() {
             let rest = self.without(fit, index);
-            let best = self.round(&rest, &mut Vec::new()).into_iter().next();
-            if let Some(best) = best
+            let trials = self.round(&rest, &mut Vec::new());
+            if let Some(best) = self.best(&rest, &trials)
                 && Self::total(&best.fit) < Self::total(fit) - 4.0
-                && self.is_accepted(&rest, &best)
             {
-                *fit = best.fit;
+                *fit = best.fit.clone();
             }
         }
     }
@@ -256,8 +295,11 @@ impl Search<'_> {
         let mut index = 0;
         while index < fit.model.effects.len() && fit.model.effects.len() > 1 {
             let rest = self.without(fit, index);
-            let needless = Self::total(&rest) < Self::total(fit) + ACCEPT
-                || self.reduction(&rest, fit) < REDUCTION_MIN;
+            let evidence = Self::total(&rest) - Self::total(fit);
+            let reduction = self.reduction(&rest, fit);
+            let needless = evidence < EVIDENCE_MIN
+                || reduction < REDUCTION_MIN
+                || evidence * reduction < STRENGTH_MIN;
             if needless {
                 *fit = rest;
             } else {
