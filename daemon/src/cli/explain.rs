@@ -19,6 +19,9 @@ use crate::grown::write_grown;
 pub struct ExplainArguments {
     /// The dataset's folder
     dataset: PathBuf,
+    /// Use the forces under traction only: for recordings without the friction brake's force
+    #[arg(long)]
+    traction_only: bool,
     /// Write the answer for machines; - for standard output
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -36,8 +39,11 @@ pub struct ExplainArguments {
 ///
 /// A wrong dataset is an input failure.
 pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
-    let dataset =
+    let mut dataset =
         dataset::load(&arguments.dataset).map_err(|error| Failure::Input(error.to_string()))?;
+    if arguments.traction_only {
+        dataset.keep_traction_only();
+    }
     let bar = ProgressBar::new(1000);
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent:>3} % {msg}") {
         bar.set_style(style);

@@ -56,6 +56,8 @@ pub use train_file::parse_train;
 
 use std::sync::Arc;
 
+use dynocar_shared::SampleField;
+
 use crate::track::Track;
 use crate::train::TrainModel;
 
@@ -110,6 +112,20 @@ pub struct Dataset {
     pub track: Option<Arc<Track>>,
     /// The runs, in the order of the manifest.
     pub runs: Vec<Run>,
+}
+
+impl Dataset {
+    /// Forgets the forces of all samples without traction, for a train whose friction brake is not
+    /// recorded: there the true force is unknown.
+    pub fn keep_traction_only(&mut self) {
+        for sample in self.runs.iter_mut().flat_map(|run| &mut run.samples) {
+            let pulls = sample.get(SampleField::TractionForce).is_some_and(|force| force > 0.0);
+            let brakes = sample.get(SampleField::BrakeForce).is_some_and(|force| force > 0.0);
+            if !pulls || brakes {
+                sample.valid &= !(SampleField::TractionForce.bit() | SampleField::BrakeForce.bit());
+            }
+        }
+    }
 }
 
 impl DatasetHead {

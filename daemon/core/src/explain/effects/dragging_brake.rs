@@ -18,8 +18,9 @@ const BUILD_UP_S: f64 = 10.0;
 const GRID_S: f64 = 12.0;
 /// Motion in s that must follow an onset.
 const TAIL_MIN_S: f64 = 40.0;
-/// A run takes part when that explains more than this beyond the choice of its onset.
-const RUN_GAIN_MIN: f64 = 4.0;
+/// What a run's taking part must explain beyond the choice of its onset: brakes release in nine
+/// runs of ten, and twice the logarithm of ten is this.
+const RUN_COST: f64 = 4.6;
 
 /// The kind.
 pub struct DraggingBrake;
@@ -114,7 +115,7 @@ fn by_speed(scan: &Scan) -> Option<(Vec<RunWindow>, f64, f64)> {
         for (onsets, choice) in onsets.iter().zip(chosen) {
             if let Some(k) = choice {
                 sum.add(&onsets.tuples[*k]);
-                cost += onsets.cost() + RUN_GAIN_MIN;
+                cost += onsets.cost() + RUN_COST;
             }
         }
         let (gain, estimate) = scan.gain(&sum);
@@ -152,7 +153,7 @@ fn refined(scan: &Scan, onsets: &[Onsets], chosen: &[Option<usize>]) -> (Vec<Run
         if let Some(k) = choice {
             let onsets = &onsets[index];
             found.push((index, onsets.times_s[*k], onsets.tuples[*k].clone()));
-            choice_cost += onsets.cost();
+            choice_cost += onsets.cost() + RUN_COST;
         }
     }
     let count = scan.fit.theta.len();

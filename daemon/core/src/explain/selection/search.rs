@@ -15,7 +15,7 @@ use crate::track::Track;
 use crate::train::TrainModel;
 
 /// Effects at most.
-const EFFECTS_MAX: usize = 3;
+const EFFECTS_MAX: usize = 4;
 /// Kinds that get a noise of their own and a second localisation in each round.
 const FINALISTS: usize = 5;
 /// The first effect must take away this share of the open-loop error of the fit runs.
