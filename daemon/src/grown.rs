@@ -1,14 +1,14 @@
 //! The grown model as files: a train and a line that the daemon loads.
 //!
 //! The declared files are taken as they are, with every key that somebody wrote into them, and
-//! only what the data changed is replaced: a, b, c always; the curve constant, the rotating mass
-//! and the gradient profile where an effect of that kind was found. What the formats cannot
-//! express is listed, so that nobody takes the files for more than they are.
+//! only what the data changed is replaced: a, b, c always, and what holds an effect that was found:
+//! a constant, a profile, a correction. What belongs to certain runs is an event and no property of
+//! a train or a line: it is listed, so that nobody takes the files for more than they are.
 
 use std::path::{Path, PathBuf};
 
 use dynocar_core::dataset::{DatasetFiles, FileProblem, MANIFEST_FILE};
-use dynocar_core::explain::answer::{Answer, ParameterValue};
+use dynocar_core::explain::answer::{Answer, EffectAnswer, MassSection, ParameterValue};
 use dynocar_core::explain::{Explanation, evidence::Fit};
 use toml::{Table, Value};
 
@@ -100,10 +100,7 @@ fn grow(
         set(train, "resistance", key, *value);
     }
     for effect in &answer.effects {
-        let number = |name: &str| match effect.parameters.get(name) {
-            Some(ParameterValue::Number(value)) => Some(*value),
-            _ => None,
-        };
+        let number = |name: &str| number(effect, name);
         let is_expressed = match effect.kind {
             "curve_resistance" => number("k_n_per_kn_m")
                 .map(|k| set(train, "resistance", "curve_constant_n_per_kn_m", k)),
@@ -112,13 +109,106 @@ fn grow(
             "gradient_shift" => number("shift_m").and_then(|shift_m| {
                 track.as_deref_mut().and_then(|track| shift_gradient(track, shift_m))
             }),
-            _ => None,
+            "tunnel_drag" => express_tunnels(effect, train, track.as_deref_mut()),
+            "local_resistance" if effect.place.runs.is_none() => {
+                track.as_deref_mut().and_then(|track| express_places(effect, track))
+            }
+            "mass_change" => track.as_deref_mut().and_then(|track| express_masses(effect, track)),
+            _ => express_numbers(effect, train),
         };
         if is_expressed.is_none() {
             not_expressed.push(effect.kind.to_string());
         }
     }
     not_expressed
+}
+
+/// The keys of `[corrections]` that hold an effect's parameters.
+fn correction_keys(kind: &str) -> &'static [(&'static str, &'static str)] {
+    match kind {
+        "wheel_diameter" => &[("speed_scale", "speed_scale")],
+        "traction_gain" => &[("gain", "traction_gain")],
+        "actuator_delay" => &[("delay_s", "actuator_delay_s"), ("lag_s", "actuator_lag_s")],
+        "wind" => &[("wind_plus_mps", "wind_plus_mps")],
+        "bearing_temperature" => {
+            &[("delta_a_n_per_kn", "bearing_delta_a_n_per_kn"), ("tau_s", "bearing_tau_s")]
+        }
+        "ambient_temperature" => {
+            &[("w0_per_k", "ambient_w0_per_k"), ("reference_k", "ambient_reference_k")]
+        }
+        _ => &[],
+    }
+}
+
+fn express_numbers(effect: &EffectAnswer, train: &mut Table) -> Option<()> {
+    let keys = correction_keys(effect.kind);
+    for (parameter, key) in keys {
+        correct(train, key, number(effect, parameter)?);
+    }
+    (!keys.is_empty() && !effect.parameters.contains_key("headwind_mps")).then_some(())
+}
+
+/// Multiplies or adds to what is corrected already.
+fn correct(train: &mut Table, key: &str, value: f64) {
+    let known = train
+        .get("corrections")
+        .and_then(|section| section.get(key))
+        .and_then(|value| value.as_float().or_else(|| value.as_integer().map(|it| it as f64)));
+    let value = match (key, known) {
+        ("speed_scale" | "traction_gain" | "tunnel_c_factor", Some(known)) => known * value,
+        ("bearing_tau_s" | "ambient_reference_k", _) | (_, None) => value,
+        (_, Some(known)) => known + value,
+    };
+    set(train, "corrections", key, value);
+}
+
+fn express_tunnels(
+    effect: &EffectAnswer,
+    train: &mut Table,
+    track: Option<&mut Table>,
+) -> Option<()> {
+    let factor = number(effect, "c_factor")?;
+    let track = track?.get_mut("track")?.as_table_mut()?;
+    if !track.contains_key("tunnels") {
+        let intervals = effect.place.intervals_m.as_ref()?;
+        let list = intervals.iter().map(|pair| Value::from(pair.to_vec())).collect::<Vec<_>>();
+        track.insert("tunnels".into(), Value::Array(list));
+    }
+    correct(train, "tunnel_c_factor", factor);
+    Some(())
+}
+
+fn express_places(effect: &EffectAnswer, track: &mut Table) -> Option<()> {
+    let extra = number(effect, "extra_n_per_kn")?;
+    let list = track_list(track, "resistance")?;
+    for [from_m, to_m] in effect.place.intervals_m.as_ref()? {
+        list.push(Value::from(vec![*from_m, *to_m, extra]));
+    }
+    Some(())
+}
+
+fn express_masses(effect: &EffectAnswer, track: &mut Table) -> Option<()> {
+    let Some(ParameterValue::Sections(sections)) = effect.parameters.get("sections") else {
+        return None;
+    };
+    let list = track_list(track, "masses")?;
+    for MassSection { from_m, to_m, direction, mass_factor } in sections {
+        list.push(Value::from(vec![*from_m, *to_m, f64::from(*direction), *mass_factor]));
+    }
+    Some(())
+}
+
+/// A list of `[track]`, made when absent.
+fn track_list<'t>(track: &'t mut Table, key: &str) -> Option<&'t mut Vec<Value>> {
+    let section = track.get_mut("track")?.as_table_mut()?;
+    section.entry(key).or_insert_with(|| Value::Array(Vec::new())).as_array_mut()
+}
+
+fn number(effect: &EffectAnswer, name: &str) -> Option<f64> {
+    match effect.parameters.get(name) {
+        Some(ParameterValue::Number(value)) => Some(*value),
+        _ => None,
+    }
 }
 
 fn set(table: &mut Table, section: &str, key: &str, value: f64) {

@@ -60,6 +60,26 @@ fn a_curve_resistance_is_found_and_the_grown_files_leave_nothing() {
 }
 
 #[test]
+fn the_grown_files_of_other_kinds_leave_nothing_either() {
+    let kinds = [
+        EffectKind::TunnelDrag,
+        EffectKind::WheelDiameter,
+        EffectKind::ActuatorDelay,
+        EffectKind::BearingTemperature,
+    ];
+    for kind in kinds {
+        let folder = tempfile::tempdir().unwrap();
+        let explanation = explained(&with_kinds(&[kind]), folder.path());
+        assert_eq!(explanation.answer.verdict, Verdict::Effect, "{kind:?}");
+        let grown = write_grown(folder.path(), &explanation, folder.path()).unwrap();
+        assert_eq!(grown.not_expressed, [] as [String; 0], "{kind:?}");
+        let again = dataset::load(folder.path()).expect("the grown files are read");
+        let again = explain(&again, &|_, _| {}).unwrap();
+        assert_eq!(again.answer.verdict, Verdict::None, "{kind:?}: {}", again.answer.statement);
+    }
+}
+
+#[test]
 fn a_dragging_brake_is_found_in_its_runs_from_its_onset() {
     let folder = tempfile::tempdir().unwrap();
     let simulated = with_kinds(&[EffectKind::DraggingBrake]);

@@ -48,6 +48,7 @@ pub fn train() -> TrainModel {
             friction: Some(0.28),
             pads: Some(95.0),
         },
+        corrections: Default::default(),
     }
 }
 

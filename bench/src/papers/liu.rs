@@ -164,6 +164,7 @@ fn live(runs: &[Vec<Measured>]) -> Estimate {
         traction: None,
         brake: None,
         brake_gear: Default::default(),
+        corrections: Default::default(),
     });
     let settings = EstimatorSettings::default_of(PipelineKind::ResistanceKalman)
         .expect("the kind can be built");

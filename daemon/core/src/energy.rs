@@ -107,6 +107,7 @@ mod tests {
             traction: None,
             brake: None,
             brake_gear: BrakeGear::default(),
+            corrections: Default::default(),
         };
         let mut validator =
             Validator::new(TrainId(1), train.mass_kg, ValidationLimits::for_train(train.mass_kg));

@@ -56,6 +56,7 @@ fn train() -> Arc<TrainModel> {
             friction: Some(0.35),
             pads: Some(48.0),
         },
+        corrections: Default::default(),
     })
 }
 

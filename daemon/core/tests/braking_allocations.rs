@@ -53,6 +53,7 @@ fn train() -> TrainModel {
             friction: Some(0.28),
             pads: Some(95.0),
         },
+        corrections: Default::default(),
     }
 }
 

@@ -201,6 +201,7 @@ pub fn make_train(train_type: TrainType, resistance_spread: f64, random: &mut Ra
         traction: EffortCurve::new(traction),
         brake: EffortCurve::new(vec![(0.0, brake_max_n)]),
         brake_gear: BrakeGear::default(),
+        corrections: Default::default(),
     };
     let handling = Handling {
         speed_max_mps,

@@ -130,6 +130,7 @@ impl Shuttle {
             traction: EffortCurve::new(effort),
             brake: EffortCurve::new(vec![(0.0, BRAKE_MAX_N)]),
             brake_gear: BrakeGear::default(),
+            corrections: Default::default(),
         };
         let track = Track::new(
             "synthetic 28 km shuttle".into(),

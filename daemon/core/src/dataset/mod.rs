@@ -19,6 +19,7 @@
 //! - [`run`], [`quality`], [`remark`]: samples, counts and warnings
 
 mod altitude;
+mod corrections;
 mod document;
 pub mod error;
 mod forces;

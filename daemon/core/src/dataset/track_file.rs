@@ -2,7 +2,7 @@
 
 use super::document::{Document, Section};
 use super::error::{DatasetError, Place, Problem};
-use crate::track::{Curve, ProfileError, Track, TrackError, Tunnel};
+use crate::track::{Curve, MassSection, ProfileError, Track, TrackError, Tunnel};
 
 /// A steeper gradient in ‰ than any adhesion railway has is a mistake of unit.
 const GRADIENT_MAX_PERMILLE: f64 = 150.0;
@@ -17,7 +17,7 @@ pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
     let root = document.root();
     root.allow(&["track"])?;
     let section = root.required_table("track")?;
-    section.allow(&["name", "length_m", "gradient", "curves", "tunnels"])?;
+    section.allow(&["name", "length_m", "gradient", "curves", "tunnels", "resistance", "masses"])?;
     let length_m = section.number("length_m", "a length in m above 0", |length| length > 0.0)?;
     let (gradient, gradient_places) = gradient(&section)?.unzip();
     let curves = section.entries::<3>("curves", "[start_m, end_m, radius_m]")?.map(split);
@@ -39,8 +39,45 @@ pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
         tunnels: tunnel_places.unwrap_or_default(),
     };
     let name = section.text("name")?.unwrap_or("unnamed line").into();
-    Track::new(name, length_m, gradient.as_deref(), curves, tunnels)
-        .map_err(|error| places.of(&error, &starts, &section).problem(Problem::Track(error)))
+    let refused =
+        |error| Err(places.of(&error, &starts, &section).problem(Problem::Track(error)));
+    let track = match Track::new(name, length_m, gradient.as_deref(), curves, tunnels) {
+        Ok(track) => track,
+        Err(error) => return refused(error),
+    };
+    with_corrections(track, &section)
+}
+
+/// Adds what measured runs have shown of the line: resistance at places, other masses in sections.
+fn with_corrections(mut track: Track, section: &Section) -> Result<Track, DatasetError> {
+    const RESISTANCE: &str = "[start_m, end_m, extra N/kN]";
+    if let Some(entries) = section.entries::<3>("resistance", RESISTANCE)? {
+        let places: Vec<_> =
+            entries.iter().map(|([start_m, end_m, extra], _)| (*start_m, *end_m, *extra)).collect();
+        track = track.with_resistance(&places).map_err(|error| {
+            section.place_of("resistance").problem(Problem::Track(error))
+        })?;
+    }
+    const MASSES: &str = "[from_m, to_m, direction (1 or -1), mass factor]";
+    if let Some(entries) = section.entries::<4>("masses", MASSES)? {
+        let mut masses = Vec::with_capacity(entries.len());
+        for (index, ([from_m, to_m, direction, mass_factor], place)) in
+            entries.into_iter().enumerate()
+        {
+            let is_sound = from_m < to_m
+                && direction.abs() == 1.0
+                && (0.1..=10.0).contains(&mass_factor);
+            if !is_sound {
+                let key = format!("{} entry {}", section.full("masses"), index + 1);
+                let value = format!("[{from_m}, {to_m}, {direction}, {mass_factor}]");
+                let allowed = "from_m < to_m, direction 1 or -1, a factor from 0.1 to 10".into();
+                return Err(place.problem(Problem::OutOfRange { key, value, allowed }));
+            }
+            masses.push(MassSection { from_m, to_m, direction, mass_factor });
+        }
+        track = track.with_masses(masses);
+    }
+    Ok(track)
 }
 
 /// Where the entries of the lists stand.
@@ -182,7 +219,8 @@ tunnels = [[2200.0, 2900.0]]
             (
                 ("tunnels", "tunnel"),
                 "track.toml:12: unknown key 'tunnel' in [track]; did you mean 'tunnels'? \
-                 (choices: 'name', 'length_m', 'gradient', 'curves', 'tunnels')",
+                 (choices: 'name', 'length_m', 'gradient', 'curves', 'tunnels', 'resistance', \
+                 'masses')",
             ),
         ];
         for ((from, to), expected) in cases {

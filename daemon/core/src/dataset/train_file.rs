@@ -1,8 +1,9 @@
 //! `train.toml`.
 
+use super::corrections::corrections;
 use super::document::{Document, Section};
 use super::error::{DatasetError, Problem};
-use crate::train::{BrakeGear, Davis, EffortCurve, TrainModel};
+use crate::train::{BrakeGear, Corrections, Davis, EffortCurve, TrainModel};
 
 /// k in the declared curve resistance k/R in N/kN, R in m, unless a train says otherwise.
 pub const CURVE_CONSTANT_DEFAULT_N_PER_KN_M: f64 = 600.0;
@@ -15,7 +16,7 @@ pub const CURVE_CONSTANT_DEFAULT_N_PER_KN_M: f64 = 600.0;
 pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> {
     let document = Document::parse(label, text)?;
     let root = document.root();
-    root.allow(&["train", "resistance", "traction", "brake"])?;
+    root.allow(&["train", "resistance", "traction", "brake", "corrections"])?;
     let train = root.required_table("train")?;
     train.allow(&["name", "mass_t", "length_m", "cars", "rotating_mass_factor"])?;
     let resistance = root.required_table("resistance")?;
@@ -29,6 +30,10 @@ pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> 
     let (brake, brake_gear) = match root.table("brake")? {
         Some(section) => brake(&section)?,
         None => (None, BrakeGear::default()),
+    };
+    let corrections = match root.table("corrections")? {
+        Some(section) => corrections(&section)?,
+        None => Corrections::NONE,
     };
     let mass_t =
         train.required_number("mass_t", "a mass in t above 0, at most 100000", |mass| {
@@ -57,6 +62,7 @@ pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> 
         traction,
         brake,
         brake_gear,
+        corrections,
     })
 }
 

@@ -10,7 +10,10 @@
 //!
 //! with the gradient in ‰ and the means taken along the train. [`ForceResolver`] gives
 //! everything but w0(v), which is what the estimators look for.
+//! The corrections of a train ([`crate::train::Corrections`]) are applied on the way.
 
+mod corrections;
+mod delay;
 mod resolver;
 
 pub use resolver::{ForceResolver, ResolvedSample};

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use dynocar_shared::SampleField;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
+use super::corrections::Corrector;
 use crate::track::Track;
 use crate::train::TrainModel;
 use crate::validation::ValidSample;
@@ -42,7 +43,7 @@ pub struct ResolvedSample {
     pub curve_n_per_kn: f64,
     /// Mean of 1/R along the train in 1/m, when curves are known.
     pub curvature_per_m: Option<f64>,
-    /// Declared tunnel resistance in N/kN.
+    /// Declared resistance in N/kN of tunnels and places, and what corrections add.
     pub tunnel_n_per_kn: f64,
     /// Share of the train inside tunnels, when tunnels are known.
     pub tunnel_share: Option<f64>,
@@ -73,13 +74,15 @@ impl ResolvedSample {
 pub struct ForceResolver {
     train: Arc<TrainModel>,
     track: Option<Arc<Track>>,
+    corrector: Option<Corrector>,
     last: Option<(u32, f64)>,
 }
 
 impl ForceResolver {
     /// A resolver for one train on one line; without a line the gradient comes from the sample.
     pub fn new(train: Arc<TrainModel>, track: Option<Arc<Track>>) -> Self {
-        ForceResolver { train, track, last: None }
+        let corrector = Corrector::of(&train);
+        ForceResolver { train, track, corrector, last: None }
     }
 
     /// The known forces at a sample.
@@ -95,7 +98,11 @@ impl ForceResolver {
         let train = &*self.train;
         let direction = f64::from(sample.direction);
         let position_m = sample.get(SampleField::Position);
-        let mass_kg = sample.get(SampleField::Mass).unwrap_or(train.mass_kg);
+        let mass_factor = match (self.track.as_deref(), position_m) {
+            (Some(track), Some(position_m)) => track.mass_factor(position_m, direction),
+            _ => 1.0,
+        };
+        let mass_kg = mass_factor * sample.get(SampleField::Mass).unwrap_or(train.mass_kg);
         let on_track = |look_up: fn(&Track, f64, f64) -> Option<f64>| {
             look_up(self.track.as_deref()?, position_m?, train.length_m)
         };
@@ -112,8 +119,9 @@ impl ForceResolver {
             0.0 => None,
             _ => on_track(Track::tunnel_length_m),
         };
+        let place_n_per_kn = on_track(Track::resistance_n_per_kn).unwrap_or(0.0);
         self.last = Some((valid.stretch, sample.speed_mps));
-        ResolvedSample {
+        let mut resolved = ResolvedSample {
             time_ns: sample.time_ns,
             step_s: valid.step_s,
             stretch: valid.stretch,
@@ -128,12 +136,17 @@ impl ForceResolver {
             gradient_permille,
             curve_n_per_kn: train.curve_constant_n_per_kn_m * curvature_per_m.unwrap_or(0.0),
             curvature_per_m,
-            tunnel_n_per_kn: train.tunnel_constant_n_per_kn_m * tunnel_length_m.unwrap_or(0.0),
+            tunnel_n_per_kn: train.tunnel_constant_n_per_kn_m * tunnel_length_m.unwrap_or(0.0)
+                + place_n_per_kn,
             tunnel_share,
             brake_cylinder_pressure_pa: sample.get(SampleField::BrakeCylinderPressure),
             ambient_temperature_degc: sample.get(SampleField::AmbientTemperature),
             is_sliding: valid.is_sliding(),
+        };
+        if let Some(corrector) = &mut self.corrector {
+            corrector.correct(train, &mut resolved);
         }
+        resolved
     }
 
     /// Gradient in ‰ along the travel from specific force = dv/dt + g * gradient, with dv/dt

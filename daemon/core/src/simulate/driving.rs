@@ -124,6 +124,7 @@ mod tests {
             traction: None,
             brake: None,
             brake_gear: BrakeGear::default(),
+            corrections: Default::default(),
         }
     }
 

@@ -28,6 +28,19 @@ pub struct Tunnel {
     pub end_m: f64,
 }
 
+/// A section between stations on which trains in one direction weigh more or less than declared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MassSection {
+    /// Chainage in m where it starts.
+    pub from_m: f64,
+    /// Chainage in m where it ends.
+    pub to_m: f64,
+    /// Direction of travel, +1 or -1.
+    pub direction: f64,
+    /// True over declared mass.
+    pub mass_factor: f64,
+}
+
 /// Why a list of track entries is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TrackError {
@@ -82,6 +95,8 @@ pub struct Track {
     tunnel: Option<TunnelProfiles>,
     curves: Vec<Curve>,
     tunnels: Vec<Tunnel>,
+    resistance_n_per_kn: Option<StepProfile>,
+    masses: Vec<MassSection>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -121,7 +136,39 @@ impl Track {
             tunnel,
             curves: curves.unwrap_or_default(),
             tunnels: tunnels.unwrap_or_default(),
+            resistance_n_per_kn: None,
+            masses: Vec::new(),
         })
+    }
+
+    /// The same line with further resistance in N/kN at places: (start, end, extra).
+    ///
+    /// # Errors
+    ///
+    /// When intervals overlap, are reversed or not finite.
+    pub fn with_resistance(mut self, places: &[(f64, f64, f64)]) -> Result<Self, TrackError> {
+        self.resistance_n_per_kn = Some(interval_profile("resistance", places)?);
+        Ok(self)
+    }
+
+    /// The same line with sections on which trains weigh more or less than declared.
+    #[must_use]
+    pub fn with_masses(mut self, masses: Vec<MassSection>) -> Self {
+        self.masses = masses;
+        self
+    }
+
+    /// Further resistance in N/kN, the mean along a train; `None` when none is known.
+    pub fn resistance_n_per_kn(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
+        Some(self.resistance_n_per_kn.as_ref()?.mean_around(centre_m, train_length_m))
+    }
+
+    /// True over declared mass at a chainage in a direction of travel.
+    pub fn mass_factor(&self, centre_m: f64, direction: f64) -> f64 {
+        let holds = |section: &&MassSection| {
+            section.direction == direction && (section.from_m..section.to_m).contains(&centre_m)
+        };
+        self.masses.iter().filter(holds).map(|section| section.mass_factor).product()
     }
 
     /// Mean gradient in ‰ under a train, climbing positive as the chainage grows.

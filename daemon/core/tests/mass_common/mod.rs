@@ -30,6 +30,7 @@ pub fn train() -> Arc<TrainModel> {
         traction: EffortCurve::new(vec![(0.0, 90_000.0), (30.0, 40_000.0)]),
         brake: None,
         brake_gear: BrakeGear::default(),
+        corrections: Default::default(),
     })
 }
 

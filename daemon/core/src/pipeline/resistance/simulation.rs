@@ -72,6 +72,7 @@ impl Scenario {
             traction: None,
             brake: None,
             brake_gear: Default::default(),
+            corrections: Default::default(),
         })
     }
 

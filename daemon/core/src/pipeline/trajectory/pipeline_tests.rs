@@ -26,6 +26,7 @@ fn train() -> Arc<TrainModel> {
         traction: None,
         brake: None,
         brake_gear: BrakeGear::default(),
+        corrections: Default::default(),
     })
 }
 

@@ -1,5 +1,8 @@
 //! What is declared of a train.
 
+mod corrections;
+
+pub use corrections::Corrections;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
 /// Davis coefficients of the unit basic resistance w0(v) = a + b v + c v² in N/kN, v in m/s.
@@ -101,6 +104,8 @@ pub struct TrainModel {
     pub brake: Option<EffortCurve>,
     /// Brake gear, as far as declared.
     pub brake_gear: BrakeGear,
+    /// What measured runs have added.
+    pub corrections: Corrections,
 }
 
 impl TrainModel {
