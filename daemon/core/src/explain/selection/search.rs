@@ -101,8 +101,10 @@ impl Search<'_> {
     fn round(&self, base: &Fit, not_testable: &mut Vec<(EffectKind, String)>) -> Vec<Trial> {
         let Some(scan) = self.scan(base) else { return Vec::new() };
         let mut trials: Vec<(Trial, &dyn Effect)> = Vec::new();
-        for effect in LIBRARY {
+        for (index, effect) in LIBRARY.into_iter().enumerate() {
             let kind = effect.kind();
+            let share = base.model.effects.len() as f64 + index as f64 / LIBRARY.len() as f64;
+            (self.progress)((0.1 + 0.25 * share).min(0.85), kind.name());
             if base.model.effects.iter().any(|own| own.kind() == kind) {
                 continue;
             }

@@ -1,0 +1,163 @@
+//! The verdict in a plain sentence: kind, where, size with unit and interval, error reduction.
+
+use super::errors::{ErrorPair, Errors};
+use super::words::{self, joined, kind_name, number};
+use crate::dataset::Role;
+use crate::explain::answer::{Answer, EffectAnswer, ParameterValue, Place, Verdict};
+
+/// Places named in a sentence at most.
+const PLACES_MAX: usize = 4;
+
+/// The verdict of an answer.
+pub fn sentence(answer: &Answer, errors: &Errors) -> String {
+    let found: Vec<String> = answer.effects.iter().map(described).collect();
+    let found = found.join("; and ");
+    match answer.verdict {
+        Verdict::None => {
+            "Nothing undeclared acts, as far as these runs tell: the declared model with a, b and \
+             c refitted explains them."
+                .into()
+        }
+        Verdict::InsufficientData => {
+            format!("These runs do not suffice for a verdict. {}", answer.statement)
+        }
+        Verdict::Effect => format!("Found: {found}. {}", gained(errors)),
+        Verdict::Ambiguous => {
+            let rivals: Vec<String> =
+                answer.ambiguous_with.iter().map(|kind| kind_name(kind).into()).collect();
+            let is_or_are = if rivals.len() == 1 { "explains" } else { "explain" };
+            format!(
+                "Something undeclared acts, but these runs cannot tell what: it may be {found}; \
+                 {} {is_or_are} them as well. {}",
+                joined(&rivals),
+                gained(errors)
+            )
+        }
+        Verdict::Unknown => format!(
+            "Something undeclared acts that no effect of the library explains: {found}. {}",
+            gained(errors)
+        ),
+    }
+}
+
+/// What the effects take away from the error that judges them.
+fn gained(errors: &Errors) -> String {
+    let Some((role, ErrorPair { before_mps, after_mps, reduction, .. })) = errors.judged() else {
+        return String::new();
+    };
+    let runs = if role == Role::Holdout { "the runs held out" } else { "the fit runs" };
+    let percent = |share: f64| format!("{:.0} %", 100.0 * share).replacen('-', "−", 1);
+    let interval = reduction.interval.map_or(String::new(), |[low, high]| {
+        format!(" (95 % interval {} to {})", percent(low), percent(high))
+    });
+    let (before, after) = (before_mps.value, after_mps.value);
+    let values = format!("from {before:.3} to {after:.3} m/s");
+    if reduction.value > 0.0 {
+        let share = percent(reduction.value);
+        format!(
+            "With it, the error of the predicted speed on {runs} falls {values}, by {share}{interval}."
+        )
+    } else {
+        format!("With it, the error of the predicted speed on {runs} does not fall ({values}).")
+    }
+}
+
+/// Kind, size and place of an effect.
+pub fn described(effect: &EffectAnswer) -> String {
+    let sizes: Vec<String> = sizes(effect);
+    let size = if sizes.is_empty() { String::new() } else { format!(", {}", joined(&sizes)) };
+    let place = placed(&effect.place);
+    let place = if place.is_empty() { place } else { format!(" {place}") };
+    format!("{}{place}{size}", kind_name(effect.kind))
+}
+
+fn sizes(effect: &EffectAnswer) -> Vec<String> {
+    let number_of = |value: Option<&ParameterValue>| match value {
+        Some(ParameterValue::Number(value)) => Some(*value),
+        _ => None,
+    };
+    let mut sizes = Vec::new();
+    for (name, value) in &effect.parameters {
+        let (words, unit) = words::parameter(name);
+        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+        match value {
+            ParameterValue::Number(value) => {
+                let half = 1.96 * number_of(effect.std.get(name)).unwrap_or(0.0);
+                // What is a convention has no uncertainty.
+                if half > 0.0 {
+                    let [low, high] = [value - half, value + half].map(|it| number(it, Some(half)));
+                    let value = number(*value, Some(half));
+                    sizes.push(format!("{words} {value}{unit} (95 % interval {low} to {high})"));
+                }
+            }
+            ParameterValue::ByRun(by_run) => {
+                let values = by_run.values().copied();
+                let low = values.clone().fold(f64::INFINITY, f64::min);
+                let high = values.fold(f64::NEG_INFINITY, f64::max);
+                sizes.push(format!("{words} {low:.1} to {high:.1}{unit}, run by run"));
+            }
+            ParameterValue::Sections(sections) => {
+                let shown = sections.iter().take(PLACES_MAX);
+                sizes.extend(shown.map(|s| {
+                    let (from, to) = (s.from_m / 1000.0, s.to_m / 1000.0);
+                    let percent = 100.0 * (s.mass_factor - 1.0);
+                    format!(
+                        "{percent:+.1} % from km {from:.2} to {to:.2} (direction {:+})",
+                        s.direction
+                    )
+                    .replace('-', "−")
+                }));
+            }
+            ParameterValue::Windows(windows) => {
+                let shown = windows.iter().take(PLACES_MAX);
+                sizes.extend(shown.map(|w| {
+                    let percent =
+                        format!("{:+.1} %", 100.0 * (w.mass_factor - 1.0)).replace('-', "−");
+                    format!("{percent} in {} from {:.0} to {:.0} s", w.run, w.t_start_s, w.t_end_s)
+                }));
+            }
+            ParameterValue::List(_) => {}
+        }
+    }
+    sizes
+}
+
+/// Where an effect acts, in words; empty when it acts everywhere.
+pub fn placed(place: &Place) -> String {
+    let mut parts = Vec::new();
+    let listed = |all: Vec<String>| {
+        let more = all.len().saturating_sub(PLACES_MAX);
+        let mut shown: Vec<String> = all.into_iter().take(PLACES_MAX).collect();
+        if more > 0 {
+            shown.push(format!("{more} more"));
+        }
+        joined(&shown)
+    };
+    if let Some(intervals) = &place.intervals_m {
+        let all = intervals
+            .iter()
+            .map(|[from, to]| format!("from km {:.2} to {:.2}", from / 1000.0, to / 1000.0));
+        parts.push(listed(all.collect()));
+    }
+    if let Some(windows) = &place.windows {
+        let all = windows
+            .iter()
+            .map(|w| format!("in {} from {:.0} to {:.0} s", w.run, w.t_start_s, w.t_end_s));
+        parts.push(listed(all.collect()));
+    }
+    if let Some(runs) = &place.runs {
+        parts.push(format!("in {}", listed(runs.clone())));
+    }
+    if let Some([low, high]) = place.speed_range_mps {
+        parts.push(format!("at {low:.1} to {high:.1} m/s"));
+    }
+    let covariate = place.covariate.as_ref().filter(|it| {
+        // The same is said above in other words.
+        !matches!(it.name.as_str(), "speed_mps" | "chainage_m" | "run")
+    });
+    if let Some(covariate) = covariate {
+        let [low, high] = covariate.range.map(|value| number(value, None));
+        parts.push(format!("while {} is {low} to {high}", covariate.name));
+    }
+    parts.join(", ")
+}
