@@ -57,7 +57,7 @@ impl ReportData {
         ReportData {
             sentence: sentence::sentence(&explanation.answer, &errors),
             traces: traces::traces(explanation),
-            panels: panels::panels(explanation),
+            panels: panels::panels(dataset, explanation),
             parameters: parameters::rows(dataset, explanation),
             candidates: candidates::rows(explanation),
             errors,

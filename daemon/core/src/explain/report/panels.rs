@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::covariates::Covariate;
 use super::windows::{Window, windows};
+use crate::dataset::{Dataset, Role};
 use crate::explain::Explanation;
 use crate::explain::answer::{ParameterValue, RunWindow};
 use crate::explain::evidence::RunData;
@@ -116,7 +117,7 @@ impl Zones {
         times
     }
 
-    fn on(&self, covariate: Covariate, runs: &[RunData]) -> Vec<[f64; 2]> {
+    fn on(&self, covariate: Covariate, runs: &[RunData], numbers: &[f64]) -> Vec<[f64; 2]> {
         let of_ranges = self.ranges.iter().filter(|(other, _)| *other == covariate);
         let mut acting: Vec<[f64; 2]> = of_ranges.map(|(_, range)| *range).collect();
         match covariate {
@@ -129,8 +130,8 @@ impl Zones {
                 let has = |run: &RunData| {
                     self.runs.contains(&run.file) || self.windows.iter().any(|w| w.run == run.file)
                 };
-                let inside = runs.iter().enumerate().filter(|(_, run)| has(run));
-                acting.extend(inside.map(|(k, _)| [k as f64 + 0.6, k as f64 + 1.4]));
+                let inside = numbers.iter().zip(runs).filter(|(_, run)| has(run));
+                acting.extend(inside.map(|(number, _)| [number - 0.4, number + 0.4]));
             }
             _ => {}
         }
@@ -141,14 +142,18 @@ impl Zones {
 
 /// The panels: first the covariate on which the effect is seen best, then those that are always
 /// shown, then those on which the residual is most uneven.
-pub fn panels(explanation: &Explanation) -> Vec<Panel> {
+pub fn panels(dataset: &Dataset, explanation: &Explanation) -> Vec<Panel> {
     let (runs, windows, zones) =
         (&explanation.problem.runs, windows(explanation), zones(explanation));
     let (deviations, covariance) = deviations(&explanation.grown);
     let covariance = with_deviations(&covariance, &deviations);
+    let numbers: Vec<f64> = dataset.with_role(Role::Fit).map(|run| f64::from(run.number)).collect();
     let panel = |covariate: Covariate, file: Option<String>| {
-        let bins = bins(covariate, &windows, runs, &covariance);
-        let acting = zones.on(covariate, runs);
+        let mut bins = bins(covariate, &windows, runs, &covariance);
+        if covariate == Covariate::Run {
+            bins.iter_mut().for_each(|bin| bin.at = numbers[bin.at as usize - 1]);
+        }
+        let acting = zones.on(covariate, runs, &numbers);
         (bins.len() > 1).then_some(Panel { covariate, file, bins, acting })
     };
     let mut list: Vec<Panel> =
