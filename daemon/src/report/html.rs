@@ -121,7 +121,7 @@ pub fn percent(share: &Estimate) -> String {
 /// A number's text with a true minus, and none before zero.
 pub fn minus(text: &str) -> String {
     let digits = text.trim_start_matches('-');
-    if digits.chars().all(|c| matches!(c, '0' | '.')) {
+    if digits.chars().all(|c| matches!(c, '0' | '.' | ' ' | '%')) {
         return digits.into();
     }
     text.replacen('-', "−", 1)
@@ -173,6 +173,7 @@ mod tests {
         assert_eq!(grouped(1_234_567), "1\u{202f}234\u{202f}567");
         assert_eq!(grouped(12), "12");
         assert_eq!(minus("-0.0"), "0.0");
+        assert_eq!(minus("-0 %"), "0 %");
         assert_eq!(minus("-1.5"), "−1.5");
         let value = Estimate { value: 1.234, interval: Some([1.0, 1.4]) };
         assert_eq!(estimate(&value), "1.23<span class=\"interval\">1.00 to 1.40</span>");

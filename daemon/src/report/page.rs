@@ -129,7 +129,7 @@ fn figures(subject: &Subject) -> String {
     let Some((role, pair)) = subject.data.errors.judged() else { return String::new() };
     let runs = if role == Role::Holdout { "holdout runs" } else { "fit runs" };
     let interval = |bounds: Option<[f64; 2]>, shown: &dyn Fn(f64) -> String| match bounds {
-        Some([low, high]) => format!("95 %: {} to {}", shown(low), shown(high)),
+        Some([low, high]) => format!("95 % interval {} to {}", shown(low), shown(high)),
         None => "no interval: one block only".into(),
     };
     let speed = |value: f64| format!("{value:.3}");

@@ -56,17 +56,21 @@ pub fn draw(panel: &Panel, has_effect: bool) -> Result<String, PlotError> {
     Ok(for_page(&drawing, &label(panel, has_effect), "panel", size))
 }
 
-/// The whiskers of a sparse bin may be cut so that the others stay readable.
+/// A range that shows every mean with the usual whisker; the longest whiskers may be cut so that
+/// the others stay readable.
 fn vertical_range(panel: &Panel, has_effect: bool) -> [f64; 2] {
-    let reach = |(mean, half): (f64, f64)| {
-        let shown = half.min(2.0 * mean.abs().max(0.1));
-        [mean - shown, mean + shown]
-    };
-    let sides = panel.bins.iter().flat_map(|bin| {
+    let sides = |bin: &PanelBin| {
         let after = if has_effect { bin.after_n_per_kn } else { bin.before_n_per_kn };
-        [reach(bin.before_n_per_kn), reach(after)].concat()
-    });
-    range_with_zero(sides)
+        [bin.before_n_per_kn, after]
+    };
+    let all: Vec<(f64, f64)> = panel.bins.iter().flat_map(sides).collect();
+    let mut halves: Vec<f64> = panel.bins.iter().map(|bin| bin.before_n_per_kn.1).collect();
+    halves.sort_unstable_by(f64::total_cmp);
+    let usual = 1.5 * halves[halves.len() * 3 / 4];
+    range_with_zero(all.iter().flat_map(|(mean, half)| {
+        let shown = half.min(usual);
+        [mean - shown, mean + shown]
+    }))
 }
 
 /// A covariate's name with its unit.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use dynocar_core::dataset::{ForceSource, GradientSource, PositionSource, Run};
+use dynocar_core::dataset::{ForceSource, GradientSource, OrderCounts, PositionSource, Run};
 use dynocar_core::explain::evidence::RunData;
 
 use super::Section;
@@ -54,8 +54,7 @@ fn runs_table(used: &[(&Run, Option<&RunData>)]) -> String {
         ("Used", Column::Numbers),
         ("Rejected", Column::Numbers),
         ("Outliers replaced", Column::Numbers),
-        ("Gaps", Column::Numbers),
-        ("Longest, s", Column::Numbers),
+        ("Gaps (longest)", Column::Numbers),
         ("Restarts", Column::Numbers),
     ];
     let mut table = Table::new("The runs", &head);
@@ -75,16 +74,18 @@ fn runs_table(used: &[(&Run, Option<&RunData>)]) -> String {
             of_data(&|data| grouped(data.samples().len())),
             of_data(&|data| count(data.rejected)),
             of_data(&|data| count(data.replaced)),
-            count(quality.order.gaps),
-            if quality.order.gaps > 0 {
-                format!("{:.1}", quality.order.longest_gap_s)
-            } else {
-                "–".into()
-            },
+            gaps(&quality.order),
             of_data(&|data| count(data.recording.restarts())),
         ]);
     }
     table.html()
+}
+
+fn gaps(order: &OrderCounts) -> String {
+    match order.gaps {
+        0 => "–".into(),
+        gaps => format!("{gaps} ({:.1} s)", order.longest_gap_s),
+    }
 }
 
 /// What was rejected, by reason, and what is missing, by quantity, run by run.
@@ -114,7 +115,7 @@ fn counts_table(used: &[(&Run, Option<&RunData>)]) -> String {
         }
     }
     if rows.is_empty() {
-        return "<p>No sample was rejected, no value is missing, none sticks out.</p>\n".into();
+        return "<p>No sample was rejected and no value is missing.</p>\n".into();
     }
     let numbers: Vec<String> = used.iter().map(|(run, _)| format!("Run {}", run.number)).collect();
     let mut head = vec![("What", Column::Words)];

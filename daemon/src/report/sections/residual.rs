@@ -35,7 +35,7 @@ pub fn section(subject: &Subject) -> Result<Section, ReportError> {
     body += "<div class=\"panels\">\n";
     for panel in &subject.data.panels {
         let title = match &panel.file {
-            Some(file) => format!("{} {file}", panel.covariate.title().replace("the run", "run")),
+            Some(file) => format!("Run {}, {file}, over time", subject.number(file)),
             None => panel.covariate.title().to_string(),
         };
         let svg = panel::draw(panel, has_effect)

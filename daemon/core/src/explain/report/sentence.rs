@@ -65,7 +65,7 @@ fn gained(errors: &Errors) -> String {
 /// Kind, size and place of an effect.
 pub fn described(effect: &EffectAnswer) -> String {
     let sizes: Vec<String> = sizes(effect);
-    let size = if sizes.is_empty() { String::new() } else { format!(", {}", joined(&sizes)) };
+    let size = if sizes.is_empty() { String::new() } else { format!(" – {}", joined(&sizes)) };
     let place = placed(&effect.place);
     let place = if place.is_empty() { place } else { format!(" {place}") };
     format!("{}{place}{size}", kind_name(effect.kind))
