@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use dynocar_core::explain::report::Estimate;
-use dynocar_core::explain::report::words::number;
+use dynocar_core::explain::report::words::{self, number};
 
 /// Text from outside, harmless within elements and quoted attributes.
 pub fn escape(text: &str) -> String {
@@ -108,7 +108,7 @@ pub fn estimate(estimate: &Estimate) -> String {
 
 /// A share in percent above its interval.
 pub fn percent(share: &Estimate) -> String {
-    let shown = |share: f64| minus(&format!("{:.0}", 100.0 * share));
+    let shown = |value: f64| words::percent(value, share.interval);
     match share.interval {
         Some([low, high]) => {
             let (low, high) = (shown(low), shown(high));

@@ -4,8 +4,9 @@ use std::fmt::Write as _;
 
 use dynocar_core::dataset::Role;
 use dynocar_core::explain::answer::Verdict;
+use dynocar_core::explain::report::words;
 
-use super::html::{escape, minus};
+use super::html::escape;
 use super::plots::colour_rules;
 use super::sections::{Section, candidates, errors, parameters, quality, reproduce, residual};
 use super::{ReportError, Subject};
@@ -133,7 +134,7 @@ fn figures(subject: &Subject) -> String {
         None => "no interval: one block only".into(),
     };
     let speed = |value: f64| format!("{value:.3}");
-    let share = |value: f64| minus(&format!("{:.0} %", 100.0 * value));
+    let share = |value: f64| format!("{} %", words::percent(value, pair.reduction.interval));
     let mut list = vec![(
         format!("{} <small>m/s</small>", speed(pair.before_mps.value)),
         if subject.has_effect() { "error before" } else { "error of the declared model" },

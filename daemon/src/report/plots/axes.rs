@@ -60,8 +60,10 @@ pub(super) fn chart<'a, 't>(
         .y_label_area_size(px(44))
         .build_cartesian_2d(x.range[0]..x.range[1], y.range[0]..y.range[1])?;
     area.draw(&Text::new(y.title.to_string(), (px(4) as i32, px(4) as i32), letters(TOP_LEFT)))?;
-    let below = (width as i32 - px(12) as i32, height as i32 - px(3) as i32);
-    area.draw(&Text::new(x.title.to_string(), below, letters((HPos::Right, VPos::Bottom))))?;
+    if !x.title.is_empty() {
+        let below = (width as i32 - px(12) as i32, height as i32 - px(3) as i32);
+        area.draw(&Text::new(x.title.to_string(), below, letters((HPos::Right, VPos::Bottom))))?;
+    }
     let label = |axis: &Axis| {
         let decimals = if axis.is_whole { 0 } else { decimals(axis) };
         move |value: &f64| minus(&format!("{value:.decimals$}"))

@@ -46,7 +46,7 @@ fn gained(errors: &Errors) -> String {
         return String::new();
     };
     let runs = if role == Role::Holdout { "the runs held out" } else { "the fit runs" };
-    let percent = |share: f64| format!("{:.0} %", 100.0 * share).replacen('-', "−", 1);
+    let percent = |share: f64| format!("{} %", words::percent(share, reduction.interval));
     let interval = reduction.interval.map_or(String::new(), |[low, high]| {
         format!(" (95 % interval {} to {})", percent(low), percent(high))
     });

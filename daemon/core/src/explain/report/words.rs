@@ -35,8 +35,8 @@ pub fn kind_name(name: &str) -> &str {
 /// What a parameter means, its symbol or name left out, and its unit.
 pub fn parameter(name: &str) -> (&str, &'static str) {
     match name {
-        "c_factor" => ("factor on c v² in the tunnel", ""),
-        "dc_n_per_mps2" => ("extra air drag, whole train inside", "N/(m/s)²"),
+        "c_factor" => ("factor on c v²", ""),
+        "dc_n_per_mps2" => ("extra drag with the whole train inside", "N/(m/s)²"),
         "k_n_per_kn_m" => ("curve constant k in k/R", "N/kN · m"),
         "wind_plus_mps" => ("headwind towards growing chainage", "m/s"),
         "headwind_mps" => ("headwind", "m/s"),
@@ -73,6 +73,15 @@ pub fn number(value: f64, uncertainty: Option<f64>) -> String {
     text.replacen('-', "−", 1)
 }
 
+/// A share in percent without its sign, with a decimal where its interval is narrow.
+pub fn percent(share: f64, interval: Option<[f64; 2]>) -> String {
+    let is_narrow = interval.is_some_and(|[low, high]| high > low && high - low < 0.02);
+    let text = format!("{:.*}", usize::from(is_narrow), 100.0 * share);
+    let digits = text.trim_start_matches('-');
+    let is_zero = digits.chars().all(|c| c == '0' || c == '.');
+    if is_zero { digits.into() } else { text.replacen('-', "−", 1) }
+}
+
 /// Words joined by commas and a last "and".
 pub fn joined(words: &[String]) -> String {
     match words {
@@ -93,6 +102,14 @@ mod tests {
         assert_eq!(number(-0.005154, Some(0.00038)), "−0.00515");
         assert_eq!(number(-0.0001, Some(0.2)), "0.00");
         assert_eq!(number(0.5846, None), "0.5846");
+    }
+
+    #[test]
+    fn shares_show_a_decimal_where_their_interval_is_narrow() {
+        assert_eq!(percent(0.6012, Some([0.596, 0.604])), "60.1");
+        assert_eq!(percent(0.6012, Some([0.5, 0.7])), "60");
+        assert_eq!(percent(-0.2, None), "−20");
+        assert_eq!(percent(-0.0001, Some([0.0, 0.0])), "0");
     }
 
     #[test]
