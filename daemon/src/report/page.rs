@@ -81,7 +81,7 @@ fn header(subject: &Subject, name: &str) -> String {
     format!(
         "<header>\n<p class=\"kicker\">Dynocar · residual report</p>\n<h1>{name}</h1>\n\
          {description}<p class=\"facts\">{train}{:.1} t, {:.0} m · {line} · {} fit and {} holdout \
-         runs · {}</p>\n</header>\n",
+         runs · <span>{}</span></p>\n</header>\n",
         dataset.train.mass_kg / 1000.0,
         dataset.train.length_m,
         count(Role::Fit),

@@ -67,10 +67,11 @@ fn vertical_range(panel: &Panel, has_effect: bool) -> [f64; 2] {
     let mut halves: Vec<f64> = panel.bins.iter().map(|bin| bin.before_n_per_kn.1).collect();
     halves.sort_unstable_by(f64::total_cmp);
     let usual = 1.5 * halves[halves.len() * 3 / 4];
-    range_with_zero(all.iter().flat_map(|(mean, half)| {
+    let whiskers = all.iter().flat_map(|(mean, half)| {
         let shown = half.min(usual);
         [mean - shown, mean + shown]
-    }))
+    });
+    range_with_zero(whiskers.chain(panel.bins.iter().map(|bin| bin.effect_n_per_kn.0)))
 }
 
 /// A covariate's name with its unit.

@@ -19,11 +19,17 @@ use crate::report::{ReportError, Subject};
 /// When a plot cannot be drawn.
 pub fn section(subject: &Subject) -> Result<Section, ReportError> {
     let mut body = String::from(
-        "<p>Each model starts at a run's first measured speed, is driven by the reported forces to \
+        "<p>Each model starts at a run’s first measured speed, is driven by the reported forces to \
          the end, and its speed is compared with the measured one (root mean square over moving \
-         samples). ‘Before’ is the declared model with a, b, c refitted on the fit runs, ‘after’ \
-         the same with the effect, everything refitted. Holdout runs took no part in any fit.</p>\n",
+         samples). Holdout runs took no part in any fit. ",
     );
+    body += if subject.has_effect() {
+        "‘Before’ is the declared model with a, b, c refitted on the fit runs, ‘after’ the same \
+         with the effect, everything refitted.</p>\n"
+    } else {
+        "The model is the declared one with a, b, c refitted on the fit runs; no effect was \
+         added.</p>\n"
+    };
     body += &summary(subject);
     body += &by_run(subject)?;
     for trace in &subject.data.traces {
@@ -35,11 +41,14 @@ pub fn section(subject: &Subject) -> Result<Section, ReportError> {
 fn summary(subject: &Subject) -> String {
     let head = [
         ("Runs", Column::Words),
-        ("Before, m/s", Column::Numbers),
+        (if subject.has_effect() { "Before, m/s" } else { "Error, m/s" }, Column::Numbers),
         ("After, m/s", Column::Numbers),
         ("Taken away", Column::Numbers),
     ];
-    let mut table = Table::new("Error of the predicted speed with 95 % intervals", &head);
+    // Without an effect there is no 'after'.
+    let columns = if subject.has_effect() { 4 } else { 2 };
+    let caption = "Error of the predicted speed with 95 % intervals";
+    let mut table = Table::new(caption, &head[..columns]);
     let errors = &subject.data.errors;
     let rows = [
         ("Holdout, whole runs", errors.holdout),
@@ -49,13 +58,13 @@ fn summary(subject: &Subject) -> String {
     ];
     for (k, (name, pair)) in rows.into_iter().enumerate() {
         let Some(pair) = pair else { continue };
-        let after = |cell: String| if subject.has_effect() { cell } else { "–".into() };
-        let cells = vec![
+        let mut cells = vec![
             name.into(),
             estimate(&pair.before_mps),
-            after(estimate(&pair.after_mps)),
-            after(percent(&pair.reduction)),
+            estimate(&pair.after_mps),
+            percent(&pair.reduction),
         ];
+        cells.truncate(columns);
         if k == 0 { table.push_marked(cells) } else { table.push(cells) }
     }
     let mut html = table.html();

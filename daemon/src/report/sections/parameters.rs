@@ -8,14 +8,14 @@ use crate::report::html::{Column, Table, escape, estimate};
 
 /// The section.
 pub fn section(subject: &Subject) -> Section {
+    let has_effect = subject.has_effect();
     let head = [
         ("Parameter", Column::Words),
         ("Unit", Column::Words),
         ("Declared", Column::Numbers),
-        ("Without the effect", Column::Numbers),
+        (if has_effect { "Without the effect" } else { "Fitted" }, Column::Numbers),
         ("With the effect", Column::Numbers),
     ];
-    let has_effect = subject.has_effect();
     let shown = if has_effect { &head[..] } else { &head[..4] };
     let mut table = Table::new("Parameters with 95 % intervals, speeds in m/s", shown);
     for row in &subject.data.parameters {

@@ -23,7 +23,8 @@ pub fn section(subject: &Subject) -> Result<Section, ReportError> {
          windows, without an error, in plots of one run). Where nothing is missing, points scatter \
          around zero.</p>\n",
     );
-    let mut entries = vec![("ring before", "before")];
+    let before = if has_effect { "before" } else { "declared model, a, b, c refitted" };
+    let mut entries = vec![("ring before", before)];
     if has_effect {
         entries.push(("dot after", "after"));
         entries.push(("area band", "what the effect accounts for, 95 %"));

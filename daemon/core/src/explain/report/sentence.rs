@@ -134,10 +134,7 @@ pub fn placed(place: &Place) -> String {
         joined(&shown)
     };
     if let Some(intervals) = &place.intervals_m {
-        let all = intervals
-            .iter()
-            .map(|[from, to]| format!("from km {:.2} to {:.2}", from / 1000.0, to / 1000.0));
-        parts.push(listed(all.collect()));
+        parts.push(stretches(intervals));
     }
     if let Some(windows) = &place.windows {
         let all = windows
@@ -160,4 +157,66 @@ pub fn placed(place: &Place) -> String {
         parts.push(format!("while {} is {low} to {high}", covariate.name));
     }
     parts.join(", ")
+}
+
+/// Stretches of the line; many are counted, not listed.
+fn stretches(intervals_m: &[[f64; 2]]) -> String {
+    let km = |m: f64| m / 1000.0;
+    if intervals_m.len() > PLACES_MAX {
+        let low = intervals_m.iter().map(|interval| interval[0]).fold(f64::INFINITY, f64::min);
+        let high = intervals_m.iter().map(|interval| interval[1]).fold(f64::NEG_INFINITY, f64::max);
+        let count = intervals_m.len();
+        return format!("at {count} places between km {:.2} and {:.2}", km(low), km(high));
+    }
+    let listed: Vec<String> = intervals_m
+        .iter()
+        .map(|[from, to]| format!("from km {:.2} to {:.2}", km(*from), km(*to)))
+        .collect();
+    joined(&listed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::explain::answer::{CovariateRange, RunWindow};
+
+    #[test]
+    fn places_are_told_in_words() {
+        let tunnels = Place::of_intervals(vec![[5200.0, 6900.0], [8000.0, 8100.0]]);
+        assert_eq!(placed(&tunnels), "from km 5.20 to 6.90 and from km 8.00 to 8.10");
+        let curves: Vec<[f64; 2]> =
+            (0..9).map(|k| [1e3 * f64::from(k), 1e3 * f64::from(k) + 300.0]).collect();
+        assert_eq!(placed(&Place::of_intervals(curves)), "at 9 places between km 0.00 and 8.30");
+        let window = RunWindow { run: "runs/03.csv".into(), t_start_s: 204.0, t_end_s: 729.6 };
+        let covariate = CovariateRange { name: "brake_force_n".into(), range: [1e3, 2.5e4] };
+        let place = Place {
+            windows: Some(vec![window]),
+            speed_range_mps: Some([10.0, 12.5]),
+            covariate: Some(covariate),
+            ..Place::default()
+        };
+        assert_eq!(
+            placed(&place),
+            "in runs/03.csv from 204 to 730 s, at 10.0 to 12.5 m/s, \
+             while brake_force_n is 1000 to 25000"
+        );
+        assert_eq!(placed(&Place::default()), "");
+    }
+
+    #[test]
+    fn an_effect_is_told_with_its_size_and_interval() {
+        let number = |value| [("force_n".to_string(), ParameterValue::Number(value))].into();
+        let effect = EffectAnswer {
+            kind: "dragging_brake",
+            place: Place { runs: Some(vec!["runs/02.csv".into()]), ..Place::default() },
+            parameters: number(3058.6),
+            std: number(107.5),
+            p_value: 1e-9,
+            error_reduction: 0.8,
+        };
+        assert_eq!(
+            described(&effect),
+            "a dragging brake in runs/02.csv – drag force 3059 N (95 % interval 2848 to 3269)"
+        );
+    }
 }

@@ -38,7 +38,7 @@ pub fn parameter(name: &str) -> (&str, &'static str) {
         "c_factor" => ("factor on c v²", ""),
         "dc_n_per_mps2" => ("extra drag with the whole train inside", "N/(m/s)²"),
         "k_n_per_kn_m" => ("curve constant k in k/R", "N/kN · m"),
-        "wind_plus_mps" => ("headwind towards growing chainage", "m/s"),
+        "wind_plus_mps" => ("headwind for travel towards growing chainage", "m/s"),
         "headwind_mps" => ("headwind", "m/s"),
         "force_n" => ("drag force", "N"),
         "speed_scale" => ("measured over true speed", ""),
