@@ -68,7 +68,12 @@ pub fn described(effect: &EffectAnswer) -> String {
     let size = if sizes.is_empty() { String::new() } else { format!(" – {}", joined(&sizes)) };
     let place = placed(&effect.place);
     let place = if place.is_empty() { place } else { format!(" {place}") };
-    format!("{}{place}{size}", kind_name(effect.kind))
+    let kind = match effect.kind {
+        // The sentence around it says that it has no name.
+        "unknown" => "a residual",
+        kind => kind_name(kind),
+    };
+    format!("{kind}{place}{size}")
 }
 
 fn sizes(effect: &EffectAnswer) -> Vec<String> {
@@ -178,7 +183,9 @@ fn stretches(intervals_m: &[[f64; 2]]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::explain::answer::{CovariateRange, RunWindow};
+    use crate::explain::answer::{BaseAnswer, CovariateRange, DavisDeviations, RunWindow};
+    use crate::explain::report::Estimate;
+    use crate::explain::report::errors::Resampling;
 
     #[test]
     fn places_are_told_in_words() {
@@ -217,6 +224,68 @@ mod tests {
         assert_eq!(
             described(&effect),
             "a dragging brake in runs/02.csv – drag force 3059 N (95 % interval 2848 to 3269)"
+        );
+    }
+
+    #[test]
+    fn rivals_and_unknown_causes_are_told_apart_from_findings() {
+        let effect = |kind, parameter: &str| EffectAnswer {
+            kind,
+            place: Place::of_intervals(vec![[5200.0, 6900.0]]),
+            parameters: [(parameter.to_string(), ParameterValue::Number(2.5))].into(),
+            std: [(parameter.to_string(), ParameterValue::Number(0.1))].into(),
+            p_value: 1e-9,
+            error_reduction: 0.8,
+        };
+        let none = DavisDeviations { a: 0.0, b: 0.0, c: 0.0 };
+        let mut answer = Answer {
+            verdict: Verdict::Ambiguous,
+            statement: String::new(),
+            effects: vec![effect("local_resistance", "extra_n_per_kn")],
+            ambiguous_with: vec!["tunnel_drag"],
+            experiment: None,
+            base: BaseAnswer { a: 1.0, b: 0.0, c: 0.0, std: none },
+            metric: "full_run",
+            rmse_before: None,
+            rmse_after: None,
+            error_reduction_interval: None,
+            window60: None,
+            fit_runs: None,
+            considered: Vec::new(),
+            predictions: std::collections::BTreeMap::new(),
+        };
+        let value = |value| Estimate { value, interval: None };
+        let pair = ErrorPair {
+            before_mps: value(0.8),
+            after_mps: value(0.9),
+            reduction: value(-0.125),
+            resampling: Resampling::Blocks(1),
+        };
+        let errors = Errors {
+            fit: None,
+            holdout: Some(pair),
+            fit_window60: None,
+            holdout_window60: None,
+            by_run: Vec::new(),
+        };
+        let size = "from km 5.20 to 6.90 – extra resistance 2.50 N/kN (95 % interval 2.30 to 2.70)";
+        let gained = "With it, the error of the predicted speed on the runs held out does not \
+                      fall (from 0.800 to 0.900 m/s).";
+        assert_eq!(
+            sentence(&answer, &errors),
+            format!(
+                "Something undeclared acts, but these runs cannot tell what: it may be a local \
+                 resistance {size}; tunnel drag explains them as well. {gained}"
+            )
+        );
+        answer.verdict = Verdict::Unknown;
+        answer.effects = vec![effect("unknown", "extra_n_per_kn")];
+        assert_eq!(
+            sentence(&answer, &errors),
+            format!(
+                "Something undeclared acts that no effect of the library explains: a \
+                 residual {size}. {gained}"
+            )
         );
     }
 }

@@ -101,10 +101,8 @@ impl Search<'_> {
     fn round(&self, base: &Fit, not_testable: &mut Vec<(EffectKind, String)>) -> Vec<Trial> {
         let Some(scan) = self.scan(base) else { return Vec::new() };
         let mut trials: Vec<(Trial, &dyn Effect)> = Vec::new();
-        for (index, effect) in LIBRARY.into_iter().enumerate() {
+        for effect in LIBRARY {
             let kind = effect.kind();
-            let share = base.model.effects.len() as f64 + index as f64 / LIBRARY.len() as f64;
-            (self.progress)((0.1 + 0.25 * share).min(0.85), kind.name());
             if base.model.effects.iter().any(|own| own.kind() == kind) {
                 continue;
             }
@@ -130,6 +128,8 @@ impl Search<'_> {
             .enumerate()
             .map(|(rank, (trial, effect))| {
                 let is_finalist = rank < FINALISTS && trial.evidence > -20.0;
+                let share = base.model.effects.len() as f64 + (rank.min(FINALISTS) + 2) as f64 / 7.0;
+                (self.progress)((0.1 + 0.25 * share).min(0.85), trial.kind.name());
                 if is_finalist { self.finalist(base, trial, effect) } else { trial }
             })
             .collect();
