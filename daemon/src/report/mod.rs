@@ -2,7 +2,7 @@
 //!
 //! # Layout
 //!
-//! - [`page`]: the page from top to bottom
+//! - [`mod@page`]: the page from top to bottom
 //! - [`sections`]: its parts
 //! - [`plots`]: the plots, as SVG text
 //! - [`html`]: escaping, tables, numbers
