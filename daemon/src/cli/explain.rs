@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use clap::Args;
+use dynocar_core::dataset::Dataset;
 use dynocar_core::explain::score::PredictedRun;
 use dynocar_core::explain::{Explanation, explain};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -13,6 +15,8 @@ use super::Failure;
 use super::output::write_json;
 use crate::dataset;
 use crate::grown::write_grown;
+use crate::report;
+use crate::report::provenance::Provenance;
 
 /// Find what the declared model leaves, trace it to an effect, and score the grown model.
 #[derive(Debug, Args)]
@@ -31,6 +35,9 @@ pub struct ExplainArguments {
     /// Write the grown model as train.toml and track.toml into this folder
     #[arg(long, value_name = "DIR")]
     grown: Option<PathBuf>,
+    /// Write a report for people: one HTML page that needs nothing else
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
 }
 
 /// Explains a dataset and prints the answer.
@@ -44,17 +51,15 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
     if arguments.traction_only {
         dataset.keep_traction_only();
     }
-    let bar = ProgressBar::new(1000);
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent:>3} % {msg}") {
-        bar.set_style(style);
-    }
+    let bar = progress_bar();
     let progress = |share: f64, what: &str| {
-        bar.set_position((1000.0 * share) as u64);
-        bar.set_message(what.to_string());
+        // Looking again at an earlier choice is no step back.
+        bar.set_position(bar.position().max((1000.0 * share) as u64));
+        bar.set_message(what.replace('_', " "));
     };
-    let mut explanation =
-        explain(&dataset, &progress).map_err(|error| Failure::Input(error.to_string()))?;
+    let explained = explain(&dataset, &progress);
     bar.finish_and_clear();
+    let mut explanation = explained.map_err(|error| Failure::Input(error.to_string()))?;
     if let Some(folder) = &arguments.predictions {
         explanation.answer.predictions = write_predictions(folder, &explanation)?;
     }
@@ -69,10 +74,40 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
             eprintln!("the files cannot express {kinds}: use the answer of --json for it");
         }
     }
+    if let Some(file) = &arguments.report {
+        write_report(file, &arguments.dataset, &dataset, &explanation)?;
+    }
     match &arguments.json {
         Some(file) => write_json(file, &explanation.answer)?,
         None => print_answer(&explanation),
     }
+    Ok(())
+}
+
+/// A bar on standard error while that is a terminal; nothing otherwise.
+fn progress_bar() -> ProgressBar {
+    let bar = ProgressBar::new(1000);
+    let template = "{bar:40} {percent:>3} %  {elapsed:>3}  {msg}";
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
+}
+
+fn write_report(
+    file: &Path,
+    path: &Path,
+    dataset: &Dataset,
+    explanation: &Explanation,
+) -> Result<(), Failure> {
+    let provenance = Provenance::of(path).map_err(|error| Failure::Input(error.to_string()))?;
+    let page = report::page(dataset, explanation, provenance)
+        .map_err(|error| Failure::Work(format!("{}: {error}", file.display())))?;
+    std::fs::write(file, page).map_err(|error| {
+        Failure::Work(format!("{}: cannot be written: {error}", file.display()))
+    })?;
+    eprintln!("report: {}", file.display());
     Ok(())
 }
 

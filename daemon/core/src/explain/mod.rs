@@ -10,6 +10,7 @@
 //! - [`selection`]: the search for effects, its significance, evidence by run
 //! - [`score`]: open-loop prediction of fit and holdout runs
 //! - [`verdict`], [`answer`]: the statement
+//! - [`report`]: what a report shows beyond it
 //!
 //! [`explain`] runs it all.
 
@@ -17,6 +18,7 @@ pub mod answer;
 pub mod effects;
 pub mod evidence;
 pub mod localise;
+pub mod report;
 pub mod residual_pressure;
 pub mod scan;
 pub mod score;

@@ -147,6 +147,9 @@ impl Search<'_> {
             .enumerate()
             .map(|(rank, (trial, effect))| {
                 let is_finalist = rank < FINALISTS && trial.evidence > -20.0;
+                let share = base.model.effects.len() as f64
+                    + (rank.min(FINALISTS) + 2) as f64 / (FINALISTS + 2) as f64;
+                (self.progress)((0.1 + 0.25 * share).min(0.85), trial.kind.name());
                 if is_finalist { self.finalist(base, trial, effect) } else { trial }
             })
             .collect();

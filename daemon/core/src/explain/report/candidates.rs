@@ -1,0 +1,98 @@
+//! What else was considered, and why it lost.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::words;
+use crate::explain::Explanation;
+use crate::explain::score::reduction_on_fit_runs;
+use crate::explain::selection::{EVIDENCE_MIN, Trial};
+
+/// A kind of the library.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CandidateRow {
+    /// Its name in files and answers.
+    pub kind: &'static str,
+    /// Its name for people.
+    pub title: &'static str,
+    /// True when it is part of the model.
+    pub is_found: bool,
+    /// Evidence of it alone on top of a, b, c; `None` when it could not be tested.
+    pub alone: Option<f64>,
+    /// Share of the open-loop error of the fit runs that it alone takes away.
+    pub reduction: Option<f64>,
+    /// Evidence beside everything found; `None` for what was found or could not be tested.
+    pub beside: Option<f64>,
+    /// Why it was taken or not.
+    pub reason: String,
+}
+
+/// Every kind that was considered: what was found first, then by the evidence alone.
+pub fn rows(explanation: &Explanation) -> Vec<CandidateRow> {
+    let outcome = &explanation.outcome;
+    let found: Vec<&str> = explanation.answer.effects.iter().map(|effect| effect.kind).collect();
+    let rivals = &explanation.answer.ambiguous_with;
+    let first = outcome.rounds.first().map_or(&[][..], |round| &round[..]);
+    let has_several = outcome.rounds.len() > 1;
+    let last = outcome.rounds.last().filter(|_| has_several).map_or(&[][..], |round| &round[..]);
+    let of = |round: &'_ [Trial], kind: EffectKind| {
+        round.iter().find(|trial| trial.kind == kind).map(|trial| trial.evidence)
+    };
+    let mut rows: Vec<CandidateRow> = first
+        .iter()
+        .map(|trial| {
+            let kind = trial.kind.name();
+            let is_found = found.contains(&kind);
+            let beside = of(last, trial.kind).filter(|_| !is_found);
+            let reduction = reduction_on_fit_runs(&explanation.problem, &outcome.base, &trial.fit);
+            let mut row = CandidateRow {
+                kind,
+                title: words::kind(trial.kind),
+                is_found,
+                alone: Some(trial.evidence),
+                reduction: Some(reduction),
+                beside,
+                reason: String::new(),
+            };
+            row.reason = reason(explanation, &row, rivals.contains(&kind));
+            row
+        })
+        .collect();
+    rows.sort_by(|one, other| {
+        let key = |row: &CandidateRow| (row.is_found, row.alone.unwrap_or(f64::NEG_INFINITY));
+        let (one, other) = (key(one), key(other));
+        other.0.cmp(&one.0).then(other.1.total_cmp(&one.1))
+    });
+    let not_testable = outcome.not_testable.iter().filter(|(kind, _)| of(first, *kind).is_none());
+    rows.extend(not_testable.map(|(kind, why)| CandidateRow {
+        kind: kind.name(),
+        title: words::kind(*kind),
+        is_found: false,
+        alone: None,
+        reduction: None,
+        beside: None,
+        reason: format!("not testable: {why}"),
+    }));
+    rows
+}
+
+fn reason(explanation: &Explanation, row: &CandidateRow, is_rival: bool) -> String {
+    let found = explanation.answer.effects.iter().map(|e| words::kind_name(e.kind).to_string());
+    let found = words::joined(&found.collect::<Vec<_>>());
+    let alone = row.alone.unwrap_or(0.0);
+    let remark = || {
+        let own = explanation.answer.considered.iter().find(|it| it.kind == row.kind);
+        own.map_or(String::new(), |it| it.remark.clone())
+    };
+    if row.is_found {
+        return "part of the model".into();
+    }
+    if is_rival {
+        return format!("explains the runs as well as {found}: not told apart");
+    }
+    match row.beside {
+        Some(beside) if alone > EVIDENCE_MIN && beside <= EVIDENCE_MIN => {
+            format!("borrows from the same residual: adds nothing beside {found}")
+        }
+        _ => remark(),
+    }
+}

@@ -1,0 +1,84 @@
+//! What a report of an explanation shows, as numbers and words: no page, no drawing.
+//!
+//! # Layout, in the order of the page
+//!
+//! - [`words`]: names and units of kinds, parameters and covariates
+//! - [`sentence`]: the verdict in a plain sentence
+//! - [`errors`]: open-loop errors before and after, with bootstrap intervals
+//! - [`traces`]: measured and predicted speeds of runs
+//! - [`windows`], [`covariates`], [`panels`]: the residual as a force, window by window, against
+//!   covariates
+//! - [`parameters`]: what was fitted, with uncertainty
+//! - [`candidates`]: what else was considered
+//!
+//! What a run's data are like is in the dataset itself
+//! ([`RunQuality`](crate::dataset::RunQuality)) and in
+//! [`RunData`](super::evidence::RunData).
+
+pub mod candidates;
+pub mod covariates;
+pub mod errors;
+pub mod panels;
+pub mod parameters;
+pub mod sentence;
+pub mod traces;
+pub mod windows;
+pub mod words;
+
+use super::Explanation;
+use crate::dataset::Dataset;
+use candidates::CandidateRow;
+use errors::Errors;
+use panels::Panel;
+use parameters::ParameterRow;
+use traces::Trace;
+
+/// Everything that a report shows beyond the answer and the dataset's own account.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReportData {
+    /// The verdict in a plain sentence or two.
+    pub sentence: String,
+    /// Errors before and after.
+    pub errors: Errors,
+    /// Speeds of some runs.
+    pub traces: Vec<Trace>,
+    /// The residual against covariates, the one that matters most first.
+    pub panels: Vec<Panel>,
+    /// Base resistance and effects.
+    pub parameters: Vec<ParameterRow>,
+    /// Every kind of the library.
+    pub candidates: Vec<CandidateRow>,
+}
+
+impl ReportData {
+    /// What a report of this explanation of a dataset shows.
+    pub fn of(dataset: &Dataset, explanation: &Explanation) -> Self {
+        let errors = Errors::of(explanation);
+        ReportData {
+            sentence: sentence::sentence(&explanation.answer, &errors),
+            traces: traces::traces(explanation),
+            panels: panels::panels(dataset, explanation),
+            parameters: parameters::rows(dataset, explanation),
+            candidates: candidates::rows(explanation),
+            errors,
+        }
+    }
+}
+
+/// A value with its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// The value.
+    pub value: f64,
+    /// The interval; `None` where nothing tells.
+    pub interval: Option<[f64; 2]>,
+}
+
+impl Estimate {
+    /// A value with 1.96 standard deviations to either side; none when that is no number.
+    pub fn normal(value: f64, deviation: f64) -> Self {
+        let half = 1.96 * deviation;
+        let is_known = half.is_finite() && half > 0.0;
+        Estimate { value, interval: is_known.then_some([value - half, value + half]) }
+    }
+}

@@ -1,0 +1,127 @@
+//! What was fitted, with its uncertainty.
+
+use super::{Estimate, words};
+use crate::dataset::Dataset;
+use crate::explain::Explanation;
+use crate::explain::answer::{EffectAnswer, ParameterValue};
+use crate::explain::selection::deviations;
+
+/// A parameter of the model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParameterRow {
+    /// What it belongs to: the basic resistance or a kind of effect.
+    pub group: String,
+    /// Its name in files and answers.
+    pub name: String,
+    /// What it means.
+    pub meaning: String,
+    /// Its unit; empty for a pure number.
+    pub unit: &'static str,
+    /// Its declared value.
+    pub declared: Option<f64>,
+    /// Its value in the model without the effects.
+    pub before: Option<Estimate>,
+    /// Its value in the model with the effects.
+    pub after: Estimate,
+}
+
+/// a, b, c and the parameters of all effects.
+pub fn rows(dataset: &Dataset, explanation: &Explanation) -> Vec<ParameterRow> {
+    let declared = dataset.train.resistance;
+    let (before, _) = deviations(&explanation.base);
+    let (after, _) = deviations(&explanation.grown);
+    let davis = [
+        ("a", "constant part", "N/kN", declared.a),
+        ("b", "part that grows with speed", "N/kN per m/s", declared.b),
+        ("c", "part that grows with its square", "N/kN per (m/s)²", declared.c),
+    ];
+    let of_base = davis.iter().enumerate().map(|(i, &(name, meaning, unit, value))| {
+        let estimate =
+            |theta: &[f64], deviations: &[f64]| Estimate::normal(theta[i], deviations[i]);
+        ParameterRow {
+            group: "basic resistance".into(),
+            name: name.into(),
+            meaning: meaning.into(),
+            unit,
+            declared: Some(value),
+            before: Some(estimate(&explanation.base.theta, &before)),
+            after: estimate(&explanation.grown.theta, &after),
+        }
+    });
+    let of_effects = explanation.answer.effects.iter().flat_map(|e| effect_rows(dataset, e));
+    of_base.chain(of_effects).collect()
+}
+
+fn effect_rows(dataset: &Dataset, effect: &EffectAnswer) -> Vec<ParameterRow> {
+    let mut rows = Vec::new();
+    for (name, value) in &effect.parameters {
+        let (meaning, unit) = words::parameter(name);
+        let mut push = |which: String, value: f64, deviation: Option<f64>| {
+            let meaning = if which.is_empty() { meaning.into() } else { which };
+            rows.push(ParameterRow {
+                group: words::kind_name(effect.kind).into(),
+                name: name.clone(),
+                meaning,
+                unit,
+                declared: declared(dataset, name),
+                before: None,
+                after: Estimate::normal(value, deviation.unwrap_or(0.0)),
+            });
+        };
+        let std = effect.std.get(name).or_else(|| effect.std.get("mass_factor"));
+        let listed = |index: usize| match std {
+            Some(ParameterValue::List(list)) => list.get(index).copied(),
+            Some(ParameterValue::Number(value)) => Some(*value),
+            _ => None,
+        };
+        match value {
+            ParameterValue::Number(value) => push(String::new(), *value, listed(0)),
+            ParameterValue::ByRun(values) => {
+                for (run, value) in values {
+                    let deviation = match std {
+                        Some(ParameterValue::ByRun(by_run)) => by_run.get(run).copied(),
+                        _ => None,
+                    };
+                    push(format!("{meaning} in {run}"), *value, deviation);
+                }
+            }
+            ParameterValue::Sections(sections) => {
+                for (i, s) in sections.iter().enumerate() {
+                    let (from, to) = (s.from_m / 1000.0, s.to_m / 1000.0);
+                    let which = format!(
+                        "mass factor, km {from:.2} to {to:.2}, direction {:+}",
+                        s.direction
+                    );
+                    push(which, s.mass_factor, listed(i));
+                }
+            }
+            ParameterValue::Windows(windows) => {
+                for (i, w) in windows.iter().enumerate() {
+                    let (run, from, to) = (&w.run, w.t_start_s, w.t_end_s);
+                    push(
+                        format!("mass factor in {run}, {from:.0} to {to:.0} s"),
+                        w.mass_factor,
+                        listed(i),
+                    );
+                }
+            }
+            ParameterValue::List(values) => {
+                for (i, value) in values.iter().enumerate() {
+                    push(format!("{meaning}, number {}", i + 1), *value, listed(i));
+                }
+            }
+        }
+    }
+    rows
+}
+
+/// What the declared model says of an effect's parameter.
+fn declared(dataset: &Dataset, name: &str) -> Option<f64> {
+    match name {
+        "k_n_per_kn_m" => Some(dataset.train.curve_constant_n_per_kn_m),
+        "rotating_mass_factor" => Some(dataset.train.rotating_mass_factor),
+        "speed_scale" | "gain" | "c_factor" | "mass_factor" | "achieved_ratio" => Some(1.0),
+        "shift_m" | "delay_s" | "lag_s" => Some(0.0),
+        _ => None,
+    }
+}

@@ -1,0 +1,291 @@
+//! The verdict in a plain sentence: kind, where, size with unit and interval, error reduction.
+
+use super::errors::{ErrorPair, Errors};
+use super::words::{self, joined, kind_name, number};
+use crate::dataset::Role;
+use crate::explain::answer::{Answer, EffectAnswer, ParameterValue, Place, Verdict};
+
+/// Places named in a sentence at most.
+const PLACES_MAX: usize = 4;
+
+/// The verdict of an answer.
+pub fn sentence(answer: &Answer, errors: &Errors) -> String {
+    let found: Vec<String> = answer.effects.iter().map(described).collect();
+    let found = found.join("; and ");
+    match answer.verdict {
+        Verdict::None => {
+            "Nothing undeclared acts, as far as these runs tell: the declared model with a, b and \
+             c refitted explains them."
+                .into()
+        }
+        Verdict::InsufficientData => {
+            format!("These runs do not suffice for a verdict. {}", answer.statement)
+        }
+        Verdict::Effect => format!("Found: {found}. {}", gained(errors)),
+        Verdict::Ambiguous => {
+            let rivals: Vec<String> =
+                answer.ambiguous_with.iter().map(|kind| kind_name(kind).into()).collect();
+            let is_or_are = if rivals.len() == 1 { "explains" } else { "explain" };
+            format!(
+                "Something undeclared acts, but these runs cannot tell what: it may be {found}; \
+                 {} {is_or_are} them as well. {}",
+                joined(&rivals),
+                gained(errors)
+            )
+        }
+        Verdict::Unknown => format!(
+            "Something undeclared acts that no effect of the library explains: {found}. {}",
+            gained(errors)
+        ),
+    }
+}
+
+/// What the effects take away from the error that judges them.
+fn gained(errors: &Errors) -> String {
+    let Some((role, ErrorPair { before_mps, after_mps, reduction, .. })) = errors.judged() else {
+        return String::new();
+    };
+    let runs = if role == Role::Holdout { "the runs held out" } else { "the fit runs" };
+    let percent = |share: f64| format!("{} %", words::percent(share, reduction.interval));
+    let interval = reduction.interval.map_or(String::new(), |[low, high]| {
+        format!(" (95 % interval {} to {})", percent(low), percent(high))
+    });
+    let (before, after) = (before_mps.value, after_mps.value);
+    let values = format!("from {before:.3} to {after:.3} m/s");
+    if reduction.value > 0.0 {
+        let share = percent(reduction.value);
+        format!(
+            "With it, the error of the predicted speed on {runs} falls {values}, by {share}{interval}."
+        )
+    } else {
+        format!("With it, the error of the predicted speed on {runs} does not fall ({values}).")
+    }
+}
+
+/// Kind, size and place of an effect.
+pub fn described(effect: &EffectAnswer) -> String {
+    let sizes: Vec<String> = sizes(effect);
+    let size = if sizes.is_empty() { String::new() } else { format!(" – {}", joined(&sizes)) };
+    let place = placed(&effect.place);
+    let place = if place.is_empty() { place } else { format!(" {place}") };
+    let kind = match effect.kind {
+        // The sentence around it says that it has no name.
+        "unknown" => "a residual",
+        kind => kind_name(kind),
+    };
+    format!("{kind}{place}{size}")
+}
+
+fn sizes(effect: &EffectAnswer) -> Vec<String> {
+    let number_of = |value: Option<&ParameterValue>| match value {
+        Some(ParameterValue::Number(value)) => Some(*value),
+        _ => None,
+    };
+    let mut sizes = Vec::new();
+    for (name, value) in &effect.parameters {
+        let (words, unit) = words::parameter(name);
+        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+        match value {
+            ParameterValue::Number(value) => {
+                let half = 1.96 * number_of(effect.std.get(name)).unwrap_or(0.0);
+                // What is a convention has no uncertainty.
+                if half > 0.0 {
+                    let [low, high] = [value - half, value + half].map(|it| number(it, Some(half)));
+                    let value = number(*value, Some(half));
+                    sizes.push(format!("{words} {value}{unit} (95 % interval {low} to {high})"));
+                }
+            }
+            ParameterValue::ByRun(by_run) => {
+                let values = by_run.values().copied();
+                let low = values.clone().fold(f64::INFINITY, f64::min);
+                let high = values.fold(f64::NEG_INFINITY, f64::max);
+                sizes.push(format!("{words} {low:.1} to {high:.1}{unit}, run by run"));
+            }
+            ParameterValue::Sections(sections) => {
+                let shown = sections.iter().take(PLACES_MAX);
+                sizes.extend(shown.map(|s| {
+                    let (from, to) = (s.from_m / 1000.0, s.to_m / 1000.0);
+                    let percent = 100.0 * (s.mass_factor - 1.0);
+                    format!(
+                        "{percent:+.1} % from km {from:.2} to {to:.2} (direction {:+})",
+                        s.direction
+                    )
+                    .replace('-', "−")
+                }));
+            }
+            ParameterValue::Windows(windows) => {
+                let shown = windows.iter().take(PLACES_MAX);
+                sizes.extend(shown.map(|w| {
+                    let percent =
+                        format!("{:+.1} %", 100.0 * (w.mass_factor - 1.0)).replace('-', "−");
+                    format!("{percent} in {} from {:.0} to {:.0} s", w.run, w.t_start_s, w.t_end_s)
+                }));
+            }
+            ParameterValue::List(_) => {}
+        }
+    }
+    sizes
+}
+
+/// Where an effect acts, in words; empty when it acts everywhere.
+pub fn placed(place: &Place) -> String {
+    let mut parts = Vec::new();
+    let listed = |all: Vec<String>| {
+        let more = all.len().saturating_sub(PLACES_MAX);
+        let mut shown: Vec<String> = all.into_iter().take(PLACES_MAX).collect();
+        if more > 0 {
+            shown.push(format!("{more} more"));
+        }
+        joined(&shown)
+    };
+    if let Some(intervals) = &place.intervals_m {
+        parts.push(stretches(intervals));
+    }
+    if let Some(windows) = &place.windows {
+        let all = windows
+            .iter()
+            .map(|w| format!("in {} from {:.0} to {:.0} s", w.run, w.t_start_s, w.t_end_s));
+        parts.push(listed(all.collect()));
+    }
+    if let Some(runs) = &place.runs {
+        parts.push(format!("in {}", listed(runs.clone())));
+    }
+    if let Some([low, high]) = place.speed_range_mps {
+        parts.push(format!("at {low:.1} to {high:.1} m/s"));
+    }
+    let covariate = place.covariate.as_ref().filter(|it| {
+        // The same is said above in other words.
+        !matches!(it.name.as_str(), "speed_mps" | "chainage_m" | "run")
+    });
+    if let Some(covariate) = covariate {
+        let [low, high] = covariate.range.map(|value| number(value, None));
+        parts.push(format!("while {} is {low} to {high}", covariate.name));
+    }
+    parts.join(", ")
+}
+
+/// Stretches of the line; many are counted, not listed.
+fn stretches(intervals_m: &[[f64; 2]]) -> String {
+    let km = |m: f64| m / 1000.0;
+    if intervals_m.len() > PLACES_MAX {
+        let low = intervals_m.iter().map(|interval| interval[0]).fold(f64::INFINITY, f64::min);
+        let high = intervals_m.iter().map(|interval| interval[1]).fold(f64::NEG_INFINITY, f64::max);
+        let count = intervals_m.len();
+        return format!("at {count} places between km {:.2} and {:.2}", km(low), km(high));
+    }
+    let listed: Vec<String> = intervals_m
+        .iter()
+        .map(|[from, to]| format!("from km {:.2} to {:.2}", km(*from), km(*to)))
+        .collect();
+    joined(&listed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::explain::answer::{BaseAnswer, CovariateRange, DavisDeviations, RunWindow};
+    use crate::explain::report::Estimate;
+    use crate::explain::report::errors::Resampling;
+
+    #[test]
+    fn places_are_told_in_words() {
+        let tunnels = Place::of_intervals(vec![[5200.0, 6900.0], [8000.0, 8100.0]]);
+        assert_eq!(placed(&tunnels), "from km 5.20 to 6.90 and from km 8.00 to 8.10");
+        let curves: Vec<[f64; 2]> =
+            (0..9).map(|k| [1e3 * f64::from(k), 1e3 * f64::from(k) + 300.0]).collect();
+        assert_eq!(placed(&Place::of_intervals(curves)), "at 9 places between km 0.00 and 8.30");
+        let window = RunWindow { run: "runs/03.csv".into(), t_start_s: 204.0, t_end_s: 729.6 };
+        let covariate = CovariateRange { name: "brake_force_n".into(), range: [1e3, 2.5e4] };
+        let place = Place {
+            windows: Some(vec![window]),
+            speed_range_mps: Some([10.0, 12.5]),
+            covariate: Some(covariate),
+            ..Place::default()
+        };
+        assert_eq!(
+            placed(&place),
+            "in runs/03.csv from 204 to 730 s, at 10.0 to 12.5 m/s, \
+             while brake_force_n is 1000 to 25000"
+        );
+        assert_eq!(placed(&Place::default()), "");
+    }
+
+    #[test]
+    fn an_effect_is_told_with_its_size_and_interval() {
+        let number = |value| [("force_n".to_string(), ParameterValue::Number(value))].into();
+        let effect = EffectAnswer {
+            kind: "dragging_brake",
+            place: Place { runs: Some(vec!["runs/02.csv".into()]), ..Place::default() },
+            parameters: number(3058.6),
+            std: number(107.5),
+            p_value: 1e-9,
+            error_reduction: 0.8,
+        };
+        assert_eq!(
+            described(&effect),
+            "a dragging brake in runs/02.csv – drag force 3059 N (95 % interval 2848 to 3269)"
+        );
+    }
+
+    #[test]
+    fn rivals_and_unknown_causes_are_told_apart_from_findings() {
+        let effect = |kind, parameter: &str| EffectAnswer {
+            kind,
+            place: Place::of_intervals(vec![[5200.0, 6900.0]]),
+            parameters: [(parameter.to_string(), ParameterValue::Number(2.5))].into(),
+            std: [(parameter.to_string(), ParameterValue::Number(0.1))].into(),
+            p_value: 1e-9,
+            error_reduction: 0.8,
+        };
+        let none = DavisDeviations { a: 0.0, b: 0.0, c: 0.0 };
+        let mut answer = Answer {
+            verdict: Verdict::Ambiguous,
+            statement: String::new(),
+            effects: vec![effect("local_resistance", "extra_n_per_kn")],
+            ambiguous_with: vec!["tunnel_drag"],
+            experiment: None,
+            base: BaseAnswer { a: 1.0, b: 0.0, c: 0.0, std: none },
+            metric: "full_run",
+            rmse_before: None,
+            rmse_after: None,
+            error_reduction_interval: None,
+            window60: None,
+            fit_runs: None,
+            considered: Vec::new(),
+            predictions: std::collections::BTreeMap::new(),
+        };
+        let value = |value| Estimate { value, interval: None };
+        let pair = ErrorPair {
+            before_mps: value(0.8),
+            after_mps: value(0.9),
+            reduction: value(-0.125),
+            resampling: Resampling::Blocks(1),
+        };
+        let errors = Errors {
+            fit: None,
+            holdout: Some(pair),
+            fit_window60: None,
+            holdout_window60: None,
+            by_run: Vec::new(),
+        };
+        let size = "from km 5.20 to 6.90 – extra resistance 2.50 N/kN (95 % interval 2.30 to 2.70)";
+        let gained = "With it, the error of the predicted speed on the runs held out does not \
+                      fall (from 0.800 to 0.900 m/s).";
+        assert_eq!(
+            sentence(&answer, &errors),
+            format!(
+                "Something undeclared acts, but these runs cannot tell what: it may be a local \
+                 resistance {size}; tunnel drag explains them as well. {gained}"
+            )
+        );
+        answer.verdict = Verdict::Unknown;
+        answer.effects = vec![effect("unknown", "extra_n_per_kn")];
+        assert_eq!(
+            sentence(&answer, &errors),
+            format!(
+                "Something undeclared acts that no effect of the library explains: a \
+                 residual {size}. {gained}"
+            )
+        );
+    }
+}

@@ -1,0 +1,121 @@
+//! Names and units for people.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+/// Name of a kind in a running text.
+pub fn kind(kind: EffectKind) -> &'static str {
+    match kind {
+        EffectKind::None => "nothing undeclared",
+        EffectKind::TunnelDrag => "tunnel drag",
+        EffectKind::CurveResistance => "curve resistance",
+        EffectKind::Wind => "wind along the line",
+        EffectKind::DraggingBrake => "a dragging brake",
+        EffectKind::WheelDiameter => "a wrong wheel diameter",
+        EffectKind::GradientShift => "a gradient profile shifted along the line",
+        EffectKind::MassChange => "a changed mass",
+        EffectKind::TractionGain => "a wrong scale of the reported traction force",
+        EffectKind::ActuatorDelay => "delayed forces",
+        EffectKind::RotatingMass => "another rotating mass than declared",
+        EffectKind::BearingTemperature => "cold bearings that warm up",
+        EffectKind::AmbientTemperature => "resistance that follows the outside temperature",
+        EffectKind::LocalResistance => "a local resistance",
+        EffectKind::LowAdhesion => "low adhesion",
+        EffectKind::Unknown => "something outside the library",
+    }
+}
+
+/// Name of a kind as the answer writes it, for a running text.
+pub fn kind_name(name: &str) -> &str {
+    match EffectKind::from_name(name) {
+        Some(known) => kind(known),
+        None => name,
+    }
+}
+
+/// What a parameter means, its symbol or name left out, and its unit.
+pub fn parameter(name: &str) -> (&str, &'static str) {
+    match name {
+        "c_factor" => ("factor on c v²", ""),
+        "dc_n_per_mps2" => ("extra drag with the whole train inside", "N/(m/s)²"),
+        "k_n_per_kn_m" => ("curve constant k in k/R", "N/kN · m"),
+        "wind_plus_mps" => ("headwind for travel towards growing chainage", "m/s"),
+        "headwind_mps" => ("headwind", "m/s"),
+        "force_n" => ("drag force", "N"),
+        "speed_scale" => ("measured over true speed", ""),
+        "shift_m" => ("shift towards growing chainage", "m"),
+        "mass_factor" => ("true over declared mass", ""),
+        "gain" => ("reported over true force", ""),
+        "delay_s" => ("dead time", "s"),
+        "lag_s" => ("lag", "s"),
+        "rotating_mass_factor" => ("rotating-mass factor", ""),
+        "delta_a_n_per_kn" => ("extra resistance at the start", "N/kN"),
+        "tau_s" => ("time constant", "s"),
+        "w0_per_k" => ("relative change of resistance", "1/K"),
+        "reference_k" => ("reference temperature", "K"),
+        "extra_n_per_kn" => ("extra resistance", "N/kN"),
+        "gradient_error_permille" => ("error of the gradient", "‰"),
+        "force_error_share" => ("share of the force that is missing", ""),
+        "adhesion" => ("adhesion", ""),
+        "achieved_ratio" => ("achieved over reported brake force", ""),
+        other => (other, ""),
+    }
+}
+
+/// A value with the digits that its uncertainty leaves meaningful: two of the uncertainty's.
+pub fn number(value: f64, uncertainty: Option<f64>) -> String {
+    let scale = uncertainty.filter(|it| it.is_finite() && *it > 0.0);
+    let leading = scale.unwrap_or(value.abs().max(1e-9) * 0.01).log10().floor();
+    let decimals = (1.0 - leading).clamp(0.0, 9.0) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') {
+        return text.trim_start_matches('-').into();
+    }
+    text.replacen('-', "−", 1)
+}
+
+/// A share in percent without its sign, with a decimal where its interval is narrow.
+pub fn percent(share: f64, interval: Option<[f64; 2]>) -> String {
+    let is_narrow = interval.is_some_and(|[low, high]| high > low && high - low < 0.02);
+    let text = format!("{:.*}", usize::from(is_narrow), 100.0 * share);
+    let digits = text.trim_start_matches('-');
+    let is_zero = digits.chars().all(|c| c == '0' || c == '.');
+    if is_zero { digits.into() } else { text.replacen('-', "−", 1) }
+}
+
+/// Words joined by commas and a last "and".
+pub fn joined(words: &[String]) -> String {
+    match words {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_show_two_digits_of_their_uncertainty() {
+        assert_eq!(number(3058.57, Some(210.7)), "3059");
+        assert_eq!(number(5.32302, Some(0.19)), "5.32");
+        assert_eq!(number(-0.005154, Some(0.00038)), "−0.00515");
+        assert_eq!(number(-0.0001, Some(0.2)), "0.00");
+        assert_eq!(number(0.5846, None), "0.5846");
+    }
+
+    #[test]
+    fn shares_show_a_decimal_where_their_interval_is_narrow() {
+        assert_eq!(percent(0.6012, Some([0.596, 0.604])), "60.1");
+        assert_eq!(percent(0.6012, Some([0.5, 0.7])), "60");
+        assert_eq!(percent(-0.2, None), "−20");
+        assert_eq!(percent(-0.0001, Some([0.0, 0.0])), "0");
+    }
+
+    #[test]
+    fn lists_read_as_sentences() {
+        let words = |list: &[&str]| joined(&list.iter().map(|&w| w.into()).collect::<Vec<_>>());
+        assert_eq!(words(&["a"]), "a");
+        assert_eq!(words(&["a", "b", "c"]), "a, b and c");
+    }
+}

@@ -1,0 +1,173 @@
+//! The page from top to bottom.
+
+use std::fmt::Write as _;
+
+use dynocar_core::dataset::Role;
+use dynocar_core::explain::answer::Verdict;
+use dynocar_core::explain::report::words;
+
+use super::html::escape;
+use super::plots::colour_rules;
+use super::sections::{Section, candidates, errors, parameters, quality, reproduce, residual};
+use super::{ReportError, Subject};
+
+const STYLE: &str = include_str!("style.css");
+
+/// The page.
+///
+/// # Errors
+///
+/// When a plot cannot be drawn.
+pub fn html(subject: &Subject) -> Result<String, ReportError> {
+    let sections = [
+        errors::section(subject)?,
+        residual::section(subject)?,
+        parameters::section(subject),
+        candidates::section(subject),
+        quality::section(subject),
+        reproduce::section(subject),
+    ];
+    let name = escape(&subject.dataset.name);
+    let mut html = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <meta name=\"generator\" content=\"dynocar {}\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
+         style-src 'unsafe-inline'\">\n\
+         <title>{name} – residual report</title>\n<style>\n{STYLE}\n{}</style>\n</head>\n<body>\n",
+        subject.provenance.version,
+        colour_rules()
+    );
+    html += &header(subject, &name);
+    html += "<main>\n";
+    html += &verdict(subject);
+    html += &contents(&sections);
+    for section in &sections {
+        // Writing to a string cannot fail.
+        let _ = write!(
+            html,
+            "<section id=\"{0}\" aria-labelledby=\"{0}-title\">\n\
+             <h2 id=\"{0}-title\">{1}</h2>\n{2}</section>\n",
+            section.id, section.title, section.body
+        );
+    }
+    html += "</main>\n";
+    let _ = write!(
+        html,
+        "<footer><p>Made by Dynocar {} on {}. The page is complete in itself: it loads nothing.\
+         </p></footer>\n</body>\n</html>\n",
+        subject.provenance.version, subject.provenance.day
+    );
+    Ok(html)
+}
+
+fn header(subject: &Subject, name: &str) -> String {
+    let dataset = subject.dataset;
+    let description = dataset
+        .description
+        .as_deref()
+        .map_or(String::new(), |text| format!("<p class=\"description\">{}</p>\n", escape(text)));
+    let count = |role| dataset.with_role(role).count();
+    let train = if dataset.train.name.is_empty() {
+        String::new()
+    } else {
+        format!("{}, ", escape(&dataset.train.name))
+    };
+    let line = match &dataset.track {
+        Some(_) => "line known",
+        None => "line not known",
+    };
+    format!(
+        "<header>\n<p class=\"kicker\">Dynocar · residual report</p>\n<h1>{name}</h1>\n\
+         {description}<p class=\"facts\">{train}{:.1} t, {:.0} m · {line} · {} fit and {} holdout \
+         runs · <span>{}</span></p>\n</header>\n",
+        dataset.train.mass_kg / 1000.0,
+        dataset.train.length_m,
+        count(Role::Fit),
+        count(Role::Holdout),
+        subject.provenance.day
+    )
+}
+
+/// Class and words of a verdict.
+fn badge(verdict: Verdict) -> (&'static str, &'static str) {
+    match verdict {
+        Verdict::None => ("none", "Nothing undeclared"),
+        Verdict::Effect => ("effect", "Effect found"),
+        Verdict::Ambiguous => ("open", "Ambiguous"),
+        Verdict::Unknown => ("open", "Unknown cause"),
+        Verdict::InsufficientData => ("open", "Insufficient data"),
+    }
+}
+
+fn verdict(subject: &Subject) -> String {
+    let answer = &subject.explanation.answer;
+    let (class, words) = badge(answer.verdict);
+    let mut html = format!(
+        "<section id=\"verdict\" class=\"verdict {class}\" aria-labelledby=\"verdict-title\">\n\
+         <h2 id=\"verdict-title\">Verdict: <span>{words}</span></h2>\n\
+         <p class=\"sentence\">{}</p>\n",
+        escape(&subject.data.sentence)
+    );
+    if let Some(experiment) = &answer.experiment {
+        let title = match answer.verdict {
+            Verdict::Ambiguous => "What would separate them",
+            _ => "What would settle it",
+        };
+        let _ = writeln!(
+            html,
+            "<p class=\"experiment\"><strong>{title}.</strong> {}</p>",
+            escape(experiment)
+        );
+    }
+    html += &figures(subject);
+    html + "</section>\n"
+}
+
+/// The figures that matter, large.
+fn figures(subject: &Subject) -> String {
+    let Some((role, pair)) = subject.data.errors.judged() else { return String::new() };
+    let runs = if role == Role::Holdout { "holdout runs" } else { "fit runs" };
+    let interval = |bounds: Option<[f64; 2]>, shown: &dyn Fn(f64) -> String| match bounds {
+        Some([low, high]) => format!("95 % interval {} to {}", shown(low), shown(high)),
+        None => "no interval: one block only".into(),
+    };
+    let speed = |value: f64| format!("{value:.3}");
+    let share = |value: f64| format!("{} %", words::percent(value, pair.reduction.interval));
+    let mut list = vec![(
+        format!("{} <small>m/s</small>", speed(pair.before_mps.value)),
+        if subject.has_effect() { "error before" } else { "error of the declared model" },
+        interval(pair.before_mps.interval, &speed),
+    )];
+    if subject.has_effect() {
+        let after = format!("{} <small>m/s</small>", speed(pair.after_mps.value));
+        list.push((after, "error after", interval(pair.after_mps.interval, &speed)));
+        list.push((
+            share(pair.reduction.value),
+            "of the error taken away",
+            interval(pair.reduction.interval, &share),
+        ));
+        let p_value = subject.explanation.answer.effects.iter().map(|effect| effect.p_value);
+        let worst = p_value.fold(0.0, f64::max);
+        let shown = if worst < 1e-6 { "< 10⁻⁶".into() } else { format!("{worst:.2e}") };
+        list.push((shown, "chance of as much where nothing acts", "for the whole search".into()));
+    }
+    let mut html = String::from("<dl class=\"figures\">\n");
+    for (value, what, more) in list {
+        let what = if what.starts_with("error") { format!("{what}, {runs}") } else { what.into() };
+        let _ = writeln!(
+            html,
+            "<div><dt>{what}</dt><dd><b>{value}</b><span class=\"interval\">{more}</span></dd></div>"
+        );
+    }
+    html + "</dl>\n"
+}
+
+fn contents(sections: &[Section]) -> String {
+    let mut html = String::from("<nav aria-label=\"Contents\"><ol>\n");
+    for section in sections {
+        let _ = writeln!(html, "<li><a href=\"#{}\">{}</a></li>", section.id, section.title);
+    }
+    html + "</ol></nav>\n"
+}

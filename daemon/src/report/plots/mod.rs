@@ -1,0 +1,99 @@
+//! The plots, as SVG text for the page.
+//!
+//! Each is drawn at twice its nominal size, so that the whole pixels of the backend are fine
+//! enough, and scaled by the page. The colours are those of the light page; the page's style
+//! replaces each by a variable ([`colour_rules`]), so that they follow the reader's scheme.
+
+mod axes;
+pub mod panel;
+pub mod runs;
+pub mod speeds;
+
+use std::fmt::Write as _;
+use std::io;
+
+use plotters::drawing::DrawingAreaErrorKind;
+use plotters::style::RGBColor;
+
+use super::html::escape;
+
+/// Why a plot cannot be drawn.
+pub type PlotError = DrawingAreaErrorKind<io::Error>;
+
+/// Drawn over nominal size.
+const SCALE: u32 = 2;
+
+/// A colour of the plots.
+struct Ink {
+    colour: RGBColor,
+    /// The page's variable for it.
+    variable: &'static str,
+}
+
+const TEXT: RGBColor = RGBColor(0x54, 0x5B, 0x66);
+const GRID: RGBColor = RGBColor(0xE3, 0xE6, 0xEA);
+const AXIS: RGBColor = RGBColor(0x9A, 0xA1, 0xAC);
+const MEASURED: RGBColor = RGBColor(0x23, 0x28, 0x30);
+const BEFORE: RGBColor = RGBColor(0xB8, 0x5C, 0x14);
+const AFTER: RGBColor = RGBColor(0x1B, 0x62, 0xA5);
+const ACTING: RGBColor = RGBColor(0xE4, 0xEE, 0xF7);
+const BAND: RGBColor = RGBColor(0xD9, 0xC3, 0xAE);
+
+const INKS: [Ink; 8] = [
+    Ink { colour: TEXT, variable: "--muted" },
+    Ink { colour: GRID, variable: "--grid" },
+    Ink { colour: AXIS, variable: "--axis" },
+    Ink { colour: MEASURED, variable: "--measured" },
+    Ink { colour: BEFORE, variable: "--before" },
+    Ink { colour: AFTER, variable: "--after" },
+    Ink { colour: ACTING, variable: "--acting" },
+    Ink { colour: BAND, variable: "--band" },
+];
+
+/// The style rules that give every colour of the plots its variable.
+pub fn colour_rules() -> String {
+    let mut rules = String::new();
+    for Ink { colour: RGBColor(r, g, b), variable } in INKS {
+        for property in ["fill", "stroke"] {
+            // Writing to a string cannot fail.
+            let _ = writeln!(
+                rules,
+                "svg.plot [{property}=\"#{r:02X}{g:02X}{b:02X}\"]{{{property}:var({variable})}}"
+            );
+        }
+    }
+    rules
+}
+
+/// Makes a backend's drawing part of the page: it takes its size from the page and tells what it
+/// shows.
+fn for_page(drawing: &str, label: &str, class: &str, (width, height): (u32, u32)) -> String {
+    let body = drawing.find('>').map_or("", |end| &drawing[end + 1..]);
+    format!(
+        "<svg class=\"plot {class}\" viewBox=\"0 0 {width} {height}\" role=\"img\" \
+         aria-label=\"{}\">{body}",
+        escape(label)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_colour_has_a_rule_of_its_own() {
+        let rules = colour_rules();
+        assert_eq!(rules.lines().count(), 2 * INKS.len());
+        for (k, ink) in INKS.iter().enumerate() {
+            assert!(INKS[..k].iter().all(|other| other.colour != ink.colour));
+        }
+        assert!(rules.contains("svg.plot [fill=\"#B85C14\"]{fill:var(--before)}"));
+    }
+
+    #[test]
+    fn a_drawing_for_the_page_has_no_size_of_its_own() {
+        let svg = for_page("<svg width=\"9\" xmlns=\"x\">\n<g/></svg>", "a \"b\"", "wide", (8, 6));
+        assert!(svg.starts_with("<svg class=\"plot wide\" viewBox=\"0 0 8 6\" role=\"img\""));
+        assert!(svg.contains("aria-label=\"a &quot;b&quot;\"") && svg.ends_with("<g/></svg>"));
+    }
+}

@@ -1,0 +1,168 @@
+//! The residual force against one covariate.
+
+use dynocar_core::explain::report::covariates::Covariate;
+use dynocar_core::explain::report::panels::{Panel, PanelBin};
+use plotters::backend::SVGBackend;
+use plotters::drawing::IntoDrawingArea;
+use plotters::element::{Circle, PathElement, Polygon};
+use plotters::style::{Color, RGBColor};
+
+use super::axes::{Axis, Chart, chart, padded, range_with_zero, shade, stroke, zero_line};
+use super::{AFTER, BAND, BEFORE, PlotError, SCALE, for_page};
+
+/// Nominal size in px.
+const SIZE: (u32, u32) = (470, 290);
+/// Before and after stand so far apart, as share of the axis.
+const APART: f64 = 0.004;
+
+/// The panel as SVG.
+///
+/// # Errors
+///
+/// When the drawing fails.
+pub fn draw(panel: &Panel, has_effect: bool) -> Result<String, PlotError> {
+    let size = (SIZE.0 * SCALE, SIZE.1 * SCALE);
+    let mut drawing = String::new();
+    {
+        let area = SVGBackend::with_string(&mut drawing, size).into_drawing_area();
+        let is_category = panel.covariate.is_category();
+        let room = if is_category { 0.0 } else { 0.03 };
+        let x = match panel.covariate {
+            Covariate::Direction => [-1.6, 1.6],
+            Covariate::Run => [0.4, panel.bins.last().map_or(1.0, |bin| bin.at) + 0.6],
+            _ => padded(panel.bins.iter().map(|bin| bin.at), room),
+        };
+        let y = vertical_range(panel, has_effect);
+        let title = axis_title(panel.covariate);
+        let labels = if is_category { panel.bins.len().clamp(3, 13) } else { 6 };
+        let x_axis = Axis { range: x, title: &title, labels, is_whole: is_category };
+        let y_axis =
+            Axis { range: y, title: "Missing resistance, N/kN", labels: 5, is_whole: false };
+        let mut chart = chart(&area, &x_axis, &y_axis)?;
+        shade(&mut chart, &panel.acting, x, y)?;
+        zero_line(&mut chart, x)?;
+        if has_effect && !is_category {
+            band(&mut chart, &panel.bins)?;
+        }
+        let apart = if has_effect { APART * (x[1] - x[0]) } else { 0.0 };
+        let before = panel.bins.iter().map(|bin| (bin.at - apart, bin.before_n_per_kn));
+        points(&mut chart, before, BEFORE, false)?;
+        if has_effect {
+            let after = panel.bins.iter().map(|bin| (bin.at + apart, bin.after_n_per_kn));
+            points(&mut chart, after, AFTER, true)?;
+        }
+        area.present()?;
+    }
+    Ok(for_page(&drawing, &label(panel, has_effect), "panel", size))
+}
+
+/// A range that shows every mean with the usual whisker; the longest whiskers may be cut so that
+/// the others stay readable.
+fn vertical_range(panel: &Panel, has_effect: bool) -> [f64; 2] {
+    let sides = |bin: &PanelBin| {
+        let after = if has_effect { bin.after_n_per_kn } else { bin.before_n_per_kn };
+        [bin.before_n_per_kn, after]
+    };
+    let all: Vec<(f64, f64)> = panel.bins.iter().flat_map(sides).collect();
+    let mut halves: Vec<f64> = panel.bins.iter().map(|bin| bin.before_n_per_kn.1).collect();
+    halves.sort_unstable_by(f64::total_cmp);
+    let usual = 1.5 * halves[halves.len() * 3 / 4];
+    let whiskers = all.iter().flat_map(|(mean, half)| {
+        let shown = half.min(usual);
+        [mean - shown, mean + shown]
+    });
+    range_with_zero(whiskers.chain(panel.bins.iter().map(|bin| bin.effect_n_per_kn.0)))
+}
+
+/// A covariate's name with its unit.
+pub fn axis_title(covariate: Covariate) -> String {
+    match (covariate, covariate.unit()) {
+        (Covariate::Run, _) => "Fit run, by number".into(),
+        (_, "") => covariate.title().into(),
+        (_, unit) => format!("{}, {unit}", covariate.title()),
+    }
+}
+
+fn points(
+    chart: &mut Chart,
+    points: impl Iterator<Item = (f64, (f64, f64))> + Clone,
+    colour: RGBColor,
+    is_filled: bool,
+) -> Result<(), PlotError> {
+    let whisker = |(at, (mean, half)): (f64, (f64, f64))| {
+        PathElement::new(vec![(at, mean - half), (at, mean + half)], stroke(colour, 1.2))
+    };
+    chart.draw_series(points.clone().filter(|point| point.1.1 > 0.0).map(whisker))?;
+    let style = if is_filled { colour.filled() } else { stroke(colour, 1.6) };
+    chart.draw_series(points.map(|(at, (mean, _))| Circle::new((at, mean), 3 * SCALE, style)))?;
+    Ok(())
+}
+
+/// What the effects account for, with its interval.
+fn band(chart: &mut Chart, bins: &[PanelBin]) -> Result<(), PlotError> {
+    let edge = |bin: &PanelBin, side: f64| {
+        let (mean, half) = bin.effect_n_per_kn;
+        (bin.at, mean + side * half)
+    };
+    let outline: Vec<(f64, f64)> = bins
+        .iter()
+        .map(|bin| edge(bin, 1.0))
+        .chain(bins.iter().rev().map(|bin| edge(bin, -1.0)))
+        .collect();
+    chart.draw_series([Polygon::new(outline, BAND.filled())])?;
+    let middle: Vec<(f64, f64)> = bins.iter().map(|bin| edge(bin, 0.0)).collect();
+    chart.draw_series([PathElement::new(middle, stroke(BEFORE, 1.0))])?;
+    Ok(())
+}
+
+/// What the plot shows, for those who do not see it.
+fn label(panel: &Panel, has_effect: bool) -> String {
+    let largest = |value: fn(&PanelBin) -> f64| {
+        panel.bins.iter().map(|bin| value(bin).abs()).fold(0.0, f64::max)
+    };
+    let before = largest(|bin| bin.before_n_per_kn.0);
+    let of_run = panel.file.as_ref().map_or(String::new(), |file| format!(" of {file}"));
+    let title = axis_title(panel.covariate);
+    let mut text = format!(
+        "Missing resistance against {title}{of_run}, {} bins: at most {before:.2} N/kN",
+        panel.bins.len()
+    );
+    if has_effect {
+        let after = largest(|bin| bin.after_n_per_kn.0);
+        text += &format!(" before and {after:.2} N/kN after the effect is added");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn panel() -> Panel {
+        let bin = |k: f64| PanelBin {
+            at: k,
+            count: 5,
+            before_n_per_kn: (0.2 * k, 0.1),
+            after_n_per_kn: (0.01, 0.1),
+            effect_n_per_kn: (0.2 * k, 0.05),
+        };
+        let bins = (0..8).map(|k| bin(f64::from(k))).collect();
+        Panel { covariate: Covariate::Chainage, file: None, bins, acting: vec![[2.0, 4.0]] }
+    }
+
+    #[test]
+    fn both_sides_have_a_point_and_a_whisker_for_each_bin() {
+        let svg = draw(&panel(), true).unwrap();
+        assert_eq!(svg.matches("<circle").count(), 16);
+        assert_eq!(svg.matches("<polygon").count(), 1);
+        assert!(svg.contains("Chainage, km") && svg.contains("fill=\"#E4EEF7\""));
+        assert!(svg.contains("at most 1.40 N/kN before and 0.01 N/kN after"));
+    }
+
+    #[test]
+    fn without_an_effect_there_is_no_after() {
+        let svg = draw(&panel(), false).unwrap();
+        assert_eq!(svg.matches("<circle").count(), 8);
+        assert!(!svg.contains("after"));
+    }
+}

@@ -1,0 +1,60 @@
+//! The error of every run, before and after.
+
+use dynocar_core::dataset::Role;
+use dynocar_core::explain::report::errors::RunErrors;
+use plotters::backend::SVGBackend;
+use plotters::drawing::IntoDrawingArea;
+use plotters::element::{Circle, PathElement};
+use plotters::prelude::Color;
+
+use super::axes::{Axis, chart, range_with_zero, stroke};
+use super::{AFTER, AXIS, BEFORE, PlotError, SCALE, for_page};
+
+/// Nominal size in px.
+const SIZE: (u32, u32) = (470, 230);
+
+/// Errors of runs with their numbers in the dataset, as SVG.
+///
+/// # Errors
+///
+/// When the drawing fails.
+pub fn draw(
+    runs: &[(usize, &RunErrors)],
+    role: Role,
+    has_effect: bool,
+) -> Result<String, PlotError> {
+    let size = (SIZE.0 * SCALE, SIZE.1 * SCALE);
+    let known: Vec<(usize, [f64; 2])> =
+        runs.iter().filter_map(|(number, run)| Some((*number, run.full_run_mps?))).collect();
+    let mut drawing = String::new();
+    {
+        let area = SVGBackend::with_string(&mut drawing, size).into_drawing_area();
+        let last = known.iter().map(|run| run.0).max().unwrap_or(1) as f64;
+        let first = known.iter().map(|run| run.0).min().unwrap_or(1) as f64;
+        let x = [first - 0.6, last + 0.6];
+        let y = [0.0, range_with_zero(known.iter().flat_map(|run| run.1))[1]];
+        let labels = ((last - first) as usize + 3).clamp(3, 14);
+        let x_axis = Axis { range: x, title: "Run, by number", labels, is_whole: true };
+        let y_axis = Axis { range: y, title: "RMSE of the speed, m/s", labels: 5, is_whole: false };
+        let mut chart = chart(&area, &x_axis, &y_axis)?;
+        if has_effect {
+            chart.draw_series(known.iter().map(|&(number, [before, after])| {
+                let at = number as f64;
+                PathElement::new(vec![(at, before), (at, after)], stroke(AXIS, 1.2))
+            }))?;
+        }
+        let point = |side: usize, style: plotters::style::ShapeStyle| {
+            known.iter().map(move |(number, rmse)| {
+                Circle::new((*number as f64, rmse[side]), 4 * SCALE, style)
+            })
+        };
+        chart.draw_series(point(0, stroke(BEFORE, 1.8)))?;
+        if has_effect {
+            chart.draw_series(point(1, AFTER.filled()))?;
+        }
+        area.present()?;
+    }
+    let role = if role == Role::Holdout { "holdout" } else { "fit" };
+    let label = format!("Error of the predicted speed of {} {role} runs", known.len());
+    Ok(for_page(&drawing, &label, "panel", size))
+}

@@ -1,0 +1,111 @@
+//! Measured and predicted speed of a run, and the error of the prediction below it.
+
+use dynocar_core::dataset::Role;
+use dynocar_core::explain::report::traces::{Trace, TracePoint};
+use plotters::backend::SVGBackend;
+use plotters::drawing::IntoDrawingArea;
+use plotters::element::PathElement;
+use plotters::style::RGBColor;
+
+use super::axes::{Axis, Chart, chart, padded, range_with_zero, shade, stroke, zero_line};
+use super::{AFTER, BEFORE, MEASURED, PlotError, SCALE, for_page};
+
+/// For which page a plot is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Width {
+    /// A desktop.
+    Wide,
+    /// A phone.
+    Narrow,
+}
+
+impl Width {
+    /// Nominal size in px: width, height of the speeds, height of the errors.
+    fn size(self) -> (u32, u32, u32) {
+        match self {
+            Width::Wide => (980, 250, 190),
+            Width::Narrow => (470, 240, 190),
+        }
+    }
+
+    fn class(self) -> &'static str {
+        match self {
+            Width::Wide => "wide",
+            Width::Narrow => "narrow",
+        }
+    }
+}
+
+/// The run as SVG.
+///
+/// # Errors
+///
+/// When the drawing fails.
+pub fn draw(trace: &Trace, width: Width, has_effect: bool) -> Result<String, PlotError> {
+    let (nominal, above, below) = width.size();
+    let size = (nominal * SCALE, (above + below) * SCALE);
+    let mut drawing = String::new();
+    {
+        let area = SVGBackend::with_string(&mut drawing, size).into_drawing_area();
+        let (speeds, errors) = area.split_vertically(above * SCALE);
+        let points = || trace.pieces.iter().flatten();
+        let x = padded(points().map(|point| point.time_s), 0.01);
+        let labels = if width == Width::Wide { 10 } else { 5 };
+        let x_axis = |title| Axis { range: x, title, labels, is_whole: true };
+
+        let all = points().flat_map(|p| [p.measured_mps, p.before_mps, p.after_mps]);
+        let y = range_with_zero(all);
+        let y = [0.0, y[1]];
+        let y_axis = Axis { range: y, title: "Speed, m/s", labels: 5, is_whole: false };
+        let mut upper = chart(&speeds, &x_axis(""), &y_axis)?;
+        shade(&mut upper, &trace.acting_s, x, y)?;
+        lines(&mut upper, trace, BEFORE, 1.2, |point| point.before_mps)?;
+        if has_effect {
+            lines(&mut upper, trace, AFTER, 1.2, |point| point.after_mps)?;
+        }
+        lines(&mut upper, trace, MEASURED, 1.4, |point| point.measured_mps)?;
+
+        let away =
+            points().flat_map(|p| [p.before_mps - p.measured_mps, p.after_mps - p.measured_mps]);
+        let y = range_with_zero(away);
+        let y_axis =
+            Axis { range: y, title: "Predicted minus measured, m/s", labels: 4, is_whole: false };
+        let mut lower = chart(&errors, &x_axis("Time in the recording, s"), &y_axis)?;
+        shade(&mut lower, &trace.acting_s, x, y)?;
+        zero_line(&mut lower, x)?;
+        lines(&mut lower, trace, BEFORE, 1.4, |p| p.before_mps - p.measured_mps)?;
+        if has_effect {
+            lines(&mut lower, trace, AFTER, 1.4, |p| p.after_mps - p.measured_mps)?;
+        }
+        area.present()?;
+    }
+    Ok(for_page(&drawing, &label(trace, has_effect), width.class(), size))
+}
+
+fn lines(
+    chart: &mut Chart,
+    trace: &Trace,
+    colour: RGBColor,
+    width_px: f64,
+    value: impl Fn(&TracePoint) -> f64,
+) -> Result<(), PlotError> {
+    chart.draw_series(trace.pieces.iter().map(|piece| {
+        let line: Vec<(f64, f64)> = piece.iter().map(|p| (p.time_s, value(p))).collect();
+        PathElement::new(line, stroke(colour, width_px))
+    }))?;
+    Ok(())
+}
+
+fn label(trace: &Trace, has_effect: bool) -> String {
+    let role = if trace.role == Role::Holdout { "holdout" } else { "fit" };
+    let mut text =
+        format!("Measured and predicted speed of the {role} run {} over time", trace.file);
+    if let Some([before, after]) = trace.rmse_mps {
+        text += &if has_effect {
+            format!("; error {before:.3} m/s before, {after:.3} m/s after the effect is added")
+        } else {
+            format!("; error {before:.3} m/s")
+        };
+    }
+    text
+}

@@ -1,0 +1,145 @@
+//! Where a report comes from: command, versions, content of the dataset.
+
+use std::path::Path;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use dynocar_core::dataset::{DatasetFiles, MANIFEST_FILE};
+use sha2::{Digest, Sha256};
+
+use crate::dataset::{self, LoadError};
+
+/// A file and what is in it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FileDigest {
+    /// Its path in the dataset.
+    pub path: String,
+    /// Its size.
+    pub bytes: usize,
+    /// SHA-256 of its content.
+    pub sha256: String,
+}
+
+/// Where a report comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Provenance {
+    /// The command line.
+    pub command: String,
+    /// Version of the program.
+    pub version: &'static str,
+    /// Kind of machine.
+    pub machine: String,
+    /// Day, in UTC.
+    pub day: String,
+    /// The files that were read: manifest, train, line, runs.
+    pub files: Vec<FileDigest>,
+    /// SHA-256 of the lines `<sha256>  <path>` of all files in this order.
+    pub sha256: String,
+}
+
+impl Provenance {
+    /// Of a report on a dataset made by this process now.
+    ///
+    /// # Errors
+    ///
+    /// When a file of the dataset cannot be read.
+    pub fn of(path: &Path) -> Result<Self, LoadError> {
+        let files = digests(path)?;
+        let lines: String =
+            files.iter().map(|file| format!("{}  {}\n", file.sha256, file.path)).collect();
+        let arguments: Vec<String> = std::env::args().skip(1).collect();
+        Ok(Provenance {
+            command: command_line(&arguments),
+            version: env!("CARGO_PKG_VERSION"),
+            machine: format!("{} on {}", std::env::consts::OS, std::env::consts::ARCH),
+            day: day(SystemTime::now()),
+            files,
+            sha256: hex(lines.as_bytes()),
+        })
+    }
+
+    /// A shell command that gives the same hash in the dataset's folder.
+    pub fn check_command(&self) -> String {
+        let paths: Vec<String> = self.files.iter().map(|file| quoted(&file.path)).collect();
+        format!("sha256sum {} | sha256sum", paths.join(" "))
+    }
+}
+
+fn digests(path: &Path) -> Result<Vec<FileDigest>, LoadError> {
+    let (folder, head) = dataset::open(path)?;
+    let manifest = &head.manifest;
+    let mut paths = vec![MANIFEST_FILE.to_string(), manifest.train_file.path.clone()];
+    paths.extend(manifest.track_file.as_ref().map(|file| file.path.clone()));
+    paths.extend(manifest.runs.iter().map(|run| run.file.clone()));
+    let digest = |path: String| {
+        // A file that was read a moment ago and is gone now has no content to state.
+        let text = folder.read(&path).unwrap_or_default();
+        FileDigest { bytes: text.len(), sha256: hex(text.as_bytes()), path }
+    };
+    Ok(paths.into_iter().map(digest).collect())
+}
+
+fn hex(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The command line as one would type it.
+fn command_line(arguments: &[String]) -> String {
+    let words = arguments.iter().map(|argument| quoted(argument));
+    std::iter::once("dynocar".to_string()).chain(words).collect::<Vec<_>>().join(" ")
+}
+
+/// A word for a shell.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        return word.into();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
+/// The day of an instant in UTC, as year-month-day.
+fn day(instant: SystemTime) -> String {
+    let days = instant.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs() / 86_400);
+    // Years that start in March put the leap day last; the count starts on 0000-03-01.
+    let shifted = days + 719_468;
+    let (era, day_of_era) = (shifted / 146_097, shifted % 146_097);
+    let year_of_era =
+        (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let month_from_march = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * month_from_march + 2) / 5 + 1;
+    let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
+    let year = era * 400 + year_of_era + u64::from(month <= 2);
+    format!("{year:04}-{month:02}-{day:02}")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn days_follow_the_calendar() {
+        let at = |days: u64| day(UNIX_EPOCH + Duration::from_secs(86_400 * days));
+        assert_eq!(at(0), "1970-01-01");
+        assert_eq!(at(11_016), "2000-02-29");
+        assert_eq!(at(11_017), "2000-03-01");
+        assert_eq!(at(20_453), "2025-12-31");
+    }
+
+    #[test]
+    fn a_command_line_can_be_typed_again() {
+        let arguments = ["explain", "my data", "it's", "--report", "a.html"].map(String::from);
+        assert_eq!(
+            command_line(&arguments),
+            r"dynocar explain 'my data' 'it'\''s' --report a.html"
+        );
+    }
+
+    #[test]
+    fn hashes_are_those_of_the_standard() {
+        let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(hex(b"abc"), abc);
+    }
+}

@@ -1,0 +1,59 @@
+//! The residual as a force against covariates.
+
+use std::fmt::Write as _;
+
+use dynocar_core::explain::report::covariates::Covariate;
+
+use super::{Section, legend};
+use crate::report::html::escape;
+use crate::report::plots::panel;
+use crate::report::{ReportError, Subject};
+
+/// The section.
+///
+/// # Errors
+///
+/// When a plot cannot be drawn.
+pub fn section(subject: &Subject) -> Result<Section, ReportError> {
+    let has_effect = subject.has_effect();
+    let mut body = String::from(
+        "<p>The resistance that the model lacks, in N per kN of weight (positive retards), on the \
+         fit runs: in windows of about 20 s of motion, the slope of measured minus modelled speed. \
+         Each point is the mean over at least four windows with ±1.96 standard errors (single \
+         windows, without an error, in plots of one run). Where nothing is missing, points scatter \
+         around zero.</p>\n",
+    );
+    let before = if has_effect { "before" } else { "declared model, a, b, c refitted" };
+    let mut entries = vec![("ring before", before)];
+    if has_effect {
+        entries.push(("dot after", "after"));
+        entries.push(("area band", "what the effect accounts for, 95 %"));
+    }
+    if subject.data.panels.iter().any(|panel| !panel.acting.is_empty()) {
+        entries.push(("area acting", "where the effect acts"));
+    }
+    body += &legend(&entries);
+    body += "<div class=\"panels\">\n";
+    for panel in &subject.data.panels {
+        let title = match &panel.file {
+            Some(file) => format!("Run {}, {file}, over time", subject.number(file)),
+            None => panel.covariate.title().to_string(),
+        };
+        let svg = panel::draw(panel, has_effect)
+            .map_err(|source| ReportError::Plot { plot: title.clone(), source })?;
+        let note = match panel.covariate {
+            Covariate::Direction => " <small>(+1: chainage grows)</small>",
+            _ => "",
+        };
+        let _ = write!(
+            body,
+            "<figure>\n<figcaption>{}{note}</figcaption>\n{svg}</figure>\n",
+            escape(&title)
+        );
+    }
+    body += "</div>\n";
+    if subject.data.panels.is_empty() {
+        body += "<p>The fit runs hold too little motion for a window.</p>\n";
+    }
+    Ok(Section { id: "residual", title: "The residual force", body })
+}

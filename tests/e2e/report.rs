@@ -1,0 +1,176 @@
+//! The report of `dynocar explain` in a real browser, at the widths of a desktop and a phone.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_tests::browser::Browser;
+use dynocar_tests::simulator::dataset_writer::write_dataset;
+use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+const DESKTOP_PX: u32 = 1280;
+const PHONE_PX: u32 = 390;
+
+/// A name that would do harm if it were taken for HTML.
+const NAME: &str = "<img src=x onerror=console.error(1)> & 'line'";
+
+/// Counts what a page must have and lists what sticks out of it or is too small to read.
+const LOOK: &str = r#"(() => {
+    const width = document.documentElement.clientWidth;
+    const isShown = element => element.getClientRects().length > 0;
+    const all = selector => [...document.querySelectorAll(selector)];
+    const wider = element => element.getBoundingClientRect().right > width + 1;
+    const plots = all("svg.plot").filter(isShown);
+    const letters = plots.flatMap(plot => [...plot.querySelectorAll("text")]);
+    return {
+        width,
+        inner_width: window.innerWidth,
+        scroll_width: document.documentElement.scrollWidth,
+        sticking_out: all("body *").filter(isShown).filter(wider)
+            .filter(element => !element.closest(".scroll, svg")).map(element => element.outerHTML.slice(0, 200)),
+        heading: document.querySelector("h1").textContent,
+        title: document.title,
+        language: document.documentElement.lang,
+        sentence: document.querySelector(".sentence").textContent,
+        sections: all("main > section h2").map(heading => heading.textContent),
+        plots: plots.filter(plot => plot.getBoundingClientRect().height > 100).length,
+        flat_plots: plots.filter(plot => plot.getBoundingClientRect().height <= 100).length,
+        unlabelled: plots.filter(plot => plot.getAttribute("role") !== "img" || !plot.getAttribute("aria-label")).length,
+        points: plots.reduce((sum, plot) => sum + plot.querySelectorAll("circle").length, 0),
+        smallest_letters_px: Math.min(...letters.map(text => text.getBoundingClientRect().height)),
+        tables: all("table").filter(isShown).length,
+        rows: all("tbody tr").length,
+        not_a_number: /NaN|undefined|inf\b/.test(document.body.innerText),
+        colours: [getComputedStyle(document.querySelector("main")).backgroundColor,
+            getComputedStyle(plots[0].querySelector("text")).fill],
+    };
+})()"#;
+
+struct Report {
+    page: PathBuf,
+    _folder: TempDir,
+}
+
+fn explain(dataset: &Path, page: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_dynocar-under-test"))
+        .arg("explain")
+        .arg(dataset)
+        .arg("--report")
+        .arg(page)
+        .output()
+        .expect("the program to start")
+}
+
+fn report(kinds: &[EffectKind]) -> Report {
+    let folder = tempfile::tempdir().unwrap();
+    let simulated = simulate(&SimulatorSettings::new(31, EffectRequest::Kinds(kinds.to_vec())));
+    write_dataset(&simulated, folder.path()).unwrap();
+    let manifest = folder.path().join("dataset.toml");
+    let text = std::fs::read_to_string(&manifest).unwrap();
+    let named: Vec<String> = text
+        .lines()
+        .map(|line| match line.split_once('=') {
+            Some((key, _)) if key.trim() == "name" => format!("name = {}", json!(NAME)),
+            _ => line.into(),
+        })
+        .collect();
+    std::fs::write(&manifest, named.join("\n")).unwrap();
+    let page = folder.path().join("report.html");
+    let output = explain(folder.path(), &page);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    // Standard error is no terminal here: no bar.
+    assert_eq!(errors.lines().count(), 1, "{errors}");
+    assert!(errors.starts_with("report: "), "{errors}");
+    Report { page, _folder: folder }
+}
+
+fn look(report: &Report, width_px: u32, is_dark: bool) -> Value {
+    let mut browser = Browser::start(width_px, is_dark);
+    let address = format!("file://{}", report.page.display());
+    browser.open(&address);
+    let seen = browser.value(LOOK);
+    let conduct = browser.conduct();
+    assert_eq!(conduct.complaints, [] as [String; 0]);
+    assert_eq!(conduct.requests, [address]);
+    assert_eq!(seen["inner_width"], width_px);
+    assert_eq!(seen["scroll_width"], seen["width"], "the page scrolls sideways: {seen:#}");
+    assert_eq!(seen["sticking_out"], json!([]));
+    assert_eq!(seen["heading"], NAME);
+    assert_eq!(seen["title"], format!("{NAME} – residual report"));
+    assert_eq!(seen["language"], "en");
+    assert_eq!(seen["unlabelled"], 0);
+    assert_eq!(seen["flat_plots"], 0);
+    assert_eq!(seen["not_a_number"], false);
+    assert!(seen["smallest_letters_px"].as_f64().unwrap() >= 9.0, "{seen:#}");
+    seen
+}
+
+const SECTIONS: [&str; 6] = [
+    "Error before and after",
+    "The residual force",
+    "Parameters",
+    "What else was considered",
+    "Data quality",
+    "How to reproduce",
+];
+
+#[test]
+fn a_report_of_an_effect_renders_on_desktop_and_phone() {
+    let report = report(&[EffectKind::TunnelDrag]);
+    for width_px in [DESKTOP_PX, PHONE_PX] {
+        let seen = look(&report, width_px, false);
+        let sentence = seen["sentence"].as_str().unwrap();
+        for words in ["tunnel drag", " km ", "95 % interval", "N/(m/s)²", "falls from"] {
+            assert!(sentence.contains(words), "{words}: {sentence}");
+        }
+        assert_eq!(seen["sections"][0], "Verdict: Effect found");
+        assert_eq!(seen["sections"].as_array().unwrap()[1..], SECTIONS.map(Value::from));
+        // Runs, speeds of a run, covariates; before and after.
+        assert!(seen["plots"].as_u64().unwrap() >= 2 + 1 + 4, "{seen:#}");
+        assert!(seen["points"].as_u64().unwrap() > 100, "{seen:#}");
+        assert!(seen["tables"].as_u64().unwrap() >= 4, "{seen:#}");
+        assert!(seen["rows"].as_u64().unwrap() > 30, "{seen:#}");
+    }
+}
+
+#[test]
+fn a_report_of_nothing_follows_the_dark_scheme() {
+    let report = report(&[]);
+    let (light, dark) = (look(&report, DESKTOP_PX, false), look(&report, DESKTOP_PX, true));
+    assert_eq!(light["sections"][0], "Verdict: Nothing undeclared");
+    assert!(light["sentence"].as_str().unwrap().contains("Nothing undeclared acts"));
+    assert!(light["plots"].as_u64().unwrap() >= 2 + 1 + 4, "{light:#}");
+    for k in [0, 1] {
+        assert_ne!(light["colours"][k], dark["colours"][k]);
+    }
+}
+
+#[test]
+fn a_faulty_page_is_seen_to_be_faulty() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("page.html");
+    let text = "<!DOCTYPE html><body><div style='width: 900px'>wide</div>\
+        <script>console.error('wrong'); fetch('http://127.0.0.1:9/x'); missing();</script>";
+    std::fs::write(&page, text).unwrap();
+    let mut browser = Browser::start(PHONE_PX, false);
+    browser.open(&format!("file://{}", page.display()));
+    let conduct = browser.conduct();
+    let has = |words: &str| conduct.complaints.iter().any(|complaint| complaint.contains(words));
+    assert!(has("wrong") && has("missing is not defined"), "{conduct:?}");
+    assert!(conduct.requests.contains(&"http://127.0.0.1:9/x".to_string()), "{conduct:?}");
+    assert!(browser.value("document.documentElement.scrollWidth").as_u64() >= Some(900));
+}
+
+#[test]
+fn a_report_that_cannot_be_written_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let simulated = simulate(&SimulatorSettings::new(31, EffectRequest::none()));
+    write_dataset(&simulated, folder.path()).unwrap();
+    let output = explain(folder.path(), &folder.path().join("no/such/folder/report.html"));
+    assert_eq!(output.status.code(), Some(1));
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(errors.contains("report.html: cannot be written"), "{errors}");
+}
