@@ -14,10 +14,6 @@ const HUBER: f64 = 3.0;
 const STEPS_MAX: usize = 8;
 /// A predicted decrease of the cost below this ends the search.
 const DECREASE_MIN: f64 = 0.02;
-/// Turns of fitting and estimating the noise at most.
-const NOISE_TURNS_MAX: usize = 6;
-/// A turn that brings less ends them: evidence differs by more.
-const NOISE_DECREASE_MIN: f64 = 0.5;
 /// Standard deviation of the declared a, b, c as share of their size: a weak prior that keeps
 /// directions apart which the runs do not excite.
 const PRIOR_SHARE: [f64; 3] = [0.4, 0.8, 0.4];
@@ -188,24 +184,11 @@ impl FitProblem {
         fit
     }
 
-    /// Fits a model and the noise by turns until neither gains.
+    /// Fits a model, the noise that its residuals show, and the model again.
+    ///
+    /// One turn only: under an undeclared force further turns would take ever more of it for noise.
     pub fn fit_with_noise(&self, model: &GrownModel, start: Vec<f64>, noise: Noise) -> Fit {
-        let mut fit = self.fit(model, start, noise);
-        for _ in 0..NOISE_TURNS_MAX {
-            let next = self.with_likelier_noise(&fit);
-            let gained = fit.cost - next.cost;
-            if gained > 0.0 {
-                fit = next;
-            }
-            if gained < NOISE_DECREASE_MIN {
-                break;
-            }
-        }
-        fit
-    }
-
-    /// The model fitted again under the noise that its residuals show.
-    fn with_likelier_noise(&self, fit: &Fit) -> Fit {
+        let fit = self.fit(model, start, noise);
         let scatter = RunScatter::updated(&fit.factors);
         let residuals: Vec<Vec<f64>> = fit
             .residuals
@@ -218,9 +201,8 @@ impl FitProblem {
                 less.map(|(value, (f, r))| value - factors[0] * f - factors[1] * r).collect()
             })
             .collect();
-        let start = Noise { scatter, ..fit.noise };
-        let noise = Noise::estimate(&self.runs, &residuals, start);
-        self.fit(&fit.model, fit.theta.clone(), noise)
+        let noise = Noise::estimate(&self.runs, &residuals, Noise { scatter, ..noise });
+        self.fit(model, fit.theta, noise)
     }
 
     fn filters(&self, noise: Noise) -> Vec<RunFilters> {

@@ -82,7 +82,8 @@ impl Search<'_> {
         (self.progress)(0.05, "fitting a, b, c");
         let declared = GrownModel::declared(self.train);
         let start = self.problem.start(&[]);
-        let base = self.problem.fit_with_noise(&declared, start, Noise::START);
+        let first = self.problem.fit_with_noise(&declared, start, Noise::START);
+        let base = self.problem.fit_with_noise(&declared, first.theta, first.noise);
         let mut outcome =
             Outcome { base: base.clone(), fit: base, rounds: Vec::new(), not_testable: Vec::new() };
         if outcome.base.observations() < OBSERVATIONS_MIN {
