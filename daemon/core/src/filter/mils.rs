@@ -2,6 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use super::rank_one::measured;
 use super::rls::scalar_update;
 use super::{NotPositiveDefinite, Step};
 
@@ -153,9 +154,7 @@ impl<const N: usize, const L: usize> Mils<N, L> {
         }
         if let Some(weights) = self.penalty.weights_at(self.updates) {
             for i in (0..N).filter(|&i| weights[i] > 0.0) {
-                let mut unit = SVector::<f64, N>::zeros();
-                unit[i] = weights[i].sqrt();
-                scalar_update(&mut self.estimate, &mut self.covariance, &unit, 0.0)?;
+                draw_to_zero(&mut self.estimate, &mut self.covariance, i, weights[i])?;
             }
         }
         let newest = (self.next + self.length - 1) % self.length;
@@ -175,6 +174,28 @@ impl<const N: usize, const L: usize> Mils<N, L> {
         self.updates += 1;
         Ok(step)
     }
+}
+
+/// A row that observes parameter `i` as 0 with a weight.
+#[inline]
+fn draw_to_zero<const N: usize>(
+    estimate: &mut SVector<f64, N>,
+    covariance: &mut SMatrix<f64, N, N>,
+    i: usize,
+    weight: f64,
+) -> Result<(), NotPositiveDefinite> {
+    let noise_variance = 1.0 / weight;
+    let spread = covariance.column(i).into_owned();
+    let variance = spread[i] + noise_variance;
+    if !(variance >= noise_variance && variance.is_finite() && estimate[i].is_finite()) {
+        return Err(NotPositiveDefinite);
+    }
+    let gain = spread * (1.0 / variance);
+    *estimate -= gain * estimate[i];
+    let mut row = SVector::<f64, N>::zeros();
+    row[i] = 1.0;
+    measured(covariance, &row, &spread, &gain, (variance, noise_variance));
+    Ok(())
 }
 
 #[cfg(test)]
