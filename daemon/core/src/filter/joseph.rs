@@ -68,12 +68,11 @@ impl<const N: usize> JosephFilter<N> {
     pub fn measure(&mut self, index: usize, value: f64, noise_variance: f64) -> ScalarInnovation {
         let innovation = self.innovation(index, value, noise_variance);
         let spread = self.covariance.column(index).into_owned();
-        let gain = spread * (1.0 / innovation.variance);
-        self.state += gain * innovation.value;
+        let inverse_variance = 1.0 / innovation.variance;
+        self.state += spread * (inverse_variance * innovation.value);
         let mut row = SVector::<f64, N>::zeros();
         row[index] = 1.0;
-        let variances = (innovation.variance, noise_variance);
-        measured(&mut self.covariance, &row, &spread, &gain, variances);
+        measured(&mut self.covariance, &row, &spread, inverse_variance, noise_variance);
         innovation
     }
 

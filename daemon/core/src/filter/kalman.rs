@@ -101,8 +101,9 @@ impl<const N: usize> GaussianState<N> {
     pub fn apply(&mut self, update: &ScalarUpdate<N>) {
         self.mean += update.gain * update.innovation;
         let spread = update.gain * update.variance;
-        let variances = (update.variance, update.noise_variance);
-        measured(&mut self.covariance, &update.row, &spread, &update.gain, variances);
+        let inverse_variance = 1.0 / update.variance;
+        let noise_variance = update.noise_variance;
+        measured(&mut self.covariance, &update.row, &spread, inverse_variance, noise_variance);
     }
 
     /// Standard deviation of one component.

@@ -74,6 +74,7 @@ impl<const N: usize> Rls<N> {
     /// # Real-time
     ///
     /// Bounded work, no allocation.
+    #[inline]
     pub fn update(
         &mut self,
         features: &SVector<f64, N>,
@@ -144,9 +145,9 @@ pub(super) fn scalar_update<const N: usize>(
     if !(variance >= 1.0 && variance.is_finite() && innovation.is_finite()) {
         return Err(NotPositiveDefinite);
     }
-    let gain = spread * (1.0 / variance);
-    *estimate += gain * innovation;
-    measured(covariance, features, &spread, &gain, (variance, 1.0));
+    let inverse_variance = 1.0 / variance;
+    *estimate += spread * (inverse_variance * innovation);
+    measured(covariance, features, &spread, inverse_variance, 1.0);
     Ok(Step { innovation, variance })
 }
 

@@ -5,7 +5,7 @@ const MEMORY: f64 = 300.0;
 /// Looks before anything is said.
 const LOOKS_MIN: f64 = 30.0;
 /// Standard deviations beyond which a force is no chance.
-const DEVIATIONS_MIN: f64 = 4.0;
+const DEVIATIONS_MIN: f64 = 3.0;
 /// Share of the basic resistance from which a force matters.
 const SHARE_MIN: f64 = 0.1;
 /// Share of the looks with such a force that the model cannot be said to fit with.
