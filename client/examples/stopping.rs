@@ -16,7 +16,7 @@ const EFFORT: [EffortPoint; 3] = [
     EffortPoint { speed_mps: 40.0, force_n: 90_000.0 },
 ];
 
-fn usable(reader: &SnapshotReader, kind: PipelineKind) -> Option<Reading> {
+fn usable(reader: &SnapshotReader, kind: PipelineKind) -> Option<Reading<'_>> {
     reader.latest(kind, monotonic_now_ns()).filter(|reading| reading.is_usable())
 }
 
