@@ -10,7 +10,7 @@ use crate::estimators::measure::Effort;
 use crate::estimators::{self, report};
 use crate::explain::matrix;
 use crate::explain::scenario::Scenario;
-use crate::papers::{self, Row, table};
+use crate::papers::{self, Row, Verdict, table};
 
 /// Measures Dynocar: accuracy against the statistical bound, speed against peers.
 #[derive(Debug, Parser)]
@@ -42,6 +42,8 @@ struct EstimatorsArguments {
 }
 
 /// Every table of the five papers over seeded runs: the paper's figure, its method, ours, the bound.
+///
+/// Exit status 1 when a row breaks what is promised of it.
 #[derive(Debug, Args)]
 struct PapersArguments {
     /// Few seeds: a check that everything runs, not a measurement
@@ -87,7 +89,16 @@ struct ExplainArguments {
 
 #[derive(Serialize)]
 struct PapersAnswer<'a> {
-    rows: &'a [Row],
+    rows: Vec<JudgedRow<'a>>,
+}
+
+/// A row with what is promised of it.
+#[derive(Serialize)]
+struct JudgedRow<'a> {
+    #[serde(flatten)]
+    row: &'a Row,
+    #[serde(flatten)]
+    verdict: Verdict,
 }
 
 /// Seeded runs of a full measurement.
@@ -144,11 +155,23 @@ fn papers(arguments: &PapersArguments) -> Result<(), (String, u8)> {
         eprintln!("{}: {seeds} seeds", source.name);
         rows.extend((source.rows)(seeds));
     }
-    give(&arguments.json, &PapersAnswer { rows: &rows }, || table::for_terminal(&rows))?;
+    let judged =
+        rows.iter().map(|row| JudgedRow { row, verdict: Verdict::of(row) }).collect::<Vec<_>>();
+    let broken: Vec<String> = judged
+        .iter()
+        .filter(|judged| !judged.verdict.broken.is_empty())
+        .map(|JudgedRow { row, verdict }| {
+            format!("{}, {}: {}", row.paper, row.quantity, verdict.broken.join(", "))
+        })
+        .collect();
+    give(&arguments.json, &PapersAnswer { rows: judged }, || table::for_terminal(&rows))?;
     if let Some(file) = &arguments.markdown {
         write(file, &table::for_documentation(&rows))?;
     }
-    Ok(())
+    match broken.is_empty() {
+        true => Ok(()),
+        false => Err((format!("broken promises:\n{}", broken.join("\n")), 1)),
+    }
 }
 
 fn explain(arguments: &ExplainArguments) -> Result<(), (String, u8)> {

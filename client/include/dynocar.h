@@ -69,7 +69,8 @@ enum {
     DYNOCAR_ERROR_SEND_REFUSED = 9,        /* the sample counts as lost; just go on */
     DYNOCAR_ERROR_NO_SNAPSHOT = 10,        /* none of this pipeline has come yet */
     DYNOCAR_ERROR_NOT_IN_SNAPSHOT = 11,    /* the pipeline does not estimate this parameter */
-    DYNOCAR_ERROR_PANIC = 12               /* a fault inside the library: close the handle */
+    DYNOCAR_ERROR_PANIC = 12,              /* a fault inside the library: close the handle */
+    DYNOCAR_ERROR_DOES_NOT_STOP = 13       /* the train does not slow down */
 };
 
 /* Who serves a train. */
@@ -372,6 +373,54 @@ dynocar_code dynocar_snapshot_value(const dynocar_parameter_snapshot *snapshot,
 dynocar_code dynocar_snapshot_covariance(const dynocar_parameter_snapshot *snapshot,
                                          uint32_t parameter, uint32_t other, double *covariance);
 
+/* ---- Braking distance and time; no handle, any thread ---- */
+
+/* What the rail carries: rail of a dynocar_stop. */
+enum {
+    DYNOCAR_RAIL_UNLIMITED = 0,   /* any brake force; adhesion is not read */
+    DYNOCAR_RAIL_COEFFICIENT = 1, /* adhesion is one coefficient at all speeds, or a lower bound */
+    DYNOCAR_RAIL_DRY_LAW = 2,     /* adhesion is a scale of the dry rail's law (Xie 2019) */
+    DYNOCAR_RAIL_WET_LAW = 3      /* adhesion is a scale of the wet rail's law (Xie 2019) */
+};
+
+/* The stop that is asked about. Set all to 0 first; standard deviations may stay 0. */
+typedef struct {
+    double from_speed_mps;       /* the brakes act in full from this speed on */
+    double to_speed_mps;         /* 0 for standstill */
+    double mass_kg;              /* without the rotating part */
+    double rotating_mass_factor; /* gamma: inertial mass = mass (1 + gamma) */
+    double gradient_permille;    /* along the travel, climbing positive */
+    double davis_a;              /* N/kN */
+    double davis_b;              /* N/kN per m/s */
+    double davis_c;              /* N/kN per (m/s)^2 */
+    double w0_std_n_per_kn;      /* as dynocar_snapshot_resistance() gives it */
+    double brake_scale;          /* factor on the effort: estimated over declared friction, or 1 */
+    double brake_scale_std;
+    double adhesion;             /* by rail: coefficient or scale of a law */
+    double adhesion_std;
+    uint64_t rail;               /* DYNOCAR_RAIL_... */
+} dynocar_stop;
+
+/* A point of the brake-effort curve: linear between points, constant beyond the ends. */
+typedef struct {
+    double speed_mps; /* increasing */
+    double force_n;   /* of the whole train at the wheel rims */
+} dynocar_effort_point;
+
+typedef struct {
+    double distance_m; /* with every quantity at its value */
+    double time_s;
+    double distance_bound_m; /* not exceeded, with at least the confidence asked for */
+    double time_bound_s;
+} dynocar_stopping;
+
+/* Distance and time of a stop. confidence: 0.5 up to below 1, for the bound, which moves every
+ * uncertain quantity to its unfavourable side. effort: 1 to 1024 points.
+ * DYNOCAR_ERROR_DOES_NOT_STOP when the train would not slow down. REAL-TIME */
+dynocar_code dynocar_stopping_estimate(const dynocar_stop *stop,
+                                       const dynocar_effort_point *effort, size_t effort_count,
+                                       double confidence, dynocar_stopping *stopping);
+
 /* ---- About ---- */
 
 /* Who serves a train: state gets DYNOCAR_DAEMON_..., message says it in words, root and message as
@@ -505,6 +554,32 @@ DYNOCAR_AT_(dynocar_resistance, w0_std_n_per_kn, 8);
 DYNOCAR_AT_(dynocar_resistance, force_n, 16);
 DYNOCAR_AT_(dynocar_resistance, force_std_n, 24);
 DYNOCAR_AT_(dynocar_resistance, is_extrapolated, 32);
+
+DYNOCAR_SIZE_(dynocar_stop, 112);
+DYNOCAR_AT_(dynocar_stop, from_speed_mps, 0);
+DYNOCAR_AT_(dynocar_stop, to_speed_mps, 8);
+DYNOCAR_AT_(dynocar_stop, mass_kg, 16);
+DYNOCAR_AT_(dynocar_stop, rotating_mass_factor, 24);
+DYNOCAR_AT_(dynocar_stop, gradient_permille, 32);
+DYNOCAR_AT_(dynocar_stop, davis_a, 40);
+DYNOCAR_AT_(dynocar_stop, davis_b, 48);
+DYNOCAR_AT_(dynocar_stop, davis_c, 56);
+DYNOCAR_AT_(dynocar_stop, w0_std_n_per_kn, 64);
+DYNOCAR_AT_(dynocar_stop, brake_scale, 72);
+DYNOCAR_AT_(dynocar_stop, brake_scale_std, 80);
+DYNOCAR_AT_(dynocar_stop, adhesion, 88);
+DYNOCAR_AT_(dynocar_stop, adhesion_std, 96);
+DYNOCAR_AT_(dynocar_stop, rail, 104);
+
+DYNOCAR_SIZE_(dynocar_effort_point, 16);
+DYNOCAR_AT_(dynocar_effort_point, speed_mps, 0);
+DYNOCAR_AT_(dynocar_effort_point, force_n, 8);
+
+DYNOCAR_SIZE_(dynocar_stopping, 32);
+DYNOCAR_AT_(dynocar_stopping, distance_m, 0);
+DYNOCAR_AT_(dynocar_stopping, time_s, 8);
+DYNOCAR_AT_(dynocar_stopping, distance_bound_m, 16);
+DYNOCAR_AT_(dynocar_stopping, time_bound_s, 24);
 
 #undef DYNOCAR_AT_
 #undef DYNOCAR_SIZE_

@@ -70,6 +70,16 @@ class Code(_Vocabulary):
     NO_SNAPSHOT = 10
     NOT_IN_SNAPSHOT = 11
     PANIC = 12
+    DOES_NOT_STOP = 13
+
+
+class Rail(_Vocabulary):
+    """What the rail carries in a stop."""
+
+    UNLIMITED = 0
+    COEFFICIENT = 1
+    DRY_LAW = 2
+    WET_LAW = 3
 
 
 class DaemonState(_Vocabulary):
@@ -310,6 +320,41 @@ class _Resistance(ctypes.Structure):
     ]
 
 
+class StopRequest(ctypes.Structure):
+    _fields_ = [
+        ("from_speed_mps", c_double),
+        ("to_speed_mps", c_double),
+        ("mass_kg", c_double),
+        ("rotating_mass_factor", c_double),
+        ("gradient_permille", c_double),
+        ("davis_a", c_double),
+        ("davis_b", c_double),
+        ("davis_c", c_double),
+        ("w0_std_n_per_kn", c_double),
+        ("brake_scale", c_double),
+        ("brake_scale_std", c_double),
+        ("adhesion", c_double),
+        ("adhesion_std", c_double),
+        ("rail", c_uint64),
+    ]
+
+
+class EffortPoint(ctypes.Structure):
+    _fields_ = [
+        ("speed_mps", c_double),
+        ("force_n", c_double),
+    ]
+
+
+class Stopping(ctypes.Structure):
+    _fields_ = [
+        ("distance_m", c_double),
+        ("time_s", c_double),
+        ("distance_bound_m", c_double),
+        ("time_bound_s", c_double),
+    ]
+
+
 class DynocarError(Exception):
     """A call that the library refused; ``code`` says why, the text says it in words."""
 
@@ -322,6 +367,13 @@ _HANDLE = ctypes.c_void_p
 _WORDS = [c_char_p, c_size_t]
 _OPEN = [c_char_p, c_uint64, POINTER(_HANDLE), *_WORDS]
 _LATEST = [_HANDLE, c_uint32, c_int64, POINTER(_Reading)]
+_STOPPING = [
+    POINTER(StopRequest),
+    POINTER(EffortPoint),
+    c_size_t,
+    c_double,
+    POINTER(Stopping),
+]
 _RESISTANCE = [POINTER(ParameterSnapshot), c_double, c_double, POINTER(_Resistance)]
 
 # Name after "dynocar_", result, arguments.
@@ -338,6 +390,7 @@ _FUNCTIONS: List[Tuple[str, Any, List[Any]]] = [
     ("reader_refused", c_int32, [_HANDLE, POINTER(c_uint64)]),
     ("reader_close", c_int32, [_HANDLE]),
     ("snapshot_resistance", c_int32, _RESISTANCE),
+    ("stopping_estimate", c_int32, _STOPPING),
     ("daemon_state", c_int32, [c_char_p, c_uint64, POINTER(c_int32), *_WORDS]),
     ("code_text", c_char_p, [c_int32]),
     ("monotonic_now_ns", c_int64, []),

@@ -6,7 +6,9 @@ use std::path::Path;
 use std::process::Command;
 
 use dynocar_client::ffi::about::DaemonState;
-use dynocar_client::ffi::{Code, ReadingCopy, Resistance};
+use dynocar_client::ffi::{
+    Code, EffortPlace, Rail, ReadingCopy, Resistance, StopRequest, Stopping,
+};
 use dynocar_shared::layout::FieldLayout;
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::services::PIPELINES_MAX;
@@ -27,7 +29,7 @@ struct Struct {
     layout: &'static [FieldLayout],
 }
 
-const STRUCTS: [Struct; 4] = [
+const STRUCTS: [Struct; 7] = [
     Struct {
         rust_name: "TrainSample",
         c_name: "dynocar_train_sample",
@@ -52,6 +54,24 @@ const STRUCTS: [Struct; 4] = [
         size: size_of::<Resistance>(),
         layout: Resistance::LAYOUT,
     },
+    Struct {
+        rust_name: "StopRequest",
+        c_name: "dynocar_stop",
+        size: size_of::<StopRequest>(),
+        layout: StopRequest::LAYOUT,
+    },
+    Struct {
+        rust_name: "EffortPlace",
+        c_name: "dynocar_effort_point",
+        size: size_of::<EffortPlace>(),
+        layout: EffortPlace::LAYOUT,
+    },
+    Struct {
+        rust_name: "Stopping",
+        c_name: "dynocar_stopping",
+        size: size_of::<Stopping>(),
+        layout: Stopping::LAYOUT,
+    },
 ];
 
 /// `WeakExcitation` as `WEAK_EXCITATION`.
@@ -73,6 +93,7 @@ fn vocabulary_members() -> Vec<(&'static str, String, i64)> {
         members.push((group, upper_snake(member), i64::from(number)));
     };
     Code::ALL.iter().for_each(|it| add("CODE", it, *it as u32));
+    Rail::ALL.iter().for_each(|it| add("RAIL", it, *it as u32));
     DaemonState::ALL.iter().for_each(|it| add("DAEMON", it, *it as u32));
     Status::ALL.iter().for_each(|it| add("STATUS", it, *it as u32));
     Reason::ALL.iter().for_each(|it| add("REASON", it, *it as u32));

@@ -52,6 +52,12 @@ pub struct Score {
 }
 
 impl Score {
+    /// Degrees of freedom of a chi-square that scatters as `nees` does: the errors of one run
+    /// are not independent of each other.
+    pub fn nees_freedom(&self) -> f64 {
+        2.0 * (self.nees / self.nees_standard_error).powi(2)
+    }
+
     /// The errors of runs, pooled.
     pub fn of(runs: &[Vec<Scored>]) -> Self {
         let pool = |value: fn(&Scored) -> f64| {

@@ -49,6 +49,7 @@ impl Table {
             seeds,
             coverage: None,
             nees: None,
+            nees_freedom: None,
         }
     }
 
@@ -115,6 +116,7 @@ impl Table {
         let row = |what: &str, unit| Row {
             coverage: Some(ours.coverage),
             nees: Some(ours.nees),
+            nees_freedom: Some(ours.nees_freedom()),
             ..self.row(what, unit, seeds)
         };
         vec![
@@ -165,6 +167,7 @@ pub fn drawn_rows(
                 bound: Some(root_mean_square(&bound(&braking, knowledge, lag_steps))),
                 coverage: Some(score.coverage),
                 nees: Some(score.nees),
+                nees_freedom: Some(score.nees_freedom()),
                 ..table.row(&format!("root mean square error, {what}"), "1", seeds)
             }
         })

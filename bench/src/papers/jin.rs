@@ -63,6 +63,7 @@ fn ratio_extras(seeds: usize) -> Vec<Row> {
         ours: Some(back.relative_percent),
         coverage: Some(back.coverage),
         nees: Some(back.nees),
+        nees_freedom: Some(back.nees_freedom()),
         ..RATIO.row(
             "mean relative error, 10 s back (baseline: always the declared 2.55)",
             "%",

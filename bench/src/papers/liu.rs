@@ -99,6 +99,7 @@ fn accuracy(condition: Condition, seeds: usize) -> Vec<Row> {
         seeds,
         coverage: Some(mean(&score.held)),
         nees: Some(mean(&score.nees)),
+        nees_freedom: Some(3.0 * score.nees.len() as f64),
     };
     let mut rows: Vec<Row> = Method::ALL
         .iter()
@@ -229,6 +230,7 @@ fn table_1(seeds: usize) -> Vec<Row> {
                 seeds,
                 coverage: None,
                 nees: None,
+                nees_freedom: None,
             }
         })
         .collect()

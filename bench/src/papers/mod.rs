@@ -8,6 +8,7 @@ pub mod braking_table;
 pub mod jin;
 pub mod literal_em;
 pub mod liu;
+pub mod promise;
 pub mod row;
 pub mod statistics;
 pub mod table;
@@ -15,6 +16,7 @@ pub mod wang;
 pub mod xia;
 pub mod xie;
 
+pub use promise::Verdict;
 pub use row::Row;
 
 /// A paper with the measurement of its tables.

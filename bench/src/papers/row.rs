@@ -31,4 +31,6 @@ pub struct Row {
     pub coverage: Option<f64>,
     /// Our mean normalised estimation error squared per degree of freedom, where it applies.
     pub nees: Option<f64>,
+    /// Degrees of freedom behind that mean over all runs, those of independent errors.
+    pub nees_freedom: Option<f64>,
 }

@@ -39,6 +39,7 @@ fn row(table: &'static str, quantity: String, unit: &'static str, seeds: usize) 
         seeds,
         coverage: None,
         nees: None,
+        nees_freedom: None,
     }
 }
 

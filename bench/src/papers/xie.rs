@@ -204,6 +204,7 @@ pub fn stop_rows(
         seeds: 1,
         coverage: None,
         nees: None,
+        nees_freedom: None,
     };
     vec![
         row(format!("braking distance, {what}"), "m", published.0, in_steps.0, ours.0),

@@ -58,6 +58,8 @@ codes! {
     NotInSnapshot = 11 c"the pipeline does not estimate this parameter",
     /// A fault inside the library; its words go to standard error.
     Panic = 12 c"a fault inside the library",
+    /// The train does not slow down, at the values given or at the edge of the bound.
+    DoesNotStop = 13 c"the train does not slow down",
 }
 
 impl From<&ChannelError> for Code {

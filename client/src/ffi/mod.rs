@@ -10,6 +10,7 @@
 //! - [`handle`]: what a `dynocar_publisher *` or a `dynocar_reader *` points to
 //! - [`publisher`], [`reader`]: the two ends a controller holds
 //! - [`snapshot`]: resistance, parameters and covariances out of a copied snapshot
+//! - [`stopping`]: braking distance and time with a bound
 //! - [`about`]: clock, versions, and who serves a train
 //! - [`names`]: the vocabularies' names
 //!
@@ -30,7 +31,9 @@ pub mod names;
 pub mod publisher;
 pub mod reader;
 pub mod snapshot;
+pub mod stopping;
 
 pub use error::Code;
 pub use reader::ReadingCopy;
 pub use snapshot::Resistance;
+pub use stopping::{EffortPlace, Rail, StopRequest, Stopping};

@@ -9,6 +9,9 @@ STRUCTS = {
     "ParameterSnapshot": dynocar.ParameterSnapshot,
     "ReadingCopy": dynocar._Reading,
     "Resistance": dynocar._Resistance,
+    "StopRequest": dynocar.StopRequest,
+    "EffortPlace": dynocar.EffortPoint,
+    "Stopping": dynocar.Stopping,
 }
 TYPES = {
     ctypes.c_int8: "i8",
@@ -23,6 +26,7 @@ TYPES = {
 }
 VOCABULARIES = {
     "CODE": dynocar.Code,
+    "RAIL": dynocar.Rail,
     "DAEMON": dynocar.DaemonState,
     "STATUS": dynocar.Status,
     "REASON": dynocar.Reason,

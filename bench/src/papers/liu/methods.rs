@@ -7,7 +7,7 @@ use super::scenario::{Measured, ROTATING_MASS_FACTOR};
 
 /// p0 of eq. 11.
 const START_VARIANCE: f64 = 1e6;
-/// Change of speed over a segment in km/h (section 2.2).
+/// Width of a segment in km/h (section 2.2).
 const SEGMENT_KMH: f64 = 0.5;
 /// V-MILS: innovations beyond this many robust standard deviations are bad data; the paper has
 /// no rule.
@@ -30,24 +30,24 @@ impl Segment {
     }
 }
 
-/// Half-overlapping segments of figure 2: a segment ends where the speed has fallen by 0.5 km/h,
-/// the next starts in its middle; the acceleration is the least-squares slope.
+/// Half-overlapping segments of figure 2: each is 0.5 km/h of speed wide and the next begins in
+/// its middle, at 0.25 km/h less; a bound is reached where a measured speed first lies at or
+/// below it, as printed. The acceleration is the least-squares slope.
 pub fn segments(runs: &[Vec<Measured>]) -> Vec<Segment> {
     runs.iter().flat_map(|run| segments_of(run)).collect()
 }
 
 fn segments_of(run: &[Measured]) -> Vec<Segment> {
-    let mut segments = Vec::new();
-    let mut start = 0;
-    while let Some(length) = run[start..]
-        .iter()
-        .position(|sample| sample.speed_kmh <= run[start].speed_kmh - SEGMENT_KMH)
-    {
-        let samples = &run[start..=start + length];
-        segments.extend(segment(samples));
-        start += (length / 2).max(1);
-    }
-    segments
+    let reached = |bound_kmh: f64| {
+        // Rounded speeds lie on the bounds but for the last bit.
+        run.iter().position(|sample| sample.speed_kmh <= bound_kmh + 1e-6)
+    };
+    let Some(first) = run.first() else { return Vec::new() };
+    let upper_kmh = |index: u32| first.speed_kmh - 0.5 * SEGMENT_KMH * f64::from(index);
+    (0..)
+        .map_while(|index| Some((reached(upper_kmh(index))?, reached(upper_kmh(index + 2))?)))
+        .filter_map(|(start, end)| segment(&run[start..=end]))
+        .collect()
 }
 
 fn segment(samples: &[Measured]) -> Option<Segment> {

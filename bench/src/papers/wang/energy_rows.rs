@@ -112,6 +112,7 @@ fn comparison(
         seeds: at_equal_time.len(),
         coverage: None,
         nees: None,
+        nees_freedom: None,
     };
     let later = Row {
         quantity: format!("later arrival, {text}, whatever the running times"),

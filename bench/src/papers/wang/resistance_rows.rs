@@ -87,6 +87,7 @@ fn error_row(quantity: String, errors: &Errors, bound: Option<f64>, seeds: usize
         seeds,
         coverage: Some(mean(&errors.covered)),
         nees: Some(mean(&errors.nees)),
+        nees_freedom: Some(3.0 * errors.nees.len() as f64),
     }
 }
 
@@ -170,6 +171,7 @@ fn printed_rows(shuttle: &Shuttle, ride: &[Instant], seeds: usize) -> [Row; 2] {
         seeds,
         coverage: None,
         nees: None,
+        nees_freedom: None,
     };
     [
         row("learning rate 1e-7, speed in km/h: samples until it has diverged", "1", mean(&until)),

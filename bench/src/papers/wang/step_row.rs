@@ -57,6 +57,7 @@ pub fn row(shuttle: &Shuttle, seeds: usize) -> Row {
         seeds,
         coverage: None,
         nees: None,
+        nees_freedom: None,
     }
 }
 

@@ -228,6 +228,7 @@ pub fn noise_rows(seeds: usize) -> Vec<Row> {
         bound: Some(root_mean_square(&consistency.bounds)),
         coverage: Some(mean(&consistency.covered)),
         nees: Some(mean(&consistency.nees)),
+        nees_freedom: Some(3.0 * consistency.nees.len() as f64),
         ..row("Figure 4", quantity.into(), "N/kN", seeds)
     };
     vec![
@@ -330,6 +331,7 @@ fn disturbed_row(seeds: usize) -> Row {
         bound: Some(root_mean_square(&ours.bounds)),
         coverage: Some(mean(&ours.covered)),
         nees: Some(mean(&ours.nees)),
+        nees_freedom: Some(3.0 * ours.nees.len() as f64),
         ..row("Figure 4", quantity.into(), "N/kN", seeds)
     }
 }

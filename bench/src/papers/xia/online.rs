@@ -274,6 +274,7 @@ impl Consistency {
             bound: Some(root_mean_square(&self.bounds)),
             coverage: Some(mean(&self.covered)),
             nees: Some(mean(&self.nees)),
+            nees_freedom: Some(3.0 * self.nees.len() as f64),
             ..row("Table 4", quantity.into(), "N/kN", seeds)
         }
     }

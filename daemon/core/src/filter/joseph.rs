@@ -1,6 +1,8 @@
-//! A small Kalman filter with scalar measurements in Joseph's form.
+//! A small Kalman filter with scalar measurements of single states.
 
 use nalgebra::{SMatrix, SVector};
+
+use super::rank_one::{measured, moved};
 
 /// State and covariance of N unknowns.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,8 +37,8 @@ impl<const N: usize> JosephFilter<N> {
         noise_variances: &SVector<f64, N>,
     ) {
         self.state = state;
-        self.covariance = transition * self.covariance * transition.transpose()
-            + SMatrix::from_diagonal(noise_variances);
+        let noise = SMatrix::from_diagonal(noise_variances);
+        self.covariance = moved(transition, &self.covariance, &noise);
     }
 
     /// Makes one state independent of the others, with a new mean and variance.
@@ -57,31 +59,29 @@ impl<const N: usize> JosephFilter<N> {
 
     /// Takes in a measurement of one state.
     ///
-    /// P ← (I - K H) P (I - K H)ᵀ + K R Kᵀ, which keeps P positive semidefinite whatever the
-    /// rounding of the gain.
+    /// The covariance stays symmetric and positive: where subtraction would cost digits, it is
+    /// P ← (I - K H) P (I - K H)ᵀ + K R Kᵀ.
     ///
     /// # Real-time
     ///
     /// No allocation.
     pub fn measure(&mut self, index: usize, value: f64, noise_variance: f64) -> ScalarInnovation {
         let innovation = self.innovation(index, value, noise_variance);
-        let gain = self.covariance.column(index) / innovation.variance;
-        self.state += gain * innovation.value;
-        let mut keep = SMatrix::<f64, N, N>::identity();
-        for i in 0..N {
-            keep[(i, index)] -= gain[i];
-        }
-        let covariance =
-            keep * self.covariance * keep.transpose() + gain * gain.transpose() * noise_variance;
-        self.covariance = 0.5 * (covariance + covariance.transpose());
+        let spread = self.covariance.column(index).into_owned();
+        let inverse_variance = 1.0 / innovation.variance;
+        self.state += spread * (inverse_variance * innovation.value);
+        let mut row = SVector::<f64, N>::zeros();
+        row[index] = 1.0;
+        measured(&mut self.covariance, &row, &spread, inverse_variance, noise_variance);
         innovation
     }
 
-    /// True while every number is finite and every variance positive; Joseph's form keeps the
-    /// rest of positive definiteness.
+    /// True while every number is finite and every variance positive; [`JosephFilter::measure`]
+    /// keeps the rest of positive definiteness.
     pub fn is_sound(&self) -> bool {
-        let is_finite = self.state.iter().chain(&self.covariance).all(|value| value.is_finite());
-        is_finite && (0..N).all(|i| self.covariance[(i, i)] > 0.0)
+        // One infinity or NaN makes the sum one.
+        (self.state.sum() + self.covariance.sum()).is_finite()
+            && (0..N).all(|i| self.covariance[(i, i)] > 0.0)
     }
 }
 

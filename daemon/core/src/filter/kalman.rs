@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::rank_one::joseph;
+use super::rank_one::{measured, moved};
 
 /// Why a step of a filter failed; the belief is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -73,8 +73,7 @@ impl<const N: usize> GaussianState<N> {
         process_noise: &SMatrix<f64, N, N>,
     ) {
         self.mean = mean;
-        let moved = jacobian * self.covariance * jacobian.transpose() + process_noise;
-        self.covariance = (moved + moved.transpose()) * 0.5;
+        self.covariance = moved(jacobian, &self.covariance, process_noise);
     }
 
     /// Innovation and gain of measuring `row` times the state, without applying them.
@@ -98,11 +97,13 @@ impl<const N: usize> GaussianState<N> {
         Ok(ScalarUpdate { innovation, variance, noise_variance, gain: cross / variance, row })
     }
 
-    /// Applies a measurement in Joseph form, which keeps the covariance positive.
+    /// Applies a measurement; the covariance stays symmetric and positive.
     pub fn apply(&mut self, update: &ScalarUpdate<N>) {
         self.mean += update.gain * update.innovation;
-        let spread = self.covariance * update.row;
-        joseph(&mut self.covariance, &update.row, &spread, &update.gain, update.noise_variance);
+        let spread = update.gain * update.variance;
+        let inverse_variance = 1.0 / update.variance;
+        let noise_variance = update.noise_variance;
+        measured(&mut self.covariance, &update.row, &spread, inverse_variance, noise_variance);
     }
 
     /// Standard deviation of one component.

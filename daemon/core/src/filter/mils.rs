@@ -2,6 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use super::rank_one::measured;
 use super::rls::scalar_update;
 use super::{NotPositiveDefinite, Step};
 
@@ -142,6 +143,18 @@ impl<const N: usize, const L: usize> Mils<N, L> {
         self.held
     }
 
+    /// Takes in the rows of the penalty.
+    #[inline]
+    fn penalise(&mut self, weights: &SVector<f64, N>) -> Result<(), NotPositiveDefinite> {
+        if N == 3 && draw_three_to_zero(&mut self.estimate, &mut self.covariance, weights) {
+            return Ok(());
+        }
+        for i in (0..N).filter(|&i| weights[i] > 0.0) {
+            draw_to_zero(&mut self.estimate, &mut self.covariance, i, weights[i])?;
+        }
+        Ok(())
+    }
+
     /// Updates with the remembered rows; the step is the newest row's.
     ///
     /// # Errors
@@ -152,11 +165,7 @@ impl<const N: usize, const L: usize> Mils<N, L> {
             return Err(NotPositiveDefinite);
         }
         if let Some(weights) = self.penalty.weights_at(self.updates) {
-            for i in (0..N).filter(|&i| weights[i] > 0.0) {
-                let mut unit = SVector::<f64, N>::zeros();
-                unit[i] = weights[i].sqrt();
-                scalar_update(&mut self.estimate, &mut self.covariance, &unit, 0.0)?;
-            }
+            self.penalise(&weights)?;
         }
         let newest = (self.next + self.length - 1) % self.length;
         let features = self.features[newest];
@@ -175,6 +184,83 @@ impl<const N: usize, const L: usize> Mils<N, L> {
         self.updates += 1;
         Ok(step)
     }
+}
+
+/// A row that observes parameter `i` as 0 with a weight.
+#[inline]
+fn draw_to_zero<const N: usize>(
+    estimate: &mut SVector<f64, N>,
+    covariance: &mut SMatrix<f64, N, N>,
+    i: usize,
+    weight: f64,
+) -> Result<(), NotPositiveDefinite> {
+    let noise_variance = 1.0 / weight;
+    let spread = covariance.column(i).into_owned();
+    let variance = spread[i] + noise_variance;
+    if !(variance >= noise_variance && variance.is_finite() && estimate[i].is_finite()) {
+        return Err(NotPositiveDefinite);
+    }
+    let inverse_variance = 1.0 / variance;
+    *estimate -= spread * (inverse_variance * estimate[i]);
+    let mut row = SVector::<f64, N>::zeros();
+    row[i] = 1.0;
+    measured(covariance, &row, &spread, inverse_variance, noise_variance);
+    Ok(())
+}
+
+/// Sum of the weighted variances up to which three rows are taken at once.
+const WEIGHTED_MAX: f64 = 100.0;
+
+/// Three rows that observe the parameters as 0, in one solution: Q = P (I + W P)^-1.
+///
+/// With the matrix A of elements `P_ij W_j`, A adj(I + A) = A + (s2 + det A) I - adj A, s2 being
+/// the sum of the principal minors (Cayley and Hamilton), so that one division does. False when
+/// nothing was done: where the weighted variances are large the minors would lose digits.
+#[inline]
+fn draw_three_to_zero<const N: usize>(
+    estimate: &mut SVector<f64, N>,
+    covariance: &mut SMatrix<f64, N, N>,
+    weights: &SVector<f64, N>,
+) -> bool {
+    let p = |i: usize, j: usize| covariance[(i, j)];
+    let [w0, w1, w2] = [weights[0], weights[1], weights[2]];
+    // Minors of P; those of A carry the weights of their columns.
+    let minor = [
+        p(1, 1) * p(2, 2) - p(1, 2) * p(1, 2),
+        p(0, 0) * p(2, 2) - p(0, 2) * p(0, 2),
+        p(0, 0) * p(1, 1) - p(0, 1) * p(0, 1),
+    ];
+    let crossed01 = p(0, 1) * p(2, 2) - p(0, 2) * p(1, 2);
+    let crossed02 = p(0, 2) * p(1, 1) - p(0, 1) * p(1, 2);
+    let crossed12 = p(1, 2) * p(0, 0) - p(0, 1) * p(0, 2);
+    let determinant = p(0, 0) * minor[0] - p(0, 1) * crossed01 - p(0, 2) * crossed02;
+    let trace = p(0, 0) * w0 + p(1, 1) * w1 + p(2, 2) * w2;
+    // Also refuses NaN.
+    if !(trace <= WEIGHTED_MAX) {
+        return false;
+    }
+    let (w01, w02, w12) = (w0 * w1, w0 * w2, w1 * w2);
+    let minors = w12 * minor[0] + w02 * minor[1] + w01 * minor[2];
+    let scale = 1.0 / (1.0 + trace + minors + w01 * w2 * determinant);
+    let diagonal = [
+        p(0, 0) + w2 * minor[1] + w1 * minor[2] + w12 * determinant,
+        p(1, 1) + w2 * minor[0] + w0 * minor[2] + w02 * determinant,
+        p(2, 2) + w1 * minor[0] + w0 * minor[1] + w01 * determinant,
+    ];
+    let off = [
+        (0, 1, p(0, 1) + w2 * crossed01),
+        (0, 2, p(0, 2) + w1 * crossed02),
+        (1, 2, p(1, 2) + w0 * crossed12),
+    ];
+    for (i, value) in diagonal.into_iter().enumerate() {
+        covariance[(i, i)] = value * scale;
+    }
+    for (i, j, value) in off {
+        covariance[(i, j)] = value * scale;
+        covariance[(j, i)] = value * scale;
+    }
+    *estimate -= *covariance * estimate.component_mul(weights);
+    true
 }
 
 #[cfg(test)]
@@ -228,6 +314,25 @@ mod tests {
             }
             let expected = printed(&rows, p, lambda / f64::from(length), p0);
             assert!((mils.estimate() - expected).norm() < 1e-8, "p = {p}");
+        }
+    }
+
+    #[test]
+    fn three_rows_at_once_are_the_three_one_after_the_other() {
+        let prior = Matrix3::new(4.0, 1.0, -0.5, 1.0, 3.0, 0.7, -0.5, 0.7, 2.0);
+        for weights in [Vector3::repeat(4e-4), Vector3::new(0.0, 2.0, 0.3), Vector3::repeat(20.0)] {
+            let start = Vector3::new(1.0, -2.0, 0.5);
+            let (mut estimate, mut covariance) = (start, prior);
+            for i in (0..3).filter(|&i| weights[i] > 0.0) {
+                draw_to_zero(&mut estimate, &mut covariance, i, weights[i]).unwrap();
+            }
+            let (mut at_once, mut joint) = (start, prior);
+            let is_done = draw_three_to_zero(&mut at_once, &mut joint, &weights);
+            assert_eq!(is_done, weights[0] < 20.0);
+            if is_done {
+                assert!((at_once - estimate).norm() < 1e-13);
+                assert!((joint - covariance).norm() < 1e-13);
+            }
         }
     }
 

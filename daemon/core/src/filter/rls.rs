@@ -3,7 +3,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::NotPositiveDefinite;
-use super::rank_one::joseph;
+use super::rank_one::measured;
 
 /// How old rows lose weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +27,9 @@ pub struct Step {
     pub variance: f64,
 }
 
-/// Recursive least squares (Liu 2018, eq. 9-11) in Joseph form.
+/// Recursive least squares (Liu 2018, eq. 9-11).
+///
+/// Joseph's form is taken where subtraction would cost digits, as from a wide prior.
 ///
 /// The covariance is in units of the error's variance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,6 +74,7 @@ impl<const N: usize> Rls<N> {
     /// # Real-time
     ///
     /// Bounded work, no allocation.
+    #[inline]
     pub fn update(
         &mut self,
         features: &SVector<f64, N>,
@@ -128,7 +131,8 @@ fn information_along<const N: usize>(
     Some(held)
 }
 
-/// One row of recursive least squares, in Joseph form: P stays symmetric and positive.
+/// One row of recursive least squares: P stays symmetric and positive.
+#[inline]
 pub(super) fn scalar_update<const N: usize>(
     estimate: &mut SVector<f64, N>,
     covariance: &mut SMatrix<f64, N, N>,
@@ -141,9 +145,9 @@ pub(super) fn scalar_update<const N: usize>(
     if !(variance >= 1.0 && variance.is_finite() && innovation.is_finite()) {
         return Err(NotPositiveDefinite);
     }
-    let gain = spread * (1.0 / variance);
-    *estimate += gain * innovation;
-    joseph(covariance, features, &spread, &gain, 1.0);
+    let inverse_variance = 1.0 / variance;
+    *estimate += spread * (inverse_variance * innovation);
+    measured(covariance, features, &spread, inverse_variance, 1.0);
     Ok(Step { innovation, variance })
 }
 

@@ -20,6 +20,10 @@ const EFFECTS_MAX: usize = 4;
 const FINALISTS: usize = 5;
 /// The first effect must take away this share of the open-loop error of the fit runs.
 const REDUCTION_MIN: f64 = 0.12;
+/// What is beyond any doubt need take away only this share.
+const SMALL_REDUCTION_MIN: f64 = 0.06;
+/// Strength beyond any doubt.
+const CERTAIN_STRENGTH: f64 = 30.0;
 /// A further one, or one outside the library, this share of what the others leave.
 const FURTHER_REDUCTION_MIN: f64 = 0.15;
 /// Less observations than this tell nothing.
@@ -229,7 +233,7 @@ impl Search<'_> {
     /// Whether the last effect of a trial is more than chance and large enough to matter.
     fn is_accepted(&self, base: &Fit, trial: &Trial) -> bool {
         trial.strength() > STRENGTH_MIN
-            && trial.reduction > Self::reduction_min(&trial.fit)
+            && trial.reduction > Self::reduction_min(trial)
             && self.is_eligible(base, trial)
     }
 
@@ -252,11 +256,15 @@ impl Search<'_> {
             .fold(0.0, f64::max)
     }
 
-    /// What the last effect of a model must take away.
-    fn reduction_min(fit: &Fit) -> f64 {
-        let effects = &fit.model.effects;
-        let is_unknown = effects.last().is_some_and(|it| it.kind() == EffectKind::Unknown);
-        if effects.len() > 1 || is_unknown { FURTHER_REDUCTION_MIN } else { REDUCTION_MIN }
+    /// What the last effect of a trial must take away.
+    fn reduction_min(trial: &Trial) -> f64 {
+        if trial.fit.model.effects.len() > 1 || trial.kind == EffectKind::Unknown {
+            FURTHER_REDUCTION_MIN
+        } else if trial.strength() > CERTAIN_STRENGTH {
+            SMALL_REDUCTION_MIN
+        } else {
+            REDUCTION_MIN
+        }
     }
 
     /// For what is not chosen run by run, the runs that took no part in the fit must gain too.

@@ -89,6 +89,8 @@ pub struct BiasBank {
     filters: [JosephFilter<3>; MODELS],
     log_weights: [f64; MODELS],
     forgetting: f64,
+    /// Share of each bias that is left after a step, and the step in s that it holds for.
+    keeps: ([f64; MODELS], f64),
     /// Change of the force's acceleration on the reference mass in the last step, in m/s².
     push_change: f64,
 }
@@ -115,6 +117,7 @@ impl BiasBank {
             filters,
             log_weights,
             forgetting: 1.0 - 1.0 / memory,
+            keeps: ([1.0; MODELS], 0.0),
             push_change: 0.0,
         }
     }
@@ -141,14 +144,17 @@ impl BiasBank {
         let (push_from, push_to) = (dynamics.push_mps2(from), dynamics.push_mps2(to));
         let jump = push_to - push_from - self.push_change;
         self.push_change = push_to - push_from;
-        for (filter, model) in self.filters.iter_mut().zip(&self.models) {
+        if self.keeps.1 != step_s {
+            self.keeps = (self.models.map(|model| model.keep(step_s)), step_s);
+        }
+        let filters = self.filters.iter_mut().zip(&self.models).zip(self.keeps.0);
+        for ((filter, model), keep) in filters {
             let [speed, inverse_mass, bias] = filter.state.into();
             let shape = model.shape(speed);
             let start = push_from * inverse_mass - dynamics.drag_mps2(from, speed) + shape * bias;
             let ahead = speed + step_s * start;
             let end = push_to * inverse_mass - dynamics.drag_mps2(to, ahead) + shape * bias;
             let damping = dynamics.mps2_per_n_per_kn() * dynamics.resistance.slope(from, speed);
-            let keep = model.keep(step_s);
             let mean_push = 0.5 * (push_from + push_to);
             #[rustfmt::skip]
             let transition = Matrix3::new(

@@ -73,6 +73,14 @@ impl<const N: usize> MeanSquare<N> {
     }
 }
 
+impl MeanSquare<1> {
+    /// Share of the target's squares that the one feature explains at best, from 0 to 1.
+    pub fn explained_share(&self) -> f64 {
+        let product = self.gram[(0, 0)] * self.squares;
+        if product > 0.0 { (self.moment[0].powi(2) / product).min(1.0) } else { 0.0 }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -88,6 +96,19 @@ mod tests {
             sums.add(&Vector3::new(1.0, x, x * x), 2.0 - x + 3.0 * x * x + noise);
         }
         sums
+    }
+
+    #[test]
+    fn the_explained_share_is_the_ratio_of_the_two_regressions() {
+        let (mut forward, mut reverse) = (MeanSquare::<1>::default(), MeanSquare::<1>::default());
+        for (x, y) in [(1.0, 2.1), (2.0, 3.9), (-1.0, -2.4), (0.5, 0.7)] {
+            forward.add(&SVector::from([x]), y);
+            reverse.add(&SVector::from([y]), x);
+        }
+        let slopes =
+            forward.moment[0] / forward.gram[(0, 0)] * reverse.moment[0] / reverse.gram[(0, 0)];
+        assert!((forward.explained_share() - slopes).abs() < 1e-12 && slopes < 1.0);
+        assert_eq!(MeanSquare::<1>::default().explained_share(), 0.0);
     }
 
     #[test]

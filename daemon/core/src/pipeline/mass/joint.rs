@@ -11,10 +11,12 @@ use super::integrals::{
     INVERSE_MASS, Integrals, POLYNOMIALS, Regressors, Row, UNKNOWNS, missed_variance,
 };
 use super::joint_settings::{JOINT_MODELS, JointLeastSquaresSettings};
+use super::lack_of_fit::LackOfFit;
 use super::line_resistance::LineResistance;
 use super::motion::{Motion, StopWatch};
 use super::section::Section;
 use super::speed_noise::SpeedNoise;
+use crate::filter::drifting_level::BIAS;
 use crate::force::ResolvedSample;
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
@@ -53,6 +55,7 @@ pub struct JointLeastSquares {
     outliers_in_a_row: u32,
     pub(super) monitor: InnovationMonitor,
     pub(super) health: InputHealth,
+    pub(super) fit: LackOfFit,
     pub(super) speed_mps: f64,
     pub(super) speed_range_mps: Option<(f64, f64)>,
     pub(super) is_fresh_reset: bool,
@@ -95,6 +98,7 @@ impl JointLeastSquares {
             outliers_in_a_row: 0,
             monitor: InnovationMonitor::new(500),
             health: InputHealth::default(),
+            fit: LackOfFit::default(),
             speed_mps: 0.0,
             speed_range_mps: None,
             is_fresh_reset: false,
@@ -242,7 +246,23 @@ impl JointLeastSquares {
         if self.updates_since_refresh >= REFRESH_EVERY {
             self.updates_since_refresh = 0;
             self.latest = self.resistance().unwrap_or(self.latest);
+            self.look();
         }
+    }
+
+    /// Looks at the force that the bias has to take up.
+    fn look(&mut self) {
+        let best = &self.hypotheses[self.best];
+        let (Some(solution), Some(root)) = (best.regression().solve(), self.covariance_root())
+        else {
+            return;
+        };
+        let per_bias = best.shape(self.speed_mps) / self.regressors.mps2_per_n_per_kn();
+        self.fit.look(
+            per_bias * solution[BIAS],
+            per_bias * root.row(BIAS).norm(),
+            self.latest.basic.w0_n_per_kn(self.speed_mps),
+        );
     }
 
     fn reset(&mut self) {

@@ -69,6 +69,9 @@ impl JointLeastSquares {
         if !(is_mass_known && is_resistance_known) {
             return (lacking, Reason::WeakExcitation);
         }
+        if self.fit.is_lasting() {
+            return (Status::Degraded, Reason::InnovationsNotWhite);
+        }
         match innovation_complaint(&self.monitor) {
             Some(reason) => (Status::Degraded, reason),
             None => (Status::Estimated, Reason::None),

@@ -20,6 +20,7 @@ mod joint_settings;
 mod joint_snapshot;
 mod kalman;
 mod kalman_settings;
+mod lack_of_fit;
 pub mod line_resistance;
 pub mod motion;
 pub mod printed_descent;

@@ -40,6 +40,10 @@ impl<const N: usize> Stage<N> {
     }
 }
 
+/// Share by which the mass may differ between the regression of force on acceleration and its
+/// reverse while it is called known.
+const BRACKET_MAX: f64 = 0.02;
+
 /// Learns z1 on open track, z2 in curves, z3 in tunnels at the declared mass, and then the mass.
 ///
 /// The acceleration is the differentiated speed, as in the paper's section 3. z2 and z3 are
@@ -227,6 +231,15 @@ impl StagedDescent {
         Some(self.mass_kg() * variance.sqrt() / self.mass.coefficients[0].abs())
     }
 
+    /// How far the regression of force on acceleration and its reverse lie apart, as a share of
+    /// the mass.
+    ///
+    /// Either is biased by the noise of its regressor, in opposite directions, so that the true
+    /// mass lies between them (Frisch 1934); a textbook deviation does not tell.
+    fn mass_bracket(&self) -> f64 {
+        1.0 / self.mass.sums.explained_share() - 1.0
+    }
+
     fn status(&self, is_mass_known: bool) -> (Status, Reason) {
         if self.printed.diverged_after().is_some() {
             return (Status::Invalid, Reason::NumericalFailure);
@@ -237,6 +250,8 @@ impl StagedDescent {
             (some, reason)
         } else if self.learned < self.settings.resistance_samples {
             (some, Reason::TooFewSamples)
+        } else if is_mass_known && self.mass_bracket() > BRACKET_MAX {
+            (Status::Degraded, Reason::NotIdentifiable)
         } else if is_mass_known {
             (Status::Estimated, Reason::None)
         } else {

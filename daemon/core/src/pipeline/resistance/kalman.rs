@@ -11,7 +11,7 @@ use nalgebra::{SMatrix, SVector};
 use super::least_squares::ResistanceLeastSquares;
 use super::noise_bank::LikeliestNoise;
 use super::regression::{
-    BRAKE_SCALE, Disturbance, FORCE_DELAY, PARAMETERS, TRACTION_SCALE, UNKNOWNS, regressors,
+    BRAKE_SCALE, Disturbance, FORCE_DELAY, Motion, PARAMETERS, TRACTION_SCALE, UNKNOWNS, regressors,
 };
 use super::report::Report;
 use super::sample::UnitSample;
@@ -34,11 +34,17 @@ type State = SVector<f64, STATES>;
 const FORCE_RATE_MEMORY_S: f64 = 0.5;
 /// Samples that the innovation statistics look back over.
 const MONITOR_SAMPLES: u32 = 600;
+/// Standard deviations beyond which a speed speaks against the filter.
+const ASTRAY_BEYOND: f64 = 3.0;
+/// After so many of them in a row on one side, each no spike, it is the filter that is wrong.
+const ASTRAY_MAX: i32 = 10;
 
 /// Davis coefficients by a robust Kalman filter with a disturbance state.
 #[derive(Clone, Debug)]
 pub struct ResistanceKalman {
     settings: KalmanSettings,
+    /// The weight that normal noise has on average: without it the covariance would be too wide.
+    mean_weight: f64,
     train_length_m: f64,
     beside: ResistanceLeastSquares,
     filter: JointState<STATES>,
@@ -47,6 +53,10 @@ pub struct ResistanceKalman {
     noise: LikeliestNoise,
     /// The fastest change of force lately, in N/kN per s.
     force_rate: f64,
+    /// How far the speed moved in the newest step, in m/s.
+    moved_mps: f64,
+    /// Speeds in a row that speak against the filter, with the sign of their side.
+    astray: i32,
     monitor: InnovationMonitor,
     report: Report,
     resets: u64,
@@ -62,12 +72,15 @@ impl ResistanceKalman {
         let declared = beside.declared();
         ResistanceKalman {
             settings,
+            mean_weight: mean_student_weight(settings.student_freedom),
             train_length_m: train.length_m,
             filter: filter_at(declared),
             last: None,
             last_time_ns: None,
             noise: beside.bank().likeliest_noise(),
             force_rate: 0.0,
+            moved_mps: 0.0,
+            astray: 0,
             monitor: InnovationMonitor::new(MONITOR_SAMPLES),
             report: *beside.report(),
             resets: 0,
@@ -87,6 +100,7 @@ impl ResistanceKalman {
         self.decay(gap_s.unwrap_or(f64::INFINITY));
         self.monitor.break_here();
         self.last = Some(*now);
+        self.astray = 0;
     }
 
     /// The disturbance after a time without a sight of it.
@@ -134,6 +148,7 @@ impl ResistanceKalman {
         gradient[FIRST_UNKNOWN + BRAKE_SCALE] = -brake / inertia;
         gradient[FIRST_UNKNOWN + FORCE_DELAY] = -change / inertia;
         let speed_mps = state[SPEED] + lost(resistance(&mean));
+        self.moved_mps = speed_mps - state[SPEED];
         let variance = self.impulse_variance(before, now, change) / (inertia * inertia);
         self.filter.rewrite(SPEED, speed_mps, &gradient, variance);
 
@@ -159,20 +174,37 @@ impl ResistanceKalman {
     /// Takes a speed into the filter, weighed by Student's t; false when it is sound for
     /// nothing.
     fn correct(&mut self, before: &UnitSample, now: &UnitSample) -> bool {
-        let per_step_mps = (now.speed_mps - before.speed_mps)
-            .abs()
-            .max((self.filter.mean()[SPEED] - before.speed_mps).abs());
-        let white = self.beside.speed_noise().variance_of_sample(per_step_mps);
+        let white = self.beside.speed_noise().variance_of_sample(self.moved_mps.abs());
         let variance = white + self.transient_variance(before, now);
         let step = self.filter.innovation(SPEED, now.speed_mps, variance);
         let freedom = self.settings.student_freedom;
         let square = step.innovation * step.innovation / step.variance;
-        let weight = ((freedom + 1.0) / (freedom + square)).min(1.0);
-        let corrected = self.filter.correct(SPEED, now.speed_mps, variance / weight);
+        let weight = student_weight(square, freedom);
+        let relative = weight / self.mean_weight;
+        let corrected = self.filter.correct(SPEED, now.speed_mps, variance / relative);
         if self.beside.is_warm() {
             self.monitor.push((square * weight).sqrt().copysign(step.innovation));
         }
+        let side = if step.innovation > 0.0 { 1 } else { -1 };
+        self.astray = match square > ASTRAY_BEYOND * ASTRAY_BEYOND {
+            true if self.astray * side > 0 => self.astray + side,
+            true => side,
+            false => 0,
+        };
         corrected.is_ok()
+    }
+
+    /// Starts anew at a sample with what the least squares beside have learned: weighing by
+    /// Student's t, a filter far from the speeds would never come back to them.
+    fn recover(&mut self, now: &UnitSample) {
+        self.astray = 0;
+        let known = self.beside.bank().likeliest_solution().filter(|_| self.beside.is_warm());
+        let disturbance = *self.filter.mean().fixed_rows::<1>(DISTURBANCE).as_scalar();
+        let variance = self.filter.covariance()[(DISTURBANCE, DISTURBANCE)];
+        self.filter = filter_at(known.as_ref().unwrap_or(self.beside.declared()));
+        self.filter.replace(DISTURBANCE, disturbance, variance);
+        self.start(now);
+        self.resets += 1;
     }
 
     /// Variance of the speed in (m/s)² while a force that acts later by d changes: its impulse
@@ -192,11 +224,13 @@ impl ResistanceKalman {
         let noise = self.beside.bank().likeliest_noise();
         let is_other_model = noise.place != self.noise.place;
         self.noise = noise;
-        if is_other_model && let Some(solution) = self.beside.bank().likeliest_solution() {
+        // While rows are few, the filter's own tangent may lie far from the truth.
+        if (is_other_model || !self.beside.is_warm())
+            && let Some(solution) = self.beside.bank().likeliest_solution()
+        {
             self.take_over(&solution);
         }
-        let Some(factor) = self.beside.bank().interval_factor() else { return };
-        let solution = self.solution(factor);
+        let Some(solution) = self.beside.bank().widened(&self.solution()) else { return };
         if let Some(report) = self.beside.judged(&solution, &self.monitor, self.disturbance()) {
             self.report = report;
         } else {
@@ -204,18 +238,45 @@ impl ResistanceKalman {
         }
     }
 
-    /// Goes on with the unknowns of another solution.
+    /// Goes on with another solution, and with the speed and the disturbance that belong to it;
+    /// where the least squares do not know them, they stay what they are for given unknowns.
     fn take_over(&mut self, solution: &Solution) {
-        let mut mean = *self.filter.mean();
-        let mut covariance = SMatrix::<f64, STATES, STATES>::zeros();
-        covariance
+        let Some(motion) = self.beside.motion().or_else(|| self.own_motion()) else {
+            self.reset();
+            return;
+        };
+        let moving = motion.at_zero + motion.gain * solution.estimate;
+        let crossed = motion.gain * solution.covariance;
+        let mean = State::from_fn(|i, _| match i.checked_sub(FIRST_UNKNOWN) {
+            Some(unknown) => solution.estimate[unknown],
+            None => moving[i],
+        });
+        let mut joint = SMatrix::<f64, STATES, STATES>::zeros();
+        joint
             .fixed_view_mut::<FIRST_UNKNOWN, FIRST_UNKNOWN>(0, 0)
-            .copy_from(&self.filter.covariance().fixed_view::<FIRST_UNKNOWN, FIRST_UNKNOWN>(0, 0));
-        mean.fixed_rows_mut::<UNKNOWNS>(FIRST_UNKNOWN).copy_from(&solution.estimate);
-        covariance
+            .copy_from(&(motion.covariance + crossed * motion.gain.transpose()));
+        joint.fixed_view_mut::<FIRST_UNKNOWN, UNKNOWNS>(0, FIRST_UNKNOWN).copy_from(&crossed);
+        joint
+            .fixed_view_mut::<UNKNOWNS, FIRST_UNKNOWN>(FIRST_UNKNOWN, 0)
+            .copy_from(&crossed.transpose());
+        joint
             .fixed_view_mut::<UNKNOWNS, UNKNOWNS>(FIRST_UNKNOWN, FIRST_UNKNOWN)
             .copy_from(&solution.covariance);
-        self.filter = JointState::new(mean, covariance);
+        self.filter = JointState::new(mean, joint);
+    }
+
+    /// Speed and disturbance for given unknowns, as this filter knows them.
+    fn own_motion(&self) -> Option<Motion> {
+        let (mean, covariance) = (self.filter.mean(), self.filter.covariance());
+        let tie = covariance.fixed_view::<UNKNOWNS, FIRST_UNKNOWN>(FIRST_UNKNOWN, 0).into_owned();
+        let unknowns = covariance.fixed_view::<UNKNOWNS, UNKNOWNS>(FIRST_UNKNOWN, FIRST_UNKNOWN);
+        let gain = unknowns.into_owned().cholesky()?.solve(&tie).transpose();
+        let estimate = mean.fixed_rows::<UNKNOWNS>(FIRST_UNKNOWN);
+        Some(Motion {
+            at_zero: mean.fixed_rows::<FIRST_UNKNOWN>(0) - gain * estimate,
+            gain,
+            covariance: covariance.fixed_view::<FIRST_UNKNOWN, FIRST_UNKNOWN>(0, 0) - gain * tie,
+        })
     }
 
     /// The disturbance now with its standard deviation, in N/kN.
@@ -224,14 +285,14 @@ impl ResistanceKalman {
         (self.filter.mean()[DISTURBANCE], variance.max(0.0).sqrt())
     }
 
-    fn solution(&self, factor: f64) -> Solution {
+    fn solution(&self) -> Solution {
         Solution {
             estimate: self.filter.mean().fixed_rows::<UNKNOWNS>(FIRST_UNKNOWN).into_owned(),
             covariance: self
                 .filter
                 .covariance()
                 .fixed_view::<UNKNOWNS, UNKNOWNS>(FIRST_UNKNOWN, FIRST_UNKNOWN)
-                * factor,
+                .into_owned(),
         }
     }
 
@@ -251,6 +312,25 @@ fn filter_at(solution: &Solution) -> JointState<STATES> {
         .fixed_view_mut::<UNKNOWNS, UNKNOWNS>(FIRST_UNKNOWN, FIRST_UNKNOWN)
         .copy_from(&solution.covariance);
     JointState::new(mean, covariance)
+}
+
+/// Weight of an observation by the square of its normalised innovation.
+fn student_weight(square: f64, freedom: f64) -> f64 {
+    ((freedom + 1.0) / (freedom + square)).min(1.0)
+}
+
+/// Mean of the weight over standard normal innovations, by the midpoint rule.
+fn mean_student_weight(freedom: f64) -> f64 {
+    const STEPS: usize = 400;
+    const STEP: f64 = 8.0 / STEPS as f64;
+    let (mut sum, mut total) = (0.0, 0.0);
+    for index in 0..STEPS {
+        let square = (STEP * (index as f64 + 0.5)).powi(2);
+        let density = (-0.5 * square).exp();
+        sum += density * student_weight(square, freedom);
+        total += density;
+    }
+    sum / total
 }
 
 impl Estimator for ResistanceKalman {
@@ -280,10 +360,12 @@ impl Estimator for ResistanceKalman {
         match self.last.filter(|last| last.stretch == now.stretch) {
             Some(before) => {
                 self.propagate(&before, &now);
-                if self.correct(&before, &now) {
-                    self.last = Some(now);
-                } else {
+                if !self.correct(&before, &now) {
                     self.reset();
+                } else if self.astray.abs() >= ASTRAY_MAX {
+                    self.recover(&now);
+                } else {
+                    self.last = Some(now);
                 }
             }
             None => self.start(&now),

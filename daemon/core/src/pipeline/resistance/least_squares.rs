@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SMatrix};
 
 use super::noise_bank::NoiseBank;
 use super::noise_model::WhiteRow;
-use super::regression::{Observation, PARAMETERS, Unknowns, scaled, unscaling};
+use super::regression::{Motion, Observation, PARAMETERS, Unknowns, scaled, unscaling};
 use super::report::{DrivenSpeeds, Evidence, Report};
 use super::sample::UnitSample;
 use super::settings::DataSettings;
@@ -172,6 +172,13 @@ impl ResistanceLeastSquares {
     /// The noise bank.
     pub(super) fn bank(&self) -> &NoiseBank {
         &self.bank
+    }
+
+    /// Speed and disturbance at the newest sample, which closed a block that was taken in;
+    /// `None` when the source has no blocks.
+    pub(super) fn motion(&self) -> Option<Motion> {
+        let since = self.source.since_block()?;
+        Some(self.bank.likeliest_motion(&since))
     }
 
     /// The declared resistance as a start.

@@ -8,7 +8,9 @@
 
 use dynocar_shared::RejectionReason;
 
-use super::regression::{BRAKE_SCALE, Columns, FORCE_DELAY, MomentumBlock, TRACTION_SCALE};
+use super::regression::{
+    BRAKE_SCALE, Columns, FORCE_DELAY, MomentumBlock, SinceBlock, TRACTION_SCALE,
+};
 use super::sample::{SpeedWatch, UnitSample, resistance_integral, trapezoids};
 use super::settings::DataSettings;
 use super::speed::{SpeedNoise, SpeedVerdict};
@@ -67,6 +69,13 @@ impl MomentumBlocks {
     /// Time in ns of the first sample of the chain; `None` between chains.
     pub fn chain_start_ns(&self) -> Option<i64> {
         self.chain.as_ref().map(|chain| chain.start_ns)
+    }
+
+    /// What has happened since the middle of the newest block; `None` before the first of a
+    /// chain.
+    pub fn since_block(&self) -> Option<SinceBlock> {
+        let chain = self.chain.as_ref().filter(|chain| chain.variance_before.is_some())?;
+        Some(SinceBlock { impulse: chain.integral, inertia: chain.last.inertia })
     }
 
     /// Ends the chain: the next sample starts a new one.

@@ -8,7 +8,9 @@
 use nalgebra::SMatrix;
 
 use super::noise_model::{NoiseModel, PRIOR_ROWS, WhiteRow};
-use super::regression::{Disturbance, Observation, PARAMETERS, UNKNOWNS, Unknowns};
+use super::regression::{
+    Disturbance, Motion, Observation, PARAMETERS, SinceBlock, UNKNOWNS, Unknowns,
+};
 use super::solver::Solution;
 
 /// Standard deviations of the disturbance in N/kN: from nothing to as large as resistance itself.
@@ -20,6 +22,8 @@ const MODELS: usize = 1 + STDS_N_PER_KN.len() * TIMES_S.len();
 const LIKELIEST_AT_FIRST: usize = 1 + 2 * TIMES_S.len() + 1;
 /// Rows after which the penalty, which forgetting takes off too, is made up for.
 const RENEWAL_ROWS: u32 = 50;
+/// Probability beforehand that there is no disturbance; the others share the rest.
+const UNDISTURBED_PRIOR: f64 = 0.95;
 /// Models of less weight than this are left out of the mixture.
 const WEIGHT_MIN: f64 = 1e-4;
 
@@ -152,6 +156,11 @@ impl NoiseBank {
         self.models[self.likeliest].solution()
     }
 
+    /// Speed and disturbance by the likeliest model, so long after the newest block.
+    pub fn likeliest_motion(&self, since: &SinceBlock) -> Motion {
+        self.models[self.likeliest].motion(since)
+    }
+
     /// The likeliest noise model.
     pub fn likeliest_noise(&self) -> LikeliestNoise {
         let model = &self.models[self.likeliest];
@@ -171,17 +180,23 @@ impl NoiseBank {
         self.mixture
     }
 
-    /// What widens the covariance of an estimate from the likeliest model's rows, for the noise
-    /// is itself estimated: the mean ratio of the mixture's variances of a, b, c to that
-    /// model's. `None` while there is no mixture.
-    pub fn interval_factor(&self) -> Option<f64> {
+    /// A solution from the likeliest model's rows, its covariance of a, b, c widened as the
+    /// mixture's is against that model's, for the noise is itself estimated. `None` while there
+    /// is no mixture.
+    pub fn widened(&self, solution: &Solution) -> Option<Solution> {
         let davis = |solution: &Solution| {
             solution.covariance.fixed_view::<PARAMETERS, PARAMETERS>(0, 0).into_owned()
         };
-        let mixed = davis(self.mixture.as_ref()?);
-        let own = davis(&self.likeliest_solution()?).cholesky()?;
-        let ratio = own.solve(&mixed).trace() / PARAMETERS as f64;
-        Some(ratio.max(self.student_factor()))
+        let mixed = davis(self.mixture.as_ref()?).cholesky()?.unpack();
+        let own = davis(&self.likeliest_solution()?).cholesky()?.unpack();
+        let root = davis(solution).cholesky()?.unpack();
+        // With roots S of the covariances: S_solution S_own^-1 S_mixed.
+        let wide = root * own.solve_lower_triangular(&mixed)?;
+        let mut covariance = solution.covariance;
+        covariance
+            .fixed_view_mut::<PARAMETERS, PARAMETERS>(0, 0)
+            .copy_from(&(wide * wide.transpose()));
+        Some(Solution { estimate: solution.estimate, covariance })
     }
 
     /// The slow force that the model does not know, over all models.
@@ -229,7 +244,7 @@ impl NoiseBank {
             return;
         }
         let likelihoods: [f64; MODELS] =
-            std::array::from_fn(|index| self.models[index].log_likelihood());
+            std::array::from_fn(|index| self.models[index].log_likelihood() + log_prior(index));
         for (index, likelihood) in likelihoods.iter().enumerate() {
             if *likelihood > likelihoods[self.likeliest] {
                 self.likeliest = index;
@@ -258,6 +273,14 @@ impl NoiseBank {
     fn student_factor(&self) -> f64 {
         let freedom = self.models[0].freedom() + PRIOR_ROWS;
         1.0 + 2.5 / (freedom - 1.2).max(0.8)
+    }
+}
+
+/// Logarithm of a model's probability before any row.
+fn log_prior(index: usize) -> f64 {
+    match index {
+        0 => UNDISTURBED_PRIOR.ln(),
+        _ => ((1.0 - UNDISTURBED_PRIOR) / (MODELS - 1) as f64).ln(),
     }
 }
 

@@ -1,7 +1,8 @@
 //! One model of the rows' noise, with the least squares that follow from it.
 
 use super::regression::{
-    Disturbance, Observation, RowWhitener, UNKNOWNS, Unknowns, disturbance_of, loosen_disturbance,
+    Disturbance, Motion, Observation, RowWhitener, SinceBlock, UNKNOWNS, Unknowns, disturbance_of,
+    loosen_disturbance, motion_of,
 };
 use super::solver::Solution;
 use crate::filter::SquareRootInformation;
@@ -126,6 +127,11 @@ impl NoiseModel {
         let estimate = self.information.solve().ok()?;
         let covariance = self.information.covariance().ok()? * self.scale();
         Some(Solution { estimate, covariance })
+    }
+
+    /// Speed and disturbance now, so long after the newest block.
+    pub fn motion(&self, since: &SinceBlock) -> Motion {
+        motion_of(&self.whitener, since, &self.disturbance, self.scale())
     }
 
     /// The disturbance now in N/kN for given unknowns, with its standard deviation.

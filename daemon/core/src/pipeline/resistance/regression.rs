@@ -5,7 +5,7 @@
 //! whose printed factor 100 lacks rotating mass and rounds 1000/g). It is linear in Davis a, b
 //! and c whatever window it is integrated over.
 
-use nalgebra::{SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2, Vector3};
 
 use crate::filter::{Propagation, Sighting, Whitener};
 use crate::train::Davis;
@@ -62,6 +62,26 @@ pub struct Disturbance {
     pub std_n_per_kn: f64,
     /// Correlation time in s.
     pub time_s: f64,
+}
+
+/// Speed in m/s, then disturbance in N/kN, as affine functions of the unknowns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// Their values were all unknowns 0.
+    pub at_zero: Vector2<f64>,
+    /// Their derivatives by the unknowns.
+    pub gain: SMatrix<f64, STATES, UNKNOWNS>,
+    /// Their covariance for known unknowns.
+    pub covariance: Matrix2<f64>,
+}
+
+/// What has happened since the middle of the newest block.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SinceBlock {
+    /// The integral of the driving force, then what each unknown takes off it.
+    pub impulse: Columns,
+    /// Momentum per weight and speed.
+    pub inertia: f64,
 }
 
 /// Mean momentum of a block of samples, and what should have led to it from the block before.
@@ -205,6 +225,35 @@ impl Observation {
 /// Lets the disturbance have jumped, by so much in N/kN.
 pub fn loosen_disturbance(whitener: &mut RowWhitener, std_n_per_kn: f64) {
     whitener.loosen(DISTURBANCE, std_n_per_kn * std_n_per_kn);
+}
+
+/// The motion now, from the errors' states in the middle of the newest block; `scale` is the
+/// variance of the rows.
+pub fn motion_of(
+    whitener: &RowWhitener,
+    since: &SinceBlock,
+    disturbance: &Disturbance,
+    scale: f64,
+) -> Motion {
+    let duration_s = since.impulse[1];
+    let mut to_now = Matrix2::identity();
+    to_now[(MOMENTUM, DISTURBANCE)] = -duration_s;
+    let mut columns = to_now * whitener.state();
+    for (column, impulse) in since.impulse.iter().enumerate() {
+        columns[(MOMENTUM, column)] += impulse;
+    }
+    // A random walk of the disturbance, integrated twice.
+    let walk = 2.0 * disturbance.std_n_per_kn.powi(2) / disturbance.time_s;
+    let mut covariance = to_now * whitener.covariance() * to_now.transpose();
+    covariance[(MOMENTUM, MOMENTUM)] += walk * duration_s.powi(3) / 3.0;
+    covariance[(DISTURBANCE, DISTURBANCE)] += walk * duration_s;
+    let to_speed = Matrix2::new(1.0 / since.inertia, 0.0, 0.0, 1.0);
+    let columns = to_speed * columns;
+    Motion {
+        at_zero: columns.column(0).into_owned(),
+        gain: -columns.fixed_columns::<UNKNOWNS>(1),
+        covariance: to_speed * covariance * to_speed * scale,
+    }
 }
 
 /// The disturbance in N/kN for given parameters, with its variance in units of the errors'.

@@ -28,8 +28,6 @@ const MEAN_SQUARE_MAX: f64 = 4.0;
 const INNOVATIONS_MIN: f64 = 15.0;
 /// Share of refused rows beyond which the input is bad.
 const REFUSED_SHARE_MAX: f64 = 0.3;
-/// Standard deviation of weight and gravity, as a share: w0 per kN is never known better.
-const WEIGHT_SHARE_STD: f64 = 0.001;
 
 /// Mean and range of the speeds behind the rows, in m/s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -56,6 +54,10 @@ impl DrivenSpeeds {
         if self.count > 0.0 { self.sum_mps / self.count } else { 0.0 }
     }
 }
+
+/// Standard deviation of the integrals over samples, as a share of w0: between two samples force
+/// and speed are taken as straight.
+const INTEGRATION_SHARE_STD: f64 = 1e-4;
 
 /// What speaks for and against a solution.
 #[derive(Clone, Copy, Debug)]
@@ -119,7 +121,8 @@ impl Report {
         let bounded = bounded_minimum(&information, &free, &Vector3::zeros()).ok()?;
         let estimate = bounded.estimate;
         // The free covariance: at a bound it is wider than need be, never narrower.
-        let covariance = covariance + estimate * estimate.transpose() * WEIGHT_SHARE_STD.powi(2);
+        let covariance =
+            covariance + estimate * estimate.transpose() * INTEGRATION_SHARE_STD.powi(2);
         let at = |speed_mps: f64| {
             let powers = Vector3::from(regressors(speed_mps));
             (powers.dot(&estimate), powers.dot(&(covariance * powers)).max(0.0).sqrt())

@@ -84,7 +84,9 @@ pub struct SpeedWatch {
 impl SpeedWatch {
     /// A watch that never calls a deviation below `spike_mps` a spike.
     pub fn new(spike_mps: f64) -> Self {
-        SpeedWatch { noise: SpeedNoise::default(), gate: SpeedGate::default(), spike_mps }
+        // What is never called a spike is taken to be three standard deviations at the start.
+        let noise = SpeedNoise::new(spike_mps / 3.0);
+        SpeedWatch { noise, gate: SpeedGate::default(), spike_mps }
     }
 
     /// Judges a sample by the one before it and the resistance as far as it is known.

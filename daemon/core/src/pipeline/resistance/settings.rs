@@ -141,7 +141,7 @@ least_squares_settings! {
         /// Degrees of freedom of Student's t for the speed's noise.
         student_freedom: f64 = 5.0,
         /// Random walk of each scaled coefficient in N/kN over an hour of motion: weather, wear.
-        drift_n_per_kn_per_sqrt_h: f64 = 0.01,
+        drift_n_per_kn_per_sqrt_h: f64 = 0.003,
     }
 }
 

@@ -133,7 +133,7 @@ impl Solver {
                 (*recursion.estimate(), recursion.covariance())
             }
         };
-        Some(Solution { estimate, covariance: covariance * bank.interval_factor()? })
+        bank.widened(&Solution { estimate, covariance })
     }
 }
 

@@ -4,7 +4,7 @@ use dynocar_shared::RejectionReason;
 
 use super::coasting::CoastingSegments;
 use super::momentum::MomentumBlocks;
-use super::regression::Observation;
+use super::regression::{Observation, SinceBlock};
 use super::sample::UnitSample;
 use super::settings::{DataSettings, DataSource};
 use super::speed::SpeedNoise;
@@ -61,6 +61,15 @@ impl RowSource {
                 .push(now, known)?
                 .map(|segment| (Observation::Segment(segment), segment.speed_mps)),
         })
+    }
+
+    /// What has happened since the middle of the newest block; `None` before the first of a
+    /// chain, and of coasting segments, which have no level of momentum.
+    pub fn since_block(&self) -> Option<SinceBlock> {
+        match &self.builder {
+            Builder::Momentum(blocks) => blocks.since_block(),
+            Builder::Coasting(_) => None,
+        }
     }
 
     /// Ends the chain: the next sample starts a new one.

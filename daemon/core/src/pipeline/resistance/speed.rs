@@ -43,6 +43,8 @@ pub struct SpeedNoise {
     freedom: f64,
     quantum_mps: f64,
     last_mps: Option<f64>,
+    /// Variance of one value before the first scatter, in (m/s)².
+    unknown_variance: f64,
 }
 
 /// The degrees of freedom that the variance looks back over.
@@ -56,13 +58,18 @@ const ALIKE_MAX: f64 = 20.0;
 /// Degrees of freedom before the scatter is clipped.
 const FREEDOM_BEFORE_CLIP: f64 = 20.0;
 
-impl Default for SpeedNoise {
-    fn default() -> Self {
-        SpeedNoise { square_sum: 0.0, freedom: 0.0, quantum_mps: f64::INFINITY, last_mps: None }
-    }
-}
-
 impl SpeedNoise {
+    /// Before the first scatter a value is taken to have a standard deviation of `unknown_mps`.
+    pub fn new(unknown_mps: f64) -> Self {
+        SpeedNoise {
+            square_sum: 0.0,
+            freedom: 0.0,
+            quantum_mps: f64::INFINITY,
+            last_mps: None,
+            unknown_variance: unknown_mps * unknown_mps,
+        }
+    }
+
     /// Takes in a speed for the quantum: the smallest step ever seen.
     pub fn see(&mut self, speed_mps: f64) {
         if let Some(last) = self.last_mps.replace(speed_mps) {
@@ -107,7 +114,8 @@ impl SpeedNoise {
     /// `per_step_mps` is how far the speed moves from one sample to the next.
     pub fn variance_of_sample(&self, per_step_mps: f64) -> f64 {
         let alike = (self.quantum_mps / per_step_mps).clamp(1.0, ALIKE_MAX);
-        self.variance().max(self.rounding_variance() * alike).max(VARIANCE_MIN)
+        let variance = if self.freedom > 0.0 { self.variance() } else { self.unknown_variance };
+        variance.max(self.rounding_variance() * alike).max(VARIANCE_MIN)
     }
 
     /// Variance of rounding to the quantum in (m/s)².
@@ -133,7 +141,7 @@ mod tests {
 
     #[test]
     fn rounding_of_a_steady_speed_does_not_average_out() {
-        let mut noise = SpeedNoise::default();
+        let mut noise = SpeedNoise::new(0.05);
         for speed_mps in [5.0, 5.1, 5.1, 5.2] {
             noise.see(speed_mps);
         }
@@ -141,13 +149,15 @@ mod tests {
         assert!((noise.rounding_variance() - rounding).abs() < 1e-12);
         assert!((noise.variance_of_mean(25.0, 0.0) - rounding).abs() < 1e-9);
         assert!((noise.variance_of_mean(25.0, 10.0) - rounding / 25.0).abs() < 1e-9);
+        assert!((noise.variance_of_sample(0.2) - 0.05_f64.powi(2)).abs() < 1e-9, "no scatter yet");
+        noise.take(0.0, 10.0);
         assert!((noise.variance_of_sample(0.2) - rounding).abs() < 1e-9);
         assert!((noise.variance_of_sample(0.01) - 10.0 * rounding).abs() < 1e-9);
     }
 
     #[test]
     fn one_wild_scatter_hardly_moves_the_variance() {
-        let mut noise = SpeedNoise::default();
+        let mut noise = SpeedNoise::new(0.05);
         for _ in 0..50 {
             noise.take(10.0 * 4e-4, 10.0);
         }

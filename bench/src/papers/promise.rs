@@ -1,0 +1,177 @@
+//! What is promised of our methods, row by row, and whether a measurement keeps it.
+
+use dynocar_shared::quantile::normal_quantile;
+use serde::Serialize;
+
+use super::Row;
+
+/// What a row's own figure has to obey.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Limit {
+    /// Ours over the bound, at most.
+    Ratio(f64),
+    /// Ours, at most, in the row's unit.
+    AtMost(f64),
+    /// Ours, at least, in the row's unit.
+    AtLeast(f64),
+}
+
+/// Paper, part of the table's name, part of the quantity, limit; all that match hold.
+const LIMITS: &[(&str, &str, &str, Limit)] = &[
+    ("Xia 2023", "Table 3", "random starts that converge", Limit::AtLeast(100.0)),
+    ("Xia 2023", "Table 3", "without noise", Limit::AtMost(1e-9)),
+    ("Xia 2023", "Figure 4", "coefficients free", Limit::Ratio(1.1)),
+    ("Xia 2023", "Table 4", "w0 at the driven speed, noisy", Limit::AtMost(0.1)),
+    ("Xia 2023", "Table 4", "settling to 0.1 N/kN", Limit::AtMost(0.4)),
+    ("Xia 2023", "Table 4", "settling to 1 N/kN", Limit::AtMost(1.6)),
+    ("Liu 2018", "section 4.2", "clean", Limit::Ratio(1.1)),
+    ("Liu 2018", "section 4.2", "5 % outliers", Limit::Ratio(1.25)),
+    ("Liu 2018", "section 4.2", "20 % missing", Limit::Ratio(1.25)),
+    ("Xie 2019", "2", "mean relative error, the present, the law", Limit::AtMost(1.0)),
+    ("Xie 2019", "3", "mean relative error, the present, the law", Limit::AtMost(1.1)),
+    ("Xie 2019", "2", "mean relative error, 5 s back", Limit::AtMost(1.5)),
+    ("Xie 2019", "3", "mean relative error, 5 s back", Limit::AtMost(1.6)),
+    ("Xie 2019", "2", "mean relative error, the present", Limit::AtMost(2.2)),
+    ("Xie 2019", "3", "mean relative error, the present", Limit::AtMost(3.0)),
+    ("Xie 2019", "", "root mean square error", Limit::Ratio(1.1)),
+    ("Jin 2020", "3", "mean relative error, the present, the law", Limit::AtMost(0.7)),
+    ("Jin 2020", "3", "mean relative error, 5 s back", Limit::AtMost(1.6)),
+    ("Jin 2020", "3", "mean relative error, the present", Limit::AtMost(3.4)),
+    ("Jin 2020", "4", "mean relative error, 5 s back", Limit::AtMost(1.0)),
+    ("Jin 2020", "", "root mean square error", Limit::Ratio(1.1)),
+    ("Wang 2022", "Table 3", "newly loaded", Limit::AtMost(0.1)),
+    ("Wang 2022", "Table 3", "headwind", Limit::AtMost(0.25)),
+    ("Wang 2022", "Table 3", "gradient wrong", Limit::AtMost(0.6)),
+    ("Wang 2022", "Figure 9", "12 % more mass", Limit::AtMost(30.0)),
+];
+
+/// Share of 95 % intervals that hold the truth.
+const COVERAGE: (f64, f64) = (0.93, 0.97);
+/// Fewer runs say nothing of coverage, and scatter too much for limits without a margin.
+const SEEDS_MIN: usize = 100;
+/// Probability with which a consistent estimator's mean NEES lies in its band.
+const BAND_PROBABILITY: f64 = 0.99;
+
+/// The measurement of a row against what is promised of it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Verdict {
+    /// The 99 % chi-square band of the mean NEES per degree of freedom.
+    pub nees_band: Option<(f64, f64)>,
+    /// What is promised, in words; empty where nothing is.
+    pub promised: Vec<String>,
+    /// The promises that this measurement breaks.
+    pub broken: Vec<String>,
+}
+
+impl Verdict {
+    /// Judges a row.
+    pub fn of(row: &Row) -> Self {
+        let mut verdict = Verdict {
+            nees_band: row.nees_freedom.filter(|freedom| *freedom > 0.0).map(nees_band),
+            promised: Vec::new(),
+            broken: Vec::new(),
+        };
+        verdict.limits(row);
+        if row.seeds >= SEEDS_MIN && row.ours.is_some() {
+            if let Some(coverage) = row.coverage {
+                let is_kept = (COVERAGE.0..=COVERAGE.1).contains(&coverage);
+                verdict.note("coverage 93-97 %".into(), is_kept);
+            }
+            if let (Some(nees), Some((low, high))) = (row.nees, verdict.nees_band) {
+                verdict.note("NEES in its band".into(), (low..=high).contains(&nees));
+            }
+        }
+        verdict
+    }
+
+    fn limits(&mut self, row: &Row) {
+        let Some(ours) = row.ours else { return };
+        // A root mean square of n runs scatters by 1 / sqrt(2 n).
+        let margin = match row.seeds < SEEDS_MIN {
+            true => 1.0 + 3.0 / (2.0 * row.seeds as f64).sqrt(),
+            false => 1.0,
+        };
+        let matches = |(paper, table, quantity, _): &&(&str, &str, &str, Limit)| {
+            *paper == row.paper && row.table.contains(table) && row.quantity.contains(quantity)
+        };
+        for (_, _, _, limit) in LIMITS.iter().filter(matches) {
+            match *limit {
+                Limit::Ratio(most) => {
+                    let Some(bound) = row.bound else { continue };
+                    self.note(format!("at most {most} bounds"), ours <= margin * most * bound);
+                }
+                Limit::AtMost(most) => {
+                    self.note(format!("at most {most} {}", row.unit), ours <= margin * most);
+                }
+                Limit::AtLeast(least) => {
+                    self.note(format!("at least {least} {}", row.unit), ours >= least);
+                }
+            }
+        }
+    }
+
+    fn note(&mut self, promise: String, is_kept: bool) {
+        if !is_kept {
+            self.broken.push(promise.clone());
+        }
+        self.promised.push(promise);
+    }
+}
+
+/// The band of a chi-square over its degrees of freedom (Wilson and Hilferty 1931).
+fn nees_band(freedom: f64) -> (f64, f64) {
+    let spread = 2.0 / (9.0 * freedom);
+    let deviations =
+        normal_quantile(0.5 + 0.5 * BAND_PROBABILITY).expect("a probability between 0 and 1");
+    let at = |deviations: f64| (1.0 - spread + deviations * spread.sqrt()).max(0.0).powi(3);
+    (at(-deviations), at(deviations))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(quantity: &str, ours: f64, seeds: usize) -> Row {
+        Row {
+            paper: "Liu 2018",
+            table: "Table 1, section 4.2",
+            quantity: quantity.into(),
+            unit: "N/kN",
+            published: None,
+            paper_method: None,
+            baseline: None,
+            ours: Some(ours),
+            bound: Some(1.0),
+            seeds,
+            coverage: Some(0.95),
+            nees: Some(1.0),
+            nees_freedom: Some(3.0 * seeds as f64),
+        }
+    }
+
+    #[test]
+    fn the_band_is_that_of_tabled_chi_squares() {
+        for (freedom, low, high) in [(10.0, 2.156, 25.188), (100.0, 67.328, 140.169)] {
+            let band = nees_band(freedom);
+            assert!((band.0 * freedom / low - 1.0).abs() < 0.01, "{band:?}");
+            assert!((band.1 * freedom / high - 1.0).abs() < 0.01, "{band:?}");
+        }
+    }
+
+    #[test]
+    fn a_promise_is_broken_beyond_its_limit_and_few_runs_have_a_margin() {
+        assert!(Verdict::of(&row("w0, clean", 1.09, 200)).broken.is_empty());
+        assert_eq!(Verdict::of(&row("w0, clean", 1.2, 200)).broken, ["at most 1.1 bounds"]);
+        assert!(Verdict::of(&row("w0, 5 % outliers", 1.2, 200)).broken.is_empty());
+        assert!(Verdict::of(&row("w0, clean", 1.2, 8)).broken.is_empty());
+        assert!(!Verdict::of(&row("w0, clean", 3.0, 8)).broken.is_empty());
+    }
+
+    #[test]
+    fn intervals_that_lie_are_named() {
+        let wide = Row { coverage: Some(0.99), nees: Some(0.5), ..row("w0, clean", 1.0, 200) };
+        assert_eq!(Verdict::of(&wide).broken, ["coverage 93-97 %", "NEES in its band"]);
+        let few = Row { seeds: 8, ..wide };
+        assert!(Verdict::of(&few).broken.is_empty());
+    }
+}

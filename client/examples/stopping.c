@@ -1,0 +1,98 @@
+/* Braking distance from the present speed, under what the daemon has learned of the rail, of the
+ * brake and of the resistance; with the built-in values where it has learned nothing usable.
+ *
+ * stopping [train id] [speed in m/s]
+ * README.md beside this folder says how to build it. */
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "dynocar.h"
+
+#define MASS_KG 114500.0
+#define DECLARED_FRICTION 0.35
+#define CONFIDENCE 0.99
+
+static const dynocar_effort_point EFFORT[] = {{0.0, 130000.0}, {25.0, 130000.0}, {40.0, 90000.0}};
+
+/* The newest reading of a pipeline, or none that is usable. */
+static int usable(dynocar_reader *reader, uint32_t kind, dynocar_reading *reading)
+{
+    (void)dynocar_reader_latest(reader, kind, dynocar_monotonic_now_ns(), reading);
+    return reading->is_usable;
+}
+
+static dynocar_stop built_in_stop(double speed_mps)
+{
+    dynocar_stop stop;
+    memset(&stop, 0, sizeof stop);
+    stop.from_speed_mps = speed_mps;
+    stop.mass_kg = MASS_KG;
+    stop.rotating_mass_factor = 0.06;
+    stop.davis_a = 1.5;
+    stop.davis_b = 0.02;
+    stop.davis_c = 0.0012;
+    stop.w0_std_n_per_kn = 0.3;
+    stop.brake_scale = 1.0;
+    stop.brake_scale_std = 0.1;
+    /* A wet rail, until the daemon knows better. */
+    stop.rail = DYNOCAR_RAIL_WET_LAW;
+    stop.adhesion = 1.0;
+    stop.adhesion_std = 0.1;
+    return stop;
+}
+
+static void take_what_is_learned(dynocar_reader *reader, dynocar_stop *stop)
+{
+    dynocar_reading reading;
+    const dynocar_parameter_snapshot *snapshot = &reading.snapshot;
+    dynocar_resistance resistance;
+    double value, std;
+    if (usable(reader, DYNOCAR_PIPELINE_RESISTANCE_KALMAN, &reading)
+        && dynocar_snapshot_resistance(snapshot, stop->from_speed_mps, 0.0, &resistance)
+               == DYNOCAR_OK) {
+        dynocar_snapshot_value(snapshot, DYNOCAR_PARAMETER_DAVIS_A, &stop->davis_a, NULL);
+        dynocar_snapshot_value(snapshot, DYNOCAR_PARAMETER_DAVIS_B, &stop->davis_b, NULL);
+        dynocar_snapshot_value(snapshot, DYNOCAR_PARAMETER_DAVIS_C, &stop->davis_c, NULL);
+        stop->w0_std_n_per_kn = resistance.w0_std_n_per_kn;
+    }
+    if (usable(reader, DYNOCAR_PIPELINE_BRAKE_SMOOTHER, &reading)
+        && dynocar_snapshot_value(snapshot, DYNOCAR_PARAMETER_DISC_FRICTION, &value, &std)
+               == DYNOCAR_OK) {
+        stop->brake_scale = value / DECLARED_FRICTION;
+        stop->brake_scale_std = std / DECLARED_FRICTION;
+    }
+    if (usable(reader, DYNOCAR_PIPELINE_ADHESION_SMOOTHER, &reading)
+        && dynocar_snapshot_value(snapshot, DYNOCAR_PARAMETER_ADHESION, &value, &std)
+               == DYNOCAR_OK) {
+        stop->rail = DYNOCAR_RAIL_COEFFICIENT;
+        stop->adhesion = value;
+        stop->adhesion_std = std;
+    }
+}
+
+int main(int count, char **arguments)
+{
+    uint64_t train = count > 1 ? strtoull(arguments[1], NULL, 10) : 7;
+    double speed_mps = count > 2 ? strtod(arguments[2], NULL) : 30.0;
+    dynocar_reader *reader = NULL;
+    char message[DYNOCAR_MESSAGE_BYTES];
+    if (dynocar_reader_open(NULL, train, &reader, message, sizeof message) != DYNOCAR_OK) {
+        fprintf(stderr, "%s\n", message);
+        return 1;
+    }
+    (void)dynocar_reader_poll(reader, NULL);
+    dynocar_stop stop = built_in_stop(speed_mps);
+    take_what_is_learned(reader, &stop);
+    dynocar_stopping found;
+    dynocar_code code = dynocar_stopping_estimate(&stop, EFFORT, sizeof EFFORT / sizeof *EFFORT,
+                                                  CONFIDENCE, &found);
+    if (code == DYNOCAR_OK) {
+        printf("from %.1f m/s: %.0f m and %.1f s; with %.0f %% confidence within %.0f m and %.1f s\n",
+               speed_mps, found.distance_m, found.time_s, 100.0 * CONFIDENCE,
+               found.distance_bound_m, found.time_bound_s);
+    } else {
+        printf("%s\n", dynocar_code_text(code));
+    }
+    dynocar_reader_close(reader);
+    return code == DYNOCAR_OK ? 0 : 1;
+}

@@ -1,0 +1,234 @@
+//! Braking distance and time for C; the mathematics are [`dynocar_shared::stopping`].
+
+use dynocar_shared::stopping::{EffortPoint, RailAdhesion, Stop, StoppingError};
+use dynocar_shared::{RailCondition, Uncertain, wire_struct};
+
+use super::error::{Code, guard};
+
+/// Most points of a brake-effort curve.
+pub const EFFORT_POINTS_MAX: usize = 1024;
+
+/// What the rail carries; `DYNOCAR_RAIL_…` in C.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u64)]
+pub enum Rail {
+    /// Any brake force: adhesion and its deviation are not read.
+    Unlimited = 0,
+    /// One adhesion coefficient at all speeds.
+    Coefficient = 1,
+    /// A scale of the dry rail's law.
+    DryLaw = 2,
+    /// A scale of the wet rail's law.
+    WetLaw = 3,
+}
+
+impl Rail {
+    /// Every kind, in the order of its number.
+    pub const ALL: [Rail; 4] = [Rail::Unlimited, Rail::Coefficient, Rail::DryLaw, Rail::WetLaw];
+}
+
+wire_struct! {
+    /// The stop that is asked about; `dynocar_stop` in C. All numbers finite.
+    #[derive(Default)]
+    pub struct StopRequest {
+        /// Speed in m/s at which the brakes act in full.
+        pub from_speed_mps: f64,
+        /// Speed in m/s at which the stop is over; 0 for standstill.
+        pub to_speed_mps: f64,
+        /// Gross mass in kg, without the rotating part.
+        pub mass_kg: f64,
+        /// gamma: inertial mass = mass (1 + gamma).
+        pub rotating_mass_factor: f64,
+        /// Gradient in ‰ along the direction of travel, climbing positive.
+        pub gradient_permille: f64,
+        /// Davis a in N/kN.
+        pub davis_a: f64,
+        /// Davis b in N/kN per m/s.
+        pub davis_b: f64,
+        /// Davis c in N/kN per (m/s)².
+        pub davis_c: f64,
+        /// Standard deviation of w0 in N/kN.
+        pub w0_std_n_per_kn: f64,
+        /// Factor on the brake force, as estimated over declared friction; 1 for the declared.
+        pub brake_scale: f64,
+        /// Its standard deviation.
+        pub brake_scale_std: f64,
+        /// Adhesion coefficient, or the scale of a law.
+        pub adhesion: f64,
+        /// Its standard deviation.
+        pub adhesion_std: f64,
+        /// What the rail carries: a [`Rail`] by number.
+        pub rail: u64,
+    }
+}
+
+wire_struct! {
+    /// A point of a brake-effort curve; `dynocar_effort_point` in C.
+    #[derive(Default)]
+    pub struct EffortPlace {
+        /// Speed in m/s.
+        pub speed_mps: f64,
+        /// Brake force of the whole train in N.
+        pub force_n: f64,
+    }
+}
+
+const _: () = assert!(
+    size_of::<EffortPlace>() == size_of::<EffortPoint>()
+        && std::mem::offset_of!(EffortPlace, force_n) == std::mem::offset_of!(EffortPoint, force_n),
+    "a curve from C is read as the shared one"
+);
+
+wire_struct! {
+    /// Distance and time of a stop; `dynocar_stopping` in C.
+    #[derive(Default)]
+    pub struct Stopping {
+        /// Distance in m with every quantity at its value.
+        pub distance_m: f64,
+        /// Time in s with every quantity at its value.
+        pub time_s: f64,
+        /// Distance in m that is not exceeded, with at least the chosen confidence.
+        pub distance_bound_m: f64,
+        /// Time in s that is not exceeded, with at least the chosen confidence.
+        pub time_bound_s: f64,
+    }
+}
+
+impl StopRequest {
+    fn stop<'a>(&self, effort: &'a [EffortPoint]) -> Option<Stop<'a>> {
+        let adhesion = Uncertain::new(self.adhesion, self.adhesion_std);
+        let rail = Rail::ALL.into_iter().find(|rail| *rail as u64 == self.rail)?;
+        let davis = [self.davis_a, self.davis_b, self.davis_c];
+        Some(Stop {
+            to_speed_mps: self.to_speed_mps,
+            rotating_mass_factor: self.rotating_mass_factor,
+            w0_std_n_per_kn: self.w0_std_n_per_kn,
+            gradient_permille: self.gradient_permille,
+            brake_scale: Uncertain::new(self.brake_scale, self.brake_scale_std),
+            adhesion: match rail {
+                Rail::Unlimited => RailAdhesion::Unlimited,
+                Rail::Coefficient => RailAdhesion::Coefficient(adhesion),
+                Rail::DryLaw => RailAdhesion::Law(RailCondition::Dry, adhesion),
+                Rail::WetLaw => RailAdhesion::Law(RailCondition::Wet, adhesion),
+            },
+            ..Stop::level(self.from_speed_mps, self.mass_kg, davis, effort)
+        })
+    }
+}
+
+/// Distance and time of a stop with a bound that holds with at least `confidence`; see
+/// [`Stop::estimate`].
+///
+/// # Safety
+///
+/// See [the module](super#safety); `effort` points to `effort_count` points.
+///
+/// # Real-time
+///
+/// Safe for the control cycle: some 500 evaluations of the deceleration.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dynocar_stopping_estimate(
+    stop: *const StopRequest,
+    effort: *const EffortPlace,
+    effort_count: usize,
+    confidence: f64,
+    stopping: *mut Stopping,
+) -> i32 {
+    guard(|| {
+        // SAFETY: promised by the caller; every bit pattern is a stop.
+        let request = unsafe { stop.as_ref() }.ok_or(Code::NullArgument)?;
+        // SAFETY: promised by the caller; every bit pattern is a stopping.
+        let place = unsafe { stopping.as_mut() }.ok_or(Code::NullArgument)?;
+        if effort.is_null() {
+            return Err(Code::NullArgument);
+        }
+        if !(1..=EFFORT_POINTS_MAX).contains(&effort_count) {
+            return Err(Code::BadNumber);
+        }
+        // SAFETY: the caller promised `effort_count` points; the layouts are the same.
+        let effort =
+            unsafe { std::slice::from_raw_parts(effort.cast::<EffortPoint>(), effort_count) };
+        let stop = request.stop(effort).ok_or(Code::BadNumber)?;
+        let found = stop.estimate(confidence).map_err(|error| match error {
+            StoppingError::BadInput { .. } => Code::BadNumber,
+            StoppingError::DoesNotStop { .. } => Code::DoesNotStop,
+        })?;
+        *place = Stopping {
+            distance_m: found.distance_m,
+            time_s: found.time_s,
+            distance_bound_m: found.distance_bound_m,
+            time_bound_s: found.time_bound_s,
+        };
+        Ok(())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EFFORT: [EffortPlace; 2] = [
+        EffortPlace { speed_mps: 0.0, force_n: 120_000.0 },
+        EffortPlace { speed_mps: 60.0, force_n: 90_000.0 },
+    ];
+
+    fn request() -> StopRequest {
+        StopRequest {
+            from_speed_mps: 40.0,
+            mass_kg: 100_000.0,
+            davis_a: 1.5,
+            brake_scale: 1.0,
+            brake_scale_std: 0.05,
+            adhesion: 0.1,
+            adhesion_std: 0.01,
+            rail: Rail::Coefficient as u64,
+            ..StopRequest::default()
+        }
+    }
+
+    fn ask(request: &StopRequest, confidence: f64) -> (i32, Stopping) {
+        let mut place = Stopping::default();
+        // SAFETY: all pointers are to living values.
+        let code = unsafe {
+            dynocar_stopping_estimate(request, EFFORT.as_ptr(), 2, confidence, &mut place)
+        };
+        (code, place)
+    }
+
+    #[test]
+    fn c_is_told_what_rust_is_told() {
+        let effort =
+            EFFORT.map(|EffortPlace { speed_mps, force_n }| EffortPoint { speed_mps, force_n });
+        for rail in Rail::ALL {
+            let request = StopRequest { rail: rail as u64, ..request() };
+            let expected = request.stop(&effort).unwrap().estimate(0.99).unwrap();
+            let (code, found) = ask(&request, 0.99);
+            assert_eq!(code, Code::Ok as i32);
+            assert_eq!(found.distance_m, expected.distance_m);
+            assert_eq!(found.distance_bound_m, expected.distance_bound_m);
+            assert!(found.distance_bound_m > found.distance_m && found.time_bound_s > found.time_s);
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_answered_has_its_code_and_writes_nothing() {
+        let cases = [
+            (StopRequest { mass_kg: f64::NAN, ..request() }, 0.99, Code::BadNumber),
+            (StopRequest { rail: 9, ..request() }, 0.99, Code::BadNumber),
+            (request(), 1.0, Code::BadNumber),
+            (StopRequest { gradient_permille: -500.0, ..request() }, 0.99, Code::DoesNotStop),
+        ];
+        for (request, confidence, expected) in cases {
+            assert_eq!(ask(&request, confidence), (expected as i32, Stopping::default()));
+        }
+        let mut place = Stopping::default();
+        // SAFETY: NULL is refused, and no point is read of a curve without points.
+        unsafe {
+            let null = std::ptr::null();
+            let code = dynocar_stopping_estimate(&request(), null, 2, 0.9, &mut place);
+            assert_eq!(code, Code::NullArgument as i32);
+            let code = dynocar_stopping_estimate(&request(), EFFORT.as_ptr(), 0, 0.9, &mut place);
+            assert_eq!(code, Code::BadNumber as i32);
+        }
+    }
+}
