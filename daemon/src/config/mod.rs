@@ -3,7 +3,10 @@
 //! Unknown keys are refused; a value outside its range is refused with key, value and range.
 //! File names inside the configuration are relative to the configuration file.
 
+mod pace;
 mod raw;
+
+pub use pace::is_slow;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
