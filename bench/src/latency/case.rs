@@ -152,7 +152,7 @@ fn run(
     cores: Cores,
     schedule: &Schedule,
 ) -> Result<Outcome, RigError> {
-    bind(cores.controller);
+    bind(cores.controller, cores.priority);
     let mut motion = Motion::of(TRAIN, monotonic_now_ns());
     await_ready(link, &mut motion, || peer.require())?;
     drive(link, &mut motion, schedule.rate_hz, schedule.warm_up_s)?;
@@ -167,12 +167,14 @@ fn run(
 fn start(case: &Case, site: &Site, cores: Cores) -> Result<Peer, RigError> {
     let folder = site.path().to_string_lossy().into_owned();
     let core = cores.server.to_string();
+    let priority = cores.priority.map(|priority| priority.to_string());
     let mut arguments: Vec<&str> = match &case.answerer {
         Answerer::Daemon { pipelines, .. } => {
             let thread = ThreadPlan {
                 name: THREAD,
                 core: Some(cores.server),
                 idle: case.idle,
+                priority: cores.priority,
                 pipelines: pipelines.clone(),
             };
             let plan = DaemonPlan { trains: 1, threads: vec![thread], lines: String::new() };
@@ -185,6 +187,9 @@ fn start(case: &Case, site: &Site, cores: Cores) -> Result<Peer, RigError> {
         Answerer::ZeroMq => vec!["zero-mq", &folder],
     };
     arguments.extend(["--core", &core]);
+    if let Some(priority) = &priority {
+        arguments.extend(["--priority", priority]);
+    }
     if case.idle == IdleStrategy::Event {
         arguments.push("--blocks");
     }

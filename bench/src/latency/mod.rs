@@ -28,6 +28,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use dynocar::runtime::affinity::pin_to_core;
+use dynocar::runtime::scheduling::set_fifo_priority;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -61,6 +62,9 @@ pub struct LatencyArguments {
     /// Core of the daemon's thread, and of whatever else answers
     #[arg(long, value_name = "CORE")]
     pub daemon_core: Option<usize>,
+    /// Real-time priority (SCHED_FIFO) of the controller and of whatever answers, 1 to 99
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=99))]
+    pub priority: Option<u8>,
     /// Seed of the order of the cases
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -72,22 +76,24 @@ pub struct LatencyArguments {
     pub plot: Option<PathBuf>,
 }
 
-/// The two cores of a measurement.
+/// The two cores of a measurement, and the priority of what runs there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cores {
     /// Where the controller publishes and polls.
     pub controller: usize,
     /// Where the answering thread runs.
     pub server: usize,
+    /// Real-time priority on both; ordinary when absent.
+    pub priority: Option<u8>,
 }
 
 impl Cores {
     /// The cores asked for, else the first two; on a machine with one core both are the same.
-    pub fn choose(controller: Option<usize>, server: Option<usize>) -> Self {
+    pub fn choose(controller: Option<usize>, server: Option<usize>, priority: Option<u8>) -> Self {
         let count = std::thread::available_parallelism().map_or(1, usize::from);
         let controller = controller.unwrap_or(0);
         let other = (controller + 1) % count.max(1);
-        Cores { controller, server: server.unwrap_or(other) }
+        Cores { controller, server: server.unwrap_or(other), priority }
     }
 }
 
@@ -113,7 +119,7 @@ const QUICK_ROUNDS: usize = 1;
 ///
 /// When a process or a transport fails; never because of a time.
 pub fn run(arguments: &LatencyArguments) -> Result<Measured, RigError> {
-    let cores = Cores::choose(arguments.controller_core, arguments.daemon_core);
+    let cores = Cores::choose(arguments.controller_core, arguments.daemon_core, arguments.priority);
     let schedule = Schedule {
         rate_hz: arguments.rate,
         warm_up_s: if arguments.quick { 0.6 } else { 0.8 },
@@ -127,7 +133,7 @@ pub fn run(arguments: &LatencyArguments) -> Result<Measured, RigError> {
     }
     let batches = if arguments.quick { 20 } else { 400 };
     let costs = in_thread(|| {
-        bind(cores.controller);
+        bind(cores.controller, cores.priority);
         costs::measure(batches)
     })?;
     let mut random = ChaCha8Rng::seed_from_u64(arguments.seed);
@@ -158,9 +164,15 @@ pub fn in_thread<T: Send>(
     })
 }
 
-/// Binds the calling thread to a core; without it the figures vary more, which is said.
-pub fn bind(core: usize) {
+/// Binds the calling thread to a core and gives it its priority; without either the figures vary
+/// more, which is said.
+pub fn bind(core: usize, priority: Option<u8>) {
     if let Err(error) = pin_to_core(core) {
         eprintln!("dynocar-bench: not bound to core {core}, figures will vary more: {error}");
+    }
+    if let Some(priority) = priority
+        && let Err(error) = set_fifo_priority(priority)
+    {
+        eprintln!("dynocar-bench: no priority {priority}, figures will vary more: {error}");
     }
 }

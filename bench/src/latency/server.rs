@@ -4,13 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use dynocar::config::DaemonConfig;
-use dynocar::runtime::affinity::pin_to_core;
 use dynocar_client::channel::{Receiver, Sender, Transport};
 use dynocar_client::{Host, monotonic_now_ns};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
 
 use super::plain::PlainNode;
-use super::sockets;
+use super::{bind, sockets};
 use crate::rig::RigError;
 
 /// The train of every latency case.
@@ -47,6 +46,9 @@ struct Place {
     /// The core to bind to
     #[arg(long)]
     core: Option<usize>,
+    /// Real-time priority
+    #[arg(long)]
+    priority: Option<u8>,
     /// Wait in the kernel instead of looking without pause
     #[arg(long)]
     blocks: bool,
@@ -54,10 +56,8 @@ struct Place {
 
 impl Place {
     fn pin(&self) {
-        if let Some(core) = self.core
-            && let Err(error) = pin_to_core(core)
-        {
-            eprintln!("dynocar-bench: not bound to core {core}: {error}");
+        if let Some(core) = self.core {
+            bind(core, self.priority);
         }
     }
 }

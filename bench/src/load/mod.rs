@@ -67,6 +67,9 @@ pub struct LoadArguments {
     /// Core of the daemon's fast thread
     #[arg(long, value_name = "CORE")]
     pub daemon_core: Option<usize>,
+    /// Real-time priority (SCHED_FIFO) of the publishers and of the daemon's fast thread, 1 to 99
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=99))]
+    pub priority: Option<u8>,
     /// Seed of jitter and bad samples
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -165,7 +168,7 @@ fn plan(arguments: &LoadArguments) -> Result<TrialPlan, LoadError> {
             Idle::Adaptive => IdleStrategy::Adaptive,
             Idle::Event => IdleStrategy::Event,
         },
-        cores: Cores::choose(arguments.controller_core, arguments.daemon_core),
+        cores: Cores::choose(arguments.controller_core, arguments.daemon_core, arguments.priority),
         seed: arguments.seed,
     })
 }

@@ -109,7 +109,7 @@ pub fn run(plan: &TrialPlan) -> Result<Trial, RigError> {
     let mut trains = (1..=plan.trains)
         .map(|id| open_train(&site, TrainId(id), plan))
         .collect::<Result<Vec<_>, _>>()?;
-    bind(plan.cores.controller);
+    bind(plan.cores.controller, plan.cores.priority);
     await_daemon(&mut trains, &mut daemon, plan.pipelines.len())?;
     let mut outcomes: Vec<PipelineOutcome> = plan.pipelines.iter().copied().map(fresh).collect();
     let start_ns = monotonic_now_ns() + 600_000_000;
@@ -161,13 +161,17 @@ fn daemon_plan(plan: &TrialPlan) -> DaemonPlan {
     let slow_kinds = pipelines::slow();
     let (slow, fast): (Vec<_>, Vec<_>) =
         plan.pipelines.iter().partition(|kind| slow_kinds.contains(kind));
-    let thread = |name, core, pipelines: Vec<PipelineKind>| ThreadPlan {
+    let thread = |name, core, priority, pipelines: Vec<PipelineKind>| ThreadPlan {
         name,
         core,
         idle: plan.idle,
+        priority,
         pipelines,
     };
-    let threads = [thread("fast", Some(plan.cores.server), fast), thread("slow", None, slow)];
+    let threads = [
+        thread("fast", Some(plan.cores.server), plan.cores.priority, fast),
+        thread("slow", None, None, slow),
+    ];
     let threads = threads.into_iter().filter(|thread| !thread.pipelines.is_empty()).collect();
     DaemonPlan { trains: plan.trains, threads, lines: String::new() }
 }

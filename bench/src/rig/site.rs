@@ -47,6 +47,8 @@ pub struct ThreadPlan {
     pub core: Option<usize>,
     /// What it does while no sample comes.
     pub idle: IdleStrategy,
+    /// Its real-time priority.
+    pub priority: Option<u8>,
     /// Its pipelines.
     pub pipelines: Vec<PipelineKind>,
 }
@@ -75,6 +77,9 @@ impl DaemonPlan {
             let _ = write!(text, "[[threads]]\nname = \"{name}\"\nidle = \"{idle}\"\n");
             if let Some(core) = thread.core {
                 let _ = writeln!(text, "core = {core}");
+            }
+            if let Some(priority) = thread.priority {
+                let _ = writeln!(text, "priority = {priority}");
             }
             for kind in &thread.pipelines {
                 let _ = write!(text, "[[pipelines]]\nkind = \"{kind}\"\nthread = \"{name}\"\n");
