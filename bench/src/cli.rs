@@ -159,7 +159,10 @@ fn papers(arguments: &PapersArguments) -> Result<(), (String, u8)> {
 }
 
 fn latency(arguments: &LatencyArguments) -> Result<(), (String, u8)> {
-    let measured = latency::run(arguments).map_err(|error| (error.to_string(), 1))?;
+    let measured = latency::run(arguments).map_err(|error| {
+        let status = if matches!(error, latency::LatencyError::Arguments(_)) { 2 } else { 1 };
+        (error.to_string(), status)
+    })?;
     if let Some(file) = &arguments.plot {
         plot::draw(&measured, file).map_err(|error| (error.to_string(), 1))?;
     }

@@ -30,6 +30,17 @@ pub trait Link {
     ///
     /// When the transport fails for good.
     fn poll(&mut self) -> Result<u64, RigError>;
+
+    /// Takes what else has come, while no answer is awaited: other pipelines' snapshots, which a
+    /// controller's next poll would find in its way.
+    ///
+    /// # Errors
+    ///
+    /// As [`Link::poll`].
+    fn rest(&mut self) -> Result<(), RigError> {
+        std::hint::spin_loop();
+        Ok(())
+    }
 }
 
 /// What a controller links: Dynocar's client library.
@@ -65,6 +76,10 @@ impl Link for ClientLink {
             self.newest = reading.snapshot.sample_sequence;
         }
         Ok(self.newest)
+    }
+
+    fn rest(&mut self) -> Result<(), RigError> {
+        self.poll().map(|_| ())
     }
 }
 

@@ -110,6 +110,17 @@ pub struct Measured {
     pub cores: Cores,
 }
 
+/// Why latency cannot be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum LatencyError {
+    /// The command line is wrong.
+    #[error("{0}")]
+    Arguments(String),
+    /// The measurement failed.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+}
+
 const ROUNDS: usize = 15;
 const QUICK_ROUNDS: usize = 1;
 
@@ -117,8 +128,18 @@ const QUICK_ROUNDS: usize = 1;
 ///
 /// # Errors
 ///
-/// When a process or a transport fails; never because of a time.
-pub fn run(arguments: &LatencyArguments) -> Result<Measured, RigError> {
+/// When the command line is wrong, or a process or a transport fails; never because of a time.
+pub fn run(arguments: &LatencyArguments) -> Result<Measured, LatencyError> {
+    let refuse = |text: String| Err(LatencyError::Arguments(text));
+    if !(arguments.rate >= 0.1 && arguments.rate <= 1e6) {
+        return refuse(format!("--rate {}: expected 0.1 to 1000000 Hz", arguments.rate));
+    }
+    if arguments.seconds.is_some_and(|seconds| !(seconds > 0.0 && seconds <= 3_600.0)) {
+        return refuse("--seconds: expected up to 3600 s".into());
+    }
+    if arguments.rounds == Some(0) {
+        return refuse("--rounds 0: expected at least one round".into());
+    }
     let cores = Cores::choose(arguments.controller_core, arguments.daemon_core, arguments.priority);
     let schedule = Schedule {
         rate_hz: arguments.rate,

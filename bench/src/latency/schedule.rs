@@ -36,6 +36,8 @@ pub struct Slice {
 pub const ANSWER_WITHIN_S: u64 = 2;
 /// Samples in flight that are told apart; at 10 kHz more than a second.
 const IN_FLIGHT: usize = 1 << 14;
+/// Time before an appointment in which nothing else is begun, in ns.
+const QUIET_NS: i64 = 3_000;
 /// How long a peer may take to answer its first sample, in s.
 const READY_WITHIN_S: u64 = 20;
 
@@ -97,6 +99,9 @@ pub fn drive(
     for number in 0..total {
         let appointed_ns = start_ns + (number as f64 * period_ns) as i64;
         let mut sample = motion.sample(appointed_ns);
+        while monotonic_now_ns() < appointed_ns - QUIET_NS {
+            link.rest()?;
+        }
         while monotonic_now_ns() < appointed_ns {
             std::hint::spin_loop();
         }
