@@ -6,11 +6,14 @@ use dynocar_tests::process::{Process, Site};
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const PEER: &str = env!("CARGO_BIN_EXE_dynocar-sealed-peer");
 
-const BUSY_ECHO: &str = "[[pipelines]]\nkind = \"echo\"\n";
+const BUSY: &str = "idle = \"busy\"";
+/// Falls asleep when no sample has come for a second.
+const ADAPTIVE: &str = "idle = \"adaptive\"\nspin_us = 1000000";
+const ECHO: &str = "[[pipelines]]\nkind = \"echo\"\n";
 
-/// A daemon that never sleeps, and a sealed controller doing something.
-fn sealed(site: &Site, what: &str) -> (Process, Process) {
-    let config = site.write_config(1, "idle = \"busy\"", BUSY_ECHO);
+/// A daemon that is awake, and a sealed controller doing something.
+fn sealed(site: &Site, idle: &str, what: &str) -> (Process, Process) {
+    let config = site.write_config(1, idle, ECHO);
     let daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().expect("UTF-8")]);
     daemon.await_error("serving");
     (daemon, site.start(PEER, &[what, "1"]))
@@ -26,21 +29,23 @@ fn news(peer: &mut Process) -> u64 {
 fn the_seal_kills_at_a_system_call() {
     use std::os::unix::process::ExitStatusExt;
     let site = Site::new();
-    let (_daemon, mut peer) = sealed(&site, "call");
+    let (_daemon, mut peer) = sealed(&site, BUSY, "call");
     assert_eq!(peer.wait().signal(), Some(libc::SIGSYS), "{}", peer.errors());
 }
 
 #[test]
 fn a_poll_without_news_makes_no_system_call() {
     let site = Site::new();
-    let (_daemon, mut peer) = sealed(&site, "poll");
+    let (_daemon, mut peer) = sealed(&site, BUSY, "poll");
     // Nothing is published meanwhile; one answer to what was published before may be on its way.
     assert!(news(&mut peer) <= 1);
 }
 
 #[test]
 fn publish_and_poll_make_no_system_call_while_the_daemon_is_awake() {
-    let site = Site::new();
-    let (_daemon, mut peer) = sealed(&site, "cycle");
-    assert!(news(&mut peer) >= 50);
+    for idle in [BUSY, ADAPTIVE] {
+        let site = Site::new();
+        let (_daemon, mut peer) = sealed(&site, idle, "cycle");
+        assert!(news(&mut peer) >= 50, "{idle}");
+    }
 }

@@ -11,6 +11,7 @@
 //! - [`server`]: the answering processes
 //! - [`sockets`], [`plain`], [`bytes`]: what they need
 //! - [`costs`]: one poll, one publish
+//! - [`rest`]: what a daemon takes while no sample comes
 //! - [`report`], [`plot`]: the result
 
 pub mod bytes;
@@ -20,6 +21,7 @@ pub mod link;
 pub mod plain;
 pub mod plot;
 pub mod report;
+pub mod rest;
 pub mod schedule;
 pub mod server;
 pub mod sockets;
@@ -27,6 +29,7 @@ pub mod sockets;
 use std::path::PathBuf;
 
 use clap::Args;
+use dynocar::config::IdleStrategy;
 use dynocar::runtime::affinity::pin_to_core;
 use dynocar::runtime::scheduling::set_fifo_priority;
 use rand::SeedableRng;
@@ -36,6 +39,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::rig::RigError;
 use case::{Case, Outcome};
 use costs::Costs;
+use rest::AtRest;
 use schedule::Schedule;
 
 /// Sample → snapshot through real processes, beside the floor and what a user would pick else.
@@ -104,6 +108,8 @@ pub struct Measured {
     pub cases: Vec<(Case, Vec<Outcome>)>,
     /// What a call costs.
     pub costs: Costs,
+    /// What a daemon takes while no sample comes.
+    pub at_rest: Vec<AtRest>,
     /// How it was driven.
     pub schedule: Schedule,
     /// Where it ran.
@@ -167,7 +173,12 @@ pub fn run(arguments: &LatencyArguments) -> Result<Measured, LatencyError> {
             cases[place].1.push(outcome);
         }
     }
-    Ok(Measured { cases, costs, schedule, cores })
+    let seconds = if arguments.quick { 0.5 } else { 5.0 };
+    let at_rest = [IdleStrategy::Adaptive, IdleStrategy::Event]
+        .into_iter()
+        .map(|idle| rest::measure(idle, cores, seconds))
+        .collect::<Result<_, _>>()?;
+    Ok(Measured { cases, costs, at_rest, schedule, cores })
 }
 
 /// Runs something in a thread of its own, which it may bind to a core: threads and processes

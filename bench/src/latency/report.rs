@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::Measured;
 use super::case::{Case, Outcome};
 use super::costs::Costs;
+use super::rest::AtRest;
 use crate::rig::quantiles::{Quantiles, for_people, histogram, median};
 use crate::rig::usage::ThreadUsage;
 
@@ -19,6 +20,8 @@ pub struct Report {
     /// What a call costs.
     #[serde(flatten)]
     pub costs: Costs,
+    /// What a daemon takes while no sample comes.
+    pub at_rest: Vec<AtRest>,
     /// Samples a second.
     pub rate_hz: f64,
     /// Rounds through all cases.
@@ -67,6 +70,7 @@ impl Report {
         Report {
             cases: measured.cases.iter().map(|case| line(case, &measured.cases)).collect(),
             costs: measured.costs,
+            at_rest: measured.at_rest.clone(),
             rate_hz: measured.schedule.rate_hz,
             rounds: measured.cases.first().map_or(0, |(_, outcomes)| outcomes.len()),
             controller_core: measured.cores.controller,
@@ -144,6 +148,9 @@ pub fn table(report: &Report) -> String {
         "One poll without news {:.0} ns, with news {:.0} ns; one publish {:.0} ns",
         costs.poll_without_news_ns, costs.poll_with_news_ns, costs.publish_ns
     );
+    for it in &report.at_rest {
+        let _ = writeln!(text, "no samples ({}): {:.2} % of a core", it.idle, it.cpu_percent);
+    }
     for line in &report.cases {
         if let Some(it) = line.suffered {
             let _ = writeln!(

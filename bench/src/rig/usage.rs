@@ -7,7 +7,7 @@ use serde::Serialize;
 /// Processor time and memory of a process at one moment.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ProcessUsage {
-    /// Processor time of all threads, in s.
+    /// Processor time of all living threads, in s.
     pub cpu_s: f64,
     /// Resident memory in bytes.
     pub rss_bytes: u64,
@@ -50,14 +50,19 @@ impl std::ops::AddAssign for ThreadUsage {
 /// A process's usage; `None` when it is gone.
 pub fn of_process(process_id: u32) -> Option<ProcessUsage> {
     let folder = format!("/proc/{process_id}");
-    let stat = std::fs::read_to_string(format!("{folder}/stat")).ok()?;
-    let ticks = stat_field(&stat, 14)? + stat_field(&stat, 15)?;
+    let tasks = std::fs::read_dir(format!("{folder}/task")).ok()?;
+    let cpu_ns: u64 = tasks.flatten().filter_map(|task| run_time_ns(&task.path())).sum();
     let pages = std::fs::read_to_string(format!("{folder}/statm")).ok()?;
     let pages: u64 = pages.split(' ').nth(1)?.parse().ok()?;
     Some(ProcessUsage {
-        cpu_s: ticks as f64 / rustix::param::clock_ticks_per_second() as f64,
+        cpu_s: cpu_ns as f64 * 1e-9,
         rss_bytes: pages * rustix::param::page_size() as u64,
     })
+}
+
+/// A thread's time on a processor; finer than the ticks of `/proc/…/stat`.
+fn run_time_ns(task: &Path) -> Option<u64> {
+    std::fs::read_to_string(task.join("schedstat")).ok()?.split(' ').next()?.parse().ok()
 }
 
 /// The usage of a process's thread of this name; `None` when there is none.
@@ -96,7 +101,8 @@ mod tests {
     #[test]
     fn this_process_has_memory_and_its_threads_are_found_by_name() {
         let id = std::process::id();
-        assert!(of_process(id).is_some_and(|usage| usage.rss_bytes > 100_000));
+        let usage = of_process(id).unwrap();
+        assert!(usage.rss_bytes > 100_000 && usage.cpu_s > 0.0);
         let usage = std::thread::Builder::new()
             .name("a name".into())
             .spawn(move || of_thread(id, "a name"))
