@@ -160,7 +160,8 @@ pub fn run(arguments: &LatencyArguments) -> Result<Measured, LatencyError> {
     }
     let batches = if arguments.quick { 20 } else { 400 };
     let costs = in_thread(|| {
-        bind(cores.controller, cores.priority);
+        bind(cores.controller);
+        prioritise(cores.priority);
         costs::measure(batches)
     })?;
     let mut random = ChaCha8Rng::seed_from_u64(arguments.seed);
@@ -196,12 +197,16 @@ pub fn in_thread<T: Send>(
     })
 }
 
-/// Binds the calling thread to a core and gives it its priority; without either the figures vary
-/// more, which is said.
-pub fn bind(core: usize, priority: Option<u8>) {
+/// Binds the calling thread to a core; without that the figures vary more, which is said.
+pub fn bind(core: usize) {
     if let Err(error) = pin_to_core(core) {
         eprintln!("dynocar-bench: not bound to core {core}, figures will vary more: {error}");
     }
+}
+
+/// Gives the calling thread, and every thread it starts from then on, a real-time priority; without
+/// it the figures vary more, which is said.
+pub fn prioritise(priority: Option<u8>) {
     if let Some(priority) = priority
         && let Err(error) = set_fifo_priority(priority)
     {

@@ -6,6 +6,7 @@ use hdrhistogram::Histogram;
 use plotters::prelude::*;
 
 use super::Measured;
+use super::case::{Answerer, COMPARED, Case};
 use super::report::pooled;
 use crate::rig::RigError;
 
@@ -43,7 +44,8 @@ fn draw_into(measured: &Measured, file: &Path) -> Result<(), Box<dyn std::error:
         .x_label_formatter(&|nines| quantile_name(*nines))
         .y_label_formatter(&|us| format!("{us}"))
         .draw()?;
-    for (place, (case, outcomes)) in measured.cases.iter().enumerate() {
+    let shown = measured.cases.iter().filter(|(case, _)| is_shown(case));
+    for (place, (case, outcomes)) in shown.enumerate() {
         let color = Palette99::pick(place).to_rgba();
         let label = format!("{} ({})", case.name, case.idle);
         chart
@@ -60,6 +62,14 @@ fn draw_into(measured: &Measured, file: &Path) -> Result<(), Box<dyn std::error:
         .draw()?;
     area.present()?;
     Ok(())
+}
+
+/// The other pipelines alone lie so near to each other that lines would hide lines.
+fn is_shown(case: &Case) -> bool {
+    match &case.answerer {
+        Answerer::Daemon { polled, .. } => *polled == COMPARED,
+        _ => true,
+    }
 }
 
 /// `90 %`, `99.9 %`: as many decimals as the quantile has nines beyond two.

@@ -9,7 +9,7 @@ use dynocar_client::{Host, monotonic_now_ns};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
 
 use super::plain::PlainNode;
-use super::{bind, sockets};
+use super::{bind, prioritise, sockets};
 use crate::rig::RigError;
 
 /// The train of every latency case.
@@ -57,7 +57,7 @@ struct Place {
 impl Place {
     fn pin(&self) {
         if let Some(core) = self.core {
-            bind(core, self.priority);
+            bind(core);
         }
     }
 }
@@ -68,6 +68,13 @@ impl Place {
 ///
 /// When a channel, socket or configuration cannot be used.
 pub fn serve(arguments: &PeerArguments) -> Result<(), RigError> {
+    if let PeerKind::Echo(place)
+    | PeerKind::ListeningEcho(place)
+    | PeerKind::UnixDatagram(place)
+    | PeerKind::ZeroMq(place) = &arguments.peer
+    {
+        prioritise(place.priority);
+    }
     match &arguments.peer {
         PeerKind::Daemon { config } => run_daemon(config),
         PeerKind::Echo(place) => {

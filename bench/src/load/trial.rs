@@ -7,7 +7,7 @@ use dynocar_shared::{PipelineKind, TrainId};
 use hdrhistogram::Histogram;
 
 use super::traffic::{Traffic, TrafficPlan};
-use crate::latency::{Cores, bind};
+use crate::latency::{Cores, bind, prioritise};
 use crate::rig::RigError;
 use crate::rig::child::Peer;
 use crate::rig::pipelines;
@@ -109,7 +109,8 @@ pub fn run(plan: &TrialPlan) -> Result<Trial, RigError> {
     let mut trains = (1..=plan.trains)
         .map(|id| open_train(&site, TrainId(id), plan))
         .collect::<Result<Vec<_>, _>>()?;
-    bind(plan.cores.controller, plan.cores.priority);
+    bind(plan.cores.controller);
+    prioritise(plan.cores.priority);
     await_daemon(&mut trains, &mut daemon, plan.pipelines.len())?;
     let mut outcomes: Vec<PipelineOutcome> = plan.pipelines.iter().copied().map(fresh).collect();
     let start_ns = monotonic_now_ns() + 600_000_000;
