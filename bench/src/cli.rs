@@ -10,6 +10,9 @@ use crate::estimators::measure::Effort;
 use crate::estimators::{self, report};
 use crate::explain::matrix;
 use crate::explain::scenario::Scenario;
+use crate::latency::server::{PeerArguments, serve};
+use crate::latency::{self, LatencyArguments, plot};
+use crate::load::{self, LoadArguments};
 use crate::papers::{self, Row, Verdict, table};
 
 /// Measures Dynocar: accuracy against the statistical bound, speed against peers.
@@ -24,7 +27,11 @@ struct Arguments {
 enum Command {
     Estimators(EstimatorsArguments),
     Explain(ExplainArguments),
+    Latency(LatencyArguments),
+    Load(LoadArguments),
     Papers(PapersArguments),
+    #[command(hide = true)]
+    Peer(PeerArguments),
 }
 
 /// Speed of every estimator beside peers that do the same work on the same data.
@@ -112,7 +119,10 @@ pub fn main() -> ExitCode {
     let result = match &arguments.command {
         Command::Estimators(arguments) => estimators(arguments),
         Command::Explain(arguments) => explain(arguments),
+        Command::Latency(arguments) => latency(arguments),
+        Command::Load(arguments) => load(arguments),
         Command::Papers(arguments) => papers(arguments),
+        Command::Peer(arguments) => serve(arguments).map_err(|error| (error.to_string(), 1)),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -172,6 +182,26 @@ fn papers(arguments: &PapersArguments) -> Result<(), (String, u8)> {
         true => Ok(()),
         false => Err((format!("broken promises:\n{}", broken.join("\n")), 1)),
     }
+}
+
+fn latency(arguments: &LatencyArguments) -> Result<(), (String, u8)> {
+    let measured = latency::run(arguments).map_err(|error| {
+        let status = if matches!(error, latency::LatencyError::Arguments(_)) { 2 } else { 1 };
+        (error.to_string(), status)
+    })?;
+    if let Some(file) = &arguments.plot {
+        plot::draw(&measured, file).map_err(|error| (error.to_string(), 1))?;
+    }
+    let report = latency::report::Report::of(&measured);
+    give(&arguments.json, &report, || latency::report::table(&report))
+}
+
+fn load(arguments: &LoadArguments) -> Result<(), (String, u8)> {
+    let report = load::run(arguments).map_err(|error| {
+        let status = if matches!(error, load::LoadError::Arguments(_)) { 2 } else { 1 };
+        (error.to_string(), status)
+    })?;
+    give(&arguments.json, &report, || load::report::table(&report))
 }
 
 fn explain(arguments: &ExplainArguments) -> Result<(), (String, u8)> {

@@ -3,9 +3,15 @@
 //! - [`cli`]: the commands of `dynocar-bench`
 //! - [`estimators`]: speed of every estimator beside peers
 //! - [`explain`]: the search for undeclared effects on simulated datasets
+//! - [`latency`]: sample → snapshot through real processes, beside the floor and alternatives
+//! - [`load`]: many trains against one daemon
+//! - [`rig`]: what the two share
 //! - [`papers`]: accuracy of every estimator over seeded runs, beside the statistical bound
 
 pub mod cli;
 pub mod estimators;
 pub mod explain;
+pub mod latency;
+pub mod load;
 pub mod papers;
+pub mod rig;

@@ -16,6 +16,12 @@ use crate::error::ChannelError;
 /// Longest root directory in bytes: the transport appends file names of its own.
 const ROOT_BYTES_MAX: usize = 150;
 
+/// Connections to dead senders whose last messages are still kept. A receiver looks through a
+/// place for each of them whenever it is polled: the transport's default of 128 took more than
+/// half of the time of a poll. Without a place the dead sender's last message is dropped, and it
+/// is older than what its successor says.
+const EXPIRED_CONNECTIONS: usize = 8;
+
 /// The run-time directory of one host, or of one of its separate installations.
 #[derive(Clone, Debug)]
 pub struct Host {
@@ -93,6 +99,8 @@ impl Host {
         let path =
             TransportPath::new(directory.as_os_str().as_encoded_bytes()).map_err(|_| refused())?;
         config.global.set_root_path(&path);
+        config.defaults.publish_subscribe.subscriber_expired_connection_buffer =
+            EXPIRED_CONNECTIONS;
         Ok(config)
     }
 }

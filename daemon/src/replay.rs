@@ -44,8 +44,9 @@ pub struct ReplayReport {
 
 /// The most that a replay at full speed runs ahead of the slowest pipeline.
 const AHEAD_MAX: u64 = SAMPLE_BUFFER as u64 / 2;
-/// How long pipelines that do not answer are waited for.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// How long pipelines that do not answer are waited for: on a busy machine a thread may get no
+/// processor for much longer than a controller would wait.
+const PATIENCE: Duration = Duration::from_secs(3);
 
 /// Plays runs one after the other; `progress` hears of each sample's place in its run.
 pub struct Replayer {
@@ -62,9 +63,11 @@ impl Replayer {
     ///
     /// When the channel cannot be opened or another controller drives the train.
     pub fn open(host: &Host, train: TrainId, rate: Rate) -> Result<Self, ChannelError> {
+        let mut reader = SnapshotReader::open(host, train)?;
+        reader.set_stale_after_ns(PATIENCE.as_nanos() as i64);
         Ok(Replayer {
             publisher: SamplePublisher::open(host, train)?,
-            reader: SnapshotReader::open(host, train)?,
+            reader,
             rate,
             report: ReplayReport::default(),
         })

@@ -16,8 +16,10 @@ use dynocar_core::pipeline::{Pipeline, SettingError};
 use dynocar_shared::TrainId;
 use tracing::{info, warn};
 
-use crate::config::{DaemonConfig, PipelineConfig, TrainConfig};
+use crate::config::{DaemonConfig, IdleStrategy, PipelineConfig, ThreadConfig, TrainConfig};
 use crate::runtime::affinity::pin_to_core;
+use crate::runtime::memory::{STACK_BYTES, lock_all_memory, prefault_stack};
+use crate::runtime::scheduling::set_fifo_priority;
 use crate::runtime::tally::Tally;
 use crate::runtime::watch::{Watch, WatchedPipeline};
 use crate::runtime::worker::{LanePlan, Worker, WorkerPlan};
@@ -67,6 +69,9 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
         .collect::<Result<Vec<_>, _>>()?;
     // Grows with every start: the monotonic clock is common to all processes of the host.
     let epoch = monotonic_now_ns() as u64;
+    if config.lock_memory {
+        lock_memory();
+    }
     let (plans, watched) = plan_workers(config, &host, epoch, &stop)?;
     let workers = start_workers(plans)?;
     info!(epoch, trains = trains.len(), pipelines = config.pipelines.len(), "serving");
@@ -156,6 +161,7 @@ fn start_workers(plans: Vec<WorkerPlan>) -> Result<Vec<JoinHandle<()>>, RunError
             let told = told.clone();
             std::thread::Builder::new()
                 .name(plan.thread.name.clone())
+                .stack_size(STACK_BYTES)
                 .spawn(move || work(plan, told))
                 .map_err(|source| RunError::System { what: "pipeline thread", source })
         })
@@ -166,13 +172,7 @@ fn start_workers(plans: Vec<WorkerPlan>) -> Result<Vec<JoinHandle<()>>, RunError
 }
 
 fn work(plan: WorkerPlan, told: Sender<Result<(), ChannelError>>) {
-    let (name, core) = (plan.thread.name.clone(), plan.thread.core);
-    if let Some(core) = core
-        && let Err(error) = pin_to_core(core)
-    {
-        warn!(thread = name, core, "not bound to its core, latency will vary more: {error}");
-    }
-    info!(thread = name, core, idle = %plan.thread.idle, "pipeline thread");
+    prepare_thread(&plan.thread);
     match Worker::start(plan) {
         Ok(mut worker) => {
             // The main thread has given up when it no longer listens; the stop flag says so too.
@@ -183,6 +183,46 @@ fn work(plan: WorkerPlan, told: Sender<Result<(), ChannelError>>) {
         Err(error) => {
             let _ = told.send(Err(error));
         }
+    }
+}
+
+/// Gives the calling thread what its configuration asks for; what the system refuses is told with
+/// its price, and the daemon goes on.
+fn prepare_thread(thread: &ThreadConfig) {
+    let name = thread.name.as_str();
+    if let Some(core) = thread.core
+        && let Err(error) = pin_to_core(core)
+    {
+        warn!(thread = name, core, "not bound to its core, latency will vary more: {error}");
+    }
+    if let Some(priority) = thread.priority {
+        if let Err(error) = set_fifo_priority(priority) {
+            warn!(
+                thread = name,
+                priority,
+                "no real-time priority: {error}; it needs CAP_SYS_NICE or a real-time limit of at \
+                 least {priority} (systemd: LimitRTPRIO={priority}). Any other program may hold \
+                 this thread up for milliseconds"
+            );
+        } else if thread.idle == IdleStrategy::Busy && thread.core.is_none() {
+            warn!(
+                thread = name,
+                "a busy thread of real-time priority takes a whole core from everyone else: bind \
+                 it to a core of its own"
+            );
+        }
+    }
+    prefault_stack();
+    info!(thread = name, core = thread.core, idle = %thread.idle, "pipeline thread");
+}
+
+fn lock_memory() {
+    match lock_all_memory() {
+        Ok(()) => info!("memory locked"),
+        Err(error) => warn!(
+            "memory not locked: {error}. A page that was put aside costs a thread microseconds, or \
+             milliseconds from a disk"
+        ),
     }
 }
 

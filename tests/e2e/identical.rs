@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
+use dynocar::config::is_slow;
 use dynocar::dataset;
 use dynocar::identify::{default_estimators, identify, published_samples};
 use dynocar::replay::{Rate, Replayer};
@@ -39,7 +40,10 @@ fn every_pipeline_gives_the_same_bits_online_and_offline() {
     let site = Site::new();
     let pipelines: String = estimators
         .iter()
-        .map(|it| format!("[[pipelines]]\nkind = \"{}\"\nthread = \"all\"\n", it.kind()))
+        .map(|it| {
+            let thread = if is_slow(it.kind()) { "slow" } else { "fast" };
+            format!("[[pipelines]]\nkind = \"{}\"\nthread = \"{thread}\"\n", it.kind())
+        })
         .collect();
     for file in ["train.toml", "track.toml"] {
         site.write(file, &std::fs::read_to_string(folder.join(file)).unwrap());
@@ -48,7 +52,7 @@ fn every_pipeline_gives_the_same_bits_online_and_offline() {
         "daemon.toml",
         &format!(
             "[[trains]]\nid = 1\nfile = \"train.toml\"\ntrack = \"track.toml\"\n\
-             [[threads]]\nname = \"all\"\n{pipelines}"
+             [[threads]]\nname = \"fast\"\n[[threads]]\nname = \"slow\"\n{pipelines}"
         ),
     );
     let daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().unwrap()]);

@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex};
@@ -82,9 +83,28 @@ impl Site {
     ///
     /// When it cannot be started.
     pub fn start(&self, program: &str, arguments: &[&str]) -> Process {
+        let mut command = Command::new(program);
+        command.args(arguments);
+        self.start_command(command)
+    }
+
+    /// Starts a program that may neither lock memory nor take a real-time priority, whoever runs
+    /// the test.
+    ///
+    /// # Panics
+    ///
+    /// When it cannot be started.
+    pub fn start_without_real_time(&self, program: &str, arguments: &[&str]) -> Process {
+        let mut command = Command::new(program);
+        command.args(arguments);
+        // SAFETY: between fork and exec only system calls are made.
+        unsafe { command.pre_exec(drop_real_time_rights) };
+        self.start_command(command)
+    }
+
+    fn start_command(&self, mut command: Command) -> Process {
         let errors = self.path().join(format!("stderr-{}", unique_number()));
-        let mut child = Command::new(program)
-            .args(arguments)
+        let mut child = command
             .env(ROOT_VARIABLE, self.root())
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
@@ -147,6 +167,24 @@ b = 0.03
 c = 0.0043
 ";
 
+/// Takes `CAP_IPC_LOCK` and `CAP_SYS_NICE` out of what a program may ever have again, and sets the
+/// limits that stand in for them to nothing.
+fn drop_real_time_rights() -> std::io::Result<()> {
+    use rustix::process::{Resource, Rlimit, setrlimit};
+    use rustix::thread::{CapabilitySet, remove_capability_from_bounding_set};
+    for capability in [CapabilitySet::IPC_LOCK, CapabilitySet::SYS_NICE] {
+        match remove_capability_from_bounding_set(capability) {
+            // Who has no privileges cannot give them up, and need not.
+            Ok(()) | Err(rustix::io::Errno::PERM) => {}
+            Err(error) => return Err(error.into()),
+        }
+    }
+    for resource in [Resource::Memlock, Resource::Rtprio] {
+        setrlimit(resource, Rlimit { current: Some(0), maximum: Some(0) })?;
+    }
+    Ok(())
+}
+
 fn unique_number() -> u64 {
     static NEXT: std::sync::atomic::AtomicU64 = std::sync::atomic::AtomicU64::new(0);
     NEXT.fetch_add(1, std::sync::atomic::Ordering::Relaxed)
@@ -160,6 +198,11 @@ pub struct Process {
 }
 
 impl Process {
+    /// Its process number.
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// Sends a signal.
     ///
     /// # Panics

@@ -3,7 +3,10 @@
 //! Unknown keys are refused; a value outside its range is refused with key, value and range.
 //! File names inside the configuration are relative to the configuration file.
 
+mod pace;
 mod raw;
+
+pub use pace::is_slow;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -66,6 +69,8 @@ pub struct ThreadConfig {
     pub core: Option<usize>,
     /// What it does while no sample comes.
     pub idle: IdleStrategy,
+    /// Real-time priority (`SCHED_FIFO`), 1 to 99; the system's ordinary scheduling when absent.
+    pub priority: Option<u8>,
 }
 
 /// A pipeline: one estimator for each of its trains.
@@ -94,6 +99,8 @@ pub struct DaemonConfig {
     pub spin_us: u64,
     /// How often a snapshot is vouched for while no sample comes, in ms.
     pub heartbeat_ms: u64,
+    /// Keeps all memory of the daemon resident, so that no thread waits for a page.
+    pub lock_memory: bool,
     /// The trains.
     pub trains: Vec<TrainConfig>,
     /// The threads.

@@ -11,6 +11,7 @@ use serde::Deserialize;
 
 use super::{
     ConfigError, DaemonConfig, IdleStrategy, LogFormat, PipelineConfig, ThreadConfig, TrainConfig,
+    is_slow,
 };
 use crate::dataset::{load_track, load_train};
 
@@ -39,6 +40,7 @@ struct RawDaemon {
     idle: IdleStrategy,
     spin_us: u64,
     heartbeat_ms: u64,
+    lock_memory: bool,
 }
 
 impl Default for RawDaemon {
@@ -50,6 +52,7 @@ impl Default for RawDaemon {
             idle: IdleStrategy::Adaptive,
             spin_us: 2_000,
             heartbeat_ms: 50,
+            lock_memory: false,
         }
     }
 }
@@ -68,6 +71,7 @@ struct RawThread {
     name: String,
     core: Option<usize>,
     idle: Option<IdleStrategy>,
+    priority: Option<u64>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -120,6 +124,7 @@ pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
     let mut threads = check_threads(&checker, raw.threads, raw.daemon.idle)?;
     let pipelines =
         check_pipelines(&checker, raw.pipelines, &trains, &mut threads, raw.daemon.idle)?;
+    keep_slow_apart(&checker, &pipelines, &threads)?;
     let in_use: HashSet<usize> = pipelines.iter().map(|pipeline| pipeline.thread).collect();
     if let Some(unused) = (0..threads.len()).find(|thread| !in_use.contains(thread)) {
         return checker.refuse("threads.name", &threads[unused].name, "a thread of a pipeline");
@@ -134,6 +139,7 @@ pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
         log_format: raw.daemon.log_format,
         spin_us: checker.range("daemon.spin_us", raw.daemon.spin_us, 0, 1_000_000)?,
         heartbeat_ms: checker.range("daemon.heartbeat_ms", raw.daemon.heartbeat_ms, 5, 100)?,
+        lock_memory: raw.daemon.lock_memory,
         trains,
         threads,
         pipelines,
@@ -178,7 +184,12 @@ fn check_threads(
                 return checker.refuse("threads.name", thread.name, "a name of its own");
             }
             let idle = thread.idle.unwrap_or(idle);
-            Ok(ThreadConfig { name: thread.name, core: thread.core, idle })
+            let priority = thread
+                .priority
+                .map(|priority| checker.range("threads.priority", priority, 1, 99))
+                .transpose()?
+                .map(|priority| priority as u8);
+            Ok(ThreadConfig { name: thread.name, core: thread.core, idle, priority })
         })
         .collect()
 }
@@ -207,7 +218,8 @@ fn check_pipelines(
             let trains = check_pipeline_trains(checker, &name, pipeline.trains, trains)?;
             let thread = match pipeline.thread {
                 None => {
-                    threads.push(ThreadConfig { name: name.clone(), core: None, idle });
+                    let name = name.clone();
+                    threads.push(ThreadConfig { name, core: None, idle, priority: None });
                     threads.len() - 1
                 }
                 Some(thread) => {
@@ -224,6 +236,27 @@ fn check_pipelines(
             Ok(PipelineConfig { name, estimator, thread, trains })
         })
         .collect()
+}
+
+/// A slow pipeline may compute for milliseconds: it never shares a thread with a fast one.
+fn keep_slow_apart(
+    checker: &Checker,
+    pipelines: &[PipelineConfig],
+    threads: &[ThreadConfig],
+) -> Result<(), ConfigError> {
+    let is_slow = |pipeline: &PipelineConfig| is_slow(pipeline.estimator.kind());
+    for slow in pipelines.iter().filter(|pipeline| is_slow(pipeline)) {
+        let mut others = pipelines.iter().filter(|it| it.thread == slow.thread && !is_slow(it));
+        if let Some(fast) = others.next() {
+            let key = format!("pipelines.{}.thread", slow.name);
+            let allowed = format!(
+                "a thread without fast pipelines as {}, which {} would hold up",
+                fast.name, slow.name
+            );
+            return checker.refuse(key, &threads[slow.thread].name, allowed);
+        }
+    }
+    Ok(())
 }
 
 fn check_estimator(

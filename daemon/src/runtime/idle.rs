@@ -47,7 +47,7 @@ impl Idler {
             Some(sleeper) if now_ns.saturating_sub(self.last_work_ns) >= self.spin_ns => {
                 sleeper.sleep(self.sleep_max, has_work);
             }
-            _ => std::hint::spin_loop(),
+            _ => {}
         }
     }
 

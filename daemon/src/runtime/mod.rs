@@ -3,11 +3,15 @@
 //! - [`worker`]: a pipeline thread, from sample to snapshot
 //! - [`idle`]: what it does while no sample comes
 //! - [`affinity`]: binding it to a core
+//! - [`scheduling`]: its real-time priority
+//! - [`memory`]: keeping its memory resident
 //! - [`tally`]: what it tells the main thread without waiting for it
 //! - [`watch`]: what the main thread does meanwhile: signals, peers, the log
 
 pub mod affinity;
 pub mod idle;
+pub mod memory;
+pub mod scheduling;
 pub mod tally;
 pub mod watch;
 pub mod worker;

@@ -12,6 +12,10 @@ use super::idle::Idler;
 use super::tally::Tally;
 use crate::config::{IdleStrategy, ThreadConfig};
 
+/// A thread that never found a sample looks so many times before it reads the clock: the clock
+/// takes as long as a look, and a sample that comes meanwhile would wait for it.
+const LOOKS_PER_CLOCK: usize = 16;
+
 /// Samples that one train may take in a row before the thread's other trains have their turn.
 const TURN: usize = 64;
 
@@ -102,7 +106,7 @@ impl Worker {
     /// Allocates nothing, locks nothing, logs nothing; sleeps only in the idler.
     pub fn run(&mut self) {
         while !self.stop.load(Ordering::Relaxed) {
-            let processed = self.take_turns();
+            let processed = self.look_for_samples();
             let now_ns = monotonic_now_ns();
             if now_ns - self.last_heartbeat_ns >= self.heartbeat_ns {
                 self.heartbeat(now_ns);
@@ -114,6 +118,17 @@ impl Worker {
                 self.idler.pause(now_ns, || look_once_more(lanes));
             }
         }
+    }
+
+    /// Looks several times; true when there was a sample.
+    fn look_for_samples(&mut self) -> bool {
+        (0..LOOKS_PER_CLOCK).any(|_| {
+            let processed = self.take_turns();
+            if !processed {
+                std::hint::spin_loop();
+            }
+            processed
+        })
     }
 
     /// One turn for every train; true when there was a sample.

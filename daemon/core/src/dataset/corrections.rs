@@ -18,9 +18,7 @@ const KEYS: [Key; 10] = [
         &mut it.bearing_delta_a_n_per_kn
     }),
     ("bearing_tau_s", "from 1 to 100000 s", [1.0, 1e5], |it| &mut it.bearing_tau_s),
-    ("ambient_w0_per_k", "from -0.1 to 0.1 per kelvin", [-0.1, 0.1], |it| {
-        &mut it.ambient_w0_per_k
-    }),
+    ("ambient_w0_per_k", "from -0.1 to 0.1 per kelvin", [-0.1, 0.1], |it| &mut it.ambient_w0_per_k),
     ("ambient_reference_k", "from 200 to 350 K", [200.0, 350.0], |it| &mut it.ambient_reference_k),
 ];
 
@@ -29,9 +27,7 @@ pub(super) fn corrections(section: &Section) -> Result<Corrections, DatasetError
     section.allow(&KEYS.map(|key| key.0))?;
     let mut corrections = Corrections::NONE;
     for (key, allowed, [low, high], field) in KEYS {
-        if let Some(value) =
-            section.number(key, allowed, |value| (low..=high).contains(&value))?
-        {
+        if let Some(value) = section.number(key, allowed, |value| (low..=high).contains(&value))? {
             *field(&mut corrections) = value;
         }
     }
@@ -50,8 +46,7 @@ mod tests {
     fn corrections_are_read_and_the_rest_corrects_nothing() {
         let text = format!("{TRAIN}[corrections]\ntunnel_c_factor = 1.9\nspeed_scale = 0.98\n");
         let known = parse_train("train.toml", &text).unwrap().corrections;
-        let expected =
-            Corrections { tunnel_c_factor: 1.9, speed_scale: 0.98, ..Corrections::NONE };
+        let expected = Corrections { tunnel_c_factor: 1.9, speed_scale: 0.98, ..Corrections::NONE };
         assert_eq!(known, expected);
         assert_eq!(parse_train("train.toml", TRAIN).unwrap().corrections, Corrections::NONE);
     }

@@ -17,7 +17,15 @@ pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
     let root = document.root();
     root.allow(&["track"])?;
     let section = root.required_table("track")?;
-    section.allow(&["name", "length_m", "gradient", "curves", "tunnels", "resistance", "masses"])?;
+    section.allow(&[
+        "name",
+        "length_m",
+        "gradient",
+        "curves",
+        "tunnels",
+        "resistance",
+        "masses",
+    ])?;
     let length_m = section.number("length_m", "a length in m above 0", |length| length > 0.0)?;
     let (gradient, gradient_places) = gradient(&section)?.unzip();
     let curves = section.entries::<3>("curves", "[start_m, end_m, radius_m]")?.map(split);
@@ -39,8 +47,7 @@ pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
         tunnels: tunnel_places.unwrap_or_default(),
     };
     let name = section.text("name")?.unwrap_or("unnamed line").into();
-    let refused =
-        |error| Err(places.of(&error, &starts, &section).problem(Problem::Track(error)));
+    let refused = |error| Err(places.of(&error, &starts, &section).problem(Problem::Track(error)));
     let track = match Track::new(name, length_m, gradient.as_deref(), curves, tunnels) {
         Ok(track) => track,
         Err(error) => return refused(error),
@@ -54,9 +61,9 @@ fn with_corrections(mut track: Track, section: &Section) -> Result<Track, Datase
     if let Some(entries) = section.entries::<3>("resistance", RESISTANCE)? {
         let places: Vec<_> =
             entries.iter().map(|([start_m, end_m, extra], _)| (*start_m, *end_m, *extra)).collect();
-        track = track.with_resistance(&places).map_err(|error| {
-            section.place_of("resistance").problem(Problem::Track(error))
-        })?;
+        track = track
+            .with_resistance(&places)
+            .map_err(|error| section.place_of("resistance").problem(Problem::Track(error)))?;
     }
     const MASSES: &str = "[from_m, to_m, direction (1 or -1), mass factor]";
     if let Some(entries) = section.entries::<4>("masses", MASSES)? {
@@ -64,9 +71,8 @@ fn with_corrections(mut track: Track, section: &Section) -> Result<Track, Datase
         for (index, ([from_m, to_m, direction, mass_factor], place)) in
             entries.into_iter().enumerate()
         {
-            let is_sound = from_m < to_m
-                && direction.abs() == 1.0
-                && (0.1..=10.0).contains(&mass_factor);
+            let is_sound =
+                from_m < to_m && direction.abs() == 1.0 && (0.1..=10.0).contains(&mass_factor);
             if !is_sound {
                 let key = format!("{} entry {}", section.full("masses"), index + 1);
                 let value = format!("[{from_m}, {to_m}, {direction}, {mass_factor}]");

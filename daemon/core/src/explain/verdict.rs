@@ -10,7 +10,9 @@ use super::answer::{
 use super::effects::ReportContext;
 use super::evidence::Fit;
 use super::score::{self, Score};
-use super::selection::{AMBIGUOUS, EVIDENCE_MIN, discounted, Outcome, Search, Trial, deviations, p_value, penalty};
+use super::selection::{
+    AMBIGUOUS, EVIDENCE_MIN, Outcome, Search, Trial, deviations, discounted, p_value, penalty,
+};
 use crate::simulate::SpeedError;
 
 /// A rival takes away this share of what the accepted effect does of the open-loop error.

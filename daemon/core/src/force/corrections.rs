@@ -50,9 +50,9 @@ impl Corrector {
         let ahead_mps = speed_mps + known.wind_plus_mps * sample.direction;
         let windy = davis.c * ahead_mps * ahead_mps.abs();
         let cold_s = self.since_cold_s(sample.time_ns);
-        let warmth_k = sample.ambient_temperature_degc.map_or(0.0, |degc| {
-            degc + ZERO_DEGC_K - known.ambient_reference_k
-        });
+        let warmth_k = sample
+            .ambient_temperature_degc
+            .map_or(0.0, |degc| degc + ZERO_DEGC_K - known.ambient_reference_k);
         sample.tunnel_n_per_kn += in_tunnel * (known.tunnel_c_factor - 1.0) * air
             + (1.0 - in_tunnel) * (windy - air)
             + known.bearing_delta_a_n_per_kn * (-cold_s / known.bearing_tau_s).exp()

@@ -67,9 +67,7 @@ impl DelayLine {
             let before = entry(back);
             if before.0 <= time_s {
                 let share = (time_s - before.0) / (after.0 - before.0);
-                return std::array::from_fn(|k| {
-                    before.1[k] + share * (after.1[k] - before.1[k])
-                });
+                return std::array::from_fn(|k| before.1[k] + share * (after.1[k] - before.1[k]));
             }
             after = before;
         }

@@ -30,6 +30,8 @@ pub(super) fn report(config: &DaemonConfig) -> String {
     text += &line("root", root.as_deref().unwrap_or("DYNOCAR_ROOT, else /tmp/dynocar-<user>"));
     text += &line("adaptive", &format!("looks for samples for {} µs, then sleeps", config.spin_us));
     text += &line("heartbeat", &format!("every {} ms", config.heartbeat_ms));
+    let memory = if config.lock_memory { "locked" } else { "may be paged" };
+    text += &line("memory", memory);
 
     let mut trains = TextTable::new(&["train", "name", "mass t", "line"], &[1, 3]);
     for train in &config.trains {
@@ -38,8 +40,8 @@ pub(super) fn report(config: &DaemonConfig) -> String {
         trains.push(vec![train.id.to_string(), train.model.name.clone(), mass_t, track.into()]);
     }
     let mut pipelines = TextTable::new(
-        &["pipeline", "name", "kind", "thread", "core", "idle", "trains"],
-        &[1, 2, 3, 5, 6],
+        &["pipeline", "name", "kind", "thread", "core", "idle", "priority", "trains"],
+        &[1, 2, 3, 5, 6, 7],
     );
     for (index, pipeline) in config.pipelines.iter().enumerate() {
         let thread = &config.threads[pipeline.thread];
@@ -51,6 +53,7 @@ pub(super) fn report(config: &DaemonConfig) -> String {
             thread.name.clone(),
             thread.core.map_or("any".into(), |core| core.to_string()),
             thread.idle.to_string(),
+            thread.priority.map_or("ordinary".into(), |priority| format!("fifo {priority}")),
             trains.join(" "),
         ]);
     }
@@ -78,6 +81,7 @@ struct PipelineAnswer<'a> {
     thread: &'a str,
     core: Option<usize>,
     idle: String,
+    priority: Option<u8>,
     trains: Vec<u64>,
 }
 
@@ -104,6 +108,7 @@ pub(super) fn answer(config: &DaemonConfig) -> DaemonAnswer<'_> {
                     thread: &thread.name,
                     core: thread.core,
                     idle: thread.idle.to_string(),
+                    priority: thread.priority,
                     trains: pipeline.trains.iter().map(|train| train.0).collect(),
                 }
             })

@@ -6,4 +6,7 @@ mod significance;
 
 pub use by_run::{Held, deviations, leave_one_run_out};
 pub use search::{Outcome, Search, Trial};
-pub use significance::{AMBIGUOUS, EVIDENCE_MIN, NullStrength, NULL_STRENGTH, STRENGTH_MIN, discounted, p_value, penalty};
+pub use significance::{
+    AMBIGUOUS, EVIDENCE_MIN, NULL_STRENGTH, NullStrength, STRENGTH_MIN, discounted, p_value,
+    penalty,
+};

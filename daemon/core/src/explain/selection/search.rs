@@ -5,7 +5,9 @@ use std::sync::Arc;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::by_run::leave_one_run_out;
-use super::significance::{AMBIGUOUS, EVIDENCE_MIN, STRENGTH_MIN, discounted, model_penalty, penalty};
+use super::significance::{
+    AMBIGUOUS, EVIDENCE_MIN, STRENGTH_MIN, discounted, model_penalty, penalty,
+};
 use crate::explain::Progress;
 use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal};
 use crate::explain::evidence::{Fit, FitProblem, GrownModel, Noise, RunData};

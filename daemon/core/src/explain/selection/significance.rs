@@ -1,7 +1,7 @@
 //! When an effect is more than chance.
 
-use nalgebra::DVector;
 use crate::explain::evidence::{Fit, SharedHypothesis};
+use nalgebra::DVector;
 
 /// Evidence that an effect must have: decrease of -2 log likelihood beyond the penalty.
 pub const EVIDENCE_MIN: f64 = 9.0;

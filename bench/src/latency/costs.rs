@@ -1,0 +1,119 @@
+//! What one poll and one publish cost the controller, on its own core.
+
+use dynocar_client::channel::{Receiver, Sender, Transport};
+use dynocar_client::{SamplePublisher, SnapshotReader, monotonic_now_ns};
+use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
+use serde::Serialize;
+
+use crate::rig::RigError;
+use crate::rig::quantiles::median;
+use crate::rig::site::Site;
+
+const TRAIN: TrainId = TrainId(1);
+/// Calls that are timed together, so that the clock's own cost is spread.
+const CALLS: u64 = 256;
+
+/// Costs in ns, each the median over batches or calls.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Costs {
+    /// One poll when nothing has come, one pipeline.
+    pub poll_without_news_ns: f64,
+    /// One poll that takes a snapshot.
+    pub poll_with_news_ns: f64,
+    /// One publish, to one awake pipeline thread.
+    pub publish_ns: f64,
+}
+
+/// Both ends of a train's channels in one process.
+struct Ends {
+    snapshots: Sender<ParameterSnapshot>,
+    samples: Receiver<TrainSample>,
+    publisher: SamplePublisher,
+    reader: SnapshotReader,
+    snapshot: ParameterSnapshot,
+    _site: Site,
+}
+
+impl Ends {
+    fn open() -> Result<Self, RigError> {
+        let site = Site::new()?;
+        let transport = Transport::open(site.host(), "dynocar-bench-costs")?;
+        let mut snapshot = ParameterSnapshot::empty();
+        snapshot.train_id = TRAIN.0;
+        snapshot.pipeline_kind = PipelineKind::Rls as u32;
+        Ok(Ends {
+            snapshots: transport.sender(TRAIN)?,
+            samples: transport.receiver(TRAIN)?,
+            publisher: SamplePublisher::open(site.host(), TRAIN)?,
+            reader: SnapshotReader::open(site.host(), TRAIN)?,
+            snapshot,
+            _site: site,
+        })
+    }
+
+    fn send_snapshot(&mut self) -> Result<(), RigError> {
+        self.snapshot.sequence += 1;
+        Ok(self.snapshots.send(&self.snapshot)?)
+    }
+}
+
+/// Measures the costs over so many batches.
+///
+/// # Errors
+///
+/// When a channel cannot be used.
+pub fn measure(batches: usize) -> Result<Costs, RigError> {
+    let mut ends = Ends::open()?;
+    let mut sample = TrainSample::empty(TRAIN);
+    for _ in 0..100 {
+        ends.send_snapshot()?;
+        ends.publisher.publish(&mut sample)?;
+        ends.reader.poll();
+        while ends.samples.receive().is_some() {}
+    }
+    let clock_ns = median(
+        (0..batches)
+            .map(|_| {
+                of_batch(|| {
+                    std::hint::black_box(monotonic_now_ns());
+                })
+            })
+            .collect(),
+    );
+    let without_news = (0..batches)
+        .map(|_| {
+            of_batch(|| {
+                std::hint::black_box(ends.reader.poll());
+            })
+        })
+        .collect();
+    let (mut with_news, mut publish) = (Vec::new(), Vec::new());
+    for _ in 0..batches {
+        for _ in 0..CALLS {
+            ends.send_snapshot()?;
+            let before_ns = monotonic_now_ns();
+            ends.reader.poll();
+            with_news.push((monotonic_now_ns() - before_ns) as f64);
+        }
+        let before_ns = monotonic_now_ns();
+        for _ in 0..CALLS {
+            ends.publisher.publish(&mut sample)?;
+        }
+        publish.push((monotonic_now_ns() - before_ns) as f64 / CALLS as f64);
+        while ends.samples.receive().is_some() {}
+    }
+    Ok(Costs {
+        poll_without_news_ns: median(without_news),
+        poll_with_news_ns: (median(with_news) - clock_ns).max(0.0),
+        publish_ns: median(publish),
+    })
+}
+
+/// The time of one call, in ns, from a batch.
+fn of_batch(mut call: impl FnMut()) -> f64 {
+    let before_ns = monotonic_now_ns();
+    for _ in 0..CALLS {
+        call();
+    }
+    (monotonic_now_ns() - before_ns) as f64 / CALLS as f64
+}

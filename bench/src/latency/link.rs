@@ -1,0 +1,246 @@
+//! The controller's end of each transport.
+
+use std::io::ErrorKind;
+use std::os::unix::net::UnixDatagram;
+use std::time::Duration;
+
+use dynocar_client::channel::{Receiver, Sender, Transport};
+use dynocar_client::{SamplePublisher, SnapshotReader};
+use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
+
+use super::bytes::{as_bytes, from_bytes};
+use super::plain::{PlainNode, PlainNotifier};
+use super::sockets::{CLIENT_SOCKET, SERVER_SOCKET, zeromq_address};
+use crate::rig::site::Site;
+use crate::rig::{RigError, system};
+
+/// Sends samples, and tells how far the answers have come.
+pub trait Link {
+    /// Sends a sample; gives its sequence number.
+    ///
+    /// # Errors
+    ///
+    /// When the transport fails for good; a message that a full queue refuses is only lost.
+    fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, RigError>;
+
+    /// The sequence number of the newest sample behind the polled pipeline's newest snapshot, 0
+    /// when none has come.
+    ///
+    /// # Errors
+    ///
+    /// When the transport fails for good.
+    fn poll(&mut self) -> Result<u64, RigError>;
+
+    /// Takes what else has come, while no answer is awaited: other pipelines' snapshots, which a
+    /// controller's next poll would find in its way.
+    ///
+    /// # Errors
+    ///
+    /// As [`Link::poll`].
+    fn rest(&mut self) -> Result<(), RigError> {
+        std::hint::spin_loop();
+        Ok(())
+    }
+}
+
+/// What a controller links: Dynocar's client library.
+pub struct ClientLink {
+    publisher: SamplePublisher,
+    reader: SnapshotReader,
+    pipeline: PipelineKind,
+    newest: u64,
+}
+
+impl ClientLink {
+    /// Opens publisher and reader; the answers of one pipeline count.
+    ///
+    /// # Errors
+    ///
+    /// When a channel cannot be opened.
+    pub fn open(site: &Site, train: TrainId, pipeline: PipelineKind) -> Result<Self, RigError> {
+        let publisher = SamplePublisher::open(site.host(), train)?;
+        let reader = SnapshotReader::open(site.host(), train)?;
+        Ok(ClientLink { publisher, reader, pipeline, newest: 0 })
+    }
+}
+
+impl Link for ClientLink {
+    fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, RigError> {
+        Ok(self.publisher.publish(sample)?)
+    }
+
+    fn poll(&mut self) -> Result<u64, RigError> {
+        if self.reader.poll() > 0
+            && let Some(reading) = self.reader.latest(self.pipeline, 0)
+        {
+            self.newest = reading.snapshot.sample_sequence;
+        }
+        Ok(self.newest)
+    }
+
+    fn rest(&mut self) -> Result<(), RigError> {
+        self.poll().map(|_| ())
+    }
+}
+
+/// The plain transport with a notification for every sample: the floor of the event strategy.
+pub struct NotifyingLink {
+    sender: Sender<TrainSample>,
+    receiver: Receiver<ParameterSnapshot>,
+    notifier: PlainNotifier,
+    _node: PlainNode,
+    sequence: u64,
+    newest: u64,
+}
+
+impl NotifyingLink {
+    /// Opens the ports.
+    ///
+    /// # Errors
+    ///
+    /// When the transport refuses one.
+    pub fn open(site: &Site, train: TrainId) -> Result<Self, RigError> {
+        let transport = Transport::open(site.host(), "dynocar-bench")?;
+        let node = PlainNode::open(site.path())?;
+        Ok(NotifyingLink {
+            sender: transport.sender(train)?,
+            receiver: transport.receiver(train)?,
+            notifier: node.notifier()?,
+            _node: node,
+            sequence: 0,
+            newest: 0,
+        })
+    }
+}
+
+impl Link for NotifyingLink {
+    fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, RigError> {
+        self.sequence += 1;
+        sample.sequence = self.sequence;
+        self.sender.send(sample)?;
+        self.notifier.notify()?;
+        Ok(self.sequence)
+    }
+
+    fn poll(&mut self) -> Result<u64, RigError> {
+        while let Some(snapshot) = self.receiver.receive() {
+            self.newest = snapshot.sample_sequence;
+        }
+        Ok(self.newest)
+    }
+}
+
+/// How long a blocking receive waits before the schedule is looked at again.
+const BLOCK: Duration = Duration::from_millis(1);
+
+/// Unix datagram sockets, as a user would write them.
+pub struct DatagramLink {
+    socket: UnixDatagram,
+    server: std::path::PathBuf,
+    sequence: u64,
+    newest: u64,
+}
+
+impl DatagramLink {
+    /// Binds the controller's socket; `blocks` waits in the kernel for answers instead of
+    /// asking again and again.
+    ///
+    /// # Errors
+    ///
+    /// When the system refuses the socket.
+    pub fn open(site: &Site, blocks: bool) -> Result<Self, RigError> {
+        let socket = UnixDatagram::bind(site.path().join(CLIENT_SOCKET)).map_err(system("bind"))?;
+        socket.set_nonblocking(!blocks).map_err(system("socket mode"))?;
+        socket.set_read_timeout(blocks.then_some(BLOCK)).map_err(system("socket timeout"))?;
+        let server = site.path().join(SERVER_SOCKET);
+        Ok(DatagramLink { socket, server, sequence: 0, newest: 0 })
+    }
+}
+
+impl Link for DatagramLink {
+    fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, RigError> {
+        self.sequence += 1;
+        sample.sequence = self.sequence;
+        match self.socket.send_to(as_bytes(sample), &self.server) {
+            Ok(_) => Ok(self.sequence),
+            // Full, or the server does not listen yet: lost.
+            Err(error) if is_passing(error.kind()) => Ok(self.sequence),
+            Err(error) => Err(system("sending a datagram")(error)),
+        }
+    }
+
+    fn poll(&mut self) -> Result<u64, RigError> {
+        let mut bytes = [0; size_of::<ParameterSnapshot>()];
+        match self.socket.recv(&mut bytes) {
+            Ok(count) => {
+                if let Some(snapshot) = from_bytes::<ParameterSnapshot>(&bytes[..count]) {
+                    self.newest = self.newest.max(snapshot.sample_sequence);
+                }
+            }
+            Err(error) if is_passing(error.kind()) => {}
+            Err(error) => return Err(system("receiving a datagram")(error)),
+        }
+        Ok(self.newest)
+    }
+}
+
+fn is_passing(kind: ErrorKind) -> bool {
+    matches!(
+        kind,
+        ErrorKind::WouldBlock
+            | ErrorKind::TimedOut
+            | ErrorKind::NotFound
+            | ErrorKind::ConnectionRefused
+            | ErrorKind::Interrupted
+    )
+}
+
+/// ZeroMQ's pair sockets over its `ipc` transport.
+pub struct ZeroMqLink {
+    socket: zmq::Socket,
+    flags: i32,
+    sequence: u64,
+    newest: u64,
+}
+
+impl ZeroMqLink {
+    /// Connects to the server's socket; see [`DatagramLink::open`] for `blocks`.
+    ///
+    /// # Errors
+    ///
+    /// When the library refuses.
+    pub fn open(site: &Site, blocks: bool) -> Result<Self, RigError> {
+        let socket = zmq::Context::new().socket(zmq::PAIR)?;
+        socket.set_linger(0)?;
+        socket.set_rcvtimeo(BLOCK.as_millis() as i32)?;
+        socket.connect(&zeromq_address(site.path()))?;
+        let flags = if blocks { 0 } else { zmq::DONTWAIT };
+        Ok(ZeroMqLink { socket, flags, sequence: 0, newest: 0 })
+    }
+}
+
+impl Link for ZeroMqLink {
+    fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, RigError> {
+        self.sequence += 1;
+        sample.sequence = self.sequence;
+        match self.socket.send(as_bytes(sample), zmq::DONTWAIT) {
+            Ok(()) | Err(zmq::Error::EAGAIN) => Ok(self.sequence),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn poll(&mut self) -> Result<u64, RigError> {
+        let mut bytes = [0; size_of::<ParameterSnapshot>()];
+        match self.socket.recv_into(&mut bytes, self.flags) {
+            Ok(count) => {
+                let bytes = &bytes[..count.min(size_of::<ParameterSnapshot>())];
+                if let Some(snapshot) = from_bytes::<ParameterSnapshot>(bytes) {
+                    self.newest = self.newest.max(snapshot.sample_sequence);
+                }
+            }
+            Err(zmq::Error::EAGAIN | zmq::Error::EINTR) => {}
+            Err(error) => return Err(error.into()),
+        }
+        Ok(self.newest)
+    }
+}

@@ -1,0 +1,215 @@
+//! `dynocar-bench latency`: from the appointed time of a sample to the poll that brings its
+//! snapshot, through real processes on cores of their own.
+//!
+//! Every round goes through all cases once, in an order drawn anew from the seed, so that whatever
+//! else the machine does falls on all of them alike. Ratios to the floor are taken within a round;
+//! the median of the rounds is told.
+//!
+//! - [`case`]: what is measured beside what
+//! - [`schedule`]: the open-loop measurement of one slice
+//! - [`link`]: the controller's end of each transport
+//! - [`server`]: the answering processes
+//! - [`sockets`], [`plain`], [`bytes`]: what they need
+//! - [`costs`]: one poll, one publish
+//! - [`rest`]: what a daemon takes while no sample comes
+//! - [`report`], [`plot`]: the result
+
+pub mod bytes;
+pub mod case;
+pub mod costs;
+pub mod link;
+pub mod plain;
+pub mod plot;
+pub mod report;
+pub mod rest;
+pub mod schedule;
+pub mod server;
+pub mod sockets;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use dynocar::config::IdleStrategy;
+use dynocar::runtime::affinity::pin_to_core;
+use dynocar::runtime::scheduling::set_fifo_priority;
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+use crate::rig::RigError;
+use case::{Case, Outcome};
+use costs::Costs;
+use rest::AtRest;
+use schedule::Schedule;
+
+/// Sample → snapshot through real processes, beside the floor and what a user would pick else.
+#[derive(Debug, Args)]
+pub struct LatencyArguments {
+    /// Few short rounds of the main cases: a check that everything runs, not a measurement
+    #[arg(long)]
+    pub quick: bool,
+    /// Samples a second
+    #[arg(long, default_value_t = 1_000.0, value_name = "HZ")]
+    pub rate: f64,
+    /// Rounds through all cases
+    #[arg(long, value_name = "N")]
+    pub rounds: Option<usize>,
+    /// Seconds of each case in each round
+    #[arg(long, value_name = "S")]
+    pub seconds: Option<f64>,
+    /// Only the cases whose name contains this, and the floors
+    #[arg(long, value_name = "TEXT")]
+    pub case: Option<String>,
+    /// Core of the controller
+    #[arg(long, value_name = "CORE")]
+    pub controller_core: Option<usize>,
+    /// Core of the daemon's thread, and of whatever else answers
+    #[arg(long, value_name = "CORE")]
+    pub daemon_core: Option<usize>,
+    /// Real-time priority (SCHED_FIFO) of the controller and of whatever answers, 1 to 99
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=99))]
+    pub priority: Option<u8>,
+    /// Seed of the order of the cases
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Write the result for machines; - for standard output
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Draw the distributions
+    #[arg(long, value_name = "FILE.svg")]
+    pub plot: Option<PathBuf>,
+}
+
+/// The two cores of a measurement, and the priority of what runs there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cores {
+    /// Where the controller publishes and polls.
+    pub controller: usize,
+    /// Where the answering thread runs.
+    pub server: usize,
+    /// Real-time priority on both; ordinary when absent.
+    pub priority: Option<u8>,
+}
+
+impl Cores {
+    /// The cores asked for, else the first two; on a machine with one core both are the same.
+    pub fn choose(controller: Option<usize>, server: Option<usize>, priority: Option<u8>) -> Self {
+        let count = std::thread::available_parallelism().map_or(1, usize::from);
+        let controller = controller.unwrap_or(0);
+        let other = (controller + 1) % count.max(1);
+        Cores { controller, server: server.unwrap_or(other), priority }
+    }
+}
+
+/// What was measured.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    /// Each case with its outcome of every round.
+    pub cases: Vec<(Case, Vec<Outcome>)>,
+    /// What a call costs.
+    pub costs: Costs,
+    /// What a daemon takes while no sample comes.
+    pub at_rest: Vec<AtRest>,
+    /// How it was driven.
+    pub schedule: Schedule,
+    /// Where it ran.
+    pub cores: Cores,
+}
+
+/// Why latency cannot be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum LatencyError {
+    /// The command line is wrong.
+    #[error("{0}")]
+    Arguments(String),
+    /// The measurement failed.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+}
+
+const ROUNDS: usize = 15;
+const QUICK_ROUNDS: usize = 1;
+
+/// Measures.
+///
+/// # Errors
+///
+/// When the command line is wrong, or a process or a transport fails; never because of a time.
+pub fn run(arguments: &LatencyArguments) -> Result<Measured, LatencyError> {
+    let refuse = |text: String| Err(LatencyError::Arguments(text));
+    if !(arguments.rate >= 0.1 && arguments.rate <= 1e6) {
+        return refuse(format!("--rate {}: expected 0.1 to 1000000 Hz", arguments.rate));
+    }
+    if arguments.seconds.is_some_and(|seconds| !(seconds > 0.0 && seconds <= 3_600.0)) {
+        return refuse("--seconds: expected up to 3600 s".into());
+    }
+    if arguments.rounds == Some(0) {
+        return refuse("--rounds 0: expected at least one round".into());
+    }
+    let cores = Cores::choose(arguments.controller_core, arguments.daemon_core, arguments.priority);
+    let schedule = Schedule {
+        rate_hz: arguments.rate,
+        warm_up_s: if arguments.quick { 0.6 } else { 0.8 },
+        measure_s: arguments.seconds.unwrap_or(if arguments.quick { 0.2 } else { 2.0 }),
+    };
+    let rounds = arguments.rounds.unwrap_or(if arguments.quick { QUICK_ROUNDS } else { ROUNDS });
+    let mut cases: Vec<(Case, Vec<Outcome>)> =
+        case::cases(arguments.quick).into_iter().map(|case| (case, Vec::new())).collect();
+    if let Some(text) = &arguments.case {
+        cases.retain(|(case, _)| case.name == "floor" || case.name.contains(text.as_str()));
+    }
+    let batches = if arguments.quick { 20 } else { 400 };
+    let costs = in_thread(|| {
+        bind(cores.controller);
+        prioritise(cores.priority);
+        costs::measure(batches)
+    })?;
+    let mut random = ChaCha8Rng::seed_from_u64(arguments.seed);
+    for round in 1..=rounds {
+        eprintln!("round {round} of {rounds}");
+        let mut order: Vec<usize> = (0..cases.len()).collect();
+        order.shuffle(&mut random);
+        for place in order {
+            let outcome = in_thread(|| case::measure(&cases[place].0, cores, &schedule))?;
+            cases[place].1.push(outcome);
+        }
+    }
+    let seconds = if arguments.quick { 0.5 } else { 5.0 };
+    let at_rest = [IdleStrategy::Adaptive, IdleStrategy::Event]
+        .into_iter()
+        .map(|idle| rest::measure(idle, cores, seconds))
+        .collect::<Result<_, _>>()?;
+    Ok(Measured { cases, costs, at_rest, schedule, cores })
+}
+
+/// Runs something in a thread of its own, which it may bind to a core: threads and processes
+/// that are started before are not bound with it.
+///
+/// # Errors
+///
+/// The work's own.
+pub fn in_thread<T: Send>(
+    work: impl FnOnce() -> Result<T, RigError> + Send,
+) -> Result<T, RigError> {
+    std::thread::scope(|scope| match scope.spawn(work).join() {
+        Ok(result) => result,
+        Err(panic) => std::panic::resume_unwind(panic),
+    })
+}
+
+/// Binds the calling thread to a core; without that the figures vary more, which is said.
+pub fn bind(core: usize) {
+    if let Err(error) = pin_to_core(core) {
+        eprintln!("dynocar-bench: not bound to core {core}, figures will vary more: {error}");
+    }
+}
+
+/// Gives the calling thread, and every thread it starts from then on, a real-time priority; without
+/// it the figures vary more, which is said.
+pub fn prioritise(priority: Option<u8>) {
+    if let Some(priority) = priority
+        && let Err(error) = set_fifo_priority(priority)
+    {
+        eprintln!("dynocar-bench: no priority {priority}, figures will vary more: {error}");
+    }
+}

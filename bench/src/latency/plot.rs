@@ -1,0 +1,92 @@
+//! The distributions as a picture: latency over the share of samples that took longer.
+
+use std::path::Path;
+
+use hdrhistogram::Histogram;
+use plotters::prelude::*;
+
+use super::Measured;
+use super::case::{Answerer, COMPARED, Case};
+use super::report::pooled;
+use crate::rig::RigError;
+
+const SIZE: (u32, u32) = (1_000, 640);
+/// Latencies shown, in µs.
+const SPAN_US: (f64, f64) = (0.2, 20_000.0);
+/// The axis runs over log10(1 / share of samples that took longer): 0 is all, 4 is 1 in 10,000.
+const NINES: f64 = 4.5;
+
+/// Draws the floors, the daemon's compared cases and the alternatives.
+///
+/// # Errors
+///
+/// When the file cannot be written.
+pub fn draw(measured: &Measured, file: &Path) -> Result<(), RigError> {
+    draw_into(measured, file)
+        .map_err(|error| RigError::File { path: file.into(), reason: error.to_string() })
+}
+
+fn draw_into(measured: &Measured, file: &Path) -> Result<(), Box<dyn std::error::Error>> {
+    let area = SVGBackend::new(file, SIZE).into_drawing_area();
+    area.fill(&WHITE)?;
+    let caption = format!("Sample → snapshot polled at {} Hz", measured.schedule.rate_hz);
+    let mut chart = ChartBuilder::on(&area)
+        .caption(caption, ("sans-serif", 22))
+        .margin(12)
+        .x_label_area_size(44)
+        .y_label_area_size(64)
+        .build_cartesian_2d(0.0..NINES, (SPAN_US.0..SPAN_US.1).log_scale())?;
+    chart
+        .configure_mesh()
+        .x_desc("quantile")
+        .y_desc("latency in µs")
+        .x_labels(6)
+        .x_label_formatter(&|nines| quantile_name(*nines))
+        .y_label_formatter(&|us| format!("{us}"))
+        .draw()?;
+    let shown = measured.cases.iter().filter(|(case, _)| is_shown(case));
+    for (place, (case, outcomes)) in shown.enumerate() {
+        let color = Palette99::pick(place).to_rgba();
+        let label = format!("{} ({})", case.name, case.idle);
+        chart
+            .draw_series(LineSeries::new(points(&pooled(outcomes)), color.stroke_width(2)))?
+            .label(label)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(2)));
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperLeft)
+        .background_style(WHITE.mix(0.85))
+        .border_style(BLACK.mix(0.3))
+        .label_font(("sans-serif", 13))
+        .draw()?;
+    area.present()?;
+    Ok(())
+}
+
+/// The other pipelines alone lie so near to each other that lines would hide lines.
+fn is_shown(case: &Case) -> bool {
+    match &case.answerer {
+        Answerer::Daemon { polled, .. } => *polled == COMPARED,
+        _ => true,
+    }
+}
+
+/// `90 %`, `99.9 %`: as many decimals as the quantile has nines beyond two.
+fn quantile_name(nines: f64) -> String {
+    let decimals = (nines.ceil() as usize).saturating_sub(2);
+    format!("{:.decimals$} %", 100.0 * (1.0 - 0.1_f64.powf(nines)))
+}
+
+fn points(histogram: &Histogram<u64>) -> Vec<(f64, f64)> {
+    // Beyond the longest latency there is nothing more to tell.
+    let last = (histogram.len().max(1) as f64).log10().min(NINES);
+    (0..=200)
+        .map(|step| f64::from(step) / 200.0 * NINES)
+        .filter(|&nines| nines <= last)
+        .map(|nines| {
+            let ns = histogram.value_at_quantile(1.0 - 0.1_f64.powf(nines));
+            (nines, ns as f64 * 1e-3)
+        })
+        .collect()
+}

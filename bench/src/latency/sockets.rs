@@ -1,0 +1,111 @@
+//! The alternatives' servers: the same estimator behind sockets.
+
+use std::io::ErrorKind;
+use std::os::unix::net::UnixDatagram;
+use std::path::Path;
+use std::sync::Arc;
+
+use dynocar::dataset::load_train;
+use dynocar_client::monotonic_now_ns;
+use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
+
+use super::bytes::{as_bytes, from_bytes};
+use crate::rig::{RigError, system};
+
+/// The controller's socket, in the site's folder.
+pub const CLIENT_SOCKET: &str = "client.socket";
+/// The server's socket, in the site's folder.
+pub const SERVER_SOCKET: &str = "server.socket";
+
+/// The server's address for ZeroMQ.
+pub fn zeromq_address(folder: &Path) -> String {
+    format!("ipc://{}/zeromq.socket", folder.display())
+}
+
+/// The estimator that every alternative runs, as the daemon builds it.
+///
+/// # Errors
+///
+/// When the train's file or a setting is wrong.
+pub fn pipeline(folder: &Path, train: TrainId) -> Result<Pipeline, RigError> {
+    let path = folder.join("train.toml");
+    let refused = |reason: String| RigError::File { path: path.clone(), reason };
+    let model = Arc::new(load_train(&path).map_err(|error| refused(error.to_string()))?);
+    let kind = PipelineKind::RegularisedRls;
+    let settings = EstimatorSettings::default_of(kind)
+        .ok_or_else(|| refused(format!("{kind} cannot be built")))?;
+    let estimator = settings.build(&model).map_err(|error| refused(error.to_string()))?;
+    Ok(Pipeline::new(train, 0, model, None, estimator))
+}
+
+fn answer<'a>(pipeline: &'a mut Pipeline, sample: &TrainSample) -> &'a ParameterSnapshot {
+    pipeline.process(sample);
+    let snapshot = pipeline.snapshot_mut();
+    snapshot.published_ns = monotonic_now_ns();
+    snapshot
+}
+
+/// Answers datagrams until killed; `blocks` waits in the kernel instead of asking again.
+///
+/// # Errors
+///
+/// When the system refuses the socket.
+pub fn serve_datagrams(
+    folder: &Path,
+    mut pipeline: Pipeline,
+    blocks: bool,
+) -> Result<(), RigError> {
+    let socket = UnixDatagram::bind(folder.join(SERVER_SOCKET)).map_err(system("bind"))?;
+    socket.set_nonblocking(!blocks).map_err(system("socket mode"))?;
+    let client = folder.join(CLIENT_SOCKET);
+    let mut bytes = [0; size_of::<TrainSample>()];
+    loop {
+        match socket.recv(&mut bytes) {
+            Ok(count) => {
+                let Some(sample) = from_bytes::<TrainSample>(&bytes[..count]) else { continue };
+                // A controller that does not read loses its answer.
+                let _ = socket.send_to(as_bytes(answer(&mut pipeline, &sample)), &client);
+            }
+            Err(error) if error.kind() == ErrorKind::WouldBlock => std::hint::spin_loop(),
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(error) => return Err(system("receiving a datagram")(error)),
+        }
+    }
+}
+
+/// Answers ZeroMQ messages until killed; `pin` is called once the library's own threads run, so
+/// that they are not bound to the same core.
+///
+/// # Errors
+///
+/// When the library refuses.
+pub fn serve_zeromq(
+    folder: &Path,
+    mut pipeline: Pipeline,
+    blocks: bool,
+    pin: impl FnOnce(),
+) -> Result<(), RigError> {
+    let socket = zmq::Context::new().socket(zmq::PAIR)?;
+    socket.set_linger(0)?;
+    socket.bind(&zeromq_address(folder))?;
+    pin();
+    let flags = if blocks { 0 } else { zmq::DONTWAIT };
+    let mut bytes = [0; size_of::<TrainSample>()];
+    loop {
+        match socket.recv_into(&mut bytes, flags) {
+            Ok(count) => {
+                let bytes = &bytes[..count.min(size_of::<TrainSample>())];
+                let Some(sample) = from_bytes::<TrainSample>(bytes) else { continue };
+                match socket.send(as_bytes(answer(&mut pipeline, &sample)), zmq::DONTWAIT) {
+                    // A controller that does not read loses its answer.
+                    Ok(()) | Err(zmq::Error::EAGAIN) => {}
+                    Err(error) => return Err(error.into()),
+                }
+            }
+            Err(zmq::Error::EAGAIN) => std::hint::spin_loop(),
+            Err(zmq::Error::EINTR) => {}
+            Err(error) => return Err(error.into()),
+        }
+    }
+}

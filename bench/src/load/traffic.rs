@@ -1,0 +1,129 @@
+//! When a train's samples leave, and which of them are bad.
+
+use dynocar_shared::{SampleField, TrainId, TrainSample};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::rig::motion::Motion;
+
+/// The traffic of every train.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrafficPlan {
+    /// Samples a second of each train.
+    pub rate_hz: f64,
+    /// Greatest delay of a sample, as a share of the period.
+    pub jitter: f64,
+    /// Samples that are gathered and leave at once; the mean rate stays.
+    pub burst: u64,
+    /// Share of samples that no validation should pass.
+    pub bad_share: f64,
+}
+
+/// One train's samples in order, each with the time at which it is to leave.
+#[derive(Clone, Debug)]
+pub struct Traffic {
+    plan: TrafficPlan,
+    motion: Motion,
+    random: ChaCha8Rng,
+    start_ns: i64,
+    number: u64,
+    next_ns: i64,
+}
+
+impl Traffic {
+    /// Traffic from a time on; trains start evenly spread over the first period.
+    pub fn new(plan: TrafficPlan, train: TrainId, spread: f64, start_ns: i64, seed: u64) -> Self {
+        let start_ns = start_ns + (spread * 1e9 / plan.rate_hz) as i64;
+        let random = ChaCha8Rng::seed_from_u64(seed ^ train.0.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let mut traffic = Traffic {
+            plan,
+            motion: Motion::of(train, start_ns),
+            random,
+            start_ns,
+            number: 0,
+            next_ns: start_ns,
+        };
+        traffic.appoint();
+        traffic
+    }
+
+    /// When the next sample is to leave, in ns.
+    pub fn next_ns(&self) -> i64 {
+        self.next_ns
+    }
+
+    /// The next sample, with the time it was to leave.
+    pub fn take(&mut self) -> (TrainSample, i64) {
+        let mut sample = self.motion.sample(self.measured_ns(self.number));
+        if self.plan.bad_share > 0.0 && self.random.random::<f64>() < self.plan.bad_share {
+            spoil(&mut sample, self.random.random_range(0..KINDS_OF_BAD));
+        }
+        let appointed_ns = self.next_ns;
+        self.number += 1;
+        self.appoint();
+        (sample, appointed_ns)
+    }
+
+    fn measured_ns(&self, number: u64) -> i64 {
+        self.start_ns + (number as f64 * 1e9 / self.plan.rate_hz) as i64
+    }
+
+    /// A burst leaves with its last sample; samples never overtake each other.
+    fn appoint(&mut self) {
+        let burst = self.plan.burst.max(1);
+        let last_of_burst = (self.number / burst + 1) * burst - 1;
+        let jitter_ns = match self.number % burst {
+            0 => self.random.random::<f64>() * self.plan.jitter * 1e9 / self.plan.rate_hz,
+            _ => 0.0,
+        };
+        let appointed_ns = self.measured_ns(last_of_burst) + jitter_ns as i64;
+        self.next_ns = appointed_ns.max(self.next_ns);
+    }
+}
+
+const KINDS_OF_BAD: u32 = 5;
+
+fn spoil(sample: &mut TrainSample, kind: u32) {
+    match kind {
+        0 => sample.speed_mps = f64::NAN,
+        1 => sample.speed_mps = 500.0,
+        2 => sample.traction_force_n = -1.0,
+        3 => sample.valid &= !SampleField::Speed.bit(),
+        _ => sample.time_ns -= 3_600_000_000_000,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynocar_core::validation::{ValidationLimits, Validator};
+
+    const TRAIN: TrainId = TrainId(2);
+
+    fn plan() -> TrafficPlan {
+        TrafficPlan { rate_hz: 1_000.0, jitter: 0.5, burst: 8, bad_share: 0.1 }
+    }
+
+    #[test]
+    fn samples_leave_in_order_in_bursts_and_at_the_mean_rate() {
+        let mut traffic = Traffic::new(plan(), TRAIN, 0.0, 0, 1);
+        let times: Vec<i64> = (0..8_000).map(|_| traffic.take().1).collect();
+        assert!(times.is_sorted());
+        assert!(times.chunks(8).all(|burst| burst.iter().all(|&time| time == burst[0])));
+        let seconds = times[times.len() - 1] as f64 * 1e-9;
+        assert!((seconds - 8.0).abs() < 0.01, "{seconds}");
+    }
+
+    #[test]
+    fn the_bad_share_is_refused_and_nothing_else() {
+        let mut traffic = Traffic::new(plan(), TRAIN, 0.0, 1_000_000_000, 1);
+        let mut validator = Validator::new(TRAIN, 200e3, ValidationLimits::for_train(200e3));
+        let mut refused = 0.0;
+        for number in 1..=20_000 {
+            let (mut sample, _) = traffic.take();
+            sample.sequence = number;
+            refused += f64::from(u8::from(validator.check(&sample).is_err()));
+        }
+        assert!((refused / 20_000.0 - 0.1).abs() < 0.01, "{refused}");
+    }
+}

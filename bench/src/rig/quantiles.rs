@@ -1,0 +1,108 @@
+//! Histograms of latencies, and what is told of them.
+
+use hdrhistogram::Histogram;
+use serde::Serialize;
+
+/// The longest latency told apart, in ns.
+const LONGEST_NS: u64 = 60_000_000_000;
+
+/// A histogram of latencies from 1 ns to a minute, to three digits.
+///
+/// # Panics
+///
+/// Never: the bounds are constants that the library takes.
+pub fn histogram() -> Histogram<u64> {
+    Histogram::new_with_bounds(1, LONGEST_NS, 3).expect("constant bounds")
+}
+
+/// Adds a latency; one below 1 ns or above a minute counts as that.
+pub fn record(histogram: &mut Histogram<u64>, latency_ns: i64) {
+    histogram.saturating_record(latency_ns.clamp(1, LONGEST_NS as i64) as u64);
+}
+
+/// What is told of a histogram, in ns.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Quantiles {
+    /// Number of latencies.
+    pub count: u64,
+    /// Median.
+    pub p50_ns: u64,
+    /// 99 %.
+    pub p99_ns: u64,
+    /// 99.9 %.
+    pub p999_ns: u64,
+    /// 99.99 %.
+    pub p9999_ns: u64,
+    /// The longest.
+    pub max_ns: u64,
+}
+
+impl Quantiles {
+    /// Of a histogram.
+    pub fn of(histogram: &Histogram<u64>) -> Self {
+        Quantiles {
+            count: histogram.len(),
+            p50_ns: histogram.value_at_quantile(0.5),
+            p99_ns: histogram.value_at_quantile(0.99),
+            p999_ns: histogram.value_at_quantile(0.999),
+            p9999_ns: histogram.value_at_quantile(0.9999),
+            max_ns: histogram.max(),
+        }
+    }
+}
+
+/// The middle of some numbers; NaN of none.
+pub fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    match values.len() {
+        0 => f64::NAN,
+        count if count % 2 == 1 => values[count / 2],
+        count => 0.5 * (values[count / 2 - 1] + values[count / 2]),
+    }
+}
+
+/// A time in ns for people: `812 ns`, `4.31 µs`, `2.20 ms`.
+pub fn for_people(ns: f64) -> String {
+    match ns {
+        ns if ns < 1e3 => format!("{ns:.0} ns"),
+        ns if ns < 1e6 => format!("{:.2} µs", ns * 1e-3),
+        ns if ns < 1e9 => format!("{:.2} ms", ns * 1e-6),
+        ns => format!("{:.2} s", ns * 1e-9),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_of_a_thousand_steps_are_the_steps() {
+        let mut steps = histogram();
+        for ns in 1..=1000 {
+            record(&mut steps, ns);
+        }
+        let quantiles = Quantiles::of(&steps);
+        assert_eq!((quantiles.count, quantiles.max_ns), (1000, 1000));
+        assert_eq!((quantiles.p50_ns, quantiles.p99_ns, quantiles.p999_ns), (500, 990, 999));
+    }
+
+    #[test]
+    fn a_clock_that_seems_to_run_back_counts_as_one_nanosecond() {
+        let mut histogram = histogram();
+        record(&mut histogram, -5);
+        assert_eq!(histogram.max(), 1);
+    }
+
+    #[test]
+    fn the_median_of_an_even_number_lies_between() {
+        assert_eq!(median(vec![3.0, 1.0, 10.0, 2.0]), 2.5);
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
+        assert!(median(Vec::new()).is_nan());
+    }
+
+    #[test]
+    fn times_are_told_in_a_fitting_unit() {
+        let told = [812.0, 4_310.0, 2.2e6].map(for_people);
+        assert_eq!(told, ["812 ns", "4.31 µs", "2.20 ms"]);
+    }
+}

@@ -1,0 +1,94 @@
+//! Keeping the daemon's memory resident.
+//!
+//! A page that is touched for the first time, or that was put aside, costs a thread a fault. Locked
+//! memory is filled in as it is mapped, shared-memory segments and stacks included, and stays.
+
+use rustix::mm::{MlockAllFlags, mlockall};
+use rustix::process::{Resource, getrlimit};
+use rustix::thread::{CapabilitySet, capabilities};
+
+/// Stack of a pipeline thread in bytes: opening the transport's ports takes more than half a MiB
+/// of it. Locked memory holds all of it.
+pub const STACK_BYTES: usize = 2 * 1024 * 1024;
+/// Stack that is touched before a thread works, in bytes.
+const PREFAULT_BYTES: usize = 256 * 1024;
+const PAGE_BYTES: usize = 4096;
+
+/// Why memory is not locked.
+#[derive(Debug, thiserror::Error)]
+pub enum LockError {
+    /// The limit is finite: later mappings would fail at it.
+    #[error(
+        "this process may lock {limit_bytes} bytes; it needs CAP_IPC_LOCK or no such limit \
+         (systemd: LimitMEMLOCK=infinity)"
+    )]
+    Limit {
+        /// The limit of this process.
+        limit_bytes: u64,
+    },
+    /// The system refused.
+    #[error("{0}")]
+    Refused(#[from] std::io::Error),
+}
+
+/// Locks all present and coming memory of the process, and keeps what is freed on the heap.
+///
+/// # Errors
+///
+/// When the process may not lock without limit: with a limit, a mapping that comes later would
+/// fail once it is reached, and no lock at all is the lesser evil.
+pub fn lock_all_memory() -> Result<(), LockError> {
+    let is_capable =
+        capabilities(None).is_ok_and(|sets| sets.effective.contains(CapabilitySet::IPC_LOCK));
+    if let Some(limit_bytes) = getrlimit(Resource::Memlock).current.filter(|_| !is_capable) {
+        return Err(LockError::Limit { limit_bytes });
+    }
+    keep_freed_memory();
+    mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(std::io::Error::from)?;
+    Ok(())
+}
+
+/// The allocator gives nothing back to the system and maps nothing apart: memory that was once
+/// used stays mapped.
+#[cfg(target_env = "gnu")]
+fn keep_freed_memory() {
+    // SAFETY: both parameters may be set at any time; a refusal leaves the default.
+    unsafe {
+        libc::mallopt(libc::M_TRIM_THRESHOLD, -1);
+        libc::mallopt(libc::M_MMAP_MAX, 0);
+    }
+}
+
+#[cfg(not(target_env = "gnu"))]
+fn keep_freed_memory() {}
+
+/// Touches the part of the calling thread's stack that its work may need, locked or not.
+pub fn prefault_stack() {
+    let mut pages = [0_u8; PREFAULT_BYTES];
+    for page in pages.chunks_mut(PAGE_BYTES) {
+        page[0] = 1;
+        std::hint::black_box(&mut *page);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_limit_is_named_in_words_with_the_remedy() {
+        let message = LockError::Limit { limit_bytes: 8192 }.to_string();
+        assert!(message.contains("8192 bytes") && message.contains("CAP_IPC_LOCK"), "{message}");
+    }
+
+    #[test]
+    fn the_touched_stack_fits_into_a_threads_stack() {
+        const { assert!(PREFAULT_BYTES <= STACK_BYTES / 2) };
+        std::thread::Builder::new()
+            .stack_size(STACK_BYTES)
+            .spawn(prefault_stack)
+            .unwrap()
+            .join()
+            .unwrap();
+    }
+}

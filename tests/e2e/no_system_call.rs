@@ -1,0 +1,51 @@
+//! A controller's cycle makes no system call while the pipelines are awake: the kernel itself
+//! watches, and kills who makes one.
+
+use dynocar_tests::process::{Process, Site};
+
+const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
+const PEER: &str = env!("CARGO_BIN_EXE_dynocar-sealed-peer");
+
+const BUSY: &str = "idle = \"busy\"";
+/// Falls asleep when no sample has come for a second.
+const ADAPTIVE: &str = "idle = \"adaptive\"\nspin_us = 1000000";
+const ECHO: &str = "[[pipelines]]\nkind = \"echo\"\n";
+
+/// A daemon that is awake, and a sealed controller doing something.
+fn sealed(site: &Site, idle: &str, what: &str) -> (Process, Process) {
+    let config = site.write_config(1, idle, ECHO);
+    let daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().expect("UTF-8")]);
+    daemon.await_error("serving");
+    (daemon, site.start(PEER, &[what, "1"]))
+}
+
+fn news(peer: &mut Process) -> u64 {
+    let status = peer.wait();
+    assert!(status.success(), "{status}: {}", peer.errors());
+    peer.await_line("a number", |line| !line.is_empty()).parse().expect("a number")
+}
+
+#[test]
+fn the_seal_kills_at_a_system_call() {
+    use std::os::unix::process::ExitStatusExt;
+    let site = Site::new();
+    let (_daemon, mut peer) = sealed(&site, BUSY, "call");
+    assert_eq!(peer.wait().signal(), Some(libc::SIGSYS), "{}", peer.errors());
+}
+
+#[test]
+fn a_poll_without_news_makes_no_system_call() {
+    let site = Site::new();
+    let (_daemon, mut peer) = sealed(&site, BUSY, "poll");
+    // Nothing is published meanwhile; one answer to what was published before may be on its way.
+    assert!(news(&mut peer) <= 1);
+}
+
+#[test]
+fn publish_and_poll_make_no_system_call_while_the_daemon_is_awake() {
+    for idle in [BUSY, ADAPTIVE] {
+        let site = Site::new();
+        let (_daemon, mut peer) = sealed(&site, idle, "cycle");
+        assert!(news(&mut peer) >= 50, "{idle}");
+    }
+}

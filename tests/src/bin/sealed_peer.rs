@@ -1,0 +1,92 @@
+//! A controller that the kernel kills at its first system call.
+//!
+//! `dynocar-sealed-peer WHAT TRAIN` connects, warms up, lets the kernel forbid every system call
+//! but writing and leaving, and then does WHAT again and again: `poll`, `cycle` (publish and poll,
+//! until there was news often enough) or `call`, which makes a system call to show that the seal
+//! holds. Who is still alive then writes how often there was news.
+
+use std::time::{Duration, Instant};
+
+use dynocar_client::{Host, SamplePublisher, SnapshotReader, monotonic_now_ns};
+use dynocar_shared::{SampleField, TrainId, TrainSample};
+
+/// The ports connect with the first messages, and a new controller wakes every thread that it
+/// knows nothing of for half a second.
+const WARM_UP: Duration = Duration::from_millis(1_200);
+const CALLS: u64 = 20_000;
+const NEWS: u64 = 50;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [what, train] = &arguments[..] else {
+        panic!("expected: poll|cycle|call TRAIN, got {arguments:?}");
+    };
+    let train = TrainId(train.parse().expect("a train number"));
+    let host = Host::from_environment().expect("a run-time directory");
+    let mut reader = SnapshotReader::open(&host, train).expect("a reader");
+    let mut publisher = SamplePublisher::open(&host, train).expect("a publisher");
+    let start = Instant::now();
+    let mut news = 0;
+    while start.elapsed() < WARM_UP || news < NEWS {
+        news += cycle(&mut publisher, &mut reader, train);
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    seal();
+    let (mut calls, mut news) = (0, 0);
+    while calls < CALLS || (what == "cycle" && news < NEWS) {
+        calls += 1;
+        match what.as_str() {
+            "poll" => news += reader.poll() as u64,
+            "cycle" => news += cycle(&mut publisher, &mut reader, train),
+            _ => {
+                // SAFETY: the call takes nothing and changes nothing.
+                unsafe { libc::getppid() };
+            }
+        }
+    }
+    leave(news);
+}
+
+/// Publishes and polls; gives the number of snapshots that told something new.
+fn cycle(publisher: &mut SamplePublisher, reader: &mut SnapshotReader, train: TrainId) -> u64 {
+    let mut sample = TrainSample::empty(train).with(SampleField::Speed, 20.0);
+    sample.time_ns = monotonic_now_ns();
+    publisher.publish(&mut sample).expect("a sample to be taken");
+    reader.poll() as u64
+}
+
+/// Has the kernel kill this process at every system call but `write` and `exit_group`.
+fn seal() {
+    let statement = |code: u32, k: u32| libc::sock_filter { code: code as u16, jt: 0, jf: 0, k };
+    let skip_if = |number: libc::c_long, jump: u8| libc::sock_filter {
+        code: (libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K) as u16,
+        jt: jump,
+        jf: 0,
+        k: number as u32,
+    };
+    let mut filter = [
+        // The system call's number is the first word of what the filter sees.
+        statement(libc::BPF_LD | libc::BPF_W | libc::BPF_ABS, 0),
+        skip_if(libc::SYS_write, 2),
+        skip_if(libc::SYS_exit_group, 1),
+        statement(libc::BPF_RET | libc::BPF_K, libc::SECCOMP_RET_KILL_PROCESS),
+        statement(libc::BPF_RET | libc::BPF_K, libc::SECCOMP_RET_ALLOW),
+    ];
+    let program = libc::sock_fprog { len: filter.len() as u16, filter: filter.as_mut_ptr() };
+    rustix::thread::set_no_new_privs(true).expect("no new privileges");
+    // SAFETY: `program` and the filter it points to outlive the call, which copies them.
+    let answer = unsafe {
+        libc::prctl(libc::PR_SET_SECCOMP, libc::SECCOMP_MODE_FILTER, std::ptr::from_ref(&program))
+    };
+    assert_eq!(answer, 0, "the seal: {}", std::io::Error::last_os_error());
+}
+
+/// Writes the number and leaves without a further system call.
+fn leave(news: u64) -> ! {
+    let line = format!("{news}\n");
+    // SAFETY: the buffer is valid for its length, and descriptor 1 is this process's own.
+    unsafe {
+        libc::write(1, line.as_ptr().cast(), line.len());
+        libc::_exit(0)
+    }
+}
