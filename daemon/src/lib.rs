@@ -10,6 +10,7 @@
 //! - [`demo`]: the main job as a show
 //! - [`run`]: the daemon, every stage on one screen
 //! - [`runtime`]: its threads
+//! - [`state`]: estimates that outlive the daemon
 //! - [`replay`]: recorded runs into the sample channel
 
 pub mod cli;
@@ -21,3 +22,4 @@ pub mod identify;
 pub mod replay;
 pub mod run;
 pub mod runtime;
+pub mod state;

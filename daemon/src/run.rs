@@ -21,6 +21,7 @@ use crate::runtime::affinity::pin_to_core;
 use crate::runtime::tally::Tally;
 use crate::runtime::watch::{Watch, WatchedPipeline};
 use crate::runtime::worker::{LanePlan, Worker, WorkerPlan};
+use crate::state::{self, keeper::Keeper};
 
 /// Why the daemon could not start or had to stop.
 #[derive(Debug, thiserror::Error)]
@@ -67,8 +68,10 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
         .collect::<Result<Vec<_>, _>>()?;
     // Grows with every start: the monotonic clock is common to all processes of the host.
     let epoch = monotonic_now_ns() as u64;
-    let (plans, watched) = plan_workers(config, &host, epoch, &stop)?;
+    let state = state::Taken::up(config);
+    let (plans, watched) = plan_workers(config, &host, epoch, &stop, state.as_ref())?;
     let workers = start_workers(plans)?;
+    let keeper = state.map(|state| start_keeper(config, &host, state, &stop)).transpose()?;
     info!(epoch, trains = trains.len(), pipelines = config.pipelines.len(), "serving");
 
     let mut watch = Watch::new(host, trains, watched);
@@ -79,6 +82,9 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     for worker in workers {
         // A panic was already printed by the thread itself; `ended` names it below.
         let _ = worker.join();
+    }
+    if let Some(keeper) = keeper {
+        let _ = keeper.join();
     }
     watch.report_totals();
     match ended {
@@ -102,6 +108,7 @@ fn plan_workers(
     host: &Host,
     epoch: u64,
     stop: &Arc<AtomicBool>,
+    state: Option<&state::Taken<'_>>,
 ) -> Result<(Vec<WorkerPlan>, Vec<WatchedPipeline>), RunError> {
     let mut plans: Vec<WorkerPlan> = config
         .threads
@@ -118,8 +125,17 @@ fn plan_workers(
         .collect();
     let mut watched = Vec::new();
     for (index, settings) in config.pipelines.iter().enumerate() {
-        for train in config.trains.iter().filter(|train| settings.trains.contains(&train.id)) {
-            let pipeline = build_pipeline(settings, index as u32, train)?;
+        for (place, train) in config.trains.iter().enumerate() {
+            if !settings.trains.contains(&train.id) {
+                continue;
+            }
+            let mut pipeline = build_pipeline(settings, index as u32, train)?;
+            let kept = state.and_then(|it| {
+                state::warm_start_of(it.config, &it.stored[place], settings, state::unix_now_s())
+            });
+            if let Some(kept) = kept {
+                pipeline.warm_start(&kept);
+            }
             let tally = Arc::new(Tally::default());
             let name = settings.name.clone();
             watched.push(WatchedPipeline { name, train: train.id, tally: Arc::clone(&tally) });
@@ -163,6 +179,24 @@ fn start_workers(plans: Vec<WorkerPlan>) -> Result<Vec<JoinHandle<()>>, RunError
     drop(told);
     started.iter().collect::<Result<(), _>>()?;
     Ok(workers)
+}
+
+/// Starts the thread that keeps validated estimates.
+fn start_keeper(
+    config: &DaemonConfig,
+    host: &Host,
+    state: state::Taken<'_>,
+    stop: &Arc<AtomicBool>,
+) -> Result<JoinHandle<()>, RunError> {
+    let (config, stop, host) = (config.clone(), Arc::clone(stop), host.clone());
+    let (state, stored) = (state.config.clone(), state.stored);
+    std::thread::Builder::new()
+        .name("state".into())
+        .spawn(move || match Keeper::new(&config, &state, &host, stored, stop) {
+            Ok(mut keeper) => keeper.run(),
+            Err(error) => warn!("no state is kept: {error}"),
+        })
+        .map_err(|source| RunError::System { what: "state thread", source })
 }
 
 fn work(plan: WorkerPlan, told: Sender<Result<(), ChannelError>>) {

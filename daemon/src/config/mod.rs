@@ -55,6 +55,19 @@ pub struct TrainConfig {
     pub model: Arc<TrainModel>,
     /// The line it runs on, when known.
     pub track: Option<Arc<Track>>,
+    /// Which wheels it runs on; estimates are not kept across a change. Empty when not told.
+    pub wheel_set: String,
+}
+
+/// Where and how estimates are kept over restarts.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StateConfig {
+    /// Directory of the state files.
+    pub directory: PathBuf,
+    /// How often they are written, in s.
+    pub interval_s: u64,
+    /// An older estimate is not taken up, in h.
+    pub age_max_h: u64,
 }
 
 /// A thread that serves pipelines.
@@ -98,6 +111,8 @@ pub struct DaemonConfig {
     pub trains: Vec<TrainConfig>,
     /// The threads.
     pub threads: Vec<ThreadConfig>,
+    /// Estimates that outlive the daemon; none are kept when absent.
+    pub state: Option<StateConfig>,
     /// The pipelines, by the number that their snapshots carry.
     pub pipelines: Vec<PipelineConfig>,
 }

@@ -10,7 +10,8 @@ use dynocar_shared::{PipelineKind, TrainId};
 use serde::Deserialize;
 
 use super::{
-    ConfigError, DaemonConfig, IdleStrategy, LogFormat, PipelineConfig, ThreadConfig, TrainConfig,
+    ConfigError, DaemonConfig, IdleStrategy, LogFormat, PipelineConfig, StateConfig, ThreadConfig,
+    TrainConfig,
 };
 use crate::dataset::{load_track, load_train};
 
@@ -28,6 +29,7 @@ struct RawConfig {
     threads: Vec<RawThread>,
     #[serde(default)]
     pipelines: Vec<RawPipeline>,
+    state: Option<RawState>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -60,6 +62,26 @@ struct RawTrain {
     id: u64,
     file: PathBuf,
     track: Option<PathBuf>,
+    #[serde(default)]
+    wheel_set: String,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawState {
+    directory: PathBuf,
+    #[serde(default = "default_interval_s")]
+    interval_s: u64,
+    #[serde(default = "default_age_max_h")]
+    age_max_h: u64,
+}
+
+const fn default_interval_s() -> u64 {
+    30
+}
+
+const fn default_age_max_h() -> u64 {
+    7 * 24
 }
 
 #[derive(Debug, Deserialize)]
@@ -134,9 +156,24 @@ pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
         log_format: raw.daemon.log_format,
         spin_us: checker.range("daemon.spin_us", raw.daemon.spin_us, 0, 1_000_000)?,
         heartbeat_ms: checker.range("daemon.heartbeat_ms", raw.daemon.heartbeat_ms, 5, 100)?,
+        state: raw.state.map(|state| check_state(&checker, state)).transpose()?,
         trains,
         threads,
         pipelines,
+    })
+}
+
+/// Checks where estimates are kept; the directory must be there when the daemon starts.
+fn check_state(checker: &Checker, raw: RawState) -> Result<StateConfig, ConfigError> {
+    let folder = checker.path.parent().unwrap_or(Path::new("."));
+    let directory = folder.join(&raw.directory);
+    if !directory.is_dir() {
+        return checker.refuse("state.directory", raw.directory.display(), "an existing directory");
+    }
+    Ok(StateConfig {
+        directory,
+        interval_s: checker.range("state.interval_s", raw.interval_s, 1, 3_600)?,
+        age_max_h: checker.range("state.age_max_h", raw.age_max_h, 1, 10_000)?,
     })
 }
 
@@ -156,6 +193,7 @@ fn check_trains(checker: &Checker, raw: Vec<RawTrain>) -> Result<Vec<TrainConfig
                 id: TrainId(train.id),
                 model: Arc::new(load_train(&folder.join(train.file))?),
                 track: track.map(Arc::new),
+                wheel_set: train.wheel_set,
             })
         })
         .collect()

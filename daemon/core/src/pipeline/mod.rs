@@ -7,6 +7,7 @@ pub mod braking;
 mod echo;
 mod estimator;
 mod innovation;
+mod kept;
 pub mod mass;
 pub mod monitor;
 pub mod output;
@@ -17,6 +18,7 @@ pub mod trajectory;
 pub use echo::Echo;
 pub use estimator::{Estimator, Outcome};
 pub use innovation::InnovationMonitor;
+pub use kept::{KeptEstimate, NotKept};
 pub use settings::{EstimatorSettings, SettingError};
 
 use std::sync::Arc;
@@ -57,6 +59,14 @@ impl Pipeline {
             estimator,
             snapshot,
         }
+    }
+
+    /// Starts from an estimate kept from earlier, before the first sample; false when the
+    /// estimator has no use for it.
+    pub fn warm_start(&mut self, kept: &KeptEstimate) -> bool {
+        let is_taken = self.estimator.warm_start(kept);
+        self.estimator.write(&mut self.snapshot);
+        is_taken
     }
 
     /// Takes one sample and gives the snapshot after it.
