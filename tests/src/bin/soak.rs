@@ -1,9 +1,11 @@
 //! Seeded faults for as long as one likes.
 //!
 //! `dynocar-soak state --rounds 1000 --seed 1`: `kill -9` while a state file is written.
+//! `dynocar-soak golden`: makes `tests/golden/demo.txt` anew, after a change that is meant.
 
 use std::collections::HashMap;
 
+use dynocar_tests::golden;
 use dynocar_tests::soak::{Programs, state_kills};
 
 fn main() {
@@ -23,6 +25,11 @@ fn main() {
             let states = state_kills::kill_writers(&programs.peer, rounds, seed);
             println!("{rounds} kills among {states} writes, every state readable");
         }
-        other => panic!("{other:?}: expected state"),
+        "golden" => {
+            let text = golden::compute().to_text();
+            std::fs::write(golden::path(), text).expect("the golden file to be written");
+            println!("{} made anew", golden::path().display());
+        }
+        other => panic!("{other:?}: expected state or golden"),
     }
 }
