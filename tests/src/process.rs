@@ -82,10 +82,25 @@ impl Site {
     ///
     /// When it cannot be started.
     pub fn start(&self, program: &str, arguments: &[&str]) -> Process {
+        self.start_with(program, arguments, &[])
+    }
+
+    /// Starts a program on this site with more environment variables.
+    ///
+    /// # Panics
+    ///
+    /// When it cannot be started.
+    pub fn start_with(
+        &self,
+        program: &str,
+        arguments: &[&str],
+        variables: &[(&str, &str)],
+    ) -> Process {
         let errors = self.path().join(format!("stderr-{}", unique_number()));
         let mut child = Command::new(program)
             .args(arguments)
             .env(ROOT_VARIABLE, self.root())
+            .envs(variables.iter().copied())
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(File::create(&errors).expect("a file for standard error"))
@@ -194,6 +209,30 @@ impl Process {
             assert!(start.elapsed() < WATCHDOG, "still running; it said:\n{}", self.errors());
             std::thread::sleep(Duration::from_millis(5));
         }
+    }
+
+    /// Its process id.
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Its exit status, if it has ended.
+    ///
+    /// # Panics
+    ///
+    /// When the system does not tell.
+    pub fn try_wait(&mut self) -> Option<ExitStatus> {
+        self.child.try_wait().expect("an exit status")
+    }
+
+    /// Everything that a program which has ended wrote to standard output.
+    ///
+    /// # Panics
+    ///
+    /// After [`WATCHDOG`], when somebody else keeps the output open.
+    pub fn output(&self) -> String {
+        await_true(|| Arc::strong_count(&self.lines) == 1, || "the end of the output".into());
+        self.lines().join("\n")
     }
 
     /// Its standard output so far.

@@ -111,6 +111,8 @@ pub struct DaemonConfig {
     pub trains: Vec<TrainConfig>,
     /// The threads.
     pub threads: Vec<ThreadConfig>,
+    /// Loopback address that hands out metrics; none when absent.
+    pub metrics: Option<std::net::SocketAddr>,
     /// Estimates that outlive the daemon; none are kept when absent.
     pub state: Option<StateConfig>,
     /// The pipelines, by the number that their snapshots carry.

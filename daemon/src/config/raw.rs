@@ -1,6 +1,7 @@
 //! From the text of a configuration to a checked [`DaemonConfig`].
 
 use std::collections::HashSet;
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -30,6 +31,13 @@ struct RawConfig {
     #[serde(default)]
     pipelines: Vec<RawPipeline>,
     state: Option<RawState>,
+    metrics: Option<RawMetrics>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawMetrics {
+    listen: String,
 }
 
 #[derive(Debug, Deserialize)]
@@ -156,11 +164,23 @@ pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
         log_format: raw.daemon.log_format,
         spin_us: checker.range("daemon.spin_us", raw.daemon.spin_us, 0, 1_000_000)?,
         heartbeat_ms: checker.range("daemon.heartbeat_ms", raw.daemon.heartbeat_ms, 5, 100)?,
+        metrics: raw.metrics.map(|metrics| check_metrics(&checker, metrics)).transpose()?,
         state: raw.state.map(|state| check_state(&checker, state)).transpose()?,
         trains,
         threads,
         pipelines,
     })
+}
+
+/// Checks where metrics are handed out: on this host only.
+fn check_metrics(checker: &Checker, raw: RawMetrics) -> Result<SocketAddr, ConfigError> {
+    match raw.listen.parse::<SocketAddr>() {
+        Ok(address) if address.ip().is_loopback() => Ok(address),
+        _ => {
+            let allowed = "a loopback address with a port, as 127.0.0.1:9464";
+            checker.refuse("metrics.listen", raw.listen, allowed)
+        }
+    }
 }
 
 /// Checks where estimates are kept; the directory must be there when the daemon starts.
