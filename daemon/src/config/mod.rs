@@ -164,6 +164,16 @@ impl DaemonConfig {
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| ConfigError::Unreadable { path: path.into(), source })?;
-        raw::check(path, &text)
+        DaemonConfig::from_text(path, &text)
+    }
+
+    /// Checks the text of a configuration, and the train and track files it names; `path` is the
+    /// file it came from.
+    ///
+    /// # Errors
+    ///
+    /// See [`ConfigError`].
+    pub fn from_text(path: &Path, text: &str) -> Result<Self, ConfigError> {
+        raw::check(path, text)
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! `dynocar-test-peer controller TRAIN PERIOD_US` publishes for ever and prints each hundredth
 //! sequence number; `dynocar-test-peer client TRAIN PERIOD_US` polls for ever and prints one line
-//! a poll: epoch, sequence, sample sequence, used, lost, age in ms, stale, status, poll time in ns.
+//! a poll: epoch, sequence, sample sequence, used, lost, age in ms, stale, status, time of the
+//! poll and its length in ns.
 //! `dynocar-test-peer state-writer FOLDER` replaces a state file for ever.
 
 use std::io::Write;
@@ -68,7 +69,7 @@ fn poll(host: &Host, train: TrainId, period: Duration) {
                 let it = reading.snapshot;
                 writeln!(
                     out,
-                    "{} {} {} {} {} {} {} {} {poll_ns}",
+                    "{} {} {} {} {} {} {} {} {now_ns} {poll_ns}",
                     it.epoch,
                     it.sequence,
                     it.sample_sequence,

@@ -4,8 +4,12 @@
 //!
 //! # Layout
 //!
+//! - [`bad_samples`]: every pipeline under every failure of its sensors
+//! - [`faults`]: kills, stops and restarts of daemon, controller and client
 //! - [`state_kills`]: `kill -9` while a state file is written
 
+pub mod bad_samples;
+pub mod faults;
 pub mod state_kills;
 
 use std::path::{Path, PathBuf};
