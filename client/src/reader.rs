@@ -64,10 +64,12 @@ impl SnapshotReader {
     pub fn open(host: &Host, train: TrainId) -> Result<Self, ChannelError> {
         Peer::look_up(host, train, Role::Daemon)?.require_compatible(train, Role::Controller)?;
         let transport = Transport::open(host, "dynocar-reader")?;
+        let receiver = transport.receiver::<ParameterSnapshot>(train)?;
+        transport.reserve()?;
         Ok(SnapshotReader {
             host: host.clone(),
             train,
-            receiver: transport.receiver::<ParameterSnapshot>(train)?,
+            receiver,
             latest: Box::new([None; PIPELINES_MAX]),
             stale_after_ns: STALE_AFTER_NS,
             refused: 0,

@@ -52,6 +52,7 @@ impl Transport {
         set_log_level_from_env_or(iceoryx2::prelude::LogLevel::Fatal);
         let refused = |reason: String| ChannelError::Transport { what: "node".into(), reason };
         let users = Users::enter(host)?;
+        users.require_free_memory()?;
         let name = NodeName::new(name).map_err(|error| refused(format!("{error:?}")))?;
         let node = NodeBuilder::new()
             .name(&name)
@@ -79,6 +80,15 @@ impl Transport {
     /// When the channel is of another layout or the shared memory cannot be used.
     pub fn receiver<T: Payload>(&self, train: TrainId) -> Result<Receiver<T>, ChannelError> {
         Receiver::new(&self.service::<T>(train)?, train, &self.users)
+    }
+
+    /// Reserves the memory of all ports opened so far; to be called once all are.
+    ///
+    /// # Errors
+    ///
+    /// When there is not enough.
+    pub fn reserve(&self) -> Result<(), ChannelError> {
+        self.users.reserve()
     }
 
     fn service<T: Payload>(

@@ -1,6 +1,8 @@
 //! Seeded faults for as long as one likes.
 //!
 //! `dynocar-soak faults --rounds 1000 --seed 1`: kills, stops and restarts of all processes.
+//! `dynocar-soak load --seconds 3600 --seed 1`: eight trains at 200 Hz, with faults.
+//! `dynocar-soak hostile --rounds 5 --seed 1`: garbage into each kind of segment; who survives.
 //! `dynocar-soak state --rounds 1000 --seed 1`: `kill -9` while a state file is written.
 //! `dynocar-soak samples --rounds 4 --seed 1`: every pipeline under every failure of its sensors, a
 //! simulated scene each round; prints the estimates that are trusted and wrong.
@@ -14,7 +16,7 @@ use dynocar_tests::golden;
 use dynocar_tests::sensor_failures::SensorFailure;
 use dynocar_tests::simulator::TrainType;
 use dynocar_tests::soak::bad_samples::Scene;
-use dynocar_tests::soak::{Programs, faults, state_kills};
+use dynocar_tests::soak::{Programs, faults, hostile, load, state_kills};
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
@@ -27,11 +29,16 @@ fn main() {
     }
     let mut option = |key: &str, otherwise| options.remove(key).unwrap_or(otherwise);
     let (rounds, seed) = (option("--rounds", 1000), option("--seed", 1));
+    let seconds = option("--seconds", 3600);
     let programs = Programs::beside(&std::env::current_exe().expect("the program's path"));
     match what.as_str() {
         "faults" => {
             let summary = faults::run(&programs, rounds, seed);
             println!("{rounds} rounds: {summary:?}");
+        }
+        "load" => println!("{:#?}", load::run(&programs, seconds, seed)),
+        "hostile" => {
+            hostile::measure(&programs, rounds, seed).iter().for_each(|it| println!("{it:?}"));
         }
         "state" => {
             let states = state_kills::kill_writers(&programs.peer, rounds, seed);
@@ -63,6 +70,8 @@ fn main() {
             std::fs::write(golden::path(), text).expect("the golden file to be written");
             println!("{} made anew", golden::path().display());
         }
-        other => panic!("{other:?}: expected faults, state, samples, fuzz or golden"),
+        other => {
+            panic!("{other:?}: expected faults, hostile, load, state, samples, fuzz or golden")
+        }
     }
 }

@@ -6,10 +6,14 @@
 //!
 //! - [`bad_samples`]: every pipeline under every failure of its sensors
 //! - [`faults`]: kills, stops and restarts of daemon, controller and client
+//! - [`hostile`]: garbage written into shared memory
+//! - [`load`]: eight trains for hours, with faults
 //! - [`state_kills`]: `kill -9` while a state file is written
 
 pub mod bad_samples;
 pub mod faults;
+pub mod hostile;
+pub mod load;
 pub mod state_kills;
 
 use std::path::{Path, PathBuf};
