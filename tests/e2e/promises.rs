@@ -47,7 +47,8 @@ fn every_test_that_the_promises_name_exists() {
         // `#[test]`, or the macro `proptest!`, which lends its functions the same attribute.
         let before = text[..place].trim_end();
         assert!(before.ends_with("#[test]"), "{file}: {name} is no test");
-        assert!(!text.contains("#[ignore"), "{file}: an ignored test holds nothing");
+        let is_ignored = text.lines().any(|line| line.trim_start().starts_with("#[ignore"));
+        assert!(!is_ignored, "{file}: an ignored test holds nothing");
     }
 }
 
