@@ -276,12 +276,7 @@ impl ResistanceLeastSquares {
         let factors = unscaling();
         let covariance =
             Matrix3::from_diagonal(&factors) * report.covariance * Matrix3::from_diagonal(&factors);
-        write_parameters(
-            snapshot,
-            DAVIS,
-            &report.estimate.component_mul(&factors),
-            &covariance,
-        );
+        write_parameters(snapshot, DAVIS, &report.estimate.component_mul(&factors), &covariance);
         write_innovations(snapshot, monitor);
         snapshot.generation = self.resets;
         snapshot.excited = report.excited;
