@@ -34,6 +34,7 @@ fn latency_measures_floor_daemon_and_alternatives_in_one_run() {
         ("dynocar/all_fast", "busy"),
         ("alternative/unix_datagram", "busy"),
         ("alternative/unix_datagram", "event"),
+        #[cfg(feature = "zeromq")]
         ("alternative/zeromq", "event"),
     ] {
         let case = cases

@@ -62,6 +62,19 @@ pub enum ChannelError {
         /// The transport's reason.
         reason: String,
     },
+    /// There is too little shared memory left.
+    #[error(
+        "{path}: shared memory is full: {free_kib} KiB free, at least {needed_kib} KiB needed; \
+         using more than there is would end this process by SIGBUS"
+    )]
+    SharedMemoryFull {
+        /// Where shared memory lies.
+        path: &'static str,
+        /// What is free.
+        free_kib: u64,
+        /// What is needed.
+        needed_kib: u64,
+    },
     /// A message was not taken.
     #[error(transparent)]
     Send(#[from] SendRefused),

@@ -33,10 +33,13 @@ impl SamplePublisher {
         let role = RoleLock::claim(host, train, Role::Controller)?;
         Peer::look_up(host, train, Role::Daemon)?.require_compatible(train, Role::Controller)?;
         let transport = Transport::open(host, "dynocar-controller")?;
+        let sender = transport.sender::<TrainSample>(train)?;
+        let waker = Waker::open(&transport, train)?;
+        transport.reserve()?;
         Ok(SamplePublisher {
             train,
-            sender: transport.sender::<TrainSample>(train)?,
-            waker: Waker::open(&transport, train)?,
+            sender,
+            waker,
             sequence: 0,
             // Milliseconds since boot: a restarted controller never repeats its last run.
             run: (monotonic_now_ns() / 1_000_000) as u32,

@@ -5,12 +5,16 @@ use dynocar_shared::snapshot::PARAMETERS_MAX;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, Status, TrainId};
 
 use crate::channel::{Receiver, Transport};
+use crate::clock::monotonic_now_ns;
 use crate::error::ChannelError;
 use crate::host::Host;
 use crate::peer::{Peer, Role};
 
 /// A snapshot older than this counts as stale, in ns. The daemon republishes every 50 ms.
 pub const STALE_AFTER_NS: i64 = 250_000_000;
+
+/// A time so far ahead in ns is none that this host's clock has given.
+const CLOCK_TOLERANCE_NS: i64 = 1_000_000_000;
 
 /// Reads the newest snapshot of each pipeline of one train.
 #[derive(Debug)]
@@ -60,10 +64,12 @@ impl SnapshotReader {
     pub fn open(host: &Host, train: TrainId) -> Result<Self, ChannelError> {
         Peer::look_up(host, train, Role::Daemon)?.require_compatible(train, Role::Controller)?;
         let transport = Transport::open(host, "dynocar-reader")?;
+        let receiver = transport.receiver::<ParameterSnapshot>(train)?;
+        transport.reserve()?;
         Ok(SnapshotReader {
             host: host.clone(),
             train,
-            receiver: transport.receiver::<ParameterSnapshot>(train)?,
+            receiver,
             latest: Box::new([None; PIPELINES_MAX]),
             stale_after_ns: STALE_AFTER_NS,
             refused: 0,
@@ -107,7 +113,8 @@ impl SnapshotReader {
         })
     }
 
-    /// Messages that no daemon of ours would send: foreign train, number out of range, NaN.
+    /// Messages that no daemon of ours would send: foreign train, number out of range, NaN, a time
+    /// in the future.
     pub fn refused(&self) -> u64 {
         self.refused
     }
@@ -121,14 +128,32 @@ impl SnapshotReader {
         Peer::look_up(&self.host, self.train, Role::Daemon)
     }
 
+    /// True for what a daemon of ours may send: this train, numbers in range, nothing that is not
+    /// finite, nothing vouched for in the future, which would never grow old.
+    fn is_plausible(&self, it: &ParameterSnapshot) -> bool {
+        let statistics = [
+            it.innovation_normalised,
+            it.innovation_mean_square,
+            it.innovation_correlation,
+            it.unexplained_force_n,
+            it.unexplained_force_std_n,
+            it.suspicion_evidence,
+            it.speed_min_mps,
+            it.speed_max_mps,
+        ];
+        let latest_ns = monotonic_now_ns().saturating_add(CLOCK_TOLERANCE_NS);
+        it.train_id == self.train.0
+            && (it.pipeline_index as usize) < PIPELINES_MAX
+            && it.parameter_count as usize <= PARAMETERS_MAX
+            && it.values.iter().chain(&it.covariance).chain(&statistics).all(|it| it.is_finite())
+            && it.vouched_ns <= latest_ns
+            && i64::try_from(it.epoch).is_ok_and(|epoch| epoch <= latest_ns)
+    }
+
     /// Keeps a snapshot unless it is older than the one we have: connections to a daemon that
     /// died are drained before those to its successor.
     fn take(&mut self, snapshot: &ParameterSnapshot) -> bool {
-        let is_plausible = snapshot.train_id == self.train.0
-            && (snapshot.pipeline_index as usize) < PIPELINES_MAX
-            && snapshot.parameter_count as usize <= PARAMETERS_MAX
-            && snapshot.values.iter().chain(&snapshot.covariance).all(|value| value.is_finite());
-        if !is_plausible {
+        if !self.is_plausible(snapshot) {
             self.refused += 1;
             return false;
         }

@@ -11,6 +11,8 @@
 //! - [`demo`]: the main job as a show
 //! - [`run`]: the daemon, every stage on one screen
 //! - [`runtime`]: its threads
+//! - [`state`]: estimates that outlive the daemon
+//! - [`supervision`]: what a supervisor and an operator see of the daemon
 //! - [`replay`]: recorded runs into the sample channel
 
 pub mod cli;
@@ -23,3 +25,5 @@ pub mod replay;
 pub mod report;
 pub mod run;
 pub mod runtime;
+pub mod state;
+pub mod supervision;

@@ -5,13 +5,15 @@
 //!             shared memory   └───────────── Pipeline, one or more in a Worker ─────┘  shared memory
 //! ```
 
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::thread::JoinHandle;
+use std::time::Instant;
 
 use crossbeam::channel::{Sender, bounded};
 use dynocar_client::peer::RoleLock;
-use dynocar_client::{ChannelError, Host, Role, monotonic_now_ns};
+use dynocar_client::{ChannelError, Host, Role, SnapshotReader, monotonic_now_ns};
 use dynocar_core::pipeline::{Pipeline, SettingError};
 use dynocar_shared::TrainId;
 use tracing::{info, warn};
@@ -23,6 +25,9 @@ use crate::runtime::scheduling::set_fifo_priority;
 use crate::runtime::tally::Tally;
 use crate::runtime::watch::{Watch, WatchedPipeline};
 use crate::runtime::worker::{LanePlan, Worker, WorkerPlan};
+use crate::state::{self, keeper::Keeper};
+use crate::supervision::listener;
+use crate::supervision::notify::{Supervisor, Watchdog};
 
 /// Why the daemon could not start or had to stop.
 #[derive(Debug, thiserror::Error)]
@@ -72,18 +77,34 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     if config.lock_memory {
         lock_memory();
     }
-    let (plans, watched) = plan_workers(config, &host, epoch, &stop)?;
+    let state = state::Taken::up(config);
+    let (plans, watched) = plan_workers(config, &host, epoch, &stop, state.as_ref())?;
     let workers = start_workers(plans)?;
+    let keeper = state.map(|state| start_keeper(config, &host, state, &stop)).transpose()?;
     info!(epoch, trains = trains.len(), pipelines = config.pipelines.len(), "serving");
 
+    let listener = config.metrics.map(|address| start_metrics(config, address, &host, &stop));
+    let listener = listener.transpose()?;
+
+    let supervisor = Supervisor::from_environment();
+    let alive = watched.iter().map(|it| (it.name.clone(), Arc::clone(&it.tally))).collect();
+    let watchdog = Watchdog::new(&supervisor, alive);
+    supervisor.tell("READY=1");
     let mut watch = Watch::new(host, trains, watched);
-    watch.until_stopped(&stop, || workers.iter().any(JoinHandle::is_finished));
+    watch.until_stopped(&stop, || {
+        watchdog.round(Instant::now());
+        workers.iter().any(JoinHandle::is_finished)
+    });
+    supervisor.tell("STOPPING=1");
 
     let ended = workers.iter().find(|worker| worker.is_finished()).map(thread_name);
     let was_asked = stop.swap(true, std::sync::atomic::Ordering::Relaxed);
     for worker in workers {
         // A panic was already printed by the thread itself; `ended` names it below.
         let _ = worker.join();
+    }
+    for helper in keeper.into_iter().chain(listener) {
+        let _ = helper.join();
     }
     watch.report_totals();
     match ended {
@@ -107,6 +128,7 @@ fn plan_workers(
     host: &Host,
     epoch: u64,
     stop: &Arc<AtomicBool>,
+    state: Option<&state::Taken<'_>>,
 ) -> Result<(Vec<WorkerPlan>, Vec<WatchedPipeline>), RunError> {
     let mut plans: Vec<WorkerPlan> = config
         .threads
@@ -123,8 +145,17 @@ fn plan_workers(
         .collect();
     let mut watched = Vec::new();
     for (index, settings) in config.pipelines.iter().enumerate() {
-        for train in config.trains.iter().filter(|train| settings.trains.contains(&train.id)) {
-            let pipeline = build_pipeline(settings, index as u32, train)?;
+        for (place, train) in config.trains.iter().enumerate() {
+            if !settings.trains.contains(&train.id) {
+                continue;
+            }
+            let mut pipeline = build_pipeline(settings, index as u32, train)?;
+            let kept = state.and_then(|it| {
+                state::warm_start_of(it.config, &it.stored[place], settings, state::unix_now_s())
+            });
+            if let Some(kept) = kept {
+                pipeline.warm_start(&kept);
+            }
             let tally = Arc::new(Tally::default());
             let name = settings.name.clone();
             watched.push(WatchedPipeline { name, train: train.id, tally: Arc::clone(&tally) });
@@ -169,6 +200,50 @@ fn start_workers(plans: Vec<WorkerPlan>) -> Result<Vec<JoinHandle<()>>, RunError
     drop(told);
     started.iter().collect::<Result<(), _>>()?;
     Ok(workers)
+}
+
+/// Starts the thread that hands out metrics.
+fn start_metrics(
+    config: &DaemonConfig,
+    address: SocketAddr,
+    host: &Host,
+    stop: &Arc<AtomicBool>,
+) -> Result<JoinHandle<()>, RunError> {
+    let failed = |what| move |source| RunError::System { what, source };
+    let socket = listener::open(address).map_err(failed("metrics.listen"))?;
+    let trains: Vec<TrainId> = config.trains.iter().map(|train| train.id).collect();
+    let names: Vec<String> = config.pipelines.iter().map(|it| it.name.clone()).collect();
+    let (host, stop) = (host.clone(), Arc::clone(stop));
+    let serve = move || {
+        let readers: Result<Vec<_>, _> =
+            trains.into_iter().map(|train| SnapshotReader::open(&host, train)).collect();
+        match readers {
+            Ok(mut readers) => listener::serve(&socket, &mut readers, &names, &stop),
+            Err(error) => warn!("no metrics: {error}"),
+        }
+    };
+    std::thread::Builder::new()
+        .name("metrics".into())
+        .spawn(serve)
+        .map_err(failed("metrics thread"))
+}
+
+/// Starts the thread that keeps validated estimates.
+fn start_keeper(
+    config: &DaemonConfig,
+    host: &Host,
+    state: state::Taken<'_>,
+    stop: &Arc<AtomicBool>,
+) -> Result<JoinHandle<()>, RunError> {
+    let (config, stop, host) = (config.clone(), Arc::clone(stop), host.clone());
+    let (state, stored) = (state.config.clone(), state.stored);
+    std::thread::Builder::new()
+        .name("state".into())
+        .spawn(move || match Keeper::new(&config, &state, &host, stored, stop) {
+            Ok(mut keeper) => keeper.run(),
+            Err(error) => warn!("no state is kept: {error}"),
+        })
+        .map_err(|source| RunError::System { what: "state thread", source })
 }
 
 fn work(plan: WorkerPlan, told: Sender<Result<(), ChannelError>>) {

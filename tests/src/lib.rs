@@ -3,9 +3,17 @@
 //! # Layout
 //!
 //! - [`browser`]: a headless browser that says what a page did
+//! - [`fuzz`]: mutations of a corpus thrown at everything that reads foreign bytes
+//! - [`golden`]: what every estimator makes of the recorded runs, bit for bit
 //! - [`process`]: real processes with a run-time directory of their own, cleaned up on drop
+//! - [`sensor_failures`]: how sensors and channels fail
 //! - [`simulator`]: recorded runs of random trains with known, undeclared effects
+//! - [`soak`]: seeded faults, for seconds in the tests and for hours by `dynocar-soak`
 
 pub mod browser;
+pub mod fuzz;
+pub mod golden;
 pub mod process;
+pub mod sensor_failures;
 pub mod simulator;
+pub mod soak;

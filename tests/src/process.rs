@@ -83,8 +83,22 @@ impl Site {
     ///
     /// When it cannot be started.
     pub fn start(&self, program: &str, arguments: &[&str]) -> Process {
-        let mut command = Command::new(program);
-        command.args(arguments);
+        self.start_with(program, arguments, &[])
+    }
+
+    /// Starts a program on this site with more environment variables.
+    ///
+    /// # Panics
+    ///
+    /// When it cannot be started.
+    pub fn start_with(
+        &self,
+        program: &str,
+        arguments: &[&str],
+        variables: &[(&str, &str)],
+    ) -> Process {
+        let mut command = self.command(program, arguments);
+        command.envs(variables.iter().copied());
         self.start_command(command)
     }
 
@@ -95,17 +109,21 @@ impl Site {
     ///
     /// When it cannot be started.
     pub fn start_without_real_time(&self, program: &str, arguments: &[&str]) -> Process {
-        let mut command = Command::new(program);
-        command.args(arguments);
+        let mut command = self.command(program, arguments);
         // SAFETY: between fork and exec only system calls are made.
         unsafe { command.pre_exec(drop_real_time_rights) };
         self.start_command(command)
     }
 
+    fn command(&self, program: &str, arguments: &[&str]) -> Command {
+        let mut command = Command::new(program);
+        command.args(arguments).env(ROOT_VARIABLE, self.root());
+        command
+    }
+
     fn start_command(&self, mut command: Command) -> Process {
         let errors = self.path().join(format!("stderr-{}", unique_number()));
         let mut child = command
-            .env(ROOT_VARIABLE, self.root())
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(File::create(&errors).expect("a file for standard error"))
@@ -122,20 +140,12 @@ impl Site {
         Process { child, lines, errors }
     }
 
-    /// Shared-memory files of this site's nodes, services and ports.
-    ///
-    /// The transport keeps one segment for each run-time directory for good
-    /// (`*.global_mgmt`, it counts the nodes); it is not counted here.
+    /// Names of this site's shared-memory files.
     ///
     /// # Panics
     ///
     /// When `/dev/shm` cannot be read.
     pub fn segments(&self) -> Vec<String> {
-        let is_leftover = |name: &String| !name.ends_with(".global_mgmt");
-        self.shared_memory_files().into_iter().filter(is_leftover).collect()
-    }
-
-    fn shared_memory_files(&self) -> Vec<String> {
         let prefix = self.host().segment_prefix();
         std::fs::read_dir("/dev/shm")
             .expect("/dev/shm")
@@ -147,7 +157,7 @@ impl Site {
 
 impl Drop for Site {
     fn drop(&mut self) {
-        for name in self.shared_memory_files() {
+        for name in self.segments() {
             // A file that another process removes first is gone as well.
             let _ = std::fs::remove_file(Path::new("/dev/shm").join(name));
         }
@@ -223,6 +233,36 @@ impl Process {
         self.child.wait().expect("an exit status");
     }
 
+    /// Sends a signal that ends it, and waits for its end.
+    ///
+    /// # Panics
+    ///
+    /// When the process is gone, or after [`WATCHDOG`].
+    pub fn end(&mut self, signal: Signal) -> ExitStatus {
+        self.signal(signal);
+        self.wait()
+    }
+
+    /// Stops it as `kill -STOP` does, and waits until all of it stands still.
+    ///
+    /// # Panics
+    ///
+    /// When the process is gone, or after [`WATCHDOG`].
+    pub fn stop(&self) {
+        self.signal(Signal::STOP);
+        let tasks = format!("/proc/{}/task", self.id());
+        // "pid (name) state": the name may hold anything, so that the last parenthesis counts.
+        let is_stopped =
+            |stat: String| stat.rsplit(") ").next().is_some_and(|it| it.starts_with('T'));
+        let all_stopped = || {
+            std::fs::read_dir(&tasks)
+                .expect("its threads")
+                .flatten()
+                .all(|task| std::fs::read_to_string(task.path().join("stat")).is_ok_and(is_stopped))
+        };
+        await_true(all_stopped, || format!("process {} to stop", self.id()));
+    }
+
     /// Waits for its end.
     ///
     /// # Panics
@@ -239,6 +279,25 @@ impl Process {
         }
     }
 
+    /// Its exit status, if it has ended.
+    ///
+    /// # Panics
+    ///
+    /// When the system does not tell.
+    pub fn try_wait(&mut self) -> Option<ExitStatus> {
+        self.child.try_wait().expect("an exit status")
+    }
+
+    /// Everything that a program which has ended wrote to standard output.
+    ///
+    /// # Panics
+    ///
+    /// After [`WATCHDOG`], when somebody else keeps the output open.
+    pub fn output(&self) -> String {
+        await_true(|| Arc::strong_count(&self.lines) == 1, || "the end of the output".into());
+        self.lines().join("\n")
+    }
+
     /// Its standard output so far.
     ///
     /// # Panics
@@ -246,6 +305,24 @@ impl Process {
     /// When the thread that collects it has panicked.
     pub fn lines(&self) -> Vec<String> {
         self.lines.lock().expect("no panic while holding the lines").clone()
+    }
+
+    /// Its newest line of standard output.
+    ///
+    /// # Panics
+    ///
+    /// When the thread that collects it has panicked.
+    pub fn last_line(&self) -> Option<String> {
+        self.lines.lock().expect("no panic while holding the lines").last().cloned()
+    }
+
+    /// Its standard output from a line on.
+    ///
+    /// # Panics
+    ///
+    /// When the thread that collects it has panicked.
+    pub fn lines_from(&self, first: usize) -> Vec<String> {
+        self.lines.lock().expect("no panic while holding the lines")[first..].to_vec()
     }
 
     /// Its standard error so far.
@@ -262,7 +339,7 @@ impl Process {
         let mut newest = String::new();
         await_true(
             || {
-                newest = self.lines().last().cloned().unwrap_or_default();
+                newest = self.last_line().unwrap_or_default();
                 condition(&newest)
             },
             || format!("{what}; standard error:\n{}", self.errors()),

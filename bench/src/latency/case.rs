@@ -4,9 +4,11 @@ use dynocar::config::IdleStrategy;
 use dynocar_client::monotonic_now_ns;
 use dynocar_shared::PipelineKind;
 
-use super::link::{ClientLink, DatagramLink, Link, NotifyingLink, ZeroMqLink};
+use super::link::{ClientLink, DatagramLink, Link, NotifyingLink};
 use super::schedule::{Schedule, Slice, await_ready, drive};
 use super::server::TRAIN;
+#[cfg(feature = "zeromq")]
+use super::zeromq::ZeroMqLink;
 use super::{Cores, bind, prioritise};
 use crate::rig::RigError;
 use crate::rig::child::Peer;
@@ -35,6 +37,7 @@ pub enum Answerer {
     /// [`COMPARED`] behind a Unix datagram socket.
     UnixDatagram,
     /// [`COMPARED`] behind a ZeroMQ pair socket.
+    #[cfg(feature = "zeromq")]
     ZeroMq,
 }
 
@@ -87,6 +90,7 @@ pub fn cases(is_quick: bool) -> Vec<Case> {
         Case::new("floor", Event, Answerer::Floor),
         Case::alone(COMPARED, Event),
         Case::new("alternative/unix_datagram", Event, Answerer::UnixDatagram),
+        #[cfg(feature = "zeromq")]
         Case::new("alternative/zeromq", Event, Answerer::ZeroMq),
     ];
     if !is_quick {
@@ -140,6 +144,7 @@ pub fn measure(case: &Case, cores: Cores, schedule: &Schedule) -> Result<Outcome
             let mut link = DatagramLink::open(&site, blocks)?;
             run(&mut link, &mut peer, cores, schedule)
         }
+        #[cfg(feature = "zeromq")]
         (Answerer::ZeroMq, _) => {
             let mut link = ZeroMqLink::open(&site, blocks)?;
             run(&mut link, &mut peer, cores, schedule)
@@ -185,6 +190,7 @@ fn start(case: &Case, site: &Site, cores: Cores) -> Result<Peer, RigError> {
         Answerer::Floor if case.idle == IdleStrategy::Event => vec!["listening-echo", &folder],
         Answerer::Floor => vec!["echo", &folder],
         Answerer::UnixDatagram => vec!["unix-datagram", &folder],
+        #[cfg(feature = "zeromq")]
         Answerer::ZeroMq => vec!["zero-mq", &folder],
     };
     arguments.extend(["--core", &core]);

@@ -10,7 +10,7 @@ use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
 
 use super::bytes::{as_bytes, from_bytes};
 use super::plain::{PlainNode, PlainNotifier};
-use super::sockets::{CLIENT_SOCKET, SERVER_SOCKET, zeromq_address};
+use super::sockets::{CLIENT_SOCKET, SERVER_SOCKET};
 use crate::rig::site::Site;
 use crate::rig::{RigError, system};
 
@@ -131,7 +131,7 @@ impl Link for NotifyingLink {
 }
 
 /// How long a blocking receive waits before the schedule is looked at again.
-const BLOCK: Duration = Duration::from_millis(1);
+pub(super) const BLOCK: Duration = Duration::from_millis(1);
 
 /// Unix datagram sockets, as a user would write them.
 pub struct DatagramLink {
@@ -193,54 +193,4 @@ fn is_passing(kind: ErrorKind) -> bool {
             | ErrorKind::ConnectionRefused
             | ErrorKind::Interrupted
     )
-}
-
-/// ZeroMQ's pair sockets over its `ipc` transport.
-pub struct ZeroMqLink {
-    socket: zmq::Socket,
-    flags: i32,
-    sequence: u64,
-    newest: u64,
-}
-
-impl ZeroMqLink {
-    /// Connects to the server's socket; see [`DatagramLink::open`] for `blocks`.
-    ///
-    /// # Errors
-    ///
-    /// When the library refuses.
-    pub fn open(site: &Site, blocks: bool) -> Result<Self, RigError> {
-        let socket = zmq::Context::new().socket(zmq::PAIR)?;
-        socket.set_linger(0)?;
-        socket.set_rcvtimeo(BLOCK.as_millis() as i32)?;
-        socket.connect(&zeromq_address(site.path()))?;
-        let flags = if blocks { 0 } else { zmq::DONTWAIT };
-        Ok(ZeroMqLink { socket, flags, sequence: 0, newest: 0 })
-    }
-}
-
-impl Link for ZeroMqLink {
-    fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, RigError> {
-        self.sequence += 1;
-        sample.sequence = self.sequence;
-        match self.socket.send(as_bytes(sample), zmq::DONTWAIT) {
-            Ok(()) | Err(zmq::Error::EAGAIN) => Ok(self.sequence),
-            Err(error) => Err(error.into()),
-        }
-    }
-
-    fn poll(&mut self) -> Result<u64, RigError> {
-        let mut bytes = [0; size_of::<ParameterSnapshot>()];
-        match self.socket.recv_into(&mut bytes, self.flags) {
-            Ok(count) => {
-                let bytes = &bytes[..count.min(size_of::<ParameterSnapshot>())];
-                if let Some(snapshot) = from_bytes::<ParameterSnapshot>(bytes) {
-                    self.newest = self.newest.max(snapshot.sample_sequence);
-                }
-            }
-            Err(zmq::Error::EAGAIN | zmq::Error::EINTR) => {}
-            Err(error) => return Err(error.into()),
-        }
-        Ok(self.newest)
-    }
 }

@@ -10,6 +10,7 @@
 //! - [`link`]: the controller's end of each transport
 //! - [`server`]: the answering processes
 //! - [`sockets`], [`plain`], [`bytes`]: what they need
+//! - `zeromq`: both ends of ZeroMQ, with the feature of that name
 //! - [`costs`]: one poll, one publish
 //! - [`rest`]: what a daemon takes while no sample comes
 //! - [`report`], [`plot`]: the result
@@ -25,6 +26,8 @@ pub mod rest;
 pub mod schedule;
 pub mod server;
 pub mod sockets;
+#[cfg(feature = "zeromq")]
+pub mod zeromq;
 
 use std::path::PathBuf;
 

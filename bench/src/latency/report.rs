@@ -168,5 +168,8 @@ pub fn table(report: &Report) -> String {
     if unanswered > 0 {
         let _ = writeln!(text, "{unanswered} samples were not answered");
     }
+    if cfg!(not(feature = "zeromq")) {
+        text += "ZeroMQ was not measured: build with --features zeromq and a C++ compiler\n";
+    }
     text
 }

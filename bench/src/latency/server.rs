@@ -36,7 +36,21 @@ enum PeerKind {
     /// The estimator behind a Unix datagram socket
     UnixDatagram(Place),
     /// The estimator behind a ZeroMQ socket
+    #[cfg(feature = "zeromq")]
     ZeroMq(Place),
+}
+
+impl PeerKind {
+    /// The real-time priority asked for; the daemon has it from its configuration.
+    fn priority(&self) -> Option<u8> {
+        match self {
+            PeerKind::Daemon { .. } => None,
+            PeerKind::Echo(place) | PeerKind::ListeningEcho(place) => place.priority,
+            PeerKind::UnixDatagram(place) => place.priority,
+            #[cfg(feature = "zeromq")]
+            PeerKind::ZeroMq(place) => place.priority,
+        }
+    }
 }
 
 #[derive(Debug, Args)]
@@ -68,13 +82,7 @@ impl Place {
 ///
 /// When a channel, socket or configuration cannot be used.
 pub fn serve(arguments: &PeerArguments) -> Result<(), RigError> {
-    if let PeerKind::Echo(place)
-    | PeerKind::ListeningEcho(place)
-    | PeerKind::UnixDatagram(place)
-    | PeerKind::ZeroMq(place) = &arguments.peer
-    {
-        prioritise(place.priority);
-    }
+    prioritise(arguments.peer.priority());
     match &arguments.peer {
         PeerKind::Daemon { config } => run_daemon(config),
         PeerKind::Echo(place) => {
@@ -90,9 +98,10 @@ pub fn serve(arguments: &PeerArguments) -> Result<(), RigError> {
             let pipeline = sockets::pipeline(&place.folder, TRAIN)?;
             sockets::serve_datagrams(&place.folder, pipeline, place.blocks)
         }
+        #[cfg(feature = "zeromq")]
         PeerKind::ZeroMq(place) => {
             let pipeline = sockets::pipeline(&place.folder, TRAIN)?;
-            sockets::serve_zeromq(&place.folder, pipeline, place.blocks, || place.pin())
+            super::zeromq::serve(&place.folder, pipeline, place.blocks, || place.pin())
         }
     }
 }

@@ -18,11 +18,6 @@ pub const CLIENT_SOCKET: &str = "client.socket";
 /// The server's socket, in the site's folder.
 pub const SERVER_SOCKET: &str = "server.socket";
 
-/// The server's address for ZeroMQ.
-pub fn zeromq_address(folder: &Path) -> String {
-    format!("ipc://{}/zeromq.socket", folder.display())
-}
-
 /// The estimator that every alternative runs, as the daemon builds it.
 ///
 /// # Errors
@@ -39,7 +34,10 @@ pub fn pipeline(folder: &Path, train: TrainId) -> Result<Pipeline, RigError> {
     Ok(Pipeline::new(train, 0, model, None, estimator))
 }
 
-fn answer<'a>(pipeline: &'a mut Pipeline, sample: &TrainSample) -> &'a ParameterSnapshot {
+pub(super) fn answer<'a>(
+    pipeline: &'a mut Pipeline,
+    sample: &TrainSample,
+) -> &'a ParameterSnapshot {
     pipeline.process(sample);
     let snapshot = pipeline.snapshot_mut();
     snapshot.published_ns = monotonic_now_ns();
@@ -70,42 +68,6 @@ pub fn serve_datagrams(
             Err(error) if error.kind() == ErrorKind::WouldBlock => std::hint::spin_loop(),
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
             Err(error) => return Err(system("receiving a datagram")(error)),
-        }
-    }
-}
-
-/// Answers ZeroMQ messages until killed; `pin` is called once the library's own threads run, so
-/// that they are not bound to the same core.
-///
-/// # Errors
-///
-/// When the library refuses.
-pub fn serve_zeromq(
-    folder: &Path,
-    mut pipeline: Pipeline,
-    blocks: bool,
-    pin: impl FnOnce(),
-) -> Result<(), RigError> {
-    let socket = zmq::Context::new().socket(zmq::PAIR)?;
-    socket.set_linger(0)?;
-    socket.bind(&zeromq_address(folder))?;
-    pin();
-    let flags = if blocks { 0 } else { zmq::DONTWAIT };
-    let mut bytes = [0; size_of::<TrainSample>()];
-    loop {
-        match socket.recv_into(&mut bytes, flags) {
-            Ok(count) => {
-                let bytes = &bytes[..count.min(size_of::<TrainSample>())];
-                let Some(sample) = from_bytes::<TrainSample>(bytes) else { continue };
-                match socket.send(as_bytes(answer(&mut pipeline, &sample)), zmq::DONTWAIT) {
-                    // A controller that does not read loses its answer.
-                    Ok(()) | Err(zmq::Error::EAGAIN) => {}
-                    Err(error) => return Err(error.into()),
-                }
-            }
-            Err(zmq::Error::EAGAIN) => std::hint::spin_loop(),
-            Err(zmq::Error::EINTR) => {}
-            Err(error) => return Err(error.into()),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! What is promised of our methods, row by row, and whether a measurement keeps it.
 
-use dynocar_shared::quantile::normal_quantile;
 use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::Row;
 
@@ -118,13 +118,11 @@ impl Verdict {
     }
 }
 
-/// The band of a chi-square over its degrees of freedom (Wilson and Hilferty 1931).
+/// The band of a chi-square over its degrees of freedom.
 fn nees_band(freedom: f64) -> (f64, f64) {
-    let spread = 2.0 / (9.0 * freedom);
-    let deviations =
-        normal_quantile(0.5 + 0.5 * BAND_PROBABILITY).expect("a probability between 0 and 1");
-    let at = |deviations: f64| (1.0 - spread + deviations * spread.sqrt()).max(0.0).powi(3);
-    (at(-deviations), at(deviations))
+    let distribution = ChiSquared::new(freedom).expect("degrees of freedom above 0");
+    let at = |probability| distribution.inverse_cdf(probability) / freedom;
+    (at(0.5 - 0.5 * BAND_PROBABILITY), at(0.5 + 0.5 * BAND_PROBABILITY))
 }
 
 #[cfg(test)]
@@ -153,8 +151,8 @@ mod tests {
     fn the_band_is_that_of_tabled_chi_squares() {
         for (freedom, low, high) in [(10.0, 2.156, 25.188), (100.0, 67.328, 140.169)] {
             let band = nees_band(freedom);
-            assert!((band.0 * freedom / low - 1.0).abs() < 0.01, "{band:?}");
-            assert!((band.1 * freedom / high - 1.0).abs() < 0.01, "{band:?}");
+            assert!((band.0 * freedom / low - 1.0).abs() < 1e-4, "{band:?}");
+            assert!((band.1 * freedom / high - 1.0).abs() < 1e-4, "{band:?}");
         }
     }
 

@@ -53,6 +53,7 @@ pub enum RigError {
         reason: String,
     },
     /// ZeroMQ refused.
+    #[cfg(feature = "zeromq")]
     #[error("ZeroMQ: {0}")]
     ZeroMq(#[from] zmq::Error),
     /// A process of the measurement ended before its time.

@@ -105,7 +105,11 @@ mod tests {
         assert!(usage.rss_bytes > 100_000 && usage.cpu_s > 0.0);
         let usage = std::thread::Builder::new()
             .name("a name".into())
-            .spawn(move || of_thread(id, "a name"))
+            .spawn(move || {
+                // Large enough that the allocator maps it anew for this thread.
+                std::hint::black_box(vec![1_u8; 4 << 20]);
+                of_thread(id, "a name")
+            })
             .unwrap()
             .join()
             .unwrap();

@@ -5,6 +5,7 @@
 //! are not `Send`: open them in the thread that uses them.
 
 mod ports;
+mod users;
 mod wake;
 mod wire;
 
@@ -12,6 +13,7 @@ pub use ports::{Receiver, SendRefused, Sender};
 pub use wake::{Sleeper, Waker};
 pub use wire::{Payload, Wire};
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use dynocar_shared::TrainId;
@@ -25,6 +27,7 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use crate::error::ChannelError;
 use crate::host::Host;
+use users::Users;
 
 /// How long a service that is being made or destroyed by another process is waited for.
 const SETTLING_TIME: Duration = Duration::from_millis(800);
@@ -33,6 +36,8 @@ const SETTLING_TIME: Duration = Duration::from_millis(800);
 #[derive(Debug)]
 pub struct Transport {
     node: Node<ipc::Service>,
+    /// After the node: the last user goes only when its ports are gone.
+    users: Arc<Users>,
 }
 
 impl Transport {
@@ -46,6 +51,8 @@ impl Transport {
     pub fn open(host: &Host, name: &str) -> Result<Self, ChannelError> {
         set_log_level_from_env_or(iceoryx2::prelude::LogLevel::Fatal);
         let refused = |reason: String| ChannelError::Transport { what: "node".into(), reason };
+        let users = Users::enter(host)?;
+        users.require_free_memory()?;
         let name = NodeName::new(name).map_err(|error| refused(format!("{error:?}")))?;
         let node = NodeBuilder::new()
             .name(&name)
@@ -53,7 +60,8 @@ impl Transport {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|error| refused(format!("{error:?}")))?;
-        Ok(Transport { node })
+        users.close_to_others();
+        Ok(Transport { node, users: Arc::new(users) })
     }
 
     /// Opens a sending port of a train's channel.
@@ -62,7 +70,7 @@ impl Transport {
     ///
     /// When the channel is of another layout or the shared memory cannot be used.
     pub fn sender<T: Payload>(&self, train: TrainId) -> Result<Sender<T>, ChannelError> {
-        Sender::new(&self.service::<T>(train)?, train)
+        Sender::new(&self.service::<T>(train)?, train, &self.users)
     }
 
     /// Opens a receiving port of a train's channel.
@@ -71,7 +79,16 @@ impl Transport {
     ///
     /// When the channel is of another layout or the shared memory cannot be used.
     pub fn receiver<T: Payload>(&self, train: TrainId) -> Result<Receiver<T>, ChannelError> {
-        Receiver::new(&self.service::<T>(train)?, train)
+        Receiver::new(&self.service::<T>(train)?, train, &self.users)
+    }
+
+    /// Reserves the memory of all ports opened so far; to be called once all are.
+    ///
+    /// # Errors
+    ///
+    /// When there is not enough.
+    pub fn reserve(&self) -> Result<(), ChannelError> {
+        self.users.reserve()
     }
 
     fn service<T: Payload>(

@@ -1,5 +1,7 @@
 //! Sending and receiving ends.
 
+use std::sync::Arc;
+
 use dynocar_shared::TrainId;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
@@ -7,6 +9,7 @@ use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{BackpressureStrategy, ipc};
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
+use super::users::Users;
 use super::wire::{Payload, Wire};
 use crate::error::ChannelError;
 
@@ -29,17 +32,22 @@ fn refused<T: Payload>(train: TrainId, port: &str, reason: impl std::fmt::Debug)
 #[derive(Debug)]
 pub struct Sender<T: Payload> {
     publisher: Publisher<ipc::Service, Wire<T>, ()>,
+    _users: Arc<Users>,
 }
 
 impl<T: Payload> Sender<T> {
-    pub(super) fn new(service: &Service<T>, train: TrainId) -> Result<Self, ChannelError> {
+    pub(super) fn new(
+        service: &Service<T>,
+        train: TrainId,
+        users: &Arc<Users>,
+    ) -> Result<Self, ChannelError> {
         let publisher = service
             .publisher_builder()
             .max_loaned_samples(1)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|error| refused::<T>(train, "sender", error))?;
-        Ok(Sender { publisher })
+        Ok(Sender { publisher, _users: Arc::clone(users) })
     }
 
     /// Sends a message to every receiver; never waits.
@@ -68,16 +76,21 @@ impl<T: Payload> Sender<T> {
 #[derive(Debug)]
 pub struct Receiver<T: Payload> {
     subscriber: Subscriber<ipc::Service, Wire<T>, ()>,
+    _users: Arc<Users>,
 }
 
 impl<T: Payload> Receiver<T> {
-    pub(super) fn new(service: &Service<T>, train: TrainId) -> Result<Self, ChannelError> {
+    pub(super) fn new(
+        service: &Service<T>,
+        train: TrainId,
+        users: &Arc<Users>,
+    ) -> Result<Self, ChannelError> {
         let subscriber = service
             .subscriber_builder()
             .buffer_size(T::BUFFER)
             .create()
             .map_err(|error| refused::<T>(train, "receiver", error))?;
-        Ok(Receiver { subscriber })
+        Ok(Receiver { subscriber, _users: Arc::clone(users) })
     }
 
     /// Takes the next message, copied out of the shared memory; `None` when there is none.

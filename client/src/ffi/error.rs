@@ -69,7 +69,9 @@ impl From<&ChannelError> for Code {
             ChannelError::RootName { .. } => Code::RootName,
             ChannelError::Occupied { .. } => Code::Occupied,
             ChannelError::IncompatiblePeer { .. } => Code::IncompatibleDaemon,
-            ChannelError::Transport { .. } => Code::Transport,
+            ChannelError::Transport { .. } | ChannelError::SharedMemoryFull { .. } => {
+                Code::Transport
+            }
             ChannelError::Send(_) => Code::SendRefused,
         }
     }

@@ -67,6 +67,19 @@ impl ValidSample {
     }
 }
 
+/// The newest gap of the sequence numbers, while it may yet turn out to be none.
+#[derive(Clone, Copy, Debug)]
+struct Gap {
+    /// The last number before it.
+    before: u64,
+    /// Samples lost before it.
+    lost_before: u64,
+    /// The newest number among refused samples that go on from before it.
+    newest: u64,
+    /// How many of those there were in a row.
+    refused: u32,
+}
+
 /// Checks the samples of one train, in order.
 #[derive(Clone, Debug)]
 pub struct Validator {
@@ -75,6 +88,7 @@ pub struct Validator {
     nominal_mass_kg: f64,
     last: Option<TrainSample>,
     last_sequence: Option<(u32, u64)>,
+    gap: Option<Gap>,
     last_refused: Option<TrainSample>,
     refusals_in_a_row: u32,
     stretch: u32,
@@ -90,6 +104,7 @@ impl Validator {
             nominal_mass_kg,
             last: None,
             last_sequence: None,
+            gap: None,
             last_refused: None,
             refusals_in_a_row: 0,
             stretch: 0,
@@ -129,18 +144,50 @@ impl Validator {
     }
 
     /// Counts the gap before a sample; a run that starts its count anew is a restart.
+    ///
+    /// A number that is wrong once makes all that follow look old: when several in a row go on
+    /// counting from before the gap, the gap is taken back.
     fn check_sequence(&mut self, sample: &TrainSample) -> Result<(), RejectionReason> {
         if let Some((run, sequence)) = self.last_sequence {
-            if sample.sequence > sequence {
-                self.lost += sample.sequence - sequence - 1;
-            } else if sample.run != run {
-                self.lost += sample.sequence.saturating_sub(1);
-            } else {
-                return Err(RejectionReason::SequenceNotIncreasing);
-            }
+            let lost = match sample.sequence.checked_sub(sequence) {
+                Some(ahead @ 1..) => self.lost.saturating_add(ahead - 1),
+                _ if sample.run != run => {
+                    self.lost.saturating_add(sample.sequence.saturating_sub(1))
+                }
+                _ => {
+                    return match self.gap.and_then(|gap| self.lost_without(gap, sample)) {
+                        Some(lost) => {
+                            self.lost = lost;
+                            self.gap = None;
+                            self.last_sequence = Some((sample.run, sample.sequence));
+                            Ok(())
+                        }
+                        None => Err(RejectionReason::SequenceNotIncreasing),
+                    };
+                }
+            };
+            self.gap = (sample.run == run && lost > self.lost).then_some(Gap {
+                before: sequence,
+                lost_before: self.lost,
+                newest: sequence,
+                refused: 0,
+            });
+            self.lost = lost;
         }
         self.last_sequence = Some((sample.run, sample.sequence));
         Ok(())
+    }
+
+    /// The samples lost if the newest gap never was, once enough samples in a row say so.
+    fn lost_without(&mut self, mut gap: Gap, sample: &TrainSample) -> Option<u64> {
+        let goes_on = sample.sequence > gap.newest;
+        gap.refused = if goes_on { gap.refused + 1 } else { 0 };
+        gap.newest = gap.newest.max(sample.sequence);
+        self.gap = Some(gap);
+        // The sample with the wrong number arrived as well.
+        let arrived = 1 + u64::from(gap.refused);
+        (gap.refused > self.limits.refusals_before_restart)
+            .then(|| gap.lost_before + (sample.sequence - gap.before).saturating_sub(arrived))
     }
 
     fn check_values(&self, sample: &TrainSample) -> Result<(), RejectionReason> {
@@ -321,6 +368,28 @@ mod tests {
         validator.check(&cruising(0)).unwrap();
         validator.check(&cruising(4)).unwrap();
         assert_eq!(validator.lost(), 3);
+    }
+
+    #[test]
+    fn one_wrong_sequence_number_is_taken_back_when_the_count_goes_on_without_it() {
+        let mut validator = validator();
+        validator.check(&cruising(0)).unwrap();
+        let mut wrong = cruising(1);
+        wrong.sequence = u64::MAX;
+        assert!(validator.check(&wrong).is_ok(), "nothing says yet that it is wrong");
+        assert_eq!(validator.lost(), u64::MAX - 2);
+        let refused = Err(RejectionReason::SequenceNotIncreasing);
+        for index in 2..7 {
+            assert_eq!(validator.check(&cruising(index)), refused);
+        }
+        assert_eq!(validator.check(&cruising(5)), refused, "it does not go on");
+        for index in 7..12 {
+            assert_eq!(validator.check(&cruising(index)), refused);
+        }
+        assert!(validator.check(&cruising(12)).is_ok());
+        assert_eq!(validator.lost(), 5, "only the five that a repeat cost more");
+        validator.check(&cruising(20)).unwrap();
+        assert_eq!(validator.lost(), 12);
     }
 
     #[test]

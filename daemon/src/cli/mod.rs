@@ -1,11 +1,12 @@
 //! The commands of `dynocar`, one file each.
 //!
 //! Messages for people go to standard error, results to standard output. Exit status: 0 done,
-//! 1 the work failed, 2 the command line or an input file is wrong.
+//! 1 the work failed, 2 the command line or an input file is wrong; `health` has some of its own.
 
 mod check;
 mod demo;
 mod explain;
+mod health;
 mod identify;
 mod output;
 mod replay;
@@ -29,6 +30,7 @@ enum Command {
     Demo(demo::DemoArguments),
     Explain(explain::ExplainArguments),
     Run(run::RunArguments),
+    Health(health::HealthArguments),
     Check(check::CheckArguments),
     Replay(replay::ReplayArguments),
     Identify(identify::IdentifyArguments),
@@ -41,6 +43,8 @@ pub enum Failure {
     Input(String),
     /// The work failed: exit status 1.
     Work(String),
+    /// The result, already told, is bad news: this exit status.
+    Verdict(u8),
 }
 
 /// Parses the command line, runs the command, reports a failure on standard error.
@@ -50,12 +54,14 @@ pub fn main() -> ExitCode {
         Command::Demo(arguments) => demo::execute(arguments),
         Command::Explain(arguments) => explain::execute(arguments),
         Command::Run(arguments) => run::execute(arguments),
+        Command::Health(arguments) => health::execute(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Replay(arguments) => replay::execute(arguments),
         Command::Identify(arguments) => identify::execute(arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
+        Err(Failure::Verdict(status)) => ExitCode::from(status),
         Err(Failure::Input(message)) => {
             eprintln!("dynocar: {message}");
             ExitCode::from(2)

@@ -58,6 +58,19 @@ pub struct TrainConfig {
     pub model: Arc<TrainModel>,
     /// The line it runs on, when known.
     pub track: Option<Arc<Track>>,
+    /// Which wheels it runs on; estimates are not kept across a change. Empty when not told.
+    pub wheel_set: String,
+}
+
+/// Where and how estimates are kept over restarts.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StateConfig {
+    /// Directory of the state files.
+    pub directory: PathBuf,
+    /// How often they are written, in s.
+    pub interval_s: u64,
+    /// An older estimate is not taken up, in h.
+    pub age_max_h: u64,
 }
 
 /// A thread that serves pipelines.
@@ -105,6 +118,10 @@ pub struct DaemonConfig {
     pub trains: Vec<TrainConfig>,
     /// The threads.
     pub threads: Vec<ThreadConfig>,
+    /// Loopback address that hands out metrics; none when absent.
+    pub metrics: Option<std::net::SocketAddr>,
+    /// Estimates that outlive the daemon; none are kept when absent.
+    pub state: Option<StateConfig>,
     /// The pipelines, by the number that their snapshots carry.
     pub pipelines: Vec<PipelineConfig>,
 }
@@ -154,6 +171,16 @@ impl DaemonConfig {
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| ConfigError::Unreadable { path: path.into(), source })?;
-        raw::check(path, &text)
+        DaemonConfig::from_text(path, &text)
+    }
+
+    /// Checks the text of a configuration, and the train and track files it names; `path` is the
+    /// file it came from.
+    ///
+    /// # Errors
+    ///
+    /// See [`ConfigError`].
+    pub fn from_text(path: &Path, text: &str) -> Result<Self, ConfigError> {
+        raw::check(path, text)
     }
 }

@@ -1,6 +1,7 @@
 //! From the text of a configuration to a checked [`DaemonConfig`].
 
 use std::collections::HashSet;
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -10,8 +11,8 @@ use dynocar_shared::{PipelineKind, TrainId};
 use serde::Deserialize;
 
 use super::{
-    ConfigError, DaemonConfig, IdleStrategy, LogFormat, PipelineConfig, ThreadConfig, TrainConfig,
-    is_slow,
+    ConfigError, DaemonConfig, IdleStrategy, LogFormat, PipelineConfig, StateConfig, ThreadConfig,
+    TrainConfig, is_slow,
 };
 use crate::dataset::{load_track, load_train};
 
@@ -29,6 +30,14 @@ struct RawConfig {
     threads: Vec<RawThread>,
     #[serde(default)]
     pipelines: Vec<RawPipeline>,
+    state: Option<RawState>,
+    metrics: Option<RawMetrics>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawMetrics {
+    listen: String,
 }
 
 #[derive(Debug, Deserialize)]
@@ -63,6 +72,26 @@ struct RawTrain {
     id: u64,
     file: PathBuf,
     track: Option<PathBuf>,
+    #[serde(default)]
+    wheel_set: String,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawState {
+    directory: PathBuf,
+    #[serde(default = "default_interval_s")]
+    interval_s: u64,
+    #[serde(default = "default_age_max_h")]
+    age_max_h: u64,
+}
+
+const fn default_interval_s() -> u64 {
+    30
+}
+
+const fn default_age_max_h() -> u64 {
+    7 * 24
 }
 
 #[derive(Debug, Deserialize)]
@@ -140,9 +169,36 @@ pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
         spin_us: checker.range("daemon.spin_us", raw.daemon.spin_us, 0, 1_000_000)?,
         heartbeat_ms: checker.range("daemon.heartbeat_ms", raw.daemon.heartbeat_ms, 5, 100)?,
         lock_memory: raw.daemon.lock_memory,
+        metrics: raw.metrics.map(|metrics| check_metrics(&checker, metrics)).transpose()?,
+        state: raw.state.map(|state| check_state(&checker, state)).transpose()?,
         trains,
         threads,
         pipelines,
+    })
+}
+
+/// Checks where metrics are handed out: on this host only.
+fn check_metrics(checker: &Checker, raw: RawMetrics) -> Result<SocketAddr, ConfigError> {
+    match raw.listen.parse::<SocketAddr>() {
+        Ok(address) if address.ip().is_loopback() => Ok(address),
+        _ => {
+            let allowed = "a loopback address with a port, as 127.0.0.1:9464";
+            checker.refuse("metrics.listen", raw.listen, allowed)
+        }
+    }
+}
+
+/// Checks where estimates are kept; the directory must be there when the daemon starts.
+fn check_state(checker: &Checker, raw: RawState) -> Result<StateConfig, ConfigError> {
+    let folder = checker.path.parent().unwrap_or(Path::new("."));
+    let directory = folder.join(&raw.directory);
+    if !directory.is_dir() {
+        return checker.refuse("state.directory", raw.directory.display(), "an existing directory");
+    }
+    Ok(StateConfig {
+        directory,
+        interval_s: checker.range("state.interval_s", raw.interval_s, 1, 3_600)?,
+        age_max_h: checker.range("state.age_max_h", raw.age_max_h, 1, 10_000)?,
     })
 }
 
@@ -162,6 +218,7 @@ fn check_trains(checker: &Checker, raw: Vec<RawTrain>) -> Result<Vec<TrainConfig
                 id: TrainId(train.id),
                 model: Arc::new(load_train(&folder.join(train.file))?),
                 track: track.map(Arc::new),
+                wheel_set: train.wheel_set,
             })
         })
         .collect()

@@ -18,6 +18,7 @@ struct Counters {
     lost: AtomicU64,
     unsent: AtomicU64,
     status: AtomicU64,
+    beats: AtomicU64,
 }
 
 /// A tally at one moment.
@@ -31,6 +32,8 @@ pub struct TallyReading {
     pub lost: u64,
     /// Snapshots that the transport did not take.
     pub unsent: u64,
+    /// Changes with every sign of life of the pipeline's thread.
+    pub beats: u64,
     /// Status and reason of the newest snapshot, by number.
     pub status: (u32, u32),
 }
@@ -47,6 +50,8 @@ impl Tally {
         self.counters.lost.store(snapshot.samples_lost, Relaxed);
         let status = u64::from(snapshot.status) << 32 | u64::from(snapshot.reason);
         self.counters.status.store(status, Relaxed);
+        let beats = self.counters.beats.load(Relaxed).wrapping_add(1);
+        self.counters.beats.store(beats, Relaxed);
     }
 
     /// Counts a snapshot that the transport did not take.
@@ -62,6 +67,7 @@ impl Tally {
             rejected: self.counters.rejected.load(Relaxed),
             lost: self.counters.lost.load(Relaxed),
             unsent: self.counters.unsent.load(Relaxed),
+            beats: self.counters.beats.load(Relaxed),
             status: ((status >> 32) as u32, status as u32),
         }
     }

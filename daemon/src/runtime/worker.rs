@@ -88,6 +88,7 @@ impl Worker {
             .into_iter()
             .map(|lane| open_lane(&transport, lane, plan.epoch))
             .collect::<Result<Vec<_>, _>>()?;
+        transport.reserve()?;
         let idler = Idler::new(plan.thread.idle, plan.spin_us, plan.heartbeat_ms, sleeper);
         Ok(Worker {
             lanes,

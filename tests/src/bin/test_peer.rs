@@ -2,7 +2,9 @@
 //!
 //! `dynocar-test-peer controller TRAIN PERIOD_US` publishes for ever and prints each hundredth
 //! sequence number; `dynocar-test-peer client TRAIN PERIOD_US` polls for ever and prints one line
-//! a poll: epoch, sequence, sample sequence, used, lost, age in ms, stale, status, poll time in ns.
+//! a poll: epoch, sequence, sample sequence, used, lost, age in ms, stale, status, time of the
+//! poll and its length in ns.
+//! `dynocar-test-peer state-writer FOLDER` replaces a state file for ever.
 
 use std::io::Write;
 use std::time::Duration;
@@ -12,6 +14,11 @@ use dynocar_shared::{SampleField, TrainId, TrainSample};
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if let [role, folder] = &arguments[..]
+        && role == "state-writer"
+    {
+        return dynocar_tests::soak::state_kills::write_for_ever(std::path::Path::new(folder));
+    }
     let [role, train, period_us] = &arguments[..] else {
         panic!("expected: controller|client TRAIN PERIOD_US, got {arguments:?}");
     };
@@ -62,7 +69,7 @@ fn poll(host: &Host, train: TrainId, period: Duration) {
                 let it = reading.snapshot;
                 writeln!(
                     out,
-                    "{} {} {} {} {} {} {} {} {poll_ns}",
+                    "{} {} {} {} {} {} {} {} {now_ns} {poll_ns}",
                     it.epoch,
                     it.sequence,
                     it.sample_sequence,

@@ -207,8 +207,8 @@ tunnels = [[2200.0, 2900.0]]
             ),
             (
                 ("[200.0, 300.0, 500.0]", "[200.0, 100.0, 500.0]"),
-                "track.toml:10: curves entry 2: expected start < end, both finite, got 200 m to \
-                 100 m",
+                "track.toml:10: curves entry 2: expected start < end, both within a million km, got \
+                 200 m to 100 m",
             ),
             (
                 ("[200.0, 300.0, 500.0]", "[200.0, 1300.0, 500.0]"),

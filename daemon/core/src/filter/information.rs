@@ -49,6 +49,12 @@ impl<const N: usize> SquareRootInformation<N> {
         }
     }
 
+    /// Adds what is known from elsewhere, as a row of unit variance that counts neither as a row
+    /// nor as residual.
+    pub fn add_knowledge(&mut self, features: &SVector<f64, N>, observed: f64) {
+        self.rotate_in(features, observed);
+    }
+
     /// Rotates a row into the triangle; gives what is left of its observed value.
     fn rotate_in(&mut self, features: &SVector<f64, N>, observed: f64) -> f64 {
         let mut row = *features;

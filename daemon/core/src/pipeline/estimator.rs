@@ -2,6 +2,7 @@
 
 use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason};
 
+use super::KeptEstimate;
 use crate::force::ResolvedSample;
 
 /// What an estimator did with a sample.
@@ -38,4 +39,10 @@ pub trait Estimator: Send {
     ///
     /// Allocates nothing, locks nothing, reads no clock.
     fn write(&self, snapshot: &mut ParameterSnapshot);
+
+    /// Takes an estimate kept from earlier as its prior, before the first sample; false when
+    /// it has no use for one. The status stays unestimated until samples confirm it.
+    fn warm_start(&mut self, _kept: &KeptEstimate) -> bool {
+        false
+    }
 }

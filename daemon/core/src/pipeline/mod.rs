@@ -7,6 +7,7 @@ pub mod braking;
 mod echo;
 mod estimator;
 mod innovation;
+mod kept;
 pub mod mass;
 pub mod monitor;
 pub mod output;
@@ -17,11 +18,12 @@ pub mod trajectory;
 pub use echo::Echo;
 pub use estimator::{Estimator, Outcome};
 pub use innovation::InnovationMonitor;
+pub use kept::{KeptEstimate, NotKept};
 pub use settings::{EstimatorSettings, SettingError};
 
 use std::sync::Arc;
 
-use dynocar_shared::{ParameterSnapshot, RejectionReason, TrainId, TrainSample};
+use dynocar_shared::{ParameterSnapshot, Reason, RejectionReason, Status, TrainId, TrainSample};
 
 use crate::force::ForceResolver;
 use crate::track::Track;
@@ -33,8 +35,16 @@ pub struct Pipeline {
     validator: Validator,
     resolver: ForceResolver,
     estimator: Box<dyn Estimator>,
+    /// Share of the samples lately that validation refused.
+    refused_share: f64,
     snapshot: ParameterSnapshot,
 }
+
+/// Samples over which refusals are remembered.
+const REFUSALS_MEMORY: f64 = 500.0;
+/// Share of refused samples above which no estimate is trusted: where so many are plainly wrong,
+/// others are wrong without being plainly so.
+const REFUSED_SHARE_MAX: f64 = 0.15;
 
 impl Pipeline {
     /// A pipeline around an estimator; `index` is its number in the configuration.
@@ -55,8 +65,17 @@ impl Pipeline {
             validator: Validator::new(train_id, train.mass_kg, limits),
             resolver: ForceResolver::new(train, track),
             estimator,
+            refused_share: 0.0,
             snapshot,
         }
+    }
+
+    /// Starts from an estimate kept from earlier, before the first sample; false when the
+    /// estimator has no use for it.
+    pub fn warm_start(&mut self, kept: &KeptEstimate) -> bool {
+        let is_taken = self.estimator.warm_start(kept);
+        self.estimator.write(&mut self.snapshot);
+        is_taken
     }
 
     /// Takes one sample and gives the snapshot after it.
@@ -68,7 +87,9 @@ impl Pipeline {
     ///
     /// Allocates nothing, locks nothing, reads no clock.
     pub fn process(&mut self, sample: &TrainSample) -> &ParameterSnapshot {
-        let outcome = match self.validator.check(sample) {
+        let valid = self.validator.check(sample);
+        self.refused_share += (f64::from(valid.is_err()) - self.refused_share) / REFUSALS_MEMORY;
+        let outcome = match valid {
             Ok(valid) => self.estimator.update(&self.resolver.resolve(&valid)),
             Err(reason) => Outcome::Rejected(reason),
         };
@@ -87,6 +108,9 @@ impl Pipeline {
         snapshot.sample_published_ns = sample.published_ns;
         snapshot.sample_sequence = sample.sequence;
         self.estimator.write(snapshot);
+        if self.refused_share > REFUSED_SHARE_MAX && snapshot.status() == Status::Estimated {
+            output::write_status(snapshot, Status::Degraded, Reason::BadInput);
+        }
         snapshot
     }
 

@@ -49,7 +49,8 @@ pub enum TrackError {
     Gradient(ProfileError),
     /// An interval is empty, reversed or not finite.
     #[error(
-        "{list} entry {index}: expected start < end, both finite, got {start_m} m to {end_m} m"
+        "{list} entry {index}: expected start < end, both within a million km, got {start_m} m to \
+         {end_m} m"
     )]
     BadInterval {
         /// `curves` or `tunnels`.
@@ -222,7 +223,9 @@ impl Track {
 
 fn curvature_profile(curves: &[Curve]) -> Result<StepProfile, TrackError> {
     for (i, curve) in curves.iter().enumerate() {
-        if !(curve.radius_m.is_finite() && curve.radius_m > 0.0) {
+        // The reciprocal of a subnormal radius is infinite.
+        let is_usable = curve.radius_m.is_finite() && (1.0 / curve.radius_m).is_finite();
+        if !(is_usable && curve.radius_m > 0.0) {
             return Err(TrackError::BadRadius { index: i + 1, radius_m: curve.radius_m });
         }
     }
@@ -241,13 +244,17 @@ fn tunnel_profiles(tunnels: &[Tunnel]) -> Result<TunnelProfiles, TrackError> {
     })
 }
 
+/// A greater chainage in m cannot be told from its neighbours to the millimetre, nor be meant.
+const CHAINAGE_MAX_M: f64 = 1e9;
+
 /// A profile that is zero outside the given (start, end, value) intervals.
 fn interval_profile(
     list: &'static str,
     intervals: &[(f64, f64, f64)],
 ) -> Result<StepProfile, TrackError> {
     for (i, &(start_m, end_m, _)) in intervals.iter().enumerate() {
-        if !(start_m.is_finite() && end_m.is_finite() && start_m < end_m) {
+        let is_on_earth = |at_m: f64| at_m.abs() <= CHAINAGE_MAX_M;
+        if !(is_on_earth(start_m) && is_on_earth(end_m) && start_m < end_m) {
             return Err(TrackError::BadInterval { list, index: i + 1, start_m, end_m });
         }
     }
@@ -339,6 +346,8 @@ mod tests {
             TrackError::BadInterval { index: 1, .. }
         ));
         assert!(matches!(with(vec![curve(0.0, 1.0, 0.0)]), TrackError::BadRadius { .. }));
+        assert!(matches!(with(vec![curve(0.0, 1.0, 1e-320)]), TrackError::BadRadius { .. }));
+        assert!(matches!(with(vec![curve(1e300, 2e300, 9.0)]), TrackError::BadInterval { .. }));
     }
 
     #[test]

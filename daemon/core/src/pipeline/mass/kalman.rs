@@ -15,7 +15,7 @@ use super::speed_noise::SpeedNoise;
 use crate::force::ResolvedSample;
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::settings::SettingError;
-use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
+use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use crate::train::TrainModel;
 
 /// A normalised innovation beyond which the speed is not believed.
@@ -54,6 +54,7 @@ pub struct MassKalman {
     /// Inverse mass as known when force last acted, bias as known now.
     moments: Moments,
     declared_mass_kg: f64,
+    is_warm_started: bool,
     noise: SpeedNoise,
     outliers_in_a_row: u32,
     monitor: InnovationMonitor,
@@ -91,6 +92,7 @@ impl MassKalman {
             last: None,
             moments: bank.moments(),
             declared_mass_kg: train.mass_kg,
+            is_warm_started: false,
             noise: SpeedNoise::new(settings.speed_noise_mps),
             outliers_in_a_row: 0,
             monitor: InnovationMonitor::new(500),
@@ -136,7 +138,8 @@ impl MassKalman {
     /// Takes over the mass that the first sample declares, if it declares another.
     fn begin_with(&mut self, declared_mass_kg: f64) {
         let ratio = declared_mass_kg / self.reference_mass_kg;
-        if !(ratio.is_finite() && ratio > 0.0) {
+        let is_as_kept = self.is_warm_started && (ratio - 1.0).abs() <= DECLARED_CHANGE_MIN;
+        if !(ratio.is_finite() && ratio > 0.0) || is_as_kept {
             return;
         }
         self.declared_mass_kg = declared_mass_kg;
@@ -307,5 +310,19 @@ impl Estimator for MassKalman {
         (snapshot.speed_min_mps, snapshot.speed_max_mps) =
             self.speed_range_mps.unwrap_or((0.0, 0.0));
         snapshot.generation = self.generation;
+    }
+
+    /// Takes up the kept mass, unless the first sample declares another than the train's.
+    fn warm_start(&mut self, kept: &KeptEstimate) -> bool {
+        let Some((mass_t, variance)) = kept.moments([Parameter::Mass]) else { return false };
+        let inverse = self.reference_mass_kg / (1e3 * mass_t[0]);
+        if !(inverse.is_finite() && inverse > 0.0) {
+            return false;
+        }
+        let relative_variance = variance[(0, 0)] / (mass_t[0] * mass_t[0]);
+        self.bank.reopen(inverse, relative_variance * inverse * inverse);
+        self.moments = self.bank.moments();
+        self.is_warm_started = true;
+        true
     }
 }

@@ -19,7 +19,7 @@ use super::settings::KalmanSettings;
 use super::solver::Solution;
 use crate::filter::JointState;
 use crate::force::ResolvedSample;
-use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
+use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use crate::train::TrainModel;
 
 const SPEED: usize = 0;
@@ -385,5 +385,12 @@ impl Estimator for ResistanceKalman {
         let (value, std) = self.disturbance();
         snapshot.unexplained_force_n = value * weight_kn;
         snapshot.unexplained_force_std_n = std * weight_kn;
+    }
+
+    fn warm_start(&mut self, kept: &KeptEstimate) -> bool {
+        let is_taken = self.beside.warm_start(kept);
+        self.filter = filter_at(self.beside.declared());
+        self.report = *self.beside.report();
+        is_taken
     }
 }

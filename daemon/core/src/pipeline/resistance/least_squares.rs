@@ -15,9 +15,11 @@ use super::speed::SpeedNoise;
 use crate::filter::RunningMedian;
 use crate::force::ResolvedSample;
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
-use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
+use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use crate::train::{Davis, TrainModel};
 
+/// What this pipeline estimates.
+const DAVIS: [Parameter; PARAMETERS] = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
 /// Rows that the innovation statistics look back over.
 const MONITOR_ROWS: u32 = 60;
 /// Rows whose median gives the robust scale of the innovations.
@@ -281,12 +283,7 @@ impl ResistanceLeastSquares {
         let factors = unscaling();
         let covariance =
             Matrix3::from_diagonal(&factors) * report.covariance * Matrix3::from_diagonal(&factors);
-        write_parameters(
-            snapshot,
-            [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC],
-            &report.estimate.component_mul(&factors),
-            &covariance,
-        );
+        write_parameters(snapshot, DAVIS, &report.estimate.component_mul(&factors), &covariance);
         write_innovations(snapshot, monitor);
         snapshot.generation = self.resets;
         snapshot.excited = report.excited;
@@ -333,6 +330,31 @@ impl Estimator for ResistanceLeastSquares {
 
     fn write(&self, snapshot: &mut ParameterSnapshot) {
         self.write_with(&self.report, &self.monitor, snapshot);
+    }
+
+    /// The kept coefficients take the place of the declared ones, and are known to every noise
+    /// model with their covariance. A reset for numerical failure forgets the latter.
+    fn warm_start(&mut self, kept: &KeptEstimate) -> bool {
+        let Some((davis, covariance)) = kept.moments(DAVIS) else { return false };
+        let factors = unscaling();
+        let scale = Matrix3::from_diagonal(&factors.map(|factor| 1.0 / factor));
+        let (mean, covariance) = (scale * davis, scale * covariance * scale);
+        let root = covariance.cholesky().map(|it| it.unpack());
+        let Some(rows) = root.and_then(|root| root.solve_lower_triangular(&Matrix3::identity()))
+        else {
+            return false;
+        };
+        for row in rows.row_iter() {
+            let features = Unknowns::from_fn(|i, _| if i < PARAMETERS { row[i] } else { 0.0 });
+            self.bank.know(&features, row.dot(&mean.transpose()));
+        }
+        self.solver.restart(&self.bank);
+        self.declared.estimate.fixed_rows_mut::<PARAMETERS>(0).copy_from(&mean);
+        let mut block = self.declared.covariance.fixed_view_mut::<PARAMETERS, PARAMETERS>(0, 0);
+        block.copy_from(&covariance);
+        self.known = Davis { a: davis[0], b: davis[1], c: davis[2] };
+        self.report = Report::unestimated(&self.declared, Reason::TooFewSamples);
+        true
     }
 }
 

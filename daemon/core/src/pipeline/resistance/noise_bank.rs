@@ -82,6 +82,13 @@ impl NoiseBank {
         }
     }
 
+    /// Adds what is known of the unknowns from elsewhere to every model, a row of unit variance.
+    pub fn know(&mut self, features: &Unknowns, observed: f64) {
+        for model in &mut self.models {
+            model.know(features, observed);
+        }
+    }
+
     /// Forgets all rows.
     pub fn clear(&mut self) {
         *self = NoiseBank::new(&self.penalty, self.forgetting);

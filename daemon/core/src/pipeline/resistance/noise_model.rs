@@ -103,6 +103,11 @@ impl NoiseModel {
         self.information.add_penalty(weights);
     }
 
+    /// Adds what is known of the unknowns from elsewhere, a row of unit variance.
+    pub fn know(&mut self, features: &Unknowns, observed: f64) {
+        self.information.add_knowledge(features, observed);
+    }
+
     /// Degrees of freedom of the residuals; negative while rows are too few.
     pub fn freedom(&self) -> f64 {
         self.count() - FREE

@@ -18,8 +18,8 @@ use super::unexplained::UnexplainedForce;
 use crate::force::ResolvedSample;
 use crate::pipeline::output::write_parameters;
 use crate::pipeline::settings::{SettingError, require};
-use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
-use crate::train::TrainModel;
+use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
+use crate::train::{Davis, TrainModel};
 
 /// Settings of `trajectory_kalman`.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -214,5 +214,12 @@ impl Estimator for TrajectoryKalman {
         let speed_variance = self.filter.bank().likeliest().noise.speed_variance;
         self.unexplained.write(snapshot, speed_variance);
         snapshot.generation = self.filter.resets();
+    }
+
+    fn warm_start(&mut self, kept: &KeptEstimate) -> bool {
+        kept.moments(DAVIS).is_some_and(|(mean, covariance)| {
+            let davis = Davis { a: mean[0], b: mean[1], c: mean[2] };
+            self.filter.warm_start(&davis, &covariance)
+        })
     }
 }

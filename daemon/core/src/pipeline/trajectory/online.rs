@@ -56,6 +56,18 @@ impl OnlineFilter {
         JumpBank::new(first, settings.hypotheses, settings.jumps, settings.noise, OUTLIERS)
     }
 
+    /// Takes coefficients with a full covariance as its start, before the first step; false when
+    /// the covariance cannot be factored. A reset goes back to the settings.
+    pub fn warm_start(&mut self, davis: &Davis, covariance: &Matrix3<f64>) -> bool {
+        let Some(factor) = covariance.cholesky() else { return false };
+        let noise = LearnedNoise::new(&self.settings.noise);
+        let mut first = Hypothesis::new(davis, &self.settings.davis_std, noise);
+        first.factor.0.fixed_view_mut::<3, 3>(0, 0).copy_from(&factor.unpack());
+        let OnlineSettings { hypotheses, jumps, noise, .. } = self.settings;
+        self.bank = JumpBank::new(first, hypotheses, jumps, noise, OUTLIERS);
+        true
+    }
+
     /// Takes a speed as the start of a trajectory; the coefficients keep what they know.
     pub fn begin(&mut self, measured_mps: f64) {
         self.bank.anchor(measured_mps);

@@ -1,0 +1,63 @@
+//! `dynocar health`: is the daemon well? For supervisors, probes and people.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use dynocar_client::Host;
+use dynocar_shared::TrainId;
+
+use super::Failure;
+use crate::config::DaemonConfig;
+use crate::supervision::health::{TrainHealth, Verdict, look_at};
+
+/// Say how well trains are served; the exit status is the verdict: 0 ok, 3 degraded, 4 stale,
+/// 5 incompatible daemon, 6 no daemon (1 and 2 as for every command)
+#[derive(Debug, Args)]
+pub struct HealthArguments {
+    /// The daemon's configuration: its root, all its trains
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Only this train
+    #[arg(long, value_name = "ID")]
+    train: Option<u64>,
+}
+
+/// Looks at the daemon and prints a line for each train and pipeline.
+///
+/// # Errors
+///
+/// The worst verdict of all trains unless it is ok; an unusable configuration or directory.
+pub fn execute(arguments: &HealthArguments) -> Result<(), Failure> {
+    let config = arguments
+        .config
+        .as_ref()
+        .map(|path| DaemonConfig::load(path).map_err(|error| Failure::Input(error.to_string())))
+        .transpose()?;
+    let work = |error: dynocar_client::ChannelError| Failure::Work(error.to_string());
+    let host = match config.as_ref().and_then(|config| config.root.as_ref()) {
+        Some(root) => Host::at(root).map_err(work)?,
+        None => Host::from_environment().map_err(work)?,
+    };
+    let trains: Vec<TrainId> = match (arguments.train, &config) {
+        (Some(train), _) => vec![TrainId(train)],
+        (None, Some(config)) => config.trains.iter().map(|train| train.id).collect(),
+        (None, None) => vec![TrainId(1)],
+    };
+    let mut worst = Verdict::Ok;
+    for train in trains {
+        let health = look_at(&host, train).map_err(work)?;
+        print(&health);
+        worst = worst.max(health.verdict);
+    }
+    if worst == Verdict::Ok { Ok(()) } else { Err(Failure::Verdict(worst.exit_status())) }
+}
+
+fn print(health: &TrainHealth) {
+    let daemon = health.daemon.as_deref().unwrap_or("nobody serves it");
+    println!("train {}: {}: {daemon}", health.train, health.verdict);
+    for it in &health.pipelines {
+        let reason = it.reason.map_or("unknown", dynocar_shared::Reason::name);
+        let (kind, status, age_ms) = (it.kind, it.status, it.age_ms);
+        println!("  pipeline {} ({kind}): {status} ({reason}), vouched {age_ms} ms ago", it.index);
+    }
+}

@@ -1,0 +1,174 @@
+//! The bytes of a state file: a header line, then the content.
+//!
+//! ```text
+//! dynocar-state 1 <bytes of content> <checksum of content, 16 hexadecimal digits>
+//! ```
+//!
+//! A file is replaced as a whole: written beside, brought to the disk, renamed over the old one,
+//! and the directory brought to the disk. Whenever the writer dies, the old or the new file is
+//! there, never a part of one.
+
+use std::fs::{File, OpenOptions};
+use std::io::{ErrorKind, Read, Write};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+
+use super::StateError;
+
+/// Version of the state file.
+pub const SCHEMA: u32 = 1;
+/// First word of the header.
+const MAGIC: &str = "dynocar-state";
+/// A longer file is none of ours.
+const BYTES_MAX: u64 = 1 << 20;
+
+/// 64-bit FNV-1a: finds torn and rotten bytes; it is no defence against forgery.
+pub fn checksum(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
+}
+
+/// Reads the content of a state file; `None` when there is no file.
+///
+/// # Errors
+///
+/// When the file is not a whole state file of this schema.
+pub fn read(path: &Path) -> Result<Option<String>, StateError> {
+    let file = match File::open(path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(source) => return Err(failed(path, "opening")(source)),
+    };
+    let mut bytes = Vec::new();
+    file.take(BYTES_MAX).read_to_end(&mut bytes).map_err(failed(path, "reading"))?;
+    content_of(path, &bytes).map(Some)
+}
+
+/// Checks the bytes of a state file and gives its content.
+///
+/// # Errors
+///
+/// When they are not a whole state file of this schema.
+pub fn content_of(path: &Path, bytes: &[u8]) -> Result<String, StateError> {
+    let none = || StateError::NotAState { path: path.into() };
+    let end = bytes.iter().position(|&byte| byte == b'\n').ok_or_else(none)?;
+    let header = std::str::from_utf8(&bytes[..end]).map_err(|_| none())?;
+    let words: Vec<&str> = header.split(' ').collect();
+    let [MAGIC, schema, rest @ ..] = &words[..] else { return Err(none()) };
+    if *schema != SCHEMA.to_string() {
+        let found = (*schema).to_owned();
+        return Err(StateError::Schema { path: path.into(), found, expected: SCHEMA });
+    }
+    let [length, sum] = rest else { return Err(none()) };
+    let expected: usize = length.parse().map_err(|_| none())?;
+    let saved = u64::from_str_radix(sum, 16).map_err(|_| none())?;
+    let content = &bytes[end + 1..];
+    if content.len() != expected {
+        return Err(StateError::Torn { path: path.into(), expected, found: content.len() });
+    }
+    let calculated = checksum(content);
+    if calculated != saved {
+        return Err(StateError::Corrupt { path: path.into(), saved, calculated });
+    }
+    String::from_utf8(content.to_vec()).map_err(|_| none())
+}
+
+/// The bytes of a state file with this content.
+pub fn bytes_of(content: &str) -> Vec<u8> {
+    let sum = checksum(content.as_bytes());
+    format!("{MAGIC} {SCHEMA} {} {sum:016x}\n{content}", content.len()).into_bytes()
+}
+
+/// Replaces a state file as a whole.
+///
+/// # Errors
+///
+/// The system's answer; the file there was stays as it is.
+pub fn replace(path: &Path, content: &str) -> Result<(), StateError> {
+    let beside = beside(path);
+    // What a writer that died left behind.
+    let mut file = OpenOptions::new()
+        .write(true)
+        .create(true)
+        .truncate(true)
+        .mode(0o600)
+        .open(&beside)
+        .map_err(failed(&beside, "making the file"))?;
+    let written = file.write_all(&bytes_of(content)).and_then(|()| file.sync_all());
+    if let Err(source) = written {
+        // The half-written file is of no use; that it cannot be removed changes nothing.
+        let _ = std::fs::remove_file(&beside);
+        return Err(failed(&beside, "writing")(source));
+    }
+    std::fs::rename(&beside, path).map_err(failed(path, "replacing"))?;
+    let directory = path.parent().unwrap_or(Path::new("."));
+    File::open(directory)
+        .and_then(|directory| directory.sync_all())
+        .map_err(failed(directory, "bringing the directory to the disk"))
+}
+
+/// One name for each state file, so that dead writers leave at most one behind; a train has one
+/// daemon and hence one writer.
+fn beside(path: &Path) -> PathBuf {
+    path.with_extension("state.new")
+}
+
+fn failed<'a>(
+    path: &'a Path,
+    action: &'static str,
+) -> impl FnOnce(std::io::Error) -> StateError + 'a {
+    move |source| StateError::System { path: path.to_path_buf(), action, source }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_replaced_file_is_read_back_and_closed_to_others() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("train-1.state");
+        assert_eq!(read(&path).unwrap(), None);
+        for content in ["one\n", "another, longer one\n", ""] {
+            replace(&path, content).unwrap();
+            assert_eq!(read(&path).unwrap().as_deref(), Some(content));
+        }
+        let mode = std::fs::metadata(&path).unwrap().permissions().mode();
+        assert_eq!(mode & 0o777, 0o600);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing beside it");
+    }
+
+    #[test]
+    fn a_file_cut_off_anywhere_is_refused() {
+        let whole = bytes_of("schema content\nof two lines\n");
+        for length in 0..whole.len() {
+            let refusal = content_of(Path::new("x"), &whole[..length]);
+            assert!(refusal.is_err(), "cut to {length} bytes");
+        }
+        assert!(content_of(Path::new("x"), &[&whole[..], b"x"].concat()).is_err(), "one too many");
+    }
+
+    #[test]
+    fn a_file_with_any_bit_flipped_is_refused() {
+        let whole = bytes_of("schema content\nof two lines\n");
+        let original = content_of(Path::new("x"), &whole).unwrap();
+        for place in 0..whole.len() {
+            for bit in 0..8 {
+                let mut rotten = whole.clone();
+                rotten[place] ^= 1 << bit;
+                // A digit of the checksum may change its case, which changes nothing.
+                let read = content_of(Path::new("x"), &rotten);
+                assert!(read.is_err() || read.unwrap() == original, "byte {place}, bit {bit}");
+            }
+        }
+    }
+
+    #[test]
+    fn another_schema_is_named() {
+        let newer = b"dynocar-state 2 0 cbf29ce484222325\n";
+        let message = content_of(Path::new("x"), newer).unwrap_err().to_string();
+        assert_eq!(message, "x: state schema 2, expected 1");
+    }
+}

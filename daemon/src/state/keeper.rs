@@ -1,0 +1,184 @@
+//! The thread that writes the states: a client of the daemon's own snapshots.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use dynocar_client::{ChannelError, Host, SnapshotReader, monotonic_now_ns};
+use dynocar_core::pipeline::KeptEstimate;
+use dynocar_shared::ParameterSnapshot;
+use tracing::{info, warn};
+
+use super::entry::{ModelKey, StateContent, StoredEstimate, settings_hash};
+use super::{StateError, file, path_of, unix_now_s};
+use crate::config::{DaemonConfig, StateConfig};
+
+/// How often the keeper looks whether to stop.
+const ROUND: Duration = Duration::from_millis(50);
+
+/// One train's state with the reader it is kept from.
+struct KeptTrain {
+    reader: SnapshotReader,
+    content: StateContent,
+    is_changed: bool,
+}
+
+/// Keeps the states of all trains.
+pub struct Keeper {
+    state: StateConfig,
+    /// Name and settings hash by number of the pipeline.
+    pipelines: Vec<(String, u64)>,
+    trains: Vec<KeptTrain>,
+    stop: Arc<AtomicBool>,
+}
+
+impl Keeper {
+    /// A keeper; `stored` is what the trains' states held at the start, by place of the train.
+    ///
+    /// # Errors
+    ///
+    /// When the snapshots cannot be read.
+    pub fn new(
+        config: &DaemonConfig,
+        state: &StateConfig,
+        host: &Host,
+        stored: Vec<Vec<StoredEstimate>>,
+        stop: Arc<AtomicBool>,
+    ) -> Result<Self, ChannelError> {
+        let trains = config
+            .trains
+            .iter()
+            .zip(stored)
+            .map(|(train, estimates)| {
+                Ok(KeptTrain {
+                    reader: SnapshotReader::open(host, train.id)?,
+                    content: StateContent { key: ModelKey::of(train), estimates },
+                    is_changed: false,
+                })
+            })
+            .collect::<Result<_, ChannelError>>()?;
+        let name =
+            |it: &crate::config::PipelineConfig| (it.name.clone(), settings_hash(&it.estimator));
+        let pipelines = config.pipelines.iter().map(name).collect();
+        Ok(Keeper { state: state.clone(), pipelines, trains, stop })
+    }
+
+    /// Writes what is validated, every so often and at the end.
+    pub fn run(&mut self) {
+        let interval = Duration::from_secs(self.state.interval_s);
+        let mut last = Instant::now();
+        while !self.stop.load(Ordering::Relaxed) {
+            std::thread::sleep(ROUND);
+            if last.elapsed() >= interval {
+                last = Instant::now();
+                self.gather();
+                self.write();
+            } else {
+                for train in &mut self.trains {
+                    train.reader.poll();
+                }
+            }
+        }
+        self.gather();
+        self.write();
+    }
+
+    fn gather(&mut self) {
+        let (now_s, now_ns) = (unix_now_s(), monotonic_now_ns());
+        for train in &mut self.trains {
+            train.reader.poll();
+            for reading in train.reader.readings(now_ns) {
+                let place = reading.snapshot.pipeline_index as usize;
+                if let Some((name, settings)) = self.pipelines.get(place) {
+                    let is_news =
+                        keep(&mut train.content, name, *settings, reading.snapshot, now_s);
+                    train.is_changed |= is_news;
+                }
+            }
+        }
+    }
+
+    fn write(&mut self) {
+        for train in self.trains.iter_mut().filter(|train| train.is_changed) {
+            let path =
+                path_of(&self.state.directory, dynocar_shared::TrainId(train.content.key.train));
+            let written = train
+                .content
+                .to_text()
+                .map_err(|error| StateError::Malformed {
+                    path: path.clone(),
+                    message: error.to_string(),
+                })
+                .and_then(|text| file::replace(&path, &text));
+            match written {
+                Ok(()) => train.is_changed = false,
+                Err(error) => warn!("state not kept, tried again later: {error}"),
+            }
+        }
+    }
+}
+
+/// Takes a validated estimate into the state; true when it is another than before. What is not
+/// validated leaves the older estimate, with its older time, where it is.
+fn keep(
+    content: &mut StateContent,
+    pipeline: &str,
+    settings: u64,
+    snapshot: &ParameterSnapshot,
+    now_s: f64,
+) -> bool {
+    let Ok(estimate) = KeptEstimate::of(snapshot) else { return false };
+    let stored = StoredEstimate {
+        train: content.key.train,
+        pipeline: pipeline.to_owned(),
+        settings,
+        estimated_unix_s: now_s,
+        estimate,
+    };
+    match content.estimates.iter_mut().find(|it| it.pipeline == pipeline) {
+        Some(before) if before.estimate == stored.estimate && before.settings == settings => {
+            // The same again, without a sample since: it does not become younger by that.
+            false
+        }
+        Some(before) => {
+            *before = stored;
+            true
+        }
+        None => {
+            info!(pipeline, train = content.key.train, "first validated estimate, to be kept");
+            content.estimates.push(stored);
+            true
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynocar_shared::{Parameter, Status};
+
+    fn snapshot(status: Status, mass_t: f64) -> ParameterSnapshot {
+        let mut snapshot = ParameterSnapshot::empty();
+        snapshot.status = status as u32;
+        snapshot.parameter_count = 1;
+        snapshot.parameters[0] = Parameter::Mass as u32;
+        (snapshot.values[0], snapshot.covariance[0]) = (mass_t, 1.0);
+        snapshot
+    }
+
+    #[test]
+    fn only_validated_estimates_replace_what_is_kept() {
+        let key = ModelKey { train: 1, wheel_set: String::new(), model: 2 };
+        let mut content = StateContent { key, estimates: Vec::new() };
+        let mut offer = |status, mass_t, now_s| {
+            let news = keep(&mut content, "mass", 5, &snapshot(status, mass_t), now_s);
+            let kept = content.estimates.first();
+            (news, kept.map(|it| (it.estimate.values()[0], it.estimated_unix_s)))
+        };
+        assert_eq!(offer(Status::Unestimated, 100.0, 1.0), (false, None));
+        assert_eq!(offer(Status::Estimated, 200.0, 2.0), (true, Some((200.0, 2.0))));
+        assert_eq!(offer(Status::Degraded, 300.0, 3.0), (false, Some((200.0, 2.0))));
+        assert_eq!(offer(Status::Estimated, 200.0, 4.0), (false, Some((200.0, 2.0))), "no news");
+        assert_eq!(offer(Status::Estimated, 201.0, 5.0), (true, Some((201.0, 5.0))));
+    }
+}

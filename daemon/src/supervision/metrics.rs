@@ -1,0 +1,119 @@
+//! The daemon's numbers as OpenMetrics text, taken from its snapshots as any client takes them.
+
+use dynocar_client::{Reading, SnapshotReader, monotonic_now_ns};
+use dynocar_shared::{Parameter, PipelineKind, RejectionReason, Status};
+use prometheus_client::encoding::text::encode;
+use prometheus_client::metrics::counter::Counter;
+use prometheus_client::metrics::family::Family;
+use prometheus_client::metrics::gauge::Gauge;
+use prometheus_client::registry::Registry;
+use std::sync::atomic::AtomicU64;
+
+/// The content type of [`text`].
+pub const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+
+type Labels = Vec<(&'static str, String)>;
+type Gauges = Family<Labels, Gauge<f64, AtomicU64>>;
+type Counters = Family<Labels, Counter>;
+
+/// The families of one answer.
+#[derive(Default)]
+struct Families {
+    used: Counters,
+    rejected: Counters,
+    lost: Counters,
+    updates: Counters,
+    resets: Counters,
+    status: Gauges,
+    vouched_age: Gauges,
+    latency: Gauges,
+    value: Gauges,
+    deviation: Gauges,
+    innovation: Gauges,
+    unexplained: Gauges,
+}
+
+impl Families {
+    fn register(&self, registry: &mut Registry) {
+        let counters = [
+            ("samples_used", "Samples that entered the estimate", &self.used),
+            ("samples_rejected", "Samples refused, by reason", &self.rejected),
+            ("samples_lost", "Samples that never arrived", &self.lost),
+            ("updates", "Windows or segments that updated the estimate", &self.updates),
+            ("resets", "Resets of the estimate", &self.resets),
+        ];
+        for (name, help, family) in counters {
+            registry.register(name, help, family.clone());
+        }
+        let gauges = [
+            ("status", "1 for the status that holds", &self.status),
+            ("vouched_age_seconds", "Time since the snapshot was vouched for", &self.vouched_age),
+            ("latency_seconds", "From sample to snapshot, the newest", &self.latency),
+            ("parameter_value", "Value in the parameter's unit", &self.value),
+            ("parameter_std", "Standard deviation in the parameter's unit", &self.deviation),
+            ("innovation_mean_square", "1 when the model holds", &self.innovation),
+            ("unexplained_force_newtons", "Force that the model lacks", &self.unexplained),
+        ];
+        for (name, help, family) in gauges {
+            registry.register(name, help, family.clone());
+        }
+    }
+
+    fn take(&self, reading: &Reading<'_>, name: &str) {
+        let it = reading.snapshot;
+        let labels: Labels = vec![
+            ("train", it.train_id.to_string()),
+            ("pipeline", name.to_owned()),
+            ("kind", it.pipeline_kind().map_or("unknown", PipelineKind::name).to_owned()),
+        ];
+        let with = |key: &'static str, value: &str| {
+            let mut labels = labels.clone();
+            labels.push((key, value.to_owned()));
+            labels
+        };
+        self.used.get_or_create(&labels).inc_by(it.samples_used);
+        self.lost.get_or_create(&labels).inc_by(it.samples_lost);
+        self.updates.get_or_create(&labels).inc_by(it.updates);
+        self.resets.get_or_create(&labels).inc_by(it.generation);
+        for &reason in RejectionReason::ALL.iter().filter(|&&reason| it.rejected(reason) > 0) {
+            let labels = with("reason", reason.name());
+            self.rejected.get_or_create(&labels).inc_by(u64::from(it.rejected(reason)));
+        }
+        for &status in Status::ALL {
+            let holds = f64::from(u8::from(status == reading.status()));
+            self.status.get_or_create(&with("status", status.name())).set(holds);
+        }
+        self.vouched_age.get_or_create(&labels).set(reading.age_ns as f64 * 1e-9);
+        if it.sample_sequence > 0 {
+            let latency_ns = it.published_ns.saturating_sub(it.sample_published_ns);
+            self.latency.get_or_create(&labels).set(latency_ns as f64 * 1e-9);
+        }
+        self.innovation.get_or_create(&labels).set(it.innovation_mean_square);
+        self.unexplained.get_or_create(&labels).set(it.unexplained_force_n);
+        for (place, number) in it.parameters.iter().enumerate().take(it.parameter_count as usize) {
+            let name = Parameter::from_number(*number).map_or("unknown", Parameter::name);
+            let labels = with("parameter", name);
+            self.value.get_or_create(&labels).set(it.values[place]);
+            let deviation = it.covariance_at(place, place).max(0.0).sqrt();
+            self.deviation.get_or_create(&labels).set(deviation);
+        }
+    }
+}
+
+/// The newest snapshots as OpenMetrics text; `names` are the pipelines' by their number.
+pub fn text(readers: &mut [SnapshotReader], names: &[String]) -> String {
+    let families = Families::default();
+    for reader in readers {
+        reader.poll();
+        for reading in reader.readings(monotonic_now_ns()) {
+            let place = reading.snapshot.pipeline_index as usize;
+            families.take(&reading, names.get(place).map_or("unnamed", String::as_str));
+        }
+    }
+    let mut registry = Registry::with_prefix("dynocar");
+    families.register(&mut registry);
+    let mut text = String::new();
+    // Writing into a String cannot fail.
+    let _ = encode(&mut text, &registry);
+    text
+}

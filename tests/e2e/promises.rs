@@ -1,0 +1,159 @@
+//! What the documents promise is held: every test they name exists, every `unsafe` is counted and
+//! justified, every licence allowed, every dependency of a controller reviewed.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn read(path: &str) -> String {
+    std::fs::read_to_string(workspace().join(path))
+        .unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+fn rust_files(folder: &Path, files: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("a source folder") {
+        let path = entry.expect("a folder entry").path();
+        if path.is_dir() {
+            rust_files(&path, files);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            files.push(path);
+        }
+    }
+}
+
+/// Pairs (file, test) in a document: `` `path/file.rs::name` ``.
+fn named_tests(document: &str) -> Vec<(String, String)> {
+    document
+        .split('`')
+        .skip(1)
+        .step_by(2)
+        .filter_map(|code| code.split_once(".rs::"))
+        .map(|(file, name)| (format!("{file}.rs"), name.to_owned()))
+        .collect()
+}
+
+#[test]
+fn every_test_that_the_promises_name_exists() {
+    let named = named_tests(&read("docs/trust.md"));
+    assert!(named.len() > 40, "the table is found: {} tests", named.len());
+    for (file, name) in named {
+        let text = read(&file);
+        let place = text.find(&format!("fn {name}("));
+        let place = place.unwrap_or_else(|| panic!("{file}: no {name}"));
+        // `#[test]`, or the macro `proptest!`, which lends its functions the same attribute.
+        let before = text[..place].trim_end();
+        assert!(before.ends_with("#[test]"), "{file}: {name} is no test");
+        let is_ignored = text.lines().any(|line| line.trim_start().starts_with("#[ignore"));
+        assert!(!is_ignored, "{file}: an ignored test holds nothing");
+    }
+}
+
+#[test]
+fn every_unsafe_block_is_counted_and_justified() {
+    let mut files = Vec::new();
+    for folder in ["shared/src", "client/src", "daemon/src", "daemon/core/src"] {
+        rust_files(&workspace().join(folder), &mut files);
+    }
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    for file in files {
+        let text = std::fs::read_to_string(&file).expect("a source file");
+        let lines: Vec<&str> = text.lines().collect();
+        for (index, line) in lines.iter().enumerate() {
+            let code = line.split("//").next().unwrap_or_default();
+            if !(code.contains("unsafe {") || code.contains("unsafe impl")) {
+                continue;
+            }
+            let folder = file.parent().and_then(|it| it.strip_prefix(workspace()).ok());
+            let folder = folder.expect("a folder of the workspace").display().to_string();
+            *counts.entry(folder).or_default() += 1;
+            // The comment stands right above the statement that holds the block.
+            let above = lines[index.saturating_sub(6)..=index].join("\n");
+            let place = file.display();
+            assert!(above.contains("// SAFETY:"), "{place}:{}: not justified", index + 1);
+        }
+    }
+    let counted: Vec<(String, usize)> = counts.into_iter().collect();
+    let document = read("docs/dependencies.md");
+    for (folder, count) in &counted {
+        let said = format!("| `{folder}` | {count} |");
+        assert!(document.contains(&said), "docs/dependencies.md should say {said:?}");
+    }
+    let expected = ["client/src/channel", "client/src/ffi", "daemon/src/runtime"];
+    assert!(counted.iter().map(|(folder, _)| folder.as_str()).eq(expected), "{counted:?}");
+}
+
+/// The platform that this compiler builds for.
+fn host() -> String {
+    let output = Command::new("rustc").arg("-vV").output().expect("rustc");
+    let said = String::from_utf8(output.stdout).expect("UTF-8");
+    let line = said.lines().find_map(|line| line.strip_prefix("host: "));
+    line.expect("the compiler names its host").to_owned()
+}
+
+/// Names, versions and licences of all packages, as `cargo metadata` lists them.
+fn packages() -> Vec<(String, String, String)> {
+    let output = Command::new(env!("CARGO"))
+        .args(["metadata", "--offline", "--locked", "--format-version", "1"])
+        // Packages of other platforms are not fetched by a build.
+        .args(["--filter-platform", &host()])
+        .current_dir(workspace())
+        .output()
+        .expect("cargo metadata");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let text = |it: &serde_json::Value| it.as_str().unwrap_or_default().to_owned();
+    metadata["packages"]
+        .as_array()
+        .expect("packages")
+        .iter()
+        .map(|it| (text(&it["name"]), text(&it["version"]), text(&it["license"])))
+        .collect()
+}
+
+/// True when a licence expression is met by these licences.
+fn is_allowed(expression: &str, allowed: &[String]) -> bool {
+    let all = expression.replace(['(', ')'], "").replace('/', " OR ");
+    all.split(" AND ")
+        .all(|part| part.split(" OR ").any(|licence| allowed.iter().any(|it| it == licence.trim())))
+}
+
+#[test]
+fn every_dependency_has_a_licence_that_is_allowed() {
+    let deny: toml::Table = read("deny.toml").parse().expect("TOML");
+    let allowed: Vec<String> = deny["licenses"]["allow"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .filter_map(|it| it.as_str().map(str::to_owned))
+        .collect();
+    let packages = packages();
+    assert!(packages.len() > 100, "the packages are found");
+    for (name, version, licence) in &packages {
+        assert!(is_allowed(licence, &allowed), "{name} {version}: {licence:?}");
+    }
+    assert!(!is_allowed("GPL-3.0", &allowed) && !is_allowed("", &allowed));
+    assert!(!is_allowed("MIT AND GPL-3.0", &allowed));
+}
+
+#[test]
+fn every_dependency_of_a_controller_is_reviewed() {
+    let document = read("docs/dependencies.md");
+    let output = Command::new(env!("CARGO"))
+        .args(["tree", "--offline", "--edges", "normal", "--prefix", "none", "--format", "{p}"])
+        .args(["--package", "dynocar-client"])
+        .current_dir(workspace())
+        .output()
+        .expect("cargo tree");
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let names: Vec<&str> = text.lines().filter_map(|line| line.split(' ').next()).collect();
+    assert!(names.len() > 30, "the tree is found");
+    for name in names {
+        // The transport's own crates are one review.
+        let name = if name.starts_with("iceoryx2-") { "iceoryx2" } else { name };
+        assert!(document.contains(&format!("`{name}`")), "{name} is not in docs/dependencies.md");
+    }
+}

@@ -1,0 +1,217 @@
+//! Estimates that outlive the daemon: taken up, refused with a reason, never torn.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use dynocar::dataset;
+use dynocar::identify::published_samples;
+use dynocar::replay::{Rate, Replayer};
+use dynocar::state::{entry::StateContent, file};
+use dynocar_client::{SnapshotReader, monotonic_now_ns};
+use dynocar_core::dataset::Dataset;
+use dynocar_core::pipeline::{EstimatorSettings, KeptEstimate, Pipeline};
+use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Status, TrainId, TrainSample};
+use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_tests::soak::state_kills::kill_writers;
+use rustix::process::Signal;
+
+const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
+const PEER: &str = env!("CARGO_BIN_EXE_dynocar-test-peer");
+const TRAIN: TrainId = TrainId(1);
+
+fn demo_folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo")
+}
+
+struct Cast {
+    site: Site,
+    dataset: Dataset,
+}
+
+impl Cast {
+    fn new() -> Self {
+        let site = Site::new();
+        for file in ["train.toml", "track.toml"] {
+            let text = std::fs::read_to_string(demo_folder().join(file)).expect("a demo file");
+            site.write(file, &text);
+        }
+        std::fs::create_dir(site.path().join("state")).expect("a state directory");
+        Cast { site, dataset: dataset::load(&demo_folder()).expect("the demo's runs") }
+    }
+
+    fn daemon(&self, train_lines: &str, settings: &str) -> Process {
+        let text = format!(
+            "[state]\ndirectory = \"state\"\ninterval_s = 1\n\
+             [[trains]]\nid = 1\nfile = \"train.toml\"\ntrack = \"track.toml\"\n{train_lines}\n\
+             [[threads]]\nname = \"all\"\n\
+             [[pipelines]]\nkind = \"v_mils\"\nthread = \"all\"\nsettings = {{ {settings} }}\n\
+             [[pipelines]]\nkind = \"mass_kalman\"\nthread = \"all\"\n"
+        );
+        let config = self.site.write("daemon.toml", &text);
+        let daemon = self.site.start(DYNOCAR, &["run", "--config", config.to_str().unwrap()]);
+        daemon.await_error("serving");
+        daemon
+    }
+
+    fn replay(&self) {
+        let mut replayer = Replayer::open(&self.site.host(), TRAIN, Rate::Max).unwrap();
+        assert!(replayer.await_daemon(Duration::from_secs(10)));
+        self.dataset.runs.iter().for_each(|run| replayer.play(&run.samples, |_| {}));
+        replayer.finish();
+    }
+
+    fn state_file(&self) -> PathBuf {
+        self.site.path().join("state/train-1.state")
+    }
+
+    fn content(&self) -> StateContent {
+        let path = self.state_file();
+        let text = file::read(&path).unwrap().expect("a state");
+        StateContent::from_text(&path, &text).unwrap()
+    }
+
+    /// The first snapshot of a daemon that has had no sample.
+    fn first_snapshot(&self, kind: PipelineKind) -> ParameterSnapshot {
+        let mut reader = SnapshotReader::open(&self.site.host(), TRAIN).unwrap();
+        await_true(
+            || {
+                reader.poll();
+                reader.latest(kind, monotonic_now_ns()).is_some_and(|it| !it.is_stale)
+            },
+            || "a first snapshot".into(),
+        );
+        *reader.latest(kind, monotonic_now_ns()).unwrap().snapshot
+    }
+}
+
+fn stop(mut daemon: Process) -> String {
+    daemon.signal(Signal::TERM);
+    assert!(daemon.wait().success(), "{}", daemon.errors());
+    daemon.errors()
+}
+
+#[test]
+fn a_state_is_taken_up_by_the_next_daemon_and_refused_when_foreign_corrupt_or_old() {
+    let cast = Cast::new();
+    let daemon = cast.daemon("", "");
+    cast.replay();
+    await_true(|| cast.state_file().exists(), || "the state".into());
+    stop(daemon);
+    let content = cast.content();
+    let kept = content.estimates.iter().find(|it| it.pipeline == "v_mils").expect("v_mils");
+
+    // Taken up: the stored values, wider, and no more trusted than before any sample.
+    let daemon = cast.daemon("", "");
+    let first = cast.first_snapshot(PipelineKind::VMils);
+    assert_eq!(first.status(), Status::Unestimated);
+    for (parameter, &value) in kept.estimate.parameters().iter().zip(kept.estimate.values()) {
+        let found = first.value(*parameter).expect("the parameter");
+        assert!((found - value).abs() <= 1e-12 * value.abs(), "{parameter}: {found}, kept {value}");
+    }
+    let kept_std = kept.estimate.covariance()[0].sqrt();
+    assert!(first.std(Parameter::DavisA).unwrap() >= kept_std * (1.0 - 1e-9));
+    assert!(stop(daemon).contains("warm start"));
+    assert_eq!(cast.content(), content, "an estimate without news keeps its age");
+
+    let whole = std::fs::read(cast.state_file()).unwrap();
+    let mut aged = content.clone();
+    aged.estimates.iter_mut().for_each(|it| it.estimated_unix_s -= 3600.0 * 24.0 * 30.0);
+    let mut future = content.clone();
+    future.estimates.iter_mut().for_each(|it| it.estimated_unix_s += 7200.0);
+    let bytes = |content: &StateContent| file::bytes_of(&content.to_text().unwrap());
+    let cases = [
+        ("wheel_set = \"new\"", "", whole.clone(), "its wheel set is \"\", expected \"new\""),
+        ("", "lambda = 0.5", whole.clone(), "its kind or settings were others"),
+        ("", "", whole[..whole.len() - 9].to_vec(), "torn: expected"),
+        ("", "", [&whole[..whole.len() - 2], b"9\n"].concat(), "corrupt: checksum"),
+        ("", "", bytes(&aged), "720.0 h old, expected at most 168 h"),
+        ("", "", bytes(&future), "2.0 h in the future by this clock"),
+        ("", "", b"nonsense".to_vec(), "not a state file"),
+    ];
+    for (train_lines, settings, bytes, expected) in cases {
+        std::fs::write(cast.state_file(), bytes).unwrap();
+        let daemon = cast.daemon(train_lines, settings);
+        let first = cast.first_snapshot(PipelineKind::VMils);
+        let log = stop(daemon);
+        assert!(log.contains(expected) && log.contains("cold start"), "{expected} in\n{log}");
+        assert_eq!(first.value(Parameter::DavisA), Some(1.498), "the declared value: {expected}");
+    }
+}
+
+#[test]
+fn a_state_that_cannot_be_written_or_read_does_not_stop_the_daemon() {
+    let cast = Cast::new();
+    std::fs::create_dir(cast.state_file()).unwrap();
+    let daemon = cast.daemon("", "");
+    cast.replay();
+    daemon.await_error("state not kept, tried again later");
+    let log = stop(daemon);
+    assert!(log.contains("cold start"), "{log}");
+}
+
+fn pipeline(dataset: &Dataset, kind: PipelineKind) -> Pipeline {
+    let settings = EstimatorSettings::default_of(kind).expect("a kind that can be built");
+    let estimator = settings.build(&dataset.train).expect("default settings");
+    Pipeline::new(TRAIN, 0, Arc::clone(&dataset.train), dataset.track.clone(), estimator)
+}
+
+/// Samples until the first estimate, and the snapshot at the end.
+fn feed(pipeline: &mut Pipeline, samples: &[TrainSample]) -> (usize, ParameterSnapshot) {
+    let mut first = usize::MAX;
+    for (index, sample) in samples.iter().enumerate() {
+        if pipeline.process(sample).status() == Status::Estimated {
+            first = first.min(index);
+        }
+    }
+    (first, *pipeline.snapshot())
+}
+
+#[test]
+fn a_warm_start_is_sooner_estimated_and_no_less_right_than_a_cold_one() {
+    let dataset = dataset::load(&demo_folder()).unwrap();
+    let samples = published_samples(&dataset, TRAIN);
+    let kinds = [
+        PipelineKind::LeastSquares,
+        PipelineKind::Rls,
+        PipelineKind::RegularisedRls,
+        PipelineKind::Mils,
+        PipelineKind::VMils,
+        PipelineKind::ResistanceKalman,
+        PipelineKind::TrajectoryKalman,
+        PipelineKind::MassKalman,
+    ];
+    for kind in kinds {
+        let (cold_first, cold) = feed(&mut pipeline(&dataset, kind), &samples);
+        let kept = KeptEstimate::of(&cold).unwrap_or_else(|error| panic!("{kind}: {error}"));
+        let kept = kept.after(3600.0);
+        let mut warm = pipeline(&dataset, kind);
+        assert!(warm.warm_start(&kept), "{kind}");
+        assert_eq!(warm.snapshot().status(), Status::Unestimated, "{kind}: no sample yet");
+        assert!((warm.snapshot().values[0] / kept.values()[0] - 1.0).abs() < 1e-12, "{kind}");
+        let (warm_first, warm) = feed(&mut warm, &samples);
+        assert!(warm_first <= cold_first, "{kind}: {warm_first} samples, cold {cold_first}");
+        for i in 0..cold.parameter_count as usize {
+            let distance = (warm.values[i] - cold.values[i]).abs();
+            let std = cold.covariance_at(i, i).sqrt();
+            assert!(distance <= 2.0 * std, "{kind}, value {i}: {distance} apart, std {std}");
+        }
+    }
+}
+
+#[test]
+fn kinds_without_a_use_for_a_kept_estimate_say_so() {
+    let dataset = dataset::load(&demo_folder()).unwrap();
+    let kept = KeptEstimate::new(&[Parameter::Adhesion], &[0.1], &[1e-4]).unwrap();
+    for &kind in PipelineKind::ALL {
+        if EstimatorSettings::default_of(kind).is_some_and(|it| it.build(&dataset.train).is_ok()) {
+            assert!(!pipeline(&dataset, kind).warm_start(&kept), "{kind}");
+        }
+    }
+}
+
+#[test]
+fn a_writer_killed_at_any_moment_leaves_a_whole_state() {
+    let states = kill_writers(Path::new(PEER), 30, 1);
+    println!("30 kills among {states} writes");
+}

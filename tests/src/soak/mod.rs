@@ -1,0 +1,39 @@
+//! What tests run for seconds and `dynocar-soak` runs for hours: seeded faults and checks.
+//!
+//! A failed check panics with the seed and round that reproduce it.
+//!
+//! # Layout
+//!
+//! - [`bad_samples`]: every pipeline under every failure of its sensors
+//! - [`faults`]: kills, stops and restarts of daemon, controller and client
+//! - [`hostile`]: garbage written into shared memory
+//! - [`load`]: eight trains for hours, with faults
+//! - [`state_kills`]: `kill -9` while a state file is written
+
+pub mod bad_samples;
+pub mod faults;
+pub mod hostile;
+pub mod load;
+pub mod state_kills;
+
+use std::path::{Path, PathBuf};
+
+/// The programs that the checks start.
+#[derive(Clone, Debug)]
+pub struct Programs {
+    /// `dynocar-under-test`.
+    pub dynocar: PathBuf,
+    /// `dynocar-test-peer`.
+    pub peer: PathBuf,
+}
+
+impl Programs {
+    /// The programs in the folder of another one of them.
+    pub fn beside(program: &Path) -> Self {
+        let folder = program.parent().unwrap_or(Path::new("."));
+        Programs {
+            dynocar: folder.join("dynocar-under-test"),
+            peer: folder.join("dynocar-test-peer"),
+        }
+    }
+}
