@@ -1,14 +1,18 @@
 //! Checks Dynocar against a folder of recorded and simulated data: every dataset loads, the
 //! resistance that `dynocar identify` finds is the true one where the truth is known, and the
-//! forward simulation comes out where other simulators do.
+//! forward simulation comes out where other simulators do; what is undeclared in them is found,
+//! offline and live.
 //!
 //! `dynocar-check-data FOLDER`, with the folders `practice`, `practice-truth`, `independent` and
 //! `measured` in it. Exit status 1 when a check fails.
 
+mod explaining;
+mod monitor;
 mod report;
 mod resistance;
 mod simulation;
 mod trainruns;
+mod truth;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -27,6 +31,8 @@ fn main() -> ExitCode {
     resistance::check(&mut report, &folder);
     simulation::check(&mut report, &folder);
     trainruns::check(&mut report, &folder.join("independent/trainruns"));
+    explaining::check(&mut report, &folder);
+    monitor::check(&mut report, &folder);
     report.finish()
 }
 
