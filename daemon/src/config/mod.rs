@@ -3,6 +3,7 @@
 //! Unknown keys are refused; a value outside its range is refused with key, value and range.
 //! File names inside the configuration are relative to the configuration file.
 
+mod check;
 mod pace;
 mod raw;
 
@@ -181,6 +182,6 @@ impl DaemonConfig {
     ///
     /// See [`ConfigError`].
     pub fn from_text(path: &Path, text: &str) -> Result<Self, ConfigError> {
-        raw::check(path, text)
+        check::check(path, text)
     }
 }

@@ -1,55 +1,42 @@
-//! From the text of a configuration to a checked [`DaemonConfig`].
+//! The shape of a configuration's text, before anything is checked.
 
-use std::collections::HashSet;
-use std::net::SocketAddr;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::PathBuf;
 
-use dynocar_core::pipeline::EstimatorSettings;
-use dynocar_shared::services::PIPELINES_MAX;
-use dynocar_shared::{PipelineKind, TrainId};
 use serde::Deserialize;
 
-use super::{
-    ConfigError, DaemonConfig, IdleStrategy, LogFormat, PipelineConfig, StateConfig, ThreadConfig,
-    TrainConfig, is_slow,
-};
-use crate::dataset::{load_track, load_train};
-
-/// The most pipeline threads that one sample channel serves.
-const THREADS_MAX: usize = 10;
+use super::{IdleStrategy, LogFormat};
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawConfig {
+pub struct RawConfig {
     #[serde(default)]
-    daemon: RawDaemon,
+    pub daemon: RawDaemon,
     #[serde(default)]
-    trains: Vec<RawTrain>,
+    pub trains: Vec<RawTrain>,
     #[serde(default)]
-    threads: Vec<RawThread>,
+    pub threads: Vec<RawThread>,
     #[serde(default)]
-    pipelines: Vec<RawPipeline>,
-    state: Option<RawState>,
-    metrics: Option<RawMetrics>,
+    pub pipelines: Vec<RawPipeline>,
+    pub state: Option<RawState>,
+    pub metrics: Option<RawMetrics>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawMetrics {
-    listen: String,
+pub struct RawMetrics {
+    pub listen: String,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-struct RawDaemon {
-    root: Option<PathBuf>,
-    log: String,
-    log_format: LogFormat,
-    idle: IdleStrategy,
-    spin_us: u64,
-    heartbeat_ms: u64,
-    lock_memory: bool,
+pub struct RawDaemon {
+    pub root: Option<PathBuf>,
+    pub log: String,
+    pub log_format: LogFormat,
+    pub idle: IdleStrategy,
+    pub spin_us: u64,
+    pub heartbeat_ms: u64,
+    pub lock_memory: bool,
 }
 
 impl Default for RawDaemon {
@@ -68,22 +55,22 @@ impl Default for RawDaemon {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawTrain {
-    id: u64,
-    file: PathBuf,
-    track: Option<PathBuf>,
+pub struct RawTrain {
+    pub id: u64,
+    pub file: PathBuf,
+    pub track: Option<PathBuf>,
     #[serde(default)]
-    wheel_set: String,
+    pub wheel_set: String,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawState {
-    directory: PathBuf,
+pub struct RawState {
+    pub directory: PathBuf,
     #[serde(default = "default_interval_s")]
-    interval_s: u64,
+    pub interval_s: u64,
     #[serde(default = "default_age_max_h")]
-    age_max_h: u64,
+    pub age_max_h: u64,
 }
 
 const fn default_interval_s() -> u64 {
@@ -96,270 +83,20 @@ const fn default_age_max_h() -> u64 {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawThread {
-    name: String,
-    core: Option<usize>,
-    idle: Option<IdleStrategy>,
-    priority: Option<u64>,
+pub struct RawThread {
+    pub name: String,
+    pub core: Option<usize>,
+    pub idle: Option<IdleStrategy>,
+    pub priority: Option<u64>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawPipeline {
-    name: Option<String>,
-    kind: String,
-    thread: Option<String>,
-    trains: Option<Vec<u64>>,
+pub struct RawPipeline {
+    pub name: Option<String>,
+    pub kind: String,
+    pub thread: Option<String>,
+    pub trains: Option<Vec<u64>>,
     #[serde(default)]
-    settings: toml::Table,
-}
-
-/// Names the configuration's file in every refusal.
-struct Checker<'a> {
-    path: &'a Path,
-}
-
-impl Checker<'_> {
-    fn refuse<T>(
-        &self,
-        key: impl Into<String>,
-        value: impl ToString,
-        allowed: impl Into<String>,
-    ) -> Result<T, ConfigError> {
-        Err(ConfigError::OutOfRange {
-            path: self.path.into(),
-            key: key.into(),
-            value: value.to_string(),
-            allowed: allowed.into(),
-        })
-    }
-
-    fn range(&self, key: &str, value: u64, low: u64, high: u64) -> Result<u64, ConfigError> {
-        if (low..=high).contains(&value) {
-            return Ok(value);
-        }
-        self.refuse(key, value, format!("a whole number from {low} to {high}"))
-    }
-}
-
-/// Checks a configuration's text; `path` is the file it came from.
-pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
-    let raw: RawConfig = toml::from_str(text).map_err(|error| ConfigError::Malformed {
-        path: path.into(),
-        message: error.to_string().trim_end().to_owned(),
-    })?;
-    let checker = Checker { path };
-    let trains = check_trains(&checker, raw.trains)?;
-    let mut threads = check_threads(&checker, raw.threads, raw.daemon.idle)?;
-    let pipelines =
-        check_pipelines(&checker, raw.pipelines, &trains, &mut threads, raw.daemon.idle)?;
-    keep_slow_apart(&checker, &pipelines, &threads)?;
-    let in_use: HashSet<usize> = pipelines.iter().map(|pipeline| pipeline.thread).collect();
-    if let Some(unused) = (0..threads.len()).find(|thread| !in_use.contains(thread)) {
-        return checker.refuse("threads.name", &threads[unused].name, "a thread of a pipeline");
-    }
-    if threads.len() > THREADS_MAX {
-        let allowed = format!("at most {THREADS_MAX} threads; let pipelines share one");
-        return checker.refuse("threads", threads.len(), allowed);
-    }
-    Ok(DaemonConfig {
-        root: raw.daemon.root,
-        log: raw.daemon.log,
-        log_format: raw.daemon.log_format,
-        spin_us: checker.range("daemon.spin_us", raw.daemon.spin_us, 0, 1_000_000)?,
-        heartbeat_ms: checker.range("daemon.heartbeat_ms", raw.daemon.heartbeat_ms, 5, 100)?,
-        lock_memory: raw.daemon.lock_memory,
-        metrics: raw.metrics.map(|metrics| check_metrics(&checker, metrics)).transpose()?,
-        state: raw.state.map(|state| check_state(&checker, state)).transpose()?,
-        trains,
-        threads,
-        pipelines,
-    })
-}
-
-/// Checks where metrics are handed out: on this host only.
-fn check_metrics(checker: &Checker, raw: RawMetrics) -> Result<SocketAddr, ConfigError> {
-    match raw.listen.parse::<SocketAddr>() {
-        Ok(address) if address.ip().is_loopback() => Ok(address),
-        _ => {
-            let allowed = "a loopback address with a port, as 127.0.0.1:9464";
-            checker.refuse("metrics.listen", raw.listen, allowed)
-        }
-    }
-}
-
-/// Checks where estimates are kept; the directory must be there when the daemon starts.
-fn check_state(checker: &Checker, raw: RawState) -> Result<StateConfig, ConfigError> {
-    let folder = checker.path.parent().unwrap_or(Path::new("."));
-    let directory = folder.join(&raw.directory);
-    if !directory.is_dir() {
-        return checker.refuse("state.directory", raw.directory.display(), "an existing directory");
-    }
-    Ok(StateConfig {
-        directory,
-        interval_s: checker.range("state.interval_s", raw.interval_s, 1, 3_600)?,
-        age_max_h: checker.range("state.age_max_h", raw.age_max_h, 1, 10_000)?,
-    })
-}
-
-fn check_trains(checker: &Checker, raw: Vec<RawTrain>) -> Result<Vec<TrainConfig>, ConfigError> {
-    if raw.is_empty() {
-        return checker.refuse("trains", "none", "at least one [[trains]] table");
-    }
-    let folder = checker.path.parent().unwrap_or(Path::new("."));
-    let mut ids = HashSet::new();
-    raw.into_iter()
-        .map(|train| {
-            if !ids.insert(train.id) {
-                return checker.refuse("trains.id", train.id, "a number that no other train has");
-            }
-            let track = train.track.map(|file| load_track(&folder.join(file))).transpose()?;
-            Ok(TrainConfig {
-                id: TrainId(train.id),
-                model: Arc::new(load_train(&folder.join(train.file))?),
-                track: track.map(Arc::new),
-                wheel_set: train.wheel_set,
-            })
-        })
-        .collect()
-}
-
-fn check_threads(
-    checker: &Checker,
-    raw: Vec<RawThread>,
-    idle: IdleStrategy,
-) -> Result<Vec<ThreadConfig>, ConfigError> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let mut names = HashSet::new();
-    raw.into_iter()
-        .map(|thread| {
-            if let Some(core) = thread.core.filter(|&core| core >= cores) {
-                let allowed = format!("a core of this machine, 0 to {}", cores - 1);
-                return checker.refuse("threads.core", core, allowed);
-            }
-            if !names.insert(thread.name.clone()) {
-                return checker.refuse("threads.name", thread.name, "a name of its own");
-            }
-            let idle = thread.idle.unwrap_or(idle);
-            let priority = thread
-                .priority
-                .map(|priority| checker.range("threads.priority", priority, 1, 99))
-                .transpose()?
-                .map(|priority| priority as u8);
-            Ok(ThreadConfig { name: thread.name, core: thread.core, idle, priority })
-        })
-        .collect()
-}
-
-/// Checks the pipelines; one that names no thread gets a thread of its own.
-fn check_pipelines(
-    checker: &Checker,
-    raw: Vec<RawPipeline>,
-    trains: &[TrainConfig],
-    threads: &mut Vec<ThreadConfig>,
-    idle: IdleStrategy,
-) -> Result<Vec<PipelineConfig>, ConfigError> {
-    if raw.is_empty() || raw.len() > PIPELINES_MAX {
-        let allowed = format!("1 to {PIPELINES_MAX} [[pipelines]] tables");
-        return checker.refuse("pipelines", raw.len(), allowed);
-    }
-    let named_threads = threads.len();
-    let mut names = HashSet::new();
-    raw.into_iter()
-        .map(|pipeline| {
-            let name = pipeline.name.unwrap_or_else(|| pipeline.kind.clone());
-            if !names.insert(name.clone()) {
-                return checker.refuse("pipelines.name", name, "a name that no other pipeline has");
-            }
-            let estimator = check_estimator(checker, &name, &pipeline.kind, pipeline.settings)?;
-            let trains = check_pipeline_trains(checker, &name, pipeline.trains, trains)?;
-            let thread = match pipeline.thread {
-                None => {
-                    let name = name.clone();
-                    threads.push(ThreadConfig { name, core: None, idle, priority: None });
-                    threads.len() - 1
-                }
-                Some(thread) => {
-                    let place = threads[..named_threads].iter().position(|it| it.name == thread);
-                    match place {
-                        Some(place) => place,
-                        None => {
-                            let key = format!("pipelines.{name}.thread");
-                            return checker.refuse(key, thread, "the name of a [[threads]] table");
-                        }
-                    }
-                }
-            };
-            Ok(PipelineConfig { name, estimator, thread, trains })
-        })
-        .collect()
-}
-
-/// A slow pipeline may compute for milliseconds: it never shares a thread with a fast one.
-fn keep_slow_apart(
-    checker: &Checker,
-    pipelines: &[PipelineConfig],
-    threads: &[ThreadConfig],
-) -> Result<(), ConfigError> {
-    let is_slow = |pipeline: &PipelineConfig| is_slow(pipeline.estimator.kind());
-    for slow in pipelines.iter().filter(|pipeline| is_slow(pipeline)) {
-        let mut others = pipelines.iter().filter(|it| it.thread == slow.thread && !is_slow(it));
-        if let Some(fast) = others.next() {
-            let key = format!("pipelines.{}.thread", slow.name);
-            let allowed = format!(
-                "a thread without fast pipelines as {}, which {} would hold up",
-                fast.name, slow.name
-            );
-            return checker.refuse(key, &threads[slow.thread].name, allowed);
-        }
-    }
-    Ok(())
-}
-
-fn check_estimator(
-    checker: &Checker,
-    name: &str,
-    kind: &str,
-    mut settings: toml::Table,
-) -> Result<EstimatorSettings, ConfigError> {
-    let known = PipelineKind::from_name(kind).and_then(EstimatorSettings::default_of);
-    if known.is_none() {
-        let names: Vec<_> = PipelineKind::ALL
-            .iter()
-            .filter(|&&kind| EstimatorSettings::default_of(kind).is_some())
-            .map(|kind| kind.name())
-            .collect();
-        let allowed = format!("one of {}", names.join(", "));
-        return checker.refuse(format!("pipelines.{name}.kind"), kind, allowed);
-    }
-    settings.insert("kind".into(), toml::Value::String(kind.into()));
-    settings.try_into().map_err(|error: toml::de::Error| ConfigError::Malformed {
-        path: checker.path.into(),
-        message: format!("pipelines.{name}.settings: {}", error.message()),
-    })
-}
-
-fn check_pipeline_trains(
-    checker: &Checker,
-    name: &str,
-    wanted: Option<Vec<u64>>,
-    trains: &[TrainConfig],
-) -> Result<Vec<TrainId>, ConfigError> {
-    let declared: Vec<TrainId> = trains.iter().map(|train| train.id).collect();
-    let Some(wanted) = wanted else { return Ok(declared) };
-    if wanted.is_empty() {
-        let key = format!("pipelines.{name}.trains");
-        return checker.refuse(key, "[]", "at least one train, or no such key for all trains");
-    }
-    wanted
-        .into_iter()
-        .map(|id| {
-            if declared.contains(&TrainId(id)) {
-                return Ok(TrainId(id));
-            }
-            let ids: Vec<_> = declared.iter().map(TrainId::to_string).collect();
-            let allowed = format!("the id of a [[trains]] table: {}", ids.join(", "));
-            checker.refuse(format!("pipelines.{name}.trains"), id, allowed)
-        })
-        .collect()
+    pub settings: toml::Table,
 }

@@ -12,7 +12,7 @@ pub const STRENGTH_MIN: f64 = 5.0;
 /// Strength of the strongest candidate of a search where nothing acts: a share of the searches
 /// reaches the first number, and one in e of these another so much more.
 /// `dynocar-bench explain --kind none --seeds 400` prints the quantiles that it is fitted to.
-pub const NULL_STRENGTH: NullStrength = NullStrength { share: 0.05, at: 3.0, per_e: 2.0 };
+pub const NULL_STRENGTH: NullStrength = NullStrength { share: 0.05, at: 2.0, per_e: 1.5 };
 /// Two kinds whose evidence differs by less than this explain the data equally well.
 pub const AMBIGUOUS: f64 = 6.0;
 

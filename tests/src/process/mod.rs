@@ -1,128 +1,31 @@
 //! Real processes with a run-time directory of their own.
 
+mod site;
+
 use std::fs::File;
 use std::io::{BufRead, BufReader};
-use std::os::unix::process::CommandExt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use dynocar_client::Host;
-use dynocar_shared::services::ROOT_VARIABLE;
 use rustix::process::{Pid, Signal, kill_process};
-use tempfile::TempDir;
+
+pub use site::Site;
 
 /// How long a test waits for what must happen before it calls it a hang.
 pub const WATCHDOG: Duration = Duration::from_secs(30);
 
-/// A run-time directory with a configuration of its own; processes of different sites never meet.
-pub struct Site {
-    directory: TempDir,
+/// A running program; killed when dropped.
+pub struct Process {
+    child: Child,
+    lines: Arc<Mutex<Vec<String>>>,
+    errors: PathBuf,
 }
 
-impl Default for Site {
-    fn default() -> Self {
-        Site::new()
-    }
-}
-
-impl Site {
-    /// A new, empty site.
-    ///
-    /// # Panics
-    ///
-    /// When no temporary directory can be made.
-    pub fn new() -> Self {
-        Site { directory: TempDir::new().expect("a temporary directory") }
-    }
-
-    /// The site's folder for files.
-    pub fn path(&self) -> &Path {
-        self.directory.path()
-    }
-
-    /// The site's run-time directory.
-    ///
-    /// # Panics
-    ///
-    /// When it cannot be used.
-    pub fn host(&self) -> Host {
-        Host::at(&self.root()).expect("a run-time directory")
-    }
-
-    fn root(&self) -> PathBuf {
-        self.path().join("root")
-    }
-
-    /// Writes a file and gives its path.
-    ///
-    /// # Panics
-    ///
-    /// When it cannot be written.
-    pub fn write(&self, name: &str, text: &str) -> PathBuf {
-        let path = self.path().join(name);
-        std::fs::write(&path, text).expect("a file to be written");
-        path
-    }
-
-    /// Writes a small train file and a daemon configuration with these pipelines for trains 1
-    /// to `trains`; gives the configuration's path.
-    pub fn write_config(&self, trains: u64, daemon_lines: &str, pipelines: &str) -> PathBuf {
-        self.write("train.toml", TRAIN);
-        let mut text = format!("[daemon]\n{daemon_lines}\n");
-        for id in 1..=trains {
-            text += &format!("[[trains]]\nid = {id}\nfile = \"train.toml\"\n");
-        }
-        self.write("daemon.toml", &(text + pipelines))
-    }
-
-    /// Starts a program on this site.
-    ///
-    /// # Panics
-    ///
-    /// When it cannot be started.
-    pub fn start(&self, program: &str, arguments: &[&str]) -> Process {
-        self.start_with(program, arguments, &[])
-    }
-
-    /// Starts a program on this site with more environment variables.
-    ///
-    /// # Panics
-    ///
-    /// When it cannot be started.
-    pub fn start_with(
-        &self,
-        program: &str,
-        arguments: &[&str],
-        variables: &[(&str, &str)],
-    ) -> Process {
-        let mut command = self.command(program, arguments);
-        command.envs(variables.iter().copied());
-        self.start_command(command)
-    }
-
-    /// Starts a program that may neither lock memory nor take a real-time priority, whoever runs
-    /// the test.
-    ///
-    /// # Panics
-    ///
-    /// When it cannot be started.
-    pub fn start_without_real_time(&self, program: &str, arguments: &[&str]) -> Process {
-        let mut command = self.command(program, arguments);
-        // SAFETY: between fork and exec only system calls are made.
-        unsafe { command.pre_exec(drop_real_time_rights) };
-        self.start_command(command)
-    }
-
-    fn command(&self, program: &str, arguments: &[&str]) -> Command {
-        let mut command = Command::new(program);
-        command.args(arguments).env(ROOT_VARIABLE, self.root());
-        command
-    }
-
-    fn start_command(&self, mut command: Command) -> Process {
-        let errors = self.path().join(format!("stderr-{}", unique_number()));
+impl Process {
+    /// Starts a program whose standard error goes into a file.
+    fn start(mut command: Command, errors: PathBuf) -> Process {
         let mut child = command
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
@@ -140,74 +43,6 @@ impl Site {
         Process { child, lines, errors }
     }
 
-    /// Names of this site's shared-memory files.
-    ///
-    /// # Panics
-    ///
-    /// When `/dev/shm` cannot be read.
-    pub fn segments(&self) -> Vec<String> {
-        let prefix = self.host().segment_prefix();
-        std::fs::read_dir("/dev/shm")
-            .expect("/dev/shm")
-            .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-            .filter(|name| name.starts_with(&prefix))
-            .collect()
-    }
-}
-
-impl Drop for Site {
-    fn drop(&mut self) {
-        for name in self.segments() {
-            // A file that another process removes first is gone as well.
-            let _ = std::fs::remove_file(Path::new("/dev/shm").join(name));
-        }
-    }
-}
-
-const TRAIN: &str = "[train]
-name = \"test train\"
-mass_t = 200.0
-length_m = 120.0
-cars = 6
-rotating_mass_factor = 0.08
-
-[resistance]
-a = 1.9
-b = 0.03
-c = 0.0043
-";
-
-/// Takes `CAP_IPC_LOCK` and `CAP_SYS_NICE` out of what a program may ever have again, and sets the
-/// limits that stand in for them to nothing.
-fn drop_real_time_rights() -> std::io::Result<()> {
-    use rustix::process::{Resource, Rlimit, setrlimit};
-    use rustix::thread::{CapabilitySet, remove_capability_from_bounding_set};
-    for capability in [CapabilitySet::IPC_LOCK, CapabilitySet::SYS_NICE] {
-        match remove_capability_from_bounding_set(capability) {
-            // Who has no privileges cannot give them up, and need not.
-            Ok(()) | Err(rustix::io::Errno::PERM) => {}
-            Err(error) => return Err(error.into()),
-        }
-    }
-    for resource in [Resource::Memlock, Resource::Rtprio] {
-        setrlimit(resource, Rlimit { current: Some(0), maximum: Some(0) })?;
-    }
-    Ok(())
-}
-
-fn unique_number() -> u64 {
-    static NEXT: std::sync::atomic::AtomicU64 = std::sync::atomic::AtomicU64::new(0);
-    NEXT.fetch_add(1, std::sync::atomic::Ordering::Relaxed)
-}
-
-/// A running program; killed when dropped.
-pub struct Process {
-    child: Child,
-    lines: Arc<Mutex<Vec<String>>>,
-    errors: PathBuf,
-}
-
-impl Process {
     /// Its process number.
     pub fn id(&self) -> u32 {
         self.child.id()

@@ -1,0 +1,190 @@
+//! The joint fit of a, b, c and the parameters of all effects.
+
+mod descent;
+mod linearised;
+mod robust;
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
+
+use super::model::GrownModel;
+use super::noise::{Noise, Whitener};
+use super::run_data::RunData;
+use super::run_scatter::{RunScatter, ScatterFilter, WeightedFilter, scatter_columns};
+use crate::train::Davis;
+use linearised::Scratch;
+use robust::RunFilters;
+pub(super) use robust::robust_loss;
+
+/// Gauss-Newton steps at most.
+const STEPS_MAX: usize = 8;
+/// A predicted decrease of the cost below this ends the search.
+const DECREASE_MIN: f64 = 0.02;
+/// Standard deviation of the declared a, b, c as share of their size: a weak prior that keeps
+/// directions apart which the runs do not excite.
+const PRIOR_SHARE: [f64; 3] = [0.4, 0.8, 0.4];
+
+/// The runs that are fitted and what is known beforehand.
+#[derive(Clone, Debug)]
+pub struct FitProblem {
+    /// The fit runs.
+    pub runs: Vec<RunData>,
+    declared: Davis,
+    prior_deviation: [f64; 3],
+    /// Columns of the runs' own factors.
+    scatter_columns: Vec<[Vec<f64>; 2]>,
+    /// Measured way over way by integrated speed, with its standard deviation.
+    pub way_ratio: Option<(f64, f64)>,
+}
+
+/// Normal equations of one run at the fitted parameters.
+#[derive(Clone, Debug)]
+pub struct RunNormal {
+    /// Information matrix.
+    pub information: DMatrix<f64>,
+    /// Score: half the negative gradient of the cost.
+    pub score: DVector<f64>,
+    /// Robust cost of the run.
+    pub cost: f64,
+}
+
+/// A fitted model.
+#[derive(Clone)]
+pub struct Fit {
+    /// The model's structure.
+    pub model: GrownModel,
+    /// a, b, c, then the parameters of the effects.
+    pub theta: Vec<f64>,
+    /// The noise under which it was fitted.
+    pub noise: Noise,
+    /// Robust -2 log likelihood with the prior, up to a constant.
+    pub cost: f64,
+    /// Normal equations by run.
+    pub runs: Vec<RunNormal>,
+    /// Information of prior and way ratio.
+    pub prior_information: DMatrix<f64>,
+    /// White innovations by run, less the runs' own factors.
+    pub innovations: Vec<Vec<f64>>,
+    /// Whitened regressors by run and parameter, less what the runs' own factors would explain.
+    pub columns: Vec<Vec<Vec<f64>>>,
+    /// Differences of the bins by run, not whitened.
+    pub residuals: Vec<Vec<f64>>,
+    /// The filters by run.
+    pub whiteners: Vec<Whitener>,
+    /// The filters of the runs' own factors, with the weights of the innovations.
+    pub filters: Vec<WeightedFilter>,
+    /// The runs' own factors less 1, with their covariance.
+    factors: Vec<(Vector2<f64>, Matrix2<f64>)>,
+}
+
+impl Fit {
+    /// Information matrix of all runs and the prior.
+    pub fn information(&self) -> DMatrix<f64> {
+        self.runs.iter().fold(self.prior_information.clone(), |sum, run| sum + &run.information)
+    }
+
+    /// Cholesky factor of the information matrix; `None` when it is not positive definite.
+    pub fn factor(&self) -> Option<Cholesky<f64, Dyn>> {
+        Cholesky::new(self.information())
+    }
+
+    /// Number of innovations.
+    pub fn observations(&self) -> usize {
+        self.whiteners.iter().map(Whitener::count).sum()
+    }
+
+    /// The parameters of effect number `index`.
+    pub fn effect_parameters(&self, index: usize) -> &[f64] {
+        &self.theta[self.model.ranges()[index].clone()]
+    }
+}
+
+impl FitProblem {
+    /// The problem of fitting these runs around declared Davis coefficients.
+    pub fn new(runs: Vec<RunData>, declared: Davis) -> Self {
+        // A train without a declared coefficient still has a scale for it.
+        let least = [0.3, 0.005, 0.0002];
+        let sizes = [declared.a, declared.b, declared.c];
+        let prior_deviation =
+            std::array::from_fn(|i| PRIOR_SHARE[i] * sizes[i].abs().max(least[i]));
+        let way_ratio = pooled_way_ratio(&runs);
+        let scatter_columns = runs.iter().map(|run| scatter_columns(run, declared)).collect();
+        FitProblem { runs, declared, prior_deviation, scatter_columns, way_ratio }
+    }
+
+    /// The model with a, b, c as declared and the effects at given parameters.
+    pub fn start(&self, effects: &[f64]) -> Vec<f64> {
+        let Davis { a, b, c } = self.declared;
+        [a, b, c].iter().chain(effects).copied().collect()
+    }
+
+    /// Fits a model from a start under a noise.
+    pub fn fit(&self, model: &GrownModel, start: Vec<f64>, noise: Noise) -> Fit {
+        let filters = self.filters(noise);
+        let mut scratch = Scratch::default();
+        let mut fit = self.linearised(model, start, noise, &filters, &mut scratch);
+        for _ in 0..STEPS_MAX {
+            let score = self.score(&fit);
+            let Some(next) = self.descend(&fit, &score, &filters, &mut scratch) else { break };
+            let gained = fit.cost - next.cost;
+            fit = next;
+            if gained < DECREASE_MIN {
+                break;
+            }
+        }
+        fit
+    }
+
+    /// Fits a model, the noise that its residuals show, and the model again.
+    ///
+    /// One turn only: under an undeclared force further turns would take ever more of it for noise.
+    pub fn fit_with_noise(&self, model: &GrownModel, start: Vec<f64>, noise: Noise) -> Fit {
+        let fit = self.fit(model, start, noise);
+        let scatter = RunScatter::updated(&fit.factors);
+        let residuals: Vec<Vec<f64>> = fit
+            .residuals
+            .iter()
+            .zip(&self.scatter_columns)
+            .zip(&fit.factors)
+            .map(|((residual, [force, resistance]), (factors, _))| {
+                let columns = force.iter().zip(resistance);
+                let less = residual.iter().zip(columns);
+                less.map(|(value, (f, r))| value - factors[0] * f - factors[1] * r).collect()
+            })
+            .collect();
+        let noise = Noise::estimate(&self.runs, &residuals, Noise { scatter, ..noise });
+        self.fit(model, fit.theta, noise)
+    }
+
+    fn filters(&self, noise: Noise) -> Vec<RunFilters> {
+        self.runs
+            .iter()
+            .zip(&self.scatter_columns)
+            .map(|(run, columns)| {
+                let whitener = Whitener::new(run, noise);
+                let scatter = ScatterFilter::new(columns, &whitener, noise.scatter);
+                RunFilters { whitener, scatter }
+            })
+            .collect()
+    }
+}
+
+/// The ratios of all runs together. Wheel creep, rounding and the places where a run starts are
+/// common to the runs: below `COMMON` nothing is told.
+fn pooled_way_ratio(runs: &[RunData]) -> Option<(f64, f64)> {
+    const COMMON: f64 = 0.001;
+    let mut ratios: Vec<f64> = runs.iter().filter_map(|run| Some(run.way_ratio?.0)).collect();
+    if ratios.is_empty() {
+        return None;
+    }
+    ratios.sort_unstable_by(f64::total_cmp);
+    let middle = ratios.len() / 2;
+    let median = if ratios.len() % 2 == 1 {
+        ratios[middle]
+    } else {
+        0.5 * (ratios[middle - 1] + ratios[middle])
+    };
+    let mean_var: f64 = runs.iter().filter_map(|run| Some(run.way_ratio?.1.powi(2))).sum::<f64>()
+        / ratios.len() as f64;
+    let deviation = (mean_var / ratios.len() as f64 + COMMON * COMMON).sqrt();
+    Some((median, deviation))
+}

@@ -1,0 +1,141 @@
+//! The validator on good and bad samples.
+
+use super::*;
+
+const TRAIN: TrainId = TrainId(3);
+
+fn validator() -> Validator {
+    Validator::new(TRAIN, 100_000.0, ValidationLimits::for_train(100_000.0))
+}
+
+/// A train at a steady 20 m/s, five samples a second.
+fn cruising(index: u64) -> TrainSample {
+    let mut sample = TrainSample::empty(TRAIN)
+        .with(SampleField::Speed, 20.0)
+        .with(SampleField::Position, 4.0 * index as f64)
+        .with(SampleField::TractionForce, 5_000.0)
+        .with(SampleField::BrakeForce, 0.0);
+    sample.time_ns = index as i64 * 200_000_000;
+    sample.sequence = index + 1;
+    sample
+}
+
+#[test]
+fn steady_motion_passes_in_one_stretch() {
+    let mut validator = validator();
+    for index in 0..50 {
+        let valid = validator.check(&cruising(index)).unwrap();
+        assert_eq!(valid.stretch, 1);
+        assert_eq!(valid.step_s, if index == 0 { 0.0 } else { 0.2 });
+    }
+    assert_eq!(validator.lost(), 0);
+}
+
+#[test]
+fn a_bad_value_is_refused_with_its_reason() {
+    let cases = [
+        (cruising(1).with(SampleField::Speed, f64::NAN), RejectionReason::NotFinite),
+        (cruising(1).with(SampleField::Speed, 400.0), RejectionReason::SpeedOutOfRange),
+        (cruising(1).with(SampleField::Speed, -1.0), RejectionReason::SpeedOutOfRange),
+        (cruising(1).with(SampleField::Speed, 72.0), RejectionReason::SpeedJump),
+        (cruising(1).with(SampleField::Position, 900.0), RejectionReason::PositionJump),
+        (cruising(1).with(SampleField::BrakeForce, -4.0), RejectionReason::ForceOutOfRange),
+        (cruising(1).with(SampleField::TractionForce, 5e6), RejectionReason::ForceOutOfRange),
+        (cruising(1).with(SampleField::Mass, 100.0), RejectionReason::MassOutOfRange),
+        (cruising(1).with(SampleField::Gradient, 400.0), RejectionReason::OutOfRange),
+    ];
+    for (sample, reason) in cases {
+        let mut validator = validator();
+        validator.check(&cruising(0)).unwrap();
+        assert_eq!(validator.check(&sample), Err(reason));
+        assert!(validator.check(&cruising(2)).is_ok(), "{reason}: the next good one passes");
+    }
+}
+
+#[test]
+fn repeated_and_reversed_samples_are_refused() {
+    let mut validator = validator();
+    validator.check(&cruising(5)).unwrap();
+    assert_eq!(validator.check(&cruising(5)), Err(RejectionReason::SequenceNotIncreasing));
+    let mut reversed = cruising(6);
+    reversed.time_ns = cruising(3).time_ns;
+    assert_eq!(validator.check(&reversed), Err(RejectionReason::TimeNotIncreasing));
+}
+
+#[test]
+fn missing_sequence_numbers_count_as_lost() {
+    let mut validator = validator();
+    validator.check(&cruising(0)).unwrap();
+    validator.check(&cruising(4)).unwrap();
+    assert_eq!(validator.lost(), 3);
+}
+
+#[test]
+fn one_wrong_sequence_number_is_taken_back_when_the_count_goes_on_without_it() {
+    let mut validator = validator();
+    validator.check(&cruising(0)).unwrap();
+    let mut wrong = cruising(1);
+    wrong.sequence = u64::MAX;
+    assert!(validator.check(&wrong).is_ok(), "nothing says yet that it is wrong");
+    assert_eq!(validator.lost(), u64::MAX - 2);
+    let refused = Err(RejectionReason::SequenceNotIncreasing);
+    for index in 2..7 {
+        assert_eq!(validator.check(&cruising(index)), refused);
+    }
+    assert_eq!(validator.check(&cruising(5)), refused, "it does not go on");
+    for index in 7..12 {
+        assert_eq!(validator.check(&cruising(index)), refused);
+    }
+    assert!(validator.check(&cruising(12)).is_ok());
+    assert_eq!(validator.lost(), 5, "only the five that a repeat cost more");
+    validator.check(&cruising(20)).unwrap();
+    assert_eq!(validator.lost(), 12);
+}
+
+#[test]
+fn a_restarted_controller_starts_a_new_stretch_and_its_own_count() {
+    let mut validator = validator();
+    for index in 0..10 {
+        validator.check(&cruising(index)).unwrap();
+    }
+    let mut restarted = cruising(300);
+    (restarted.run, restarted.sequence) = (9, 2);
+    let valid = validator.check(&restarted).unwrap();
+    assert_eq!((valid.stretch, valid.step_s), (2, 0.0));
+    assert_eq!(validator.lost(), 1, "its first sample never came");
+}
+
+#[test]
+fn a_long_gap_starts_a_new_stretch() {
+    let mut validator = validator();
+    validator.check(&cruising(0)).unwrap();
+    let mut late = cruising(50);
+    late.sequence = 2;
+    assert_eq!(validator.check(&late).unwrap().stretch, 2);
+    assert_eq!(validator.lost(), 0);
+}
+
+#[test]
+fn a_clock_set_back_is_refused_a_few_times_and_then_believed() {
+    let mut validator = validator();
+    for index in 1000..1010 {
+        validator.check(&cruising(index)).unwrap();
+    }
+    let results: Vec<_> = (0..8)
+        .map(|index| {
+            let mut sample = cruising(index);
+            sample.sequence = 1011 + index;
+            validator.check(&sample)
+        })
+        .collect();
+    assert!(results[..5].iter().all(|r| *r == Err(RejectionReason::TimeNotIncreasing)));
+    assert_eq!(results[5].unwrap().stretch, 2);
+    assert!(results[6].is_ok());
+}
+
+#[test]
+fn another_train_is_refused() {
+    let mut sample = cruising(0);
+    sample.train_id = 4;
+    assert_eq!(validator().check(&sample), Err(RejectionReason::WrongTrain));
+}
