@@ -89,14 +89,17 @@ fn assert_round_trip(command: &mut Command, daemon: &PlayedDaemon) {
 }
 
 /// Answers once the controller drives by its own parameters, falls silent once it drives by
-/// ours, and expects it to go back.
+/// ours, and expects it to go back. On a busy machine an answer may come so late that the
+/// controller has gone back before.
 fn assert_example_falls_back(command: &mut Command) {
     let daemon = PlayedDaemon::start();
-    command.env(ROOT_VARIABLE, daemon.root()).args([TRAIN.to_string(), "600".into()]);
+    command.env(ROOT_VARIABLE, daemon.root()).args([TRAIN.to_string(), "6000".into()]);
     let controller = Program::start(command);
+    let built_in = |reason| format!("the built-in parameters ({reason})");
+    let (ours, silent) = ("the daemon (estimated)".to_owned(), built_in("daemon_silent"));
     let mut is_answering = false;
     let mut origins = Vec::new();
-    while origins.len() < 3 {
+    while !(origins.contains(&ours) && origins.last() == Some(&silent)) {
         let line = controller.next_line(|| {
             while let Some(sample) = daemon.next_sample() {
                 if is_answering {
@@ -108,10 +111,8 @@ fn assert_example_falls_back(command: &mut Command) {
         is_answering = line.contains("built-in");
         origins.push(line.split_once(" from ").unwrap().1.to_owned());
     }
-    let built_in = |reason| format!("the built-in parameters ({reason})");
-    let expected =
-        [built_in("no_snapshot"), "the daemon (estimated)".into(), built_in("daemon_silent")];
-    assert_eq!(origins, expected);
+    assert_eq!(origins[0], built_in("no_snapshot"));
+    assert!(origins[1..].iter().all(|it| *it == ours || *it == silent), "{origins:?}");
 }
 
 fn c_program(source: &Path, link: Link, directory: &tempfile::TempDir) -> Command {
