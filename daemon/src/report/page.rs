@@ -150,7 +150,7 @@ fn figures(subject: &Subject) -> String {
         ));
         let p_value = subject.explanation.answer.effects.iter().map(|effect| effect.p_value);
         let worst = p_value.fold(0.0, f64::max);
-        let shown = if worst < 1e-6 { "< 10⁻⁶".into() } else { format!("{worst:.2e}") };
+        let shown = if worst < 1e-6 { "&lt; 10⁻⁶".into() } else { format!("{worst:.2e}") };
         list.push((shown, "chance of as much where nothing acts", "for the whole search".into()));
     }
     let mut html = String::from("<dl class=\"figures\">\n");
