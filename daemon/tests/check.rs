@@ -183,10 +183,12 @@ fn what_a_grown_model_adds_is_told_and_nothing_else() {
     std::fs::write(folder.path().join("track.toml"), grown_track).unwrap();
     let output = check(folder.path(), &["train.toml"]);
     let report = text(&output.stdout);
-    let expected =
-        "  corrections measured over true speed 0.985, forces build up in 0.4 s, 1.9 c v² in
-              tunnels, headwind -2.5 m/s as the chainage grows, +0.6 N/kN of cold bearings,
-              fading in 420 s, -0.4 % of w0 per kelvin above 288.15 K\n";
+    let expected = "  corrections measured over true speed 0.985
+              forces build up with a time constant of 0.4 s
+              1.9 c v² in tunnels
+              headwind -2.5 m/s as the chainage grows
+              +0.6 N/kN of cold bearings, fading in 420 s
+              -0.4 % of w0 per kelvin above 288.15 K\n";
     assert!(report.ends_with(expected), "{report}");
     let output = check(folder.path(), &["track.toml"]);
     let report = text(&output.stdout);

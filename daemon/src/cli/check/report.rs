@@ -93,13 +93,15 @@ fn train(train: &TrainModel) -> String {
         text += &line("brake gear", &brake_gear(&train.brake_gear));
     }
     if train.corrections != Corrections::NONE {
-        text += &line("corrections", &corrections(&train.corrections));
+        for (index, words) in corrections(&train.corrections).iter().enumerate() {
+            text += &line(if index == 0 { "corrections" } else { "" }, words);
+        }
     }
     text
 }
 
 /// What measured runs have added to the declared model, as far as it changes something.
-fn corrections(known: &Corrections) -> String {
+fn corrections(known: &Corrections) -> Vec<String> {
     let none = Corrections::NONE;
     let mut parts = Vec::new();
     let mut say = |acts: bool, words: String| {
@@ -125,7 +127,7 @@ fn corrections(known: &Corrections) -> String {
     );
     say(
         known.actuator_lag_s > 0.0,
-        format!("forces build up in {} s", short(known.actuator_lag_s, 3)),
+        format!("forces build up with a time constant of {} s", short(known.actuator_lag_s, 3)),
     );
     say(
         known.tunnel_c_factor != none.tunnel_c_factor,
@@ -151,7 +153,7 @@ fn corrections(known: &Corrections) -> String {
             short(known.ambient_reference_k, 2)
         ),
     );
-    if parts.is_empty() { "none that changes anything".into() } else { parts.join(", ") }
+    if parts.is_empty() { vec!["none that changes anything".into()] } else { parts }
 }
 
 /// The declared resistance in kN at a few speeds, which tells of a wrong unit at a glance.
