@@ -14,6 +14,9 @@ use toml::{Table, Value};
 
 use crate::dataset::{LoadError, open};
 
+/// Greatest `tunnel_c_factor` that a train file may hold.
+const TUNNEL_C_FACTOR_MAX: f64 = 100.0;
+
 /// Why the grown files cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum GrownError {
@@ -167,7 +170,8 @@ fn express_tunnels(
     train: &mut Table,
     track: Option<&mut Table>,
 ) -> Option<()> {
-    let factor = number(effect, "c_factor")?;
+    // Where c is next to nothing, no factor on it says what a tunnel adds.
+    let factor = number(effect, "c_factor").filter(|factor| *factor <= TUNNEL_C_FACTOR_MAX)?;
     let track = track?.get_mut("track")?.as_table_mut()?;
     if !track.contains_key("tunnels") {
         let intervals = effect.place.intervals_m.as_ref()?;
@@ -227,4 +231,32 @@ fn shift_gradient(track: &mut Table, shift_m: f64) -> Option<()> {
         *chainage = Value::Float(at + shift_m);
     }
     Some(())
+}
+
+#[cfg(test)]
+mod tests {
+    use dynocar_core::explain::answer::Place;
+
+    use super::*;
+
+    fn tunnel_drag(c_factor: f64) -> EffectAnswer {
+        EffectAnswer {
+            kind: "tunnel_drag",
+            place: Place::default(),
+            parameters: [("c_factor".into(), ParameterValue::Number(c_factor))].into(),
+            std: Default::default(),
+            p_value: 1e-9,
+            error_reduction: 0.5,
+        }
+    }
+
+    #[test]
+    fn a_factor_that_no_train_file_may_hold_is_not_written() {
+        let mut track: Table = "[track]\ntunnels = [[100.0, 900.0]]".parse().unwrap();
+        let mut train = Table::new();
+        assert_eq!(express_tunnels(&tunnel_drag(2654.7), &mut train, Some(&mut track)), None);
+        assert_eq!(train, Table::new());
+        assert_eq!(express_tunnels(&tunnel_drag(2.5), &mut train, Some(&mut track)), Some(()));
+        assert_eq!(train["corrections"]["tunnel_c_factor"], Value::Float(2.5));
+    }
 }

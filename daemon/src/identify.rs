@@ -5,16 +5,24 @@ use std::sync::Arc;
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline, SettingError};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
 
-use dynocar_core::dataset::Dataset;
+use dynocar_core::dataset::{Dataset, Run};
 
 /// The samples of all runs, in file order, as a controller publishes them: numbered on without
 /// a gap, each run under a number of its own.
 pub fn published_samples(dataset: &Dataset, train: TrainId) -> Vec<TrainSample> {
-    let mut samples = Vec::with_capacity(dataset.runs.iter().map(|run| run.samples.len()).sum());
-    for (run, recorded) in (1..).zip(&dataset.runs) {
-        for sample in &recorded.samples {
+    samples_of_runs(&dataset.runs, train)
+}
+
+/// The samples of some runs, as a controller publishes them that drove no others.
+pub fn samples_of_runs<'a>(
+    runs: impl IntoIterator<Item = &'a Run>,
+    train: TrainId,
+) -> Vec<TrainSample> {
+    let mut samples = Vec::new();
+    for run in runs {
+        for sample in &run.samples {
             let sequence = samples.len() as u64 + 1;
-            samples.push(TrainSample { sequence, run, train_id: train.0, ..*sample });
+            samples.push(TrainSample { sequence, run: run.number, train_id: train.0, ..*sample });
         }
     }
     samples

@@ -169,6 +169,45 @@ fn a_train_and_a_track_can_be_checked_alone() {
 }
 
 #[test]
+fn what_a_grown_model_adds_is_told_and_nothing_else() {
+    let folder = dataset(RUN_2);
+    let grown_train = format!(
+        "{TRAIN}[corrections]\nspeed_scale = 0.985\nactuator_lag_s = 0.4\ntunnel_c_factor = 1.9\n\
+         wind_plus_mps = -2.5\nbearing_delta_a_n_per_kn = 0.6\nbearing_tau_s = 420\n\
+         ambient_w0_per_k = -0.004\n"
+    );
+    let grown_track = format!(
+        "{TRACK}resistance = [[100, 200, 1.25], [300, 400, -0.5]]\nmasses = [[0, 900, 1, 1.04]]\n"
+    );
+    std::fs::write(folder.path().join("train.toml"), grown_train).unwrap();
+    std::fs::write(folder.path().join("track.toml"), grown_track).unwrap();
+    let output = check(folder.path(), &["train.toml"]);
+    let report = text(&output.stdout);
+    let expected = "  corrections measured over true speed 0.985
+              forces build up with a time constant of 0.4 s
+              1.9 c v² in tunnels
+              headwind -2.5 m/s as the chainage grows
+              +0.6 N/kN of cold bearings, fading in 420 s
+              -0.4 % of w0 per kelvin above 288.15 K\n";
+    assert!(report.ends_with(expected), "{report}");
+    let output = check(folder.path(), &["track.toml"]);
+    let report = text(&output.stdout);
+    let expected = "  resistance  further -0.5 to 1.25 N/kN at 2 places\n  \
+                    masses      1.04 to 1.04 of the declared, 1 section\n";
+    assert!(report.ends_with(expected), "{report}");
+
+    let output = check(folder.path(), &[".", "--json", "-"]);
+    let answer: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(answer["train"]["corrections"]["speed_scale"], 0.985);
+    assert_eq!(answer["train"]["corrections"]["traction_gain"], 1.0);
+    assert_eq!(answer["track"]["masses"], serde_json::json!([[0.0, 900.0, 1.0, 1.04]]));
+    std::fs::write(folder.path().join("train.toml"), TRAIN).unwrap();
+    let output = check(folder.path(), &["train.toml", "--json", "-"]);
+    let answer: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(answer["train"]["corrections"], serde_json::Value::Null);
+}
+
+#[test]
 fn a_broken_run_is_named_and_the_others_are_still_reported() {
     let folder = dataset("t,s,v,F,B\n0,0,x,0,0\n1,0,0,0,0\n");
     let output = check(folder.path(), &["."]);

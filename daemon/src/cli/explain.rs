@@ -38,6 +38,9 @@ pub struct ExplainArguments {
     /// Write a report for people: one HTML page that needs nothing else
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
+    /// Write the report's plots as SVG files into this folder
+    #[arg(long, value_name = "DIR")]
+    plots: Option<PathBuf>,
 }
 
 /// Explains a dataset and prints the answer.
@@ -77,6 +80,9 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
     if let Some(file) = &arguments.report {
         write_report(file, &arguments.dataset, &dataset, &explanation)?;
     }
+    if let Some(folder) = &arguments.plots {
+        write_plots(folder, &dataset, &explanation)?;
+    }
     match &arguments.json {
         Some(file) => write_json(file, &explanation.answer)?,
         None => print_answer(&explanation),
@@ -108,6 +114,21 @@ fn write_report(
         Failure::Work(format!("{}: cannot be written: {error}", file.display()))
     })?;
     eprintln!("report: {}", file.display());
+    Ok(())
+}
+
+fn write_plots(folder: &Path, dataset: &Dataset, explanation: &Explanation) -> Result<(), Failure> {
+    let images = report::images::images(dataset, explanation)
+        .map_err(|error| Failure::Work(error.to_string()))?;
+    for image in images {
+        let path = folder.join(&image.name);
+        let written =
+            std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&path, image.svg));
+        written.map_err(|error| {
+            Failure::Work(format!("{}: cannot be written: {error}", path.display()))
+        })?;
+        eprintln!("plot: {}", path.display());
+    }
     Ok(())
 }
 

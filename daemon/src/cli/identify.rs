@@ -1,19 +1,22 @@
 //! `dynocar identify`: the daemon's pipelines over recorded runs.
 
-use std::collections::BTreeMap;
+mod answer;
+mod runs;
+
 use std::path::PathBuf;
 
 use clap::Args;
+use dynocar_core::dataset::Dataset;
 use dynocar_core::pipeline::EstimatorSettings;
-use dynocar_shared::{
-    Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, TrainId,
-};
+use dynocar_shared::TrainId;
 use serde::Serialize;
 
+use self::answer::EstimatorAnswer;
+use self::runs::{EstimatorSpread, RunAnswer};
 use super::Failure;
-use super::output::write_json;
+use super::output::{print, write_json};
 use crate::dataset;
-use crate::identify::{default_estimators, identify, published_samples};
+use crate::identify::{default_estimators, identify, samples_of_runs};
 
 /// Learn the train's parameters from recorded runs with the daemon's own pipelines.
 #[derive(Debug, Args)]
@@ -23,6 +26,12 @@ pub struct IdentifyArguments {
     /// Only this estimator, as v_mils; all of them by default
     #[arg(long, value_name = "NAME")]
     estimator: Option<String>,
+    /// Learn from each run alone, too, and say how much the runs differ
+    #[arg(long)]
+    per_run: bool,
+    /// Use the forces under traction only: for recordings without the friction brake's force
+    #[arg(long)]
+    traction_only: bool,
     /// Write the result for machines; - for standard output
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -31,37 +40,13 @@ pub struct IdentifyArguments {
 #[derive(Debug, Serialize)]
 struct Answer {
     dataset: String,
+    /// From all runs, one after the other.
     estimators: Vec<EstimatorAnswer>,
-}
-
-#[derive(Debug, Serialize)]
-struct EstimatorAnswer {
-    name: &'static str,
-    status: &'static str,
-    reason: &'static str,
-    values: BTreeMap<&'static str, f64>,
-    std: BTreeMap<&'static str, f64>,
-    resistance: Vec<ResistancePoint>,
-    samples: SampleCounts,
-    updates: u64,
-    innovation_mean_square: f64,
-    innovation_correlation: f64,
-    unexplained_force_n: f64,
-    unexplained_force_std_n: f64,
-}
-
-#[derive(Debug, Serialize)]
-struct ResistancePoint {
-    speed_mps: f64,
-    w0_n_per_kn: f64,
-    std: f64,
-}
-
-#[derive(Debug, Serialize)]
-struct SampleCounts {
-    used: u64,
-    rejected: BTreeMap<&'static str, u32>,
-    lost: u64,
+    /// From each run alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    runs: Option<Vec<RunAnswer>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    between_runs: Option<Vec<EstimatorSpread>>,
 }
 
 /// Runs the estimators and prints what they learned.
@@ -71,29 +56,50 @@ struct SampleCounts {
 /// A wrong dataset or estimator name is an input failure.
 pub fn execute(arguments: &IdentifyArguments) -> Result<(), Failure> {
     let estimators = chosen_estimators(arguments.estimator.as_deref())?;
-    let dataset =
+    let mut dataset =
         dataset::load(&arguments.dataset).map_err(|error| Failure::Input(error.to_string()))?;
-    let samples = published_samples(&dataset, TrainId(1));
+    if arguments.traction_only {
+        dataset.keep_traction_only();
+    }
+    let all: Vec<usize> = (0..dataset.runs.len()).collect();
+    let learned = learned(&dataset, &all, &estimators)?;
+    let runs = if arguments.per_run { Some(by_run(&dataset, &estimators)?) } else { None };
+    let answer = Answer {
+        dataset: dataset.name.clone(),
+        estimators: learned,
+        between_runs: runs.as_deref().map(runs::spreads),
+        runs,
+    };
+    match &arguments.json {
+        Some(file) => write_json(file, &answer),
+        None => print_answer(&answer),
+    }
+}
+
+/// What every estimator learns from some runs, one after the other.
+fn learned(
+    dataset: &Dataset,
+    runs: &[usize],
+    estimators: &[EstimatorSettings],
+) -> Result<Vec<EstimatorAnswer>, Failure> {
+    let samples = samples_of_runs(runs.iter().map(|&index| &dataset.runs[index]), TrainId(1));
     let snapshots: Vec<_> = std::thread::scope(|scope| {
         let threads: Vec<_> = estimators
             .iter()
-            .map(|settings| scope.spawn(|| identify(&dataset, &samples, settings)))
+            .map(|settings| scope.spawn(|| identify(dataset, &samples, settings)))
             .collect();
         threads.into_iter().map(|thread| thread.join().expect("an estimator")).collect()
     });
-    let mut answers = Vec::new();
-    for (settings, snapshot) in estimators.iter().zip(snapshots) {
-        let snapshot = snapshot.map_err(|error| Failure::Input(error.to_string()))?;
-        answers.push(answer(settings.kind(), &snapshot));
-    }
-    let answer = Answer { dataset: dataset.name.clone(), estimators: answers };
-    match &arguments.json {
-        Some(file) => write_json(file, &answer),
-        None => {
-            print_answer(&answer);
-            Ok(())
-        }
-    }
+    let answer = |(settings, snapshot): (&EstimatorSettings, Result<_, _>)| match snapshot {
+        Ok(snapshot) => Ok(EstimatorAnswer::of(settings.kind(), &snapshot)),
+        Err(error) => Err(Failure::Input(format!("{error}"))),
+    };
+    estimators.iter().zip(snapshots).map(answer).collect()
+}
+
+fn by_run(dataset: &Dataset, estimators: &[EstimatorSettings]) -> Result<Vec<RunAnswer>, Failure> {
+    let one = |(index, run)| Ok(RunAnswer::of(run, learned(dataset, &[index], estimators)?));
+    dataset.runs.iter().enumerate().map(one).collect()
 }
 
 fn chosen_estimators(name: Option<&str>) -> Result<Vec<EstimatorSettings>, Failure> {
@@ -108,49 +114,7 @@ fn chosen_estimators(name: Option<&str>) -> Result<Vec<EstimatorSettings>, Failu
     Ok(chosen)
 }
 
-fn answer(kind: PipelineKind, snapshot: &ParameterSnapshot) -> EstimatorAnswer {
-    let parameters = || Parameter::ALL.iter().filter(|&&it| snapshot.index_of(it).is_some());
-    EstimatorAnswer {
-        name: kind.name(),
-        status: snapshot.status().name(),
-        reason: snapshot.reason().unwrap_or(Reason::None).name(),
-        values: parameters().filter_map(|&it| Some((it.name(), snapshot.value(it)?))).collect(),
-        std: parameters().filter_map(|&it| Some((it.name(), snapshot.std(it)?))).collect(),
-        resistance: resistance_points(snapshot),
-        samples: SampleCounts {
-            used: snapshot.samples_used,
-            rejected: RejectionReason::ALL
-                .iter()
-                .map(|&reason| (reason.name(), snapshot.rejected(reason)))
-                .filter(|&(_, count)| count > 0)
-                .collect(),
-            lost: snapshot.samples_lost,
-        },
-        updates: snapshot.updates,
-        innovation_mean_square: snapshot.innovation_mean_square,
-        innovation_correlation: snapshot.innovation_correlation,
-        unexplained_force_n: snapshot.unexplained_force_n,
-        unexplained_force_std_n: snapshot.unexplained_force_std_n,
-    }
-}
-
-/// Resistance over the driven speeds in steps of 1 m/s.
-fn resistance_points(snapshot: &ParameterSnapshot) -> Vec<ResistancePoint> {
-    let (low, high) = (snapshot.speed_min_mps.ceil() as u32, snapshot.speed_max_mps.floor() as u32);
-    (low..=high)
-        .filter_map(|speed_mps| {
-            let speed_mps = f64::from(speed_mps);
-            let estimate = snapshot.resistance_at(speed_mps)?;
-            Some(ResistancePoint {
-                speed_mps,
-                w0_n_per_kn: estimate.w0_n_per_kn,
-                std: estimate.w0_std_n_per_kn,
-            })
-        })
-        .collect()
-}
-
-fn print_answer(answer: &Answer) {
+fn print_answer(answer: &Answer) -> Result<(), Failure> {
     println!("{}", answer.dataset);
     for it in &answer.estimators {
         let reason = if it.reason == "none" { String::new() } else { format!(", {}", it.reason) };
@@ -176,5 +140,9 @@ fn print_answer(answer: &Answer) {
             );
         }
     }
+    if let Some(runs) = &answer.runs {
+        print(&runs::report(runs))?;
+    }
     println!("\n± is the half width of the 95 % interval");
+    Ok(())
 }

@@ -5,11 +5,13 @@
 //! - [`mod@page`]: the page from top to bottom
 //! - [`sections`]: its parts
 //! - [`plots`]: the plots, as SVG text
+//! - [`mod@images`]: the same as files of their own
 //! - [`html`]: escaping, tables, numbers
 //! - [`provenance`]: command, versions, content hash
 //! - `style.css`: the style, for wide and narrow, light and dark, screen and paper
 
 pub mod html;
+pub mod images;
 pub mod page;
 pub mod plots;
 pub mod provenance;

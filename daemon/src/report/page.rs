@@ -6,7 +6,7 @@ use dynocar_core::dataset::Role;
 use dynocar_core::explain::answer::Verdict;
 use dynocar_core::explain::report::words;
 
-use super::html::escape;
+use super::html::{escape, tonnes};
 use super::plots::colour_rules;
 use super::sections::{Section, candidates, errors, parameters, quality, reproduce, residual};
 use super::{ReportError, Subject};
@@ -80,9 +80,9 @@ fn header(subject: &Subject, name: &str) -> String {
     };
     format!(
         "<header>\n<p class=\"kicker\">Dynocar · residual report</p>\n<h1>{name}</h1>\n\
-         {description}<p class=\"facts\">{train}{:.1} t, {:.0} m · {line} · {} fit and {} holdout \
+         {description}<p class=\"facts\">{train}{} t, {:.0} m · {line} · {} fit and {} holdout \
          runs · <span>{}</span></p>\n</header>\n",
-        dataset.train.mass_kg / 1000.0,
+        tonnes(dataset.train.mass_kg),
         dataset.train.length_m,
         count(Role::Fit),
         count(Role::Holdout),
@@ -150,7 +150,7 @@ fn figures(subject: &Subject) -> String {
         ));
         let p_value = subject.explanation.answer.effects.iter().map(|effect| effect.p_value);
         let worst = p_value.fold(0.0, f64::max);
-        let shown = if worst < 1e-6 { "< 10⁻⁶".into() } else { format!("{worst:.2e}") };
+        let shown = if worst < 1e-6 { "&lt; 10⁻⁶".into() } else { format!("{worst:.2e}") };
         list.push((shown, "chance of as much where nothing acts", "for the whole search".into()));
     }
     let mut html = String::from("<dl class=\"figures\">\n");

@@ -17,6 +17,11 @@ const LINE_TOLERANCE_M: f64 = 50.0;
 /// Median time steps in s of recordings that make sense.
 const USUAL_STEP_S: (f64, f64) = (0.0005, 60.0);
 
+/// A moving train's columns that all keep their values for so many s are remarked on.
+const STANDS_STILL_MIN_S: f64 = 10.0;
+/// The speed in m/s from which a train surely moves.
+const MOVING_MPS: f64 = 1.0;
+
 /// A remark on a run.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "remark", rename_all = "snake_case")]
@@ -113,6 +118,20 @@ pub enum Remark {
         /// The median step in s.
         step_s: f64,
     },
+    /// The recording keeps repeating itself while the train moves.
+    #[error(
+        "from {from_s} s every column but the time keeps its value for {for_s:.1} s, at \
+         {speed_mps:.1} m/s: unless the data are free of noise, the recorder hung, and the file \
+         should end there"
+    )]
+    StandsStill {
+        /// When it begins, as in the file.
+        from_s: f64,
+        /// How long it lasts.
+        for_s: f64,
+        /// The speed in m/s that is repeated.
+        speed_mps: f64,
+    },
     /// Values outside what the quantity can be on a railway.
     #[error(
         "{quantity} lies outside {low} to {high} {unit} in {count} rows, and those samples are \
@@ -136,6 +155,7 @@ pub enum Remark {
 pub(super) fn remarks(context: Context, run: &Resolved, quality: &RunQuality) -> Vec<Remark> {
     let mut remarks = Vec::new();
     of_time(quality, &mut remarks);
+    remarks.extend(stands_still(run));
     of_position(context, run, quality, &mut remarks);
     if run.speeds.negative > 0 {
         remarks.push(Remark::NegativeSpeed { count: run.speeds.negative });
@@ -155,6 +175,33 @@ fn of_time(quality: &RunQuality, remarks: &mut Vec<Remark>) {
     if step_s > 0.0 && !(USUAL_STEP_S.0..=USUAL_STEP_S.1).contains(&step_s) {
         remarks.push(Remark::UnusualStep { step_s });
     }
+}
+
+/// The longest stretch of a moving train in which no column but the time changes.
+fn stands_still(run: &Resolved) -> Option<Remark> {
+    let columns: Vec<&[f64]> = run
+        .table
+        .columns()
+        .filter(|(quantity, _)| *quantity != Quantity::Time)
+        .map(|(_, values)| values)
+        .collect();
+    let same = |one: f64, other: f64| one == other || (one.is_nan() && other.is_nan());
+    let repeats = |row: usize| columns.iter().all(|values| same(values[row], values[row - 1]));
+    let mut longest: Option<(f64, usize)> = None;
+    let mut start = 0;
+    for row in 1..run.times_s.len() {
+        if !repeats(row) {
+            start = row;
+        }
+        let for_s = run.times_s[row] - run.times_s[start];
+        let moves = run.speeds.speed_mps[row] >= MOVING_MPS;
+        if moves && for_s >= STANDS_STILL_MIN_S && longest.is_none_or(|(most, _)| for_s > most) {
+            longest = Some((for_s, start));
+        }
+    }
+    let (for_s, start) = longest?;
+    let (from_s, speed_mps) = (run.times_s[start], run.speeds.speed_mps[start]);
+    Some(Remark::StandsStill { from_s, for_s, speed_mps })
 }
 
 fn of_position(context: Context, run: &Resolved, quality: &RunQuality, remarks: &mut Vec<Remark>) {

@@ -269,6 +269,32 @@ fn likely_mistakes_are_remarked_on() {
 }
 
 #[test]
+fn a_recorder_that_hangs_while_the_train_moves_is_remarked_on() {
+    let remarks = |hangs_at: &dyn Fn(u32) -> bool, stands: bool| -> Vec<String> {
+        let mut csv = String::from("t,v,F,B\n");
+        let (mut speed_mps, mut force_kn) = (16.0, 30.0);
+        for row in 0..600_u32 {
+            if !hangs_at(row) && !stands {
+                speed_mps += if row % 3 == 0 { -0.01 } else { 0.01 };
+                force_kn += if row % 2 == 0 { 0.3 } else { -0.2 };
+            }
+            let shown = if stands { 0.0 } else { speed_mps };
+            csv += &format!("{},{shown},{force_kn},0\n", 0.1 * f64::from(row));
+        }
+        let columns = [("traction_force", "F", "kN"), ("brake_force", "B", "kN")];
+        let run = Example::new(&columns, &csv).run();
+        let remarks = run.remarks.iter().map(ToString::to_string);
+        remarks.filter(|remark| remark.contains("every column")).collect()
+    };
+    let hung = remarks(&|row| row > 300, false);
+    assert_eq!(hung.len(), 1, "{hung:?}");
+    let expected = "from 30 s every column but the time keeps its value for 29.9 s, at 17.0 m/s: ";
+    assert!(hung[0].starts_with(expected), "{hung:?}");
+    assert_eq!(remarks(&|row| (300..390).contains(&row), false), [] as [String; 0], "nine seconds");
+    assert_eq!(remarks(&|_| false, true), [] as [String; 0], "a train at a stop");
+}
+
+#[test]
 fn a_handle_without_its_curve_is_refused_where_it_is_mapped() {
     let example = Example::new(&[("brake_handle", "h", "1")], "t,v,h\n0,1,0\n");
     assert_eq!(

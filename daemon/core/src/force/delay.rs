@@ -97,3 +97,93 @@ impl DelayLine {
         output
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::ResolvedSample;
+    use super::*;
+
+    const STEP_S: f64 = 0.1;
+
+    fn sample(time_s: f64, stretch: u32, forces: Option<Forces>) -> ResolvedSample {
+        ResolvedSample {
+            time_ns: 5_000_000_000 + (time_s * 1e9).round() as i64,
+            stretch,
+            traction_force_n: forces.map(|forces| forces[0]),
+            brake_force_n: forces.map(|forces| forces[1]),
+            ..ResolvedSample::coasting()
+        }
+    }
+
+    /// Forces that act at the times of a recording with reported traction and brake forces.
+    fn acting(
+        line: &mut DelayLine,
+        reported: impl Fn(f64) -> Forces,
+        count: usize,
+    ) -> Vec<(f64, Forces)> {
+        (0..count)
+            .map(|k| {
+                let time_s = k as f64 * STEP_S;
+                let mut sample = sample(time_s, 1, Some(reported(time_s)));
+                line.pass(&mut sample);
+                (time_s, [sample.traction_force_n.unwrap(), sample.brake_force_n.unwrap()])
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_dead_time_moves_both_forces_later_also_between_samples() {
+        let reported = |time_s: f64| [1000.0 * time_s, 50.0 - 3.0 * time_s];
+        // 0.73 s is no multiple of the step.
+        for (time_s, forces) in acting(&mut DelayLine::new(0.73, 0.0), reported, 100) {
+            let expected = reported((time_s - 0.73).max(0.0));
+            for (found, expected) in forces.iter().zip(expected) {
+                assert!((found - expected).abs() < 1e-6, "{time_s} s: {found} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_lag_builds_a_step_up_exponentially() {
+        let step = |time_s: f64| [if time_s > 0.95 { 8000.0 } else { 0.0 }, 0.0];
+        let lag_s = 0.8;
+        for (time_s, [found, _]) in acting(&mut DelayLine::new(0.0, lag_s), step, 60) {
+            // Linear between samples: the force rises from 0.9 s to 1.0 s.
+            let ramp = |since_s: f64| since_s - lag_s * (1.0 - (-since_s / lag_s).exp());
+            let [from_s, to_s] = [time_s - 0.9, time_s - 1.0].map(|since_s| since_s.max(0.0));
+            let expected = 8000.0 / STEP_S * (ramp(from_s) - ramp(to_s));
+            assert!((found - expected).abs() < 1e-6, "{time_s} s: {found} {expected}");
+        }
+    }
+
+    #[test]
+    fn dead_time_and_lag_follow_one_another() {
+        let step = |time_s: f64| [if time_s > 0.95 { 8000.0 } else { 0.0 }, 0.0];
+        let lagged = acting(&mut DelayLine::new(0.0, 0.8), step, 60);
+        let both = acting(&mut DelayLine::new(0.5, 0.8), step, 60);
+        for k in 5..60 {
+            assert!((both[k].1[0] - lagged[k - 5].1[0]).abs() < 1e-6, "{k}");
+        }
+    }
+
+    #[test]
+    fn a_new_stretch_forgets_the_forces_before_it() {
+        let mut line = DelayLine::new(1.0, 0.5);
+        acting(&mut line, |_| [9000.0, 0.0], 50);
+        let mut first = sample(60.0, 2, Some([100.0, 20.0]));
+        line.pass(&mut first);
+        assert_eq!((first.traction_force_n, first.brake_force_n), (Some(100.0), Some(20.0)));
+    }
+
+    #[test]
+    fn unknown_forces_stay_unknown_and_the_known_ones_bridge_them() {
+        let mut line = DelayLine::new(0.2, 0.0);
+        for k in 0..10 {
+            let is_known = k != 4;
+            let mut sample = sample(f64::from(k) * STEP_S, 1, is_known.then_some([7.0, 1.0]));
+            line.pass(&mut sample);
+            assert_eq!(sample.traction_force_n, is_known.then_some(7.0), "{k}");
+            assert_eq!(sample.brake_force_n, is_known.then_some(1.0), "{k}");
+        }
+    }
+}

@@ -224,27 +224,7 @@ pub(super) mod tests {
 
     /// A train of 100 t with gamma 0.06 that coasts on the level at 20 m/s.
     pub(in crate::simulate) fn coasting_sample(time_s: f64) -> ResolvedSample {
-        ResolvedSample {
-            time_ns: (time_s * 1e9).round() as i64,
-            step_s: 0.0,
-            stretch: 1,
-            direction: 1.0,
-            position_m: None,
-            speed_mps: 20.0,
-            mass_kg: 100_000.0,
-            inertial_mass_kg: 106_000.0,
-            weight_kn: 100.0 * STANDARD_GRAVITY_MPS2,
-            traction_force_n: Some(0.0),
-            brake_force_n: Some(0.0),
-            gradient_permille: Some(0.0),
-            curve_n_per_kn: 0.0,
-            curvature_per_m: None,
-            tunnel_n_per_kn: 0.0,
-            tunnel_share: None,
-            brake_cylinder_pressure_pa: None,
-            ambient_temperature_degc: None,
-            is_sliding: false,
-        }
+        ResolvedSample { time_ns: (time_s * 1e9).round() as i64, ..ResolvedSample::coasting() }
     }
 
     pub(in crate::simulate) fn recorded(samples: Vec<ResolvedSample>) -> Recording {

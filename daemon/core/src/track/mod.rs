@@ -210,6 +210,16 @@ impl Track {
         &self.tunnels
     }
 
+    /// The further resistance in N/kN at places, zero elsewhere, when known.
+    pub fn resistance(&self) -> Option<&StepProfile> {
+        self.resistance_n_per_kn.as_ref()
+    }
+
+    /// The sections on which trains weigh more or less than declared.
+    pub fn masses(&self) -> &[MassSection] {
+        &self.masses
+    }
+
     /// True when the list of curves is known, be it empty.
     pub fn knows_curves(&self) -> bool {
         self.curvature_per_m.is_some()

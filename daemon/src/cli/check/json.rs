@@ -7,7 +7,7 @@ use dynocar_core::dataset::{
     PositionSource, Quantity, Remark, Role, Run, RunEntry, RunQuality,
 };
 use dynocar_core::track::Track;
-use dynocar_core::train::{EffortCurve, TrainModel};
+use dynocar_core::train::{Corrections, EffortCurve, TrainModel};
 use serde::Serialize;
 
 use super::daemon::{self, DaemonAnswer};
@@ -89,6 +89,22 @@ struct TrainAnswer<'a> {
     /// Points (m/s, N).
     traction_effort: Option<&'a [(f64, f64)]>,
     brake_effort: Option<&'a [(f64, f64)]>,
+    /// As in `train.toml`; `null` when nothing is corrected.
+    corrections: Option<CorrectionsAnswer>,
+}
+
+#[derive(Debug, Serialize)]
+struct CorrectionsAnswer {
+    speed_scale: f64,
+    traction_gain: f64,
+    actuator_delay_s: f64,
+    actuator_lag_s: f64,
+    tunnel_c_factor: f64,
+    wind_plus_mps: f64,
+    bearing_delta_a_n_per_kn: f64,
+    bearing_tau_s: f64,
+    ambient_w0_per_k: f64,
+    ambient_reference_k: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -100,6 +116,10 @@ struct TrackAnswer<'a> {
     gradient_range_permille: Option<(f64, f64)>,
     curves: Option<usize>,
     tunnels: Option<usize>,
+    /// Steps (m, N/kN) of further resistance; `null`: not known.
+    resistance: Option<Vec<(f64, f64)>>,
+    /// [from_m, to_m, direction, mass factor]
+    masses: Vec<[f64; 4]>,
 }
 
 /// The answer when nothing could be understood.
@@ -191,7 +211,24 @@ fn train_answer(train: &TrainModel) -> TrainAnswer<'_> {
         tunnel_constant_n_per_kn_m: train.tunnel_constant_n_per_kn_m,
         traction_effort: train.traction.as_ref().map(EffortCurve::points),
         brake_effort: train.brake.as_ref().map(EffortCurve::points),
+        corrections: corrections_answer(train.corrections),
     }
+}
+
+fn corrections_answer(known: Corrections) -> Option<CorrectionsAnswer> {
+    let answer = CorrectionsAnswer {
+        speed_scale: known.speed_scale,
+        traction_gain: known.traction_gain,
+        actuator_delay_s: known.actuator_delay_s,
+        actuator_lag_s: known.actuator_lag_s,
+        tunnel_c_factor: known.tunnel_c_factor,
+        wind_plus_mps: known.wind_plus_mps,
+        bearing_delta_a_n_per_kn: known.bearing_delta_a_n_per_kn,
+        bearing_tau_s: known.bearing_tau_s,
+        ambient_w0_per_k: known.ambient_w0_per_k,
+        ambient_reference_k: known.ambient_reference_k,
+    };
+    (known != Corrections::NONE).then_some(answer)
 }
 
 fn track_answer(track: &Track) -> TrackAnswer<'_> {
@@ -208,5 +245,11 @@ fn track_answer(track: &Track) -> TrackAnswer<'_> {
         gradient_range_permille: range,
         curves: track.knows_curves().then(|| track.curves().len()),
         tunnels: track.knows_tunnels().then(|| track.tunnels().len()),
+        resistance: track.resistance().map(|profile| profile.entries().collect()),
+        masses: track
+            .masses()
+            .iter()
+            .map(|it| [it.from_m, it.to_m, it.direction, it.mass_factor])
+            .collect(),
     }
 }

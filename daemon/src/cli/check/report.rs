@@ -2,7 +2,7 @@
 
 use dynocar_core::dataset::{Manifest, PositionReference, Quantity};
 use dynocar_core::track::Track;
-use dynocar_core::train::{BrakeGear, EffortCurve, TrainModel};
+use dynocar_core::train::{BrakeGear, Corrections, EffortCurve, TrainModel};
 
 use super::{Understood, daemon, runs};
 use crate::cli::text::{short, wrap};
@@ -92,7 +92,68 @@ fn train(train: &TrainModel) -> String {
     if train.brake_gear != BrakeGear::default() {
         text += &line("brake gear", &brake_gear(&train.brake_gear));
     }
+    if train.corrections != Corrections::NONE {
+        for (index, words) in corrections(&train.corrections).iter().enumerate() {
+            text += &line(if index == 0 { "corrections" } else { "" }, words);
+        }
+    }
     text
+}
+
+/// What measured runs have added to the declared model, as far as it changes something.
+fn corrections(known: &Corrections) -> Vec<String> {
+    let none = Corrections::NONE;
+    let mut parts = Vec::new();
+    let mut say = |acts: bool, words: String| {
+        if acts {
+            parts.push(words);
+        }
+    };
+    let signed = |value: f64, decimals| {
+        let sign = if value < 0.0 { "-" } else { "+" };
+        format!("{sign}{}", short(value.abs(), decimals))
+    };
+    say(
+        known.speed_scale != none.speed_scale,
+        format!("measured over true speed {}", short(known.speed_scale, 5)),
+    );
+    say(
+        known.traction_gain != none.traction_gain,
+        format!("reported over true traction {}", short(known.traction_gain, 5)),
+    );
+    say(
+        known.actuator_delay_s > 0.0,
+        format!("forces act {} s late", short(known.actuator_delay_s, 3)),
+    );
+    say(
+        known.actuator_lag_s > 0.0,
+        format!("forces build up with a time constant of {} s", short(known.actuator_lag_s, 3)),
+    );
+    say(
+        known.tunnel_c_factor != none.tunnel_c_factor,
+        format!("{} c v² in tunnels", short(known.tunnel_c_factor, 4)),
+    );
+    say(
+        known.wind_plus_mps != 0.0,
+        format!("headwind {} m/s as the chainage grows", signed(known.wind_plus_mps, 3)),
+    );
+    say(
+        known.bearing_delta_a_n_per_kn > 0.0,
+        format!(
+            "{} N/kN of cold bearings, fading in {} s",
+            signed(known.bearing_delta_a_n_per_kn, 4),
+            short(known.bearing_tau_s, 1)
+        ),
+    );
+    say(
+        known.ambient_w0_per_k != 0.0,
+        format!(
+            "{} % of w0 per kelvin above {} K",
+            signed(100.0 * known.ambient_w0_per_k, 4),
+            short(known.ambient_reference_k, 2)
+        ),
+    );
+    if parts.is_empty() { vec!["none that changes anything".into()] } else { parts }
 }
 
 /// The declared resistance in kN at a few speeds, which tells of a wrong unit at a glance.
@@ -183,6 +244,24 @@ fn track(track: &Track) -> String {
             }
         },
     );
+    if let Some(profile) = track.resistance() {
+        let places: Vec<f64> =
+            profile.entries().map(|(_, extra)| extra).filter(|extra| *extra != 0.0).collect();
+        let (low, high) = range(places.iter().copied());
+        let extra = match places.len() {
+            0 => "at no place".into(),
+            1 => format!("{} N/kN at 1 place", short(low, 4)),
+            count => format!("{} to {} N/kN at {count} places", short(low, 4), short(high, 4)),
+        };
+        text += &line("resistance", &format!("further {extra}"));
+    }
+    if !track.masses().is_empty() {
+        let factors = track.masses().iter().map(|section| section.mass_factor);
+        let (low, high) = range(factors);
+        let (low, high, count) = (short(low, 4), short(high, 4), track.masses().len());
+        let sections = if count == 1 { "section" } else { "sections" };
+        text += &line("masses", &format!("{low} to {high} of the declared, {count} {sections}"));
+    }
     text
 }
 

@@ -66,7 +66,12 @@ pub(super) fn chart<'a, 't>(
     }
     let label = |axis: &Axis| {
         let decimals = if axis.is_whole { 0 } else { decimals(axis) };
-        move |value: &f64| minus(&format!("{value:.decimals$}"))
+        let is_whole = axis.is_whole;
+        move |value: &f64| {
+            // A label between two whole numbers would repeat one of them.
+            let is_shown = !is_whole || (value - value.round()).abs() < 1e-6;
+            if is_shown { minus(&format!("{value:.decimals$}")) } else { String::new() }
+        }
     };
     let (x_label, y_label) = (label(x), label(y));
     chart

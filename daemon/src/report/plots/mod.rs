@@ -76,9 +76,37 @@ fn for_page(drawing: &str, label: &str, class: &str, (width, height): (u32, u32)
     )
 }
 
+/// Makes a plot of the page a file of its own: at its nominal size, on white.
+pub fn as_file(plot: &str) -> String {
+    let size: Vec<u32> = plot
+        .split_once("viewBox=\"0 0 ")
+        .and_then(|(_, rest)| rest.split_once('"'))
+        .map_or(Vec::new(), |(size, _)| size.split(' ').filter_map(|px| px.parse().ok()).collect());
+    let (Some(width), Some(height)) = (size.first(), size.get(1)) else { return plot.into() };
+    let (head, body) = plot.split_once('>').unwrap_or((plot, ""));
+    format!(
+        "{head} xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\">\n\
+         <rect width=\"{width}\" height=\"{height}\" fill=\"#FFFFFF\"/>{body}\n",
+        width / SCALE,
+        height / SCALE
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_file_of_its_own_has_a_size_a_name_space_and_a_ground() {
+        let plot = for_page("<svg width=\"9\">\n<g/></svg>", "a", "wide", (800, 600));
+        let file = as_file(&plot);
+        assert!(file.contains("viewBox=\"0 0 800 600\""), "{file}");
+        assert!(
+            file.contains(" xmlns=\"http://www.w3.org/2000/svg\" width=\"400\" height=\"300\">")
+        );
+        let ground = "<rect width=\"800\" height=\"600\" fill=\"#FFFFFF\"/>\n<g/></svg>\n";
+        assert!(file.ends_with(ground), "{file}");
+    }
 
     #[test]
     fn every_colour_has_a_rule_of_its_own() {

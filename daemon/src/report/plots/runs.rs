@@ -58,3 +58,21 @@ pub fn draw(
     let label = format!("Error of the predicted speed of {} {role} runs", known.len());
     Ok(for_page(&drawing, &label, "panel", size))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_single_run_has_its_number_once() {
+        let errors = RunErrors {
+            file: "2.csv".into(),
+            role: Role::Holdout,
+            full_run_mps: Some([0.27, 0.08]),
+            window60_mps: None,
+        };
+        let svg = draw(&[(7, &errors)], Role::Holdout, true).unwrap();
+        let labels = svg.lines().filter(|line| line.trim() == "7").count();
+        assert_eq!(labels, 1, "{svg}");
+    }
+}

@@ -69,7 +69,7 @@ pub fn draw(trace: &Trace, width: Width, has_effect: bool) -> Result<String, Plo
             points().flat_map(|p| [p.before_mps - p.measured_mps, p.after_mps - p.measured_mps]);
         let y = range_with_zero(away);
         let y_axis =
-            Axis { range: y, title: "Predicted minus measured, m/s", labels: 4, is_whole: false };
+            Axis { range: y, title: "Predicted minus measured, m/s", labels: 5, is_whole: false };
         let mut lower = chart(&errors, &x_axis("Time in the recording, s"), &y_axis)?;
         shade(&mut lower, &trace.acting_s, x, y)?;
         zero_line(&mut lower, x)?;

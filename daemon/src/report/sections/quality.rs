@@ -8,7 +8,7 @@ use dynocar_core::explain::evidence::RunData;
 
 use super::Section;
 use crate::report::Subject;
-use crate::report::html::{Column, Table, count, escape, grouped};
+use crate::report::html::{Column, Table, count, escape, grouped, tonnes};
 
 /// The section.
 pub fn section(subject: &Subject) -> Section {
@@ -66,7 +66,7 @@ fn runs_table(used: &[(&Run, Option<&RunData>)]) -> String {
             escape(&run.file),
             run.role.name().into(),
             if run.direction > 0 { "+1".into() } else { "−1".into() },
-            format!("{:.1}", run.mass_kg / 1000.0),
+            tonnes(run.mass_kg),
             format!("{:.0}", quality.duration_s),
             format!("{:.1}", quality.distance_m / 1000.0),
             quality.speed_range_mps.map_or("–".into(), |(_, high)| format!("{high:.1}")),

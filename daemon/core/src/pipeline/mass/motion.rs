@@ -26,7 +26,8 @@ pub struct Motion {
     pub gradient_permille: f64,
     /// Declared curve resistance in N/kN.
     pub declared_curve_n_per_kn: f64,
-    /// Declared tunnel resistance in N/kN.
+    /// Declared resistance in N/kN of tunnels and places, and what corrections add: negative in
+    /// warm weather or with the wind behind.
     pub declared_tunnel_n_per_kn: f64,
     /// Mean of 1/R along the train in 1/m; 0 where no curves are known.
     pub curvature_per_m: f64,
@@ -63,7 +64,7 @@ impl Motion {
             (motion.force_n, -1e8, 1e8),
             (motion.gradient_permille, -500.0, 500.0),
             (motion.declared_curve_n_per_kn, 0.0, 500.0),
-            (motion.declared_tunnel_n_per_kn, 0.0, 500.0),
+            (motion.declared_tunnel_n_per_kn, -500.0, 500.0),
             (motion.curvature_per_m, 0.0, 1.0),
             (motion.tunnel_share, 0.0, 1.0 + 1e-9),
         ];
@@ -133,6 +134,14 @@ mod tests {
     use super::*;
 
     const SECOND_NS: i64 = 1_000_000_000;
+
+    #[test]
+    fn a_correction_that_takes_resistance_away_is_no_reason_to_refuse_a_sample() {
+        let warm = ResolvedSample { tunnel_n_per_kn: -1.7, ..ResolvedSample::coasting() };
+        assert_eq!(Motion::of(&warm).unwrap().declared_tunnel_n_per_kn, -1.7);
+        let absurd = ResolvedSample { tunnel_n_per_kn: -501.0, ..warm };
+        assert_eq!(Motion::of(&absurd), Err(RejectionReason::OutOfRange));
+    }
 
     #[test]
     fn a_stop_is_reported_once_at_departure_and_a_short_one_never() {

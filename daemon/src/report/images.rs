@@ -1,0 +1,87 @@
+//! The report's plots as files of their own.
+
+use dynocar_core::dataset::{Dataset, Role};
+use dynocar_core::explain::Explanation;
+use dynocar_core::explain::report::ReportData;
+use dynocar_core::explain::report::errors::RunErrors;
+use dynocar_core::explain::report::panels::Panel;
+
+use super::ReportError;
+use super::plots::speeds::Width;
+use super::plots::{PlotError, as_file, panel, runs, speeds};
+
+/// A plot as a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Image {
+    /// Name of the file.
+    pub name: String,
+    /// The SVG.
+    pub svg: String,
+}
+
+/// Every plot of the report: the errors of the runs, the speeds of runs, the residual against
+/// covariates.
+///
+/// # Errors
+///
+/// When a plot cannot be drawn.
+pub fn images(dataset: &Dataset, explanation: &Explanation) -> Result<Vec<Image>, ReportError> {
+    let data = ReportData::of(dataset, explanation);
+    let has_effect = !explanation.answer.effects.is_empty();
+    let number = |file: &str| {
+        dataset.runs.iter().find(|run| run.file == file).map_or(0, |run| run.number as usize)
+    };
+    let mut images = Vec::new();
+    let mut keep = |name: String, drawn: Result<String, PlotError>| match drawn {
+        Ok(plot) => {
+            images.push(Image { name, svg: as_file(&plot) });
+            Ok(())
+        }
+        Err(source) => Err(ReportError::Plot { plot: name, source }),
+    };
+    for role in [Role::Holdout, Role::Fit] {
+        let own: Vec<(usize, &RunErrors)> = data
+            .errors
+            .by_run
+            .iter()
+            .filter(|run| run.role == role)
+            .map(|run| (number(&run.file), run))
+            .collect();
+        if !own.is_empty() {
+            keep(format!("errors_{}.svg", role.name()), runs::draw(&own, role, has_effect))?;
+        }
+    }
+    for trace in &data.traces {
+        let name = format!("speed_run_{}.svg", number(&trace.file));
+        keep(name, speeds::draw(trace, Width::Wide, has_effect))?;
+    }
+    for shown in &data.panels {
+        let run = shown.file.as_deref().map(number);
+        keep(panel_name(shown, run), panel::draw(shown, has_effect))?;
+    }
+    Ok(images)
+}
+
+/// As `residual_by_outside_temperature.svg`.
+fn panel_name(panel: &Panel, run: Option<usize>) -> String {
+    let covariate = panel.covariate.title().to_lowercase().replace([' ', '-'], "_");
+    let run = run.map_or(String::new(), |number| format!("_{number}"));
+    format!("residual_by_{covariate}{run}.svg")
+}
+
+#[cfg(test)]
+mod tests {
+    use dynocar_core::explain::report::covariates::Covariate;
+
+    use super::*;
+
+    #[test]
+    fn a_panel_is_named_by_its_covariate_and_its_run() {
+        let panel =
+            |covariate| Panel { covariate, file: None, bins: Vec::new(), acting: Vec::new() };
+        let name = panel_name(&panel(Covariate::Temperature), None);
+        assert_eq!(name, "residual_by_outside_temperature.svg");
+        let name = panel_name(&panel(Covariate::TimeInRun(0)), Some(4));
+        assert_eq!(name, "residual_by_time_in_the_run_4.svg");
+    }
+}
