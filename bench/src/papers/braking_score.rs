@@ -10,6 +10,7 @@ use dynocar_core::pipeline::braking::settings::{
 use super::bound::Knowledge;
 use super::braking::{Braking, DrawnDrift, SPEED_NOISE_MPS, Sought, WINDOW, disc_friction};
 use super::braking_run::{Scored, run};
+use super::seeds::Seeds;
 use super::statistics::mean;
 
 /// Lag in s of our smoother.
@@ -20,16 +21,17 @@ pub const LAG_STEPS: usize = 25;
 pub const MIDDLE_STEPS: usize = WINDOW - 1 - WINDOW / 2;
 
 /// Runs `work` for every seed, on as many threads as the machine has.
-pub fn over_seeds<T: Send>(seeds: usize, work: impl Fn(u64) -> T + Sync) -> Vec<T> {
+pub fn over_seeds<T: Send>(seeds: Seeds, work: impl Fn(u64) -> T + Sync) -> Vec<T> {
     let threads = std::thread::available_parallelism().map_or(1, |count| count.get());
-    let share = seeds.div_ceil(threads).max(1);
+    let share = seeds.count.div_ceil(threads).max(1);
     std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..seeds)
+        let workers: Vec<_> = seeds
+            .range()
             .step_by(share)
             .map(|from| {
                 let work = &work;
-                let until = (from + share).min(seeds);
-                scope.spawn(move || (from..until).map(|seed| work(seed as u64)).collect::<Vec<_>>())
+                let until = (from + share as u64).min(seeds.range().end);
+                scope.spawn(move || (from..until).map(work).collect::<Vec<_>>())
             })
             .collect();
         workers.into_iter().flat_map(|worker| worker.join().expect("a worker")).collect()
@@ -90,7 +92,7 @@ fn nees(scored: &Scored) -> f64 {
 /// Scores an estimator over runs, once for each lag.
 pub fn score<const LAGS: usize>(
     braking: &Braking,
-    seeds: usize,
+    seeds: Seeds,
     lags_steps: [usize; LAGS],
     settings: impl Fn(u64) -> EstimatorSettings + Sync,
 ) -> [Score; LAGS] {
@@ -253,8 +255,9 @@ mod tests {
 
     #[test]
     fn every_seed_is_run_once_and_in_order() {
-        for seeds in [0, 1, 2, 7] {
-            let expected: Vec<u64> = (0..seeds as u64).collect();
+        for (first, count) in [(0, 0), (0, 1), (3, 2), (5, 7)] {
+            let seeds = Seeds { first, count };
+            let expected: Vec<u64> = seeds.range().collect();
             assert_eq!(over_seeds(seeds, |seed| seed), expected);
         }
     }

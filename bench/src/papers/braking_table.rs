@@ -9,6 +9,7 @@ use super::braking_score::{
     smoother_knowledge,
 };
 use super::row::Row;
+use super::seeds::Seeds;
 
 /// One of the papers' tables, and what is measured for it.
 pub struct Table {
@@ -35,7 +36,7 @@ impl Table {
     }
 
     /// A row without figures.
-    pub fn row(&self, what: &str, unit: &'static str, seeds: usize) -> Row {
+    pub fn row(&self, what: &str, unit: &'static str, seeds: Seeds) -> Row {
         Row {
             paper: self.paper,
             table: self.table,
@@ -46,7 +47,7 @@ impl Table {
             baseline: None,
             ours: None,
             bound: None,
-            seeds,
+            seeds: seeds.count,
             coverage: None,
             nees: None,
             nees_freedom: None,
@@ -54,7 +55,7 @@ impl Table {
     }
 
     /// The rows that every table has: the present, 5 s back, and the baseline on its own.
-    pub fn comparison(&self, seeds: usize) -> Vec<Row> {
+    pub fn comparison(&self, seeds: Seeds) -> Vec<Row> {
         let sought = self.braking.sought;
         let lags = [0, MIDDLE_STEPS];
         let [em_end, em_middle] = score(&self.braking, seeds, lags, |seed| {
@@ -93,7 +94,7 @@ impl Table {
     }
 
     /// The rows where the curve over speed is known but for its scale.
-    pub fn known_law(&self, scale_std: f64, seeds: usize) -> Vec<Row> {
+    pub fn known_law(&self, scale_std: f64, seeds: Seeds) -> Vec<Row> {
         let sought = self.braking.sought;
         let [score] = score(&self.braking, seeds, [0], |_| known_law(sought));
         let bounds = bound(&self.braking, Knowledge::Law(scale_std), 0);
@@ -111,7 +112,7 @@ impl Table {
         what: &str,
         (em, ekf, ours): (Option<Score>, Option<Score>, Score),
         bounds: &[BoundAt],
-        seeds: usize,
+        seeds: Seeds,
     ) -> Vec<Row> {
         let row = |what: &str, unit| Row {
             coverage: Some(ours.coverage),
@@ -145,7 +146,7 @@ pub fn drawn_rows(
     paper: &'static str,
     sought: Sought,
     name: &'static str,
-    seeds: usize,
+    seeds: Seeds,
 ) -> Vec<Row> {
     let braking = drawn_braking(sought);
     let table = Table {

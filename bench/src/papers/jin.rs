@@ -9,6 +9,7 @@ use super::braking::{
 use super::braking_score::{over_seeds, score, smoother};
 use super::braking_table::{Table, drawn_rows};
 use super::row::Row;
+use super::seeds::Seeds;
 use super::statistics::mean;
 use super::xie::{PAPER_GRAVITY_MPS2, stop_in_steps, stop_rows};
 
@@ -36,7 +37,7 @@ const RATIO: Table = Table {
 const SCALE_STD: f64 = 1.0;
 
 /// Tables 3 and 4, and the stop of figure 8.
-pub fn rows(seeds: usize) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<Row> {
     let mut rows = FRICTION.comparison(seeds);
     rows.extend(FRICTION.known_law(SCALE_STD, seeds));
     rows.extend(RATIO.comparison(seeds));
@@ -47,7 +48,7 @@ pub fn rows(seeds: usize) -> Vec<Row> {
 }
 
 /// A ratio that hardly moves gains from a window of 40 s, and the declared value is hard to beat.
-fn ratio_extras(seeds: usize) -> Vec<Row> {
+fn ratio_extras(seeds: Seeds) -> Vec<Row> {
     // 10 s back, the random walk of 0.4 % after 1 s remembers about as long on either side.
     let [back] = score(&RATIO.braking, seeds, [50], |_| smoother(Sought::Ratio, 10.0));
     let nominal = over_seeds(seeds, |seed| {
@@ -114,7 +115,7 @@ mod tests {
 
     #[test]
     fn drawn_friction_is_found_at_the_bound_with_honest_intervals() {
-        for row in drawn_rows("Jin 2020", Sought::Friction, "disc friction", 60) {
+        for row in drawn_rows("Jin 2020", Sought::Friction, "disc friction", Seeds::from_zero(60)) {
             let ratio = row.ours.unwrap() / row.bound.unwrap();
             assert!((0.9..1.1).contains(&ratio), "{row:?}");
             assert!((0.92..0.98).contains(&row.coverage.unwrap()), "{row:?}");
@@ -123,8 +124,8 @@ mod tests {
 
     #[test]
     fn a_known_curve_is_worth_more_than_a_lag() {
-        let lagged = FRICTION.comparison(6)[2].ours.unwrap();
-        let known = FRICTION.known_law(SCALE_STD, 6)[0].ours.unwrap();
+        let lagged = FRICTION.comparison(Seeds::from_zero(6))[2].ours.unwrap();
+        let known = FRICTION.known_law(SCALE_STD, Seeds::from_zero(6))[0].ours.unwrap();
         assert!(known < 0.6 * lagged, "{known} against {lagged}");
     }
 }
