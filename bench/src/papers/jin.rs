@@ -7,7 +7,7 @@ use super::braking::{
     JIN_TABLE_3, JIN_TABLE_4, MPS_PER_KMH, PRESSURE_PA, Sought, declared, disc_friction, train,
 };
 use super::braking_score::{over_seeds, score, smoother};
-use super::braking_table::{Table, drawn_rows};
+use super::braking_table::{Table, drawn_rows, drawn_score};
 use super::row::Row;
 use super::seeds::Seeds;
 use super::statistics::mean;
@@ -43,6 +43,7 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
     rows.extend(RATIO.comparison(seeds));
     rows.extend(ratio_extras(seeds));
     rows.extend(drawn_rows("Jin 2020", Sought::Friction, "disc friction", seeds));
+    rows.extend(drawn_rows("Jin 2020", Sought::Ratio, "braking ratio", seeds));
     rows.extend(stop());
     rows
 }
@@ -51,6 +52,7 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
 fn ratio_extras(seeds: Seeds) -> Vec<Row> {
     // 10 s back, the random walk of 0.4 % after 1 s remembers about as long on either side.
     let [back] = score(&RATIO.braking, seeds, [50], |_| smoother(Sought::Ratio, 10.0));
+    let drawn = drawn_score(Sought::Ratio, 10.0, 50, seeds);
     let nominal = over_seeds(seeds, |seed| {
         let moments = RATIO.braking.simulate(seed);
         let scored = moments.iter().filter(|moment| moment.is_scored);
@@ -64,7 +66,7 @@ fn ratio_extras(seeds: Seeds) -> Vec<Row> {
         ours: Some(back.relative_percent),
         coverage: Some(back.coverage),
         nees: Some(back.nees),
-        nees_freedom: Some(back.nees_freedom()),
+        nees_freedom: Some(back.nees_freedom_of_one_curve(&drawn)),
         ..RATIO.row(
             "mean relative error, 10 s back (baseline: always the declared 2.55)",
             "%",
@@ -115,7 +117,8 @@ mod tests {
 
     #[test]
     fn drawn_friction_is_found_at_the_bound_with_honest_intervals() {
-        for row in drawn_rows("Jin 2020", Sought::Friction, "disc friction", Seeds::from_zero(60)) {
+        let rows = |sought| drawn_rows("Jin 2020", sought, "drawn", Seeds::from_zero(60));
+        for row in rows(Sought::Friction).into_iter().chain(rows(Sought::Ratio)) {
             let ratio = row.ours.unwrap() / row.bound.unwrap();
             assert!((0.9..1.1).contains(&ratio), "{row:?}");
             assert!((0.92..0.98).contains(&row.coverage.unwrap()), "{row:?}");

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::PAPER;
 use super::bound::{Information, mass_std_in_wind};
-use super::disturbance::{GradientError, Wind};
+use super::disturbance::{GradientError, Presumed, Wind};
 use super::leg::{kalman, known_resistance, leg, staged, there_and_back};
 use super::resistance_rows::{CROSSING, joint_least_squares};
 use super::sensor::measure;
@@ -27,6 +27,7 @@ enum Condition {
     Calm,
     Wind,
     GradientError,
+    Presumed,
 }
 
 impl Condition {
@@ -34,6 +35,7 @@ impl Condition {
         match self {
             Condition::Calm => Box::new(Calm),
             Condition::Wind => Box::new(Wind::new(shuttle.truth.basic.c, seed ^ 0x5eed)),
+            Condition::Presumed => Box::new(Presumed::new(seed)),
             Condition::GradientError => {
                 Box::new(GradientError(if seed.is_multiple_of(2) { 1.0 } else { -1.0 }))
             }
@@ -115,10 +117,11 @@ fn chain_row(shuttle: &Shuttle, mass_kg: f64, seeds: Seeds) -> Row {
     )
 }
 
-fn disturbed_rows(shuttle: &Shuttle, mass_kg: f64, seeds: Seeds) -> [Row; 2] {
+fn disturbed_rows(shuttle: &Shuttle, mass_kg: f64, seeds: Seeds) -> [Row; 3] {
     let calm_leg = leg(shuttle, mass_kg, &mut Calm);
     let wind = run(shuttle, mass_kg, Condition::Wind, 1.0, seeds);
     let gradient = run(shuttle, mass_kg, Condition::GradientError, 1.0, seeds);
+    let presumed = run(shuttle, mass_kg, Condition::Presumed, 1.0, seeds);
     let wind_bound = 100.0 * mass_std_in_wind(shuttle, &calm_leg);
     let gradient_bound = 100.0 * Information::of(shuttle, &calm_leg).mass_std_with_bias();
     [
@@ -134,6 +137,13 @@ fn disturbed_rows(shuttle: &Shuttle, mass_kg: f64, seeds: Seeds) -> [Row; 2] {
             None,
             &gradient,
             Some(gradient_bound),
+            seeds,
+        ),
+        error_row(
+            "mass of 117.1 t after one leg, unexplained acceleration drawn from the filter's eight behaviours".into(),
+            None,
+            &presumed,
+            None,
             seeds,
         ),
     ]

@@ -155,7 +155,8 @@ pub enum FitError {
 pub struct TrajectoryFit {
     /// The coefficients.
     pub davis: Davis,
-    /// Their covariance, widened where the residuals are correlated over tens of seconds.
+    /// Their covariance, averaged over the disturbance ratios where that is estimated, and
+    /// widened where the residuals are correlated over tens of seconds.
     pub covariance: Matrix3<f64>,
     /// Factor by which it was widened, see [`super::long_run`].
     pub inflation: f64,
@@ -262,14 +263,17 @@ impl TrajectoryFitter {
         };
         self.initial.reset(stretches.iter().map(|stretch| stretch.speeds_mps[0]));
         let mut search = Search::new(stretches, settings, prior, self);
-        let ratio = match settings.disturbance {
-            Disturbance::None => 0.0,
-            Disturbance::Ratio(ratio) => ratio,
-            Disturbance::Estimated => search.likeliest_ratio(&mut point)?,
+        let (ratio, others) = match settings.disturbance {
+            Disturbance::None => (0.0, None),
+            Disturbance::Ratio(ratio) => (ratio, None),
+            Disturbance::Estimated => {
+                let (ratio, others) = search.likeliest_ratio(&mut point)?;
+                (ratio, Some(others))
+            }
         };
         search.decrease_tolerance = settings.decrease_tolerance;
         let fitted = search.at_ratio(&point, ratio)?;
-        search.describe(&fitted, ratio)
+        search.describe(&fitted, ratio, others.as_ref())
     }
 }
 
