@@ -351,7 +351,10 @@ mod tests {
 
     #[test]
     fn intervals_hold_with_and_without_disturbance() {
-        for (disturbance, noise_mps) in [(0.0, 0.2), (0.01, 0.05)] {
+        // 180 squares of standard normal numbers: 1 ± 0.105. The disturbance, estimated from 400
+        // speeds, is known within a factor of 2, which lengthens the tail. Where there is none,
+        // 400 speeds cannot exclude one that doubles the variance, and the intervals allow for it.
+        for (disturbance, noise_mps, band) in [(0.0, 0.2, 0.4..1.2), (0.01, 0.05, 0.7..1.3)] {
             let rule = StepRule::Time;
             let steps = steps(rule, 400);
             let mut square = 0.0;
@@ -372,10 +375,8 @@ mod tests {
                 square += error.dot(&weighed) / 3.0;
                 assert!((fit.speed_noise_mps / noise_mps - 1.0).abs() < 0.25);
             }
-            // 180 squares of standard normal numbers: 1 ± 0.105. The disturbance, estimated from
-            // 400 speeds, is known within a factor of 2, which lengthens the tail.
             let mean = square / seeds as f64;
-            assert!((0.7..1.4).contains(&mean), "disturbance {disturbance}: {mean}");
+            assert!(band.contains(&mean), "disturbance {disturbance}: {mean}");
         }
     }
 
