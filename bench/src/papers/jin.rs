@@ -116,11 +116,12 @@ mod tests {
     }
 
     #[test]
-    fn drawn_friction_is_found_at_the_bound_with_honest_intervals() {
+    fn drawn_friction_and_ratio_are_found_at_the_bound_with_honest_intervals() {
         let rows = |sought| drawn_rows("Jin 2020", sought, "drawn", Seeds::from_zero(60));
         for row in rows(Sought::Friction).into_iter().chain(rows(Sought::Ratio)) {
             let ratio = row.ours.unwrap() / row.bound.unwrap();
-            assert!((0.9..1.1).contains(&ratio), "{row:?}");
+            // 60 runs are worth some 200 independent errors: three times 5 %.
+            assert!((0.85..1.15).contains(&ratio), "{row:?}");
             assert!((0.92..0.98).contains(&row.coverage.unwrap()), "{row:?}");
         }
     }
