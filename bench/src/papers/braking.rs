@@ -76,13 +76,45 @@ pub enum Sought {
     Ratio,
 }
 
-/// A share of the declared brake force that drifts at random, as the smoother's model has it.
+/// A share of the declared brake force that moves at random, as the smoother's model has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DrawnDrift {
-    /// Standard deviation of the drift in 1/s.
-    pub std_per_s: f64,
-    /// Time in s after which the drift is forgotten.
-    pub time_s: f64,
+pub enum DrawnShare {
+    /// It drifts, and the drift comes and goes.
+    Drift {
+        /// Standard deviation of the drift in 1/s.
+        std_per_s: f64,
+        /// Time in s after which the drift is forgotten.
+        time_s: f64,
+    },
+    /// It walks at random.
+    Walk {
+        /// Standard deviation that it gains in 1 s.
+        std_after_1_s: f64,
+    },
+}
+
+impl DrawnShare {
+    /// The first drift in 1/s.
+    fn first_drift(self, random: &mut ChaCha8Rng) -> f64 {
+        match self {
+            DrawnShare::Drift { std_per_s, .. } => std_per_s * normal(random),
+            DrawnShare::Walk { .. } => 0.0,
+        }
+    }
+
+    /// Share and drift a step later; `noise` is 0 for a share that stays.
+    fn step(self, share: f64, drift: f64, noise: f64, random: &mut ChaCha8Rng) -> (f64, f64) {
+        match self {
+            DrawnShare::Drift { std_per_s, time_s } => {
+                let kept = (-STEP_S / time_s).exp();
+                let new = noise * std_per_s * (1.0 - kept * kept).sqrt() * normal(random);
+                (share + STEP_S * drift, kept * drift + new)
+            }
+            DrawnShare::Walk { std_after_1_s } => {
+                (share + noise * std_after_1_s * STEP_S.sqrt() * normal(random), 0.0)
+            }
+        }
+    }
 }
 
 /// One braking.
@@ -91,7 +123,7 @@ pub struct Braking {
     /// What is looked for.
     pub sought: Sought,
     /// Draws the coefficient instead of taking the papers' curve.
-    pub drawn: Option<DrawnDrift>,
+    pub drawn: Option<DrawnShare>,
     /// First speed in km/h.
     pub from_kmh: f64,
     /// Last speed in km/h.
@@ -193,7 +225,7 @@ impl Braking {
         let (mut time_s, mut position_m) = (0.0, 0.0);
         let mut speed_mps = self.from_kmh * MPS_PER_KMH;
         let mut share = DRAWN_SHARE;
-        let mut drift = self.drawn.map_or(0.0, |drawn| drawn.std_per_s * normal(random) * noise);
+        let mut drift = self.drawn.map_or(0.0, |drawn| noise * drawn.first_drift(random));
         let mut moments = Vec::new();
         while speed_mps > self.to_kmh * MPS_PER_KMH {
             let (truth, achieved) = match self.drawn {
@@ -219,10 +251,7 @@ impl Braking {
             speed_mps = after_mps + noise * SPEED_NOISE_MPS * uniform(random);
             time_s += STEP_S;
             if let Some(drawn) = self.drawn {
-                let kept = (-STEP_S / drawn.time_s).exp();
-                share += STEP_S * drift;
-                drift = kept * drift
-                    + noise * drawn.std_per_s * (1.0 - kept * kept).sqrt() * normal(random);
+                (share, drift) = drawn.step(share, drift, noise, random);
             }
         }
         moments

@@ -8,8 +8,9 @@ use dynocar_core::pipeline::braking::settings::{
 };
 
 use super::bound::Knowledge;
-use super::braking::{Braking, DrawnDrift, SPEED_NOISE_MPS, Sought, WINDOW, disc_friction};
+use super::braking::{Braking, DrawnShare, SPEED_NOISE_MPS, Sought, WINDOW, disc_friction};
 use super::braking_run::{Scored, run};
+use super::seeds::Seeds;
 use super::statistics::mean;
 
 /// Lag in s of our smoother.
@@ -20,16 +21,17 @@ pub const LAG_STEPS: usize = 25;
 pub const MIDDLE_STEPS: usize = WINDOW - 1 - WINDOW / 2;
 
 /// Runs `work` for every seed, on as many threads as the machine has.
-pub fn over_seeds<T: Send>(seeds: usize, work: impl Fn(u64) -> T + Sync) -> Vec<T> {
+pub fn over_seeds<T: Send>(seeds: Seeds, work: impl Fn(u64) -> T + Sync) -> Vec<T> {
     let threads = std::thread::available_parallelism().map_or(1, |count| count.get());
-    let share = seeds.div_ceil(threads).max(1);
+    let share = seeds.count.div_ceil(threads).max(1);
     std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..seeds)
+        let workers: Vec<_> = seeds
+            .range()
             .step_by(share)
             .map(|from| {
                 let work = &work;
-                let until = (from + share).min(seeds);
-                scope.spawn(move || (from..until).map(|seed| work(seed as u64)).collect::<Vec<_>>())
+                let until = (from + share as u64).min(seeds.range().end);
+                scope.spawn(move || (from..until).map(work).collect::<Vec<_>>())
             })
             .collect();
         workers.into_iter().flat_map(|worker| worker.join().expect("a worker")).collect()
@@ -47,15 +49,31 @@ pub struct Score {
     pub coverage: f64,
     /// Mean of (error / claimed standard deviation)².
     pub nees: f64,
-    /// Standard error of `nees`, the runs being independent.
-    pub nees_standard_error: f64,
+    /// Variance of a run's own mean of it over the runs.
+    pub nees_run_variance: f64,
+    /// Runs behind it.
+    pub runs: usize,
+    /// Errors in a run, on average.
+    pub errors_per_run: f64,
 }
 
 impl Score {
     /// Degrees of freedom of a chi-square that scatters as `nees` does: the errors of one run
     /// are not independent of each other.
     pub fn nees_freedom(&self) -> f64 {
-        2.0 * (self.nees / self.nees_standard_error).powi(2)
+        2.0 * self.nees * self.nees * self.runs as f64 / self.nees_run_variance
+    }
+
+    /// The same where all runs share one curve of the coefficient, given the score of runs that
+    /// draw a curve each.
+    ///
+    /// The claimed variance counts with the curves that the estimator presumes; one curve is one
+    /// of them, however many runs are made of it. The runs' scatter shows the noise alone, that
+    /// of drawn runs noise and curve, which falls with the length of a run.
+    pub fn nees_freedom_of_one_curve(&self, drawn: &Score) -> f64 {
+        let both = drawn.nees_run_variance * drawn.errors_per_run / self.errors_per_run;
+        let curve = (both - self.nees_run_variance).max(0.0);
+        2.0 / (curve + self.nees_run_variance / self.runs as f64)
     }
 
     /// The errors of runs, pooled.
@@ -78,7 +96,10 @@ impl Score {
                 f64::from(u8::from(scored.error.abs() <= 1.959_964 * scored.std))
             }),
             nees: pool(nees),
-            nees_standard_error: (mean(&squares) / nees_of_runs.len().max(1) as f64).sqrt(),
+            nees_run_variance: mean(&squares),
+            runs: nees_of_runs.len(),
+            errors_per_run: runs.iter().map(Vec::len).sum::<usize>() as f64
+                / nees_of_runs.len().max(1) as f64,
         }
     }
 }
@@ -90,7 +111,7 @@ fn nees(scored: &Scored) -> f64 {
 /// Scores an estimator over runs, once for each lag.
 pub fn score<const LAGS: usize>(
     braking: &Braking,
-    seeds: usize,
+    seeds: Seeds,
     lags_steps: [usize; LAGS],
     settings: impl Fn(u64) -> EstimatorSettings + Sync,
 ) -> [Score; LAGS] {
@@ -207,21 +228,12 @@ fn smoother_walk(sought: Sought) -> WalkSettings {
 }
 
 /// A braking whose coefficient is drawn from the smoother's own model.
-///
-/// # Panics
-///
-/// When the smoother presumes no drift.
 pub fn drawn_braking(sought: Sought) -> Braking {
-    let WalkSettings::Drift { std_per_s, time_s } = smoother_walk(sought) else {
-        panic!("the smoother presumes no drift of {sought:?}");
+    let drawn = match smoother_walk(sought) {
+        WalkSettings::Drift { std_per_s, time_s } => DrawnShare::Drift { std_per_s, time_s },
+        WalkSettings::Scale { std_after_1_s } => DrawnShare::Walk { std_after_1_s },
     };
-    Braking {
-        sought,
-        drawn: Some(DrawnDrift { std_per_s, time_s }),
-        from_kmh: 300.0,
-        to_kmh: 180.0,
-        scored_from_kmh: 265.0,
-    }
+    Braking { sought, drawn: Some(drawn), from_kmh: 300.0, to_kmh: 180.0, scored_from_kmh: 265.0 }
 }
 
 #[cfg(test)]
@@ -253,8 +265,9 @@ mod tests {
 
     #[test]
     fn every_seed_is_run_once_and_in_order() {
-        for seeds in [0, 1, 2, 7] {
-            let expected: Vec<u64> = (0..seeds as u64).collect();
+        for (first, count) in [(0, 0), (0, 1), (3, 2), (5, 7)] {
+            let seeds = Seeds { first, count };
+            let expected: Vec<u64> = seeds.range().collect();
             assert_eq!(over_seeds(seeds, |seed| seed), expected);
         }
     }
@@ -267,6 +280,27 @@ mod tests {
         assert!((score.relative_percent - 1.0).abs() < 1e-12);
         assert!((score.rmse - 0.02).abs() < 1e-15);
         assert!((score.nees - 1.0).abs() < 1e-12);
-        assert_eq!((score.coverage, score.nees_standard_error), (1.0, 0.0));
+        assert_eq!((score.coverage, score.nees_run_variance), (1.0, 0.0));
+        assert_eq!((score.runs, score.errors_per_run), (2, 1.5));
+    }
+
+    #[test]
+    fn one_curve_of_many_runs_leaves_the_freedom_of_one_curve() {
+        let score = |nees_run_variance, runs, errors_per_run| Score {
+            relative_percent: 1.0,
+            rmse: 1.0,
+            coverage: 0.95,
+            nees: 1.0,
+            nees_run_variance,
+            runs,
+            errors_per_run,
+        };
+        let drawn = score(0.6, 200, 100.0);
+        // Twice as long a run halves the variance of 0.6; 0.1 of it is noise.
+        let freedom = score(0.1, 1000, 200.0).nees_freedom_of_one_curve(&drawn);
+        assert!((freedom - 2.0 / 0.2001).abs() < 1e-9, "{freedom}");
+        // Without a part of the curve it is the noise over all runs.
+        let freedom = score(0.4, 1000, 200.0).nees_freedom_of_one_curve(&drawn);
+        assert!((freedom - 5000.0).abs() < 1e-9, "{freedom}");
     }
 }

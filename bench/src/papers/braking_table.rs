@@ -9,6 +9,7 @@ use super::braking_score::{
     smoother_knowledge,
 };
 use super::row::Row;
+use super::seeds::Seeds;
 
 /// One of the papers' tables, and what is measured for it.
 pub struct Table {
@@ -35,7 +36,7 @@ impl Table {
     }
 
     /// A row without figures.
-    pub fn row(&self, what: &str, unit: &'static str, seeds: usize) -> Row {
+    pub fn row(&self, what: &str, unit: &'static str, seeds: Seeds) -> Row {
         Row {
             paper: self.paper,
             table: self.table,
@@ -46,7 +47,7 @@ impl Table {
             baseline: None,
             ours: None,
             bound: None,
-            seeds,
+            seeds: seeds.count,
             coverage: None,
             nees: None,
             nees_freedom: None,
@@ -54,7 +55,7 @@ impl Table {
     }
 
     /// The rows that every table has: the present, 5 s back, and the baseline on its own.
-    pub fn comparison(&self, seeds: usize) -> Vec<Row> {
+    pub fn comparison(&self, seeds: Seeds) -> Vec<Row> {
         let sought = self.braking.sought;
         let lags = [0, MIDDLE_STEPS];
         let [em_end, em_middle] = score(&self.braking, seeds, lags, |seed| {
@@ -67,16 +68,20 @@ impl Table {
         let [present] = score(&self.braking, seeds, [0], |_| smoother(sought, 0.0));
         let [back] = score(&self.braking, seeds, [LAG_STEPS], |_| smoother(sought, LAG_S));
         let knowledge = smoother_knowledge(sought);
+        let drawn = |lag_s, lag_steps| drawn_score(sought, lag_s, lag_steps, seeds);
+        let freedom = |own: &Score, drawn: Score| own.nees_freedom_of_one_curve(&drawn);
+        let (at_present, at_back) =
+            (freedom(&present, drawn(0.0, 0)), freedom(&back, drawn(LAG_S, LAG_STEPS)));
         let mut rows = Vec::new();
         rows.extend(self.pair(
             "the present",
-            (Some(em_end), Some(ekf), present),
+            (Some(em_end), Some(ekf), present, at_present),
             &bound(&self.braking, knowledge, 0),
             seeds,
         ));
         rows.extend(self.pair(
             "5 s back (EM: middle of the window)",
-            (Some(em_middle), None, back),
+            (Some(em_middle), None, back, at_back),
             &bound(&self.braking, knowledge, LAG_STEPS),
             seeds,
         ));
@@ -93,13 +98,13 @@ impl Table {
     }
 
     /// The rows where the curve over speed is known but for its scale.
-    pub fn known_law(&self, scale_std: f64, seeds: usize) -> Vec<Row> {
+    pub fn known_law(&self, scale_std: f64, seeds: Seeds) -> Vec<Row> {
         let sought = self.braking.sought;
         let [score] = score(&self.braking, seeds, [0], |_| known_law(sought));
         let bounds = bound(&self.braking, Knowledge::Law(scale_std), 0);
         self.pair(
             "the present, the law known but for its scale",
-            (None, None, score),
+            (None, None, score, score.nees_freedom()),
             &bounds,
             seeds,
         )
@@ -109,14 +114,14 @@ impl Table {
     fn pair(
         &self,
         what: &str,
-        (em, ekf, ours): (Option<Score>, Option<Score>, Score),
+        (em, ekf, ours, freedom): (Option<Score>, Option<Score>, Score, f64),
         bounds: &[BoundAt],
-        seeds: usize,
+        seeds: Seeds,
     ) -> Vec<Row> {
         let row = |what: &str, unit| Row {
             coverage: Some(ours.coverage),
             nees: Some(ours.nees),
-            nees_freedom: Some(ours.nees_freedom()),
+            nees_freedom: Some(freedom),
             ..self.row(what, unit, seeds)
         };
         vec![
@@ -139,13 +144,19 @@ impl Table {
     }
 }
 
+/// Our smoother over runs that each draw a coefficient from its own model.
+pub fn drawn_score(sought: Sought, lag_s: f64, lag_steps: usize, seeds: Seeds) -> Score {
+    let [score] = score(&drawn_braking(sought), seeds, [lag_steps], |_| smoother(sought, lag_s));
+    score
+}
+
 /// Rows in which the coefficient is drawn from the very model of the smoother, so that bound,
 /// coverage and NEES apply without reservation.
 pub fn drawn_rows(
     paper: &'static str,
     sought: Sought,
     name: &'static str,
-    seeds: usize,
+    seeds: Seeds,
 ) -> Vec<Row> {
     let braking = drawn_braking(sought);
     let table = Table {
@@ -161,7 +172,7 @@ pub fn drawn_rows(
     [("the present", 0.0, 0), ("5 s back", LAG_S, LAG_STEPS)]
         .into_iter()
         .map(|(what, lag_s, lag_steps)| {
-            let [score] = score(&braking, seeds, [lag_steps], |_| smoother(sought, lag_s));
+            let score = drawn_score(sought, lag_s, lag_steps, seeds);
             Row {
                 ours: Some(score.rmse),
                 bound: Some(root_mean_square(&bound(&braking, knowledge, lag_steps))),

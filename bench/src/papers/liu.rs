@@ -22,6 +22,7 @@ use nalgebra::{Matrix3, Vector3};
 use self::methods::Method;
 use self::scenario::{COMPARED_KMH, Condition, Measured, ROTATING_MASS_FACTOR, STEP_S, davis};
 use super::row::Row;
+use super::seeds::Seeds;
 use super::statistics::{mean, root_mean_square};
 
 const PAPER: &str = "Liu 2018";
@@ -61,18 +62,18 @@ impl Score {
 }
 
 /// Rows for every method under every condition, over seeded runs.
-pub fn rows(seeds: usize) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<Row> {
     let mut rows: Vec<Row> =
         Condition::ALL.into_iter().flat_map(|condition| accuracy(condition, seeds)).collect();
     rows.extend(table_1(seeds));
     rows
 }
 
-fn accuracy(condition: Condition, seeds: usize) -> Vec<Row> {
+fn accuracy(condition: Condition, seeds: Seeds) -> Vec<Row> {
     let mut of_methods = vec![Vec::new(); Method::ALL.len()];
     let (mut ours, mut online) = (Score::default(), Score::default());
     let mut bounds = Vec::new();
-    for seed in 0..seeds as u64 {
+    for seed in seeds.range() {
         let runs = scenario::measure(condition, seed);
         let segments = methods::segments(&runs);
         for (errors, method) in of_methods.iter_mut().zip(Method::ALL) {
@@ -96,7 +97,7 @@ fn accuracy(condition: Condition, seeds: usize) -> Vec<Row> {
         baseline: Some(root_mean_square(&of_methods[0])),
         ours: Some(root_mean_square(&score.errors)),
         bound: Some(root_mean_square(&bounds)),
-        seeds,
+        seeds: seeds.count,
         coverage: Some(mean(&score.held)),
         nees: Some(mean(&score.nees)),
         nees_freedom: Some(3.0 * score.nees.len() as f64),
@@ -195,7 +196,7 @@ fn live(runs: &[Vec<Measured>]) -> Estimate {
 
 /// Table 1's last column: the variance of the segments' residuals. The paper's are of its own
 /// recorded data, so that only the order of the methods compares.
-fn table_1(seeds: usize) -> Vec<Row> {
+fn table_1(seeds: Seeds) -> Vec<Row> {
     let published = [
         (Method::LeastSquares, 0.5632),
         (Method::Rls, 0.5632),
@@ -207,7 +208,7 @@ fn table_1(seeds: usize) -> Vec<Row> {
         .into_iter()
         .map(|(method, published)| {
             let (mut variances, mut ours) = (Vec::new(), Vec::new());
-            for seed in 0..seeds as u64 {
+            for seed in seeds.range() {
                 let runs = scenario::measure(Condition::Clean, seed);
                 let segments = methods::segments(&runs);
                 let variance = |theta_kmh| methods::residual_variance(&segments, theta_kmh);
@@ -227,7 +228,7 @@ fn table_1(seeds: usize) -> Vec<Row> {
                 baseline: None,
                 ours: Some(mean(&ours)),
                 bound: None,
-                seeds,
+                seeds: seeds.count,
                 coverage: None,
                 nees: None,
                 nees_freedom: None,
@@ -242,7 +243,7 @@ mod tests {
 
     #[test]
     fn a_few_seeds_show_the_order_of_the_methods_and_nearness_to_the_bound() {
-        let rows = rows(12);
+        let rows = rows(Seeds::from_zero(12));
         assert_eq!(rows.len(), 4 * (Method::ALL.len() + 1) + 5);
         for row in rows.iter().filter(|row| row.unit == "N/kN") {
             let (ours, bound) = (row.ours.unwrap(), row.bound.unwrap());

@@ -10,6 +10,7 @@ pub mod literal_em;
 pub mod liu;
 pub mod promise;
 pub mod row;
+pub mod seeds;
 pub mod statistics;
 pub mod table;
 pub mod wang;
@@ -18,13 +19,14 @@ pub mod xie;
 
 pub use promise::Verdict;
 pub use row::Row;
+pub use seeds::Seeds;
 
 /// A paper with the measurement of its tables.
 pub struct Source {
     /// Short name on the command line.
     pub name: &'static str,
-    /// Measures every row over so many seeded runs.
-    pub rows: fn(usize) -> Vec<Row>,
+    /// Measures every row over seeded runs.
+    pub rows: fn(Seeds) -> Vec<Row>,
 }
 
 /// Every paper, by year.

@@ -45,6 +45,16 @@ const LIMITS: &[(&str, &str, &str, Limit)] = &[
     ("Wang 2022", "Figure 9", "12 % more mass", Limit::AtMost(30.0)),
 ];
 
+/// Why the filter of the mass may claim more than the scenario needs.
+const PRESUMES_MORE: &str = "the filter allows for eight kinds of unexplained acceleration, of \
+                             which the scenario has none or one; the row that draws them is \
+                             judged on both sides";
+
+/// Paper, part of the quantity, and why intervals may be wider there than the scenario needs:
+/// coverage and NEES are judged on the unsafe side alone.
+const MAY_BE_WIDER: &[(&str, &str, &str)] =
+    &[("Wang 2022", "newly loaded", PRESUMES_MORE), ("Wang 2022", "headwind", PRESUMES_MORE)];
+
 /// Share of 95 % intervals that hold the truth.
 const COVERAGE: (f64, f64) = (0.93, 0.97);
 /// Fewer runs say nothing of coverage, and scatter too much for limits without a margin.
@@ -61,6 +71,8 @@ pub struct Verdict {
     pub promised: Vec<String>,
     /// The promises that this measurement breaks.
     pub broken: Vec<String>,
+    /// Why intervals may be wider than the scenario needs, where they may.
+    pub may_be_wider: Option<&'static str>,
 }
 
 impl Verdict {
@@ -70,18 +82,30 @@ impl Verdict {
             nees_band: row.nees_freedom.filter(|freedom| *freedom > 0.0).map(nees_band),
             promised: Vec::new(),
             broken: Vec::new(),
+            may_be_wider: MAY_BE_WIDER
+                .iter()
+                .find(|(paper, quantity, _)| *paper == row.paper && row.quantity.contains(quantity))
+                .map(|(_, _, reason)| *reason),
         };
         verdict.limits(row);
         if row.seeds >= SEEDS_MIN && row.ours.is_some() {
-            if let Some(coverage) = row.coverage {
-                let is_kept = (COVERAGE.0..=COVERAGE.1).contains(&coverage);
-                verdict.note("coverage 93-97 %".into(), is_kept);
-            }
-            if let (Some(nees), Some((low, high))) = (row.nees, verdict.nees_band) {
-                verdict.note("NEES in its band".into(), (low..=high).contains(&nees));
-            }
+            verdict.intervals(row);
         }
         verdict
+    }
+
+    fn intervals(&mut self, row: &Row) {
+        let may_be_wider = self.may_be_wider.is_some();
+        if let Some(coverage) = row.coverage {
+            let is_kept = coverage >= COVERAGE.0 && (may_be_wider || coverage <= COVERAGE.1);
+            let promise = if may_be_wider { "coverage from 93 % on" } else { "coverage 93-97 %" };
+            self.note(promise.into(), is_kept);
+        }
+        if let (Some(nees), Some((low, high))) = (row.nees, self.nees_band) {
+            let is_kept = nees <= high && (may_be_wider || nees >= low);
+            let promise = if may_be_wider { "NEES not above its band" } else { "NEES in its band" };
+            self.note(promise.into(), is_kept);
+        }
     }
 
     fn limits(&mut self, row: &Row) {
@@ -169,7 +193,15 @@ mod tests {
     fn intervals_that_lie_are_named() {
         let wide = Row { coverage: Some(0.99), nees: Some(0.5), ..row("w0, clean", 1.0, 200) };
         assert_eq!(Verdict::of(&wide).broken, ["coverage 93-97 %", "NEES in its band"]);
-        let few = Row { seeds: 8, ..wide };
+        let few = Row { seeds: 8, ..wide.clone() };
         assert!(Verdict::of(&few).broken.is_empty());
+        let named = Row { paper: "Wang 2022", quantity: "in a headwind".into(), ..wide };
+        assert!(Verdict::of(&named).broken.is_empty());
+        assert!(Verdict::of(&named).may_be_wider.is_some());
+        let narrow = Row { coverage: Some(0.9), nees: Some(1.5), ..named };
+        assert_eq!(
+            Verdict::of(&narrow).broken,
+            ["coverage from 93 % on", "NEES not above its band"]
+        );
     }
 }

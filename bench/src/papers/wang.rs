@@ -18,6 +18,7 @@ pub mod shuttle;
 pub mod step_row;
 
 use super::row::Row;
+use super::seeds::Seeds;
 
 const PAPER: &str = "Wang 2022";
 
@@ -25,7 +26,7 @@ const PAPER: &str = "Wang 2022";
 ///
 /// Rows that take a whole crossing beside another, or that hardly scatter, take 20 runs at most;
 /// each row says how many.
-pub fn rows(seeds: usize) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<Row> {
     let mut rows = resistance_rows::rows(seeds);
     rows.extend(mass_rows::rows(seeds));
     rows.push(step_row::row(&shuttle::Shuttle::new(false), seeds));
@@ -43,7 +44,7 @@ mod tests {
 
     #[test]
     fn every_figure_of_a_short_run_is_a_number_and_ours_beat_the_papers() {
-        let rows = rows(6);
+        let rows = rows(Seeds::from_zero(6));
         for row in &rows {
             let figures =
                 [row.paper_method, row.baseline, row.ours, row.bound, row.coverage, row.nees];
@@ -74,7 +75,7 @@ mod tests {
 
     #[test]
     fn what_is_not_identifiable_shifts_the_mass_by_as_much() {
-        let rows = mass_rows::rows(2);
+        let rows = mass_rows::rows(Seeds::from_zero(2));
         let gain = row(&rows, "mean error of the mass of 117.1 t with the traction table");
         assert!((gain.ours.unwrap() - 1.0).abs() < 0.1, "{gain:?}");
         let rotating = row(&rows, "mean error of the mass of 117.1 t with a rotating mass");
@@ -83,7 +84,7 @@ mod tests {
 
     #[test]
     fn at_equal_running_time_the_assumed_mass_hardly_changes_the_energy() {
-        let rows = energy_rows::rows(1);
+        let rows = energy_rows::rows(Seeds::from_zero(1));
         for control in ["closed-loop", "feed-forward"] {
             let saving = row(&rows, &format!("traction energy saved, {control}"));
             assert!(saving.ours.unwrap().abs() < 1.0, "{saving:?}");

@@ -11,12 +11,13 @@ pub mod online;
 pub mod scenario;
 
 use super::row::Row;
+use super::seeds::Seeds;
 
 /// Every line of the comparison for this paper.
 ///
 /// `seeds` runs each; where the paper's method goes over a whole line of 120 km window by window
 /// it gets a tenth of them, as the line says.
-pub fn rows(seeds: usize) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<Row> {
     let mut rows = offline::convergence_rows(seeds);
     rows.extend(offline::noise_free_rows(seeds));
     rows.extend(offline::noise_rows(seeds));
@@ -25,7 +26,7 @@ pub fn rows(seeds: usize) -> Vec<Row> {
 }
 
 /// A line of this paper without any figure yet.
-fn row(table: &'static str, quantity: String, unit: &'static str, seeds: usize) -> Row {
+fn row(table: &'static str, quantity: String, unit: &'static str, seeds: Seeds) -> Row {
     Row {
         paper: "Xia 2023",
         table,
@@ -36,7 +37,7 @@ fn row(table: &'static str, quantity: String, unit: &'static str, seeds: usize) 
         baseline: None,
         ours: None,
         bound: None,
-        seeds,
+        seeds: seeds.count,
         coverage: None,
         nees: None,
         nees_freedom: None,
@@ -88,9 +89,17 @@ mod tests {
             let of_unit = rows.into_iter().filter(|row| row.unit == unit);
             of_unit.map(|row| row.ours.expect("every line has our figure")).collect()
         };
-        assert!(by(offline::convergence_rows(2), "%").iter().all(|share| *share == 100.0));
-        assert!(by(offline::noise_free_rows(2), "N/kN").iter().all(|error| *error < 1e-9));
-        let online = online::rows(2);
+        assert!(
+            by(offline::convergence_rows(Seeds::from_zero(2)), "%")
+                .iter()
+                .all(|share| *share == 100.0)
+        );
+        assert!(
+            by(offline::noise_free_rows(Seeds::from_zero(2)), "N/kN")
+                .iter()
+                .all(|error| *error < 1e-9)
+        );
+        let online = online::rows(Seeds::from_zero(2));
         assert!(by(online.clone(), "N/kN")[0] < 0.2);
         assert!(by(online, "km").iter().all(|settling| *settling < 3.0));
     }

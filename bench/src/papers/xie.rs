@@ -9,6 +9,7 @@ use super::braking_score::{MIDDLE_STEPS, em_with_cap, over_seeds, score};
 use super::braking_table::{Table, drawn_rows};
 use super::literal_em::finite_changes;
 use super::row::Row;
+use super::seeds::Seeds;
 use super::statistics::mean;
 use dynocar_core::pipeline::braking::gear::DeclaredGear;
 
@@ -37,7 +38,7 @@ const TABLES: [Table; 2] = [
 ];
 
 /// Tables 2 and 3, the printed forms that fail, and the stopping distances.
-pub fn rows(seeds: usize) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<Row> {
     let mut rows = Vec::new();
     for table in &TABLES {
         rows.extend(table.comparison(seeds));
@@ -50,7 +51,7 @@ pub fn rows(seeds: usize) -> Vec<Row> {
 }
 
 /// What the printed cap and the printed density make of the EM.
-fn printed_forms(table: &Table, seeds: usize) -> Vec<Row> {
+fn printed_forms(table: &Table, seeds: Seeds) -> Vec<Row> {
     let capped = |initial, what| {
         let [score] = score(&table.braking, seeds, [MIDDLE_STEPS], |seed| {
             em_with_cap(Sought::Adhesion, initial, seed, EStep::Kalman, true)
@@ -77,7 +78,11 @@ fn printed_forms(table: &Table, seeds: usize) -> Vec<Row> {
         capped(0.12, "mean relative error, printed cap min(F, B), from 0.12"),
         Row {
             paper_method: Some(mean(&widths)),
-            ..table.row("change that leaves Q finite, printed uniform density", "1", widths.len())
+            ..table.row(
+                "change that leaves Q finite, printed uniform density",
+                "1",
+                Seeds::from_zero(widths.len()),
+            )
         },
         Row {
             paper_method: Some(mean(&frozen)),
@@ -229,7 +234,7 @@ mod tests {
 
     #[test]
     fn drawn_adhesion_is_found_at_the_bound_with_honest_intervals() {
-        for row in drawn_rows("Xie 2019", Sought::Adhesion, "adhesion", 60) {
+        for row in drawn_rows("Xie 2019", Sought::Adhesion, "adhesion", Seeds::from_zero(60)) {
             let ratio = row.ours.unwrap() / row.bound.unwrap();
             assert!((0.9..1.1).contains(&ratio), "{row:?}");
             assert!((0.92..0.98).contains(&row.coverage.unwrap()), "{row:?}");
@@ -238,7 +243,7 @@ mod tests {
 
     #[test]
     fn on_the_papers_curve_the_smoother_beats_filter_and_particles() {
-        let rows = TABLES[0].comparison(12);
+        let rows = TABLES[0].comparison(Seeds::from_zero(12));
         for row in &rows[..2] {
             let ours = row.ours.unwrap();
             assert!(ours < row.baseline.unwrap() && ours < row.paper_method.unwrap(), "{row:?}");
@@ -248,7 +253,7 @@ mod tests {
 
     #[test]
     fn the_printed_cap_sticks_where_the_start_exceeds_the_demand() {
-        let rows = printed_forms(&TABLES[0], 4);
+        let rows = printed_forms(&TABLES[0], Seeds::from_zero(4));
         assert!(rows[0].paper_method.unwrap() < 5.0, "{:?}", rows[0]);
         assert!(rows[1].paper_method.unwrap() > 30.0, "{:?}", rows[1]);
     }

@@ -1,5 +1,8 @@
 //! What acts on the train and is not in the model.
 
+use dynocar_core::pipeline::mass::MassKalmanSettings;
+use dynocar_core::pipeline::mass::bias_model::BiasModel;
+use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -38,6 +41,33 @@ impl Disturbance for Wind {
             + GUST_STD_MPS * (1.0 - keep * keep).sqrt() * normal(&mut self.random);
         let air_mps = speed_mps + self.mean_mps + self.gust_mps;
         self.quadratic * (air_mps * air_mps.abs() - speed_mps * speed_mps)
+    }
+}
+
+/// An unexplained acceleration drawn from what the mass filter presumes: one of its behaviours,
+/// all alike likely.
+pub struct Presumed {
+    model: BiasModel,
+    bias_mps2: f64,
+    random: ChaCha8Rng,
+}
+
+impl Presumed {
+    /// Draws by a seed; seeds in a row take the behaviours in turn.
+    pub fn new(seed: u64) -> Self {
+        let models = MassKalmanSettings::default().bias_models();
+        let model = models[(seed % models.len() as u64) as usize];
+        let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0xb1a5);
+        Presumed { model, bias_mps2: model.std_mps2 * normal(&mut random), random }
+    }
+}
+
+impl Disturbance for Presumed {
+    fn resistance_n_per_kn(&mut self, _time_s: f64, speed_mps: f64) -> f64 {
+        let keep = self.model.keep(PERIOD_S);
+        let new = self.model.noise_variance(keep).sqrt() * normal(&mut self.random);
+        self.bias_mps2 = keep * self.bias_mps2 + new;
+        -1e3 / STANDARD_GRAVITY_MPS2 * self.model.shape(speed_mps) * self.bias_mps2
     }
 }
 

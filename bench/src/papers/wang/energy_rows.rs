@@ -17,6 +17,7 @@ use super::line::STATIONS_M;
 use super::sensor::{exact, measure};
 use super::shuttle::{BRAKE_MAX_N, Calm, EMPTY_MASS_KG, Instant, PERIOD_S, Shuttle};
 use crate::papers::row::Row;
+use crate::papers::seeds::Seeds;
 use crate::papers::statistics::mean;
 
 /// The fixed mass in kg that the controller assumes without learning.
@@ -54,11 +55,11 @@ struct Driven {
 }
 
 /// The rows for energy.
-pub fn rows(seeds: usize) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<Row> {
     let shuttle = Shuttle::new(false);
-    let seeds = seeds.min(20);
+    let seeds = seeds.at_most(20);
     let learned_kg: Vec<f64> =
-        (0..seeds as u64).map(|seed| learned_mass_kg(&shuttle, seed)).collect();
+        (seeds.range()).map(|seed| learned_mass_kg(&shuttle, seed)).collect();
     let mut rows = Vec::new();
     for (control, name) in
         [(Control::ClosedLoop, "closed-loop"), (Control::FeedForward, "feed-forward")]

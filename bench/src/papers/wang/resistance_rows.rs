@@ -18,6 +18,7 @@ use super::bound::Information;
 use super::sensor::measure;
 use super::shuttle::{Calm, Instant, Shuttle};
 use crate::papers::row::Row;
+use crate::papers::seeds::Seeds;
 use crate::papers::statistics::{mean, root_mean_square};
 
 /// Samples of one crossing.
@@ -35,7 +36,7 @@ struct Errors {
 }
 
 /// The rows for resistance.
-pub fn rows(seeds: usize) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<Row> {
     let shuttle = Shuttle::new(false);
     let ride = shuttle.crossing(CROSSING, &mut Calm);
     let speeds = Section::ALL.map(|section| driven_speeds(&shuttle, &ride, section));
@@ -53,13 +54,13 @@ pub fn rows(seeds: usize) -> Vec<Row> {
     let empirical = Davis { a: 2.7551, b: 0.014 * 3.6, c: 0.00075 * 12.96 };
     let empirical = differences(&empirical, &shuttle.truth.basic, &speeds[0]);
     rows[0].baseline = Some(root_mean_square(&empirical));
-    rows.push(curve_in_tunnel_row(seeds.min(20)));
-    rows.extend(printed_rows(&shuttle, &ride, seeds.min(20)));
+    rows.push(curve_in_tunnel_row(seeds.at_most(20)));
+    rows.extend(printed_rows(&shuttle, &ride, seeds.at_most(20)));
     rows
 }
 
 /// With curves inside tunnels, which Algorithm 1 puts into the curve set.
-fn curve_in_tunnel_row(seeds: usize) -> Row {
+fn curve_in_tunnel_row(seeds: Seeds) -> Row {
     let shuttle = Shuttle::new(true);
     let ride = shuttle.crossing(CROSSING, &mut Calm);
     let speeds = Section::ALL.map(|section| driven_speeds(&shuttle, &ride, section));
@@ -70,7 +71,7 @@ fn curve_in_tunnel_row(seeds: usize) -> Row {
     error_row(quantity, &errors[curve], Some(bound), seeds)
 }
 
-fn error_row(quantity: String, errors: &Errors, bound: Option<f64>, seeds: usize) -> Row {
+fn error_row(quantity: String, errors: &Errors, bound: Option<f64>, seeds: Seeds) -> Row {
     Row {
         paper: PAPER,
         table: "Table 2",
@@ -84,18 +85,18 @@ fn error_row(quantity: String, errors: &Errors, bound: Option<f64>, seeds: usize
         baseline: None,
         ours: Some(root_mean_square(&errors.ours)),
         bound,
-        seeds,
+        seeds: seeds.count,
         coverage: Some(mean(&errors.covered)),
         nees: Some(mean(&errors.nees)),
         nees_freedom: Some(3.0 * errors.nees.len() as f64),
     }
 }
 
-fn run(shuttle: &Shuttle, ride: &[Instant], speeds: &[Vec<f64>; 3], seeds: usize) -> [Errors; 3] {
+fn run(shuttle: &Shuttle, ride: &[Instant], speeds: &[Vec<f64>; 3], seeds: Seeds) -> [Errors; 3] {
     let truths = [shuttle.truth.basic, shuttle.truth.curve, shuttle.truth.tunnel];
     let mut errors: [Errors; 3] = Default::default();
-    for seed in 0..seeds {
-        let samples = measure(shuttle, ride, &mut ChaCha8Rng::seed_from_u64(seed as u64));
+    for seed in seeds.range() {
+        let samples = measure(shuttle, ride, &mut ChaCha8Rng::seed_from_u64(seed));
         let mut staged = staged_descent(shuttle, DescentVariant::Normalised, SpeedUnit::default());
         let mut joint = joint_least_squares(shuttle);
         for sample in &samples {
@@ -142,10 +143,10 @@ pub fn joint_least_squares(shuttle: &Shuttle) -> JointLeastSquares {
 }
 
 /// The rows that show the printed learning rate to fail.
-fn printed_rows(shuttle: &Shuttle, ride: &[Instant], seeds: usize) -> [Row; 2] {
+fn printed_rows(shuttle: &Shuttle, ride: &[Instant], seeds: Seeds) -> [Row; 2] {
     let (mut until, mut moved) = (Vec::new(), Vec::new());
-    for seed in 0..seeds {
-        let samples = measure(shuttle, ride, &mut ChaCha8Rng::seed_from_u64(seed as u64));
+    for seed in seeds.range() {
+        let samples = measure(shuttle, ride, &mut ChaCha8Rng::seed_from_u64(seed));
         let mut in_kmh =
             staged_descent(shuttle, DescentVariant::Printed, SpeedUnit::KilometresPerHour);
         let mut in_mps =
@@ -168,7 +169,7 @@ fn printed_rows(shuttle: &Shuttle, ride: &[Instant], seeds: usize) -> [Row; 2] {
         baseline: None,
         ours: None,
         bound: None,
-        seeds,
+        seeds: seeds.count,
         coverage: None,
         nees: None,
         nees_freedom: None,

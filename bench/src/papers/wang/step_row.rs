@@ -11,16 +11,17 @@ use super::leg::{kalman, known_resistance, staged, there_and_back};
 use super::sensor::measure;
 use super::shuttle::{Calm, EMPTY_MASS_KG, Shuttle};
 use crate::papers::row::Row;
+use crate::papers::seeds::Seeds;
 use crate::papers::statistics::mean;
 
 /// A change of mass at a stop: seconds under force until the error stays below 1 %.
-pub fn row(shuttle: &Shuttle, seeds: usize) -> Row {
+pub fn row(shuttle: &Shuttle, seeds: Seeds) -> Row {
     let loaded_kg = 1.12 * EMPTY_MASS_KG;
     let ride = there_and_back(shuttle, loaded_kg, &mut Calm);
     let stop = ride.iter().position(|instant| instant.mass_kg == loaded_kg).expect("a second leg");
     let resistance = known_resistance(shuttle);
     let (mut paper, mut reverse, mut ours) = (Vec::new(), Vec::new(), Vec::new());
-    for seed in 0..seeds as u64 {
+    for seed in seeds.range() {
         let samples = measure(shuttle, &ride, &mut ChaCha8Rng::seed_from_u64(seed));
         let (before, after) = samples.split_at(stop);
         for (regression, times) in [
@@ -40,7 +41,7 @@ pub fn row(shuttle: &Shuttle, seeds: usize) -> Row {
         }));
     }
     // A way that does not settle in every run has no settling time.
-    let time_s = |times: &[f64]| (times.len() == seeds).then(|| mean(times));
+    let time_s = |times: &[f64]| (times.len() == seeds.count).then(|| mean(times));
     Row {
         paper: PAPER,
         table: "Figure 9",
@@ -54,7 +55,7 @@ pub fn row(shuttle: &Shuttle, seeds: usize) -> Row {
         baseline: time_s(&reverse),
         ours: time_s(&ours),
         bound: None,
-        seeds,
+        seeds: seeds.count,
         coverage: None,
         nees: None,
         nees_freedom: None,

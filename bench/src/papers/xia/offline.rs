@@ -20,6 +20,7 @@ use super::bound::{davis_covariance, disturbed_davis_covariance};
 use super::row;
 use super::scenario::{CASES, KMH, Profile, Run, drive};
 use crate::papers::row::Row;
+use crate::papers::seeds::Seeds;
 use crate::papers::statistics::{mean, root_mean_square};
 
 /// Identified a of Table 3, case by case.
@@ -79,12 +80,12 @@ const RUNS: [(&str, Profile, f64); 2] =
     [("full speed profile, 25 km", Profile::Full, 25e3), ("cruise, 20 km", Profile::Cruise, 20e3)];
 
 /// Shares of random starts from which each method finds the truth.
-pub fn convergence_rows(seeds: usize) -> Vec<Row> {
+pub fn convergence_rows(seeds: Seeds) -> Vec<Row> {
     let mut rows = Vec::new();
     for (name, profile, length_m) in RUNS {
         for (case, truth) in CASES.iter().enumerate() {
             let mut converged = [0usize; 3];
-            for seed in 0..seeds as u64 {
+            for seed in seeds.range() {
                 let run = drive(profile, length_m, seed, |_| *truth);
                 let start = random_start(&mut ChaCha8Rng::seed_from_u64(1000 + seed));
                 let speeds = &run.speeds_mps;
@@ -98,7 +99,7 @@ pub fn convergence_rows(seeds: usize) -> Vec<Row> {
                     *count += usize::from(has_converged);
                 }
             }
-            let share = |count: usize| Some(100.0 * count as f64 / seeds as f64);
+            let share = |count: usize| Some(100.0 * count as f64 / seeds.count as f64);
             let quantity = format!(
                 "random starts that converge, case {}, {name} (baseline: without restarts)",
                 case + 1
@@ -117,7 +118,7 @@ pub fn convergence_rows(seeds: usize) -> Vec<Row> {
 
 /// Error in a without noise: the paper's method where it converges, ours from integral least
 /// squares; the runs differ in line and driver.
-pub fn noise_free_rows(seeds: usize) -> Vec<Row> {
+pub fn noise_free_rows(seeds: Seeds) -> Vec<Row> {
     let mut rows = Vec::new();
     for (name, profile, length_m) in [
         ("full speed profile, 25 km", Profile::Full, 25e3),
@@ -125,7 +126,7 @@ pub fn noise_free_rows(seeds: usize) -> Vec<Row> {
     ] {
         for (case, truth) in CASES.iter().enumerate() {
             let (mut paper, mut ours) = (Vec::new(), Vec::new());
-            for seed in 0..seeds as u64 {
+            for seed in seeds.range() {
                 let run = drive(profile, length_m, seed, |_| *truth);
                 let speeds = &run.speeds_mps;
                 if profile == Profile::Full {
@@ -144,7 +145,7 @@ pub fn noise_free_rows(seeds: usize) -> Vec<Row> {
             rows.push(Row {
                 published: Some((PUBLISHED_A[case] - truth.a).abs()),
                 paper_method: (!paper.is_empty()).then(|| root_mean_square(&paper)),
-                ours: (ours.len() == seeds).then(|| root_mean_square(&ours)),
+                ours: (ours.len() == seeds.count).then(|| root_mean_square(&ours)),
                 ..row("Table 3", quantity, "N/kN", seeds)
             });
         }
@@ -186,7 +187,7 @@ impl Consistency {
 }
 
 /// Figure 4: w0 from noisy runs beside the bound.
-pub fn noise_rows(seeds: usize) -> Vec<Row> {
+pub fn noise_rows(seeds: Seeds) -> Vec<Row> {
     let truth = CASES[0];
     let fast: Vec<f64> = (0..=7).map(|i| 270.0 + 5.0 * f64::from(i)).collect();
     let all: Vec<f64> = (1..=10).map(|i| 30.0 * f64::from(i)).collect();
@@ -196,7 +197,7 @@ pub fn noise_rows(seeds: usize) -> Vec<Row> {
     let (mut paper_free, mut paper_boxed, mut boxed) = (Vec::new(), Vec::new(), Vec::new());
     let (cruise_bound, full_bound) =
         (davis_covariance(&cruise, &truth), davis_covariance(&full, &truth));
-    for seed in 0..seeds as u64 {
+    for seed in seeds.range() {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let speeds = cruise.measured_mps(0, &mut random);
         let errors = |davis: &Davis| -> Vec<f64> {
@@ -299,13 +300,13 @@ fn paper_minimum(
 
 /// Cruise under a disturbance that lasts for seconds: output error, as the paper fits, beside
 /// the fit that estimates the disturbance, and generalised least squares that knows it.
-fn disturbed_row(seeds: usize) -> Row {
+fn disturbed_row(seeds: Seeds) -> Row {
     let truth = CASES[0];
     let fast: Vec<f64> = (0..=7).map(|i| 270.0 + 5.0 * f64::from(i)).collect();
     let cruise = drive(Profile::Cruise, 120e3, 1, |_| truth);
     let bound = disturbed_davis_covariance(&cruise, &truth);
     let (mut output_error, mut ours) = (Consistency::default(), Consistency::default());
-    for seed in 0..seeds as u64 {
+    for seed in seeds.range() {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let run = cruise.disturbed(&truth, &mut random);
         let speeds = run.measured_mps(0, &mut random);

@@ -25,6 +25,7 @@ use super::scenario::{
 };
 use super::{offline, row};
 use crate::papers::row::Row;
+use crate::papers::seeds::Seeds;
 use crate::papers::statistics::{mean, root_mean_square};
 
 /// Data capacity I of the paper's window.
@@ -192,22 +193,22 @@ impl Score {
 }
 
 /// Table 4, and the consistency of the online filter where the coefficients stay.
-pub fn rows(seeds: usize) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<Row> {
     let (davis, std) = declared();
     let (mut filter, mut bound, mut windows) =
         (Score::default(), Score::default(), Score::default());
-    let paper_lines = seeds.div_ceil(10);
-    for seed in 0..seeds {
-        let run = drive(Profile::Cruise, 120e3, seed as u64, table_4);
-        let mut random = ChaCha8Rng::seed_from_u64(5000 + seed as u64);
+    let paper_lines = seeds.count.div_ceil(10);
+    for seed in seeds.range() {
+        let run = drive(Profile::Cruise, 120e3, seed, table_4);
+        let mut random = ChaCha8Rng::seed_from_u64(5000 + seed);
         let speeds = run.measured_mps(NOISY_FROM, &mut random);
         filter.push(&run, &ours(&run, &speeds, settings(davis, std)));
         let noise_mps = |i| if i >= NOISY_FROM { SPEED_NOISE_MPS } else { 1e-3 };
         let switches = SWITCHES.map(|(at, _)| at);
         let told = informed(&run, &speeds, declared(), noise_mps, &switches);
         bound.push(&run, &told);
-        if seed < paper_lines {
-            windows.push(&run, &paper(&run, &speeds, seed as u64));
+        if seed < seeds.first + paper_lines as u64 {
+            windows.push(&run, &paper(&run, &speeds, seed));
         }
     }
     let line = |quantity: &str, unit| {
@@ -268,7 +269,7 @@ impl Consistency {
         }
     }
 
-    fn row(&self, quantity: &str, seeds: usize) -> Row {
+    fn row(&self, quantity: &str, seeds: Seeds) -> Row {
         Row {
             ours: Some(root_mean_square(&self.errors)),
             bound: Some(root_mean_square(&self.bounds)),
@@ -294,11 +295,11 @@ fn drawn((mean, std): (Davis, Vector3<f64>), random: &mut ChaCha8Rng) -> Davis {
 }
 
 /// A full speed profile; the forces are exact, which the filter is told.
-fn exact_forces_row(seeds: usize) -> Row {
+fn exact_forces_row(seeds: Seeds) -> Row {
     let (mean_davis, std) = constant_prior();
     let speeds_mps: Vec<f64> = (1..=10).map(|i| 30.0 * f64::from(i) * KMH).collect();
     let mut consistency = Consistency::default();
-    for seed in 0..seeds as u64 {
+    for seed in seeds.range() {
         let mut random = ChaCha8Rng::seed_from_u64(9000 + seed);
         let truth = drawn(constant_prior(), &mut random);
         let run = drive(Profile::Full, 40e3, seed, |_| truth);
@@ -318,7 +319,7 @@ fn exact_forces_row(seeds: usize) -> Row {
 
 /// Cruise under a disturbance that lasts for seconds, of which the filter knows nothing; the
 /// bound knows its strength and correlation.
-fn disturbed_row(seeds: usize) -> Row {
+fn disturbed_row(seeds: Seeds) -> Row {
     let (mean_davis, std) = constant_prior();
     let speeds_mps: Vec<f64> = (0..=7).map(|i| (270.0 + 5.0 * f64::from(i)) * KMH).collect();
     let nominal = drive(Profile::Cruise, 120e3, 1, |_| mean_davis);
@@ -328,7 +329,7 @@ fn disturbed_row(seeds: usize) -> Row {
         .and_then(|information| (information + prior).try_inverse())
         .expect("a positive definite information");
     let mut consistency = Consistency::default();
-    for seed in 0..seeds as u64 {
+    for seed in seeds.range() {
         let mut random = ChaCha8Rng::seed_from_u64(9000 + seed);
         let truth = drawn(constant_prior(), &mut random);
         let run = drive(Profile::Cruise, 120e3, 1, |_| truth).disturbed(&truth, &mut random);

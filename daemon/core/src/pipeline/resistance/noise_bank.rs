@@ -24,6 +24,8 @@ const LIKELIEST_AT_FIRST: usize = 1 + 2 * TIMES_S.len() + 1;
 const RENEWAL_ROWS: u32 = 50;
 /// Probability beforehand that there is no disturbance; the others share the rest.
 const UNDISTURBED_PRIOR: f64 = 0.95;
+/// Probability of the models that widen the intervals of a filter beside the bank.
+const CREDIBLE: f64 = 0.99;
 /// Models of less weight than this are left out of the mixture.
 const WEIGHT_MIN: f64 = 1e-4;
 
@@ -132,7 +134,7 @@ impl NoiseBank {
         self.renew_penalty();
         let before = self.likeliest;
         self.weigh();
-        self.mixture = self.mix();
+        self.mixture = self.mix(1.0, self.student_factor());
         before != self.likeliest
     }
 
@@ -188,13 +190,18 @@ impl NoiseBank {
     }
 
     /// A solution from the likeliest model's rows, its covariance of a, b, c widened as the
-    /// mixture's is against that model's, for the noise is itself estimated. `None` while there
+    /// mixture's is against that model's: the disturbance is itself uncertain. `None` while there
     /// is no mixture.
+    ///
+    /// Models of the last hundredth of the probability are left out: an interval of 95 % that
+    /// reached for them too would be too wide in the other 99 cases of 100. Nor is it widened
+    /// for the rows' scale, since the filter takes the noise of its speeds from the scatter of
+    /// all samples, which are many times as many as the rows.
     pub fn widened(&self, solution: &Solution) -> Option<Solution> {
         let davis = |solution: &Solution| {
             solution.covariance.fixed_view::<PARAMETERS, PARAMETERS>(0, 0).into_owned()
         };
-        let mixed = davis(self.mixture.as_ref()?).cholesky()?.unpack();
+        let mixed = davis(&self.mix(CREDIBLE, 1.0)?).cholesky()?.unpack();
         let own = davis(&self.likeliest_solution()?).cholesky()?.unpack();
         let root = davis(solution).cholesky()?.unpack();
         // With roots S of the covariances: S_solution S_own^-1 S_mixed.
@@ -224,13 +231,20 @@ impl NoiseBank {
         }
     }
 
-    fn mix(&self) -> Option<Solution> {
-        let factor = self.student_factor();
+    /// The mixture of the likeliest models that together have so much of the probability, each
+    /// covariance times a factor.
+    fn mix(&self, probability: f64, factor: f64) -> Option<Solution> {
+        let mut order: [usize; MODELS] = std::array::from_fn(|index| index);
+        order.sort_unstable_by(|&i, &j| self.weights[j].total_cmp(&self.weights[i]));
         let mut estimate = Unknowns::zeros();
         let mut second = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
         let mut total = 0.0;
-        for (model, weight) in self.weighty() {
-            let own = model.solution()?;
+        for index in order {
+            let weight = self.weights[index];
+            if total >= probability || weight <= WEIGHT_MIN {
+                break;
+            }
+            let own = self.models[index].solution()?;
             estimate += own.estimate * weight;
             second += (own.covariance * factor + own.estimate * own.estimate.transpose()) * weight;
             total += weight;

@@ -188,7 +188,8 @@ impl JumpBank {
         for hypothesis in live.iter().filter(published) {
             let share = hypothesis.log_weight.exp() / weight;
             let apart = hypothesis.state.fixed_rows::<3>(0) - mean;
-            covariance += (hypothesis.davis_covariance() + apart * apart.transpose()) * share;
+            let own = hypothesis.davis_covariance_over_noise(&self.noise);
+            covariance += (own + apart * apart.transpose()) * share;
         }
         (Davis { a: mean[0], b: mean[1], c: mean[2] }, covariance)
     }

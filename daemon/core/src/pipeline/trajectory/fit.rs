@@ -155,7 +155,8 @@ pub enum FitError {
 pub struct TrajectoryFit {
     /// The coefficients.
     pub davis: Davis,
-    /// Their covariance, widened where the residuals are correlated over tens of seconds.
+    /// Their covariance, averaged over the disturbance ratios where that is estimated, and
+    /// widened where the residuals are correlated over tens of seconds.
     pub covariance: Matrix3<f64>,
     /// Factor by which it was widened, see [`super::long_run`].
     pub inflation: f64,
@@ -262,14 +263,17 @@ impl TrajectoryFitter {
         };
         self.initial.reset(stretches.iter().map(|stretch| stretch.speeds_mps[0]));
         let mut search = Search::new(stretches, settings, prior, self);
-        let ratio = match settings.disturbance {
-            Disturbance::None => 0.0,
-            Disturbance::Ratio(ratio) => ratio,
-            Disturbance::Estimated => search.likeliest_ratio(&mut point)?,
+        let (ratio, others) = match settings.disturbance {
+            Disturbance::None => (0.0, None),
+            Disturbance::Ratio(ratio) => (ratio, None),
+            Disturbance::Estimated => {
+                let (ratio, others) = search.likeliest_ratio(&mut point)?;
+                (ratio, Some(others))
+            }
         };
         search.decrease_tolerance = settings.decrease_tolerance;
         let fitted = search.at_ratio(&point, ratio)?;
-        search.describe(&fitted, ratio)
+        search.describe(&fitted, ratio, others.as_ref())
     }
 }
 
@@ -347,7 +351,10 @@ mod tests {
 
     #[test]
     fn intervals_hold_with_and_without_disturbance() {
-        for (disturbance, noise_mps) in [(0.0, 0.2), (0.01, 0.05)] {
+        // 180 squares of standard normal numbers: 1 ± 0.105. The disturbance, estimated from 400
+        // speeds, is known within a factor of 2, which lengthens the tail. Where there is none,
+        // 400 speeds cannot exclude one that doubles the variance, and the intervals allow for it.
+        for (disturbance, noise_mps, band) in [(0.0, 0.2, 0.4..1.2), (0.01, 0.05, 0.7..1.3)] {
             let rule = StepRule::Time;
             let steps = steps(rule, 400);
             let mut square = 0.0;
@@ -368,10 +375,8 @@ mod tests {
                 square += error.dot(&weighed) / 3.0;
                 assert!((fit.speed_noise_mps / noise_mps - 1.0).abs() < 0.25);
             }
-            // 180 squares of standard normal numbers: 1 ± 0.105. The disturbance, estimated from
-            // 400 speeds, is known within a factor of 2, which lengthens the tail.
             let mean = square / seeds as f64;
-            assert!((0.7..1.4).contains(&mean), "disturbance {disturbance}: {mean}");
+            assert!(band.contains(&mean), "disturbance {disturbance}: {mean}");
         }
     }
 

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, SVector, Vector3};
 use super::index::{A, B, C, SPEED};
 use super::noise::{LearnedNoise, NoiseModel};
 use super::step::{Step, StepRule};
+use super::unit_disturbance::UnitDisturbance;
 use crate::filter::square_root::CovarianceFactor;
 use crate::train::Davis;
 
@@ -29,6 +30,8 @@ pub struct Hypothesis {
     pub factor: CovarianceFactor<4>,
     /// Noise as it was learned under the hypothesis.
     pub noise: LearnedNoise,
+    /// Covariance that a disturbance of unit density would have left with the gains used.
+    unit: UnitDisturbance,
     /// Logarithm of the hypothesis' probability.
     pub log_weight: f64,
     /// Time in s since its jump.
@@ -60,6 +63,7 @@ impl Hypothesis {
                 std[A], std[B], std[C], 1.0,
             )),
             noise,
+            unit: UnitDisturbance::default(),
             log_weight: 0.0,
             age_s: 0.0,
             refusals: 0,
@@ -77,6 +81,17 @@ impl Hypothesis {
         lower * lower.transpose()
     }
 
+    /// Covariance that a disturbance of unit density would have left with the gains used.
+    pub fn unit_disturbance(&self) -> &UnitDisturbance {
+        &self.unit
+    }
+
+    /// Covariance of the coefficients over what the learned density of the disturbance leaves
+    /// open: the filter's own holds for the likeliest density.
+    pub fn davis_covariance_over_noise(&self, model: &NoiseModel) -> Matrix3<f64> {
+        self.davis_covariance() + self.unit.of_davis() * self.noise.density_surplus(model)
+    }
+
     /// Takes the speed from a measurement alone; the coefficients keep what they know.
     pub fn anchor(&mut self, speed_mps: f64) {
         self.state[SPEED] = speed_mps;
@@ -85,6 +100,7 @@ impl Hypothesis {
         }
         self.factor.0[(SPEED, SPEED)] = self.noise.speed_variance.sqrt();
         self.noise.anchor();
+        self.unit.anchor();
         self.refusals = 0;
     }
 
@@ -124,6 +140,7 @@ impl Hypothesis {
         let own = advance.by_speed * lower[(SPEED, SPEED)];
         lower[(SPEED, SPEED)] = (own * own + self.noise.disturbance_density * duration_s).sqrt();
         self.noise.predict(advance.by_speed, duration_s);
+        self.unit.predict(&advance.by_davis, advance.by_speed, duration_s);
         self.age_s += duration_s;
     }
 
@@ -156,6 +173,7 @@ impl Hypothesis {
             direction[SPEED] = 1.0;
             let gain = self.factor.measure(&direction, noise_variance).gain;
             self.state += gain * innovation_mps;
+            self.unit.measure(&gain);
         } else if self.refusals > REFUSALS_MAX {
             self.anchor(measured_mps);
         }
@@ -181,6 +199,7 @@ impl Hypothesis {
         if let Some(factor) = CovarianceFactor::of(&covariance) {
             united.state += apart * share;
             united.factor = factor;
+            united.unit = more.unit.mixed(&less.unit, share);
         }
         united
     }

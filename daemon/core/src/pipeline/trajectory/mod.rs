@@ -24,11 +24,13 @@ pub mod online;
 #[cfg(test)]
 mod pipeline_tests;
 pub mod quality;
+mod ratio_posterior;
 pub mod residuals;
 mod search;
 pub mod step;
 #[cfg(test)]
 mod test_runs;
 pub mod unexplained;
+mod unit_disturbance;
 pub mod window;
 pub mod wolfe_newton;

@@ -43,6 +43,8 @@ const NEWEST: f64 = 32.0;
 const SHRUNK_BELOW: f64 = 0.25;
 /// Information on ln R and ln q from before any data: standard deviations of 3.
 const PRIOR_INFORMATION: f64 = 0.1;
+/// Information on ln q beyond the first unit that the mean of q is reckoned with at least.
+const LEAST_FREE_INFORMATION: f64 = 1.0;
 /// Largest step of ln R and ln q for one innovation.
 const STEP_MAX: f64 = 0.5;
 
@@ -76,6 +78,19 @@ impl LearnedNoise {
             exceeded: 0,
             exceeded_square: 0.0,
         }
+    }
+
+    /// What the mean of q exceeds the learned q by, in (m/s)²/s; 0 when q is given.
+    ///
+    /// With the information I on ln q, q is about as well known as the variance of 2 I normal
+    /// numbers from their squares, and the mean of such a variance is I / (I - 1) times the
+    /// likeliest one.
+    pub fn density_surplus(&self, model: &NoiseModel) -> f64 {
+        if !model.learns_disturbance {
+            return 0.0;
+        }
+        let [[rr, _], [rq, qq]] = self.information.data.0;
+        self.disturbance_density / (qq - rq * rq / rr - 1.0).max(LEAST_FREE_INFORMATION)
     }
 
     /// The speed has been taken from a measurement alone.

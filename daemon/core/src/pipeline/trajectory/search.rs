@@ -1,8 +1,9 @@
 //! The search behind a trajectory fit: coefficients, noise and disturbance in turn.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::fit::{FitError, FitSettings, SCALES, Stretch, TrajectoryFit, TrajectoryFitter};
+use super::ratio_posterior::{EXPONENTS, RatioPosterior, Tried};
 use super::residuals::{Pass, Residuals, Weighting};
 use crate::filter::levenberg_marquardt::{LeastSquares, Solution, SolverSettings, minimise};
 use crate::filter::triangular::TriangularSystem;
@@ -30,6 +31,14 @@ pub struct Fitted {
     /// the greatest likelihood itself takes the slow disturbances that coefficients and initial
     /// speeds have absorbed for their absence.
     restricted_log_likelihood: f64,
+}
+
+impl Fitted {
+    /// Covariance of the coefficients by the noise that the residuals show.
+    fn covariance(&self) -> Result<Matrix3<f64>, FitError> {
+        let raw = self.solution.linearisation.system.covariance().ok_or(FitError::NotDetermined)?;
+        Ok(raw * (self.noise_mps / self.used_noise_mps).powi(2))
+    }
 }
 
 /// A fit under way.
@@ -148,42 +157,53 @@ impl<'a, 'b> Search<'a, 'b> {
         Ok(*median / 0.6745)
     }
 
-    /// The disturbance ratio of greatest restricted likelihood: by decades, then by golden section.
-    pub fn likeliest_ratio(&mut self, point: &mut Vector3<f64>) -> Result<f64, FitError> {
-        let mut best = (f64::NEG_INFINITY, 0.0_f64);
+    /// The disturbance ratio of greatest restricted likelihood, by decades and then by quarters
+    /// of a decade, and what the other ratios are worth.
+    pub fn likeliest_ratio(
+        &mut self,
+        point: &mut Vector3<f64>,
+    ) -> Result<(f64, RatioPosterior), FitError> {
+        let mut posterior = RatioPosterior::new();
         // Downwards, since much disturbance binds the trajectory to the measured speeds.
-        for exponent in (-7..=2).rev().map(f64::from) {
-            let fitted = self.at_ratio(point, 10f64.powf(exponent))?;
-            *point = fitted.solution.point;
-            if fitted.restricted_log_likelihood > best.0 {
-                best = (fitted.restricted_log_likelihood, exponent);
-            }
+        for exponent in EXPONENTS.rev().map(f64::from) {
+            posterior.add(self.tried(point, exponent)?);
         }
-        let (mut low, mut high) = (best.1 - 1.0, best.1 + 1.0);
-        let share = 0.5 * (5f64.sqrt() - 1.0);
-        while high - low > 0.1 {
-            let (left, right) = (high - share * (high - low), low + share * (high - low));
-            let at_left = self.at_ratio(point, 10f64.powf(left))?;
-            let at_right = self.at_ratio(point, 10f64.powf(right))?;
-            *point = at_left.solution.point;
-            if at_left.restricted_log_likelihood > at_right.restricted_log_likelihood {
-                high = right
-            } else {
-                low = left
-            }
+        *point = posterior.likeliest().point;
+        for exponent in posterior.between_neighbours() {
+            posterior.add(self.tried(point, exponent)?);
         }
-        let ratio = 10f64.powf(0.5 * (low + high));
-        let (with, without) = (self.at_ratio(point, ratio)?, self.at_ratio(point, 0.0)?);
+        *point = posterior.likeliest().point;
+        let without = self.at_ratio(point, 0.0)?;
         // Half a unit of likelihood is what the free ratio gains by chance (Akaike 1974: 1).
-        let gain = with.restricted_log_likelihood - without.restricted_log_likelihood;
-        Ok(if gain > 0.5 { ratio } else { 0.0 })
+        let gain = posterior.likeliest().log_likelihood - without.restricted_log_likelihood;
+        let ratio = if gain > 0.5 { 10f64.powf(posterior.peak_exponent()) } else { 0.0 };
+        Ok((ratio, posterior))
+    }
+
+    /// The fit at 10 to the power of an exponent; `point` moves on to it.
+    fn tried(&mut self, point: &mut Vector3<f64>, exponent: f64) -> Result<Tried, FitError> {
+        let fitted = self.at_ratio(point, 10f64.powf(exponent))?;
+        *point = fitted.solution.point;
+        Ok(Tried {
+            exponent,
+            log_likelihood: fitted.restricted_log_likelihood,
+            point: *point,
+            covariance: fitted.covariance()?,
+        })
     }
 
     /// The fit with covariance and counts.
-    pub fn describe(&self, fitted: &Fitted, ratio: f64) -> Result<TrajectoryFit, FitError> {
+    pub fn describe(
+        &self,
+        fitted: &Fitted,
+        ratio: f64,
+        others: Option<&RatioPosterior>,
+    ) -> Result<TrajectoryFit, FitError> {
         let Fitted { solution, pass, .. } = fitted;
         let inflation = pass.long_run.inflation();
-        let shown_over_used = fitted.noise_mps / fitted.used_noise_mps;
+        let own = fitted.covariance()?;
+        let covariance =
+            others.and_then(|others| others.covariance_about(&solution.point)).unwrap_or(own);
         let raw = solution.linearisation.system.covariance().ok_or(FitError::NotDetermined)?;
         let stretches = self.stretches.len() as f64;
         let cluster_covariance = (self.stretches.len() >= 4)
@@ -192,7 +212,7 @@ impl<'a, 'b> Search<'a, 'b> {
         let bounds = &self.settings.bounds;
         Ok(TrajectoryFit {
             davis: Davis { a: point[0], b: point[1], c: point[2] },
-            covariance: raw * (shown_over_used * shown_over_used * inflation),
+            covariance: covariance * inflation,
             inflation,
             cluster_covariance,
             speed_noise_mps: fitted.noise_mps,
