@@ -113,6 +113,22 @@ fn an_effect_outside_the_library_is_called_unknown_and_placed() {
 }
 
 #[test]
+fn on_a_level_straight_line_two_kinds_of_mass_cannot_be_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let effects = EffectRequest::Kinds(vec![EffectKind::RotatingMass]);
+    let ordinary = SimulatorSettings::new(SEED, effects);
+    let settings = SimulatorSettings { is_level_and_straight: true, ..ordinary };
+    let answer = explained(&simulate(&settings), folder.path()).answer;
+    assert_eq!(answer.verdict, Verdict::Ambiguous, "{}", answer.statement);
+    let mut kinds = answer.ambiguous_with.clone();
+    kinds.push(answer.effects[0].kind);
+    kinds.sort_unstable();
+    assert_eq!(kinds, ["mass_change", "rotating_mass"]);
+    let experiment = answer.experiment.expect("what would separate them");
+    assert!(experiment.contains("gradient"), "{experiment}");
+}
+
+#[test]
 fn a_scan_foretells_what_a_fit_then_gains() {
     let folder = tempfile::tempdir().unwrap();
     let simulated = with_kinds(&[EffectKind::TunnelDrag]);

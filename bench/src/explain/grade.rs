@@ -2,6 +2,7 @@
 
 use dynocar_core::explain::Explanation;
 use dynocar_core::explain::answer::Verdict;
+use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};
 use serde_json::Value;
@@ -38,15 +39,17 @@ pub struct ParameterGrade {
     pub z: f64,
 }
 
-/// Grades an explanation.
-pub fn grade(simulated: &SimulatedDataset, explanation: &Explanation) -> Grade {
+/// Grades an explanation; `rival` is a kind that the data cannot tell from the one that acts.
+pub fn grade(
+    simulated: &SimulatedDataset,
+    rival: Option<EffectKind>,
+    explanation: &Explanation,
+) -> Grade {
     let answer = &explanation.answer;
     let named: Vec<String> = answer.effects.iter().map(|effect| effect.kind.into()).collect();
     let mut expected: Vec<&str> =
         simulated.effects.iter().map(|effect| effect.kind().name()).collect();
-    expected.sort_unstable();
     let mut found: Vec<&str> = named.iter().map(String::as_str).collect();
-    found.sort_unstable();
     let verdict = match answer.verdict {
         Verdict::None => "none",
         Verdict::Effect => "effect",
@@ -54,8 +57,13 @@ pub fn grade(simulated: &SimulatedDataset, explanation: &Explanation) -> Grade {
         Verdict::Unknown => "unknown",
         Verdict::InsufficientData => "insufficient_data",
     };
+    found.extend(&answer.ambiguous_with);
+    expected.extend(rival.map(EffectKind::name));
+    expected.sort_unstable();
+    found.sort_unstable();
     let is_right = match simulated.verdict() {
         "unknown" => verdict == "unknown",
+        _ if rival.is_some() => verdict == "ambiguous" && expected == found,
         right => verdict == right && expected == found,
     };
     let json = serde_json::to_value(answer).unwrap_or(Value::Null);

@@ -88,7 +88,7 @@ pub fn run(
                     .and_then(|at| Some((at, cases.get(at)?)))
                 {
                     let simulated = case.simulate();
-                    let graded = grade(&simulated, &explained(&simulated));
+                    let graded = grade(&simulated, case.scenario.rival(), &explained(&simulated));
                     tell(case, &graded);
                     grades.lock().unwrap_or_else(PoisonError::into_inner)[at] = Some(graded);
                 }

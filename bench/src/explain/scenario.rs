@@ -10,6 +10,8 @@ pub enum Scenario {
     Kind(EffectKind),
     /// Two effects of kinds drawn from the seed.
     Two,
+    /// A rotating mass on a level, straight line, where another mass does the same.
+    Alike,
     /// A null recorded with gaps, repeats and heavy outliers.
     PoorNull,
     /// One effect of a kind drawn from the seed, recorded so.
@@ -53,7 +55,7 @@ impl Scenario {
     /// All of them, in the order of the table.
     pub fn all() -> Vec<Scenario> {
         let kinds = EffectKind::ALL.iter().copied().map(Scenario::Kind);
-        kinds.chain([Scenario::Two, Scenario::PoorNull, Scenario::Poor]).collect()
+        kinds.chain([Scenario::Two, Scenario::Alike, Scenario::PoorNull, Scenario::Poor]).collect()
     }
 
     /// The scenario of this name.
@@ -66,6 +68,7 @@ impl Scenario {
         match self {
             Scenario::Kind(kind) => kind.name(),
             Scenario::Two => "two_effects",
+            Scenario::Alike => "level_straight_line",
             Scenario::PoorNull => "none_poor_recording",
             Scenario::Poor => "poor_recording",
         }
@@ -82,6 +85,7 @@ impl Scenario {
         match self {
             Scenario::Kind(EffectKind::None) | Scenario::PoorNull => Vec::new(),
             Scenario::Kind(kind) => vec![kind],
+            Scenario::Alike => vec![EffectKind::RotatingMass],
             Scenario::Two => PAIRS[drawn(PAIRS.len())].to_vec(),
             Scenario::Poor => vec![POOR[drawn(POOR.len())]],
         }
@@ -91,6 +95,12 @@ impl Scenario {
     pub fn settings(self, seed: u64) -> SimulatorSettings {
         let ordinary = SimulatorSettings::new(seed, EffectRequest::Kinds(self.kinds(seed)));
         let is_poor = matches!(self, Scenario::PoorNull | Scenario::Poor);
-        SimulatorSettings { defects: if is_poor { HEAVY } else { Defects::NONE }, ..ordinary }
+        let defects = if is_poor { HEAVY } else { Defects::NONE };
+        SimulatorSettings { defects, is_level_and_straight: self == Scenario::Alike, ..ordinary }
+    }
+
+    /// The kind that no data of this family can tell from the one that acts.
+    pub fn rival(self) -> Option<EffectKind> {
+        (self == Scenario::Alike).then_some(EffectKind::MassChange)
     }
 }

@@ -20,6 +20,7 @@ use dynocar::config::IdleStrategy;
 
 use crate::latency::{Cores, in_thread};
 use crate::rig::RigError;
+use crate::rig::host::HostGaps;
 use crate::rig::pipelines;
 use report::Report;
 use traffic::TrafficPlan;
@@ -81,11 +82,11 @@ pub struct LoadArguments {
 /// An idle strategy on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Idle {
-    /// See [`IdleStrategy::Busy`].
+    /// Look all the time: the lowest latency, a whole core
     Busy,
-    /// See [`IdleStrategy::Adaptive`].
+    /// Look for a while, then sleep until the controller wakes them
     Adaptive,
-    /// See [`IdleStrategy::Event`].
+    /// Sleep until the controller wakes them
     Event,
 }
 
@@ -102,6 +103,8 @@ pub enum LoadError {
 
 const SECONDS: f64 = 10.0;
 const QUICK_SECONDS: f64 = 1.0;
+/// For so long at most the host is watched before and after a load, in s.
+const HOST_SECONDS: f64 = 3.0;
 /// Each trial of a search or of the growth lasts at most so long, in s.
 const TRIAL_SECONDS: f64 = 3.0;
 
@@ -113,8 +116,12 @@ const TRIAL_SECONDS: f64 = 3.0;
 /// loss.
 pub fn run(arguments: &LoadArguments) -> Result<Report, LoadError> {
     let plan = plan(arguments)?;
+    let mut host = HostGaps::default();
+    let watched_s = HOST_SECONDS.min(plan.seconds);
+    host.watch(plan.cores, watched_s)?;
     let trial = in_thread(|| trial::run(&plan))?;
-    let mut report = Report::of(&plan, &trial);
+    host.watch(plan.cores, watched_s)?;
+    let mut report = Report::of(&plan, &trial, host.figures());
     let short = TrialPlan { seconds: plan.seconds.min(TRIAL_SECONDS), ..plan };
     if arguments.search {
         report.search = Some(search::highest_rate(&short)?);

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::search::{Found, Size};
 use super::trial::{Trial, TrialPlan};
+use crate::rig::host::HostFigures;
 use crate::rig::quantiles::{Quantiles, for_people};
 
 /// The result for machines.
@@ -25,6 +26,8 @@ pub struct Report {
     pub rss_start_bytes: u64,
     /// Resident memory of the daemon at the end, in bytes.
     pub rss_bytes: u64,
+    /// What the host took away from busy threads before and after the load.
+    pub host: HostFigures,
     /// The latest that a sample left after its appointed time, in ns.
     pub publisher_lag_ns: i64,
     /// The highest rate without loss, when it was searched for.
@@ -53,7 +56,7 @@ pub struct Line {
 
 impl Report {
     /// Of a trial.
-    pub fn of(plan: &TrialPlan, trial: &Trial) -> Self {
+    pub fn of(plan: &TrialPlan, trial: &Trial, host: HostFigures) -> Self {
         let line = |it: &super::trial::PipelineOutcome| Line {
             name: it.kind.to_string(),
             offered: it.offered,
@@ -70,6 +73,7 @@ impl Report {
             cpu_percent: trial.cpu_percent,
             rss_start_bytes: trial.rss_start_bytes,
             rss_bytes: trial.rss_bytes,
+            host,
             publisher_lag_ns: trial.publisher_lag_ns,
             search: None,
             growth: None,
@@ -115,6 +119,16 @@ pub fn table(report: &Report) -> String {
         report.rss_bytes as f64 / MEBIBYTE,
         report.rss_start_bytes as f64 / MEBIBYTE,
         for_people(report.publisher_lag_ns as f64)
+    );
+    let host = &report.host;
+    let _ = writeln!(
+        text,
+        "host: threads that only read the clock were away {:.1} % of the time, {} at most; that \
+         alone makes p99 {} and p99.9 {}",
+        host.away_percent,
+        for_people(host.longest_ns as f64),
+        for_people(host.p99_ns as f64),
+        for_people(host.p999_ns as f64)
     );
     if let Some(found) = &report.search {
         let limit = if found.limited_by_publishers { "the publishers'" } else { "the daemon's" };

@@ -2,12 +2,14 @@
 //!
 //! - [`site`]: a run-time directory with a daemon configuration, gone afterwards
 //! - [`child`]: processes beside this one, each bound to a core
+//! - [`host`]: what the host takes away from threads that are always busy
 //! - [`motion`]: the samples of a train that swings between 10 and 30 m/s
 //! - [`pipelines`]: which pipelines a measurement names
 //! - [`quantiles`]: histograms and what is told of them
 //! - [`usage`]: what the kernel says of a process: processor time, memory, faults, switches
 
 pub mod child;
+pub mod host;
 pub mod motion;
 pub mod pipelines;
 pub mod quantiles;

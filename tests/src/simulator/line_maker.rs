@@ -132,13 +132,15 @@ const HIGH_SPEED: Ranges = Ranges {
 /// Lateral acceleration in m/s², cant included, that a speed limit allows in a curve.
 const CURVE_ACCELERATION_MPS2: f64 = 1.9;
 
-/// Draws a line for a type of train; `train` is its length in m and highest speed in m/s.
+/// Draws a line for a type of train; `train` is its length in m and highest speed in m/s,
+/// `is_plain` takes gradients and curves out.
 ///
 /// The line is the same with and without tunnels otherwise.
 pub fn make_line(
     train_type: TrainType,
     train: (f64, f64),
     has_tunnels: bool,
+    is_plain: bool,
     random: &mut Random,
 ) -> Line {
     let ranges = match train_type {
@@ -149,8 +151,12 @@ pub fn make_line(
     };
     let (train_length_m, speed_max_mps) = train;
     let length_m = random.uniform(ranges.length_m.0, ranges.length_m.1).round();
-    let gradient = make_gradient(&ranges, length_m, random);
-    let curves = make_curves(&ranges, length_m, random);
+    let mut gradient = make_gradient(&ranges, length_m, random);
+    let mut curves = make_curves(&ranges, length_m, random);
+    if is_plain {
+        gradient = vec![(0.0, 0.0)];
+        curves.clear();
+    }
     let tunnels = make_tunnels(&ranges, length_m, random);
     let stations_m = make_stations(&ranges, length_m, train_length_m, random);
     let limits = make_limits(&ranges, length_m, speed_max_mps, &curves, random);

@@ -124,6 +124,8 @@ pub struct SimulatorSettings {
     pub sensor_noise: f64,
     /// Factor on the distance of the true from the declared Davis coefficients.
     pub resistance_spread: f64,
+    /// A line without gradients and curves.
+    pub is_level_and_straight: bool,
     /// Factor on the small things that nobody declares and no library holds: the survey's error of
     /// each gradient (standard deviation 0.05 ‰), and from run to run the calibration of the
     /// forces (0.2 %) and the basic resistance (1 %).
@@ -149,6 +151,7 @@ impl SimulatorSettings {
             time_offset_s: 0.0,
             sensor_noise: 1.0,
             resistance_spread: 1.0,
+            is_level_and_straight: false,
             hidden_variation: 1.0,
             wheel_slips_per_run: 0.25,
             defects: Defects::NONE,

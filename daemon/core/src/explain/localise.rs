@@ -15,7 +15,7 @@ const RUN_GAIN_MIN: f64 = 6.0;
 /// A further interval must add this share of what the others explain.
 const FURTHER_SHARE: f64 = 0.05;
 /// A surveyed gradient is good to this in ‰, which is N/kN.
-const MAP_ERROR_PERMILLE: f64 = 0.1;
+pub const MAP_ERROR_PERMILLE: f64 = 0.1;
 /// Intervals of one effect at most.
 const INTERVALS_MAX: usize = 6;
 

@@ -9,7 +9,7 @@
 //!   time, would explain
 //! - [`selection`]: the search for effects, its significance, evidence by run
 //! - [`score`]: open-loop prediction of fit and holdout runs
-//! - [`verdict`], [`answer`]: the statement
+//! - [`rivals`], [`verdict`], [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
 //!
 //! [`explain`] runs it all.
@@ -20,6 +20,7 @@ pub mod evidence;
 pub mod localise;
 pub mod report;
 pub mod residual_pressure;
+pub mod rivals;
 pub mod scan;
 pub mod score;
 pub mod selection;

@@ -8,15 +8,11 @@ use super::answer::{
     Answer, BaseAnswer, Considered, DavisDeviations, EffectAnswer, ParameterValue, Verdict,
 };
 use super::effects::ReportContext;
-use super::evidence::Fit;
+use super::rivals::{is_in, rivals, separating_run};
 use super::score::{self, Score};
-use super::selection::{
-    AMBIGUOUS, EVIDENCE_MIN, Outcome, Search, Trial, deviations, discounted, p_value, penalty,
-};
+use super::selection::{Outcome, Search, deviations, discounted, p_value, penalty};
 use crate::simulate::SpeedError;
 
-/// A rival takes away this share of what the accepted effect does of the open-loop error.
-const RIVAL_REDUCTION_SHARE: f64 = 0.7;
 /// Moving time in s of the fit runs below which nothing is said.
 const MOVING_MIN_S: f64 = 180.0;
 /// Share of the decrease that the library must explain when something unknown is left too.
@@ -50,7 +46,7 @@ pub fn answer(search: &Search, outcome: &Outcome, score: &Score) -> Answer {
         error_reduction_interval: score.reduction_interval(),
         window60: pair(score.holdout_window60),
         fit_runs: pair(score.fit_runs),
-        considered: considered(outcome),
+        considered: considered(search, outcome, &rivals),
         predictions: BTreeMap::new(),
     }
 }
@@ -98,44 +94,6 @@ fn effect_answers(
     answers.into_iter().map(|(_, answer)| answer).collect()
 }
 
-/// Kinds that could stand in the place of the effect accepted last.
-///
-/// A rival explains the data as well, takes away about as much of the open-loop error, and has
-/// nothing left to explain once the effect is in: what keeps its evidence acts beside the effect
-/// and not in its place.
-fn rivals(outcome: &Outcome) -> Vec<EffectKind> {
-    let Some(accepted) = accepted_round(outcome) else { return Vec::new() };
-    let Some(best) = accepted.iter().find(|trial| is_in(&outcome.fit, trial.kind)) else {
-        return Vec::new();
-    };
-    let left = |kind: EffectKind| {
-        let last = outcome.rounds.last().into_iter().flatten().find(|trial| trial.kind == kind);
-        last.map_or(0.0, |trial| trial.evidence)
-    };
-    accepted
-        .iter()
-        .filter(|trial| {
-            !is_in(&outcome.fit, trial.kind)
-                && trial.kind != EffectKind::Unknown
-                && trial.evidence > best.evidence - AMBIGUOUS
-                && trial.evidence > EVIDENCE_MIN
-                && left(trial.kind) < 0.5 * trial.evidence
-                && trial.reduction > RIVAL_REDUCTION_SHARE * best.reduction
-        })
-        .map(|trial| trial.kind)
-        .collect()
-}
-
-fn is_in(fit: &Fit, kind: EffectKind) -> bool {
-    fit.model.effects.iter().any(|effect| effect.kind() == kind)
-}
-
-/// The last round that added an effect.
-fn accepted_round(outcome: &Outcome) -> Option<&Vec<Trial>> {
-    let count = outcome.fit.model.effects.len();
-    count.checked_sub(1).and_then(|index| outcome.rounds.get(index))
-}
-
 fn verdict(search: &Search, outcome: &Outcome, rivals: &[EffectKind]) -> Verdict {
     let moving_s: f64 = search.problem.runs.iter().map(|run| run.moving_s()).sum();
     if outcome.rounds.is_empty() || moving_s < MOVING_MIN_S {
@@ -157,23 +115,24 @@ fn verdict(search: &Search, outcome: &Outcome, rivals: &[EffectKind]) -> Verdict
     if rivals.is_empty() { Verdict::Effect } else { Verdict::Ambiguous }
 }
 
-fn considered(outcome: &Outcome) -> Vec<Considered> {
+fn considered(search: &Search, outcome: &Outcome, rivals: &[EffectKind]) -> Vec<Considered> {
     let mut list: Vec<Considered> = Vec::new();
     if let Some(last) = outcome.rounds.last() {
         for trial in last {
             let remark = if is_in(&outcome.fit, trial.kind) {
-                "found"
-            } else if trial.evidence > EVIDENCE_MIN {
-                "explains the data, but less well or too little of the error"
-            } else if trial.evidence > 0.0 {
-                "not significant for a search over the whole library"
+                "found".into()
+            } else if rivals.contains(&trial.kind) {
+                "explains the data as well".into()
             } else {
-                "explains no more than chance"
+                search.refusal(&outcome.fit, trial).map_or_else(
+                    || "explains the data, but less well than what was found".into(),
+                    |refusal| refusal.to_string(),
+                )
             };
             list.push(Considered {
                 kind: trial.kind.name(),
                 evidence: Some(trial.evidence),
-                remark: remark.into(),
+                remark,
             });
         }
     }
@@ -225,52 +184,6 @@ fn statement(
     }
 }
 
-/// What is known to separate the kinds that are easily confused.
-fn separating_run(kind: EffectKind, rivals: &[EffectKind]) -> String {
-    use EffectKind::{
-        AmbientTemperature, BearingTemperature, CurveResistance, DraggingBrake, GradientShift,
-        LocalResistance, MassChange, RotatingMass, TractionGain, TunnelDrag, WheelDiameter, Wind,
-    };
-    let has = |wanted: EffectKind| kind == wanted || rivals.contains(&wanted);
-    let pairs: [(EffectKind, EffectKind, &str); 9] = [
-        (
-            MassChange,
-            TractionGain,
-            "coast down a known gradient: a mass is felt there, a gain is not",
-        ),
-        (
-            MassChange,
-            RotatingMass,
-            "pass a steep gradient at other loads: the rotating mass does not feel it",
-        ),
-        (
-            RotatingMass,
-            TractionGain,
-            "compare accelerating with braking: a gain acts on traction only",
-        ),
-        (RotatingMass, WheelDiameter, "compare the odometer with balises over several kilometres"),
-        (TunnelDrag, Wind, "pass the portals in both directions and on another day"),
-        (TunnelDrag, LocalResistance, "pass the place at clearly different speeds"),
-        (
-            CurveResistance,
-            GradientShift,
-            "pass the curves in both directions: a gradient changes its sign",
-        ),
-        (
-            DraggingBrake,
-            BearingTemperature,
-            "read the brake-cylinder pressure while released, and let the train run on",
-        ),
-        (AmbientTemperature, BearingTemperature, "start warm on a cold day and cold on a warm one"),
-    ];
-    pairs
-        .iter()
-        .find(|(one, other, _)| has(*one) && has(*other))
-        .map_or("Drive again with other speeds, loads, directions and weather.".into(), |pair| {
-            format!("To separate them, {}.", pair.2)
-        })
-}
-
 fn describe(effect: &EffectAnswer) -> String {
     let mut parts = Vec::new();
     for (name, value) in &effect.parameters {
@@ -280,6 +193,7 @@ fn describe(effect: &EffectAnswer) -> String {
             parts.push(format!("{name} = {value:.4} ± {:.4}", 1.96 * deviation));
         }
     }
+    parts.extend(effect.parameters.values().find_map(mass_factors));
     if let Some(intervals) = &effect.place.intervals_m {
         let shown = intervals.iter().take(4).map(|[from, to]| format!("{from:.0}–{to:.0} m"));
         let more = if intervals.len() > 4 { " …" } else { "" };
@@ -298,4 +212,16 @@ fn describe(effect: &EffectAnswer) -> String {
         parts.push(format!("{} from {low:.1} to {high:.1}", covariate.name));
     }
     format!("{} ({})", effect.kind, parts.join(", "))
+}
+
+/// What a list of mass factors says; a section in both directions once.
+fn mass_factors(value: &ParameterValue) -> Option<String> {
+    let mut factors: Vec<f64> = match value {
+        ParameterValue::Sections(list) => list.iter().map(|section| section.mass_factor).collect(),
+        ParameterValue::Windows(list) => list.iter().map(|window| window.mass_factor).collect(),
+        _ => return None,
+    };
+    factors.dedup();
+    let listed: Vec<String> = factors.iter().map(|factor| format!("{factor:.3}")).collect();
+    Some(format!("mass_factor = {}", listed.join(", ")))
 }

@@ -28,8 +28,18 @@ pub struct MassChange;
 /// Where one factor holds.
 #[derive(Clone, Debug, PartialEq)]
 enum Part {
-    Section { from_m: f64, to_m: f64, direction: f64 },
-    Window { run: String, from_s: f64, to_s: f64, offset_s: f64 },
+    /// Without a direction: the same in both.
+    Section {
+        from_m: f64,
+        to_m: f64,
+        direction: Option<f64>,
+    },
+    Window {
+        run: String,
+        from_s: f64,
+        to_s: f64,
+        offset_s: f64,
+    },
 }
 
 #[derive(Debug)]
@@ -44,7 +54,7 @@ impl Part {
         match self {
             Part::Section { from_m, to_m, direction } => {
                 let sample = &run.samples()[index];
-                sample.direction == *direction
+                direction.is_none_or(|direction| sample.direction == direction)
                     && sample.position_m.is_some_and(|at| (*from_m..*to_m).contains(&at))
             }
             Part::Window { run: file, from_s, to_s, .. } => {
@@ -93,7 +103,11 @@ fn stations(scan: &Scan) -> Vec<f64> {
     let mut group: Vec<f64> = Vec::new();
     for place in places.into_iter().chain([f64::INFINITY]) {
         if group.last().is_some_and(|last| place - last > STATION_M) {
-            stations.push(group[group.len() / 2]);
+            let station = group[group.len() / 2];
+            // Beyond the last station nobody drives on.
+            if station - low > STATION_M && high - station > STATION_M {
+                stations.push(station);
+            }
             group.clear();
         }
         group.push(place);
@@ -114,6 +128,7 @@ impl Effect for MassChange {
             candidates.extend(grow(scan, &sections));
         }
         candidates.extend(grow(scan, &all_windows(scan)));
+        candidates.extend(everywhere(scan));
         Proposal::Candidates(candidates)
     }
 }
@@ -122,7 +137,7 @@ impl Effect for MassChange {
 fn all_sections(scan: &Scan) -> Vec<(Part, Tuple)> {
     let stations = stations(scan);
     let mut sections = Vec::new();
-    for direction in [1.0, -1.0] {
+    for direction in [Some(1.0), Some(-1.0)] {
         let elementary: Vec<Tuple> = stations
             .windows(2)
             .map(|pair| {
@@ -142,6 +157,20 @@ fn all_sections(scan: &Scan) -> Vec<(Part, Tuple)> {
         }
     }
     sections
+}
+
+/// One factor in all runs: nothing to choose but whether there are parts at all.
+fn everywhere(scan: &Scan) -> Option<Candidate> {
+    let [low, high] = span_m(scan)?;
+    let runs = &scan.problem.runs;
+    let first = runs.first()?.direction;
+    let direction = runs.iter().all(|run| run.direction == first).then_some(first);
+    let part = Part::Section { from_m: low - STATION_M, to_m: high + STATION_M, direction };
+    let (_, estimate) = scan.gain(&scan.tuple(shape));
+    let start = vec![(1.0 + estimate).clamp(0.7, 1.5)];
+    let choice_cost = 2.0 * std::f64::consts::LN_2;
+    let masses = Masses { parts: vec![part], parameters: vec![PARAMETER], choice_cost };
+    Some(Candidate::new(masses, start))
 }
 
 /// Every stretch between two stops of a run, with its tuple.
@@ -233,7 +262,10 @@ fn apart(one: &Part, other: &Part) -> bool {
         (
             Part::Section { from_m, to_m, direction },
             Part::Section { from_m: from, to_m: to, direction: towards },
-        ) => direction != towards || to_m <= from || to <= from_m,
+        ) => {
+            let opposite = direction.zip(*towards).is_some_and(|(one, other)| one != other);
+            opposite || to_m <= from || to <= from_m
+        }
         (
             Part::Window { run, from_s, to_s, .. },
             Part::Window { run: file, from_s: from, to_s: to, .. },
@@ -312,22 +344,30 @@ impl Hypothesis for Masses {
     }
 
     fn report(&self, context: &ReportContext) -> Reported {
-        let (mut sections, mut windows) = (Vec::new(), Vec::new());
+        let (mut sections, mut windows, mut deviations) = (Vec::new(), Vec::new(), Vec::new());
         for (k, part) in self.parts.iter().enumerate() {
             let mass_factor = context.parameters[k];
             match part {
-                Part::Section { from_m, to_m, direction } => sections.push(MassSection {
-                    from_m: *from_m,
-                    to_m: *to_m,
-                    direction: *direction as i8,
-                    mass_factor,
-                }),
-                Part::Window { run, from_s, to_s, offset_s } => windows.push(MassWindow {
-                    run: run.clone(),
-                    t_start_s: offset_s + from_s,
-                    t_end_s: offset_s + to_s,
-                    mass_factor,
-                }),
+                Part::Section { from_m, to_m, direction } => {
+                    for towards in direction.map_or(vec![1.0, -1.0], |direction| vec![direction]) {
+                        sections.push(MassSection {
+                            from_m: *from_m,
+                            to_m: *to_m,
+                            direction: towards as i8,
+                            mass_factor,
+                        });
+                        deviations.push(context.deviations[k]);
+                    }
+                }
+                Part::Window { run, from_s, to_s, offset_s } => {
+                    windows.push(MassWindow {
+                        run: run.clone(),
+                        t_start_s: offset_s + from_s,
+                        t_end_s: offset_s + to_s,
+                        mass_factor,
+                    });
+                    deviations.push(context.deviations[k]);
+                }
             }
         }
         let mut reported = Reported::default();
@@ -338,8 +378,7 @@ impl Hypothesis for Masses {
             reported.values.insert("windows".into(), ParameterValue::Windows(windows));
             "windows"
         };
-        let listed = ParameterValue::List(context.deviations.to_vec());
-        reported.deviations.insert(name.into(), listed);
+        reported.deviations.insert(name.into(), ParameterValue::List(deviations));
         reported
     }
 }

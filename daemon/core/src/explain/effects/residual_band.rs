@@ -6,6 +6,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
 use crate::explain::answer::{CovariateRange, Place};
 use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::localise::MAP_ERROR_PERMILLE;
 use crate::explain::scan::{Scan, Tuple};
 use crate::force::ResolvedSample;
 
@@ -185,6 +186,11 @@ impl Hypothesis for Band {
 
     fn choice_cost(&self) -> f64 {
         self.choice_cost
+    }
+
+    fn shared_error(&self) -> f64 {
+        // A band of chainage is an error of the map, which every passage has in full.
+        if self.covariate == Covariate::Chainage { MAP_ERROR_PERMILLE } else { 0.0 }
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {

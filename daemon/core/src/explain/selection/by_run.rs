@@ -59,8 +59,8 @@ fn few_runs_factor(runs: usize) -> f64 {
 /// Standard deviations of all parameters, and their covariance.
 ///
 /// The likelihood's covariance is enlarged where the scores scatter more from run to run than it
-/// says (cluster-robust). With few runs a parameter's own scatter is itself uncertain, so that
-/// half of the enlargement is that of all parameters together.
+/// says (cluster-robust). With few runs a parameter's own scatter is itself uncertain: where that
+/// of all parameters together is greater, half of the enlargement is theirs.
 pub fn deviations(fit: &Fit) -> (Vec<f64>, DMatrix<f64>) {
     let count = fit.theta.len();
     let Some(factor) = fit.factor() else {
@@ -75,7 +75,7 @@ pub fn deviations(fit: &Fit) -> (Vec<f64>, DMatrix<f64>) {
     let robust = &covariance * scatter * &covariance * (runs / (runs - 1.0).max(1.0));
     let own: Vec<f64> = (0..count).map(|i| robust[(i, i)] / covariance[(i, i)]).collect();
     let pooled = own.iter().sum::<f64>() / count as f64;
-    let enlarged: Vec<f64> = own.iter().map(|own| (0.5 * (own + pooled)).max(1.0)).collect();
+    let enlarged: Vec<f64> = own.iter().map(|own| own.max(0.5 * (own + pooled)).max(1.0)).collect();
     let few = few_runs_factor(fit.runs.len());
     let mut deviations: Vec<f64> =
         (0..count).map(|i| few * (covariance[(i, i)] * enlarged[i]).sqrt()).collect();

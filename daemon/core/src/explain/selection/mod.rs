@@ -1,5 +1,6 @@
 //! The search for effects.
 
+mod acceptance;
 mod by_run;
 mod search;
 mod significance;
@@ -7,6 +8,6 @@ mod significance;
 pub use by_run::{Held, deviations, leave_one_run_out};
 pub use search::{Outcome, Search, Trial};
 pub use significance::{
-    AMBIGUOUS, EVIDENCE_MIN, NULL_STRENGTH, NullStrength, STRENGTH_MIN, discounted, p_value,
-    penalty,
+    AMBIGUOUS, EVIDENCE_MIN, NULL_STRENGTH, NullStrength, STRENGTH_MIN, discounted, model_penalty,
+    p_value, penalty,
 };

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::by_run::leave_one_run_out;
+use super::acceptance::REDUCTION_MIN;
 use super::significance::{
     AMBIGUOUS, EVIDENCE_MIN, STRENGTH_MIN, discounted, model_penalty, penalty,
 };
@@ -20,14 +20,6 @@ use crate::train::TrainModel;
 const EFFECTS_MAX: usize = 4;
 /// Kinds that get a noise of their own and a second localisation in each round.
 const FINALISTS: usize = 5;
-/// The first effect must take away this share of the open-loop error of the fit runs.
-const REDUCTION_MIN: f64 = 0.12;
-/// What is beyond any doubt need take away only this share.
-const SMALL_REDUCTION_MIN: f64 = 0.06;
-/// Strength beyond any doubt.
-const CERTAIN_STRENGTH: f64 = 30.0;
-/// A further one, or one outside the library, this share of what the others leave.
-const FURTHER_REDUCTION_MIN: f64 = 0.15;
 /// Less observations than this tell nothing.
 pub const OBSERVATIONS_MIN: usize = 80;
 
@@ -38,9 +30,9 @@ pub struct Trial {
     pub kind: EffectKind,
     /// The fitted model; the candidate is its last effect.
     pub fit: Fit,
-    /// Decrease of -2 log likelihood by it.
-    pub decrease: f64,
-    /// The same less the penalty.
+    /// Decrease of -2 log likelihood by it, less its price: what kinds are compared by.
+    pub advantage: f64,
+    /// The same after the discount for errors that all runs share: what must be more than chance.
     pub evidence: f64,
     /// Share of the open-loop error of the fit runs that it takes away; 0 where the evidence does
     /// not ask for it.
@@ -113,14 +105,19 @@ impl Search<'_> {
     }
 
     /// The trial to accept: the one with the strongest evidence, or one with about the same that
-    /// takes away more of the open-loop error.
+    /// takes away more of the open-loop error. What is outside the library must explain more than
+    /// anything in it.
     fn best<'t>(&self, base: &Fit, trials: &'t [Trial]) -> Option<&'t Trial> {
-        let mut accepted = trials.iter().filter(|trial| self.is_accepted(base, trial));
-        let strongest = accepted.next()?;
+        let accepted: Vec<&Trial> =
+            trials.iter().filter(|trial| self.refusal(base, trial).is_none()).collect();
+        let strongest = accepted.first()?;
         accepted
-            .take_while(|trial| trial.evidence > strongest.evidence - AMBIGUOUS)
-            .chain([strongest])
+            .iter()
+            .take_while(|trial| trial.advantage > strongest.advantage - AMBIGUOUS)
+            .filter(|trial| trial.kind != EffectKind::Unknown)
             .max_by(|one, other| one.reduction.total_cmp(&other.reduction))
+            .or(Some(strongest))
+            .copied()
     }
 
     /// Tries every kind that the model does not have yet; the strongest first.
@@ -142,18 +139,18 @@ impl Search<'_> {
                     let best = candidates
                         .into_iter()
                         .map(|candidate| self.attempt(base, base, candidate, false))
-                        .max_by(|one, other| one.evidence.total_cmp(&other.evidence));
+                        .max_by(|one, other| one.advantage.total_cmp(&other.advantage));
                     trials.extend(best.map(|trial| (trial, effect)));
                 }
             }
         }
-        let by_evidence = |one: &Trial, other: &Trial| other.evidence.total_cmp(&one.evidence);
-        trials.sort_by(|one, other| by_evidence(&one.0, &other.0));
+        let by_advantage = |one: &Trial, other: &Trial| other.advantage.total_cmp(&one.advantage);
+        trials.sort_by(|one, other| by_advantage(&one.0, &other.0));
         let mut finished: Vec<Trial> = trials
             .into_iter()
             .enumerate()
             .map(|(rank, (trial, effect))| {
-                let is_finalist = rank < FINALISTS && trial.evidence > -20.0;
+                let is_finalist = rank < FINALISTS && trial.advantage > -20.0;
                 let share = base.model.effects.len() as f64
                     + (rank.min(FINALISTS) + 2) as f64 / (FINALISTS + 2) as f64;
                 (self.progress)((0.1 + 0.25 * share).min(0.85), trial.kind.name());
@@ -163,7 +160,7 @@ impl Search<'_> {
         for trial in finished.iter_mut().filter(|trial| trial.evidence > EVIDENCE_MIN) {
             trial.reduction = self.reduction(base, &trial.fit);
         }
-        finished.sort_by(by_evidence);
+        finished.sort_by(by_advantage);
         finished
     }
 
@@ -186,8 +183,9 @@ impl Search<'_> {
     }
 
     fn trial(base: &Fit, fit: Fit, kind: EffectKind, price: f64) -> Trial {
-        let decrease = discounted(&fit, fit.model.effects.len() - 1, base.cost - fit.cost);
-        Trial { kind, fit, decrease, evidence: decrease - price, reduction: 0.0 }
+        let decrease = base.cost - fit.cost;
+        let evidence = discounted(&fit, fit.model.effects.len() - 1, decrease) - price;
+        Trial { kind, fit, advantage: decrease - price, evidence, reduction: 0.0 }
     }
 
     /// Gives a trial the noise that remains under it and lets its kind look again for places and
@@ -199,7 +197,7 @@ impl Search<'_> {
                 trial.fit.theta.clone(),
                 trial.fit.noise,
             );
-            Self::trial(base, fit, trial.kind, trial.decrease - trial.evidence)
+            Self::trial(base, fit, trial.kind, base.cost - trial.fit.cost - trial.advantage)
         };
         let mut best = refit(&trial);
         for attempt in 0..3 {
@@ -209,7 +207,7 @@ impl Search<'_> {
             let mut is_better = false;
             for &noise in looks {
                 let Some(again) = self.look_again(base, noise, effect) else { continue };
-                if again.evidence > best.evidence + 1.0 {
+                if again.advantage > best.advantage + 1.0 {
                     best = again;
                     is_better = true;
                 }
@@ -229,55 +227,7 @@ impl Search<'_> {
         candidates
             .into_iter()
             .map(|candidate| self.attempt(base, &onto, candidate, true))
-            .max_by(|one, other| one.evidence.total_cmp(&other.evidence))
-    }
-
-    /// Whether the last effect of a trial is more than chance and large enough to matter.
-    fn is_accepted(&self, base: &Fit, trial: &Trial) -> bool {
-        trial.strength() > STRENGTH_MIN
-            && trial.reduction > Self::reduction_min(trial)
-            && self.is_eligible(base, trial)
-    }
-
-    /// Whether a trial passes what does not depend on its strength.
-    fn is_eligible(&self, base: &Fit, trial: &Trial) -> bool {
-        let last = trial.fit.model.effects.len() - 1;
-        let parameters = trial.fit.effect_parameters(last);
-        trial.evidence > EVIDENCE_MIN
-            && trial.fit.model.effects[last].is_material(parameters, trial.fit.theta[2])
-            && self.holds_by_run(base, trial)
-    }
-
-    /// The greatest strength of all eligible trials of the first round: what is compared with its
-    /// distribution where nothing acts.
-    pub fn greatest_strength(&self, outcome: &Outcome) -> f64 {
-        let first = outcome.rounds.first().into_iter().flatten();
-        first
-            .filter(|trial| self.is_eligible(&outcome.base, trial))
-            .map(Trial::strength)
-            .fold(0.0, f64::max)
-    }
-
-    /// What the last effect of a trial must take away.
-    fn reduction_min(trial: &Trial) -> f64 {
-        if trial.fit.model.effects.len() > 1 || trial.kind == EffectKind::Unknown {
-            FURTHER_REDUCTION_MIN
-        } else if trial.strength() > CERTAIN_STRENGTH {
-            SMALL_REDUCTION_MIN
-        } else {
-            REDUCTION_MIN
-        }
-    }
-
-    /// For what is not chosen run by run, the runs that took no part in the fit must gain too.
-    fn holds_by_run(&self, base: &Fit, trial: &Trial) -> bool {
-        let sharper = self.problem.fit(&base.model, base.theta.clone(), trial.fit.noise);
-        let held = leave_one_run_out(&sharper, &trial.fit);
-        let own = trial.fit.model.effects[trial.fit.model.effects.len() - 1].place();
-        if own.windows.is_some() || own.runs.is_some() || held.runs < 3 {
-            return true;
-        }
-        held.gain > 0.5 * EVIDENCE_MIN && 2 * held.better > held.runs
+            .max_by(|one, other| one.advantage.total_cmp(&other.advantage))
     }
 
     /// Share of the open-loop error of the fit runs that the larger model takes away, over whole

@@ -1,7 +1,6 @@
 //! When an effect is more than chance.
 
 use crate::explain::evidence::{Fit, SharedHypothesis};
-use nalgebra::DVector;
 
 /// Evidence that an effect must have: decrease of -2 log likelihood beyond the penalty.
 pub const EVIDENCE_MIN: f64 = 9.0;
@@ -27,16 +26,13 @@ pub fn penalty(hypothesis: &SharedHypothesis, observations: usize) -> f64 {
 /// Decrease of -2 log likelihood by an effect of a fitted model, less what errors that all runs
 /// share would bring: (x/s)² becomes x²/(s² + e²).
 pub fn discounted(fit: &Fit, index: usize, decrease: f64) -> f64 {
-    let shared = fit.model.effects[index].shared_error();
-    if shared == 0.0 {
+    let effect = &fit.model.effects[index];
+    let shared = effect.shared_error();
+    if shared == 0.0 || decrease <= 0.0 {
         return decrease;
     }
-    let at = fit.model.ranges()[index].start;
-    let Some(factor) = fit.factor() else { return 0.0 };
-    let mut unit = DVector::zeros(fit.theta.len());
-    unit[at] = 1.0;
-    let variance = factor.solve(&unit)[at];
-    decrease * variance / (variance + shared * shared)
+    let size = fit.effect_parameters(index)[0] - effect.none();
+    decrease / (1.0 + decrease * (shared / size).powi(2))
 }
 
 /// The price of all effects of a model.

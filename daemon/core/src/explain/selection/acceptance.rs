@@ -1,0 +1,116 @@
+//! Whether what was tried is more than chance, large enough to matter, and seen in the runs.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::by_run::leave_one_run_out;
+use super::search::{Outcome, Search, Trial};
+use super::significance::{EVIDENCE_MIN, STRENGTH_MIN};
+use crate::explain::evidence::Fit;
+
+/// The first effect must take away this share of the open-loop error of the fit runs.
+pub const REDUCTION_MIN: f64 = 0.12;
+/// What is beyond any doubt need take away only this share.
+const SMALL_REDUCTION_MIN: f64 = 0.06;
+/// Strength beyond any doubt.
+const CERTAIN_STRENGTH: f64 = 30.0;
+/// A further one, or one outside the library, this share of what the others leave.
+const FURTHER_REDUCTION_MIN: f64 = 0.15;
+
+/// Why an effect is not accepted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Refusal {
+    /// Its evidence is negative.
+    Chance,
+    /// Its evidence is less than a search over the whole library brings by itself.
+    Insignificant,
+    /// It is smaller than what declared figures are good for.
+    Immaterial,
+    /// It takes away this share of the open-loop error, which is too little.
+    LittleOfTheError(f64),
+    /// Evidence and share of the error are too small together.
+    Weak,
+    /// Runs left out of the fit do not gain from it.
+    NotInEveryRun,
+}
+
+impl std::fmt::Display for Refusal {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Refusal::Chance => "explains no more than chance",
+            Refusal::Insignificant => "not significant for a search over the whole library",
+            Refusal::Immaterial => "smaller than what declared figures are good for",
+            Refusal::LittleOfTheError(share) if *share < 0.005 => {
+                return f.write_str("takes nothing from the error");
+            }
+            Refusal::LittleOfTheError(share) => {
+                return write!(f, "takes only {:.0} % from the error", 100.0 * share);
+            }
+            Refusal::Weak => "takes too little from the error for its evidence",
+            Refusal::NotInEveryRun => "runs left out of the fit do not gain from it",
+        })
+    }
+}
+
+impl Search<'_> {
+    /// Why the last effect of a trial is not accepted; `None` when it is.
+    pub fn refusal(&self, base: &Fit, trial: &Trial) -> Option<Refusal> {
+        if trial.evidence <= 0.0 {
+            Some(Refusal::Chance)
+        } else if trial.evidence <= EVIDENCE_MIN {
+            Some(Refusal::Insignificant)
+        } else if !is_material(trial) {
+            Some(Refusal::Immaterial)
+        } else if trial.reduction <= reduction_min(trial) {
+            Some(Refusal::LittleOfTheError(trial.reduction))
+        } else if trial.strength() <= STRENGTH_MIN {
+            Some(Refusal::Weak)
+        } else if !self.holds_by_run(base, trial) {
+            Some(Refusal::NotInEveryRun)
+        } else {
+            None
+        }
+    }
+
+    /// The greatest strength of the trials of the first round that only their strength may refuse:
+    /// what is compared with its distribution where nothing acts.
+    pub fn greatest_strength(&self, outcome: &Outcome) -> f64 {
+        let first = outcome.rounds.first().into_iter().flatten();
+        first
+            .filter(|trial| {
+                trial.evidence > EVIDENCE_MIN
+                    && is_material(trial)
+                    && self.holds_by_run(&outcome.base, trial)
+            })
+            .map(Trial::strength)
+            .fold(0.0, f64::max)
+    }
+
+    /// For what is not chosen run by run, the runs that took no part in the fit must gain too.
+    fn holds_by_run(&self, base: &Fit, trial: &Trial) -> bool {
+        let sharper = self.problem.fit(&base.model, base.theta.clone(), trial.fit.noise);
+        let held = leave_one_run_out(&sharper, &trial.fit);
+        let own = trial.fit.model.effects[trial.fit.model.effects.len() - 1].place();
+        if own.windows.is_some() || own.runs.is_some() || held.runs < 3 {
+            return true;
+        }
+        held.gain > 0.5 * EVIDENCE_MIN && 2 * held.better > held.runs
+    }
+}
+
+/// Whether the last effect of a trial is larger than what declared figures are good for.
+fn is_material(trial: &Trial) -> bool {
+    let last = trial.fit.model.effects.len() - 1;
+    let parameters = trial.fit.effect_parameters(last);
+    trial.fit.model.effects[last].is_material(parameters, trial.fit.theta[2])
+}
+
+/// What the last effect of a trial must take away.
+fn reduction_min(trial: &Trial) -> f64 {
+    if trial.fit.model.effects.len() > 1 || trial.kind == EffectKind::Unknown {
+        FURTHER_REDUCTION_MIN
+    } else if trial.strength() > CERTAIN_STRENGTH {
+        SMALL_REDUCTION_MIN
+    } else {
+        REDUCTION_MIN
+    }
+}
