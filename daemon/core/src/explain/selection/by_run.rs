@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::explain::evidence::Fit;
+use crate::explain::evidence::{Fit, RunNormal};
 
 /// What an effect does for runs that did not take part in its fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,20 +16,27 @@ pub struct Held {
     pub runs: usize,
 }
 
+/// By how much the parameters move when each run is left out, to second order; `None` for a run
+/// without which they are not determined.
+fn moves_without_each_run(fit: &Fit) -> Vec<Option<DVector<f64>>> {
+    let information = fit.information();
+    let moved = |run: &RunNormal| {
+        let rest = Cholesky::new(&information - &run.information)?;
+        Some(-rest.solve(&run.score))
+    };
+    fit.runs.iter().map(moved).collect()
+}
+
 /// Cost of each run under the parameters fitted without it, to second order.
 fn held_out_costs(fit: &Fit) -> Vec<f64> {
-    let information = fit.information();
     fit.runs
         .iter()
-        .map(|run| {
-            let rest = &information - &run.information;
-            match Cholesky::new(rest) {
-                Some(factor) => {
-                    let away: DVector<f64> = -factor.solve(&run.score);
-                    run.cost - 2.0 * run.score.dot(&away) + away.dot(&(&run.information * &away))
-                }
-                None => run.cost,
+        .zip(moves_without_each_run(fit))
+        .map(|(run, moved)| match moved {
+            Some(away) => {
+                run.cost - 2.0 * run.score.dot(&away) + away.dot(&(&run.information * &away))
             }
+            None => run.cost,
         })
         .collect()
 }
@@ -58,8 +65,8 @@ fn few_runs_factor(runs: usize) -> f64 {
 
 /// Standard deviations of all parameters, and their covariance.
 ///
-/// The likelihood's covariance is enlarged where the scores scatter more from run to run than it
-/// says (cluster-robust). With few runs a parameter's own scatter is itself uncertain: where that
+/// The likelihood's covariance is enlarged where the parameters move more when single runs are
+/// left out than it says (jackknife over runs). With few runs a parameter's own scatter is itself uncertain: where that
 /// of all parameters together is greater, half of the enlargement is theirs.
 pub fn deviations(fit: &Fit) -> (Vec<f64>, DMatrix<f64>) {
     let count = fit.theta.len();
@@ -68,12 +75,12 @@ pub fn deviations(fit: &Fit) -> (Vec<f64>, DMatrix<f64>) {
     };
     let covariance = factor.inverse();
     let runs = fit.runs.len() as f64;
-    let mut scatter = DMatrix::zeros(count, count);
-    for run in &fit.runs {
-        scatter += &run.score * run.score.transpose();
+    let mut scatter = DVector::zeros(count);
+    for moved in moves_without_each_run(fit).into_iter().flatten() {
+        scatter += moved.component_mul(&moved);
     }
-    let robust = &covariance * scatter * &covariance * (runs / (runs - 1.0).max(1.0));
-    let own: Vec<f64> = (0..count).map(|i| robust[(i, i)] / covariance[(i, i)]).collect();
+    let left = (runs - 1.0) / runs;
+    let own: Vec<f64> = (0..count).map(|i| left * scatter[i] / covariance[(i, i)]).collect();
     let pooled = own.iter().sum::<f64>() / count as f64;
     let enlarged: Vec<f64> = own.iter().map(|own| own.max(0.5 * (own + pooled)).max(1.0)).collect();
     let few = few_runs_factor(fit.runs.len());
