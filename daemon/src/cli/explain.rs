@@ -162,12 +162,13 @@ fn print_answer(explanation: &Explanation) {
     let answer = &explanation.answer;
     println!("{}", answer.statement);
     if let Some(experiment) = &answer.experiment {
-        println!("{experiment}");
+        println!("To settle it: {experiment}");
     }
-    let base = &answer.base;
+    let (base, std) = (&answer.base, &answer.base.std);
+    let [a, b, c] = [std.a, std.b, std.c].map(|deviation| 1.96 * deviation);
     println!(
-        "a = {:.3} ± {:.3} N/kN, b = {:.4} ± {:.4}, c = {:.6} ± {:.6} (v in m/s)",
-        base.a, base.std.a, base.b, base.std.b, base.c, base.std.c
+        "a = {:.3} ± {a:.3} N/kN, b = {:.4} ± {b:.4}, c = {:.6} ± {c:.6} (95 %, v in m/s)",
+        base.a, base.b, base.c
     );
     if let (Some(before), Some(after)) = (answer.rmse_before, answer.rmse_after) {
         println!("holdout runs, open loop: {before:.3} m/s before, {after:.3} m/s after");

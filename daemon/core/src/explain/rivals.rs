@@ -53,41 +53,54 @@ pub fn separating_run(kind: EffectKind, rivals: &[EffectKind]) -> String {
         LocalResistance, MassChange, RotatingMass, TractionGain, TunnelDrag, WheelDiameter, Wind,
     };
     let has = |wanted: EffectKind| kind == wanted || rivals.contains(&wanted);
-    let pairs: [(EffectKind, EffectKind, &str); 9] = [
+    let pairs: [(EffectKind, EffectKind, &str); 11] = [
         (
             MassChange,
             TractionGain,
-            "coast down a known gradient: a mass is felt there, a gain is not",
+            "Coast down a known gradient: a mass is felt there, a gain is not.",
         ),
         (
             MassChange,
             RotatingMass,
-            "pass a steep gradient at other loads: the rotating mass does not feel it",
+            "Pass a steep gradient at other loads: the rotating mass does not feel it.",
         ),
         (
             RotatingMass,
             TractionGain,
-            "compare accelerating with braking: a gain acts on traction only",
+            "Compare accelerating with braking: a gain acts on traction only.",
         ),
-        (RotatingMass, WheelDiameter, "compare the odometer with balises over several kilometres"),
-        (TunnelDrag, Wind, "pass the portals in both directions and on another day"),
-        (TunnelDrag, LocalResistance, "pass the place at clearly different speeds"),
+        (RotatingMass, WheelDiameter, "Compare the odometer with balises over several kilometres."),
+        (TunnelDrag, Wind, "Pass the portals in both directions and on another day."),
+        (TunnelDrag, LocalResistance, "Pass the place at clearly different speeds."),
         (
             CurveResistance,
             GradientShift,
-            "pass the curves in both directions: a gradient changes its sign",
+            "Pass the curves in both directions: a gradient changes its sign.",
         ),
         (
             DraggingBrake,
             BearingTemperature,
-            "read the brake-cylinder pressure while released, and let the train run on",
+            "Read the brake-cylinder pressure while released, and let the train run on.",
         ),
-        (AmbientTemperature, BearingTemperature, "start warm on a cold day and cold on a warm one"),
+        (
+            DraggingBrake,
+            LocalResistance,
+            "Pass the place in further runs: a place stays, a brake moves with its train.",
+        ),
+        (
+            DraggingBrake,
+            AmbientTemperature,
+            "Read the brake-cylinder pressure while released, and record runs on a mild day.",
+        ),
+        (
+            AmbientTemperature,
+            BearingTemperature,
+            "Start warm on a cold day and cold on a warm one.",
+        ),
     ];
     pairs
         .iter()
         .find(|(one, other, _)| has(*one) && has(*other))
-        .map_or("Drive again with other speeds, loads, directions and weather.".into(), |pair| {
-            format!("To separate them, {}.", pair.2)
-        })
+        .map_or("Drive again with other speeds, loads, directions and weather.", |pair| pair.2)
+        .into()
 }

@@ -190,7 +190,11 @@ fn describe(effect: &EffectAnswer) -> String {
         if let (ParameterValue::Number(value), Some(ParameterValue::Number(deviation))) =
             (value, effect.std.get(name))
         {
-            parts.push(format!("{name} = {value:.4} ± {:.4}", 1.96 * deviation));
+            parts.push(match 1.96 * deviation {
+                // A reference that was chosen and not estimated.
+                0.0 => format!("{name} = {value}"),
+                half_width => format!("{name} = {value:.4} ± {half_width:.4}"),
+            });
         }
     }
     parts.extend(effect.parameters.values().find_map(mass_factors));
