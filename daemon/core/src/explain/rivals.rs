@@ -10,8 +10,9 @@ const REDUCTION_SHARE: f64 = 0.7;
 
 /// Kinds that could stand in the place of the effect accepted last.
 ///
-/// A rival explains the data as well, takes away about as much of the open-loop error, and has nothing left to explain once the effect is in:
-/// what keeps its evidence acts beside the effect and not in its place.
+/// A rival explains the data as well, takes away about as much of the open-loop error, and has
+/// nothing left to explain once the effect is in: what keeps its evidence acts beside the effect
+/// and not in its place.
 pub fn rivals(outcome: &Outcome) -> Vec<EffectKind> {
     let Some(accepted) = accepted_round(outcome) else { return Vec::new() };
     let Some(best) = accepted.iter().find(|trial| is_in(&outcome.fit, trial.kind)) else {

@@ -66,8 +66,8 @@ fn few_runs_factor(runs: usize) -> f64 {
 /// Standard deviations of all parameters, and their covariance.
 ///
 /// The likelihood's covariance is enlarged where the parameters move more when single runs are
-/// left out than it says (jackknife over runs). With few runs a parameter's own scatter is itself uncertain: where that
-/// of all parameters together is greater, half of the enlargement is theirs.
+/// left out than it says (jackknife over runs). With few runs a parameter's own scatter is itself
+/// uncertain: where that of all parameters together is greater, half of the enlargement is theirs.
 pub fn deviations(fit: &Fit) -> (Vec<f64>, DMatrix<f64>) {
     let count = fit.theta.len();
     let Some(factor) = fit.factor() else {
