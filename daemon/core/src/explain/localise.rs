@@ -1,8 +1,7 @@
 //! Where along the line, and in which runs, a force of a given shape acts.
 
-use super::evidence::RunData;
+use super::evidence::{Bin, RunData};
 use super::scan::{Scan, Tuple};
-use crate::force::ResolvedSample;
 
 /// Shortest interval in m that is looked for.
 const SHORTEST_M: f64 = 150.0;
@@ -32,10 +31,11 @@ pub enum Inside {
 }
 
 impl Inside {
-    /// The share of the train inside any of some disjoint intervals, 0 to 1.
+    /// The share of the train inside any of some disjoint intervals, 0 to 1, by the chainage of
+    /// its centre; 0 where that is not known.
     #[inline]
-    pub fn share(self, sample: &ResolvedSample, intervals_m: &[[f64; 2]]) -> f64 {
-        let Some(centre_m) = sample.position_m else { return 0.0 };
+    pub fn share(self, centre_m: Option<f64>, intervals_m: &[[f64; 2]]) -> f64 {
+        let Some(centre_m) = centre_m else { return 0.0 };
         match self {
             Inside::Centre => {
                 let inside = intervals_m.iter().any(|&[from, to]| (from..=to).contains(&centre_m));
@@ -79,15 +79,40 @@ struct Cell {
 /// A shape: acceleration in m/s² per unit at a sample of a run, where the force acts in full.
 pub type Shape<'s> = &'s dyn Fn(&RunData, usize) -> f64;
 
-fn tuples(scan: &Scan, shape: Shape, inside: Inside, interval_m: [f64; 2]) -> Vec<Tuple> {
-    (0..scan.problem.runs.len())
-        .map(|index| {
-            scan.run_tuple(index, |run, i| match inside.share(&run.samples()[i], &[interval_m]) {
-                0.0 => 0.0,
-                share => share * shape(run, i),
-            })
-        })
-        .collect()
+/// A shape at the bins of all fit runs, with the places of the bins.
+struct Places<'s, 'a> {
+    scan: &'s Scan<'a>,
+    inside: Inside,
+    positive: bool,
+    /// By run and bin: chainage in m and acceleration in m/s² per unit.
+    bins: Vec<Vec<(Option<f64>, f64)>>,
+}
+
+impl<'s, 'a> Places<'s, 'a> {
+    fn new(scan: &'s Scan<'a>, shape: Shape, inside: Inside, positive: bool) -> Self {
+        let at_bins = |run: &RunData| {
+            let middles = run.bins.iter().map(Bin::middle);
+            middles.map(|i| (run.samples()[i].position_m, shape(run, i))).collect()
+        };
+        let bins = scan.problem.runs.iter().map(at_bins).collect();
+        Places { scan, inside, positive, bins }
+    }
+
+    fn run_tuple(&self, index: usize, intervals_m: &[[f64; 2]]) -> Tuple {
+        let value = |&(position_m, value): &(Option<f64>, f64)| match self
+            .inside
+            .share(position_m, intervals_m)
+        {
+            0.0 => 0.0,
+            share => share * value,
+        };
+        let shape: Vec<f64> = self.bins[index].iter().map(value).collect();
+        self.scan.shape_tuple(index, &shape)
+    }
+
+    fn tuples(&self, interval_m: [f64; 2]) -> Vec<Tuple> {
+        (0..self.bins.len()).map(|index| self.run_tuple(index, &[interval_m])).collect()
+    }
 }
 
 /// The chainage in m over which the fit runs move.
@@ -104,7 +129,7 @@ pub fn span_m(scan: &Scan) -> Option<[f64; 2]> {
     span.filter(|[low, high]| high - low > 4.0 * SHORTEST_M)
 }
 
-fn cells(scan: &Scan, shape: Shape, inside: Inside, [low, high]: [f64; 2]) -> Vec<Cell> {
+fn cells(places: &Places, [low, high]: [f64; 2]) -> Vec<Cell> {
     let shortest_m = SHORTEST_M.max((high - low) / 250.0);
     let mut cells = Vec::new();
     let mut length_m = shortest_m;
@@ -113,7 +138,7 @@ fn cells(scan: &Scan, shape: Shape, inside: Inside, [low, high]: [f64; 2]) -> Ve
         for k in 0..count {
             let from_m = low + 0.5 * length_m * k as f64;
             let interval_m = [from_m, from_m + length_m];
-            cells.push(Cell { interval_m, runs: tuples(scan, shape, inside, interval_m) });
+            cells.push(Cell { interval_m, runs: places.tuples(interval_m) });
         }
         length_m *= 1.6;
     }
@@ -187,7 +212,8 @@ pub fn subset_cost(count: usize, taken: usize) -> f64 {
 /// choice among all of them does by chance.
 pub fn find(scan: &Scan, shape: Shape, inside: Inside, positive: bool) -> Option<Found> {
     let span = span_m(scan)?;
-    let cells = cells(scan, shape, inside, span);
+    let places = Places::new(scan, shape, inside, positive);
+    let cells = cells(&places, span);
     let interval_cost = 2.0 * (cells.len().max(2) as f64).ln();
     let best = cells
         .iter()
@@ -205,125 +231,128 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside, positive: bool) -> Option
         choice_cost: interval_cost + subset,
         map_error: 0.0,
     };
-    polish(scan, shape, inside, &mut found, positive);
+    places.polish(&mut found);
     while found.intervals_m.len() < INTERVALS_MAX {
-        let Some(added) = with_another(scan, &cells, shape, inside, &found, positive) else {
-            break;
-        };
+        let Some(added) = places.with_another(&cells, &found) else { break };
         if added.gain - found.gain < (interval_cost + 6.0).max(FURTHER_SHARE * found.gain) {
             break;
         }
         found = Found { choice_cost: found.choice_cost + interval_cost, ..added };
     }
     found.intervals_m.sort_by(|one, other| one[0].total_cmp(&other[0]));
-    found.map_error = map_error(scan, shape, inside, &found);
+    found.map_error = places.map_error(&found);
     Some(found)
 }
 
-/// What an error of the gradient map makes of the factor. It slows the train in one direction and
-/// helps it in the other, so that passes in both directions cancel it; a set of runs in one
-/// direction shows it in full, the same in every run.
-fn map_error(scan: &Scan, shape: Shape, inside: Inside, found: &Found) -> f64 {
-    let (mut square, mut leaning, mut resistance, mut full) = (0.0, 0.0, 0.0, 0.0);
-    for (index, run) in scan.problem.runs.iter().enumerate() {
-        if found.runs.as_ref().is_some_and(|runs| !runs.contains(&index)) {
-            continue;
-        }
-        let share = |i: usize| inside.share(&run.samples()[i], &found.intervals_m);
-        let tuple = scan.run_tuple(index, |run, i| share(i) * shape(run, i));
-        square += tuple.square;
-        leaning += run.direction * tuple.square;
-        for i in run.bins.iter().map(super::evidence::Bin::middle) {
-            resistance += share(i) * scan.per_unit_resistance_mps2(&run.samples()[i]);
-            full += (share(i) * shape(run, i)).abs();
-        }
-    }
-    if square <= 0.0 || full <= 0.0 {
-        return 0.0;
-    }
-    let places = found.intervals_m.len().max(1) as f64;
-    MAP_ERROR_PERMILLE * (leaning / square).abs() / places.sqrt() * resistance / full
+/// True when an interval overlaps none of some others.
+fn apart(one: [f64; 2], others: &[[f64; 2]]) -> bool {
+    others.iter().all(|other| one[1] <= other[0] || one[0] >= other[1])
 }
 
-fn summed(scan: &Scan, tuples: &[Tuple], runs: &Option<Vec<usize>>) -> Tuple {
-    let mut sum = Tuple::zero(scan.fit.theta.len());
-    for (index, tuple) in tuples.iter().enumerate() {
-        if runs.as_ref().is_none_or(|runs| runs.contains(&index)) {
-            sum.add(tuple);
+impl Places<'_, '_> {
+    /// What an error of the gradient map makes of the factor. It slows the train in one direction
+    /// and helps it in the other, so that passes in both directions cancel it; a set of runs in
+    /// one direction shows it in full, the same in every run.
+    fn map_error(&self, found: &Found) -> f64 {
+        let (mut square, mut leaning, mut resistance, mut full) = (0.0, 0.0, 0.0, 0.0);
+        for (index, run) in self.scan.problem.runs.iter().enumerate() {
+            if found.runs.as_ref().is_some_and(|runs| !runs.contains(&index)) {
+                continue;
+            }
+            let tuple = self.run_tuple(index, &found.intervals_m);
+            square += tuple.square;
+            leaning += run.direction * tuple.square;
+            for (bin, &(position_m, value)) in run.bins.iter().zip(&self.bins[index]) {
+                let share = self.inside.share(position_m, &found.intervals_m);
+                let sample = &run.samples()[bin.middle()];
+                resistance += share * self.scan.per_unit_resistance_mps2(sample);
+                full += (share * value).abs();
+            }
         }
+        if square <= 0.0 || full <= 0.0 {
+            return 0.0;
+        }
+        let places = found.intervals_m.len().max(1) as f64;
+        MAP_ERROR_PERMILLE * (leaning / square).abs() / places.sqrt() * resistance / full
     }
-    sum
-}
 
-fn with_another(
-    scan: &Scan,
-    cells: &[Cell],
-    shape: Shape,
-    inside: Inside,
-    found: &Found,
-    positive: bool,
-) -> Option<Found> {
-    let mut base = Tuple::zero(scan.fit.theta.len());
-    for &interval in &found.intervals_m {
-        base.add(&summed(scan, &tuples(scan, shape, inside, interval), &found.runs));
+    /// The sum over the chosen runs.
+    fn summed(&self, tuples: &[Tuple], runs: &Option<Vec<usize>>) -> Tuple {
+        let mut sum = Tuple::zero(self.scan.fit.theta.len());
+        for (index, tuple) in tuples.iter().enumerate() {
+            if runs.as_ref().is_none_or(|runs| runs.contains(&index)) {
+                sum.add(tuple);
+            }
+        }
+        sum
     }
-    let apart = |one: [f64; 2]| found.intervals_m.iter().all(|o| one[1] <= o[0] || one[0] >= o[1]);
-    let (cell, gain) = cells
-        .iter()
-        .filter(|cell| apart(cell.interval_m))
-        .map(|cell| {
-            let mut sum = summed(scan, &cell.runs, &found.runs);
+
+    /// The sum over the chosen runs and some intervals, each with its edges to itself.
+    fn over(&self, intervals_m: &[[f64; 2]], runs: &Option<Vec<usize>>) -> Tuple {
+        let mut sum = Tuple::zero(self.scan.fit.theta.len());
+        let is_chosen = |index: &usize| runs.as_ref().is_none_or(|runs| runs.contains(index));
+        for index in (0..self.bins.len()).filter(is_chosen) {
+            for &interval_m in intervals_m {
+                sum.add(&self.run_tuple(index, &[interval_m]));
+            }
+        }
+        sum
+    }
+
+    fn with_another(&self, cells: &[Cell], found: &Found) -> Option<Found> {
+        let base = self.over(&found.intervals_m, &found.runs);
+        let (cell, gain) = cells
+            .iter()
+            .filter(|cell| apart(cell.interval_m, &found.intervals_m))
+            .map(|cell| {
+                let mut sum = self.summed(&cell.runs, &found.runs);
+                sum.add(&base);
+                (cell, self.scan.gain(&sum).0)
+            })
+            .max_by(|one, other| one.1.total_cmp(&other.1))?;
+        let mut grown = found.clone();
+        grown.intervals_m.push(cell.interval_m);
+        grown.gain = gain;
+        self.polish(&mut grown);
+        Some(grown)
+    }
+
+    /// Moves the ends of the last interval while that explains more.
+    fn polish(&self, found: &mut Found) {
+        let last = found.intervals_m.len() - 1;
+        let others = found.intervals_m[..last].to_vec();
+        let base = self.over(&others, &found.runs);
+        let value = |interval: [f64; 2]| {
+            let mut sum = self.over(&[interval], &found.runs);
             sum.add(&base);
-            (cell, scan.gain(&sum).0)
-        })
-        .max_by(|one, other| one.1.total_cmp(&other.1))?;
-    let mut grown = found.clone();
-    grown.intervals_m.push(cell.interval_m);
-    grown.gain = gain;
-    polish(scan, shape, inside, &mut grown, positive);
-    Some(grown)
-}
-
-/// Moves the ends of the last interval while that explains more.
-fn polish(scan: &Scan, shape: Shape, inside: Inside, found: &mut Found, positive: bool) {
-    let last = found.intervals_m.len() - 1;
-    let mut base = Tuple::zero(scan.fit.theta.len());
-    for &interval in &found.intervals_m[..last] {
-        base.add(&summed(scan, &tuples(scan, shape, inside, interval), &found.runs));
-    }
-    let value = |interval: [f64; 2]| {
-        let mut sum = summed(scan, &tuples(scan, shape, inside, interval), &found.runs);
-        sum.add(&base);
-        let (gain, estimate) = scan.gain(&sum);
-        if positive && estimate <= 0.0 { (0.0, estimate) } else { (gain, estimate) }
-    };
-    let mut best = (found.intervals_m[last], value(found.intervals_m[last]));
-    let mut step_m = 0.5 * (best.0[1] - best.0[0]);
-    while step_m > FINEST_M {
-        let [from, to] = best.0;
-        let tries = [
-            [from - step_m, to],
-            [from + step_m, to],
-            [from, to - step_m],
-            [from, to + step_m],
-            [from - step_m, to - step_m],
-            [from + step_m, to + step_m],
-        ];
-        let apart = |one: [f64; 2]| {
-            found.intervals_m[..last].iter().all(|o| one[1] <= o[0] || one[0] >= o[1])
+            let (gain, estimate) = self.scan.gain(&sum);
+            if self.positive && estimate <= 0.0 { (0.0, estimate) } else { (gain, estimate) }
         };
-        let better = tries
-            .into_iter()
-            .filter(|&interval| interval[1] - interval[0] >= 100.0 && apart(interval))
-            .map(|interval| (interval, value(interval)))
-            .max_by(|one, other| one.1.0.total_cmp(&other.1.0));
-        match better {
-            Some(better) if better.1.0 > best.1.0 => best = better,
-            _ => step_m *= 0.5,
+        let mut best = (found.intervals_m[last], value(found.intervals_m[last]));
+        let mut step_m = 0.5 * (best.0[1] - best.0[0]);
+        while step_m > FINEST_M {
+            let [from, to] = best.0;
+            let tries = [
+                [from - step_m, to],
+                [from + step_m, to],
+                [from, to - step_m],
+                [from, to + step_m],
+                [from - step_m, to - step_m],
+                [from + step_m, to + step_m],
+            ];
+            let better = tries
+                .into_iter()
+                .filter(|&it| it[1] - it[0] >= 100.0 && apart(it, &others))
+                .map(|interval| (interval, value(interval)))
+                .max_by(|one, other| one.1.0.total_cmp(&other.1.0));
+            match better {
+                Some(better) if better.1.0 > best.1.0 => best = better,
+                _ => step_m *= 0.5,
+            }
         }
+        found.intervals_m[last] = best.0;
+        (found.gain, found.estimate) = best.1;
     }
-    found.intervals_m[last] = best.0;
-    (found.gain, found.estimate) = best.1;
 }
 
 #[cfg(test)]

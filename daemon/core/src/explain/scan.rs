@@ -7,12 +7,15 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 
 use super::evidence::{Fit, FitProblem, RunData};
 use crate::force::ResolvedSample;
 use crate::track::Track;
 use crate::train::TrainModel;
+
+/// Bins after which the whitening filter has forgotten a force.
+const MEMORY_BINS: usize = 200;
 
 /// Inner products of a whitened regressor.
 #[derive(Clone, Debug)]
@@ -36,6 +39,13 @@ impl Tuple {
         self.score += other.score;
         self.square += other.square;
         self.cross += &other.cross;
+    }
+
+    /// Takes out what [`add`](Tuple::add) put in.
+    pub fn take_out(&mut self, other: &Tuple) {
+        self.score -= other.score;
+        self.square -= other.square;
+        self.cross -= &other.cross;
     }
 }
 
@@ -113,32 +123,35 @@ impl<'a> Scan<'a> {
         let mut tuple = Tuple::zero(self.fit.theta.len());
         let Some(first) = shape.iter().position(|&a| a != 0.0) else { return tuple };
         let last = shape.iter().rposition(|&a| a != 0.0).unwrap_or(first);
-        let run = &self.problem.runs[index];
-        let mut gained = Vec::with_capacity(shape.len());
+        // The filter forgets what is long past.
+        let until = (last + MEMORY_BINS).min(shape.len());
+        let bins = &self.problem.runs[index].bins;
+        let mut gained = Vec::with_capacity(until - first);
         let mut speed = 0.0;
-        for (k, bin) in run.bins.iter().enumerate() {
-            if k > 0 && run.bins[k - 1].segment == bin.segment {
-                let step_s = bin.time_s - run.bins[k - 1].time_s;
+        for k in first..until {
+            if k > 0 && bins[k - 1].segment == bins[k].segment {
+                let step_s = bins[k].time_s - bins[k - 1].time_s;
                 speed += 0.5 * step_s * (shape[k - 1] + shape[k]);
             } else {
                 speed = 0.0;
             }
             gained.push(speed);
         }
-        let mut column = Vec::with_capacity(shape.len());
-        self.fit.whiteners[index].whiten(&gained, &mut column);
-        let (innovations, columns) = (&self.fit.innovations[index], &self.fit.columns[index]);
+        let mut column = Vec::with_capacity(until - first);
+        self.fit.whiteners[index].whiten_from(first, &gained, &mut column);
         let filter = &self.fit.filters[index];
-        let free = filter.remove(&column, &filter.factors(&column));
-        // The filter forgets what is long past.
-        let until = (last + 200).min(column.len());
-        for (k, weight) in filter.weights().iter().enumerate().take(until).skip(first.max(1) - 1) {
-            let weighted = weight * column[k];
-            tuple.score += weighted * innovations[k];
-            tuple.square += weighted * free[k];
-            for (cross, other) in tuple.cross.iter_mut().zip(columns) {
-                *cross += weighted * other[k];
-            }
+        let weighted = &mut gained;
+        for ((weighted, value), weight) in
+            weighted.iter_mut().zip(&column).zip(&filter.weights()[first..])
+        {
+            *weighted = value * weight;
+        }
+        let with = |series: &[f64]| dot(weighted, &series[first..until]);
+        tuple.score = with(&self.fit.innovations[index]);
+        tuple.square = dot(weighted, &column) - filter.explained(with);
+        let columns = &self.fit.columns[index];
+        for (cross, other) in tuple.cross.iter_mut().zip(columns).filter(|(_, o)| !o.is_empty()) {
+            *cross = with(other);
         }
         tuple
     }
@@ -169,4 +182,8 @@ impl<'a> Scan<'a> {
             runs.iter().filter_map(|run| Some(run.samples().first()?.weight_kn)).collect();
         weights.iter().sum::<f64>() / weights.len().max(1) as f64
     }
+}
+
+fn dot(one: &[f64], other: &[f64]) -> f64 {
+    DVectorView::from_slice(one, one.len()).dot(&DVectorView::from_slice(other, other.len()))
 }

@@ -22,6 +22,9 @@ const TAIL_MIN_S: f64 = 40.0;
 /// runs of ten, and twice the logarithm of ten is this.
 const RUN_COST: f64 = 4.6;
 
+/// Onsets are changed so many times more often than there are runs, at most.
+const CHANGES_BESIDE_RUNS: usize = 4;
+
 /// The kind.
 pub struct DraggingBrake;
 
@@ -61,8 +64,9 @@ impl Onsets {
         Onsets { times_s, tuples }
     }
 
+    /// What the taking part of the run must explain.
     fn cost(&self) -> f64 {
-        2.0 * (self.times_s.len().max(2) as f64).ln()
+        2.0 * (self.times_s.len().max(2) as f64).ln() + RUN_COST
     }
 }
 
@@ -104,45 +108,60 @@ fn window_tuple(scan: &Scan, windows: &[RunWindow]) -> Tuple {
 }
 
 /// Windows from the speeds of the fit runs: a common force, an onset for each run that takes
-/// part, improved run by run until nothing changes.
+/// part, improved by one run's onset at a time until nothing changes.
 fn by_speed(scan: &Scan) -> Option<(Vec<RunWindow>, f64, f64)> {
     let count = scan.problem.runs.len();
     let onsets: Vec<Onsets> = (0..count).map(|index| Onsets::of(scan, index)).collect();
     let mut chosen: Vec<Option<usize>> = vec![None; count];
-    let value = |chosen: &[Option<usize>]| {
-        let mut sum = Tuple::zero(scan.fit.theta.len());
-        let mut cost = 0.0;
-        for (onsets, choice) in onsets.iter().zip(chosen) {
-            if let Some(k) = choice {
-                sum.add(&onsets.tuples[*k]);
-                cost += onsets.cost() + RUN_COST;
-            }
-        }
-        let (gain, estimate) = scan.gain(&sum);
-        if estimate > 0.0 { gain - cost } else { f64::NEG_INFINITY }
-    };
     let mut best = 0.0;
-    for _ in 0..12 {
-        let mut change: Option<(usize, Option<usize>)> = None;
-        for (index, run_onsets) in onsets.iter().enumerate() {
-            let mut trial = chosen.clone();
-            let choices = (0..run_onsets.times_s.len()).map(Some).chain([None]);
-            for choice in choices {
-                trial[index] = choice;
-                let reached = value(&trial);
-                if reached > best + 1e-9 && trial.iter().any(Option::is_some) {
-                    best = reached;
-                    change = Some((index, choice));
-                }
-            }
-        }
-        let Some((index, choice)) = change else { break };
+    for _ in 0..CHANGES_BESIDE_RUNS + count {
+        let Some((reached, index, choice)) = best_change(scan, &onsets, &chosen, best) else {
+            break;
+        };
+        best = reached;
         chosen[index] = choice;
     }
     if chosen.iter().all(Option::is_none) {
         return None;
     }
     Some(refined(scan, &onsets, &chosen))
+}
+
+/// The change of one run's onset that brings most, if any brings more than `best`.
+fn best_change(
+    scan: &Scan,
+    onsets: &[Onsets],
+    chosen: &[Option<usize>],
+    mut best: f64,
+) -> Option<(f64, usize, Option<usize>)> {
+    let taking_part = || onsets.iter().zip(chosen).filter_map(|(own, k)| Some((own, (*k)?)));
+    let mut all = Tuple::zero(scan.fit.theta.len());
+    taking_part().for_each(|(own, k)| all.add(&own.tuples[k]));
+    let all_cost: f64 = taking_part().map(|(own, _)| own.cost()).sum();
+    let mut change = None;
+    for (index, own) in onsets.iter().enumerate() {
+        let (mut sum, mut cost) = (all.clone(), all_cost);
+        if let Some(k) = chosen[index] {
+            sum.take_out(&own.tuples[k]);
+            cost -= own.cost();
+        }
+        let mut consider = |sum: &Tuple, cost: f64, choice: Option<usize>| {
+            let (gain, estimate) = scan.gain(sum);
+            if estimate > 0.0 && gain - cost > best + 1e-9 {
+                best = gain - cost;
+                change = Some((best, index, choice));
+            }
+        };
+        if chosen[index].is_some() {
+            consider(&sum, cost, None);
+        }
+        for (k, tuple) in own.tuples.iter().enumerate() {
+            sum.add(tuple);
+            consider(&sum, cost + own.cost(), Some(k));
+            sum.take_out(tuple);
+        }
+    }
+    change
 }
 
 /// Onsets to about a bin, one run after the other.
@@ -153,7 +172,7 @@ fn refined(scan: &Scan, onsets: &[Onsets], chosen: &[Option<usize>]) -> (Vec<Run
         if let Some(k) = choice {
             let onsets = &onsets[index];
             found.push((index, onsets.times_s[*k], onsets.tuples[*k].clone()));
-            choice_cost += onsets.cost() + RUN_COST;
+            choice_cost += onsets.cost();
         }
     }
     let count = scan.fit.theta.len();

@@ -80,7 +80,8 @@ impl Hypothesis for Local {
             return;
         }
         for (force, sample) in forces.iter_mut().zip(run.samples()) {
-            force.extra_n_per_kn += parameters[0] * self.inside.share(sample, &self.intervals_m);
+            force.extra_n_per_kn +=
+                parameters[0] * self.inside.share(sample.position_m, &self.intervals_m);
         }
     }
 

@@ -162,7 +162,7 @@ impl Hypothesis for Slippery {
             let is_there = self
                 .intervals_m
                 .as_ref()
-                .is_none_or(|intervals| Inside::Centre.share(sample, intervals) > 0.0);
+                .is_none_or(|intervals| Inside::Centre.share(sample.position_m, intervals) > 0.0);
             if is_there {
                 force.brake_n = match self.form {
                     Form::Cap => {

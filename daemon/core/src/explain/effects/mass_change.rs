@@ -305,6 +305,13 @@ impl Hypothesis for Masses {
         parameters.iter().any(|factor| (factor - 1.0).abs() > MATERIAL)
     }
 
+    fn touches(&self, parameter: usize, run: &RunData) -> bool {
+        match &self.parts[parameter] {
+            Part::Section { .. } => true,
+            Part::Window { run: file, .. } => *file == run.file,
+        }
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         for (part, factor) in self.parts.iter().zip(parameters) {
             for (i, force) in forces.iter_mut().enumerate() {

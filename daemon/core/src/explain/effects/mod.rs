@@ -113,6 +113,11 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
     /// Changes the forces at all samples of a run.
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]);
 
+    /// False when a parameter changes nothing on a fit run.
+    fn touches(&self, _parameter: usize, _run: &RunData) -> bool {
+        true
+    }
+
     /// Measured over true speed.
     fn speed_scale(&self, _parameters: &[f64]) -> f64 {
         1.0

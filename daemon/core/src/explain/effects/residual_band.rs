@@ -1,11 +1,13 @@
 //! A residual that is real but fits no kind of the library: an extra force in a range of some
 //! covariate. It is not an explanation; it says where an explanation is to be looked for.
 
+use std::collections::BTreeMap;
+
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
 use crate::explain::answer::{CovariateRange, Place};
-use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::evidence::{Bin, RunData, SampleForces};
 use crate::explain::localise::MAP_ERROR_PERMILLE;
 use crate::explain::scan::{Scan, Tuple};
 use crate::force::ResolvedSample;
@@ -68,7 +70,8 @@ impl Covariate {
         }
     }
 
-    fn value(self, run: &RunData, index: usize, files: &[String]) -> Option<f64> {
+    /// At a sample of the fit run with this number; a holdout run has none.
+    fn value(self, run: &RunData, number: Option<usize>, index: usize) -> Option<f64> {
         let sample = &run.samples()[index];
         match self {
             Covariate::Speed => Some(run.smooth_mps[index]),
@@ -77,7 +80,7 @@ impl Covariate {
             Covariate::TractionForce => sample.traction_force_n,
             Covariate::BrakeForce => sample.brake_force_n,
             Covariate::Temperature => sample.ambient_temperature_degc,
-            Covariate::Run => files.iter().position(|file| *file == run.file).map(|k| k as f64),
+            Covariate::Run => number.map(|number| number as f64),
         }
     }
 
@@ -118,51 +121,88 @@ impl Effect for ResidualBand {
     }
 }
 
+/// Equal cells of the range of a covariate.
+struct Cells {
+    low: f64,
+    width: f64,
+    count: usize,
+    /// What an extra force in each explains.
+    tuples: Vec<Tuple>,
+    /// Motion in s in each.
+    seconds: Vec<f64>,
+}
+
+impl Cells {
+    /// `None` where the covariate does not vary.
+    fn of(scan: &Scan, covariate: Covariate) -> Option<Self> {
+        let runs = &scan.problem.runs;
+        let by_run: Vec<Vec<Option<f64>>> = runs
+            .iter()
+            .enumerate()
+            .map(|(number, run)| {
+                let middles = run.bins.iter().map(Bin::middle);
+                middles.map(|i| covariate.value(run, Some(number), i)).collect()
+            })
+            .collect();
+        let (low, high) = by_run
+            .iter()
+            .flatten()
+            .flatten()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (v.min(l), v.max(h)));
+        if high - low < 1e-6 || !(high - low).is_finite() {
+            return None;
+        }
+        let is_run = covariate == Covariate::Run;
+        let count = if is_run { runs.len() } else { CELLS };
+        let width = if is_run { 1.0 } else { (high - low) / count as f64 * (1.0 + 1e-9) };
+        let low = if is_run { -0.5 } else { low };
+        let tuples = vec![Tuple::zero(scan.fit.theta.len()); count];
+        let mut cells = Cells { low, width, count, tuples, seconds: vec![0.0; count] };
+        for (number, values) in by_run.iter().enumerate() {
+            cells.add_run(scan, covariate, number, values);
+        }
+        Some(cells)
+    }
+
+    fn edge(&self, cell: usize) -> f64 {
+        self.low + self.width * cell as f64
+    }
+
+    fn add_run(
+        &mut self,
+        scan: &Scan,
+        covariate: Covariate,
+        number: usize,
+        values: &[Option<f64>],
+    ) {
+        let run = &scan.problem.runs[number];
+        let time_s = run.recording.time_s();
+        let mut shapes: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+        for (k, (bin, value)) in run.bins.iter().zip(values).enumerate() {
+            let Some(value) = value else { continue };
+            let cell = (((value - self.low) / self.width) as usize).min(self.count - 1);
+            let shape = shapes.entry(cell).or_insert_with(|| vec![0.0; run.bins.len()]);
+            shape[k] = covariate.shape(scan, &run.samples()[bin.middle()]);
+            self.seconds[cell] += time_s[bin.end - 1] - time_s[bin.first];
+        }
+        for (cell, shape) in shapes {
+            self.tuples[cell].add(&scan.shape_tuple(number, &shape));
+        }
+    }
+}
+
 /// The range of a covariate in which an extra force explains most.
 fn best_band(scan: &Scan, covariate: Covariate) -> Option<(f64, Candidate)> {
-    let runs = &scan.problem.runs;
-    let files: Vec<String> = runs.iter().map(|run| run.file.clone()).collect();
-    let values = runs.iter().flat_map(|run| {
-        run.bins.iter().filter_map(|bin| covariate.value(run, bin.middle(), &files))
-    });
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-        (low.min(value), high.max(value))
-    });
-    if high - low < 1e-6 || !(high - low).is_finite() {
-        return None;
-    }
-    let is_run = covariate == Covariate::Run;
-    let count = if is_run { runs.len() } else { CELLS };
-    let width = if is_run { 1.0 } else { (high - low) / count as f64 * (1.0 + 1e-9) };
-    let low = if is_run { -0.5 } else { low };
-    let edge = |k: usize| low + width * k as f64;
-    let cells: Vec<Tuple> = (0..count)
-        .map(|k| {
-            scan.tuple(|run, i| match covariate.value(run, i, &files) {
-                Some(value) if value >= edge(k) && value < edge(k + 1) => {
-                    covariate.shape(scan, &run.samples()[i])
-                }
-                _ => 0.0,
-            })
-        })
-        .collect();
-    let cell_seconds: Vec<f64> = (0..count)
-        .map(|k| {
-            let inside = |run: &RunData, i: usize| {
-                let value = covariate.value(run, i, &files);
-                value.is_some_and(|value| value >= edge(k) && value < edge(k + 1))
-            };
-            scan.bin_seconds_where(inside)
-        })
-        .collect();
+    let cells = Cells::of(scan, covariate)?;
+    let count = cells.count;
     let mut best: Option<(f64, f64, usize, usize)> = None;
     for from in 0..count {
         let mut sum = Tuple::zero(scan.fit.theta.len());
         let mut seconds_s = 0.0;
-        for (to, cell) in cells.iter().enumerate().skip(from) {
-            sum.add(cell);
+        for to in from..count {
+            sum.add(&cells.tuples[to]);
             let (gain, estimate) = scan.gain(&sum);
-            seconds_s += cell_seconds[to];
+            seconds_s += cells.seconds[to];
             if seconds_s > BAND_MIN_S && best.is_none_or(|best| gain > best.0) {
                 best = Some((gain, estimate, from, to + 1));
             }
@@ -171,7 +211,9 @@ fn best_band(scan: &Scan, covariate: Covariate) -> Option<(f64, Candidate)> {
     let (gain, estimate, from, to) = best?;
     let structures = COVARIATES.len() as f64 * (count * (count + 1)) as f64 / 2.0;
     let choice_cost = OUTSIDE_COST + 2.0 * structures.ln();
-    let band = Band { covariate, low: edge(from), high: edge(to), files, choice_cost };
+    let files = scan.problem.runs.iter().map(|run| run.file.clone()).collect();
+    let (low, high) = (cells.edge(from), cells.edge(to));
+    let band = Band { covariate, low, high, files, choice_cost };
     Some((gain, Candidate::new(band, vec![estimate])))
 }
 
@@ -205,8 +247,9 @@ impl Hypothesis for Band {
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        let number = self.files.iter().position(|file| *file == run.file);
         for (i, force) in forces.iter_mut().enumerate() {
-            let value = self.covariate.value(run, i, &self.files);
+            let value = self.covariate.value(run, number, i);
             if !value.is_some_and(|value| value >= self.low && value < self.high) {
                 continue;
             }

@@ -89,7 +89,7 @@ impl Hypothesis for Tunnels {
         for (force, sample) in forces.iter_mut().zip(run.samples()) {
             let share = match &self.found_m {
                 None => sample.tunnel_share.unwrap_or(0.0),
-                Some((intervals_m, inside)) => inside.share(sample, intervals_m),
+                Some((intervals_m, inside)) => inside.share(sample.position_m, intervals_m),
             };
             force.c_extra += share * parameters[0];
         }

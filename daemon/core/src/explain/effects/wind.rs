@@ -96,6 +96,10 @@ impl Hypothesis for ByRun {
         parameters.iter().any(|wind| wind.abs() > MATERIAL_MPS)
     }
 
+    fn touches(&self, parameter: usize, run: &RunData) -> bool {
+        self.runs[parameter].0 == run.file
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         let own = self.runs.iter().position(|(file, _)| *file == run.file);
         let mean = parameters.iter().sum::<f64>() / parameters.len() as f64;

@@ -14,6 +14,8 @@ pub type SharedHypothesis = Arc<dyn Hypothesis>;
 /// What accelerates the train at one sample; effects change these fields.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleForces {
+    /// Declared gross mass in kg.
+    pub mass_kg: f64,
     /// True traction force in N.
     pub traction_n: f64,
     /// True brake force in N, retarding.
@@ -43,6 +45,7 @@ impl SampleForces {
     #[inline]
     pub fn declared(sample: &ResolvedSample, rotating_mass_factor: f64) -> Self {
         SampleForces {
+            mass_kg: sample.mass_kg,
             traction_n: sample.traction_force_n.unwrap_or(0.0),
             brake_n: sample.brake_force_n.unwrap_or(0.0),
             mass_factor: 1.0,
@@ -57,16 +60,28 @@ impl SampleForces {
         }
     }
 
-    /// The acceleration p0 + p1 v + p2 v² in m/s² for speeds near `speed_mps`: the air resistance
-    /// is c (v + w) |v + w|, whose sign is taken at that speed.
+    /// Acceleration in m/s² that 1 N/kN of basic resistance takes away.
     #[inline]
-    fn polynomial(&self, sample: &ResolvedSample, davis: Davis, speed_mps: f64) -> [f64; 3] {
-        let per_kg = 1.0 / (sample.mass_kg * self.mass_factor * (1.0 + self.rotating_mass_factor));
-        let weight_kn = sample.weight_kn * self.mass_factor;
-        let c = davis.c + self.c_extra;
+    fn per_unit_resistance_mps2(&self) -> f64 {
+        self.resistance_factor * TrainModel::weight_kn(1.0) / (1.0 + self.rotating_mass_factor)
+    }
+
+    /// Sign of the air resistance c (v + w) |v + w|.
+    #[inline]
+    fn air_sign(&self, speed_mps: f64) -> f64 {
+        if speed_mps + self.headwind_mps < 0.0 { -1.0 } else { 1.0 }
+    }
+
+    /// The acceleration p0 + p1 v + p2 v² in m/s² for speeds near `speed_mps`: the sign of the air
+    /// resistance is taken at that speed.
+    #[inline]
+    fn polynomial(&self, davis: Davis, speed_mps: f64) -> [f64; 3] {
+        let mass_kg = self.mass_kg * self.mass_factor;
+        let per_kg = 1.0 / (mass_kg * (1.0 + self.rotating_mass_factor));
+        let weight_kn = TrainModel::weight_kn(mass_kg);
         let wind = self.headwind_mps;
-        let air = if speed_mps + wind < 0.0 { -c } else { c };
-        let factor = self.resistance_factor * weight_kn * per_kg;
+        let air = self.air_sign(speed_mps) * (davis.c + self.c_extra);
+        let factor = self.per_unit_resistance_mps2();
         let other_n_per_kn = self.gradient_permille + self.tied_n_per_kn + self.extra_n_per_kn;
         let force_n = self.traction_n - self.brake_n - self.extra_n;
         [
@@ -76,23 +91,24 @@ impl SampleForces {
             -factor * air,
         ]
     }
+
+    /// What the acceleration changes by for each unit of a, b and c.
+    #[inline]
+    fn davis_slopes(&self, speed_mps: f64) -> [f64; 3] {
+        let factor = -self.per_unit_resistance_mps2();
+        let air_mps = speed_mps + self.headwind_mps;
+        [factor, factor * speed_mps, factor * self.air_sign(speed_mps) * air_mps * air_mps]
+    }
 }
 
-/// The declared model, Davis coefficients and effects with their parameters.
-#[derive(Clone)]
+/// The declared model with Davis coefficients and effects as parameters.
+#[derive(Clone, Default)]
 pub struct GrownModel {
     /// Effects, in the order in which they act on the sample forces.
     pub effects: Vec<SharedHypothesis>,
-    /// Names of runs that effects speak of.
-    pub rotating_mass_factor: f64,
 }
 
 impl GrownModel {
-    /// The declared model of a train with no effect.
-    pub fn declared(train: &TrainModel) -> Self {
-        GrownModel { effects: Vec::new(), rotating_mass_factor: train.rotating_mass_factor }
-    }
-
     /// The same with one effect more.
     pub fn with(&self, effect: SharedHypothesis) -> Self {
         let mut grown = self.clone();
@@ -118,29 +134,27 @@ impl GrownModel {
             .collect()
     }
 
-    /// The forces on a run for given parameters; `theta` starts with a, b, c.
-    pub fn forces(&self, run: &RunData, theta: &[f64], forces: &mut GrownForces) {
-        let samples = run.samples();
-        let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
+    /// The effects on the declared forces of a run.
+    fn act(&self, run: &RunData, theta: &[f64], forces: &mut GrownForces) {
         forces.samples.clear();
-        forces
-            .samples
-            .extend(samples.iter().map(|s| SampleForces::declared(s, self.rotating_mass_factor)));
+        forces.samples.extend_from_slice(&run.declared);
         forces.speed_scale = 1.0;
         for (effect, range) in self.effects.iter().zip(self.ranges()) {
             effect.apply(&theta[range.clone()], run, &mut forces.samples);
             forces.speed_scale *= effect.speed_scale(&theta[range]);
         }
-        forces.polynomials.clear();
+    }
+
+    /// The forces on a run for given parameters; `theta` starts with a, b, c.
+    pub fn forces(&self, run: &RunData, theta: &[f64], forces: &mut GrownForces) {
+        self.act(run, theta, forces);
+        let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
         let per_scale = 1.0 / forces.speed_scale;
-        forces.polynomials.extend(
-            forces
-                .samples
-                .iter()
-                .zip(samples)
-                .zip(&run.smooth_mps)
-                .map(|((state, sample), speed)| state.polynomial(sample, davis, speed * per_scale)),
-        );
+        forces.polynomials.clear();
+        let samples = forces.samples.iter().zip(&run.smooth_mps);
+        forces
+            .polynomials
+            .extend(samples.map(|(state, speed)| state.polynomial(davis, speed * per_scale)));
     }
 
     /// Modelled measured speed at each bin, each segment starting from zero: the integral of the
@@ -152,10 +166,13 @@ impl GrownModel {
         forces: &mut GrownForces,
         bins: &mut Vec<f64>,
     ) {
-        self.forces(run, theta, forces);
-        let per_scale = 1.0 / forces.speed_scale;
+        self.act(run, theta, forces);
+        let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
+        let (scale, per_scale) = (forces.speed_scale, 1.0 / forces.speed_scale);
         let acceleration = |i: usize| {
-            forces.speed_scale * forces.acceleration_mps2(i, run.smooth_mps[i] * per_scale)
+            let speed_mps = run.smooth_mps[i] * per_scale;
+            let [p0, p1, p2] = forces.samples[i].polynomial(davis, speed_mps);
+            scale * (p0 + speed_mps * (p1 + speed_mps * p2))
         };
         integrate_bins(run, acceleration, bins);
     }
@@ -190,6 +207,17 @@ pub struct GrownForces {
     samples: Vec<SampleForces>,
     polynomials: Vec<[f64; 3]>,
     speed_scale: f64,
+}
+
+impl GrownForces {
+    /// What the bins of the prediction made last change by for each unit of a (0), b (1) or c (2).
+    pub fn davis_slopes(&self, run: &RunData, coefficient: usize, bins: &mut Vec<f64>) {
+        let (scale, per_scale) = (self.speed_scale, 1.0 / self.speed_scale);
+        let slope = |i: usize| {
+            scale * self.samples[i].davis_slopes(run.smooth_mps[i] * per_scale)[coefficient]
+        };
+        integrate_bins(run, slope, bins);
+    }
 }
 
 impl ForceModel for GrownForces {

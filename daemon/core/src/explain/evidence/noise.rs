@@ -101,11 +101,15 @@ impl Whitener {
         let mut log_determinant = 0.0;
         let mut before: Option<(usize, f64)> = None;
         let mut steps = Vec::with_capacity(run.bins.len());
+        // Nearly all bins are equally far apart.
+        let (mut fade_s, mut fade) = (0.0, 1.0);
         for bin in &run.bins {
             let step_s = before.map_or(0.0, |(_, time_s)| bin.time_s - time_s);
             let starts = before.is_none_or(|(segment, _)| segment != bin.segment);
             before = Some((bin.segment, bin.time_s));
-            let fade = (-step_s / fading_s).exp();
+            if step_s != fade_s {
+                (fade_s, fade) = (step_s, (-step_s / fading_s).exp());
+            }
             let carry_s = fading_s * (1.0 - fade);
             let gone = 1.0 - fade * fade;
             if starts {
@@ -146,9 +150,14 @@ impl Whitener {
 
     /// Innovations of a series of bin differences; 0 where a segment starts.
     pub fn whiten(&self, series: &[f64], innovations: &mut Vec<f64>) {
+        self.whiten_from(0, series, innovations);
+    }
+
+    /// Innovations of a series that is zero before bin number `first` and starts there.
+    pub fn whiten_from(&self, first: usize, series: &[f64], innovations: &mut Vec<f64>) {
         innovations.clear();
         let (mut level, mut fading) = (0.0, 0.0);
-        for (step, &value) in self.steps.iter().zip(series) {
+        for (step, &value) in self.steps[first..].iter().zip(series) {
             let ahead = if step.starts { value } else { level + step.carry_s * fading };
             fading *= step.fade;
             let difference = value - ahead;

@@ -6,6 +6,7 @@ use crate::simulate::{BridgeLimits, Recording, SimulateError};
 use crate::validation::{ValidationLimits, Validator};
 
 use super::cleaning;
+use super::model::SampleForces;
 
 /// Width in s of a bin over which speeds are averaged.
 const BIN_S: f64 = 2.0;
@@ -53,6 +54,8 @@ pub struct RunData {
     pub direction: f64,
     /// The cleaned run.
     pub recording: Recording,
+    /// What the declared model says of each sample.
+    pub declared: Vec<SampleForces>,
     /// Cleaned speed in m/s, lightly smoothed, at which resistances are evaluated.
     pub smooth_mps: Vec<f64>,
     /// The bins of all segments of motion, in order of time.
@@ -123,6 +126,11 @@ fn prepare_run(dataset: &Dataset, index: usize) -> Result<RunData, RunDataError>
     let first_ns = samples.first().map_or(0, |sample| sample.time_ns);
     let recording = Recording::new(samples, BridgeLimits::default())
         .map_err(|source| RunDataError::Simulate { file: run.file.clone(), source })?;
+    let declared = recording
+        .samples()
+        .iter()
+        .map(|sample| SampleForces::declared(sample, dataset.train.rotating_mass_factor))
+        .collect();
     let smooth_mps = smoothed(&recording);
     let bins = bins(&recording);
     let way_ratio = match run.position_source {
@@ -135,6 +143,7 @@ fn prepare_run(dataset: &Dataset, index: usize) -> Result<RunData, RunDataError>
         offset_s: first_ns as f64 * 1e-9,
         direction: f64::from(run.direction),
         recording,
+        declared,
         smooth_mps,
         bins,
         way_ratio,

@@ -124,6 +124,13 @@ impl WeightedFilter {
         self.covariance * Vector2::new(product(&self.columns[0]), product(&self.columns[1]))
     }
 
+    /// What the factors explain of the square of a series, given its weighted product with each of
+    /// their columns.
+    pub fn explained(&self, product: impl Fn(&[f64]) -> f64) -> f64 {
+        let products = Vector2::new(product(&self.columns[0]), product(&self.columns[1]));
+        products.dot(&(self.covariance * products))
+    }
+
     /// The series less what the factors explain.
     pub fn remove(&self, series: &[f64], factors: &Vector2<f64>) -> Vec<f64> {
         let columns = self.columns[0].iter().zip(&self.columns[1]);

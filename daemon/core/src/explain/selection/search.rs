@@ -78,7 +78,7 @@ impl Search<'_> {
     /// Searches.
     pub fn run(&self) -> Outcome {
         (self.progress)(0.05, "fitting a, b, c");
-        let declared = GrownModel::declared(self.train);
+        let declared = GrownModel::default();
         let start = self.problem.start(&[]);
         let first = self.problem.fit_with_noise(&declared, start, Noise::START);
         let base = self.problem.fit_with_noise(&declared, first.theta, first.noise);

@@ -22,8 +22,9 @@ impl FitProblem {
             if promised < DECREASE_MIN {
                 return None;
             }
-            if self.cost(&fit.model, &theta, filters, scratch) < fit.cost {
-                return Some(self.linearised(&fit.model, theta, fit.noise, filters, scratch));
+            let next = self.linearised(&fit.model, theta, fit.noise, filters, scratch);
+            if next.cost < fit.cost {
+                return Some(next);
             }
         }
         None

@@ -6,6 +6,7 @@ use super::super::model::{GrownForces, GrownModel};
 use super::super::noise::Noise;
 use super::robust::{RunFilters, Whitened};
 use super::{Fit, FitProblem, RunNormal};
+use crate::explain::evidence::RunData;
 
 /// Working memory of evaluations.
 #[derive(Default)]
@@ -60,24 +61,6 @@ impl FitProblem {
         fit.runs.iter().fold(prior, |sum, run| sum + &run.score)
     }
 
-    pub(super) fn cost(
-        &self,
-        model: &GrownModel,
-        theta: &[f64],
-        filters: &[RunFilters],
-        scratch: &mut Scratch,
-    ) -> f64 {
-        let mut total = self.prior(model, theta).2;
-        for (run, filters) in self.runs.iter().zip(filters) {
-            model.predict_bins(run, theta, &mut scratch.forces, &mut scratch.bins);
-            for (value, bin) in scratch.bins.iter_mut().zip(&run.bins) {
-                *value = bin.speed_mps - *value;
-            }
-            total += filters.whitened(&scratch.bins, &mut scratch.whitened).cost;
-        }
-        total
-    }
-
     /// Residuals, regressors and normal equations at given parameters.
     pub(super) fn linearised(
         &self,
@@ -87,7 +70,7 @@ impl FitProblem {
         filters: &[RunFilters],
         scratch: &mut Scratch,
     ) -> Fit {
-        let steps = self.difference_steps(model, &theta);
+        let steps = Self::difference_steps(model, &theta);
         let (prior_information, _, mut cost) = self.prior(model, &theta);
         let mut fit = Fit {
             model: model.clone(),
@@ -108,21 +91,7 @@ impl FitProblem {
             let residual: Vec<f64> =
                 run.bins.iter().zip(&scratch.bins).map(|(bin, p)| bin.speed_mps - p).collect();
             let whitened = filters.whitened(&residual, &mut scratch.whitened);
-            let columns: Vec<Vec<f64>> = steps
-                .iter()
-                .enumerate()
-                .map(|(i, &step)| {
-                    let mut theta = fit.theta.clone();
-                    theta[i] += step;
-                    model.predict_bins(run, &theta, &mut scratch.forces, &mut scratch.moved);
-                    for (moved, base) in scratch.moved.iter_mut().zip(&scratch.bins) {
-                        *moved = (*moved - base) / step;
-                    }
-                    let mut column = Vec::new();
-                    filters.whitener.whiten(&scratch.moved, &mut column);
-                    column
-                })
-                .collect();
+            let columns = whitened_columns(model, run, &fit.theta, &steps, filters, scratch);
             let Whitened { innovations, filter, factors, cost: run_cost } = whitened;
             cost += run_cost;
             let free: Vec<Vec<f64>> = columns
@@ -146,17 +115,51 @@ impl FitProblem {
         fit
     }
 
-    /// Steps for finite differences, towards the inside of the bounds.
-    pub(super) fn difference_steps(&self, model: &GrownModel, theta: &[f64]) -> Vec<f64> {
-        let mut steps: Vec<f64> = self.prior_deviation.iter().map(|sd| 0.05 * sd).collect();
-        for (effect, range) in model.effects.iter().zip(model.ranges()) {
-            for (value, spec) in theta[range].iter().zip(effect.parameters()) {
-                let inside = value + spec.step <= spec.upper;
-                steps.push(if inside { spec.step } else { -spec.step });
-            }
-        }
-        steps
+    /// Steps for finite differences of the effects' parameters, towards the inside of the bounds.
+    fn difference_steps(model: &GrownModel, theta: &[f64]) -> Vec<f64> {
+        let specs = model.effects.iter().flat_map(|effect| effect.parameters());
+        theta[3..]
+            .iter()
+            .zip(specs)
+            .map(
+                |(value, spec)| {
+                    if value + spec.step <= spec.upper { spec.step } else { -spec.step }
+                },
+            )
+            .collect()
     }
+}
+
+/// Regressors of one run at the parameters of the prediction made last: a, b, c by their slopes,
+/// the others by differences; empty for a parameter that does not touch the run.
+fn whitened_columns(
+    model: &GrownModel,
+    run: &RunData,
+    theta: &[f64],
+    steps: &[f64],
+    filters: &RunFilters,
+    scratch: &mut Scratch,
+) -> Vec<Vec<f64>> {
+    let Scratch { forces, bins, moved, .. } = scratch;
+    let mut columns = vec![Vec::new(); theta.len()];
+    for (coefficient, column) in columns.iter_mut().take(3).enumerate() {
+        forces.davis_slopes(run, coefficient, moved);
+        filters.whitener.whiten(moved, column);
+    }
+    let mut elsewhere = theta.to_vec();
+    for (effect, range) in model.effects.iter().zip(model.ranges()) {
+        for i in range.clone().filter(|i| effect.touches(i - range.start, run)) {
+            let step = steps[i - 3];
+            elsewhere[i] += step;
+            model.predict_bins(run, &elsewhere, forces, moved);
+            elsewhere[i] = theta[i];
+            for (moved, base) in moved.iter_mut().zip(bins.iter()) {
+                *moved = (*moved - base) / step;
+            }
+            filters.whitener.whiten(moved, &mut columns[i]);
+        }
+    }
+    columns
 }
 
 /// `free` are the columns less what the run's own factors would explain.
@@ -168,6 +171,7 @@ fn normal_equations(
     cost: f64,
 ) -> RunNormal {
     let count = columns.len();
+    // A column that is empty is zero.
     let product = |one: &[f64], other: &[f64]| -> f64 {
         one.iter().zip(other).zip(weights).map(|((one, other), weight)| weight * one * other).sum()
     };

@@ -64,7 +64,8 @@ pub struct Fit {
     pub prior_information: DMatrix<f64>,
     /// White innovations by run, less the runs' own factors.
     pub innovations: Vec<Vec<f64>>,
-    /// Whitened regressors by run and parameter, less what the runs' own factors would explain.
+    /// Whitened regressors by run and parameter, less what the runs' own factors would explain;
+    /// empty for a parameter that does not touch the run.
     pub columns: Vec<Vec<Vec<f64>>>,
     /// Differences of the bins by run, not whitened.
     pub residuals: Vec<Vec<f64>>,
