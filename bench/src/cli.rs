@@ -8,8 +8,7 @@ use serde::Serialize;
 
 use crate::estimators::measure::Effort;
 use crate::estimators::{self, report};
-use crate::explain::matrix;
-use crate::explain::scenario::Scenario;
+use crate::explain::command::{ExplainArguments, explain};
 use crate::latency::server::{PeerArguments, serve};
 use crate::latency::{self, LatencyArguments, plot};
 use crate::load::{self, LoadArguments};
@@ -71,33 +70,6 @@ struct PapersArguments {
     /// Write the tables as a page of the documentation
     #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
-}
-
-/// Every kind of undeclared effect, and nulls, over simulated datasets: power, false alarms,
-/// confusions, localisation, parameters and their coverage.
-#[derive(Debug, Args)]
-struct ExplainArguments {
-    /// Simulated datasets for each kind
-    #[arg(long, default_value_t = 20)]
-    seeds: usize,
-    /// The first seed
-    #[arg(long, default_value_t = 1)]
-    first_seed: u64,
-    /// Only this kind, as tunnel_drag, or none, two_effects, poor_recording; may be repeated
-    #[arg(long = "kind", value_name = "NAME")]
-    kinds: Vec<String>,
-    /// Datasets at a time
-    #[arg(long, default_value_t = 2)]
-    threads: usize,
-    /// Tell the outcome of every dataset on standard error
-    #[arg(long)]
-    verbose: bool,
-    /// Write the simulated datasets with their truth into this folder
-    #[arg(long, value_name = "DIR")]
-    write: Option<PathBuf>,
-    /// Write the result for machines; - for standard output
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
 }
 
 #[derive(Serialize)]
@@ -209,53 +181,8 @@ fn load(arguments: &LoadArguments) -> Result<(), (String, u8)> {
     give(&arguments.json, &report, || load::report::table(&report))
 }
 
-fn explain(arguments: &ExplainArguments) -> Result<(), (String, u8)> {
-    let mut scenarios = Scenario::all();
-    if !arguments.kinds.is_empty() {
-        let chosen = arguments.kinds.iter().map(|name| {
-            let names: Vec<_> = Scenario::all().iter().map(|scenario| scenario.name()).collect();
-            Scenario::from_name(name)
-                .ok_or((format!("--kind {name}: expected one of {}", names.join(", ")), 2))
-        });
-        scenarios = chosen.collect::<Result<_, _>>()?;
-    }
-    let (seeds, first) = (arguments.seeds, arguments.first_seed);
-    if let Some(folder) = &arguments.write {
-        for case in matrix::cases(&scenarios, seeds, first) {
-            case.write(folder).map_err(|error| (format!("{}: {error}", folder.display()), 1))?;
-        }
-    }
-    let matrix = matrix::run(&scenarios, seeds, first, arguments.threads.max(1), &|case, grade| {
-        if arguments.verbose {
-            let kinds: Vec<_> =
-                case.scenario.kinds(case.seed).iter().map(|kind| kind.name()).collect();
-            let parameters: Vec<String> = grade
-                .parameters
-                .iter()
-                .map(|p| format!("{} {:+.3} ({:+.1} sd)", p.name, p.error, p.z))
-                .collect();
-            eprintln!(
-                "{} seed {}: {} {} {} iou {:?} share {:?} {}",
-                if grade.is_right { "right" } else { "WRONG" },
-                case.seed,
-                kinds.join("+"),
-                grade.verdict,
-                grade.named.join("+"),
-                grade.iou,
-                grade.share,
-                parameters.join(", ")
-            );
-            eprintln!("    strength {:.2}", grade.strength);
-            for detail in &grade.details {
-                eprintln!("    {detail}");
-            }
-        }
-    });
-    give(&arguments.json, &matrix, || matrix::table(&matrix))
-}
-
 /// Writes a result for machines where it is wanted, and for people unless standard output is taken.
-fn give(
+pub(crate) fn give(
     json: &Option<PathBuf>,
     result: &impl Serialize,
     for_people: impl FnOnce() -> String,

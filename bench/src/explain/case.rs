@@ -37,15 +37,23 @@ impl Case {
     }
 }
 
-/// Reads a simulated dataset through its files, as the program does, and explains it.
+/// Reads a simulated dataset through its files, as the program does.
 ///
 /// # Panics
 ///
 /// When the simulator's files are refused.
-pub fn explained(simulated: &SimulatedDataset) -> Explanation {
+pub fn read(simulated: &SimulatedDataset) -> Dataset {
     let files = dataset_files(simulated);
     let texts: Vec<(&str, &str)> =
         files.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
-    let dataset = Dataset::load(&texts[..]).expect("a simulated dataset");
-    explain(&dataset, &|_, _| {}).expect("usable runs")
+    Dataset::load(&texts[..]).expect("a simulated dataset")
+}
+
+/// Explains a simulated dataset.
+///
+/// # Panics
+///
+/// When a run has no usable sample.
+pub fn explained(dataset: &Dataset) -> Explanation {
+    explain(dataset, &|_, _| {}).expect("usable runs")
 }

@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 
 use serde::Serialize;
 
-use super::case::{Case, explained};
+use super::case::{Case, explained, read};
 use super::grade::{Grade, grade};
 use super::scenario::Scenario;
 
@@ -88,7 +88,8 @@ pub fn run(
                     .and_then(|at| Some((at, cases.get(at)?)))
                 {
                     let simulated = case.simulate();
-                    let graded = grade(&simulated, case.scenario.rival(), &explained(&simulated));
+                    let explanation = explained(&read(&simulated));
+                    let graded = grade(&simulated, case.scenario.rival(), &explanation);
                     tell(case, &graded);
                     grades.lock().unwrap_or_else(PoisonError::into_inner)[at] = Some(graded);
                 }

@@ -1,11 +1,15 @@
-//! The matrix of `dynocar explain`: every kind of effect and nulls over seeded simulations.
+//! `dynocar explain` over seeded simulations of every kind of effect and of nulls.
 //!
 //! - [`scenario`]: what is simulated
 //! - [`case`]: one simulated dataset, explained in this process
 //! - [`grade`]: the answer against the truth
 //! - [`matrix`]: all kinds over all seeds, in numbers
+//! - [`growth`]: time for 1, 4 and 16 times the data
+//! - [`command`]: the command line
 
 pub mod case;
+pub mod command;
 pub mod grade;
+pub mod growth;
 pub mod matrix;
 pub mod scenario;

@@ -3,7 +3,7 @@
 use dynocar_core::track::{Curve, Track, Tunnel};
 
 use super::random::Random;
-use super::settings::TrainType;
+use super::settings::{SimulatorSettings, TrainType};
 use super::train_maker::rounded;
 
 /// A stretch with one speed limit.
@@ -129,18 +129,20 @@ const HIGH_SPEED: Ranges = Ranges {
     balise_gap_m: (1000.0, 2500.0),
 };
 
+/// The lengths of the lines are for runs of so many s, or shorter ones.
+const RANGES_HOLD_S: f64 = 900.0;
 /// Lateral acceleration in m/s², cant included, that a speed limit allows in a curve.
 const CURVE_ACCELERATION_MPS2: f64 = 1.9;
 
-/// Draws a line for a type of train; `train` is its length in m and highest speed in m/s,
-/// `is_plain` takes gradients and curves out.
+/// Draws a line for a type of train, long enough for the runs; `train` is its length in m and
+/// highest speed in m/s.
 ///
 /// The line is the same with and without tunnels otherwise.
 pub fn make_line(
+    settings: &SimulatorSettings,
     train_type: TrainType,
     train: (f64, f64),
     has_tunnels: bool,
-    is_plain: bool,
     random: &mut Random,
 ) -> Line {
     let ranges = match train_type {
@@ -150,10 +152,12 @@ pub fn make_line(
         TrainType::HighSpeed => HIGH_SPEED,
     };
     let (train_length_m, speed_max_mps) = train;
-    let length_m = random.uniform(ranges.length_m.0, ranges.length_m.1).round();
+    let times_longer = (settings.duration_s / RANGES_HOLD_S).max(1.0);
+    let drawn_m = random.uniform(ranges.length_m.0, ranges.length_m.1);
+    let length_m = (times_longer * drawn_m).round();
     let mut gradient = make_gradient(&ranges, length_m, random);
     let mut curves = make_curves(&ranges, length_m, random);
-    if is_plain {
+    if settings.is_level_and_straight {
         gradient = vec![(0.0, 0.0)];
         curves.clear();
     }

@@ -117,8 +117,7 @@ pub fn simulate(settings: &SimulatorSettings) -> SimulatedDataset {
     let has_tunnels =
         of_line.chance(0.5) || settings.effects.kinds().contains(&EffectKind::TunnelDrag);
     let size = (train.declared.length_m, train.handling.speed_max_mps);
-    let line =
-        make_line(train_type, size, has_tunnels, settings.is_level_and_straight, &mut of_line);
+    let line = make_line(settings, train_type, size, has_tunnels, &mut of_line);
     let plans = make_plans(settings, &train, &line, &mut stream(Stream::Plans));
     let effects =
         draw_effects(settings, &EffectScene { train: &train, line: &line, plans: &plans });

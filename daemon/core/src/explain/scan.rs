@@ -7,9 +7,10 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector, DVectorView};
+use nalgebra::{DMatrix, DVector};
 
 use super::evidence::{Fit, FitProblem, RunData};
+use crate::filter::lanes::dot;
 use crate::force::ResolvedSample;
 use crate::track::Track;
 use crate::train::TrainModel;
@@ -182,8 +183,4 @@ impl<'a> Scan<'a> {
             runs.iter().filter_map(|run| Some(run.samples().first()?.weight_kn)).collect();
         weights.iter().sum::<f64>() / weights.len().max(1) as f64
     }
-}
-
-fn dot(one: &[f64], other: &[f64]) -> f64 {
-    DVectorView::from_slice(one, one.len()).dot(&DVectorView::from_slice(other, other.len()))
 }

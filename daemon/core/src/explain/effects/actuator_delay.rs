@@ -9,6 +9,9 @@ use crate::explain::scan::Scan;
 const PARAMETERS: [Parameter; 2] =
     [Parameter::new("delay_s", (0.0, 6.0), 0.05), Parameter::new("lag_s", (0.0, 8.0), 0.05)];
 
+/// Steps in s that differ by no more are equal: what is left of rounded times.
+const SAME_STEP_S: f64 = 1e-9;
+
 /// The kind.
 pub struct ActuatorDelay;
 
@@ -28,11 +31,16 @@ impl Effect for ActuatorDelay {
     }
 }
 
-/// The force `delay_s` earlier, then lagged by `lag_s`: exact for forces linear between samples.
-fn delayed(time_s: &[f64], force_n: &[f64], delay_s: f64, lag_s: f64) -> Vec<f64> {
+/// Traction and brake force in N.
+type Forces = [f64; 2];
+
+/// The forces `delay_s` earlier, then lagged by `lag_s`: exact for forces linear between samples.
+fn delayed(time_s: &[f64], forces_n: &[Forces], delay_s: f64, lag_s: f64) -> Vec<Forces> {
+    let both = |value: &dyn Fn(usize) -> f64| [value(0), value(1)];
     let mut before = 0;
-    let mut last: Option<(f64, f64)> = None;
-    let mut lagged = 0.0;
+    let mut last: Option<(f64, Forces)> = None;
+    let (mut fade_step_s, mut fade) = (0.0, 1.0);
+    let mut lagged = [0.0; 2];
     (0..time_s.len())
         .map(|i| {
             let at_s = time_s[i] - delay_s;
@@ -40,20 +48,25 @@ fn delayed(time_s: &[f64], force_n: &[f64], delay_s: f64, lag_s: f64) -> Vec<f64
                 before += 1;
             }
             let input = if at_s <= time_s[0] || before + 1 >= time_s.len() {
-                force_n[before]
+                forces_n[before]
             } else {
                 let share = (at_s - time_s[before]) / (time_s[before + 1] - time_s[before]);
-                force_n[before] + share * (force_n[before + 1] - force_n[before])
+                let (from, to) = (forces_n[before], forces_n[before + 1]);
+                both(&|k| from[k] + share * (to[k] - from[k]))
             };
             lagged = match last {
                 Some((last_s, last_input)) if lag_s > 1e-3 => {
                     let step_s = time_s[i] - last_s;
-                    let fade = (-step_s / lag_s).exp();
+                    if (step_s - fade_step_s).abs() > SAME_STEP_S {
+                        (fade_step_s, fade) = (step_s, (-step_s / lag_s).exp());
+                    }
                     // Response to a ramp from the last input to this one.
-                    let slope = (input - last_input) / step_s;
-                    fade * lagged
-                        + (1.0 - fade) * last_input
-                        + slope * (step_s - lag_s * (1.0 - fade))
+                    let ramp = 1.0 - lag_s * (1.0 - fade) / step_s;
+                    both(&|k| {
+                        fade * lagged[k]
+                            + (1.0 - fade) * last_input[k]
+                            + ramp * (input[k] - last_input[k])
+                    })
                 }
                 _ => input,
             };
@@ -79,12 +92,10 @@ impl Hypothesis for DelayAndLag {
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         let time_s = run.recording.time_s();
         let [delay_s, lag_s] = [parameters[0], parameters[1]];
-        let traction: Vec<f64> = forces.iter().map(|force| force.traction_n).collect();
-        let brake: Vec<f64> = forces.iter().map(|force| force.brake_n).collect();
-        let traction = delayed(time_s, &traction, delay_s, lag_s);
-        let brake = delayed(time_s, &brake, delay_s, lag_s);
-        for (force, (traction_n, brake_n)) in forces.iter_mut().zip(traction.into_iter().zip(brake))
-        {
+        let reported: Vec<Forces> =
+            forces.iter().map(|force| [force.traction_n, force.brake_n]).collect();
+        let late = delayed(time_s, &reported, delay_s, lag_s);
+        for (force, [traction_n, brake_n]) in forces.iter_mut().zip(late) {
             (force.traction_n, force.brake_n) = (traction_n, brake_n);
         }
     }
@@ -97,17 +108,20 @@ mod tests {
     #[test]
     fn a_step_comes_late_and_with_a_lag() {
         let time_s: Vec<f64> = (0..2000).map(|k| 0.01 * f64::from(k)).collect();
-        let step: Vec<f64> = time_s.iter().map(|&t| if t < 2.0 { 0.0 } else { 100.0 }).collect();
+        let height = |t: f64| if t < 2.0 { 0.0 } else { 100.0 };
+        let step: Vec<Forces> = time_s.iter().map(|&t| [height(t), 0.5 * height(t)]).collect();
         let late = delayed(&time_s, &step, 1.5, 0.8);
         for (time, force) in time_s.iter().zip(late) {
             let expected = 100.0 * (1.0 - (-(time - 3.5f64).max(0.0) / 0.8).exp());
-            assert!((force - expected).abs() < 1.0, "{time}: {force} {expected}");
+            for (force, expected) in force.into_iter().zip([expected, 0.5 * expected]) {
+                assert!((force - expected).abs() < 1.0, "{time}: {force} {expected}");
+            }
         }
     }
 
     #[test]
     fn no_delay_changes_nothing() {
-        let (time_s, force) = (vec![0.0, 0.3, 0.9], vec![3.0, -1.0, 8.0]);
+        let (time_s, force) = (vec![0.0, 0.3, 0.9], vec![[3.0, 0.0], [-1.0, 2.0], [8.0, 1.0]]);
         assert_eq!(delayed(&time_s, &force, 0.0, 0.0), force);
     }
 }

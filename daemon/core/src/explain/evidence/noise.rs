@@ -81,6 +81,9 @@ pub struct Whitener {
     log_determinant: f64,
 }
 
+/// Steps in s that differ by no more are equal: what is left of rounded times.
+const SAME_STEP_S: f64 = 1e-9;
+
 #[derive(Clone, Copy, Debug)]
 struct Step {
     starts: bool,
@@ -107,7 +110,7 @@ impl Whitener {
             let step_s = before.map_or(0.0, |(_, time_s)| bin.time_s - time_s);
             let starts = before.is_none_or(|(segment, _)| segment != bin.segment);
             before = Some((bin.segment, bin.time_s));
-            if step_s != fade_s {
+            if (step_s - fade_s).abs() > SAME_STEP_S {
                 (fade_s, fade) = (step_s, (-step_s / fading_s).exp());
             }
             let carry_s = fading_s * (1.0 - fade);

@@ -20,6 +20,9 @@ use crate::train::TrainModel;
 const EFFECTS_MAX: usize = 4;
 /// Kinds that get a noise of their own and a second localisation in each round.
 const FINALISTS: usize = 5;
+/// A finalist's advantage: not far below none, and no less than this share of the greatest.
+const FINALIST_MIN: f64 = -20.0;
+const FINALIST_SHARE: f64 = 0.1;
 /// Less observations than this tell nothing.
 pub const OBSERVATIONS_MIN: usize = 80;
 
@@ -146,11 +149,13 @@ impl Search<'_> {
         }
         let by_advantage = |one: &Trial, other: &Trial| other.advantage.total_cmp(&one.advantage);
         trials.sort_by(|one, other| by_advantage(&one.0, &other.0));
+        let greatest = trials.first().map_or(0.0, |(trial, _)| trial.advantage);
+        let least = FINALIST_MIN.max(FINALIST_SHARE * greatest);
         let mut finished: Vec<Trial> = trials
             .into_iter()
             .enumerate()
             .map(|(rank, (trial, effect))| {
-                let is_finalist = rank < FINALISTS && trial.advantage > -20.0;
+                let is_finalist = rank < FINALISTS && trial.advantage > least;
                 let share = base.model.effects.len() as f64
                     + (rank.min(FINALISTS) + 2) as f64 / (FINALISTS + 2) as f64;
                 (self.progress)((0.1 + 0.25 * share).min(0.85), trial.kind.name());

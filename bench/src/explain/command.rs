@@ -1,0 +1,108 @@
+//! `dynocar-bench explain`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::case::Case;
+use super::grade::Grade;
+use super::scenario::Scenario;
+use super::{growth, matrix};
+use crate::cli::give;
+use dynocar_shared::vocabulary::EffectKind;
+
+/// Every kind of undeclared effect, and nulls, over simulated datasets: power, false alarms,
+/// confusions, localisation, parameters and their coverage.
+#[derive(Debug, Args)]
+pub struct ExplainArguments {
+    /// Simulated datasets for each kind
+    #[arg(long, default_value_t = 20)]
+    seeds: usize,
+    /// The first seed
+    #[arg(long, default_value_t = 1)]
+    first_seed: u64,
+    /// Only this kind, as tunnel_drag, or none, two_effects, poor_recording; may be repeated
+    #[arg(long = "kind", value_name = "NAME")]
+    kinds: Vec<String>,
+    /// Datasets at a time
+    #[arg(long, default_value_t = 2)]
+    threads: usize,
+    /// Instead of the matrix, the time for 1, 4 and 16 times the data: one dataset of each kind
+    /// (none, tunnel_drag, dragging_brake and wind unless chosen) with more runs, then longer ones
+    #[arg(long, conflicts_with_all = ["seeds", "threads", "write", "verbose"])]
+    growth: bool,
+    /// Tell the outcome of every dataset on standard error
+    #[arg(long)]
+    verbose: bool,
+    /// Write the simulated datasets with their truth into this folder
+    #[arg(long, value_name = "DIR")]
+    write: Option<PathBuf>,
+    /// Write the result for machines; - for standard output
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+impl ExplainArguments {
+    fn scenarios(&self) -> Result<Vec<Scenario>, (String, u8)> {
+        if self.kinds.is_empty() {
+            use EffectKind::{DraggingBrake, None, TunnelDrag, Wind};
+            let few = [None, TunnelDrag, DraggingBrake, Wind].map(Scenario::Kind);
+            return Ok(if self.growth { few.to_vec() } else { Scenario::all() });
+        }
+        let named = |name: &String| {
+            let names: Vec<_> = Scenario::all().iter().map(|scenario| scenario.name()).collect();
+            Scenario::from_name(name)
+                .ok_or((format!("--kind {name}: expected one of {}", names.join(", ")), 2))
+        };
+        self.kinds.iter().map(named).collect()
+    }
+}
+
+/// Runs the command; an error has its text and the exit status.
+pub fn explain(arguments: &ExplainArguments) -> Result<(), (String, u8)> {
+    let scenarios = arguments.scenarios()?;
+    let (seeds, first) = (arguments.seeds, arguments.first_seed);
+    if arguments.growth {
+        let sizes = growth::measure(&scenarios, first, &|size| {
+            eprintln!("{} x{}: {:.1} s", size.axis, size.factor, size.seconds);
+        });
+        return give(&arguments.json, &sizes, || growth::table(&sizes));
+    }
+    if let Some(folder) = &arguments.write {
+        for case in matrix::cases(&scenarios, seeds, first) {
+            case.write(folder).map_err(|error| (format!("{}: {error}", folder.display()), 1))?;
+        }
+    }
+    let tell = |case: &Case, grade: &Grade| {
+        if arguments.verbose {
+            tell(case, grade);
+        }
+    };
+    let matrix = matrix::run(&scenarios, seeds, first, arguments.threads.max(1), &tell);
+    give(&arguments.json, &matrix, || matrix::table(&matrix))
+}
+
+/// One dataset's outcome on standard error.
+fn tell(case: &Case, grade: &Grade) {
+    let kinds: Vec<_> = case.scenario.kinds(case.seed).iter().map(|kind| kind.name()).collect();
+    let parameters: Vec<String> = grade
+        .parameters
+        .iter()
+        .map(|p| format!("{} {:+.3} ({:+.1} sd)", p.name, p.error, p.z))
+        .collect();
+    eprintln!(
+        "{} seed {}: {} {} {} iou {:?} share {:?} {}",
+        if grade.is_right { "right" } else { "WRONG" },
+        case.seed,
+        kinds.join("+"),
+        grade.verdict,
+        grade.named.join("+"),
+        grade.iou,
+        grade.share,
+        parameters.join(", ")
+    );
+    eprintln!("    strength {:.2}", grade.strength);
+    for detail in &grade.details {
+        eprintln!("    {detail}");
+    }
+}
