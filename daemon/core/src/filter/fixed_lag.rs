@@ -1,17 +1,17 @@
 //! What later measurements say of an earlier state.
 //!
-//! For each remembered moment the smoother keeps one linear function of the state at that
-//! moment: its mean, its variance, and its covariance with the present state. A measurement of
-//! the present state then corrects every remembered value through that covariance, exactly as
-//! if it were a further component of the state (Anderson and Moore 1979, section 7.3). No
-//! matrix is inverted and no backward pass is made; the cost of a step is one small
-//! matrix-vector product for each remembered moment.
+//! For each remembered moment the smoother keeps one component of the state at that moment: its
+//! mean, its variance, and its covariance with the present state. A measurement of the present
+//! state then corrects every remembered value through that covariance, exactly as if it were a
+//! further component of the state (Anderson and Moore 1979, section 7.3). No matrix is inverted and
+//! no backward pass is made; the cost of a step is one small matrix-vector product for each
+//! remembered moment.
 
 use nalgebra::{SMatrix, SVector};
 
 use super::kalman::{GaussianState, ScalarUpdate};
 
-/// A linear function of the state at an earlier moment, given all measurements since.
+/// A component of the state at an earlier moment, given all measurements since.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lagged<const N: usize, T> {
     /// What the caller attached to the moment.
@@ -47,14 +47,15 @@ impl<const N: usize, T: Copy> FixedLagSmoother<N, T> {
         self.oldest = 0;
     }
 
-    /// Remembers `row` times the present state, in place of the oldest moment when full.
+    /// Remembers a component of the present state, in place of the oldest moment when full.
     ///
     /// # Real-time
     ///
     /// Allocates nothing.
-    pub fn remember(&mut self, state: &GaussianState<N>, row: SVector<f64, N>, tag: T) {
-        let cross = state.covariance * row;
-        let moment = Lagged { tag, mean: row.dot(&state.mean), variance: row.dot(&cross), cross };
+    pub fn remember(&mut self, state: &GaussianState<N>, component: usize, tag: T) {
+        let cross = state.covariance.column(component).into_owned();
+        let mean = state.mean[component];
+        let moment = Lagged { tag, mean, variance: cross[component], cross };
         if self.moments.len() < self.capacity {
             self.moments.push(moment);
         } else {
@@ -73,9 +74,10 @@ impl<const N: usize, T: Copy> FixedLagSmoother<N, T> {
     /// Follows a measurement of the present state.
     pub fn apply(&mut self, update: &ScalarUpdate<N>) {
         for moment in &mut self.moments {
-            let covariance = moment.cross.dot(&update.row);
-            moment.mean += covariance / update.variance * update.innovation;
-            moment.variance -= covariance * covariance / update.variance;
+            let covariance = moment.cross[update.component];
+            let share = covariance * update.inverse_variance;
+            moment.mean += share * update.innovation;
+            moment.variance -= share * covariance;
             moment.cross -= update.gain * covariance;
         }
     }
@@ -101,54 +103,36 @@ impl<const N: usize, T: Copy> FixedLagSmoother<N, T> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::batch_twin::MovingState;
     use super::*;
-    use crate::filter::kalman::GaussianState;
-    use crate::filter::random::Random;
-    use crate::filter::rts::{self, ForwardStep, SmoothedStep};
-    use nalgebra::Matrix2;
 
-    /// Constant speed with noise, position measured; forward pass and the smoother's moments.
-    fn run(capacity: usize) -> (Vec<ForwardStep<2>>, FixedLagSmoother<2, usize>) {
-        let mut random = Random::new(3);
-        let noise = Matrix2::new(0.01, 0.002, 0.002, 0.02);
-        let mut state =
-            GaussianState::independent(SVector::from([0.0, 1.0]), SVector::from([1.0, 2.0]));
+    const SECOND: usize = 1;
+
+    /// The smoother's moments after a forward pass over 40 steps, and the last state.
+    fn run(capacity: usize) -> (GaussianState<2>, FixedLagSmoother<2, usize>) {
         let mut smoother = FixedLagSmoother::new(capacity);
-        let mut forward = Vec::new();
-        for step in 0..40 {
-            let jacobian = if step == 0 {
-                Matrix2::identity()
-            } else {
-                Matrix2::new(1.0, 0.3 + 0.01 * step as f64, 0.0, 0.98)
-            };
-            if step > 0 {
-                state.predict(jacobian * state.mean, &jacobian, &noise);
-                smoother.predict(&jacobian);
+        let mut number = 0;
+        let forward = MovingState::new(40).forward(|step, jacobian| {
+            if let Some(jacobian) = jacobian {
+                smoother.predict(jacobian);
             }
-            let predicted = state;
-            let measured = 0.4 * step as f64 + random.normal();
-            let update = state.innovation(SVector::from([1.0, 0.0]), measured, 0.25).unwrap();
-            state.apply(&update);
-            smoother.apply(&update);
-            smoother.remember(&state, SVector::from([0.5, 2.0]), step);
-            forward.push(ForwardStep { predicted, filtered: state, jacobian });
-        }
-        (forward, smoother)
+            smoother.apply(&step.update);
+            smoother.remember(&step.filtered, SECOND, number);
+            number += 1;
+        });
+        (forward[39].filtered, smoother)
     }
 
     #[test]
-    fn every_moment_equals_the_backward_pass_of_rauch_tung_and_striebel() {
-        let (forward, smoother) = run(12);
-        let mut smoothed = vec![SmoothedStep::empty(); forward.len()];
-        rts::smooth(&forward, &mut smoothed).unwrap();
-        let row = SVector::from([0.5, 2.0]);
+    fn every_moment_equals_batch_least_squares() {
+        let (_, smoother) = run(12);
+        let (means, covariances) = MovingState::new(40).batch();
         let mut newest_first = smoother.newest_first();
         for step in (28..40).rev() {
             let moment = newest_first.next().unwrap();
-            let exact = &smoothed[step].state;
             assert_eq!(moment.tag, step);
-            assert!((moment.mean - row.dot(&exact.mean)).abs() < 1e-10);
-            assert!((moment.variance - row.dot(&(exact.covariance * row))).abs() < 1e-10);
+            assert!((moment.mean - means[step][SECOND]).abs() < 1e-10);
+            assert!((moment.variance - covariances[step][(SECOND, SECOND)]).abs() < 1e-10);
         }
         assert!(newest_first.next().is_none());
         assert_eq!(smoother.oldest().unwrap().tag, 28);
@@ -156,11 +140,10 @@ mod tests {
 
     #[test]
     fn a_frozen_moment_no_longer_changes() {
-        let (forward, mut smoother) = run(5);
+        let (mut state, mut smoother) = run(5);
         smoother.freeze();
         let before = smoother.oldest().unwrap().mean;
-        let mut state = forward[39].filtered;
-        let update = state.innovation(SVector::from([1.0, 0.0]), 99.0, 0.25).unwrap();
+        let update = state.innovation(0, 99.0, 0.25).unwrap();
         state.apply(&update);
         smoother.apply(&update);
         assert_eq!(smoother.oldest().unwrap().mean, before);

@@ -1,4 +1,4 @@
-//! A Gaussian belief about a state, moved by a linearised model and scalar measurements.
+//! A Gaussian belief about a state, moved by a linearised model and by measurements of components.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -13,12 +13,6 @@ pub enum FilterError {
         /// The variance.
         variance: f64,
     },
-    /// A covariance cannot be factorised.
-    #[error("the covariance of step {step} is not positive definite")]
-    NotPositiveDefinite {
-        /// Number of the step, from 0.
-        step: usize,
-    },
 }
 
 /// Mean and covariance of a state.
@@ -30,25 +24,27 @@ pub struct GaussianState<const N: usize> {
     pub covariance: SMatrix<f64, N, N>,
 }
 
-/// What a scalar measurement did to a [`GaussianState`].
+/// What the measurement of a component did to a [`GaussianState`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScalarUpdate<const N: usize> {
     /// Measured minus predicted value.
     pub innovation: f64,
     /// Predicted variance of the innovation.
     pub variance: f64,
+    /// One over it.
+    pub inverse_variance: f64,
     /// The measurement's share of it.
     pub noise_variance: f64,
     /// Gain.
     pub gain: SVector<f64, N>,
-    /// The row of the measurement.
-    pub row: SVector<f64, N>,
+    /// The component that was measured.
+    pub component: usize,
 }
 
 impl<const N: usize> ScalarUpdate<N> {
     /// Innovation over its predicted standard deviation.
     pub fn normalised(&self) -> f64 {
-        self.innovation / self.variance.sqrt()
+        self.innovation * self.inverse_variance.sqrt()
     }
 
     /// Logarithm of the predicted density of the measured value.
@@ -66,6 +62,7 @@ impl<const N: usize> GaussianState<N> {
     }
 
     /// Moves the belief to a mean computed by the caller, with the Jacobian of that move.
+    #[inline]
     pub fn predict(
         &mut self,
         mean: SVector<f64, N>,
@@ -76,34 +73,39 @@ impl<const N: usize> GaussianState<N> {
         self.covariance = moved(jacobian, &self.covariance, process_noise);
     }
 
-    /// Innovation and gain of measuring `row` times the state, without applying them.
+    /// Innovation and gain of measuring one component of the state, without applying them.
     ///
     /// # Errors
     ///
     /// When the innovation's variance is not positive and finite.
+    #[inline]
     pub fn innovation(
         &self,
-        row: SVector<f64, N>,
+        component: usize,
         measured: f64,
         noise_variance: f64,
     ) -> Result<ScalarUpdate<N>, FilterError> {
-        let cross = self.covariance * row;
-        let variance = row.dot(&cross) + noise_variance;
+        let cross = self.covariance.column(component);
+        let variance = cross[component] + noise_variance;
         // Also refuses NaN.
         if !(variance > 0.0 && variance.is_finite()) {
             return Err(FilterError::InnovationVariance { variance });
         }
-        let innovation = measured - row.dot(&self.mean);
-        Ok(ScalarUpdate { innovation, variance, noise_variance, gain: cross / variance, row })
+        let innovation = measured - self.mean[component];
+        let inverse_variance = 1.0 / variance;
+        let gain = cross * inverse_variance;
+        Ok(ScalarUpdate { innovation, variance, inverse_variance, noise_variance, gain, component })
     }
 
     /// Applies a measurement; the covariance stays symmetric and positive.
+    #[inline]
     pub fn apply(&mut self, update: &ScalarUpdate<N>) {
         self.mean += update.gain * update.innovation;
-        let spread = update.gain * update.variance;
-        let inverse_variance = 1.0 / update.variance;
-        let noise_variance = update.noise_variance;
-        measured(&mut self.covariance, &update.row, &spread, inverse_variance, noise_variance);
+        let ScalarUpdate { component, inverse_variance, noise_variance, .. } = *update;
+        let spread = self.covariance.column(component).into_owned();
+        let mut row = SVector::zeros();
+        row[component] = 1.0;
+        measured(&mut self.covariance, &row, &spread, inverse_variance, noise_variance);
     }
 
     /// Standard deviation of one component.
@@ -129,7 +131,7 @@ mod tests {
             if k > 0 {
                 belief.predict(jacobian * belief.mean, &jacobian, &SMatrix::zeros());
             }
-            let update = belief.innovation(SVector::from([1.0, 0.0]), value, 0.04).unwrap();
+            let update = belief.innovation(0, value, 0.04).unwrap();
             belief.apply(&update);
         }
         let mut information = prior.covariance.try_inverse().unwrap();
@@ -150,9 +152,9 @@ mod tests {
     fn a_measurement_without_variance_is_refused() {
         let belief =
             GaussianState::independent(SVector::from([0.0, 0.0]), SVector::from([0.0, 1.0]));
-        let refused = belief.innovation(SVector::from([1.0, 0.0]), 1.0, 0.0);
+        let refused = belief.innovation(0, 1.0, 0.0);
         assert_eq!(refused, Err(FilterError::InnovationVariance { variance: 0.0 }));
-        assert!(belief.innovation(SVector::from([1.0, 0.0]), 1.0, f64::NAN).is_err());
+        assert!(belief.innovation(0, 1.0, f64::NAN).is_err());
     }
 
     #[test]
@@ -162,7 +164,7 @@ mod tests {
         let jacobian = Matrix2::new(1.0, 0.01, 0.0, 1.0);
         for _ in 0..10_000 {
             belief.predict(jacobian * belief.mean, &jacobian, &SMatrix::zeros());
-            let update = belief.innovation(SVector::from([1.0, 0.0]), 0.0, 1e-12).unwrap();
+            let update = belief.innovation(0, 0.0, 1e-12).unwrap();
             belief.apply(&update);
             assert!(belief.covariance.cholesky().is_some());
         }

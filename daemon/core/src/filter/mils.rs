@@ -116,6 +116,7 @@ impl<const N: usize, const L: usize> Mils<N, L> {
     /// # Real-time
     ///
     /// Bounded work, no allocation.
+    #[inline]
     pub fn update(
         &mut self,
         features: &SVector<f64, N>,
@@ -126,10 +127,11 @@ impl<const N: usize, const L: usize> Mils<N, L> {
     }
 
     /// Keeps a row for the next update without updating.
+    #[inline]
     pub fn remember(&mut self, features: &SVector<f64, N>, observed: f64) {
         self.features[self.next] = *features;
         self.observed[self.next] = observed;
-        self.next = (self.next + 1) % self.length;
+        self.next = self.place_after(self.next);
         self.held = (self.held + 1).min(self.length);
     }
 
@@ -141,6 +143,14 @@ impl<const N: usize, const L: usize> Mils<N, L> {
     /// The number of rows remembered, at most p.
     pub fn remembered(&self) -> usize {
         self.held
+    }
+
+    fn place_after(&self, place: usize) -> usize {
+        if place + 1 < self.length { place + 1 } else { 0 }
+    }
+
+    fn place_before(&self, place: usize) -> usize {
+        place.checked_sub(1).unwrap_or(self.length - 1)
     }
 
     /// Takes in the rows of the penalty.
@@ -160,6 +170,7 @@ impl<const N: usize, const L: usize> Mils<N, L> {
     /// # Errors
     ///
     /// When P is no longer positive definite, or no row is remembered.
+    #[inline]
     pub fn update_from_memory(&mut self) -> Result<Step, NotPositiveDefinite> {
         if self.held == 0 {
             return Err(NotPositiveDefinite);
@@ -167,7 +178,7 @@ impl<const N: usize, const L: usize> Mils<N, L> {
         if let Some(weights) = self.penalty.weights_at(self.updates) {
             self.penalise(&weights)?;
         }
-        let newest = (self.next + self.length - 1) % self.length;
+        let newest = self.place_before(self.next);
         let features = self.features[newest];
         let step = scalar_update(
             &mut self.estimate,
@@ -175,8 +186,9 @@ impl<const N: usize, const L: usize> Mils<N, L> {
             &features,
             self.observed[newest],
         )?;
-        for back in 1..self.held {
-            let place = (newest + self.length - back) % self.length;
+        let mut place = newest;
+        for _ in 1..self.held {
+            place = self.place_before(place);
             let features = self.features[place];
             let observed = self.observed[place];
             scalar_update(&mut self.estimate, &mut self.covariance, &features, observed)?;

@@ -13,10 +13,13 @@
 //! - [`joseph`]: a small Kalman filter in Joseph's form
 //! - [`kalman`]: Gaussian state, scalar measurements in Joseph form
 //! - [`fixed_lag`]: what later measurements say of an earlier state, without a backward pass
-//! - [`rts`]: fixed-interval smoothing by Rauch, Tung and Striebel
+//! - [`adjoint`]: fixed-interval smoothing without an inverse (Bryson and Frazier)
 //! - [`particle`], [`random`]: particle filter, marginal particle smoother and their seeded generator
 //! - [`lanes`]: sums and powers over slices; `rank_one`: the covariance after a scalar measurement
 
+pub mod adjoint;
+#[cfg(test)]
+mod batch_twin;
 mod bounded;
 pub mod drifting_level;
 pub mod fixed_lag;
@@ -33,7 +36,6 @@ pub mod particle;
 pub mod random;
 mod rank_one;
 mod rls;
-pub mod rts;
 pub mod square_root;
 pub mod triangular;
 mod whitening;

@@ -82,7 +82,7 @@ impl<const N: usize> Rls<N> {
     ) -> Result<Step, NotPositiveDefinite> {
         match self.forgetting {
             Forgetting::None => {}
-            Forgetting::Exponential(factor) => self.covariance /= factor,
+            Forgetting::Exponential(factor) => self.covariance *= 1.0 / factor,
             Forgetting::Directional(factor) => self.forget_along(features, factor)?,
         }
         scalar_update(&mut self.estimate, &mut self.covariance, features, observed)

@@ -10,7 +10,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::engine::{Engine, EngineError, Estimate, Observation, Step};
 use super::law::Law;
-use super::motion::{self, STATES, State, StepInputs};
+use super::motion::{STATES, State, StepInputs};
 use super::tracker::{TrackerModel, measure};
 use crate::filter::kalman::GaussianState;
 
@@ -195,9 +195,7 @@ impl Engine for LawBank {
         for hypothesis in &mut self.hypotheses {
             let model = &hypothesis.model;
             let mut state = hypothesis.mixed;
-            let (mean, jacobian) = motion::predict(inputs, &model.law, model.walk, &state.mean);
-            let added = motion::process_noise(&model.noise, model.walk, inputs.step_s);
-            state.predict(mean, &jacobian, &added);
+            model.advance(inputs, &mut state);
             let (log_likelihood, normalised) = measure(model, &mut state, observed)?;
             hypothesis.state = state;
             hypothesis.log_likelihood += log_likelihood;

@@ -160,6 +160,36 @@ pub fn predict(
     (after, jacobian)
 }
 
+/// F P Fᵀ + Q for the Jacobian F of [`predict`], exactly symmetric: F is the identity but for six
+/// places, and nothing else is multiplied.
+pub fn move_covariance(
+    jacobian: &SMatrix<f64, STATES, STATES>,
+    covariance: &SMatrix<f64, STATES, STATES>,
+    added: &SMatrix<f64, STATES, STATES>,
+) -> SMatrix<f64, STATES, STATES> {
+    const DISTANCE: usize = State::Distance as usize;
+    const SPEED: usize = State::Speed as usize;
+    const SCALE: usize = State::Scale as usize;
+    const DRIFT: usize = State::Drift as usize;
+    let times_jacobian = |matrix: SMatrix<f64, STATES, STATES>| {
+        let [distance, speed, scale, drift] =
+            [DISTANCE, SPEED, SCALE, DRIFT].map(|component| matrix.column(component).into_owned());
+        SMatrix::<f64, STATES, STATES>::from_columns(&[
+            distance + speed * jacobian[(DISTANCE, SPEED)] + scale * jacobian[(DISTANCE, SCALE)],
+            speed * jacobian[(SPEED, SPEED)] + scale * jacobian[(SPEED, SCALE)],
+            scale + drift * jacobian[(SCALE, DRIFT)],
+            drift * jacobian[(DRIFT, DRIFT)],
+        ])
+    };
+    let mut moved = times_jacobian(times_jacobian(*covariance).transpose()) + added;
+    for j in 0..STATES {
+        for i in 0..j {
+            moved[(j, i)] = moved[(i, j)];
+        }
+    }
+    moved
+}
+
 /// Covariance that a step adds.
 pub fn process_noise(noise: &MotionNoise, walk: Walk, step_s: f64) -> SMatrix<f64, STATES, STATES> {
     const SCALE: usize = State::Scale as usize;
@@ -217,6 +247,29 @@ mod tests {
                     / (2.0 * step);
                 assert!((jacobian.column(column) - difference).norm() < 1e-8, "{law:?} {column}");
             }
+        }
+    }
+
+    #[test]
+    fn the_covariance_is_moved_as_by_full_products() {
+        let state = SVector::from([120.0, 60.0, 0.9, -0.01]);
+        let root = SMatrix::<f64, STATES, STATES>::from_fn(|i, j| {
+            0.3 + 0.2 * i as f64 - 0.4 * (j as f64) * (i as f64 - 1.3)
+        });
+        let covariance = root * root.transpose();
+        let noise = MotionNoise {
+            distance_m2_per_s: 0.02,
+            speed_m2_per_s3: 0.01,
+            measured_distance_m2: 1.0,
+            measured_speed_m2_per_s2: None,
+        };
+        for walk in [WALK, Walk::Scale(1e-4)] {
+            let (_, jacobian) = predict(&inputs(), &Law::Rail(RailCondition::Wet), walk, &state);
+            let added = process_noise(&noise, walk, inputs().step_s);
+            let moved = move_covariance(&jacobian, &covariance, &added);
+            let full = jacobian * covariance * jacobian.transpose() + added;
+            assert!((moved - full).norm() < 1e-12 * full.norm());
+            assert_eq!(moved, moved.transpose());
         }
     }
 

@@ -4,7 +4,7 @@
 //! with; with an integrated random walk and a lag it is our smoother.
 
 use dynocar_shared::Uncertain;
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 
 use super::engine::{Engine, EngineError, Estimate, Observation, Step};
 use super::law::Law;
@@ -12,6 +12,7 @@ use super::motion::{self, MotionNoise, STATES, State, StepInputs, Walk};
 use crate::filter::fixed_lag::FixedLagSmoother;
 use crate::filter::kalman::{FilterError, GaussianState};
 
+const DISTANCE: usize = State::Distance as usize;
 const SPEED: usize = State::Speed as usize;
 const SCALE: usize = State::Scale as usize;
 
@@ -73,20 +74,27 @@ impl TrackerModel {
         )
     }
 
-    /// Measurement rows with measured values and noise variances, in order.
-    pub fn measurements(
+    /// Moves a belief over one step; gives the Jacobian of the move.
+    pub fn advance(
         &self,
-        observed: &Observation,
-    ) -> [Option<(SVector<f64, STATES>, f64, f64)>; 2] {
-        let distance = (
-            SVector::from([1.0, 0.0, 0.0, 0.0]),
-            observed.distance_m,
-            self.noise.measured_distance_m2,
-        );
-        let speed =
-            self.noise.measured_speed_m2_per_s2.filter(|_| observed.is_speed_valid).map(
-                |variance| (SVector::from([0.0, 1.0, 0.0, 0.0]), observed.speed_mps, variance),
-            );
+        inputs: &StepInputs,
+        state: &mut GaussianState<STATES>,
+    ) -> SMatrix<f64, STATES, STATES> {
+        let (mean, jacobian) = motion::predict(inputs, &self.law, self.walk, &state.mean);
+        let added = motion::process_noise(&self.noise, self.walk, inputs.step_s);
+        let covariance = motion::move_covariance(&jacobian, &state.covariance, &added);
+        *state = GaussianState { mean, covariance };
+        jacobian
+    }
+
+    /// Measured components with their values and noise variances, in order.
+    pub fn measurements(&self, observed: &Observation) -> [Option<(usize, f64, f64)>; 2] {
+        let distance = (DISTANCE, observed.distance_m, self.noise.measured_distance_m2);
+        let speed = self
+            .noise
+            .measured_speed_m2_per_s2
+            .filter(|_| observed.is_speed_valid)
+            .map(|variance| (SPEED, observed.speed_mps, variance));
         [Some(distance), speed]
     }
 
@@ -182,8 +190,7 @@ impl Tracker {
     fn remember(&mut self, demand: f64) {
         if let Some(state) = &self.state {
             let (shape, _) = self.model.law.at(state.mean[SPEED], demand);
-            let row = SVector::from([0.0, 0.0, 1.0, 0.0]);
-            self.smoother.remember(state, row, Moment { time_s: self.time_s, shape, demand });
+            self.smoother.remember(state, SCALE, Moment { time_s: self.time_s, shape, demand });
         }
     }
 
@@ -215,17 +222,18 @@ impl Engine for Tracker {
             return Ok(Step::Restarted);
         };
         self.time_s += inputs.step_s;
-        let (mean, jacobian) =
-            motion::predict(inputs, &self.model.law, self.model.walk, &state.mean);
-        let added = motion::process_noise(&self.model.noise, self.model.walk, inputs.step_s);
-        state.predict(mean, &jacobian, &added);
-        self.smoother.predict(&jacobian);
+        let jacobian = self.model.advance(inputs, state);
+        // Without a lag the only moment is the newest, which is remembered anew after each step.
+        let has_lag = self.lag_s > 0.0;
+        if has_lag {
+            self.smoother.predict(&jacobian);
+        }
         let mut first_innovation = None;
         let mut is_change = false;
         let measurements = self.model.measurements(observed).into_iter();
         for (measurement, changes) in measurements.zip(&mut self.changes) {
-            let Some((row, measured, variance)) = measurement else { continue };
-            let update = state.innovation(row, measured, variance)?;
+            let Some((component, measured, variance)) = measurement else { continue };
+            let update = state.innovation(component, measured, variance)?;
             let normalised = update.normalised();
             let is_outlier = normalised.abs() > OUTLIER_GATE;
             if is_outlier && first_innovation.is_some() {
@@ -241,7 +249,9 @@ impl Engine for Tracker {
                 return Ok(Step::Outlier);
             }
             state.apply(&update);
-            self.smoother.apply(&update);
+            if has_lag {
+                self.smoother.apply(&update);
+            }
             is_change |= changes.push(normalised);
             first_innovation.get_or_insert(normalised);
         }
@@ -289,8 +299,8 @@ pub fn measure(
     observed: &Observation,
 ) -> Result<(f64, f64), FilterError> {
     let (mut log_likelihood, mut first_normalised) = (0.0, None);
-    for (row, measured, variance) in model.measurements(observed).into_iter().flatten() {
-        let update = state.innovation(row, measured, variance)?;
+    for (component, measured, variance) in model.measurements(observed).into_iter().flatten() {
+        let update = state.innovation(component, measured, variance)?;
         log_likelihood += update.log_likelihood();
         first_normalised.get_or_insert(update.normalised());
         state.apply(&update);

@@ -5,12 +5,15 @@ use std::f64::consts::LOG2_E;
 use nalgebra::{SMatrix, SVector};
 
 use super::window::WindowModel;
+use crate::filter::adjoint::{ForwardStep, smooth_means};
 use crate::filter::kalman::GaussianState;
 use crate::filter::lanes;
 use crate::filter::particle::{ParticleModel, ParticleSmoother};
 use crate::filter::random::Random;
-use crate::filter::rts::{self, ForwardStep, SmoothedStep};
 use crate::pipeline::braking::engine::EngineError;
+use crate::pipeline::braking::motion::State;
+
+const DISTANCE: usize = State::Distance as usize;
 
 /// What the M-step needs of the E-step: dQ/d share and -d²Q/d share² at the present value, the
 /// share being the coefficient over the demand. Only I_2, the moves, depends on it (Xie 2019,
@@ -138,11 +141,12 @@ impl Expectation for ParticleExpectation {
     }
 }
 
-/// The exact E-step for the Gaussian model: Kalman filter and Rauch-Tung-Striebel smoother.
+/// The exact E-step for the Gaussian model: Kalman filter and its adjoint. Q needs the smoothed
+/// means only.
 #[derive(Clone, Debug)]
 pub struct KalmanExpectation {
     forward: Vec<ForwardStep<2>>,
-    smoothed: Vec<SmoothedStep<2>>,
+    smoothed: Vec<SVector<f64, 2>>,
 }
 
 impl KalmanExpectation {
@@ -150,13 +154,13 @@ impl KalmanExpectation {
     pub fn new(window_steps: usize) -> Self {
         KalmanExpectation {
             forward: Vec::with_capacity(window_steps),
-            smoothed: vec![SmoothedStep::empty(); window_steps],
+            smoothed: vec![SVector::zeros(); window_steps],
         }
     }
 
     /// Mean of distance and speed at a step given the whole window, from the last E-step.
     pub fn smoothed_mean(&self, step: usize) -> Option<[f64; 2]> {
-        (step < self.forward.len()).then(|| self.smoothed[step].state.mean.into())
+        (step < self.forward.len()).then(|| self.smoothed[step].into())
     }
 
     fn filter(&mut self, model: &WindowModel<'_>) -> Result<(), EngineError> {
@@ -174,12 +178,12 @@ impl KalmanExpectation {
             }
             let predicted = state;
             let update = state.innovation(
-                SVector::from([1.0, 0.0]),
+                DISTANCE,
                 entry.observed.distance_m,
                 model.noise.measured_distance_m2,
             )?;
             state.apply(&update);
-            self.forward.push(ForwardStep { predicted, filtered: state, jacobian });
+            self.forward.push(ForwardStep { predicted, filtered: state, update, jacobian });
         }
         Ok(())
     }
@@ -189,11 +193,11 @@ impl Expectation for KalmanExpectation {
     fn expect(&mut self, model: &WindowModel<'_>) -> Result<Statistics, EngineError> {
         self.filter(model)?;
         let count = self.forward.len();
-        rts::smooth(&self.forward, &mut self.smoothed[..count])?;
+        smooth_means(&self.forward, &mut self.smoothed[..count]);
         let mut statistics = Statistics::default();
         for step in 0..count.saturating_sub(1) {
-            let (advanced, _) = model.advance(step, self.smoothed[step].state.mean.into());
-            let next = self.smoothed[step + 1].state.mean;
+            let (advanced, _) = model.advance(step, self.smoothed[step].into());
+            let next = self.smoothed[step + 1];
             let deviation = [next[0] - advanced[0], next[1] - advanced[1]];
             model.accumulate(step, deviation, &mut statistics);
         }

@@ -215,10 +215,7 @@ impl<E: Expectation> EmWindow<E> {
         state.covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&first.covariance);
         for (step, entry) in self.window.entries.iter().enumerate() {
             if step > 0 {
-                let (mean, jacobian) =
-                    motion::predict(&entry.inputs, &model.law, model.walk, &state.mean);
-                let added = motion::process_noise(&model.noise, model.walk, entry.inputs.step_s);
-                state.predict(mean, &jacobian, &added);
+                model.advance(&entry.inputs, &mut state);
             }
             measure(&model, &mut state, &entry.observed)?;
         }
