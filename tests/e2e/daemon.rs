@@ -2,7 +2,7 @@
 
 use dynocar_client::peer::{Announcement, Role};
 use dynocar_client::{SamplePublisher, SnapshotReader};
-use dynocar_shared::{SampleField, TrainId, TrainSample};
+use dynocar_shared::{ParameterSnapshot, SampleField, TrainId, TrainSample};
 use dynocar_tests::process::{Process, Site, await_true};
 use rustix::process::Signal;
 
@@ -49,6 +49,36 @@ fn every_idle_strategy_serves() {
             );
         }
     }
+}
+
+#[test]
+fn a_sample_published_as_soon_as_the_first_snapshot_is_there_is_not_lost() {
+    const PIPELINES: usize = 32;
+    let site = Site::new();
+    let host = site.host();
+    let mut publisher = SamplePublisher::open(&host, TrainId(1)).unwrap();
+    let mut reader = SnapshotReader::open(&host, TrainId(1)).unwrap();
+    let echo = |k| format!("{ECHO}name = \"{k}\"\nthread = \"all\"\n");
+    let pipelines: String = (0..PIPELINES).map(echo).collect();
+    let daemon = daemon(&site, "", &format!("[[threads]]\nname = \"all\"\n{pipelines}"));
+    await_true(
+        || {
+            reader.poll();
+            reader.readings(0).count() > 0
+        },
+        || daemon.errors(),
+    );
+    let mut sample = TrainSample::empty(TrainId(1)).with(SampleField::Speed, 20.0);
+    sample.time_ns = 1;
+    publisher.publish(&mut sample).unwrap();
+    await_true(
+        || {
+            reader.poll();
+            let taken = |it: &ParameterSnapshot| it.samples_used == 1;
+            reader.readings(0).filter(|it| taken(it.snapshot)).count() == PIPELINES
+        },
+        || format!("all pipelines to take the sample: {}", daemon.errors()),
+    );
 }
 
 #[test]

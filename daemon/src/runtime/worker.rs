@@ -190,6 +190,8 @@ impl Slot {
 }
 
 fn open_lane(transport: &Transport, plan: LanePlan, epoch: u64) -> Result<Lane, ChannelError> {
+    // Before the first snapshot: who reads that may publish at once, and loses nothing.
+    let receiver = transport.receiver::<TrainSample>(plan.train)?;
     let slots = plan
         .pipelines
         .into_iter()
@@ -200,7 +202,6 @@ fn open_lane(transport: &Transport, plan: LanePlan, epoch: u64) -> Result<Lane, 
             Ok(slot)
         })
         .collect::<Result<_, ChannelError>>()?;
-    let receiver = transport.receiver::<TrainSample>(plan.train)?;
     Ok(Lane { receiver, found: None, slots })
 }
 

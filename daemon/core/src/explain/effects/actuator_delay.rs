@@ -4,13 +4,16 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
-use crate::explain::scan::Scan;
+use crate::explain::scan::{Scan, Tuple};
 
 const PARAMETERS: [Parameter; 2] =
     [Parameter::new("delay_s", (0.0, 6.0), 0.05), Parameter::new("lag_s", (0.0, 8.0), 0.05)];
 
 /// Steps in s that differ by no more are equal: what is left of rounded times.
 const SAME_STEP_S: f64 = 1e-9;
+
+/// Delay and lag in s that a fit may start from.
+const STARTS: [[f64; 2]; 4] = [[0.3, 0.3], [1.0, 1.0], [0.2, 2.0], [2.0, 0.3]];
 
 /// The kind.
 pub struct ActuatorDelay;
@@ -23,12 +26,29 @@ impl Effect for ActuatorDelay {
         EffectKind::ActuatorDelay
     }
 
-    fn propose(&self, _scan: &Scan) -> Proposal {
-        let starts = [[0.3, 0.3], [1.0, 1.0], [0.2, 2.0]];
-        Proposal::Candidates(
-            starts.map(|start| Candidate::new(DelayAndLag, start.to_vec())).to_vec(),
-        )
+    fn propose(&self, scan: &Scan) -> Proposal {
+        let best = STARTS
+            .into_iter()
+            .map(|start| (decrease(scan, start), start))
+            .max_by(|one, other| one.0.total_cmp(&other.0));
+        let candidate = |(_, start): (f64, [f64; 2])| Candidate::new(DelayAndLag, start.to_vec());
+        Proposal::Candidates(best.map(candidate).into_iter().collect())
     }
+}
+
+/// Decrease of the cost when the forces act with this delay and lag.
+fn decrease(scan: &Scan, [delay_s, lag_s]: [f64; 2]) -> f64 {
+    let mut sum = Tuple::zero(scan.fit.theta.len());
+    for (index, run) in scan.problem.runs.iter().enumerate() {
+        let reported: Vec<Forces> =
+            run.declared.iter().map(|force| [force.traction_n, force.brake_n]).collect();
+        let late = delayed(run.recording.time_s(), &reported, delay_s, lag_s);
+        let control_n = |[traction_n, brake_n]: Forces| traction_n - brake_n;
+        sum.add(&scan.run_tuple(index, |run, i| {
+            (control_n(late[i]) - control_n(reported[i])) / run.samples()[i].inertial_mass_kg
+        }));
+    }
+    scan.decrease_at_one(&sum)
 }
 
 /// Traction and brake force in N.

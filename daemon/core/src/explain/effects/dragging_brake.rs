@@ -14,8 +14,11 @@ use crate::explain::scan::{Scan, Tuple};
 const PARAMETERS: [Parameter; 1] = [Parameter::new("force_n", (0.0, 3e5), 20.0)];
 /// The force builds up over this time in s.
 const BUILD_UP_S: f64 = 10.0;
-/// Onsets are first looked for this far apart in s.
-const GRID_S: f64 = 12.0;
+/// Onsets are first looked for at least this far apart in s, and at so many places of a run.
+const GRID_MIN_S: f64 = 12.0;
+const GRID_PLACES: f64 = 120.0;
+/// Then each to so many s.
+const FINEST_S: f64 = 2.0;
 /// Motion in s that must follow an onset.
 const TAIL_MIN_S: f64 = 40.0;
 /// What a run's taking part must explain beyond the choice of its onset: brakes release in nine
@@ -36,6 +39,8 @@ struct Dragging {
 
 /// The onsets of one run, by time, with their tuples.
 struct Onsets {
+    /// Distance in s between them.
+    grid_s: f64,
     times_s: Vec<f64>,
     tuples: Vec<Tuple>,
 }
@@ -55,13 +60,14 @@ impl Onsets {
     fn of(scan: &Scan, index: usize) -> Self {
         let run = &scan.problem.runs[index];
         let last_s = run.duration_s() - TAIL_MIN_S;
-        let count = (last_s / GRID_S).floor().max(0.0) as usize;
+        let grid_s = GRID_MIN_S.max(last_s / GRID_PLACES);
+        let count = (last_s / grid_s).floor().max(0.0) as usize;
         let first_s = run.bins.first().map_or(0.0, |bin| bin.time_s) - BUILD_UP_S;
         let times_s: Vec<f64> = std::iter::once(first_s)
-            .chain((1..count).map(|k| GRID_S * k as f64).filter(|&time| time > first_s))
+            .chain((1..count).map(|k| grid_s * k as f64).filter(|&time| time > first_s))
             .collect();
         let tuples = times_s.iter().map(|&onset_s| onset_tuple(scan, index, onset_s)).collect();
-        Onsets { times_s, tuples }
+        Onsets { grid_s, times_s, tuples }
     }
 
     /// What the taking part of the run must explain.
@@ -183,18 +189,22 @@ fn refined(scan: &Scan, onsets: &[Onsets], chosen: &[Option<usize>]) -> (Vec<Run
                 rest.add(tuple);
             }
         }
-        let (index, middle_s, _) = found[at];
-        let best = (-6..=6)
-            .map(|k| {
-                let onset_s = middle_s + GRID_S / 6.0 * f64::from(k);
-                let own = onset_tuple(scan, index, onset_s);
-                let mut sum = rest.clone();
-                sum.add(&own);
-                (scan.gain(&sum).0, onset_s, own)
-            })
-            .max_by(|one, other| one.0.total_cmp(&other.0));
-        if let Some((_, onset_s, own)) = best {
-            found[at] = (index, onset_s, own);
+        let mut step_s = onsets[found[at].0].grid_s;
+        while step_s > FINEST_S {
+            step_s /= 6.0;
+            let (index, middle_s, _) = found[at];
+            let best = (-6..=6)
+                .map(|k| {
+                    let onset_s = middle_s + step_s * f64::from(k);
+                    let own = onset_tuple(scan, index, onset_s);
+                    let mut sum = rest.clone();
+                    sum.add(&own);
+                    (scan.gain(&sum).0, onset_s, own)
+                })
+                .max_by(|one, other| one.0.total_cmp(&other.0));
+            if let Some((_, onset_s, own)) = best {
+                found[at] = (index, onset_s, own);
+            }
         }
     }
     let mut sum = Tuple::zero(count);
