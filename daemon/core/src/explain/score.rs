@@ -33,21 +33,27 @@ pub fn run_error(fit: &Fit, run: &RunData, restart: Restart) -> SpeedError {
     SpeedError::of(&run.recording, &prediction)
 }
 
-/// Share of the root mean square error of the fit runs that the larger model takes away: over
-/// whole runs or with restarts every 60 s, whichever is more.
-pub fn reduction_on_fit_runs(problem: &FitProblem, smaller: &Fit, larger: &Fit) -> f64 {
-    [Restart::FullRun, Restart::WINDOW_60]
+/// Root mean square open-loop error in m/s of the fit runs: over whole runs, and with restarts every
+/// 60 s.
+pub fn errors_on_fit_runs(problem: &FitProblem, fit: &Fit) -> [f64; 2] {
+    [Restart::FullRun, Restart::WINDOW_60].map(|restart| {
+        let error: SpeedError = problem.runs.iter().map(|run| run_error(fit, run, restart)).sum();
+        error.rmse_mps().unwrap_or(0.0)
+    })
+}
+
+/// Share of the error that a model takes away: over whole runs or with restarts, whichever is more.
+pub fn reduction(before_mps: [f64; 2], after_mps: [f64; 2]) -> f64 {
+    before_mps
         .into_iter()
-        .map(|restart| {
-            let rmse = |fit: &Fit| {
-                let error: SpeedError =
-                    problem.runs.iter().map(|run| run_error(fit, run, restart)).sum();
-                error.rmse_mps().unwrap_or(0.0)
-            };
-            let before = rmse(smaller);
-            if before > 0.0 { 1.0 - rmse(larger) / before } else { 0.0 }
-        })
+        .zip(after_mps)
+        .map(|(before, after)| if before > 0.0 { 1.0 - after / before } else { 0.0 })
         .fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Share of the error of the fit runs that the larger model takes away.
+pub fn reduction_on_fit_runs(problem: &FitProblem, smaller: &Fit, larger: &Fit) -> f64 {
+    reduction(errors_on_fit_runs(problem, smaller), errors_on_fit_runs(problem, larger))
 }
 
 /// Predictions of all runs, fit and holdout.

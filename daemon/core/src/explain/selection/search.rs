@@ -23,6 +23,10 @@ const FINALISTS: usize = 5;
 /// A finalist's advantage: not far below none, and no less than this share of the greatest.
 const FINALIST_MIN: f64 = -20.0;
 const FINALIST_SHARE: f64 = 0.1;
+/// Beyond this number of observations, where small things are significant, a finalist takes away
+/// at least this share of the open-loop error, a sixth of what an effect needs.
+const MANY_OBSERVATIONS: usize = 5_000;
+const FINALIST_REDUCTION: f64 = 0.02;
 /// Less observations than this tell nothing.
 pub const OBSERVATIONS_MIN: usize = 80;
 
@@ -151,11 +155,17 @@ impl Search<'_> {
         trials.sort_by(|one, other| by_advantage(&one.0, &other.0));
         let greatest = trials.first().map_or(0.0, |(trial, _)| trial.advantage);
         let least = FINALIST_MIN.max(FINALIST_SHARE * greatest);
+        let before_mps = score::errors_on_fit_runs(self.problem, base);
+        let reduction =
+            |fit: &Fit| score::reduction(before_mps, score::errors_on_fit_runs(self.problem, fit));
+        let has_many = base.observations() > MANY_OBSERVATIONS;
         let mut finished: Vec<Trial> = trials
             .into_iter()
             .enumerate()
             .map(|(rank, (trial, effect))| {
-                let is_finalist = rank < FINALISTS && trial.advantage > least;
+                let is_finalist = rank < FINALISTS
+                    && trial.advantage > least
+                    && (!has_many || reduction(&trial.fit) > FINALIST_REDUCTION);
                 let share = base.model.effects.len() as f64
                     + (rank.min(FINALISTS) + 2) as f64 / (FINALISTS + 2) as f64;
                 (self.progress)((0.1 + 0.25 * share).min(0.85), trial.kind.name());
@@ -163,7 +173,7 @@ impl Search<'_> {
             })
             .collect();
         for trial in finished.iter_mut().filter(|trial| trial.evidence > EVIDENCE_MIN) {
-            trial.reduction = self.reduction(base, &trial.fit);
+            trial.reduction = reduction(&trial.fit);
         }
         finished.sort_by(by_advantage);
         finished
