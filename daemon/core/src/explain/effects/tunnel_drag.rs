@@ -105,7 +105,8 @@ impl Hypothesis for Tunnels {
         let force_per_unit = 1.0 * context.weight_kn;
         reported.push("dc_n_per_mps2", extra * force_per_unit, extra_deviation * force_per_unit);
         let c = context.c;
-        if c > 0.0 {
+        // A c that is not told from none makes no factor.
+        if c > context.c_deviation {
             // Delta method for 1 + extra / c.
             let (by_extra, by_c) = (1.0 / c, -extra / (c * c));
             let variance = (by_extra * extra_deviation).powi(2)

@@ -4,12 +4,14 @@ mod descent;
 mod linearised;
 mod robust;
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 
 use super::model::GrownModel;
 use super::noise::{Noise, Whitener};
 use super::run_data::RunData;
-use super::run_scatter::{RunScatter, ScatterFilter, WeightedFilter, scatter_columns};
+use super::run_scatter::{
+    Columns, RunScatter, ScatterFilter, WeightedFilter, remove, scatter_columns,
+};
 use crate::train::Davis;
 use linearised::Scratch;
 use robust::RunFilters;
@@ -31,7 +33,7 @@ pub struct FitProblem {
     declared: Davis,
     prior_deviation: [f64; 3],
     /// Columns of the runs' own factors.
-    scatter_columns: Vec<[Vec<f64>; 2]>,
+    scatter_columns: Vec<Columns>,
     /// Measured way over way by integrated speed, with its standard deviation.
     pub way_ratio: Option<(f64, f64)>,
 }
@@ -74,7 +76,7 @@ pub struct Fit {
     /// The filters of the runs' own factors, with the weights of the innovations.
     pub filters: Vec<WeightedFilter>,
     /// The runs' own factors less 1, with their covariance.
-    factors: Vec<(Vector2<f64>, Matrix2<f64>)>,
+    factors: Vec<(Vector3<f64>, Matrix3<f64>)>,
 }
 
 impl Fit {
@@ -146,11 +148,7 @@ impl FitProblem {
             .iter()
             .zip(&self.scatter_columns)
             .zip(&fit.factors)
-            .map(|((residual, [force, resistance]), (factors, _))| {
-                let columns = force.iter().zip(resistance);
-                let less = residual.iter().zip(columns);
-                less.map(|(value, (f, r))| value - factors[0] * f - factors[1] * r).collect()
-            })
+            .map(|((residual, columns), (factors, _))| remove(columns, residual, factors))
             .collect();
         let noise = Noise::estimate(&self.runs, &residuals, Noise { scatter, ..noise });
         self.fit(model, fit.theta, noise)

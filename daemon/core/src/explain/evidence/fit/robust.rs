@@ -1,6 +1,6 @@
 //! Huber's loss, and the innovations of a run under it.
 
-use nalgebra::Vector2;
+use nalgebra::Vector3;
 
 use super::super::noise::Whitener;
 use super::super::run_scatter::{ScatterFilter, WeightedFilter};
@@ -33,7 +33,7 @@ pub(super) struct RunFilters {
 pub(super) struct Whitened {
     pub innovations: Vec<f64>,
     pub filter: WeightedFilter,
-    pub factors: Vector2<f64>,
+    pub factors: Vector3<f64>,
     pub cost: f64,
 }
 
