@@ -11,7 +11,7 @@ use dynocar_core::explain::{Explanation, explain};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::write_dataset;
 use dynocar_tests::simulator::{
-    Effect, EffectRequest, SimulatedDataset, SimulatorSettings, simulate,
+    Effect, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate,
 };
 
 const SEED: u64 = 23;
@@ -126,6 +126,20 @@ fn on_a_level_straight_line_two_kinds_of_mass_cannot_be_told_apart() {
     assert_eq!(kinds, ["mass_change", "rotating_mass"]);
     let experiment = answer.experiment.expect("what would separate them");
     assert!(experiment.contains("gradient"), "{experiment}");
+}
+
+#[test]
+fn a_force_that_acts_somewhat_later_than_stamped_bends_no_resistance() {
+    let folder = tempfile::tempdir().unwrap();
+    // The simulator holds each force for 0.05 s: on average it acts 0.025 s after its stamp.
+    let ideal = SimulatorSettings::ideal(SEED, EffectRequest::none());
+    let settings = SimulatorSettings { train_type: Some(TrainType::Regional), ..ideal };
+    let simulated = simulate(&settings);
+    let answer = explained(&simulated, folder.path()).answer;
+    assert_eq!(answer.verdict, Verdict::None, "{}", answer.statement);
+    let truth = simulated.train.resistance.c;
+    let error = answer.base.c / truth - 1.0;
+    assert!(error.abs() < 0.01, "c is off by {:.1} %", 100.0 * error);
 }
 
 #[test]
