@@ -64,7 +64,7 @@ pub fn explain(arguments: &ExplainArguments) -> Result<(), (String, u8)> {
     let (seeds, first) = (arguments.seeds, arguments.first_seed);
     if arguments.growth {
         let sizes = growth::measure(&scenarios, first, &|size| {
-            eprintln!("{} x{}: {:.1} s", size.axis, size.factor, size.seconds);
+            eprintln!("{} x{}: {:.1} s", size.axis.name(), size.factor, size.seconds);
         });
         return give(&arguments.json, &sizes, || growth::table(&sizes));
     }

@@ -11,11 +11,44 @@ use dynocar_tests::simulator::{SimulatorSettings, simulate};
 /// The data are made so many times more.
 const FACTORS: [usize; 3] = [1, 4, 16];
 
+/// What grows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Axis {
+    /// The number of runs.
+    Runs,
+    /// Their length.
+    Duration,
+}
+
+impl Axis {
+    /// Its name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Axis::Runs => "runs",
+            Axis::Duration => "duration",
+        }
+    }
+
+    fn grown(self, settings: SimulatorSettings, factor: usize) -> SimulatorSettings {
+        match self {
+            Axis::Runs => SimulatorSettings {
+                runs: factor * settings.runs,
+                holdout_runs: factor * settings.holdout_runs,
+                ..settings
+            },
+            Axis::Duration => {
+                SimulatorSettings { duration_s: factor as f64 * settings.duration_s, ..settings }
+            }
+        }
+    }
+}
+
 /// One size of data.
 #[derive(Clone, Debug, Serialize)]
 pub struct Size {
-    /// What grows: `runs` or `duration`.
-    pub axis: &'static str,
+    /// What grows.
+    pub axis: Axis,
     /// How many times more data than at first.
     pub factor: usize,
     /// Runs of a dataset.
@@ -38,35 +71,24 @@ impl Size {
 /// Explains one dataset of each scenario at every size, one after the other on one thread.
 pub fn measure(scenarios: &[Scenario], seed: u64, tell: &dyn Fn(&Size)) -> Vec<Size> {
     let mut sizes = Vec::new();
-    for axis in ["runs", "duration"] {
+    for axis in [Axis::Runs, Axis::Duration] {
         for factor in FACTORS {
-            let (mut samples, mut seconds) = (0, 0.0);
-            let settings = |scenario: Scenario| grown(scenario.settings(seed), axis, factor);
-            for &scenario in scenarios {
-                let dataset = read(&simulate(&settings(scenario)));
-                samples += dataset.runs.iter().map(|run| run.samples.len()).sum::<usize>();
+            let mut size =
+                Size { axis, factor, runs: 0, duration_s: 0.0, samples: 0, seconds: 0.0 };
+            for scenario in scenarios {
+                let settings = axis.grown(scenario.settings(seed), factor);
+                (size.runs, size.duration_s) = (settings.runs, settings.duration_s);
+                let dataset = read(&simulate(&settings));
+                size.samples += dataset.runs.iter().map(|run| run.samples.len()).sum::<usize>();
                 let since = Instant::now();
                 explained(&dataset);
-                seconds += since.elapsed().as_secs_f64();
+                size.seconds += since.elapsed().as_secs_f64();
             }
-            let SimulatorSettings { runs, duration_s, .. } = settings(Scenario::PoorNull);
-            let size = Size { axis, factor, runs, duration_s, samples, seconds };
             tell(&size);
             sizes.push(size);
         }
     }
     sizes
-}
-
-fn grown(settings: SimulatorSettings, axis: &str, factor: usize) -> SimulatorSettings {
-    match axis {
-        "runs" => SimulatorSettings {
-            runs: factor * settings.runs,
-            holdout_runs: factor * settings.holdout_runs,
-            ..settings
-        },
-        _ => SimulatorSettings { duration_s: factor as f64 * settings.duration_s, ..settings },
-    }
 }
 
 /// The sizes as a table for people.
@@ -77,7 +99,7 @@ pub fn table(sizes: &[Size]) -> String {
         let first = sizes.iter().find(|other| other.axis == size.axis).unwrap_or(size);
         text += &format!(
             "{:9} {:5} {:5} {:7.0} {:10} {:10.2} {:10.1} {:9.2}\n",
-            size.axis,
+            size.axis.name(),
             size.factor,
             size.runs,
             size.duration_s,

@@ -3,14 +3,11 @@
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
-use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::evidence::{Fade, RunData, SampleForces};
 use crate::explain::scan::{Scan, Tuple};
 
 const PARAMETERS: [Parameter; 2] =
     [Parameter::new("delay_s", (0.0, 6.0), 0.05), Parameter::new("lag_s", (0.0, 8.0), 0.05)];
-
-/// Steps in s that differ by no more are equal: what is left of rounded times.
-const SAME_STEP_S: f64 = 1e-9;
 
 /// Delay and lag in s that a fit may start from.
 const STARTS: [[f64; 2]; 4] = [[0.3, 0.3], [1.0, 1.0], [0.2, 2.0], [2.0, 0.3]];
@@ -59,7 +56,7 @@ fn delayed(time_s: &[f64], forces_n: &[Forces], delay_s: f64, lag_s: f64) -> Vec
     let both = |value: &dyn Fn(usize) -> f64| [value(0), value(1)];
     let mut before = 0;
     let mut last: Option<(f64, Forces)> = None;
-    let (mut fade_step_s, mut fade) = (0.0, 1.0);
+    let mut by_step = Fade::new(lag_s);
     let mut lagged = [0.0; 2];
     (0..time_s.len())
         .map(|i| {
@@ -77,9 +74,7 @@ fn delayed(time_s: &[f64], forces_n: &[Forces], delay_s: f64, lag_s: f64) -> Vec
             lagged = match last {
                 Some((last_s, last_input)) if lag_s > 1e-3 => {
                     let step_s = time_s[i] - last_s;
-                    if (step_s - fade_step_s).abs() > SAME_STEP_S {
-                        (fade_step_s, fade) = (step_s, (-step_s / lag_s).exp());
-                    }
+                    let fade = by_step.over(step_s);
                     // Response to a ramp from the last input to this one.
                     let ramp = 1.0 - lag_s * (1.0 - fade) / step_s;
                     both(&|k| {

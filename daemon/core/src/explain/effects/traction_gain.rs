@@ -8,10 +8,6 @@ use crate::explain::scan::Scan;
 
 const PARAMETERS: [Parameter; 1] = [Parameter::new("gain", (0.6, 1.6), 0.005)];
 
-/// A model of a train in one piece, over averages of 2 s, gives the force of a train of many cars
-/// back to this share: root mean square over noise-free simulated runs.
-const MODEL_ERROR: f64 = 0.0013;
-
 /// The kind.
 pub struct TractionGain;
 
@@ -44,10 +40,6 @@ impl Hypothesis for Gain {
 
     fn none(&self) -> f64 {
         1.0
-    }
-
-    fn shared_error(&self) -> f64 {
-        MODEL_ERROR
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {

@@ -8,12 +8,14 @@
 //! least-squares problem whatever the noise.
 
 mod cleaning;
+mod fade;
 mod fit;
 mod model;
 mod noise;
 mod run_data;
 mod run_scatter;
 
+pub use fade::Fade;
 pub use fit::{Fit, FitProblem, RunNormal};
 pub use model::{GrownForces, GrownModel, SampleForces, SharedHypothesis};
 pub use noise::{Noise, Whitener};

@@ -1,5 +1,6 @@
 //! The process that is left when the model is right, and its whitening.
 
+use super::fade::Fade;
 use super::run_data::RunData;
 use super::run_scatter::RunScatter;
 
@@ -81,9 +82,6 @@ pub struct Whitener {
     log_determinant: f64,
 }
 
-/// Steps in s that differ by no more are equal: what is left of rounded times.
-const SAME_STEP_S: f64 = 1e-9;
-
 #[derive(Clone, Copy, Debug)]
 struct Step {
     starts: bool,
@@ -104,15 +102,12 @@ impl Whitener {
         let mut log_determinant = 0.0;
         let mut before: Option<(usize, f64)> = None;
         let mut steps = Vec::with_capacity(run.bins.len());
-        // Nearly all bins are equally far apart.
-        let (mut fade_s, mut fade) = (0.0, 1.0);
+        let mut by_step = Fade::new(fading_s);
         for bin in &run.bins {
             let step_s = before.map_or(0.0, |(_, time_s)| bin.time_s - time_s);
             let starts = before.is_none_or(|(segment, _)| segment != bin.segment);
             before = Some((bin.segment, bin.time_s));
-            if (step_s - fade_s).abs() > SAME_STEP_S {
-                (fade_s, fade) = (step_s, (-step_s / fading_s).exp());
-            }
+            let fade = by_step.over(step_s);
             let carry_s = fading_s * (1.0 - fade);
             let gone = 1.0 - fade * fade;
             if starts {

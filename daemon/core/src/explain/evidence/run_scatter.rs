@@ -15,7 +15,7 @@ use crate::train::Davis;
 
 /// A run's own deviations: of the factors on the control force and on the basic resistance from
 /// 1, and the delay of the force in s.
-pub const DEVIATIONS: usize = 3;
+const DEVIATIONS: usize = 3;
 
 /// Columns of the deviations.
 pub type Columns = [Vec<f64>; DEVIATIONS];
@@ -24,7 +24,7 @@ pub type Columns = [Vec<f64>; DEVIATIONS];
 /// recorder.
 const DELAY_S: f64 = 0.02;
 
-/// Standard deviations of the runs' own factors.
+/// Standard deviations of the runs' own factors; that of the delays is fixed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunScatter {
     /// Of the factor on the control force.
@@ -151,7 +151,7 @@ impl ScatterFilter {
 }
 
 impl WeightedFilter {
-    /// The factors, less 1, that fit a whitened series best.
+    /// The factors, less 1, and the delay that fit a whitened series best.
     pub fn factors(&self, series: &[f64]) -> Vector3<f64> {
         let product = |column: &[f64]| -> f64 {
             column.iter().zip(series).zip(&self.weights).map(|((c, s), w)| w * c * s).sum()

@@ -75,7 +75,7 @@ pub struct Fit {
     pub whiteners: Vec<Whitener>,
     /// The filters of the runs' own factors, with the weights of the innovations.
     pub filters: Vec<WeightedFilter>,
-    /// The runs' own factors less 1, with their covariance.
+    /// The runs' own factors less 1 and delays, with their covariance.
     factors: Vec<(Vector3<f64>, Matrix3<f64>)>,
 }
 
