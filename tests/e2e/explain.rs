@@ -98,6 +98,37 @@ fn a_dragging_brake_is_found_in_its_runs_from_its_onset() {
 }
 
 #[test]
+fn the_intervals_of_the_ends_of_places_hold_the_true_ends() {
+    let (mut ends, mut held) = (0, 0);
+    for seed in SEED..SEED + 6 {
+        let kinds = EffectRequest::Kinds(vec![EffectKind::LocalResistance]);
+        let simulated = simulate(&SimulatorSettings::new(seed, kinds));
+        let Effect::LocalResistance { intervals_m: truth, .. } = &simulated.effects[0] else {
+            panic!("the simulator was asked for a local resistance");
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let explanation = explained(&simulated, folder.path());
+        let Some(effect) = explanation.answer.effects.first() else { continue };
+        assert_eq!(effect.kind, "local_resistance", "seed {seed}");
+        let known = effect.place.uncertainty_95.as_ref().and_then(|it| it.intervals_m.as_ref());
+        let known = known.expect("the ends were estimated");
+        let found = effect.place.intervals_m.as_ref().expect("a local resistance has a place");
+        assert_eq!((known.len(), found.len()), (truth.len(), truth.len()), "seed {seed}");
+        for ((of_ends, found_m), &(from_m, to_m)) in known.iter().zip(found).zip(truth) {
+            for ([low_m, high_m], (at_m, true_m)) in
+                of_ends.iter().zip(found_m.iter().zip([from_m, to_m]))
+            {
+                assert!(low_m <= at_m && at_m <= high_m, "seed {seed}: {at_m} not within its own");
+                assert!(high_m - low_m < 400.0, "seed {seed}: {low_m} to {high_m} says little");
+                ends += 1;
+                held += usize::from((*low_m..=*high_m).contains(&true_m));
+            }
+        }
+    }
+    assert!(ends >= 10 && 10 * held >= 8 * ends, "{held} of {ends}");
+}
+
+#[test]
 fn an_effect_outside_the_library_is_called_unknown_and_placed() {
     let folder = tempfile::tempdir().unwrap();
     let simulated = with_kinds(&[EffectKind::Unknown]);

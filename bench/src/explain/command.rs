@@ -91,13 +91,15 @@ fn tell(case: &Case, grade: &Grade) {
         .map(|p| format!("{} {:+.3} ({:+.1} sd)", p.name, p.error, p.z))
         .collect();
     eprintln!(
-        "{} seed {}: {} {} {} iou {:?} share {:?} {}",
+        "{} seed {}: {} {} {} iou {:?} ends {}/{} share {:?} {}",
         if grade.is_right { "right" } else { "WRONG" },
         case.seed,
         kinds.join("+"),
         grade.verdict,
         grade.named.join("+"),
         grade.iou,
+        grade.ends_held.iter().filter(|held| **held).count(),
+        grade.ends_held.len(),
         grade.share,
         parameters.join(", ")
     );

@@ -7,6 +7,8 @@ use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};
 use serde_json::Value;
 
+use super::place::{ends_within, place_iou};
+
 /// How good an answer is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grade {
@@ -18,6 +20,8 @@ pub struct Grade {
     pub is_right: bool,
     /// Intersection over union of the places, where the effect has one.
     pub iou: Option<f64>,
+    /// For every end of a place with a 95 % interval, whether that holds the true end.
+    pub ends_held: Vec<bool>,
     /// Relative errors of the parameters and whether their 95 % intervals hold the truth.
     pub parameters: Vec<ParameterGrade>,
     /// Evidence, error reduction and parameters of the named effects, for people.
@@ -67,12 +71,13 @@ pub fn grade(
         right => verdict == right && expected == found,
     };
     let json = serde_json::to_value(answer).unwrap_or(Value::Null);
-    let (mut iou, mut parameters) = (None, Vec::new());
+    let (mut iou, mut ends_held, mut parameters) = (None, Vec::new(), Vec::new());
     for effect in &simulated.effects {
         let own = json["effects"].as_array().into_iter().flatten();
         let own = own.clone().find(|answer| answer["kind"] == effect.kind().name());
         if let Some(own) = own {
             iou = place_iou(effect, own, simulated).or(iou);
+            ends_held.extend(ends_within(effect, own));
             parameters.extend(graded(effect, own, simulated));
         }
     }
@@ -96,6 +101,7 @@ pub fn grade(
         verdict: verdict.into(),
         is_right,
         iou,
+        ends_held,
         parameters,
         share: share(simulated, explanation),
         strength: explanation.strength,
@@ -115,74 +121,6 @@ fn share(simulated: &SimulatedDataset, explanation: &Explanation) -> Option<f64>
     let oracle = score(simulated).full_run.true_mps;
     let (before, after) = (explanation.answer.rmse_before?, explanation.answer.rmse_after?);
     (before > 1.2 * oracle).then(|| (before - after) / (before - oracle))
-}
-
-/// Total length of intervals that are cut into disjoint pieces by sampling.
-fn interval_iou(one: &[[f64; 2]], other: &[[f64; 2]]) -> f64 {
-    let ends = one.iter().chain(other).flatten().copied();
-    let low = ends.clone().fold(f64::INFINITY, f64::min);
-    let high = ends.fold(f64::NEG_INFINITY, f64::max);
-    let inside =
-        |set: &[[f64; 2]], at: f64| set.iter().any(|[from, to]| (*from..*to).contains(&at));
-    let (mut both, mut either) = (0, 0);
-    const POINTS: usize = 20_000;
-    for k in 0..POINTS {
-        let at = low + (high - low) * (k as f64 + 0.5) / POINTS as f64;
-        let (here, there) = (inside(one, at), inside(other, at));
-        both += usize::from(here && there);
-        either += usize::from(here || there);
-    }
-    both as f64 / either.max(1) as f64
-}
-
-fn pairs(value: &Value) -> Vec<[f64; 2]> {
-    let list = value.as_array().cloned().unwrap_or_default();
-    list.iter().filter_map(|pair| Some([pair[0].as_f64()?, pair[1].as_f64()?])).collect()
-}
-
-fn place_iou(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Option<f64> {
-    match effect {
-        Effect::LocalResistance { intervals_m, .. } | Effect::LowAdhesion { intervals_m, .. }
-            if !intervals_m.is_empty() =>
-        {
-            let truth: Vec<[f64; 2]> = intervals_m.iter().map(|&(from, to)| [from, to]).collect();
-            Some(interval_iou(&truth, &pairs(&own["where"]["intervals_m"])))
-        }
-        Effect::DraggingBrake { windows, .. } => {
-            let mut truth = Vec::new();
-            let mut found = Vec::new();
-            for (number, run) in simulated.runs.iter().enumerate() {
-                if run.plan.is_holdout {
-                    continue;
-                }
-                // One axis for all runs, each far from the next.
-                let offset = 1e5 * number as f64;
-                let of_run = windows.iter().filter(|window| window.run == number);
-                truth.extend(of_run.map(|w| [offset + w.start_s, offset + w.end_s]));
-                let listed = own["where"]["windows"].as_array().into_iter().flatten();
-                for window in listed.filter(|window| window["run"] == run.plan.file()) {
-                    if let (Some(from), Some(to)) =
-                        (window["t_start_s"].as_f64(), window["t_end_s"].as_f64())
-                    {
-                        found.push([offset + from, offset + to]);
-                    }
-                }
-            }
-            Some(run_windows_iou(&truth, &found))
-        }
-        _ => None,
-    }
-}
-
-fn run_windows_iou(truth: &[[f64; 2]], found: &[[f64; 2]]) -> f64 {
-    let length = |set: &[[f64; 2]]| set.iter().map(|[from, to]| to - from).sum::<f64>();
-    let both: f64 = truth
-        .iter()
-        .flat_map(|[from, to]| {
-            found.iter().map(move |[start, end]| (to.min(*end) - from.max(*start)).max(0.0))
-        })
-        .sum();
-    both / (length(truth) + length(found) - both)
 }
 
 /// Parameters that have a single true number; the size of an effect is its distance from none.

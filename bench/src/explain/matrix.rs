@@ -23,6 +23,8 @@ pub struct KindRow {
     pub confused_with: BTreeMap<String, usize>,
     /// Median intersection over union of the place.
     pub iou: Option<f64>,
+    /// Share of the 95 % intervals of ends of places that hold the true end.
+    pub place_coverage: Option<f64>,
     /// Median relative error of the parameters.
     pub parameter_error: Option<f64>,
     /// Share of the 95 % intervals that hold the truth.
@@ -120,6 +122,16 @@ fn quantiles(mut values: Vec<f64>) -> Vec<(f64, f64)> {
     [0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 1.0].into_iter().filter_map(at).collect()
 }
 
+/// Share of what is true; `None` of nothing.
+fn share_of(all: impl Iterator<Item = bool>) -> Option<f64> {
+    let (mut count, mut held) = (0, 0);
+    for own in all {
+        count += 1;
+        held += usize::from(own);
+    }
+    (count > 0).then(|| f64::from(held as u32) / f64::from(count))
+}
+
 fn row(kind: &str, grades: &[Grade]) -> KindRow {
     let mut confused_with = BTreeMap::new();
     for wrong in grades.iter().filter(|grade| !grade.is_right) {
@@ -128,33 +140,35 @@ fn row(kind: &str, grades: &[Grade]) -> KindRow {
     }
     let right: Vec<&Grade> = grades.iter().filter(|grade| grade.is_right).collect();
     let parameters: Vec<_> = right.iter().flat_map(|grade| &grade.parameters).collect();
-    let covered = parameters.iter().filter(|parameter| parameter.z.abs() < 1.96).count();
     KindRow {
         kind: kind.into(),
         runs: grades.len(),
         right: right.len(),
         confused_with,
         iou: median(right.iter().filter_map(|grade| grade.iou).collect()),
+        place_coverage: share_of(right.iter().flat_map(|grade| grade.ends_held.iter().copied())),
         parameter_error: median(parameters.iter().map(|p| p.error.abs()).collect()),
-        coverage: (!parameters.is_empty()).then(|| covered as f64 / parameters.len() as f64),
+        coverage: share_of(parameters.iter().map(|parameter| parameter.z.abs() < 1.96)),
         error_reduction_share: median(right.iter().filter_map(|grade| grade.share).collect()),
     }
 }
 
 /// The matrix as a table for people.
 pub fn table(matrix: &Matrix) -> String {
-    let mut text =
-        String::from("kind                  right      IoU  error  cover  share  named instead\n");
+    let mut text = String::from(
+        "kind                  right      IoU   ends  error  cover  share  named instead\n",
+    );
     let shown = |value: Option<f64>| value.map_or("     -".into(), |value| format!("{value:6.3}"));
     for row in &matrix.kinds {
         let confused: Vec<String> =
             row.confused_with.iter().map(|(named, count)| format!("{named} {count}")).collect();
         text += &format!(
-            "{:20} {:3}/{:<3} {} {} {} {}  {}\n",
+            "{:20} {:3}/{:<3} {} {} {} {} {}  {}\n",
             row.kind,
             row.right,
             row.runs,
             shown(row.iou),
+            shown(row.place_coverage),
             shown(row.parameter_error),
             shown(row.coverage),
             shown(row.error_reduction_share),

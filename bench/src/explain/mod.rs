@@ -3,6 +3,7 @@
 //! - [`scenario`]: what is simulated
 //! - [`case`]: one simulated dataset, explained in this process
 //! - [`grade`]: the answer against the truth
+//! - [`place`]: its places against the true ones
 //! - [`matrix`]: all kinds over all seeds, in numbers
 //! - [`growth`]: time for 1, 4 and 16 times the data
 //! - [`command`]: the command line
@@ -12,4 +13,6 @@ pub mod command;
 pub mod grade;
 pub mod growth;
 pub mod matrix;
+pub mod place;
+
 pub mod scenario;

@@ -40,6 +40,35 @@ pub struct CovariateRange {
     pub range: [f64; 2],
 }
 
+/// How surely a window's ends are known.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WindowUncertainty {
+    /// The run's file.
+    pub run: String,
+    /// 95 % interval of the start in s.
+    pub t_start_s: [f64; 2],
+    /// 95 % interval of the end in s; absent for an end that was not estimated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub t_end_s: Option<[f64; 2]>,
+}
+
+/// How surely a place is known: 95 % intervals of the ends that were estimated.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct PlaceUncertainty {
+    /// Of both ends of every interval, in m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub intervals_m: Option<Vec<[[f64; 2]; 2]>>,
+    /// Of the windows that were estimated from the speeds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub windows: Option<Vec<WindowUncertainty>>,
+    /// Of the least and the greatest value of the covariate; `null` where the data end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range: Option<[Option<[f64; 2]>; 2]>,
+    /// Probability that the effect acts in a run, for all fit runs where the runs were chosen.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub run_probability: Option<BTreeMap<String, f64>>,
+}
+
 /// Where an effect acts; all that is given holds together.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Place {
@@ -58,6 +87,9 @@ pub struct Place {
     /// A covariate and its range.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub covariate: Option<CovariateRange>,
+    /// How surely that is known, where it was estimated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uncertainty_95: Option<PlaceUncertainty>,
 }
 
 impl Place {

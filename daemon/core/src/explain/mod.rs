@@ -5,7 +5,7 @@
 //!
 //! - [`evidence`]: observations, noise, the joint fit of a, b, c and effects
 //! - [`effects`]: the library, one file for each kind
-//! - [`scan`], [`localise`], [`residual_pressure`]: what a force of some shape, at some place or
+//! - [`scan`], [`places`], [`residual_pressure`]: what a force of some shape, at some place or
 //!   time, would explain
 //! - [`selection`]: the search for effects, its significance, evidence by run
 //! - [`score`]: open-loop prediction of fit and holdout runs
@@ -17,7 +17,7 @@
 pub mod answer;
 pub mod effects;
 pub mod evidence;
-pub mod localise;
+pub mod places;
 pub mod report;
 pub mod residual_pressure;
 pub mod rivals;
@@ -78,11 +78,12 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
         track: dataset.track.as_ref(),
         progress,
     };
-    let outcome = search.run();
+    let mut outcome = search.run();
+    let known = places::settle(&problem, &mut outcome.fit);
     progress(0.95, "scoring the holdout runs");
     let score = Score::of(&problem, &holdout, &outcome.base, &outcome.fit);
     let predictions = score::predictions(&problem, &holdout, &outcome.fit);
-    let answer = verdict::answer(&search, &outcome, &score);
+    let answer = verdict::answer(&search, &outcome, &known, &score);
     let strength = search.greatest_strength(&outcome);
     progress(1.0, "done");
     let (base, grown) = (outcome.base.clone(), outcome.fit.clone());

@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 
 use dynocar_shared::vocabulary::EffectKind;
+use nalgebra::DMatrix;
 
 use super::answer::{
-    Answer, BaseAnswer, Considered, DavisDeviations, EffectAnswer, ParameterValue, Verdict,
+    Answer, BaseAnswer, Considered, DavisDeviations, EffectAnswer, ParameterValue, Place,
+    PlaceUncertainty, Verdict,
 };
 use super::effects::ReportContext;
 use super::rivals::{is_in, rivals, separating_run};
@@ -18,11 +20,16 @@ const MOVING_MIN_S: f64 = 180.0;
 /// Share of the decrease that the library must explain when something unknown is left too.
 const LIBRARY_SHARE_MIN: f64 = 0.5;
 
-/// The answer to a finished search.
-pub fn answer(search: &Search, outcome: &Outcome, score: &Score) -> Answer {
+/// The answer to a finished search; `known` says how surely the place of each effect is.
+pub fn answer(
+    search: &Search,
+    outcome: &Outcome,
+    known: &[Option<PlaceUncertainty>],
+    score: &Score,
+) -> Answer {
     let fit = &outcome.fit;
     let (deviation, covariance) = deviations(fit);
-    let effects = effect_answers(search, outcome, &deviation, &covariance);
+    let effects = effect_answers(search, outcome, known, (&deviation, &covariance));
     let rivals = rivals(outcome);
     let verdict = verdict(search, outcome, &rivals);
     let [rmse_before, rmse_after] = score.holdout_rmse_mps();
@@ -54,8 +61,8 @@ pub fn answer(search: &Search, outcome: &Outcome, score: &Score) -> Answer {
 fn effect_answers(
     search: &Search,
     outcome: &Outcome,
-    deviation: &[f64],
-    covariance: &nalgebra::DMatrix<f64>,
+    known: &[Option<PlaceUncertainty>],
+    (deviation, covariance): (&[f64], &DMatrix<f64>),
 ) -> Vec<EffectAnswer> {
     let fit = &outcome.fit;
     let mut answers: Vec<(f64, EffectAnswer)> = fit
@@ -81,7 +88,7 @@ fn effect_answers(
             });
             let answer = EffectAnswer {
                 kind: effect.kind().name(),
-                place: effect.place(),
+                place: Place { uncertainty_95: known[index].clone(), ..effect.place() },
                 parameters: reported.values,
                 std: reported.deviations,
                 p_value: p_value((decrease - penalty(effect, fit.observations())) * reduction),
@@ -215,7 +222,28 @@ fn describe(effect: &EffectAnswer) -> String {
         let [low, high] = covariate.range;
         parts.push(format!("{} from {low:.1} to {high:.1}", covariate.name));
     }
+    parts.extend(effect.place.uncertainty_95.as_ref().and_then(precision));
     format!("{} ({})", effect.kind, parts.join(", "))
+}
+
+/// How well the ends of a place are known: half of the widest 95 % interval.
+fn precision(known: &PlaceUncertainty) -> Option<String> {
+    let half = |interval: [f64; 2]| 0.5 * (interval[1] - interval[0]);
+    let widest = |ends: &mut dyn Iterator<Item = [f64; 2]>| ends.map(half).reduce(f64::max);
+    let ends_m = widest(&mut known.intervals_m.iter().flatten().flatten().copied());
+    let windows = known.windows.iter().flatten();
+    let ends_s = widest(&mut windows.flat_map(|it| [Some(it.t_start_s), it.t_end_s]).flatten());
+    let range = widest(&mut known.range.iter().flatten().flatten().copied());
+    let shown = [
+        ends_m.map(|half| format!("{half:.0} m")),
+        ends_s.map(|half| format!("{half:.0} s")),
+        range.filter(|_| ends_m.is_none()).map(|half| format!("{half:.1}")),
+    ];
+    let shown: Vec<String> = shown.into_iter().flatten().collect();
+    if ends_m.or(ends_s) == Some(0.0) {
+        return Some("ends certain".into());
+    }
+    (!shown.is_empty()).then(|| format!("ends known to ± {} or better", shown.join(", ± ")))
 }
 
 /// What a list of mass factors says; a section in both directions once.

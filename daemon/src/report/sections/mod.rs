@@ -3,6 +3,7 @@
 pub mod candidates;
 pub mod errors;
 pub mod parameters;
+pub mod places;
 pub mod quality;
 pub mod reproduce;
 pub mod residual;

@@ -2,7 +2,7 @@
 
 use dynocar_core::explain::report::words::number;
 
-use super::Section;
+use super::{Section, places};
 use crate::report::Subject;
 use crate::report::html::{Column, Table, escape, estimate};
 
@@ -44,5 +44,6 @@ pub fn section(subject: &Subject) -> Section {
              standard deviations to either side; the deviations hold the scatter from run to run \
              and the small number of runs. a, b and c are strongly correlated: judge them together, \
              by the resistance at a speed.</p>\n";
+    body += &places::table(subject);
     Section { id: "parameters", title: "Parameters", body }
 }

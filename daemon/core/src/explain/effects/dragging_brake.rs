@@ -3,11 +3,14 @@
 //! Where the brake cylinders keep some pressure while no brake is reported, that tells the
 //! windows too, in holdout runs as well, whose speeds are not looked at.
 
+use std::sync::Arc;
+
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
 use crate::explain::answer::{Place, RunWindow};
-use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::evidence::{RunData, SampleForces, SharedHypothesis};
+use crate::explain::places::{Axis, End, Reach};
 use crate::explain::residual_pressure;
 use crate::explain::scan::{Scan, Tuple};
 
@@ -31,9 +34,12 @@ const CHANGES_BESIDE_RUNS: usize = 4;
 /// The kind.
 pub struct DraggingBrake;
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Dragging {
     windows: Vec<RunWindow>,
+    /// Of the first windows, whose onsets were found by the speeds: time in s of the run's first
+    /// sample, and its duration in s.
+    by_speed: Vec<[f64; 2]>,
     choice_cost: f64,
 }
 
@@ -91,16 +97,23 @@ impl Effect for DraggingBrake {
         if let Some(windows) = by_pressure.clone().filter(|windows| fitted(windows)) {
             let tuple = window_tuple(scan, &windows);
             let (_, estimate) = scan.gain(&tuple);
-            let hypothesis = Dragging { windows, choice_cost: 2.0 };
+            let hypothesis = Dragging { windows, by_speed: Vec::new(), choice_cost: 2.0 };
             candidates.push(Candidate::new(hypothesis, vec![estimate.max(0.0)]));
         }
         if let Some((windows, estimate, choice_cost)) = by_speed(scan) {
+            let by_speed = windows.iter().map(|window| spanned(scan, window)).collect();
             let windows = with_holdout(scan, windows, by_pressure);
-            let hypothesis = Dragging { windows, choice_cost };
+            let hypothesis = Dragging { windows, by_speed, choice_cost };
             candidates.push(Candidate::new(hypothesis, vec![estimate]));
         }
         Proposal::Candidates(candidates)
     }
+}
+
+/// Time in s of the first sample of a window's run, and the run's duration in s.
+fn spanned(scan: &Scan, window: &RunWindow) -> [f64; 2] {
+    let run = scan.problem.runs.iter().find(|run| run.file == window.run);
+    run.map_or([0.0; 2], |run| [run.offset_s, run.duration_s()])
 }
 
 fn window_tuple(scan: &Scan, windows: &[RunWindow]) -> Tuple {
@@ -262,6 +275,30 @@ impl Hypothesis for Dragging {
                 force.extra_n += parameters[0] * build_up(time_s - onset_s);
             }
         }
+    }
+
+    fn ends(&self) -> Vec<End> {
+        let estimated = self.by_speed.iter().zip(&self.windows).enumerate();
+        let onset =
+            |(part, (&[offset_s, duration_s], window)): (usize, (&[f64; 2], &RunWindow))| {
+                let at = window.t_start_s - offset_s;
+                End {
+                    axis: Axis::Time,
+                    part,
+                    is_upper: false,
+                    at,
+                    reach: Reach::Between(0.0, (duration_s - BUILD_UP_S).max(at)),
+                    fine: 0.5,
+                    run: Some(window.run.clone()),
+                }
+            };
+        estimated.map(onset).collect()
+    }
+
+    fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
+        let mut moved = self.clone();
+        moved.windows[end.part].t_start_s = self.by_speed[end.part][0] + at;
+        Some(Arc::new(moved))
     }
 
     fn place(&self) -> Place {

@@ -1,11 +1,13 @@
 //! Extra resistance at certain places, in all runs or some, on the part of the train there.
 
+use std::sync::Arc;
+
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
 use crate::explain::answer::Place;
-use crate::explain::evidence::{RunData, SampleForces};
-use crate::explain::localise::{Inside, find};
+use crate::explain::evidence::{RunData, SampleForces, SharedHypothesis};
+use crate::explain::places::{End, Inside, Stretches, find};
 use crate::explain::scan::Scan;
 
 const PARAMETERS: [Parameter; 1] = [Parameter::new("extra_n_per_kn", (0.0, 100.0), 0.02)];
@@ -13,9 +15,9 @@ const PARAMETERS: [Parameter; 1] = [Parameter::new("extra_n_per_kn", (0.0, 100.0
 /// The kind.
 pub struct LocalResistance;
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Local {
-    intervals_m: Vec<[f64; 2]>,
+    stretches: Stretches,
     inside: Inside,
     /// Files of the runs; `None` for all.
     runs: Option<Vec<String>>,
@@ -37,20 +39,17 @@ impl Effect for LocalResistance {
         let Some(found) = find(scan, &shape, inside, true) else {
             return Proposal::Candidates(Vec::new());
         };
-        let candidate = |runs: Option<&Vec<usize>>| {
-            let files = |runs: &Vec<usize>| -> Vec<String> {
-                runs.iter().map(|&index| scan.problem.runs[index].file.clone()).collect()
-            };
+        let candidate = |runs: Option<Vec<String>>| {
             let hypothesis = Local {
-                intervals_m: found.intervals_m.clone(),
+                stretches: found.stretches(),
                 inside,
-                runs: runs.map(files),
+                runs,
                 choice_cost: found.choice_cost,
                 map_error: found.map_error,
             };
             Candidate::new(hypothesis, vec![found.estimate])
         };
-        let mut candidates = vec![candidate(found.runs.as_ref())];
+        let mut candidates = vec![candidate(found.files(scan))];
         if found.runs.is_some() {
             candidates.push(candidate(None));
         }
@@ -81,11 +80,27 @@ impl Hypothesis for Local {
         }
         for (force, sample) in forces.iter_mut().zip(run.samples()) {
             force.extra_n_per_kn +=
-                parameters[0] * self.inside.share(sample.position_m, &self.intervals_m);
+                parameters[0] * self.inside.share(sample.position_m, &self.stretches.intervals_m);
         }
     }
 
+    fn ends(&self) -> Vec<End> {
+        self.stretches.ends()
+    }
+
+    fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
+        Some(Arc::new(Local { stretches: self.stretches.moved(end, at)?, ..self.clone() }))
+    }
+
+    fn chosen_runs(&self) -> Option<&[String]> {
+        self.runs.as_deref()
+    }
+
+    fn with_runs(&self, runs: Vec<String>) -> Option<SharedHypothesis> {
+        Some(Arc::new(Local { runs: Some(runs), ..self.clone() }))
+    }
+
     fn place(&self) -> Place {
-        Place { runs: self.runs.clone(), ..Place::of_intervals(self.intervals_m.clone()) }
+        Place { runs: self.runs.clone(), ..Place::of_intervals(self.stretches.intervals_m.clone()) }
     }
 }

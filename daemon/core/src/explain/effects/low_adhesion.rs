@@ -1,12 +1,14 @@
 //! A brake force that the rail does not carry: achieved = min(reported, mu * weight), or a share
 //! of the reported one, at certain places and in certain runs.
 
+use std::sync::Arc;
+
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
 use crate::explain::answer::Place;
-use crate::explain::evidence::{RunData, SampleForces};
-use crate::explain::localise::{Found, Inside, find};
+use crate::explain::evidence::{RunData, SampleForces, SharedHypothesis};
+use crate::explain::places::{End, Found, Inside, Stretches, best_of_runs, find};
 use crate::explain::scan::{Scan, Tuple};
 use crate::force::ResolvedSample;
 
@@ -26,11 +28,11 @@ enum Form {
     Ratio,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Slippery {
     form: Form,
     /// `None` for everywhere.
-    intervals_m: Option<Vec<[f64; 2]>>,
+    stretches: Option<Stretches>,
     /// Files of the runs; `None` for all.
     runs: Option<Vec<String>>,
     choice_cost: f64,
@@ -93,34 +95,31 @@ fn places(
     form: Form,
     cap: f64,
 ) -> Vec<(f64, Form, Candidate)> {
-    let files = |runs: &[usize]| -> Vec<String> {
-        runs.iter().map(|&index| scan.problem.runs[index].file.clone()).collect()
-    };
-    let candidate = |found: &Found, intervals_m: Option<Vec<[f64; 2]>>| {
-        let runs = found.runs.as_deref().map(files);
+    let candidate = |found: &Found, stretches: Option<Stretches>| {
+        let runs = found.files(scan);
         let start = match form {
             Form::Cap => vec![cap.max(0.006)],
             Form::Ratio => vec![(1.0 - found.estimate).clamp(0.1, 0.99)],
         };
         let (choice_cost, map_error) = (found.choice_cost, found.map_error);
         let value = found.gain - choice_cost;
-        let hypothesis = Slippery { form, intervals_m, runs, choice_cost, map_error };
+        let hypothesis = Slippery { form, stretches, runs, choice_cost, map_error };
         (value, form, Candidate::new(hypothesis, start))
     };
     let mut candidates = Vec::new();
     let by_run: Vec<Tuple> =
         (0..scan.problem.runs.len()).map(|index| scan.run_tuple(index, shape)).collect();
-    let everywhere = crate::explain::localise::best_of_runs(scan, &by_run);
+    let everywhere = best_of_runs(scan, &by_run);
     if everywhere.gain > 0.0 {
         candidates.push(candidate(&everywhere, None));
     }
     if scan.problem.way_ratio.is_some()
         && let Some(found) = find(scan, shape, Inside::Centre, true)
     {
-        candidates.push(candidate(&found, Some(found.intervals_m.clone())));
+        candidates.push(candidate(&found, Some(found.stretches())));
         if found.runs.is_some() {
             let all = Found { runs: None, ..found };
-            candidates.push(candidate(&all, Some(all.intervals_m.clone())));
+            candidates.push(candidate(&all, Some(all.stretches())));
         }
     }
     candidates
@@ -159,10 +158,9 @@ impl Hypothesis for Slippery {
             return;
         }
         for (force, sample) in forces.iter_mut().zip(run.samples()) {
-            let is_there = self
-                .intervals_m
-                .as_ref()
-                .is_none_or(|intervals| Inside::Centre.share(sample.position_m, intervals) > 0.0);
+            let is_there = self.stretches.as_ref().is_none_or(|stretches| {
+                Inside::Centre.share(sample.position_m, &stretches.intervals_m) > 0.0
+            });
             if is_there {
                 force.brake_n = match self.form {
                     Form::Cap => {
@@ -174,7 +172,25 @@ impl Hypothesis for Slippery {
         }
     }
 
+    fn ends(&self) -> Vec<End> {
+        self.stretches.as_ref().map_or_else(Vec::new, Stretches::ends)
+    }
+
+    fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
+        let stretches = Some(self.stretches.as_ref()?.moved(end, at)?);
+        Some(Arc::new(Slippery { stretches, ..self.clone() }))
+    }
+
+    fn chosen_runs(&self) -> Option<&[String]> {
+        self.runs.as_deref()
+    }
+
+    fn with_runs(&self, runs: Vec<String>) -> Option<SharedHypothesis> {
+        Some(Arc::new(Slippery { runs: Some(runs), ..self.clone() }))
+    }
+
     fn place(&self) -> Place {
-        Place { runs: self.runs.clone(), intervals_m: self.intervals_m.clone(), ..Place::default() }
+        let intervals_m = self.stretches.as_ref().map(|stretches| stretches.intervals_m.clone());
+        Place { runs: self.runs.clone(), intervals_m, ..Place::default() }
     }
 }

@@ -27,6 +27,7 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::{ParameterValue, Place};
 use super::evidence::{RunData, SampleForces, SharedHypothesis};
+use super::places::End;
 use super::scan::Scan;
 
 /// Every kind, in the order of the search: timing, scales, mass and gain, what is tied to a
@@ -131,6 +132,26 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
     /// Where it acts.
     fn place(&self) -> Place {
         Place::default()
+    }
+
+    /// The ends of its places that were estimated from the speeds.
+    fn ends(&self) -> Vec<End> {
+        Vec::new()
+    }
+
+    /// The same structure with one of its ends elsewhere; `None` where that makes no place.
+    fn with_end(&self, _end: &End, _at: f64) -> Option<SharedHypothesis> {
+        None
+    }
+
+    /// Files of the fit runs in which it acts, where these were chosen.
+    fn chosen_runs(&self) -> Option<&[String]> {
+        None
+    }
+
+    /// The same structure in other runs.
+    fn with_runs(&self, _runs: Vec<String>) -> Option<SharedHypothesis> {
+        None
     }
 
     /// Twice the logarithm of the number of structures it was chosen from.

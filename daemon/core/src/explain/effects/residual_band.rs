@@ -2,13 +2,14 @@
 //! covariate. It is not an explanation; it says where an explanation is to be looked for.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
 use crate::explain::answer::{CovariateRange, Place};
-use crate::explain::evidence::{Bin, RunData, SampleForces};
-use crate::explain::localise::MAP_ERROR_PERMILLE;
+use crate::explain::evidence::{Bin, RunData, SampleForces, SharedHypothesis};
+use crate::explain::places::{Axis, End, MAP_ERROR_PERMILLE, Reach};
 use crate::explain::scan::{Scan, Tuple};
 use crate::force::ResolvedSample;
 
@@ -47,11 +48,14 @@ const COVARIATES: [Covariate; 7] = [
     Covariate::Run,
 ];
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Band {
     covariate: Covariate,
     low: f64,
     high: f64,
+    /// Least and greatest value of the covariate, and the width of a cell.
+    span: [f64; 2],
+    cell: f64,
     /// Files of all fit runs, by number, for the covariate `Run`.
     files: Vec<String>,
     choice_cost: f64,
@@ -213,7 +217,8 @@ fn best_band(scan: &Scan, covariate: Covariate) -> Option<(f64, Candidate)> {
     let choice_cost = OUTSIDE_COST + 2.0 * structures.ln();
     let files = scan.problem.runs.iter().map(|run| run.file.clone()).collect();
     let (low, high) = (cells.edge(from), cells.edge(to));
-    let band = Band { covariate, low, high, files, choice_cost };
+    let span = [cells.edge(0), cells.edge(count)];
+    let band = Band { covariate, low, high, span, cell: cells.width, files, choice_cost };
     Some((gain, Candidate::new(band, vec![estimate])))
 }
 
@@ -262,6 +267,31 @@ impl Hypothesis for Band {
                 _ => force.extra_n_per_kn += parameters[0],
             }
         }
+    }
+
+    fn ends(&self) -> Vec<End> {
+        if self.covariate == Covariate::Run {
+            return Vec::new();
+        }
+        // Bounds of the covariate itself are no ends.
+        let end = |is_upper: bool, at: f64, low: f64, high: f64| End {
+            axis: Axis::Covariate,
+            part: 0,
+            is_upper,
+            at,
+            reach: Reach::Between(low, high),
+            fine: 0.1 * self.cell,
+            run: None,
+        };
+        let lower = end(false, self.low, self.span[0], self.high - 0.5 * self.cell);
+        let upper = end(true, self.high, self.low + 0.5 * self.cell, self.span[1]);
+        let is_inside = |end: &End| end.at > self.span[0] && end.at < self.span[1];
+        [lower, upper].into_iter().filter(is_inside).collect()
+    }
+
+    fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
+        let (low, high) = if end.is_upper { (self.low, at) } else { (at, self.high) };
+        (low < high).then(|| Arc::new(Band { low, high, ..self.clone() }) as SharedHypothesis)
     }
 
     fn place(&self) -> Place {

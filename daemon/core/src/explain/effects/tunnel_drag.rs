@@ -1,11 +1,13 @@
 //! Air resistance in tunnels: c v² is larger for the part of the train inside.
 
+use std::sync::Arc;
+
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Parameter, Proposal, ReportContext, Reported};
 use crate::explain::answer::Place;
-use crate::explain::evidence::{RunData, SampleForces};
-use crate::explain::localise::{Inside, find};
+use crate::explain::evidence::{RunData, SampleForces, SharedHypothesis};
+use crate::explain::places::{End, Inside, Stretches, find};
 use crate::explain::scan::Scan;
 
 /// Single-track tunnels reach several times c; the bound is in N/kN per (m/s)².
@@ -14,11 +16,11 @@ const PARAMETERS: [Parameter; 1] = [Parameter::new("dc_n_per_kn_per_mps2", (0.0,
 /// The kind.
 pub struct TunnelDrag;
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Tunnels {
-    /// `None`: the mapped ones; else where they were found.
-    found_m: Option<(Vec<[f64; 2]>, Inside)>,
-    intervals_m: Vec<[f64; 2]>,
+    /// Where they were found; `None`: the mapped ones.
+    found: Option<(Stretches, Inside)>,
+    mapped_m: Vec<[f64; 2]>,
     choice_cost: f64,
     map_error: f64,
 }
@@ -35,10 +37,10 @@ impl Effect for TunnelDrag {
             return Proposal::NotTestable("no mapped tunnel on the way".into());
         }
         if is_mapped {
-            let intervals_m = scan.track.map_or_else(Vec::new, |track| {
+            let mapped_m = scan.track.map_or_else(Vec::new, |track| {
                 track.tunnels().iter().map(|tunnel| [tunnel.start_m, tunnel.end_m]).collect()
             });
-            let mapped = Tunnels { found_m: None, intervals_m, choice_cost: 0.0, map_error: 0.0 };
+            let mapped = Tunnels { found: None, mapped_m, choice_cost: 0.0, map_error: 0.0 };
             return Proposal::Candidates(vec![Candidate::new(mapped, vec![0.0])]);
         }
         if scan.track.is_none() {
@@ -54,8 +56,8 @@ impl Effect for TunnelDrag {
             return Proposal::Candidates(Vec::new());
         };
         let hypothesis = Tunnels {
-            found_m: Some((found.intervals_m.clone(), inside)),
-            intervals_m: found.intervals_m,
+            found: Some((found.stretches(), inside)),
+            mapped_m: Vec::new(),
             // A tunnel that nobody mapped is less likely than some resistance at a place.
             choice_cost: found.choice_cost + 4.0,
             map_error: found.map_error,
@@ -87,16 +89,27 @@ impl Hypothesis for Tunnels {
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         for (force, sample) in forces.iter_mut().zip(run.samples()) {
-            let share = match &self.found_m {
+            let share = match &self.found {
                 None => sample.tunnel_share.unwrap_or(0.0),
-                Some((intervals_m, inside)) => inside.share(sample.position_m, intervals_m),
+                Some((at, inside)) => inside.share(sample.position_m, &at.intervals_m),
             };
             force.c_extra += share * parameters[0];
         }
     }
 
+    fn ends(&self) -> Vec<End> {
+        self.found.as_ref().map_or_else(Vec::new, |(stretches, _)| stretches.ends())
+    }
+
+    fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
+        let (stretches, inside) = self.found.as_ref()?;
+        let found = Some((stretches.moved(end, at)?, *inside));
+        Some(Arc::new(Tunnels { found, ..self.clone() }))
+    }
+
     fn place(&self) -> Place {
-        Place::of_intervals(self.intervals_m.clone())
+        let found = self.found.as_ref().map(|(stretches, _)| &stretches.intervals_m);
+        Place::of_intervals(found.unwrap_or(&self.mapped_m).clone())
     }
 
     fn report(&self, context: &ReportContext) -> Reported {

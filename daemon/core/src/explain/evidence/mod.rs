@@ -16,7 +16,7 @@ mod run_data;
 mod run_scatter;
 
 pub use fade::Fade;
-pub use fit::{Fit, FitProblem, RunNormal};
+pub use fit::{Fit, FitProblem, Nearby, RunNormal};
 pub use model::{GrownForces, GrownModel, SampleForces, SharedHypothesis};
 pub use noise::{Noise, Whitener};
 pub use run_data::{Bin, RunData, RunDataError, prepare};

@@ -20,6 +20,7 @@ pub mod covariates;
 pub mod errors;
 pub mod panels;
 pub mod parameters;
+pub mod places;
 pub mod sentence;
 pub mod traces;
 pub mod windows;
@@ -31,6 +32,7 @@ use candidates::CandidateRow;
 use errors::Errors;
 use panels::Panel;
 use parameters::ParameterRow;
+use places::PlaceTable;
 use traces::Trace;
 
 /// Everything that a report shows beyond the answer and the dataset's own account.
@@ -46,6 +48,8 @@ pub struct ReportData {
     pub panels: Vec<Panel>,
     /// Base resistance and effects.
     pub parameters: Vec<ParameterRow>,
+    /// Where the effects act.
+    pub places: PlaceTable,
     /// Every kind of the library.
     pub candidates: Vec<CandidateRow>,
 }
@@ -59,6 +63,7 @@ impl ReportData {
             traces: traces::traces(explanation),
             panels: panels::panels(dataset, explanation),
             parameters: parameters::rows(dataset, explanation),
+            places: PlaceTable::of(explanation),
             candidates: candidates::rows(explanation),
             errors,
         }

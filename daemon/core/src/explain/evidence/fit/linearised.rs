@@ -17,6 +17,16 @@ pub(super) struct Scratch {
     whitened: Vec<f64>,
 }
 
+/// One run at given parameters.
+pub(super) struct LinearisedRun {
+    pub normal: RunNormal,
+    pub whitened: Whitened,
+    /// Differences of the bins, not whitened.
+    pub residual: Vec<f64>,
+    /// Whitened regressors, less what the run's own factors would explain.
+    pub free: Vec<Vec<f64>>,
+}
+
 impl FitProblem {
     /// Pull of the prior: information and score.
     pub(super) fn prior(
@@ -70,7 +80,6 @@ impl FitProblem {
         filters: &[RunFilters],
         scratch: &mut Scratch,
     ) -> Fit {
-        let steps = Self::difference_steps(model, &theta);
         let (prior_information, _, mut cost) = self.prior(model, &theta);
         let mut fit = Fit {
             model: model.clone(),
@@ -87,32 +96,40 @@ impl FitProblem {
             theta,
         };
         for (run, filters) in self.runs.iter().zip(filters) {
-            model.predict_bins(run, &fit.theta, &mut scratch.forces, &mut scratch.bins);
-            let residual: Vec<f64> =
-                run.bins.iter().zip(&scratch.bins).map(|(bin, p)| bin.speed_mps - p).collect();
-            let whitened = filters.whitened(&residual, &mut scratch.whitened);
-            let columns = whitened_columns(model, run, &fit.theta, &steps, filters, scratch);
-            let Whitened { innovations, filter, factors, cost: run_cost } = whitened;
+            let own = Self::run_linearised(model, &fit.theta, run, filters, scratch);
+            let Whitened { innovations, filter, factors, cost: run_cost } = own.whitened;
             cost += run_cost;
-            let free: Vec<Vec<f64>> = columns
-                .iter()
-                .map(|column| filter.remove(column, &filter.factors(column)))
-                .collect();
-            fit.runs.push(normal_equations(
-                &columns,
-                &free,
-                &innovations,
-                filter.weights(),
-                run_cost,
-            ));
+            fit.runs.push(own.normal);
             fit.innovations.push(innovations);
-            fit.columns.push(free);
-            fit.residuals.push(residual);
+            fit.columns.push(own.free);
+            fit.residuals.push(own.residual);
             fit.factors.push((factors, filter.covariance));
             fit.filters.push(filter);
         }
         fit.cost = cost;
         fit
+    }
+
+    /// The same for one run.
+    pub(super) fn run_linearised(
+        model: &GrownModel,
+        theta: &[f64],
+        run: &RunData,
+        filters: &RunFilters,
+        scratch: &mut Scratch,
+    ) -> LinearisedRun {
+        model.predict_bins(run, theta, &mut scratch.forces, &mut scratch.bins);
+        let residual: Vec<f64> =
+            run.bins.iter().zip(&scratch.bins).map(|(bin, p)| bin.speed_mps - p).collect();
+        let whitened = filters.whitened(&residual, &mut scratch.whitened);
+        let steps = Self::difference_steps(model, theta);
+        let columns = whitened_columns(model, run, theta, &steps, filters, scratch);
+        let free: Vec<Vec<f64>> = columns
+            .iter()
+            .map(|column| whitened.filter.remove(column, &whitened.filter.factors(column)))
+            .collect();
+        let normal = normal_equations(&columns, &free, &whitened);
+        LinearisedRun { normal, whitened, residual, free }
     }
 
     /// Steps for finite differences of the effects' parameters, towards the inside of the bounds.
@@ -163,14 +180,8 @@ fn whitened_columns(
 }
 
 /// `free` are the columns less what the run's own factors would explain.
-fn normal_equations(
-    columns: &[Vec<f64>],
-    free: &[Vec<f64>],
-    innovations: &[f64],
-    weights: &[f64],
-    cost: f64,
-) -> RunNormal {
-    let count = columns.len();
+fn normal_equations(columns: &[Vec<f64>], free: &[Vec<f64>], whitened: &Whitened) -> RunNormal {
+    let (count, weights) = (columns.len(), whitened.filter.weights());
     // A column that is empty is zero.
     let product = |one: &[f64], other: &[f64]| -> f64 {
         one.iter().zip(other).zip(weights).map(|((one, other), weight)| weight * one * other).sum()
@@ -178,11 +189,11 @@ fn normal_equations(
     let mut information = DMatrix::zeros(count, count);
     let mut score = DVector::zeros(count);
     for i in 0..count {
-        score[i] = product(&columns[i], innovations);
+        score[i] = product(&columns[i], &whitened.innovations);
         for j in 0..=i {
             let sum = product(&columns[i], &free[j]);
             (information[(i, j)], information[(j, i)]) = (sum, sum);
         }
     }
-    RunNormal { information, score, cost }
+    RunNormal { information, score, cost: whitened.cost }
 }

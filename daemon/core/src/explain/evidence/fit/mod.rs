@@ -2,6 +2,7 @@
 
 mod descent;
 mod linearised;
+mod nearby;
 mod robust;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
@@ -14,6 +15,7 @@ use super::run_scatter::{
 };
 use crate::train::Davis;
 use linearised::Scratch;
+pub use nearby::Nearby;
 use robust::RunFilters;
 pub(super) use robust::robust_loss;
 

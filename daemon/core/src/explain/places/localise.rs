@@ -1,7 +1,10 @@
 //! Where along the line, and in which runs, a force of a given shape acts.
 
-use super::evidence::{Bin, RunData};
-use super::scan::{Scan, Tuple};
+use super::ends::Stretches;
+use super::inside::Inside;
+use super::runs::best_runs;
+use crate::explain::evidence::{Bin, RunData};
+use crate::explain::scan::{Scan, Tuple};
 
 /// Shortest interval in m that is looked for.
 const SHORTEST_M: f64 = 150.0;
@@ -9,8 +12,6 @@ const SHORTEST_M: f64 = 150.0;
 const FINEST_M: f64 = 10.0;
 /// What is tied to a place shows in so many runs; less is an event.
 const PLACE_RUNS_MIN: usize = 2;
-/// A chosen run must show the force by itself.
-const RUN_GAIN_MIN: f64 = 6.0;
 /// A further interval must add this share of what the others explain.
 const FURTHER_SHARE: f64 = 0.05;
 /// A surveyed gradient is good to this in ‰, which is N/kN.
@@ -18,47 +19,13 @@ pub const MAP_ERROR_PERMILLE: f64 = 0.1;
 /// Intervals of one effect at most.
 const INTERVALS_MAX: usize = 6;
 
-/// How much of a train counts as inside an interval.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Inside {
-    /// The part of the train's length inside.
-    Share {
-        /// The train's length in m.
-        length_m: f64,
-    },
-    /// All of it while its centre is inside.
-    Centre,
-}
-
-impl Inside {
-    /// The share of the train inside any of some disjoint intervals, 0 to 1, by the chainage of
-    /// its centre; 0 where that is not known.
-    #[inline]
-    pub fn share(self, centre_m: Option<f64>, intervals_m: &[[f64; 2]]) -> f64 {
-        let Some(centre_m) = centre_m else { return 0.0 };
-        match self {
-            Inside::Centre => {
-                let inside = intervals_m.iter().any(|&[from, to]| (from..=to).contains(&centre_m));
-                f64::from(u8::from(inside))
-            }
-            Inside::Share { length_m } => {
-                let length_m = length_m.max(1.0);
-                let (rear, front) = (centre_m - 0.5 * length_m, centre_m + 0.5 * length_m);
-                let inside: f64 = intervals_m
-                    .iter()
-                    .map(|&[from, to]| (front.min(to) - rear.max(from)).max(0.0))
-                    .sum();
-                inside / length_m
-            }
-        }
-    }
-}
-
 /// A set of intervals and runs with what a common factor on the shape there explains.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// Disjoint intervals in m, by chainage.
     pub intervals_m: Vec<[f64; 2]>,
+    /// The chainage in m over which the runs move.
+    pub span_m: [f64; 2],
     /// Fit runs by number; `None` for all that pass.
     pub runs: Option<Vec<usize>>,
     /// Decrease of the cost.
@@ -74,6 +41,19 @@ pub struct Found {
 struct Cell {
     interval_m: [f64; 2],
     runs: Vec<Tuple>,
+}
+
+impl Found {
+    /// Its intervals, as ends that were estimated.
+    pub fn stretches(&self) -> Stretches {
+        Stretches { intervals_m: self.intervals_m.clone(), span_m: self.span_m }
+    }
+
+    /// Files of its runs; `None` for all.
+    pub fn files(&self, scan: &Scan) -> Option<Vec<String>> {
+        let file = |&index: &usize| scan.problem.runs[index].file.clone();
+        self.runs.as_ref().map(|runs| runs.iter().map(file).collect())
+    }
 }
 
 /// A shape: acceleration in m/s² per unit at a sample of a run, where the force acts in full.
@@ -145,67 +125,6 @@ fn cells(places: &Places, [low, high]: [f64; 2]) -> Vec<Cell> {
     cells
 }
 
-/// The runs, as a set of numbers, whose common factor explains most after the cost of choosing.
-fn best_runs(
-    scan: &Scan,
-    tuples: &[Tuple],
-    positive: bool,
-    runs_min: usize,
-) -> (Option<Vec<usize>>, f64, f64, f64) {
-    let mut order: Vec<(usize, f64, f64)> = tuples
-        .iter()
-        .enumerate()
-        .filter(|(_, tuple)| tuple.square > 0.0)
-        .map(|(index, tuple)| {
-            let (gain, estimate) = scan.gain(tuple);
-            (index, gain, estimate)
-        })
-        .collect();
-    order.sort_by(|one, other| other.1.total_cmp(&one.1));
-    let passing = order.len();
-    let mut best = (None, 0.0, 0.0, 0.0);
-    if passing < runs_min {
-        return best;
-    }
-    let signs: &[f64] = if positive { &[1.0] } else { &[1.0, -1.0] };
-    for &sign in signs {
-        let mut sum = Tuple::zero(scan.fit.theta.len());
-        let mut chosen = Vec::new();
-        let tells = |own: &&(usize, f64, f64)| own.1 > RUN_GAIN_MIN && own.2 * sign > 0.0;
-        for &(index, _, _) in order.iter().filter(tells) {
-            sum.add(&tuples[index]);
-            chosen.push(index);
-            let (gain, estimate) = scan.gain(&sum);
-            let cost = subset_cost(passing, chosen.len());
-            let is_set = chosen.len() >= runs_min && chosen.len() < passing;
-            if is_set && estimate * sign > 0.0 && gain - cost > best.1 - best.3 {
-                let mut runs = chosen.clone();
-                runs.sort_unstable();
-                best = (Some(runs), gain, estimate, cost);
-            }
-        }
-        let mut all = Tuple::zero(scan.fit.theta.len());
-        order.iter().for_each(|&(index, _, _)| all.add(&tuples[index]));
-        let (gain, estimate) = scan.gain(&all);
-        if estimate * sign > 0.0 && gain > best.1 - best.3 {
-            best = (None, gain, estimate, 0.0);
-        }
-    }
-    best
-}
-
-/// The runs in which a common positive factor on a shape explains most, wherever they are.
-pub fn best_of_runs(scan: &Scan, tuples: &[Tuple]) -> Found {
-    let (runs, gain, estimate, choice_cost) = best_runs(scan, tuples, true, 1);
-    Found { intervals_m: Vec::new(), runs, gain, estimate, choice_cost, map_error: 0.0 }
-}
-
-/// Twice the logarithm of the number of ways to take `taken` of `count` runs.
-pub fn subset_cost(count: usize, taken: usize) -> f64 {
-    let ways: f64 = (0..taken).map(|k| ((count - k) as f64 / (k + 1) as f64).ln()).sum::<f64>();
-    2.0 * (ways + (count.max(1) as f64).ln())
-}
-
 /// Finds the intervals and runs in which a common factor on a shape explains most.
 ///
 /// `positive` asks for a positive factor. Intervals are added while each explains more than the
@@ -225,6 +144,7 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside, positive: bool) -> Option
     }
     let mut found = Found {
         intervals_m: vec![cell.interval_m],
+        span_m: span,
         runs,
         gain,
         estimate: 0.0,
@@ -352,16 +272,5 @@ impl Places<'_, '_> {
         }
         found.intervals_m[last] = best.0;
         (found.gain, found.estimate) = best.1;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn choosing_all_or_none_of_the_runs_costs_less_than_choosing_half() {
-        assert!(subset_cost(8, 4) > subset_cost(8, 1));
-        assert!((subset_cost(8, 4) - 2.0 * (70f64.ln() + 8f64.ln())).abs() < 1e-9);
     }
 }

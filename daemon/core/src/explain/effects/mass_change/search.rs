@@ -1,0 +1,146 @@
+//! The search for the parts of the line or of a run in which another mass holds.
+
+use std::sync::Arc;
+
+use super::parts::{Part, STATION_M, STOP_MIN_S, stations, stops};
+use super::{MATERIAL, Masses, PARAMETER};
+use crate::explain::effects::Candidate;
+use crate::explain::evidence::RunData;
+use crate::explain::places::span_m;
+use crate::explain::scan::{Scan, Tuple};
+
+/// Sections or windows at most.
+const PARTS_MAX: usize = 5;
+/// What another section must explain beyond its choice.
+const GAIN_MIN: f64 = 8.0;
+
+/// What a mass factor slightly above 1 does: traction and brake force move more mass, while all
+/// that goes with the weight stays.
+fn shape(run: &RunData, index: usize) -> f64 {
+    let sample = &run.samples()[index];
+    -sample.control_force_n().unwrap_or(0.0) / sample.inertial_mass_kg
+}
+
+/// Every stretch between two stations in one direction, with its tuple.
+pub fn all_sections(scan: &Scan) -> Vec<(Part, Tuple)> {
+    let stations = stations(scan);
+    let mut sections = Vec::new();
+    for direction in [Some(1.0), Some(-1.0)] {
+        let elementary: Vec<Tuple> = stations
+            .windows(2)
+            .map(|pair| {
+                let part = Part::Section { from_m: pair[0], to_m: pair[1], direction };
+                scan.tuple(|run, i| if part.holds(run, i) { shape(run, i) } else { 0.0 })
+            })
+            .collect();
+        for from in 0..elementary.len() {
+            let mut sum = Tuple::zero(scan.fit.theta.len());
+            for to in from..elementary.len() {
+                sum.add(&elementary[to]);
+                if elementary[to].square > 0.0 && elementary[from].square > 0.0 {
+                    let (from_m, to_m) = (stations[from], stations[to + 1]);
+                    sections.push((Part::Section { from_m, to_m, direction }, sum.clone()));
+                }
+            }
+        }
+    }
+    sections
+}
+
+/// One factor in all runs: nothing to choose but whether there are parts at all.
+pub fn everywhere(scan: &Scan) -> Option<Candidate> {
+    let [low, high] = span_m(scan)?;
+    let runs = &scan.problem.runs;
+    let first = runs.first()?.direction;
+    let direction = runs.iter().all(|run| run.direction == first).then_some(first);
+    let part = Part::Section { from_m: low - STATION_M, to_m: high + STATION_M, direction };
+    let (_, estimate) = scan.gain(&scan.tuple(shape));
+    let start = vec![(1.0 + estimate).clamp(0.7, 1.5)];
+    let choice_cost = 2.0 * std::f64::consts::LN_2;
+    Some(Candidate::new(Masses::new(part, Vec::new(), choice_cost), start))
+}
+
+/// Every stretch between two stops of a run, with its tuple.
+pub fn all_windows(scan: &Scan) -> Vec<(Part, Tuple)> {
+    let mut windows = Vec::new();
+    for (index, run) in scan.problem.runs.iter().enumerate() {
+        let mut edges = vec![0.0];
+        edges.extend(stops(run).iter().map(|stop| 0.5 * (stop.0 + stop.1)));
+        edges.push(run.duration_s());
+        edges.dedup_by(|one, other| *one - *other < STOP_MIN_S);
+        let part = |from: usize, to: usize| Part::Window {
+            run: run.file.clone(),
+            from_s: edges[from],
+            to_s: edges[to],
+            offset_s: run.offset_s,
+        };
+        let elementary: Vec<Tuple> = (0..edges.len() - 1)
+            .map(|k| {
+                let part = part(k, k + 1);
+                let masked = |run: &RunData, i: usize| {
+                    if part.holds(run, i) { shape(run, i) } else { 0.0 }
+                };
+                scan.run_tuple(index, masked)
+            })
+            .collect();
+        for from in 0..elementary.len() {
+            let mut sum = Tuple::zero(scan.fit.theta.len());
+            for to in from..elementary.len() {
+                sum.add(&elementary[to]);
+                if elementary[to].square > 0.0 && elementary[from].square > 0.0 {
+                    windows.push((part(from, to + 1), sum.clone()));
+                }
+            }
+        }
+    }
+    windows
+}
+
+/// Adds parts one by one, each fitted with a factor of its own, while they explain something.
+pub fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Option<Candidate> {
+    let part_cost = 2.0 * (parts.len().max(2) as f64).ln();
+    let best = |scan: &Scan, tuples: &mut dyn Iterator<Item = (Part, Tuple)>| {
+        tuples
+            .map(|(part, tuple)| {
+                let (gain, estimate) = scan.gain(&tuple);
+                (gain, estimate, part)
+            })
+            .filter(|(_, estimate, _)| estimate.abs() > MATERIAL)
+            .max_by(|one, other| one.0.total_cmp(&other.0))
+    };
+    let (_, estimate, part) = best(scan, &mut parts.iter().cloned())?;
+    let edges = |part: &Part| part.edges(parts.iter().map(|(other, _)| other));
+    let mut masses = Masses::new(part.clone(), edges(&part), part_cost);
+    let mut start = vec![(1.0 + estimate).clamp(0.7, 1.5)];
+    while masses.parts.len() < PARTS_MAX {
+        let hypothesis = Arc::new(masses.clone());
+        let model = scan.fit.model.with(hypothesis);
+        let theta = scan.fit.theta.iter().chain(&start).copied().collect();
+        let fit = scan.problem.fit(&model, theta, scan.fit.noise);
+        start = fit.theta[scan.fit.theta.len()..].to_vec();
+        let Some(next) = Scan::new(scan.problem, scan.holdout, scan.train, scan.track, &fit) else {
+            break;
+        };
+        let free =
+            parts.iter().filter(|(part, _)| masses.parts.iter().all(|own| own.is_apart(part)));
+        let mut fresh = free.map(|(part, _)| {
+            let masked = |run: &RunData, i: usize| {
+                if part.holds(run, i) { shape(run, i) } else { 0.0 }
+            };
+            (part.clone(), next.tuple(masked))
+        });
+        match best(&next, &mut fresh) {
+            Some((gain, estimate, part))
+                if gain > part_cost + GAIN_MIN && estimate.abs() > MATERIAL =>
+            {
+                masses.edges.push(edges(&part));
+                masses.parts.push(part);
+                masses.parameters.push(PARAMETER);
+                masses.choice_cost += part_cost;
+                start.push((1.0 + estimate).clamp(0.7, 1.5));
+            }
+            _ => break,
+        }
+    }
+    Some(Candidate::new(masses, start))
+}

@@ -1,0 +1,119 @@
+//! Ends of places that were estimated from the speeds.
+
+/// An interval is not shorter than this in m.
+const SHORTEST_M: f64 = 100.0;
+
+/// What an end is a value of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// Chainage in m.
+    Chainage,
+    /// Time in s since the run's first sample.
+    Time,
+    /// A covariate, in its unit.
+    Covariate,
+}
+
+/// Where else an end could be.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Reach {
+    /// Anywhere between two values.
+    Between(f64, f64),
+    /// At one of some values, in ascending order.
+    OneOf(Vec<f64>),
+}
+
+/// One end of an interval or window.
+#[derive(Clone, Debug, PartialEq)]
+pub struct End {
+    /// What it is a value of.
+    pub axis: Axis,
+    /// The interval or window, by its place in the list.
+    pub part: usize,
+    /// True for the upper or later end.
+    pub is_upper: bool,
+    /// Where it was found.
+    pub at: f64,
+    /// Where else it could be.
+    pub reach: Reach,
+    /// A step that is surely small.
+    pub fine: f64,
+    /// The only run that it concerns, by file; `None` for all.
+    pub run: Option<String>,
+}
+
+/// Disjoint intervals of chainage whose ends were estimated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stretches {
+    /// The intervals in m, by chainage.
+    pub intervals_m: Vec<[f64; 2]>,
+    /// The chainage in m over which the runs move.
+    pub span_m: [f64; 2],
+}
+
+impl Stretches {
+    /// All ends, lower before upper; each may move up to its neighbours.
+    pub fn ends(&self) -> Vec<End> {
+        let all = &self.intervals_m;
+        let mut ends = Vec::new();
+        for (part, &[from_m, to_m]) in all.iter().enumerate() {
+            let below_m = if part == 0 { self.span_m[0] } else { all[part - 1][1] };
+            let above_m = all.get(part + 1).map_or(self.span_m[1], |next| next[0]);
+            let end = |is_upper: bool, at: f64, low_m: f64, high_m: f64| End {
+                axis: Axis::Chainage,
+                part,
+                is_upper,
+                at,
+                reach: Reach::Between(low_m.min(at), high_m.max(at)),
+                fine: 5.0,
+                run: None,
+            };
+            ends.push(end(false, from_m, below_m, to_m - SHORTEST_M));
+            ends.push(end(true, to_m, from_m + SHORTEST_M, above_m));
+        }
+        ends
+    }
+
+    /// The same with one end elsewhere; `None` when an interval would be gone or meet another.
+    pub fn moved(&self, end: &End, at_m: f64) -> Option<Self> {
+        let mut moved = self.clone();
+        moved.intervals_m[end.part][usize::from(end.is_upper)] = at_m;
+        let ascends = moved.intervals_m.iter().flatten().is_sorted();
+        let [from_m, to_m] = moved.intervals_m[end.part];
+        (ascends && from_m < to_m).then_some(moved)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two() -> Stretches {
+        Stretches { intervals_m: vec![[1000.0, 2000.0], [3000.0, 3500.0]], span_m: [0.0, 5000.0] }
+    }
+
+    #[test]
+    fn an_end_reaches_from_its_own_interval_to_the_neighbour() {
+        let ends = two().ends();
+        let reaches: Vec<&Reach> = ends.iter().map(|end| &end.reach).collect();
+        assert_eq!(
+            reaches,
+            [
+                &Reach::Between(0.0, 1900.0),
+                &Reach::Between(1100.0, 3000.0),
+                &Reach::Between(2000.0, 3400.0),
+                &Reach::Between(3100.0, 5000.0)
+            ]
+        );
+    }
+
+    #[test]
+    fn an_end_moves_by_itself_and_never_into_a_neighbour() {
+        let stretches = two();
+        let ends = stretches.ends();
+        let moved = stretches.moved(&ends[1], 2500.0).unwrap();
+        assert_eq!(moved.intervals_m, [[1000.0, 2500.0], [3000.0, 3500.0]]);
+        assert_eq!(stretches.moved(&ends[1], 3200.0), None);
+        assert_eq!(stretches.moved(&ends[0], 2000.0), None);
+    }
+}

@@ -1,0 +1,19 @@
+//! Where along the line, when, and in which runs something acts, and how surely that is known.
+//!
+//! - [`Inside`]: how much of a train is at a place
+//! - [`find`]: the intervals and runs in which a force of some shape explains most
+//! - [`End`], [`Stretches`]: ends that were estimated, and where else they could be
+//! - [`settle`]: every end at the middle of what the data allow, with its interval, and for every
+//!   run how likely it takes part
+
+mod ends;
+mod inside;
+mod localise;
+mod runs;
+mod settle;
+
+pub use ends::{Axis, End, Reach, Stretches};
+pub use inside::Inside;
+pub use localise::{Found, MAP_ERROR_PERMILLE, find, span_m};
+pub use runs::best_of_runs;
+pub use settle::settle;

@@ -1,0 +1,87 @@
+//! In which runs a force acts.
+
+use super::localise::Found;
+use crate::explain::scan::{Scan, Tuple};
+
+/// A chosen run must show the force by itself.
+const RUN_GAIN_MIN: f64 = 6.0;
+
+/// The runs, as a set of numbers, whose common factor explains most after the cost of choosing.
+pub(super) fn best_runs(
+    scan: &Scan,
+    tuples: &[Tuple],
+    positive: bool,
+    runs_min: usize,
+) -> (Option<Vec<usize>>, f64, f64, f64) {
+    let mut order: Vec<(usize, f64, f64)> = tuples
+        .iter()
+        .enumerate()
+        .filter(|(_, tuple)| tuple.square > 0.0)
+        .map(|(index, tuple)| {
+            let (gain, estimate) = scan.gain(tuple);
+            (index, gain, estimate)
+        })
+        .collect();
+    order.sort_by(|one, other| other.1.total_cmp(&one.1));
+    let passing = order.len();
+    let mut best = (None, 0.0, 0.0, 0.0);
+    if passing < runs_min {
+        return best;
+    }
+    let signs: &[f64] = if positive { &[1.0] } else { &[1.0, -1.0] };
+    for &sign in signs {
+        let mut sum = Tuple::zero(scan.fit.theta.len());
+        let mut chosen = Vec::new();
+        let tells = |own: &&(usize, f64, f64)| own.1 > RUN_GAIN_MIN && own.2 * sign > 0.0;
+        for &(index, _, _) in order.iter().filter(tells) {
+            sum.add(&tuples[index]);
+            chosen.push(index);
+            let (gain, estimate) = scan.gain(&sum);
+            let cost = subset_cost(passing, chosen.len());
+            let is_set = chosen.len() >= runs_min && chosen.len() < passing;
+            if is_set && estimate * sign > 0.0 && gain - cost > best.1 - best.3 {
+                let mut runs = chosen.clone();
+                runs.sort_unstable();
+                best = (Some(runs), gain, estimate, cost);
+            }
+        }
+        let mut all = Tuple::zero(scan.fit.theta.len());
+        order.iter().for_each(|&(index, _, _)| all.add(&tuples[index]));
+        let (gain, estimate) = scan.gain(&all);
+        if estimate * sign > 0.0 && gain > best.1 - best.3 {
+            best = (None, gain, estimate, 0.0);
+        }
+    }
+    best
+}
+
+/// The runs in which a common positive factor on a shape explains most, wherever they are.
+pub fn best_of_runs(scan: &Scan, tuples: &[Tuple]) -> Found {
+    let (runs, gain, estimate, choice_cost) = best_runs(scan, tuples, true, 1);
+    Found {
+        intervals_m: Vec::new(),
+        span_m: [0.0; 2],
+        runs,
+        gain,
+        estimate,
+        choice_cost,
+        map_error: 0.0,
+    }
+}
+
+/// Twice the logarithm of the number of ways to take `taken` of `count` runs.
+pub fn subset_cost(count: usize, taken: usize) -> f64 {
+    let ways: f64 = (0..taken).map(|k| ((count - k) as f64 / (k + 1) as f64).ln()).sum::<f64>();
+    2.0 * (ways + (count.max(1) as f64).ln())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn choosing_all_or_none_of_the_runs_costs_less_than_choosing_half() {
+        assert!(subset_cost(8, 4) > subset_cost(8, 1));
+        assert!((subset_cost(8, 4) - 2.0 * (70f64.ln() + 8f64.ln())).abs() < 1e-9);
+    }
+}
