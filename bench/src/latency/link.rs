@@ -5,7 +5,7 @@ use std::os::unix::net::UnixDatagram;
 use std::time::Duration;
 
 use dynocar_client::channel::{Receiver, Sender, Transport};
-use dynocar_client::{SamplePublisher, SnapshotReader};
+use dynocar_client::{SamplePublisher, SnapshotReader, monotonic_now_ns};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
 
 use super::bytes::{as_bytes, from_bytes};
@@ -31,6 +31,12 @@ pub trait Link {
     /// When the transport fails for good.
     fn poll(&mut self) -> Result<u64, RigError>;
 
+    /// When the newest answered sample left, and when its answer did, in ns of the monotonic clock;
+    /// `None` where the peer does not say so.
+    fn stamps(&self) -> Option<(i64, i64)> {
+        None
+    }
+
     /// Takes what else has come, while no answer is awaited: other pipelines' snapshots, which a
     /// controller's next poll would find in its way.
     ///
@@ -49,6 +55,7 @@ pub struct ClientLink {
     reader: SnapshotReader,
     pipeline: PipelineKind,
     newest: u64,
+    stamps: (i64, i64),
 }
 
 impl ClientLink {
@@ -60,7 +67,7 @@ impl ClientLink {
     pub fn open(site: &Site, train: TrainId, pipeline: PipelineKind) -> Result<Self, RigError> {
         let publisher = SamplePublisher::open(site.host(), train)?;
         let reader = SnapshotReader::open(site.host(), train)?;
-        Ok(ClientLink { publisher, reader, pipeline, newest: 0 })
+        Ok(ClientLink { publisher, reader, pipeline, newest: 0, stamps: (0, 0) })
     }
 }
 
@@ -74,8 +81,13 @@ impl Link for ClientLink {
             && let Some(reading) = self.reader.latest(self.pipeline, 0)
         {
             self.newest = reading.snapshot.sample_sequence;
+            self.stamps = (reading.snapshot.sample_published_ns, reading.snapshot.published_ns);
         }
         Ok(self.newest)
+    }
+
+    fn stamps(&self) -> Option<(i64, i64)> {
+        (self.stamps.1 > 0).then_some(self.stamps)
     }
 
     fn rest(&mut self) -> Result<(), RigError> {
@@ -139,6 +151,7 @@ pub struct DatagramLink {
     server: std::path::PathBuf,
     sequence: u64,
     newest: u64,
+    stamps: (i64, i64),
 }
 
 impl DatagramLink {
@@ -153,7 +166,7 @@ impl DatagramLink {
         socket.set_nonblocking(!blocks).map_err(system("socket mode"))?;
         socket.set_read_timeout(blocks.then_some(BLOCK)).map_err(system("socket timeout"))?;
         let server = site.path().join(SERVER_SOCKET);
-        Ok(DatagramLink { socket, server, sequence: 0, newest: 0 })
+        Ok(DatagramLink { socket, server, sequence: 0, newest: 0, stamps: (0, 0) })
     }
 }
 
@@ -161,6 +174,7 @@ impl Link for DatagramLink {
     fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, RigError> {
         self.sequence += 1;
         sample.sequence = self.sequence;
+        sample.published_ns = monotonic_now_ns();
         match self.socket.send_to(as_bytes(sample), &self.server) {
             Ok(_) => Ok(self.sequence),
             // Full, or the server does not listen yet: lost.
@@ -175,12 +189,17 @@ impl Link for DatagramLink {
             Ok(count) => {
                 if let Some(snapshot) = from_bytes::<ParameterSnapshot>(&bytes[..count]) {
                     self.newest = self.newest.max(snapshot.sample_sequence);
+                    self.stamps = (snapshot.sample_published_ns, snapshot.published_ns);
                 }
             }
             Err(error) if is_passing(error.kind()) => {}
             Err(error) => return Err(system("receiving a datagram")(error)),
         }
         Ok(self.newest)
+    }
+
+    fn stamps(&self) -> Option<(i64, i64)> {
+        (self.stamps.1 > 0).then_some(self.stamps)
     }
 }
 

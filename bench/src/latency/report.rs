@@ -46,6 +46,9 @@ pub struct Line {
     pub unanswered: u64,
     /// From the moment before publishing, as a closed loop would have it.
     pub from_publish: Quantiles,
+    /// Medians in ns of where that went: until the sample left, until its answer left, until that
+    /// was polled; none where the peer does not say.
+    pub stages_p50_ns: Option<[u64; 3]>,
     /// Median over the rounds of this case's p50 over the floor's.
     pub floor_ratio_p50: f64,
     /// Median over the rounds of this case's p99 over the floor's.
@@ -88,8 +91,12 @@ fn line((case, outcomes): &(Case, Vec<Outcome>), all: &[(Case, Vec<Outcome>)]) -
         median(rounds.map(|(ours, floor)| of(ours) / of(floor)).collect())
     };
     let mut from_publish = histogram();
+    let mut stages: [_; 3] = std::array::from_fn(|_| histogram());
     let mut suffered = None;
     for outcome in outcomes {
+        for (all, own) in stages.iter_mut().zip(&outcome.slice.stages) {
+            let _ = all.add(own);
+        }
         // Every histogram has the same bounds.
         let _ = from_publish.add(&outcome.slice.from_publish);
         if let Some(usage) = outcome.suffered {
@@ -102,6 +109,7 @@ fn line((case, outcomes): &(Case, Vec<Outcome>), all: &[(Case, Vec<Outcome>)]) -
         latency: Quantiles::of(&pooled(outcomes)),
         unanswered: outcomes.iter().map(|outcome| outcome.slice.unanswered).sum(),
         from_publish: Quantiles::of(&from_publish),
+        stages_p50_ns: (!stages[0].is_empty()).then(|| stages.map(|it| it.value_at_quantile(0.5))),
         floor_ratio_p50: ratio(0.5),
         floor_ratio_p99: ratio(0.99),
         suffered,
@@ -141,6 +149,17 @@ pub fn table(report: &Report) -> String {
             line.floor_ratio_p50,
             line.floor_ratio_p99,
         );
+    }
+    for line in &report.cases {
+        if let Some(stages) = line.stages_p50_ns {
+            let [leaving, answering, polling] = stages.map(|ns| for_people(ns as f64));
+            let _ = writeln!(
+                text,
+                "{:<34} p50 until the sample leaves {leaving}, until its answer leaves {answering}, \
+                 until that is polled {polling}",
+                format!("{} ({})", line.name, line.idle),
+            );
+        }
     }
     let costs = &report.costs;
     let _ = writeln!(

@@ -28,8 +28,31 @@ pub struct Slice {
     pub from_appointed: Histogram<u64>,
     /// From the moment before publishing: what a closed loop would tell.
     pub from_publish: Histogram<u64>,
+    /// Where the time from publishing went: until the sample left, until its answer left, until
+    /// that was polled. Empty where the peer does not say.
+    pub stages: [Histogram<u64>; 3],
     /// Samples to which no snapshot came within [`ANSWER_WITHIN_S`].
     pub unanswered: u64,
+}
+
+impl Slice {
+    fn empty() -> Self {
+        Slice {
+            from_appointed: histogram(),
+            from_publish: histogram(),
+            stages: std::array::from_fn(|_| histogram()),
+            unanswered: 0,
+        }
+    }
+
+    fn record_stages(&mut self, actual_ns: i64, stamps: Option<(i64, i64)>, polled_ns: i64) {
+        if let Some((left_ns, answered_ns)) = stamps {
+            let stages = [left_ns - actual_ns, answered_ns - left_ns, polled_ns - answered_ns];
+            for (histogram, stage_ns) in self.stages.iter_mut().zip(stages) {
+                record(histogram, stage_ns);
+            }
+        }
+    }
 }
 
 /// How long an answer may take before it counts as none, in s.
@@ -92,7 +115,7 @@ pub fn drive(
 ) -> Result<Slice, RigError> {
     let period_ns = 1e9 / rate_hz;
     let total = (seconds * rate_hz).max(1.0) as u64;
-    let mut slice = Slice { from_appointed: histogram(), from_publish: histogram(), unanswered: 0 };
+    let mut slice = Slice::empty();
     let mut in_flight = InFlight { times: vec![(0, 0); IN_FLIGHT].into(), answered: 0 };
     let start_ns = monotonic_now_ns() + 1_000_000;
     let mut newest = 0;
@@ -139,6 +162,10 @@ impl InFlight {
                     let (appointed_ns, actual_ns) = self.times[sequence as usize % IN_FLIGHT];
                     record(&mut slice.from_appointed, now_ns - appointed_ns);
                     record(&mut slice.from_publish, now_ns - actual_ns);
+                }
+                if newest == sequence {
+                    let (_, actual_ns) = self.times[sequence as usize % IN_FLIGHT];
+                    slice.record_stages(actual_ns, link.stamps(), now_ns);
                 }
                 self.answered = newest.min(sequence);
             } else if monotonic_now_ns() >= until_ns {

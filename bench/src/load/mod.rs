@@ -12,6 +12,7 @@ pub mod report;
 pub mod search;
 pub mod traffic;
 pub mod trial;
+pub mod waits;
 
 use std::path::PathBuf;
 

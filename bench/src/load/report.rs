@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::search::{Found, Size};
 use super::trial::{Trial, TrialPlan};
+use super::waits::Waits;
 use crate::rig::host::HostFigures;
 use crate::rig::quantiles::{Quantiles, for_people};
 
@@ -30,6 +31,8 @@ pub struct Report {
     pub host: HostFigures,
     /// The latest that a sample left after its appointed time, in ns.
     pub publisher_lag_ns: i64,
+    /// What kernel and host took from publishers and daemon during the load.
+    pub waits: Waits,
     /// The highest rate without loss, when it was searched for.
     pub search: Option<Found>,
     /// Growth with trains and pipelines, when it was asked for.
@@ -52,6 +55,8 @@ pub struct Line {
     /// From appointed time to the poll that brought the snapshot.
     #[serde(flatten)]
     pub latency: Quantiles,
+    /// The same from the moment at which the sample left.
+    pub since_leaving: Quantiles,
 }
 
 impl Report {
@@ -64,6 +69,7 @@ impl Report {
             rejected: it.rejected,
             lost: it.missing(),
             latency: Quantiles::of(&it.latency),
+            since_leaving: Quantiles::of(&it.since_leaving),
         };
         Report {
             trains: plan.trains,
@@ -75,6 +81,7 @@ impl Report {
             rss_bytes: trial.rss_bytes,
             host,
             publisher_lag_ns: trial.publisher_lag_ns,
+            waits: trial.waits,
             search: None,
             growth: None,
         }
@@ -111,6 +118,13 @@ pub fn table(report: &Report) -> String {
             line.name, line.offered, line.used, line.rejected, line.lost
         );
     }
+    for line in &report.pipelines {
+        let it = &line.since_leaving;
+        let [p50, p99, p999, max] =
+            [it.p50_ns, it.p99_ns, it.p999_ns, it.max_ns].map(|ns| for_people(ns as f64));
+        let name = format!("  {} since leaving", line.name);
+        let _ = writeln!(text, "{name:<64} {p50:>10} {p99:>10} {p999:>10} {max:>10}");
+    }
     let _ = writeln!(
         text,
         "daemon: {:.0} % of a core, {:.1} MiB resident ({:.1} MiB at first); samples left at most \
@@ -119,6 +133,16 @@ pub fn table(report: &Report) -> String {
         report.rss_bytes as f64 / MEBIBYTE,
         report.rss_start_bytes as f64 / MEBIBYTE,
         for_people(report.publisher_lag_ns as f64)
+    );
+    let waits = &report.waits;
+    let share = |seconds: f64| 100.0 * seconds / report.seconds;
+    let _ = writeln!(
+        text,
+        "ready but without a processor: publishers {:.2} %, daemon {:.2} % of the time; the machine \
+         beneath says that it took {:.2} %",
+        share(waits.publishers_s),
+        share(waits.daemon_s),
+        share(waits.stolen_s)
     );
     let host = &report.host;
     let _ = writeln!(

@@ -7,6 +7,7 @@ use dynocar_shared::{PipelineKind, TrainId};
 use hdrhistogram::Histogram;
 
 use super::traffic::{Traffic, TrafficPlan};
+use super::waits::Waits;
 use crate::latency::{Cores, bind, prioritise};
 use crate::rig::RigError;
 use crate::rig::child::Peer;
@@ -49,6 +50,8 @@ pub struct PipelineOutcome {
     pub lost: u64,
     /// From appointed time to the poll that brought the snapshot.
     pub latency: Histogram<u64>,
+    /// The same from the moment at which the sample left: without the publishers' own delays.
+    pub since_leaving: Histogram<u64>,
 }
 
 impl PipelineOutcome {
@@ -72,6 +75,8 @@ pub struct Trial {
     /// The latest that a sample left after its appointed time, in ns: beyond some ms the
     /// publishers themselves are at their limit.
     pub publisher_lag_ns: i64,
+    /// What kernel and host took from the two threads that matter.
+    pub waits: Waits,
 }
 
 impl Trial {
@@ -93,9 +98,13 @@ struct Train {
     reader: SnapshotReader,
     traffic: Traffic,
     appointed: Box<[i64]>,
+    left: Box<[i64]>,
     /// Newest sample behind each pipeline's snapshot.
     seen: [u64; PIPELINES_MAX],
 }
+
+/// Name of the daemon's thread with the fast pipelines.
+const FAST: &str = "fast";
 
 /// Runs one trial; binds the calling thread.
 ///
@@ -119,6 +128,7 @@ pub fn run(plan: &TrialPlan) -> Result<Trial, RigError> {
         let id = TrainId(index as u64 + 1);
         train.traffic = Traffic::new(plan.traffic, id, spread, start_ns, plan.seed);
     }
+    let waits_before = Waits::so_far(daemon.process_id(), FAST, plan.cores);
     let (mut lag_ns, mut early) = (0, ProcessUsage::default());
     let end_ns = start_ns + (plan.seconds * 1e9) as i64;
     let early_ns = start_ns + (plan.seconds * 1e8) as i64;
@@ -141,6 +151,7 @@ pub fn run(plan: &TrialPlan) -> Result<Trial, RigError> {
         trains[turn].poll(&mut outcomes);
     }
     let late = usage::of_process(daemon.process_id()).unwrap_or_default();
+    let waits = Waits::so_far(daemon.process_id(), FAST, plan.cores).since(waits_before);
     let wall_s = (monotonic_now_ns() - early_at_ns) as f64 * 1e-9;
     settle(&mut trains, &mut outcomes);
     for train in &trains {
@@ -154,6 +165,7 @@ pub fn run(plan: &TrialPlan) -> Result<Trial, RigError> {
         rss_start_bytes: early.rss_bytes,
         rss_bytes: late.rss_bytes,
         publisher_lag_ns: lag_ns,
+        waits,
     })
 }
 
@@ -170,7 +182,7 @@ fn daemon_plan(plan: &TrialPlan) -> DaemonPlan {
         pipelines,
     };
     let threads = [
-        thread("fast", Some(plan.cores.server), plan.cores.priority, fast),
+        thread(FAST, Some(plan.cores.server), plan.cores.priority, fast),
         thread("slow", None, None, slow),
     ];
     let threads = threads.into_iter().filter(|thread| !thread.pipelines.is_empty()).collect();
@@ -178,8 +190,8 @@ fn daemon_plan(plan: &TrialPlan) -> DaemonPlan {
 }
 
 fn fresh(kind: PipelineKind) -> PipelineOutcome {
-    let latency = histogram();
-    PipelineOutcome { kind, offered: 0, used: 0, rejected: 0, lost: 0, latency }
+    let (latency, since_leaving) = (histogram(), histogram());
+    PipelineOutcome { kind, offered: 0, used: 0, rejected: 0, lost: 0, latency, since_leaving }
 }
 
 fn open_train(site: &Site, id: TrainId, plan: &TrialPlan) -> Result<Train, RigError> {
@@ -188,6 +200,7 @@ fn open_train(site: &Site, id: TrainId, plan: &TrialPlan) -> Result<Train, RigEr
         reader: SnapshotReader::open(site.host(), id)?,
         traffic: Traffic::new(plan.traffic, id, 0.0, monotonic_now_ns(), plan.seed),
         appointed: vec![0; IN_FLIGHT].into(),
+        left: vec![0; IN_FLIGHT].into(),
         seen: [0; PIPELINES_MAX],
     })
 }
@@ -235,6 +248,7 @@ impl Train {
             let (mut sample, appointed_ns) = self.traffic.take();
             let sequence = self.publisher.publish(&mut sample)?;
             self.appointed[sequence as usize % IN_FLIGHT] = appointed_ns;
+            self.left[sequence as usize % IN_FLIGHT] = sample.published_ns;
             lag_ns = lag_ns.max(sample.published_ns - appointed_ns);
         }
         Ok(lag_ns)
@@ -252,8 +266,9 @@ impl Train {
             let newest = reading.snapshot.sample_sequence;
             let oldest = (self.seen[index] + 1).max(newest.saturating_sub(IN_FLIGHT as u64 - 1));
             for sequence in oldest..=newest {
-                let appointed_ns = self.appointed[sequence as usize % IN_FLIGHT];
-                record(&mut outcome.latency, now_ns - appointed_ns);
+                let place = sequence as usize % IN_FLIGHT;
+                record(&mut outcome.latency, now_ns - self.appointed[place]);
+                record(&mut outcome.since_leaving, now_ns - self.left[place]);
             }
             self.seen[index] = self.seen[index].max(newest);
         }

@@ -1,6 +1,6 @@
 //! What the kernel says of a process and its threads.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -62,15 +62,43 @@ pub fn of_process(process_id: u32) -> Option<ProcessUsage> {
 
 /// A thread's time on a processor; finer than the ticks of `/proc/…/stat`.
 fn run_time_ns(task: &Path) -> Option<u64> {
-    std::fs::read_to_string(task.join("schedstat")).ok()?.split(' ').next()?.parse().ok()
+    schedule_figure(task, 0)
+}
+
+/// A figure of `/proc/…/schedstat`: time on a processor, or ready and waiting for one, in ns.
+fn schedule_figure(task: &Path, place: usize) -> Option<u64> {
+    std::fs::read_to_string(task.join("schedstat")).ok()?.split(' ').nth(place)?.parse().ok()
+}
+
+/// For how long the calling thread was ready but had no processor, in s.
+pub fn own_wait_s() -> f64 {
+    schedule_figure(Path::new("/proc/thread-self"), 1).unwrap_or(0) as f64 * 1e-9
+}
+
+/// The same for a process's thread of this name; 0 when there is none.
+pub fn thread_wait_s(process_id: u32, name: &str) -> f64 {
+    let wait_ns = task_named(process_id, name).and_then(|task| schedule_figure(&task, 1));
+    wait_ns.unwrap_or(0) as f64 * 1e-9
+}
+
+/// For how long the machine beneath kept a core from its kernel, in s, as far as it says so.
+pub fn stolen_s(core: usize) -> f64 {
+    let stat = std::fs::read_to_string("/proc/stat").unwrap_or_default();
+    let name = format!("cpu{core} ");
+    let line = stat.lines().find_map(|line| line.strip_prefix(&name));
+    let ticks: Option<u64> = line.and_then(|line| line.split(' ').nth(7)?.parse().ok());
+    ticks.unwrap_or(0) as f64 / rustix::param::clock_ticks_per_second() as f64
 }
 
 /// The usage of a process's thread of this name; `None` when there is none.
 pub fn of_thread(process_id: u32, name: &str) -> Option<ThreadUsage> {
+    task_named(process_id, name).and_then(|task| read_thread(&task))
+}
+
+fn task_named(process_id: u32, name: &str) -> Option<PathBuf> {
     let tasks = std::fs::read_dir(format!("/proc/{process_id}/task")).ok()?;
-    tasks.flatten().map(|task| task.path()).find_map(|task| {
-        let is_it = std::fs::read_to_string(task.join("comm")).ok()?.trim_end() == name;
-        if is_it { read_thread(&task) } else { None }
+    tasks.flatten().map(|task| task.path()).find(|task| {
+        std::fs::read_to_string(task.join("comm")).is_ok_and(|own| own.trim_end() == name)
     })
 }
 
@@ -115,6 +143,16 @@ mod tests {
             .unwrap();
         assert!(usage.is_some_and(|usage| usage.minor_faults > 0));
         assert_eq!(of_thread(id, "nobody"), None);
+    }
+
+    #[test]
+    fn waits_and_stolen_time_are_read_and_never_fall() {
+        let before = (own_wait_s(), stolen_s(0));
+        std::thread::yield_now();
+        assert!(own_wait_s() >= before.0 && stolen_s(0) >= before.1);
+        assert!(std::path::Path::new("/proc/thread-self/schedstat").exists());
+        assert_eq!(thread_wait_s(std::process::id(), "nobody"), 0.0);
+        assert_eq!(stolen_s(usize::MAX), 0.0);
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! A residual that is real but fits no kind of the library: an extra force in a range of some
 //! covariate. It is not an explanation; it says where an explanation is to be looked for.
 
+mod covariate;
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -11,11 +13,8 @@ use crate::explain::answer::{CovariateRange, Place};
 use crate::explain::evidence::{Bin, RunData, SampleForces, SharedHypothesis};
 use crate::explain::places::{Axis, End, MAP_ERROR_PERMILLE, Reach};
 use crate::explain::scan::{Scan, Tuple};
-use crate::force::ResolvedSample;
+use covariate::{COVARIATES, Covariate};
 
-const RESISTANCE: [Parameter; 1] = [Parameter::new("extra_n_per_kn", (-50.0, 50.0), 0.01)];
-const GRADIENT: [Parameter; 1] = [Parameter::new("gradient_error_permille", (-30.0, 30.0), 0.01)];
-const SHARE: [Parameter; 1] = [Parameter::new("force_error_share", (-0.6, 0.6), 0.002)];
 /// Cells into which the range of a covariate is cut.
 const CELLS: usize = 20;
 /// Motion in s that a band must hold.
@@ -25,28 +24,6 @@ const OUTSIDE_COST: f64 = 10.0;
 
 /// The kind.
 pub struct ResidualBand;
-
-/// What the residual may depend on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Covariate {
-    Speed,
-    Chainage,
-    TimeSinceStart,
-    TractionForce,
-    BrakeForce,
-    Temperature,
-    Run,
-}
-
-const COVARIATES: [Covariate; 7] = [
-    Covariate::Speed,
-    Covariate::Chainage,
-    Covariate::TimeSinceStart,
-    Covariate::TractionForce,
-    Covariate::BrakeForce,
-    Covariate::Temperature,
-    Covariate::Run,
-];
 
 #[derive(Clone, Debug)]
 struct Band {
@@ -59,56 +36,6 @@ struct Band {
     /// Files of all fit runs, by number, for the covariate `Run`.
     files: Vec<String>,
     choice_cost: f64,
-}
-
-impl Covariate {
-    fn name(self) -> &'static str {
-        match self {
-            Covariate::Speed => "speed_mps",
-            Covariate::Chainage => "chainage_m",
-            Covariate::TimeSinceStart => "time_since_start_s",
-            Covariate::TractionForce => "traction_force_n",
-            Covariate::BrakeForce => "brake_force_n",
-            Covariate::Temperature => "ambient_temperature_degc",
-            Covariate::Run => "run",
-        }
-    }
-
-    /// At a sample of the fit run with this number; a holdout run has none.
-    fn value(self, run: &RunData, number: Option<usize>, index: usize) -> Option<f64> {
-        let sample = &run.samples()[index];
-        match self {
-            Covariate::Speed => Some(run.smooth_mps[index]),
-            Covariate::Chainage => sample.position_m,
-            Covariate::TimeSinceStart => Some(run.recording.time_s()[index]),
-            Covariate::TractionForce => sample.traction_force_n,
-            Covariate::BrakeForce => sample.brake_force_n,
-            Covariate::Temperature => sample.ambient_temperature_degc,
-            Covariate::Run => number.map(|number| number as f64),
-        }
-    }
-
-    fn parameters(self) -> &'static [Parameter] {
-        match self {
-            Covariate::Chainage => &GRADIENT,
-            Covariate::TractionForce | Covariate::BrakeForce => &SHARE,
-            _ => &RESISTANCE,
-        }
-    }
-
-    /// Acceleration in m/s² per unit of the parameter.
-    fn shape(self, scan: &Scan, sample: &ResolvedSample) -> f64 {
-        let per_unit = scan.per_unit_resistance_mps2(sample);
-        match self {
-            // The map's error turns its sign with the direction of travel.
-            Covariate::Chainage => -sample.direction * per_unit,
-            Covariate::TractionForce => {
-                sample.traction_force_n.unwrap_or(0.0) / sample.inertial_mass_kg
-            }
-            Covariate::BrakeForce => -sample.brake_force_n.unwrap_or(0.0) / sample.inertial_mass_kg,
-            _ => -per_unit,
-        }
-    }
 }
 
 impl Effect for ResidualBand {
