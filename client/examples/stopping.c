@@ -5,6 +5,7 @@
  * README.md beside this folder says how to build it. */
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "dynocar.h"
 
@@ -18,7 +19,7 @@ static const dynocar_effort_point EFFORT[] = {{0.0, 130000.0}, {25.0, 130000.0},
 static int usable(dynocar_reader *reader, uint32_t kind, dynocar_reading *reading)
 {
     (void)dynocar_reader_latest(reader, kind, dynocar_monotonic_now_ns(), reading);
-    return reading->is_usable;
+    return reading->is_usable != 0;
 }
 
 static dynocar_stop built_in_stop(double speed_mps)

@@ -176,3 +176,23 @@ fn the_rust_example_uses_the_daemon_and_falls_back() {
     assert!(program.exists(), "run all tests of the package: that builds the example");
     assert_example_falls_back(&mut Command::new(program));
 }
+
+/// With nobody on the channel both examples reckon with their built-in values.
+#[test]
+fn the_stopping_examples_in_c_and_rust_say_the_same() {
+    let directory = tempfile::tempdir().unwrap();
+    let daemon = PlayedDaemon::start();
+    let in_c = c_program(&example("stopping.c"), Link::Static, &directory);
+    let in_rust = Command::new(library_directory().join("../examples/stopping"));
+    let said = [in_c, in_rust].map(|mut program| {
+        program.env(ROOT_VARIABLE, daemon.root()).args([TRAIN.to_string(), "40".into()]);
+        support::must_succeed(&mut program)
+    });
+    assert_eq!(said[0], said[1]);
+    let words: Vec<f64> = said[0].split_whitespace().filter_map(|it| it.parse().ok()).collect();
+    let [from_mps, distance_m, time_s, _, bound_m, bound_s] = words[..] else {
+        panic!("{}", said[0]);
+    };
+    assert_eq!(from_mps, 40.0);
+    assert!(distance_m > 500.0 && bound_m > distance_m && bound_s > time_s, "{}", said[0]);
+}
