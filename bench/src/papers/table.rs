@@ -109,7 +109,9 @@ pub fn for_documentation(rows: &[Row]) -> String {
          \n\
          Where the paper's method comes out otherwise than its paper says: Liu's segments end where a\n\
          noisy speed first reaches a bound, which biases w0 by -1.7 %; V-MILS has no printed rule for\n\
-         bad data, and the gate used here acts on rows that a spike has already spoilt. Xia's windows\n\
+         bad data, and the gate used here acts on rows that a spike has already spoilt. The error of\n\
+         plain least squares under outliers is that of their size (here 1 to 5 km/h, either way), which\n\
+         the paper does not give. Xia's windows\n\
          of 2 km settle late to 0.1 N/kN, since Newton's method seldom reaches the printed tolerance\n\
          within 100 iterations where the Hessian is not positive definite, and the best of the random\n\
          restarts stands; to 0.2 N/kN they settle within 1 to 2 km.\n",

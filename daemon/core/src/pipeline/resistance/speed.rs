@@ -49,8 +49,9 @@ pub struct SpeedNoise {
 
 /// The degrees of freedom that the variance looks back over.
 const MEMORY: f64 = 2_000.0;
-/// A scatter beyond this many times the known variance counts as so many times only.
-const CLIP: f64 = 9.0;
+/// A scatter counts up to so many standard deviations above what the known variance lets expect:
+/// a spike too small for the gate would else widen every interval.
+const CLIP_DEVIATIONS: f64 = 4.0;
 /// No speed is known better, in (m/s)².
 const VARIANCE_MIN: f64 = 1e-10;
 /// The most samples that are taken to share one rounding error.
@@ -87,7 +88,10 @@ impl SpeedNoise {
             return;
         }
         let clipped = match self.freedom > FREEDOM_BEFORE_CLIP {
-            true => square_sum.min(CLIP * freedom * self.variance().max(self.rounding_variance())),
+            true => {
+                let most = freedom + CLIP_DEVIATIONS * (2.0 * freedom).sqrt();
+                square_sum.min(most * self.variance().max(self.rounding_variance()))
+            }
             false => square_sum,
         };
         let kept = 1.0 - freedom / MEMORY;
