@@ -16,6 +16,7 @@ use super::wolfe_newton::{NewtonSettings, RestartSource, Restarts, wolfe_newton}
 use crate::filter::levenberg_marquardt::ParameterBox;
 use crate::force::ResolvedSample;
 use crate::pipeline::output::write_parameters;
+use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 use crate::train::Davis;
 
@@ -35,6 +36,7 @@ pub struct TrajectoryNewton {
     fit: FitSettings,
     speed_noise_mps: f64,
     source: RestartSource,
+    gate: SampleGate,
     tracker: MotionTracker,
     window: Window,
     fitter: TrajectoryFitter,
@@ -74,6 +76,7 @@ impl TrajectoryNewton {
             },
             speed_noise_mps: settings.speed_noise_mps,
             source: RestartSource::new(settings.seed),
+            gate: SampleGate::default(),
             tracker: MotionTracker::default(),
             window: Window::new(rule, capacity, settings.interval_m),
             fitter: TrajectoryFitter::with_capacity(1, capacity + 1),
@@ -184,7 +187,7 @@ impl TrajectoryNewton {
         self.long_run.push(normalised, duration_s);
     }
 
-    fn break_off(&mut self) {
+    fn end_window(&mut self) {
         self.window.clear();
         self.end = None;
         self.innovations.break_here();
@@ -192,12 +195,12 @@ impl TrajectoryNewton {
     }
 }
 
-impl Estimator for TrajectoryNewton {
-    fn kind(&self) -> PipelineKind {
-        PipelineKind::TrajectoryNewton
+impl Gated for TrajectoryNewton {
+    fn gate(&mut self) -> &mut SampleGate {
+        &mut self.gate
     }
 
-    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+    fn take(&mut self, sample: &ResolvedSample) -> Outcome {
         match self.tracker.advance(sample) {
             Motion::Continue(motion) => {
                 self.unexplained.push(&motion, sample, &self.davis);
@@ -209,23 +212,38 @@ impl Estimator for TrajectoryNewton {
                 }
             }
             Motion::Begin => {
-                self.break_off();
+                self.end_window();
                 self.window.begin(sample.speed_mps);
                 self.unexplained.begin(sample.speed_mps);
                 Outcome::Used
             }
             Motion::Standstill => {
-                self.break_off();
+                self.end_window();
                 Outcome::Used
             }
             Motion::Unusable(reason) => {
-                self.break_off();
+                self.end_window();
                 if reason == RejectionReason::Missing && self.windows == 0 {
                     self.fault = Some(missing(sample));
                 }
                 Outcome::Rejected(reason)
             }
         }
+    }
+
+    fn leave_out(&mut self, _: &ResolvedSample, _: RejectionReason) {
+        self.tracker = MotionTracker::default();
+        self.end_window();
+    }
+}
+
+impl Estimator for TrajectoryNewton {
+    fn kind(&self) -> PipelineKind {
+        PipelineKind::TrajectoryNewton
+    }
+
+    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+        self.pass(sample)
     }
 
     fn write(&self, snapshot: &mut ParameterSnapshot) {
@@ -244,6 +262,7 @@ impl Estimator for TrajectoryNewton {
             is_at_bound: self.at_bound,
         };
         estimate.write(snapshot, self.fault);
+        self.gate.qualify(snapshot);
         self.unexplained.write(snapshot, self.speed_noise_mps.powi(2));
     }
 }
