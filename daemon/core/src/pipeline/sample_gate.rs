@@ -24,6 +24,10 @@ const STANDSTILL_MPS: f64 = 1.0;
 const TOLERANCE_N_PER_KN: f64 = 0.5;
 /// A change that counts as none, as a share of the force: sensors of force are good to a few %.
 const TOLERANCE_SHARE: f64 = 0.08;
+/// A change of speed in m/s that the noise of a speed sensor may make.
+const TOLERANCE_MPS: f64 = 0.5;
+/// The most in m/s² that a train accelerates or brakes by.
+const ACCELERATION_MAX_MPS2: f64 = 2.0;
 /// The quantile of the changes between samples that tells the noise of the forces. It is low, so
 /// that neither ramps nor failures of half of all samples reach it.
 const NOISE_QUANTILE: f64 = 0.2;
@@ -54,6 +58,7 @@ pub enum Verdict {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Reading {
     stretch: u32,
+    speed_mps: f64,
     driving_n_per_kn: f64,
     content: [Option<f64>; 4],
 }
@@ -65,6 +70,7 @@ impl Reading {
         let driving_n_per_kn = sample.driving_force_n()? / sample.weight_kn;
         (is_moving && driving_n_per_kn.is_finite()).then_some(Reading {
             stretch: sample.stretch,
+            speed_mps: sample.speed_mps,
             driving_n_per_kn,
             content: [
                 Some(sample.speed_mps),
@@ -228,9 +234,7 @@ impl SampleGate {
             self.held[0] = Some(ResolvedSample { step_s: 0.0, ..*sample });
             return if verdict == Verdict::Take { Verdict::Release(1) } else { verdict };
         }
-        let apart = now.driving_n_per_kn - level.driving_n_per_kn;
-        let force = now.driving_n_per_kn.abs().max(level.driving_n_per_kn.abs());
-        let is_away = apart.abs() > self.tolerance_n_per_kn(force);
+        let (apart, is_away) = self.compared(now, level, since_level_s);
         let is_on_their_side = self.held_count == 0 || self.is_above == (apart > 0.0);
         if is_away && is_on_their_side {
             return self.hold(ResolvedSample { step_s, ..*sample }, now, apart);
@@ -283,6 +287,17 @@ impl SampleGate {
     /// Time in s that the held samples have taken.
     fn held_s(&self) -> f64 {
         self.held[..self.held_count].iter().flatten().map(|sample| sample.step_s).sum()
+    }
+
+    /// How far force or speed lies from the level, and whether that is too far.
+    fn compared(&self, now: &Reading, level: &Reading, since_level_s: f64) -> (f64, bool) {
+        let faster_mps = now.speed_mps - level.speed_mps;
+        if faster_mps.abs() > TOLERANCE_MPS + ACCELERATION_MAX_MPS2 * since_level_s {
+            return (faster_mps, true);
+        }
+        let more = now.driving_n_per_kn - level.driving_n_per_kn;
+        let force = now.driving_n_per_kn.abs().max(level.driving_n_per_kn.abs());
+        (more, more.abs() > self.tolerance_n_per_kn(force))
     }
 
     fn tolerance_n_per_kn(&self, force_n_per_kn: f64) -> f64 {

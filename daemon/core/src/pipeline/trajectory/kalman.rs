@@ -16,7 +16,7 @@ use super::quality::{Estimate, SpeedRange, missing, prior_std};
 use super::step::{Step, StepRule, resistance_gain};
 use super::unexplained::UnexplainedForce;
 use crate::force::ResolvedSample;
-use crate::pipeline::output::write_parameters;
+use crate::pipeline::output::{write_parameters, write_status};
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::{SettingError, require};
 use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
@@ -128,6 +128,9 @@ pub struct TrajectoryKalman {
     fault: Option<(Status, Reason)>,
 }
 
+/// Time in s that a jump of the coefficients has to last before it is trusted: a force that stays
+/// wrong for seconds looks like one.
+const FRESH_S: f64 = 30.0;
 /// Updates before the estimate is more than the declared values.
 const UPDATES_MIN: u64 = 50;
 /// Innovations that the published statistics look back over.
@@ -228,6 +231,10 @@ impl Estimator for TrajectoryKalman {
             is_at_bound: false,
         };
         estimate.write(snapshot, self.fault);
+        let is_fresh = self.filter.bank().likeliest().age_s < FRESH_S;
+        if is_fresh && snapshot.status() == Status::Estimated {
+            write_status(snapshot, Status::Degraded, Reason::InnovationsTooLarge);
+        }
         self.gate.qualify(snapshot);
         let speed_variance = self.filter.bank().likeliest().noise.speed_variance;
         self.unexplained.write(snapshot, speed_variance);

@@ -15,7 +15,7 @@ use super::window::Window;
 use super::wolfe_newton::{NewtonSettings, RestartSource, Restarts, wolfe_newton};
 use crate::filter::levenberg_marquardt::ParameterBox;
 use crate::force::ResolvedSample;
-use crate::pipeline::output::write_parameters;
+use crate::pipeline::output::{write_parameters, write_status};
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 use crate::train::Davis;
@@ -24,6 +24,9 @@ use crate::train::Davis;
 const NOISE_WINDOWS: f64 = 50.0;
 /// Innovations that the published statistics look back over.
 const INNOVATION_MEMORY: u32 = 200;
+
+/// Standard deviations beyond which a speed shows that something in the window is wrong.
+const SURPRISE: f64 = 5.0;
 
 /// Blocks of 30 s that the long-run variance of the innovations looks back over.
 const LONG_RUN_BLOCKS: f64 = 60.0;
@@ -51,6 +54,8 @@ pub struct TrajectoryNewton {
     long_run: LongRunVariance,
     unexplained: UnexplainedForce,
     speeds: SpeedRange,
+    /// Steps since a speed was far from what the fit before predicted.
+    since_surprise: usize,
     fault: Option<(Status, Reason)>,
 }
 
@@ -89,6 +94,7 @@ impl TrajectoryNewton {
             long_run: LongRunVariance::new(LONG_RUN_BLOCKS),
             unexplained: UnexplainedForce::default(),
             speeds: SpeedRange::default(),
+            since_surprise: usize::MAX / 2,
             fault: None,
             settings,
         }
@@ -183,6 +189,7 @@ impl TrajectoryNewton {
         let variance = spread * self.speed_noise_mps.powi(2)
             + self.settings.disturbance_mps2.powi(2) * duration_s;
         let normalised = (measured_mps - advance.speed_mps) / variance.sqrt();
+        self.since_surprise = if normalised.abs() > SURPRISE { 0 } else { self.since_surprise + 1 };
         self.innovations.push(normalised);
         self.long_run.push(normalised, duration_s);
     }
@@ -262,6 +269,9 @@ impl Estimator for TrajectoryNewton {
             is_at_bound: self.at_bound,
         };
         estimate.write(snapshot, self.fault);
+        if self.since_surprise < self.window.len() && snapshot.status() == Status::Estimated {
+            write_status(snapshot, Status::Degraded, Reason::InnovationsTooLarge);
+        }
         self.gate.qualify(snapshot);
         self.unexplained.write(snapshot, self.speed_noise_mps.powi(2));
     }
