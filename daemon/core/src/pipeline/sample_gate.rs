@@ -128,6 +128,8 @@ pub struct SampleGate {
     level: Option<Reading>,
     /// The newest sample that told something.
     newest: Option<Reading>,
+    /// True once a sample has agreed with the level.
+    is_confirmed: bool,
     held: [Option<ResolvedSample>; AGREEING],
     held_count: usize,
     /// True when the held samples lie above the level.
@@ -144,6 +146,7 @@ impl Default for SampleGate {
         SampleGate {
             level: None,
             newest: None,
+            is_confirmed: false,
             held: [None; AGREEING],
             held_count: 0,
             is_above: false,
@@ -201,6 +204,7 @@ impl SampleGate {
     fn forget(&mut self) {
         self.level = None;
         self.newest = None;
+        self.is_confirmed = false;
         self.held_count = 0;
         self.skipped_s = 0.0;
     }
@@ -250,6 +254,7 @@ impl SampleGate {
 
     fn take(&mut self, sample: ResolvedSample, came_step_s: f64, now: &Reading) -> Verdict {
         self.level = Some(*now);
+        self.is_confirmed = true;
         self.skipped_s = 0.0;
         self.withdrawn_share -= self.withdrawn_share / MEMORY;
         if sample.step_s == came_step_s {
@@ -269,6 +274,11 @@ impl SampleGate {
         }
         self.held_count = 0;
         self.level = Some(*now);
+        if !self.is_confirmed {
+            // Nothing ever agreed with the first sample: the motion begins with these.
+            self.held[0] = self.held[0].map(|first| ResolvedSample { step_s: 0.0, ..first });
+        }
+        self.is_confirmed = true;
         self.withdrawn_share *= (1.0 - 1.0 / MEMORY).powi(AGREEING as i32);
         self.unless_in_doubt(Verdict::Release(AGREEING))
     }

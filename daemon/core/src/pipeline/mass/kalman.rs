@@ -270,7 +270,8 @@ impl Gated for MassKalman {
                 return Outcome::Rejected(reason);
             }
         };
-        let step = self.last.and_then(|last| Some((last, motion.step_from(&last)?)));
+        let last = self.last.filter(|_| sample.step_s > 0.0);
+        let step = last.and_then(|last| Some((last, motion.step_from(&last)?)));
         let outcome = match step {
             Some((last, step_s)) => self.advance(last, motion, step_s),
             None => self.begin(motion),

@@ -25,8 +25,9 @@ const NOISE_WINDOWS: f64 = 50.0;
 /// Innovations that the published statistics look back over.
 const INNOVATION_MEMORY: u32 = 200;
 
-/// Standard deviations beyond which a speed shows that something in the window is wrong.
-const SURPRISE: f64 = 5.0;
+/// Standard deviations by which the mean square of a window's residuals may exceed the noise that
+/// windows before have shown; more, and something in the window is wrong.
+const EXCESS_MAX: f64 = 4.0;
 
 /// Blocks of 30 s that the long-run variance of the innovations looks back over.
 const LONG_RUN_BLOCKS: f64 = 60.0;
@@ -54,8 +55,8 @@ pub struct TrajectoryNewton {
     long_run: LongRunVariance,
     unexplained: UnexplainedForce,
     speeds: SpeedRange,
-    /// Steps since a speed was far from what the fit before predicted.
-    since_surprise: usize,
+    /// False when the newest window's residuals are larger than the noise accounts for.
+    is_consistent: bool,
     fault: Option<(Status, Reason)>,
 }
 
@@ -94,7 +95,7 @@ impl TrajectoryNewton {
             long_run: LongRunVariance::new(LONG_RUN_BLOCKS),
             unexplained: UnexplainedForce::default(),
             speeds: SpeedRange::default(),
-            since_surprise: usize::MAX / 2,
+            is_consistent: true,
             fault: None,
             settings,
         }
@@ -160,13 +161,24 @@ impl TrajectoryNewton {
         };
         self.windows += 1;
         self.fault = None;
+        self.judge_residuals(fit);
+        self.end = Some((fit.end_speed_mps, fit.end_variance));
+    }
+
+    /// Compares the residuals of a window with the noise, and learns that.
+    fn judge_residuals(&mut self, fit: &TrajectoryFit) {
+        let shown = fit.residual_std_mps * fit.residual_std_mps;
+        let variance = self.speed_noise_mps * self.speed_noise_mps;
+        let limit = variance * (1.0 + EXCESS_MAX * (2.0 / fit.samples as f64).sqrt());
+        // The noise before the first window is a guess.
+        let is_first = self.settings.learns_noise && self.windows == 1;
+        self.is_consistent = is_first || (shown <= limit && fit.outliers == 0);
         if self.settings.learns_noise {
             let gain = 1.0 / (self.windows as f64).min(NOISE_WINDOWS);
-            let shown = fit.residual_std_mps * fit.residual_std_mps;
-            let variance = self.speed_noise_mps * self.speed_noise_mps;
-            self.speed_noise_mps = (variance + gain * (shown - variance)).sqrt().max(1e-6);
+            // What is wrong with one window is hardly noise of the next.
+            let believed = if is_first { shown } else { shown.min(limit) };
+            self.speed_noise_mps = (variance + gain * (believed - variance)).sqrt().max(1e-6);
         }
-        self.end = Some((fit.end_speed_mps, fit.end_variance));
     }
 
     /// Compares the newest speed with what the fit before predicted for it.
@@ -189,7 +201,6 @@ impl TrajectoryNewton {
         let variance = spread * self.speed_noise_mps.powi(2)
             + self.settings.disturbance_mps2.powi(2) * duration_s;
         let normalised = (measured_mps - advance.speed_mps) / variance.sqrt();
-        self.since_surprise = if normalised.abs() > SURPRISE { 0 } else { self.since_surprise + 1 };
         self.innovations.push(normalised);
         self.long_run.push(normalised, duration_s);
     }
@@ -269,7 +280,7 @@ impl Estimator for TrajectoryNewton {
             is_at_bound: self.at_bound,
         };
         estimate.write(snapshot, self.fault);
-        if self.since_surprise < self.window.len() && snapshot.status() == Status::Estimated {
+        if !self.is_consistent && snapshot.status() == Status::Estimated {
             write_status(snapshot, Status::Degraded, Reason::InnovationsTooLarge);
         }
         self.gate.qualify(snapshot);
