@@ -66,7 +66,7 @@ fn tally_at(scenes: &[Scene], rate: f64) -> Tally {
 #[test]
 fn plausible_wrong_forces_mislead_no_estimator_that_fits_motion_to_them() {
     let scenes: Vec<Scene> = (201..)
-        .zip(TrainType::ALL.into_iter().cycle().take(8))
+        .zip(TrainType::ALL.into_iter().cycle().take(4))
         .map(|(seed, train_type)| Scene::new(seed, train_type))
         .collect();
     let mut all = Tally::default();
@@ -77,7 +77,7 @@ fn plausible_wrong_forces_mislead_no_estimator_that_fits_motion_to_them() {
         all += tally;
     }
     println!("{all:?}, trusted {trusted_shares:.2?}");
-    // Good samples mislead one look in 2000 by what the declared model does not know.
+    // What is left are forces that stay wrong for seconds, by chance as a jump of the resistance does.
     assert!(1000 * all.wrong <= all.trusted, "trusted and wrong at a look: {all:?}");
     // Refusing to estimate would keep the promise as well.
     let [first, second, ..] = trusted_shares[..] else { unreachable!("six rates") };
