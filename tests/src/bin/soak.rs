@@ -1,11 +1,13 @@
 //! Seeded faults for as long as one likes.
 
+use std::collections::BTreeMap;
+
 use clap::{Args, Parser, Subcommand};
 use dynocar_tests::fuzz::{self, Target};
 use dynocar_tests::golden;
 use dynocar_tests::sensor_failures::SensorFailure;
 use dynocar_tests::simulator::TrainType;
-use dynocar_tests::soak::bad_samples::Scene;
+use dynocar_tests::soak::bad_samples::{Scene, Tally};
 use dynocar_tests::soak::{Programs, faults, hostile, load, state_kills};
 
 /// Seeded faults, load and bad input for as long as one likes; exit status 101 when a promise breaks.
@@ -34,8 +36,14 @@ enum Command {
     /// `kill -9` while a state file is written
     State(Rounds),
     /// Every pipeline under every failure of its sensors, a simulated scene each round; prints the
-    /// estimates that are trusted and wrong
-    Samples(Rounds),
+    /// estimates that are trusted and wrong at the end, and how many were at a look every 40 s
+    Samples {
+        #[command(flatten)]
+        rounds: Rounds,
+        /// Kinds of estimator, all when absent
+        #[arg(long, value_delimiter = ',')]
+        kinds: Vec<String>,
+    },
     /// Mutations of `tests/corpus` into every reader
     Fuzz(Rounds),
     /// Makes `tests/golden/demo.txt` anew, after a change that is meant
@@ -51,6 +59,9 @@ struct Rounds {
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
+
+/// Tallies by the kind of estimator and whether sensors failed.
+type Tallies = BTreeMap<(String, bool), Tally>;
 
 fn main() {
     let programs = Programs::beside(&std::env::current_exe().expect("the program's path"));
@@ -69,8 +80,10 @@ fn main() {
             let states = state_kills::kill_writers(&programs.peer, rounds, seed);
             println!("{rounds} kills among {states} writes, every state readable");
         }
-        Command::Samples(Rounds { rounds, seed }) => {
-            (0..rounds).for_each(|round| samples(round, seed + round));
+        Command::Samples { rounds: Rounds { rounds, seed }, kinds } => {
+            let mut tallies = Tallies::new();
+            (0..rounds).for_each(|round| samples(round, seed + round, &kinds, &mut tallies));
+            print_tallies(&tallies);
             println!("{rounds} scenes, every sample accounted for, every snapshot finite");
         }
         Command::Fuzz(Rounds { rounds, seed }) => {
@@ -87,15 +100,32 @@ fn main() {
     }
 }
 
-/// One scene without and with every failure at four rates.
-fn samples(round: u64, seed: u64) {
+/// One scene without and with every failure at six rates; adds to the tallies of the kinds.
+fn samples(round: u64, seed: u64, kinds: &[String], tallies: &mut Tallies) {
     let train_type = TrainType::ALL[(round % 4) as usize];
     let scene = Scene::new(seed, train_type);
-    let report = |misled: Vec<_>| misled.iter().for_each(|it| println!("{train_type:?} {it:?}"));
-    report(scene.run(None, 0.0, 0));
-    for failure in SensorFailure::ALL {
-        for rate in [0.001, 0.01, 0.1, 0.5] {
-            report(scene.run(Some(failure), rate, seed));
+    let is_wanted = |kind: &str| kinds.is_empty() || kinds.iter().any(|wanted| wanted == kind);
+    let mut watch = |failure, rate| {
+        for watched in scene.watch(failure, rate, seed, is_wanted) {
+            watched.misled_at_end.iter().for_each(|it| println!("{train_type:?} {it:?}"));
+            *tallies.entry((watched.kind, failure.is_some())).or_default() += watched.tally;
         }
+    };
+    watch(None, 0.0);
+    for failure in SensorFailure::ALL {
+        for rate in [0.001, 0.01, 0.03, 0.1, 0.25, 0.5] {
+            watch(Some(failure), rate);
+        }
+    }
+}
+
+fn print_tallies(tallies: &Tallies) {
+    for ((kind, is_failing), tally) in tallies {
+        let samples = if *is_failing { "failing" } else { "good" };
+        let Tally { looks, trusted, wrong, wrong_at_end } = tally;
+        println!(
+            "{kind}, {samples} samples: {looks} looks, {trusted} trusted, {wrong} of them wrong; \
+             {wrong_at_end} wrong at the end of a scene"
+        );
     }
 }

@@ -29,6 +29,50 @@ pub struct Misled {
     pub what: String,
 }
 
+/// Samples between two looks at an estimate, 40 s.
+pub const LOOK_SAMPLES: u64 = 200;
+
+/// How often estimates were looked at, trusted, and wrong nevertheless.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Looks.
+    pub looks: u64,
+    /// Looks at an estimate called `estimated`.
+    pub trusted: u64,
+    /// Looks at such an estimate that was wrong.
+    pub wrong: u64,
+    /// Runs at whose end it was.
+    pub wrong_at_end: u64,
+}
+
+impl Tally {
+    fn add(&mut self, snapshot: &ParameterSnapshot, is_wrong: bool) {
+        self.looks += 1;
+        self.trusted += u64::from(snapshot.status() == Status::Estimated);
+        self.wrong += u64::from(is_wrong);
+    }
+}
+
+impl std::ops::AddAssign for Tally {
+    fn add_assign(&mut self, other: Tally) {
+        self.looks += other.looks;
+        self.trusted += other.trusted;
+        self.wrong += other.wrong;
+        self.wrong_at_end += other.wrong_at_end;
+    }
+}
+
+/// One kind of estimator over a scene.
+#[derive(Clone, Debug)]
+pub struct Watched {
+    /// The kind of estimator.
+    pub kind: String,
+    /// What all looks found.
+    pub tally: Tally,
+    /// Whether it was misled at the end.
+    pub misled_at_end: Option<Misled>,
+}
+
 /// Simulated driving without anything undeclared.
 #[derive(Debug)]
 pub struct Scene {
@@ -57,23 +101,53 @@ impl Scene {
         Scene { data, samples }
     }
 
-    /// Runs every estimator over the samples under a failure; gives those that were misled.
+    /// Runs every estimator over the samples under a failure; gives those that were misled at the
+    /// end.
+    ///
+    /// # Panics
+    ///
+    /// As [`Scene::watch`].
+    pub fn run(&self, failure: Option<SensorFailure>, rate: f64, seed: u64) -> Vec<Misled> {
+        let watched = self.watch(failure, rate, seed, |_| true).into_iter();
+        watched.filter_map(|it| it.misled_at_end).collect()
+    }
+
+    /// Runs the estimators of some kinds over the samples under a failure, with a look every
+    /// [`LOOK_SAMPLES`] samples and at the end.
     ///
     /// # Panics
     ///
     /// When a snapshot holds what is not finite, or a sample is not accounted for.
-    pub fn run(&self, failure: Option<SensorFailure>, rate: f64, seed: u64) -> Vec<Misled> {
+    pub fn watch(
+        &self,
+        failure: Option<SensorFailure>,
+        rate: f64,
+        seed: u64,
+        is_wanted: impl Fn(&str) -> bool,
+    ) -> Vec<Watched> {
         let spoiled = match failure {
             Some(failure) => failure.apply(&self.samples, rate, seed),
             None => Spoiled { samples: self.samples.clone(), dropped: 0 },
         };
-        let of_kind = |settings: &EstimatorSettings| {
-            let told = format!("{failure:?} at {rate}, seed {seed}, {}", settings.kind());
-            let last = self.feed(settings, &spoiled, failure, &told);
-            let what = self.misled(&last)?;
-            Some(Misled { failure, rate, kind: settings.kind().to_string(), what })
-        };
-        default_estimators().iter().filter_map(of_kind).collect()
+        let mut all = Vec::new();
+        for settings in default_estimators() {
+            let kind = settings.kind().to_string();
+            if !is_wanted(&kind) {
+                continue;
+            }
+            let told = format!("{failure:?} at {rate}, seed {seed}, {kind}");
+            let mut watched = Watched { kind, tally: Tally::default(), misled_at_end: None };
+            let misled = |what| Misled { failure, rate, kind: watched.kind.clone(), what };
+            let last = self.feed(&settings, &spoiled, failure, &told, |run, it| {
+                // Before a train departs, the mass of the run before may stand.
+                let wrong = self.misled(it, run).and_then(|_| self.misled(it, run.max(2) - 1));
+                watched.tally.add(it, wrong.is_some());
+            });
+            watched.misled_at_end = self.misled(&last, self.data.runs.len() as u32).map(misled);
+            watched.tally.wrong_at_end += u64::from(watched.misled_at_end.is_some());
+            all.push(watched);
+        }
+        all
     }
 
     fn feed(
@@ -82,6 +156,7 @@ impl Scene {
         spoiled: &Spoiled,
         failure: Option<SensorFailure>,
         told: &str,
+        mut look: impl FnMut(u32, &ParameterSnapshot),
     ) -> ParameterSnapshot {
         let train = Arc::new(self.data.declared_train().clone());
         let estimator = settings.build(&train).expect("default settings");
@@ -91,6 +166,9 @@ impl Scene {
             let it = pipeline.process(sample);
             assert_eq!(it.samples_used + it.samples_rejected, offered, "{told}");
             assert_finite(it, told);
+            if offered % LOOK_SAMPLES == 0 || offered == spoiled.samples.len() as u64 {
+                look(sample.run, it);
+            }
         }
         let last = *pipeline.snapshot();
         let by_reason: u64 = last.rejected_by_reason.iter().map(|&it| u64::from(it)).sum();
@@ -101,8 +179,8 @@ impl Scene {
         last
     }
 
-    /// What a trusted estimate says that is not so.
-    fn misled(&self, snapshot: &ParameterSnapshot) -> Option<String> {
+    /// What a trusted estimate says that is not so in a run.
+    fn misled(&self, snapshot: &ParameterSnapshot, run: u32) -> Option<String> {
         if snapshot.status() != Status::Estimated {
             return None;
         }
@@ -117,8 +195,7 @@ impl Scene {
                 ));
             }
         }
-        let last_run = &self.data.runs[self.data.runs.len() - 1];
-        let truth_t = 1e-3 * last_run.plan.mass_kg;
+        let truth_t = 1e-3 * self.data.runs[run as usize - 1].plan.mass_kg;
         let (value, std) = (snapshot.value(Parameter::Mass)?, snapshot.std(Parameter::Mass)?);
         let is_wrong = (value - truth_t).abs() > STDS_MAX * std + SHARE_MAX * truth_t;
         is_wrong.then(|| format!("mass {value:.1} ± {std:.1}, truth {truth_t:.1} t"))

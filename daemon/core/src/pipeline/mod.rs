@@ -12,6 +12,7 @@ pub mod mass;
 pub mod monitor;
 pub mod output;
 pub mod resistance;
+pub mod sample_gate;
 pub mod settings;
 pub mod trajectory;
 

@@ -15,6 +15,9 @@ const SQUARE_MAX: f64 = 2.0;
 /// they are far smaller than expected, as with a perfect sensor, it does not matter that they
 /// are alike.
 const COVARIANCE_MAX: f64 = 0.4;
+/// Long-run variance of the innovations beyond which the intervals are too narrow, however small
+/// each of them is: noise that was learned from bad speeds hides the size, not the likeness.
+const LONG_RUN_MAX: f64 = 4.0;
 /// Innovations that such a judgement rests on.
 const JUDGED_FROM: f64 = 100.0;
 
@@ -64,11 +67,20 @@ pub fn innovation_complaint(monitor: &InnovationMonitor) -> Option<Reason> {
         None
     } else if monitor.mean_square() > SQUARE_MAX {
         Some(Reason::InnovationsTooLarge)
-    } else if monitor.correlation() * monitor.mean_square() > COVARIANCE_MAX {
+    } else if monitor.correlation() * monitor.mean_square() > COVARIANCE_MAX
+        || long_run_variance(monitor) > LONG_RUN_MAX
+    {
         Some(Reason::InnovationsNotWhite)
     } else {
         None
     }
+}
+
+/// Variance of sums of the innovations over that of as many white ones of the expected size, if
+/// their correlation fades from lag to lag as it does over the first.
+fn long_run_variance(monitor: &InnovationMonitor) -> f64 {
+    let correlation = monitor.correlation();
+    monitor.mean_square() * (1.0 + correlation) / (1.0 - correlation).max(f64::EPSILON)
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ use super::motion::{Motion, StopWatch};
 use super::speed_noise::SpeedNoise;
 use crate::force::ResolvedSample;
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
+use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use crate::train::TrainModel;
@@ -50,6 +51,7 @@ pub struct MassKalman {
     initial_bank: BiasBank,
     bank: BiasBank,
     stops: StopWatch,
+    gate: SampleGate,
     last: Option<Motion>,
     /// Inverse mass as known when force last acted, bias as known now.
     moments: Moments,
@@ -89,6 +91,7 @@ impl MassKalman {
             initial_bank: bank,
             bank,
             stops: StopWatch::new(settings.stop_min_s),
+            gate: SampleGate::default(),
             last: None,
             moments: bank.moments(),
             declared_mass_kg: train.mass_kg,
@@ -247,18 +250,12 @@ impl MassKalman {
     }
 }
 
-impl Estimator for MassKalman {
-    fn kind(&self) -> PipelineKind {
-        PipelineKind::MassKalman
+impl Gated for MassKalman {
+    fn gate(&mut self) -> &mut SampleGate {
+        &mut self.gate
     }
 
-    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
-        if self.stops.is_first() {
-            self.begin_with(sample.mass_kg);
-        }
-        if self.stops.departs(sample.time_ns, sample.stretch, sample.speed_mps) {
-            self.reopen(sample.mass_kg);
-        }
+    fn take(&mut self, sample: &ResolvedSample) -> Outcome {
         if sample.speed_mps < self.settings.speed_min_mps {
             self.last = None;
             return Outcome::Used;
@@ -273,7 +270,8 @@ impl Estimator for MassKalman {
                 return Outcome::Rejected(reason);
             }
         };
-        let step = self.last.and_then(|last| Some((last, motion.step_from(&last)?)));
+        let last = self.last.filter(|_| sample.step_s > 0.0);
+        let step = last.and_then(|last| Some((last, motion.step_from(&last)?)));
         let outcome = match step {
             Some((last, step_s)) => self.advance(last, motion, step_s),
             None => self.begin(motion),
@@ -283,6 +281,27 @@ impl Estimator for MassKalman {
             Outcome::Used | Outcome::Updated => self.health.accept(),
         }
         outcome
+    }
+
+    fn leave_out(&mut self, sample: &ResolvedSample, reason: RejectionReason) {
+        self.last = None;
+        self.health.refuse(reason, sample);
+    }
+}
+
+impl Estimator for MassKalman {
+    fn kind(&self) -> PipelineKind {
+        PipelineKind::MassKalman
+    }
+
+    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+        if self.stops.is_first() {
+            self.begin_with(sample.mass_kg);
+        }
+        if self.stops.departs(sample.time_ns, sample.stretch, sample.speed_mps) {
+            self.reopen(sample.mass_kg);
+        }
+        self.pass(sample)
     }
 
     fn write(&self, snapshot: &mut ParameterSnapshot) {
@@ -303,6 +322,7 @@ impl Estimator for MassKalman {
         snapshot.missing_manoeuvres = if is_known { 0 } else { Manoeuvre::Accelerate.bit() };
         let (status, reason) = self.status();
         write_status(snapshot, status, reason);
+        self.gate.qualify(snapshot);
         write_innovations(snapshot, &self.monitor);
         let inertia_kg = mass_kg * self.inertia_factor;
         snapshot.unexplained_force_n = -bias_mps2 * inertia_kg;

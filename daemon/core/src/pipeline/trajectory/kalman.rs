@@ -16,7 +16,8 @@ use super::quality::{Estimate, SpeedRange, missing, prior_std};
 use super::step::{Step, StepRule, resistance_gain};
 use super::unexplained::UnexplainedForce;
 use crate::force::ResolvedSample;
-use crate::pipeline::output::write_parameters;
+use crate::pipeline::output::{write_parameters, write_status};
+use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::{SettingError, require};
 use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use crate::train::{Davis, TrainModel};
@@ -115,6 +116,7 @@ impl TrajectoryKalmanSettings {
 /// distance to pass and no force is averaged away.
 #[derive(Clone, Debug)]
 pub struct TrajectoryKalman {
+    gate: SampleGate,
     tracker: MotionTracker,
     filter: OnlineFilter,
     prior_std: Vector3<f64>,
@@ -126,6 +128,9 @@ pub struct TrajectoryKalman {
     fault: Option<(Status, Reason)>,
 }
 
+/// Time in s that a jump of the coefficients has to last before it is trusted: a force that stays
+/// wrong for seconds looks like one.
+const FRESH_S: f64 = 30.0;
 /// Updates before the estimate is more than the declared values.
 const UPDATES_MIN: u64 = 50;
 /// Innovations that the published statistics look back over.
@@ -135,6 +140,7 @@ impl TrajectoryKalman {
     /// An estimator from checked settings.
     pub fn new(settings: OnlineSettings) -> Self {
         TrajectoryKalman {
+            gate: SampleGate::default(),
             tracker: MotionTracker::default(),
             filter: OnlineFilter::new(settings),
             prior_std: settings.davis_std,
@@ -173,12 +179,12 @@ impl TrajectoryKalman {
     }
 }
 
-impl Estimator for TrajectoryKalman {
-    fn kind(&self) -> PipelineKind {
-        PipelineKind::TrajectoryKalman
+impl Gated for TrajectoryKalman {
+    fn gate(&mut self) -> &mut SampleGate {
+        &mut self.gate
     }
 
-    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+    fn take(&mut self, sample: &ResolvedSample) -> Outcome {
         match self.tracker.advance(sample) {
             Motion::Continue(motion) => self.take_step(&motion, sample),
             Motion::Begin => {
@@ -197,6 +203,20 @@ impl Estimator for TrajectoryKalman {
         }
     }
 
+    fn leave_out(&mut self, _: &ResolvedSample, _: RejectionReason) {
+        self.tracker = MotionTracker::default();
+    }
+}
+
+impl Estimator for TrajectoryKalman {
+    fn kind(&self) -> PipelineKind {
+        PipelineKind::TrajectoryKalman
+    }
+
+    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+        self.pass(sample)
+    }
+
     fn write(&self, snapshot: &mut ParameterSnapshot) {
         let (davis, covariance) = self.filter.davis();
         write_parameters(snapshot, DAVIS, &Vector3::new(davis.a, davis.b, davis.c), &covariance);
@@ -211,6 +231,11 @@ impl Estimator for TrajectoryKalman {
             is_at_bound: false,
         };
         estimate.write(snapshot, self.fault);
+        let is_fresh = self.filter.bank().likeliest().age_s < FRESH_S;
+        if is_fresh && snapshot.status() == Status::Estimated {
+            write_status(snapshot, Status::Degraded, Reason::InnovationsTooLarge);
+        }
+        self.gate.qualify(snapshot);
         let speed_variance = self.filter.bank().likeliest().noise.speed_variance;
         self.unexplained.write(snapshot, speed_variance);
         snapshot.generation = self.filter.resets();

@@ -15,7 +15,8 @@ use super::window::Window;
 use super::wolfe_newton::{NewtonSettings, RestartSource, Restarts, wolfe_newton};
 use crate::filter::levenberg_marquardt::ParameterBox;
 use crate::force::ResolvedSample;
-use crate::pipeline::output::write_parameters;
+use crate::pipeline::output::{write_parameters, write_status};
+use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 use crate::train::Davis;
 
@@ -23,6 +24,10 @@ use crate::train::Davis;
 const NOISE_WINDOWS: f64 = 50.0;
 /// Innovations that the published statistics look back over.
 const INNOVATION_MEMORY: u32 = 200;
+
+/// Standard deviations by which the mean square of a window's residuals may exceed the noise that
+/// windows before have shown; more, and something in the window is wrong.
+const EXCESS_MAX: f64 = 4.0;
 
 /// Blocks of 30 s that the long-run variance of the innovations looks back over.
 const LONG_RUN_BLOCKS: f64 = 60.0;
@@ -35,6 +40,7 @@ pub struct TrajectoryNewton {
     fit: FitSettings,
     speed_noise_mps: f64,
     source: RestartSource,
+    gate: SampleGate,
     tracker: MotionTracker,
     window: Window,
     fitter: TrajectoryFitter,
@@ -49,6 +55,8 @@ pub struct TrajectoryNewton {
     long_run: LongRunVariance,
     unexplained: UnexplainedForce,
     speeds: SpeedRange,
+    /// False when the newest window's residuals are larger than the noise accounts for.
+    is_consistent: bool,
     fault: Option<(Status, Reason)>,
 }
 
@@ -74,6 +82,7 @@ impl TrajectoryNewton {
             },
             speed_noise_mps: settings.speed_noise_mps,
             source: RestartSource::new(settings.seed),
+            gate: SampleGate::default(),
             tracker: MotionTracker::default(),
             window: Window::new(rule, capacity, settings.interval_m),
             fitter: TrajectoryFitter::with_capacity(1, capacity + 1),
@@ -86,6 +95,7 @@ impl TrajectoryNewton {
             long_run: LongRunVariance::new(LONG_RUN_BLOCKS),
             unexplained: UnexplainedForce::default(),
             speeds: SpeedRange::default(),
+            is_consistent: true,
             fault: None,
             settings,
         }
@@ -151,13 +161,24 @@ impl TrajectoryNewton {
         };
         self.windows += 1;
         self.fault = None;
+        self.judge_residuals(fit);
+        self.end = Some((fit.end_speed_mps, fit.end_variance));
+    }
+
+    /// Compares the residuals of a window with the noise, and learns that.
+    fn judge_residuals(&mut self, fit: &TrajectoryFit) {
+        let shown = fit.residual_std_mps * fit.residual_std_mps;
+        let variance = self.speed_noise_mps * self.speed_noise_mps;
+        let limit = variance * (1.0 + EXCESS_MAX * (2.0 / fit.samples as f64).sqrt());
+        // The noise before the first window is a guess.
+        let is_first = self.settings.learns_noise && self.windows == 1;
+        self.is_consistent = is_first || (shown <= limit && fit.outliers == 0);
         if self.settings.learns_noise {
             let gain = 1.0 / (self.windows as f64).min(NOISE_WINDOWS);
-            let shown = fit.residual_std_mps * fit.residual_std_mps;
-            let variance = self.speed_noise_mps * self.speed_noise_mps;
-            self.speed_noise_mps = (variance + gain * (shown - variance)).sqrt().max(1e-6);
+            // What is wrong with one window is hardly noise of the next.
+            let believed = if is_first { shown } else { shown.min(limit) };
+            self.speed_noise_mps = (variance + gain * (believed - variance)).sqrt().max(1e-6);
         }
-        self.end = Some((fit.end_speed_mps, fit.end_variance));
     }
 
     /// Compares the newest speed with what the fit before predicted for it.
@@ -184,7 +205,7 @@ impl TrajectoryNewton {
         self.long_run.push(normalised, duration_s);
     }
 
-    fn break_off(&mut self) {
+    fn end_window(&mut self) {
         self.window.clear();
         self.end = None;
         self.innovations.break_here();
@@ -192,12 +213,12 @@ impl TrajectoryNewton {
     }
 }
 
-impl Estimator for TrajectoryNewton {
-    fn kind(&self) -> PipelineKind {
-        PipelineKind::TrajectoryNewton
+impl Gated for TrajectoryNewton {
+    fn gate(&mut self) -> &mut SampleGate {
+        &mut self.gate
     }
 
-    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+    fn take(&mut self, sample: &ResolvedSample) -> Outcome {
         match self.tracker.advance(sample) {
             Motion::Continue(motion) => {
                 self.unexplained.push(&motion, sample, &self.davis);
@@ -209,23 +230,38 @@ impl Estimator for TrajectoryNewton {
                 }
             }
             Motion::Begin => {
-                self.break_off();
+                self.end_window();
                 self.window.begin(sample.speed_mps);
                 self.unexplained.begin(sample.speed_mps);
                 Outcome::Used
             }
             Motion::Standstill => {
-                self.break_off();
+                self.end_window();
                 Outcome::Used
             }
             Motion::Unusable(reason) => {
-                self.break_off();
+                self.end_window();
                 if reason == RejectionReason::Missing && self.windows == 0 {
                     self.fault = Some(missing(sample));
                 }
                 Outcome::Rejected(reason)
             }
         }
+    }
+
+    fn leave_out(&mut self, _: &ResolvedSample, _: RejectionReason) {
+        self.tracker = MotionTracker::default();
+        self.end_window();
+    }
+}
+
+impl Estimator for TrajectoryNewton {
+    fn kind(&self) -> PipelineKind {
+        PipelineKind::TrajectoryNewton
+    }
+
+    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+        self.pass(sample)
     }
 
     fn write(&self, snapshot: &mut ParameterSnapshot) {
@@ -244,6 +280,10 @@ impl Estimator for TrajectoryNewton {
             is_at_bound: self.at_bound,
         };
         estimate.write(snapshot, self.fault);
+        if !self.is_consistent && snapshot.status() == Status::Estimated {
+            write_status(snapshot, Status::Degraded, Reason::InnovationsTooLarge);
+        }
+        self.gate.qualify(snapshot);
         self.unexplained.write(snapshot, self.speed_noise_mps.powi(2));
     }
 }

@@ -1,0 +1,310 @@
+//! Keeps forces that stand alone, and samples that only repeat, out of the estimators.
+//!
+//! A force that is wrong by a plausible amount passes every check of a single sample. What gives
+//! it away is time: a train's force, once it has left its level, stays away for a while, since
+//! actuators are slow; a reading that fails comes back at once. A sample whose force has left the
+//! level of the last one taken is therefore held back until the next ones agree with it, and
+//! dropped when they return. Nothing is lost of a true change: what was held is released in order.
+//! Where too many readings stand alone, some of them agree by chance, and nothing is taken until
+//! the forces are steady again.
+
+mod gated;
+
+pub use gated::Gated;
+
+use dynocar_shared::{ParameterSnapshot, Reason, RejectionReason, Status};
+
+use super::output::write_status;
+use crate::force::ResolvedSample;
+
+/// So many samples away from the old level make a new one.
+const AGREEING: usize = 3;
+/// The longest time in s between two samples that steps are integrated over, as in validation.
+const BRIDGED_MAX_S: f64 = 2.5;
+/// A speed in m/s at and below which forces hold the train and do not move it.
+const STANDSTILL_MPS: f64 = 1.0;
+/// A change in N/kN that is none: gradients change by as much within a sample.
+const TOLERANCE_N_PER_KN: f64 = 1.0;
+/// A change that counts as none, as a share of the force: sensors of force are good to a few %.
+const TOLERANCE_SHARE: f64 = 0.08;
+/// A change of speed in m/s that the noise of a speed sensor may make.
+const TOLERANCE_MPS: f64 = 0.5;
+/// The most in m/s² that a train accelerates or brakes by.
+const ACCELERATION_MAX_MPS2: f64 = 2.0;
+/// The quantile of the changes between samples that tells the noise of the forces. It is low, so
+/// that neither ramps nor failures of half of all samples reach it.
+const NOISE_QUANTILE: f64 = 0.2;
+/// Tolerance over that quantile: 6 standard deviations of the change of a white noise.
+const NOISE_TOLERANCE: f64 = 24.0;
+/// Logarithmic step of the quantile at each sample.
+const NOISE_STEP: f64 = 0.1;
+/// Samples that the share of withdrawn ones looks back over.
+const MEMORY: f64 = 100.0;
+/// Share of withdrawn samples beyond which none is taken: where one in 20 fails, one in 8000 begins
+/// a row that passes for a new level.
+const WITHDRAWN_SHARE_MAX: f64 = 0.05;
+
+/// What to do with a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// Take it as it is.
+    Take,
+    /// Nothing yet: later samples decide, or it tells nothing new.
+    Wait,
+    /// Take so many from [`SampleGate::released`], of which this one is the last.
+    Release(usize),
+    /// Leave it out, and begin anew with the next.
+    Refuse(RejectionReason),
+}
+
+/// Force and content of a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Reading {
+    stretch: u32,
+    speed_mps: f64,
+    driving_n_per_kn: f64,
+    content: [Option<f64>; 4],
+}
+
+impl Reading {
+    /// `None` for a sample that no estimator steps to.
+    fn of(sample: &ResolvedSample) -> Option<Self> {
+        let is_moving = sample.speed_mps > STANDSTILL_MPS && !sample.is_sliding;
+        let driving_n_per_kn = sample.driving_force_n()? / sample.weight_kn;
+        (is_moving && driving_n_per_kn.is_finite()).then_some(Reading {
+            stretch: sample.stretch,
+            speed_mps: sample.speed_mps,
+            driving_n_per_kn,
+            content: [
+                Some(sample.speed_mps),
+                sample.position_m,
+                sample.traction_force_n,
+                sample.brake_force_n,
+            ],
+        })
+    }
+
+    /// True when a moving train has sent the same once more, place and all.
+    fn repeats(&self, last: &Reading) -> bool {
+        self.content[1].is_some() && self.content == last.content
+    }
+}
+
+/// Decides which samples an estimator steps to, and when.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampleGate {
+    /// The last sample taken.
+    level: Option<Reading>,
+    /// The newest sample that told something.
+    newest: Option<Reading>,
+    /// True once a sample has agreed with the level.
+    is_confirmed: bool,
+    held: [Option<ResolvedSample>; AGREEING],
+    held_count: usize,
+    /// True when the held samples lie above the level.
+    is_above: bool,
+    /// Time in s since the last sample that was taken or is held.
+    skipped_s: f64,
+    /// Quantile of the changes between samples in N/kN.
+    change_n_per_kn: f64,
+    withdrawn_share: f64,
+}
+
+impl Default for SampleGate {
+    fn default() -> Self {
+        SampleGate {
+            level: None,
+            newest: None,
+            is_confirmed: false,
+            held: [None; AGREEING],
+            held_count: 0,
+            is_above: false,
+            skipped_s: 0.0,
+            change_n_per_kn: TOLERANCE_N_PER_KN / NOISE_TOLERANCE,
+            withdrawn_share: 0.0,
+        }
+    }
+}
+
+impl SampleGate {
+    /// Judges the next sample.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    pub fn judge(&mut self, sample: &ResolvedSample) -> Verdict {
+        let Some(now) = Reading::of(sample) else {
+            // The estimator says what is wrong with it.
+            self.forget();
+            return Verdict::Take;
+        };
+        let (Some(level), Some(newest)) = (self.level, self.newest) else {
+            return self.begin(now);
+        };
+        if now.stretch != level.stretch || !(sample.step_s > 0.0) {
+            return self.begin(now);
+        }
+        if now.repeats(&newest) {
+            return self.pass_over(sample.step_s);
+        }
+        self.newest = Some(now);
+        let change = (now.driving_n_per_kn - newest.driving_n_per_kn).abs();
+        self.learn_noise(change);
+        self.compare(sample, &now, &level, &newest)
+    }
+
+    /// The samples that [`Verdict::Release`] speaks of, the oldest first.
+    pub fn released(&self, index: usize) -> Option<ResolvedSample> {
+        self.held.get(index).copied().flatten()
+    }
+
+    /// True while too many samples are withdrawn for any to be taken.
+    pub fn is_in_doubt(&self) -> bool {
+        self.withdrawn_share > WITHDRAWN_SHARE_MAX
+    }
+
+    /// Marks an estimate as degraded while the forces are in doubt.
+    pub fn qualify(&self, snapshot: &mut ParameterSnapshot) {
+        if self.is_in_doubt() && snapshot.status() == Status::Estimated {
+            write_status(snapshot, Status::Degraded, Reason::BadInput);
+        }
+    }
+
+    fn forget(&mut self) {
+        self.level = None;
+        self.newest = None;
+        self.is_confirmed = false;
+        self.held_count = 0;
+        self.skipped_s = 0.0;
+    }
+
+    fn begin(&mut self, now: Reading) -> Verdict {
+        self.forget();
+        self.level = Some(now);
+        self.newest = Some(now);
+        self.unless_in_doubt(Verdict::Take)
+    }
+
+    /// A sample that tells nothing new.
+    fn pass_over(&mut self, step_s: f64) -> Verdict {
+        self.skipped_s += step_s;
+        if self.skipped_s <= BRIDGED_MAX_S {
+            return Verdict::Wait;
+        }
+        let newest = self.newest;
+        self.forget();
+        // The content stays known, so that what repeats it further is refused as well.
+        (self.level, self.newest) = (newest, newest);
+        self.skipped_s = f64::INFINITY;
+        Verdict::Refuse(RejectionReason::Frozen)
+    }
+
+    /// Judges a sample by the level and by the reading before it.
+    fn compare(
+        &mut self,
+        sample: &ResolvedSample,
+        now: &Reading,
+        level: &Reading,
+        before: &Reading,
+    ) -> Verdict {
+        let step_s = sample.step_s + self.skipped_s;
+        let since_level_s = step_s + self.held_s();
+        if since_level_s > BRIDGED_MAX_S {
+            let verdict = self.begin(*now);
+            self.held[0] = Some(ResolvedSample { step_s: 0.0, ..*sample });
+            return if verdict == Verdict::Take { Verdict::Release(1) } else { verdict };
+        }
+        let departure = self.departure(now, level, since_level_s);
+        // A reading that failed comes back at once, a new level may drift towards the old one.
+        let goes_on = self.held_count > 0
+            && match departure {
+                Some(is_above) => is_above == self.is_above,
+                None => self.departure(now, before, step_s).is_none(),
+            };
+        if goes_on || (self.held_count == 0 && departure.is_some()) {
+            let is_above = departure.unwrap_or(self.is_above);
+            return self.hold(ResolvedSample { step_s, ..*sample }, now, is_above);
+        }
+        self.withdraw_held();
+        let bridging = ResolvedSample { step_s: since_level_s, ..*sample };
+        match departure {
+            Some(is_above) => self.hold(bridging, now, is_above),
+            None => self.take(bridging, sample.step_s, now),
+        }
+    }
+
+    fn take(&mut self, sample: ResolvedSample, came_step_s: f64, now: &Reading) -> Verdict {
+        self.level = Some(*now);
+        self.is_confirmed = true;
+        self.skipped_s = 0.0;
+        self.withdrawn_share -= self.withdrawn_share / MEMORY;
+        if sample.step_s == came_step_s {
+            return self.unless_in_doubt(Verdict::Take);
+        }
+        self.held[0] = Some(sample);
+        self.unless_in_doubt(Verdict::Release(1))
+    }
+
+    fn hold(&mut self, sample: ResolvedSample, now: &Reading, is_above: bool) -> Verdict {
+        self.held[self.held_count] = Some(sample);
+        self.held_count += 1;
+        self.is_above = is_above;
+        self.skipped_s = 0.0;
+        if self.held_count < AGREEING {
+            return Verdict::Wait;
+        }
+        self.held_count = 0;
+        self.level = Some(*now);
+        if !self.is_confirmed {
+            // Nothing ever agreed with the first sample: the motion begins with these.
+            self.held[0] = self.held[0].map(|first| ResolvedSample { step_s: 0.0, ..first });
+        }
+        self.is_confirmed = true;
+        self.withdrawn_share *= (1.0 - 1.0 / MEMORY).powi(AGREEING as i32);
+        self.unless_in_doubt(Verdict::Release(AGREEING))
+    }
+
+    fn withdraw_held(&mut self) {
+        for _ in 0..self.held_count {
+            self.withdrawn_share += (1.0 - self.withdrawn_share) / MEMORY;
+        }
+        self.held_count = 0;
+    }
+
+    fn unless_in_doubt(&self, verdict: Verdict) -> Verdict {
+        if self.is_in_doubt() { Verdict::Refuse(RejectionReason::Outlier) } else { verdict }
+    }
+
+    /// Time in s that the held samples have taken.
+    fn held_s(&self) -> f64 {
+        self.held[..self.held_count].iter().flatten().map(|sample| sample.step_s).sum()
+    }
+
+    /// Whether force or speed lies above the level or below it; `None` while near it.
+    fn departure(&self, now: &Reading, level: &Reading, since_level_s: f64) -> Option<bool> {
+        let faster_mps = now.speed_mps - level.speed_mps;
+        if faster_mps.abs() > TOLERANCE_MPS + ACCELERATION_MAX_MPS2 * since_level_s {
+            return Some(faster_mps > 0.0);
+        }
+        let more = now.driving_n_per_kn - level.driving_n_per_kn;
+        let force = now.driving_n_per_kn.abs().max(level.driving_n_per_kn.abs());
+        (more.abs() > self.tolerance_n_per_kn(force)).then_some(more > 0.0)
+    }
+
+    fn tolerance_n_per_kn(&self, force_n_per_kn: f64) -> f64 {
+        TOLERANCE_N_PER_KN
+            .max(TOLERANCE_SHARE * force_n_per_kn)
+            .max(NOISE_TOLERANCE * self.change_n_per_kn)
+    }
+
+    /// Follows the quantile of the changes (Robbins, Monro 1951).
+    fn learn_noise(&mut self, change_n_per_kn: f64) {
+        let is_above = change_n_per_kn > self.change_n_per_kn;
+        let step = if is_above { NOISE_QUANTILE } else { NOISE_QUANTILE - 1.0 };
+        let low = TOLERANCE_N_PER_KN / NOISE_TOLERANCE;
+        self.change_n_per_kn = (self.change_n_per_kn * (NOISE_STEP * step).exp()).max(low);
+    }
+}
+
+#[cfg(test)]
+mod tests;
