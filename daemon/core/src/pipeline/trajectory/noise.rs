@@ -123,6 +123,9 @@ impl LearnedNoise {
         is_used: bool,
         model: &NoiseModel,
     ) {
+        if !(model.learns_speed_noise || model.learns_disturbance) {
+            return;
+        }
         let variance = own_variance + self.speed_variance;
         let inverse = 1.0 / variance;
         let square = innovation_mps * innovation_mps * inverse;

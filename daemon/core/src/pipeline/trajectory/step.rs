@@ -69,7 +69,7 @@ impl StepRule {
 
     /// As [`StepRule::advance`], but a train that would stop rolls on at the stall speed,
     /// whatever the parameters: a fit may start from parameters that stop the train.
-    #[inline]
+    #[inline(always)]
     pub fn advance_or_crawl(self, step: &Step, davis: &Davis, speed_mps: f64) -> (Advance, bool) {
         match self.advance(step, davis, speed_mps) {
             Some(advance) => (advance, false),
