@@ -48,6 +48,7 @@ pub struct StepInputs {
 
 impl StepInputs {
     /// Deceleration by everything but the brake in m/s², and its derivative by speed.
+    #[inline]
     pub fn resistance_mps2(&self, speed_mps: f64) -> (f64, f64) {
         let [a, b, c] = self.basic_mps2;
         let value = self.tied_mps2 + a + speed_mps * (b + speed_mps * c);
@@ -118,6 +119,7 @@ pub struct Move {
 }
 
 /// Moves the train over one step.
+#[inline]
 pub fn advance(inputs: &StepInputs, law: &Law, speed_mps: f64, scale: f64) -> Move {
     let (shape, shape_slope) = law.at(speed_mps, inputs.demand);
     let (resistance, resistance_slope) = inputs.resistance_mps2(speed_mps);
