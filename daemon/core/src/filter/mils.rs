@@ -199,7 +199,7 @@ impl<const N: usize, const L: usize> Mils<N, L> {
 }
 
 /// A row that observes parameter `i` as 0 with a weight.
-#[inline]
+#[inline(always)]
 fn draw_to_zero<const N: usize>(
     estimate: &mut SVector<f64, N>,
     covariance: &mut SMatrix<f64, N, N>,
@@ -228,7 +228,7 @@ const WEIGHTED_MAX: f64 = 100.0;
 /// With the matrix A of elements `P_ij W_j`, A adj(I + A) = A + (s2 + det A) I - adj A, s2 being
 /// the sum of the principal minors (Cayley and Hamilton), so that one division does. False when
 /// nothing was done: where the weighted variances are large the minors would lose digits.
-#[inline]
+#[inline(always)]
 fn draw_three_to_zero<const N: usize>(
     estimate: &mut SVector<f64, N>,
     covariance: &mut SMatrix<f64, N, N>,
