@@ -88,7 +88,7 @@ impl<const N: usize> GaussianState<N> {
         let cross = self.covariance.column(component);
         let variance = cross[component] + noise_variance;
         // Also refuses NaN.
-        if !(variance > 0.0 && variance.is_finite()) {
+        if !(variance > 0.0 && variance < f64::INFINITY) {
             return Err(FilterError::InnovationVariance { variance });
         }
         let innovation = measured - self.mean[component];

@@ -86,6 +86,7 @@ pub enum Walk {
 
 impl Walk {
     /// Share of the drift that is left after a step, and the time in s over which it acted.
+    #[inline]
     fn drift_transition(self, step_s: f64) -> (f64, f64) {
         match self {
             Walk::Scale(_) => (1.0, step_s),
@@ -134,6 +135,7 @@ pub fn advance(inputs: &StepInputs, law: &Law, speed_mps: f64, scale: f64) -> Mo
 }
 
 /// Mean of the state after a step, and the Jacobian.
+#[inline]
 pub fn predict(
     inputs: &StepInputs,
     law: &Law,
@@ -164,6 +166,7 @@ pub fn predict(
 
 /// F P Fᵀ + Q for the Jacobian F of [`predict`], exactly symmetric: F is the identity but for six
 /// places, and nothing else is multiplied.
+#[inline]
 pub fn move_covariance(
     jacobian: &SMatrix<f64, STATES, STATES>,
     covariance: &SMatrix<f64, STATES, STATES>,
@@ -174,8 +177,8 @@ pub fn move_covariance(
     const SCALE: usize = State::Scale as usize;
     const DRIFT: usize = State::Drift as usize;
     let times_jacobian = |matrix: SMatrix<f64, STATES, STATES>| {
-        let [distance, speed, scale, drift] =
-            [DISTANCE, SPEED, SCALE, DRIFT].map(|component| matrix.column(component).into_owned());
+        let (distance, speed) = (matrix.column(DISTANCE), matrix.column(SPEED));
+        let (scale, drift) = (matrix.column(SCALE), matrix.column(DRIFT));
         SMatrix::<f64, STATES, STATES>::from_columns(&[
             distance + speed * jacobian[(DISTANCE, SPEED)] + scale * jacobian[(DISTANCE, SCALE)],
             speed * jacobian[(SPEED, SPEED)] + scale * jacobian[(SPEED, SCALE)],
@@ -193,6 +196,7 @@ pub fn move_covariance(
 }
 
 /// Covariance that a step adds.
+#[inline]
 pub fn process_noise(noise: &MotionNoise, walk: Walk, step_s: f64) -> SMatrix<f64, STATES, STATES> {
     const SCALE: usize = State::Scale as usize;
     const DRIFT: usize = State::Drift as usize;
