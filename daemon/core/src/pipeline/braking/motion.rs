@@ -135,7 +135,6 @@ pub fn advance(inputs: &StepInputs, law: &Law, speed_mps: f64, scale: f64) -> Mo
 }
 
 /// Mean of the state after a step, and the Jacobian.
-#[inline]
 pub fn predict(
     inputs: &StepInputs,
     law: &Law,
@@ -196,7 +195,6 @@ pub fn move_covariance(
 }
 
 /// Covariance that a step adds.
-#[inline]
 pub fn process_noise(noise: &MotionNoise, walk: Walk, step_s: f64) -> SMatrix<f64, STATES, STATES> {
     const SCALE: usize = State::Scale as usize;
     const DRIFT: usize = State::Drift as usize;
