@@ -4,8 +4,12 @@
 use std::f64::consts::LOG2_E;
 use std::ops::Range;
 
+use resampling::find_ancestors;
+
 use super::lanes;
 use super::random::Random;
+
+mod resampling;
 
 /// A Markov model of a state of `D` components, observed at every step.
 ///
@@ -110,7 +114,8 @@ impl<const D: usize> ParticleSmoother<D> {
         for step in 0..steps {
             if step > 0 {
                 self.advance(model, step - 1);
-                self.find_ancestors(step - 1, random.uniform());
+                let weights = &self.filtered[self.places(step - 1)];
+                find_ancestors(weights, random.uniform(), &mut self.ancestors);
                 self.move_on(model, step, random);
             } else {
                 for particle in 0..self.particles {
@@ -119,7 +124,7 @@ impl<const D: usize> ParticleSmoother<D> {
                 }
             }
             let here = self.places(step);
-            let states: [&[f64]; D] = self.states.each_ref().map(|states| &states[here.clone()]);
+            let states = at(&self.states, &here);
             let weights = &mut self.filtered[here];
             let log_likelihood = model.log_likelihood(step);
             for (particle, weight) in weights.iter_mut().enumerate() {
@@ -139,9 +144,8 @@ impl<const D: usize> ParticleSmoother<D> {
     /// Moves the particles of a step without noise.
     fn advance(&mut self, model: &impl ParticleModel<D>, step: usize) {
         let here = self.places(step);
-        let states: [&[f64]; D] = self.states.each_ref().map(|states| &states[here.clone()]);
-        let advanced: [&mut [f64]; D] =
-            self.advanced.each_mut().map(|advanced| &mut advanced[here.clone()]);
+        let states = at(&self.states, &here);
+        let advanced = at_mut(&mut self.advanced, &here);
         let advance = model.advance(step);
         for particle in 0..here.len() {
             let moved = advance(states.map(|states| states[particle]));
@@ -151,39 +155,11 @@ impl<const D: usize> ParticleSmoother<D> {
         }
     }
 
-    /// Resamples a step systematically: the particle at place p comes from the first whose
-    /// cumulated weight exceeds the level p + `offset`, in shares of a particle.
-    ///
-    /// Each particle marks the place from which on others follow; what is marked up to a place is
-    /// the number of its ancestor. Searching for it would take a branch that none can foresee.
-    fn find_ancestors(&mut self, step: usize, offset: f64) {
-        let weights = &self.filtered[step * self.particles..(step + 1) * self.particles];
-        let last = self.particles - 1;
-        self.ancestors.fill(0);
-        // Weights sum to 1 but for rounding.
-        let scale = self.particles as f64 / lanes::sum(weights);
-        let mut sum = 0.0;
-        for (particle, weight) in weights[..last].iter().enumerate() {
-            sum += weight;
-            let levels = sum * scale - offset;
-            let whole = levels as u32;
-            let below = whole + u32::from(f64::from(whole) < levels);
-            self.ancestors[(below as usize).min(last + 1)] = particle + 1;
-        }
-        let mut ancestor = 0;
-        for place in &mut self.ancestors {
-            ancestor = ancestor.max(*place);
-            *place = ancestor;
-        }
-    }
-
     /// The particles of a step: the advanced ones that they come from, with noise.
     fn move_on(&mut self, model: &impl ParticleModel<D>, step: usize, random: &mut Random) {
         let (before, here) = (self.places(step - 1), self.places(step));
-        let advanced: [&[f64]; D] =
-            self.advanced.each_ref().map(|advanced| &advanced[before.clone()]);
-        let states: [&mut [f64]; D] =
-            self.states.each_mut().map(|states| &mut states[here.clone()]);
+        let advanced = at(&self.advanced, &before);
+        let states = at_mut(&mut self.states, &here);
         let draw_noise = model.draw_noise(step - 1);
         for (particle, &ancestor) in self.ancestors[..here.len()].iter().enumerate() {
             let noise = draw_noise(random);
@@ -224,12 +200,8 @@ impl<const D: usize> ParticleSmoother<D> {
     }
 
     fn fill_densities(&mut self, model: &impl ParticleModel<D>, step: usize) {
-        let n = self.particles;
-        let (here, next) = (step * n, (step + 1) * n);
-        let successors: [&[f64]; D] =
-            std::array::from_fn(|component| &self.states[component][next..next + n]);
-        let advanced: [&[f64]; D] =
-            std::array::from_fn(|component| &self.advanced[component][here..here + n]);
+        let advanced = at(&self.advanced, &self.places(step));
+        let successors = at(&self.states, &self.places(step + 1));
         model.transition_densities(step, advanced, successors, &mut self.densities);
     }
 
@@ -281,8 +253,7 @@ impl<const D: usize> ParticleSmoother<D> {
         if step + 1 >= self.steps {
             return None;
         }
-        let n = self.particles;
-        let (here, next) = (step * n..(step + 1) * n, (step + 1) * n..(step + 2) * n);
+        let (here, next) = (self.places(step), self.places(step + 1));
         Some(std::array::from_fn(|component| {
             let after = &self.states[component][next.clone()];
             let moved = &self.advanced[component][here.clone()];
@@ -292,7 +263,7 @@ impl<const D: usize> ParticleSmoother<D> {
     }
 
     fn moments(&self, step: usize, weight: impl Fn(usize) -> f64) -> ([f64; D], [[f64; D]; D]) {
-        let places = step * self.particles..(step + 1) * self.particles;
+        let places = self.places(step);
         let mut mean = [0.0; D];
         for place in places.clone() {
             for (mean, states) in mean.iter_mut().zip(&self.states) {
@@ -319,11 +290,24 @@ impl<const D: usize> ParticleSmoother<D> {
     }
 }
 
+/// A step's part of each component.
+fn at<'a, const D: usize>(arrays: &'a [Vec<f64>; D], places: &Range<usize>) -> [&'a [f64]; D] {
+    arrays.each_ref().map(|array| &array[places.clone()])
+}
+
+fn at_mut<'a, const D: usize>(
+    arrays: &'a mut [Vec<f64>; D],
+    places: &Range<usize>,
+) -> [&'a mut [f64]; D] {
+    arrays.each_mut().map(|array| &mut array[places.clone()])
+}
+
 /// Turns logarithms of weights into weights of sum 1; `None` when that cannot be done.
 fn normalise_logarithms(weights: &mut [f64]) -> Option<()> {
     // Passes over NaN, which weighs nothing below.
-    let greatest =
-        weights.iter().fold(f64::NEG_INFINITY, |greatest, &w| if w > greatest { w } else { greatest });
+    let greatest = weights
+        .iter()
+        .fold(f64::NEG_INFINITY, |greatest, &w| if w > greatest { w } else { greatest });
     if !greatest.is_finite() {
         return None;
     }

@@ -168,9 +168,8 @@ impl JumpBank {
             }
             best = hypothesis.weight.max(best);
         }
-        let scale = 1.0 / best;
         for index in (0..self.count).rev() {
-            let weight = self.hypotheses[index].weight * scale;
+            let weight = self.hypotheses[index].weight / best;
             self.hypotheses[index].weight = weight;
             // Also drops what became NaN because no weight is above 0.
             if !(weight > WEIGHT_MIN) {

@@ -192,8 +192,7 @@ impl Hypothesis {
     /// The spread between them stays in the covariance: neither knows exactly when the jump
     /// was, and samples from before it would bias the coefficients.
     pub fn united(&self, other: &Hypothesis) -> Hypothesis {
-        let (more, less) =
-            if self.weight >= other.weight { (self, other) } else { (other, self) };
+        let (more, less) = if self.weight >= other.weight { (self, other) } else { (other, self) };
         let weight = more.weight + less.weight;
         let share = less.weight / weight;
         let apart = less.state - more.state;
