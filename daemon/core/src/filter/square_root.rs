@@ -124,6 +124,15 @@ mod tests {
     }
 
     #[test]
+    fn measuring_the_last_component_is_measuring_along_it() {
+        let (mut one, mut other) =
+            (CovarianceFactor::of(&example()).unwrap(), CovarianceFactor::of(&example()).unwrap());
+        let along = one.measure(&Vector3::new(0.0, 0.0, 1.0), 0.5);
+        assert_eq!(other.measure_last(0.5), along);
+        assert_eq!(other, one);
+    }
+
+    #[test]
     fn an_almost_exact_measurement_leaves_a_positive_covariance() {
         let mut factor = CovarianceFactor::of(&example()).unwrap();
         for _ in 0..50 {
