@@ -80,7 +80,6 @@ pub enum Law {
 
 impl Law {
     /// The law's coefficient at a speed in m/s, and its derivative by speed in s/m.
-    #[inline]
     pub fn at(&self, speed_mps: f64, demand: f64) -> (f64, f64) {
         match self {
             Law::Constant => (1.0, 0.0),

@@ -120,9 +120,18 @@ pub struct Move {
 }
 
 /// Moves the train over one step.
-#[inline]
 pub fn advance(inputs: &StepInputs, law: &Law, speed_mps: f64, scale: f64) -> Move {
-    let (shape, shape_slope) = law.at(speed_mps, inputs.demand);
+    advance_under(inputs, law.at(speed_mps, inputs.demand), speed_mps, scale)
+}
+
+/// As [`advance`], under a law of a given value and slope at the speed.
+#[inline]
+pub fn advance_under(
+    inputs: &StepInputs,
+    (shape, shape_slope): (f64, f64),
+    speed_mps: f64,
+    scale: f64,
+) -> Move {
     let (resistance, resistance_slope) = inputs.resistance_mps2(speed_mps);
     let step_s = inputs.step_s;
     let speed_after = speed_mps - step_s * (inputs.gain_mps2 * shape * scale + resistance);

@@ -106,8 +106,10 @@ impl WindowModel<'_> {
     pub fn mover(&self, step: usize) -> impl Fn([f64; 2]) -> ([f64; 2], f64) + use<> {
         let inputs = self.window.entries[step + 1].inputs;
         let (share, _) = self.acting();
+        // The law is the demand itself.
+        let law = (inputs.demand, 0.0);
         move |[distance_m, speed_mps]| {
-            let moved = motion::advance(&inputs, &Law::Demand, speed_mps, share);
+            let moved = motion::advance_under(&inputs, law, speed_mps, share);
             ([distance_m + moved.travelled_m, moved.speed_mps], moved.speed_by_speed)
         }
     }
