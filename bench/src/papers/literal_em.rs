@@ -53,13 +53,15 @@ impl ParticleModel<2> for UniformWindow<'_> {
         ]
     }
 
-    fn advance(&self, _step: usize, state: &[f64; 2]) -> [f64; 2] {
-        let moved = motion::advance(&self.inputs, &Law::Constant, state[1], self.adhesion);
-        [state[0] + moved.travelled_m, moved.speed_mps]
+    fn advance(&self, _step: usize) -> impl Fn([f64; 2]) -> [f64; 2] {
+        |[distance_m, speed_mps]| {
+            let moved = motion::advance(&self.inputs, &Law::Constant, speed_mps, self.adhesion);
+            [distance_m + moved.travelled_m, moved.speed_mps]
+        }
     }
 
-    fn draw_noise(&self, _step: usize, random: &mut Random) -> [f64; 2] {
-        [uniform(POSITION_NOISE_M, random), uniform(SPEED_NOISE_MPS, random)]
+    fn draw_noise(&self, _step: usize) -> impl Fn(&mut Random) -> [f64; 2] {
+        |random| [uniform(POSITION_NOISE_M, random), uniform(SPEED_NOISE_MPS, random)]
     }
 
     fn transition_densities(
@@ -84,9 +86,12 @@ impl ParticleModel<2> for UniformWindow<'_> {
         }
     }
 
-    fn log_likelihood(&self, step: usize, state: &[f64; 2]) -> f64 {
-        let off = (self.moments[step].measured_m - state[0]) / POSITION_STD_M;
-        -0.5 * off * off
+    fn log_likelihood(&self, step: usize) -> impl Fn([f64; 2]) -> f64 {
+        let measured_m = self.moments[step].measured_m;
+        move |[distance_m, _]| {
+            let off = (measured_m - distance_m) / POSITION_STD_M;
+            -0.5 * off * off
+        }
     }
 }
 

@@ -39,7 +39,9 @@ pub fn smooth_means<const N: usize>(forward: &[ForwardStep<N>], means: &mut [SVe
     for (step, mean) in forward.iter().zip(means).rev() {
         *mean = step.filtered.mean - step.filtered.covariance * later;
         let ScalarUpdate { component, gain, innovation, inverse_variance, .. } = &step.update;
-        later[*component] -= gain.dot(&later) + inverse_variance * innovation;
+        let shift = gain.dot(&later) + inverse_variance * innovation;
+        // Chosen, not indexed: the vector stays in registers.
+        later = SVector::from_fn(|i, _| if i == *component { later[i] - shift } else { later[i] });
         later = step.jacobian.tr_mul(&later);
     }
 }

@@ -52,6 +52,7 @@ impl<const N: usize, T: Copy> FixedLagSmoother<N, T> {
     /// # Real-time
     ///
     /// Allocates nothing.
+    #[inline]
     pub fn remember(&mut self, state: &GaussianState<N>, component: usize, tag: T) {
         let cross = state.covariance.column(component).into_owned();
         let mean = state.mean[component];
@@ -60,7 +61,7 @@ impl<const N: usize, T: Copy> FixedLagSmoother<N, T> {
             self.moments.push(moment);
         } else {
             self.moments[self.oldest] = moment;
-            self.oldest = (self.oldest + 1) % self.capacity;
+            self.oldest = if self.oldest + 1 < self.capacity { self.oldest + 1 } else { 0 };
         }
     }
 

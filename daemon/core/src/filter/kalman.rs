@@ -87,12 +87,12 @@ impl<const N: usize> GaussianState<N> {
     ) -> Result<ScalarUpdate<N>, FilterError> {
         let cross = self.covariance.column(component);
         let variance = cross[component] + noise_variance;
-        // Also refuses NaN.
-        if !(variance > 0.0 && variance.is_finite()) {
+        let inverse_variance = 1.0 / variance;
+        // Also refuses NaN; infinity by its inverse.
+        if !(variance > 0.0 && inverse_variance > 0.0) {
             return Err(FilterError::InnovationVariance { variance });
         }
         let innovation = measured - self.mean[component];
-        let inverse_variance = 1.0 / variance;
         let gain = cross * inverse_variance;
         Ok(ScalarUpdate { innovation, variance, inverse_variance, noise_variance, gain, component })
     }

@@ -11,7 +11,8 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
             sums[lane] += x[lane] * y[lane];
         }
     }
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+    // In an order that keeps neighbours in one vector.
+    (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
 }
 
 /// Sum of a slice, in four lanes.
@@ -24,7 +25,8 @@ pub fn sum(a: &[f64]) -> f64 {
             sums[lane] += x[lane];
         }
     }
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+    // In an order that keeps neighbours in one vector.
+    (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
 }
 
 /// Binary logarithm of the smallest density that is told from 0.

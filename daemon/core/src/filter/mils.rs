@@ -111,7 +111,7 @@ impl<const N: usize, const L: usize> Mils<N, L> {
     ///
     /// # Errors
     ///
-    /// When P is no longer positive definite; the estimate may then be half updated.
+    /// When P is no longer positive definite; the estimate is then left alone.
     ///
     /// # Real-time
     ///
@@ -153,18 +153,6 @@ impl<const N: usize, const L: usize> Mils<N, L> {
         place.checked_sub(1).unwrap_or(self.length - 1)
     }
 
-    /// Takes in the rows of the penalty.
-    #[inline]
-    fn penalise(&mut self, weights: &SVector<f64, N>) -> Result<(), NotPositiveDefinite> {
-        if N == 3 && draw_three_to_zero(&mut self.estimate, &mut self.covariance, weights) {
-            return Ok(());
-        }
-        for i in (0..N).filter(|&i| weights[i] > 0.0) {
-            draw_to_zero(&mut self.estimate, &mut self.covariance, i, weights[i])?;
-        }
-        Ok(())
-    }
-
     /// Updates with the remembered rows; the step is the newest row's.
     ///
     /// # Errors
@@ -175,31 +163,44 @@ impl<const N: usize, const L: usize> Mils<N, L> {
         if self.held == 0 {
             return Err(NotPositiveDefinite);
         }
+        // Copies, which stay in registers where `self` may not.
+        let (mut estimate, mut covariance) = (self.estimate, self.covariance);
         if let Some(weights) = self.penalty.weights_at(self.updates) {
-            self.penalise(&weights)?;
+            penalise(&mut estimate, &mut covariance, &weights)?;
         }
         let newest = self.place_before(self.next);
-        let features = self.features[newest];
-        let step = scalar_update(
-            &mut self.estimate,
-            &mut self.covariance,
-            &features,
-            self.observed[newest],
-        )?;
+        let (features, observed) = (&self.features[newest], self.observed[newest]);
+        let step = scalar_update(&mut estimate, &mut covariance, features, observed)?;
         let mut place = newest;
         for _ in 1..self.held {
             place = self.place_before(place);
-            let features = self.features[place];
-            let observed = self.observed[place];
-            scalar_update(&mut self.estimate, &mut self.covariance, &features, observed)?;
+            let (features, observed) = (&self.features[place], self.observed[place]);
+            scalar_update(&mut estimate, &mut covariance, features, observed)?;
         }
+        (self.estimate, self.covariance) = (estimate, covariance);
         self.updates += 1;
         Ok(step)
     }
 }
 
+/// Takes in the rows of a penalty.
+#[inline(always)]
+fn penalise<const N: usize>(
+    estimate: &mut SVector<f64, N>,
+    covariance: &mut SMatrix<f64, N, N>,
+    weights: &SVector<f64, N>,
+) -> Result<(), NotPositiveDefinite> {
+    if N == 3 && draw_three_to_zero(estimate, covariance, weights) {
+        return Ok(());
+    }
+    for i in (0..N).filter(|&i| weights[i] > 0.0) {
+        draw_to_zero(estimate, covariance, i, weights[i])?;
+    }
+    Ok(())
+}
+
 /// A row that observes parameter `i` as 0 with a weight.
-#[inline]
+#[inline(always)]
 fn draw_to_zero<const N: usize>(
     estimate: &mut SVector<f64, N>,
     covariance: &mut SMatrix<f64, N, N>,
@@ -228,7 +229,7 @@ const WEIGHTED_MAX: f64 = 100.0;
 /// With the matrix A of elements `P_ij W_j`, A adj(I + A) = A + (s2 + det A) I - adj A, s2 being
 /// the sum of the principal minors (Cayley and Hamilton), so that one division does. False when
 /// nothing was done: where the weighted variances are large the minors would lose digits.
-#[inline]
+#[inline(always)]
 fn draw_three_to_zero<const N: usize>(
     estimate: &mut SVector<f64, N>,
     covariance: &mut SMatrix<f64, N, N>,

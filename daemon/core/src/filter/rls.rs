@@ -90,6 +90,7 @@ impl<const N: usize> Rls<N> {
 
     /// P + (1 - f)/f phi phi' / (phi' P^-1 phi): takes the share 1 - f of the information
     /// along the new row, and nothing across it.
+    #[inline(always)]
     fn forget_along(
         &mut self,
         features: &SVector<f64, N>,
@@ -105,6 +106,7 @@ impl<const N: usize> Rls<N> {
 }
 
 /// x' P^-1 x by P = L D L'; `None` unless P is positive definite.
+#[inline(always)]
 fn information_along<const N: usize>(
     covariance: &SMatrix<f64, N, N>,
     along: &SVector<f64, N>,
@@ -132,7 +134,7 @@ fn information_along<const N: usize>(
 }
 
 /// One row of recursive least squares: P stays symmetric and positive.
-#[inline]
+#[inline(always)]
 pub(super) fn scalar_update<const N: usize>(
     estimate: &mut SVector<f64, N>,
     covariance: &mut SMatrix<f64, N, N>,

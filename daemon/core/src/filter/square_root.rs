@@ -41,17 +41,34 @@ impl<const N: usize> CovarianceFactor<N> {
 
     /// Updates the covariance by a measurement hᵀ x + noise of variance r > 0.
     ///
-    /// Only sums of positive terms are formed: with S_k = r + Σ_{j>=k} w_j², w = Lᵀ h, the
-    /// factor of I - w wᵀ / S_1 has the diagonal √(S_{k+1} / S_k) and, below it,
-    /// -w_j w_k / √(S_k S_{k+1}).
-    ///
     /// # Real-time
     ///
     /// Bounded work, no allocation.
     pub fn measure(&mut self, direction: &SVector<f64, N>, noise_variance: f64) -> Gain<N> {
+        let along =
+            SVector::from_fn(|j, _| (j..N).map(|i| self.0[(i, j)] * direction[i]).sum::<f64>());
+        self.measure_along(&along, noise_variance)
+    }
+
+    /// As [`CovarianceFactor::measure`] for a measurement of the last component, whose w is a row
+    /// of the factor.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    #[inline]
+    pub fn measure_last(&mut self, noise_variance: f64) -> Gain<N> {
+        let along = self.0.row(N - 1).transpose();
+        self.measure_along(&along, noise_variance)
+    }
+
+    /// The update for w = Lᵀ h.
+    ///
+    /// Only sums of positive terms are formed: with S_k = r + Σ_{j>=k} w_j², the factor of
+    /// I - w wᵀ / S_1 has the diagonal √(S_{k+1} / S_k) and, below it, -w_j w_k / √(S_k S_{k+1}).
+    #[inline]
+    fn measure_along(&mut self, along: &SVector<f64, N>, noise_variance: f64) -> Gain<N> {
         let lower = &mut self.0;
-        let along: SVector<f64, N> =
-            SVector::from_fn(|j, _| (j..N).map(|i| lower[(i, j)] * direction[i]).sum());
         // From the last column to the first; `carried` is Σ_{j>k} L_ij w_j.
         let mut carried = SVector::<f64, N>::zeros();
         let mut sum = noise_variance;
@@ -70,12 +87,14 @@ impl<const N: usize> CovarianceFactor<N> {
             }
             (sum, root) = (next_sum, next_root);
         }
-        Gain { gain: carried / sum, innovation_variance: sum }
+        Gain { gain: carried * (1.0 / sum), innovation_variance: sum }
     }
 
     /// True while every entry is a number and no variance is zero.
+    #[inline]
     pub fn is_sound(&self) -> bool {
-        self.0.iter().all(|entry| entry.is_finite()) && (0..N).all(|i| self.0[(i, i)] != 0.0)
+        // One infinity or NaN makes the sum one.
+        self.0.column_sum().sum().is_finite() && (0..N).all(|i| self.0[(i, i)] != 0.0)
     }
 }
 
@@ -102,6 +121,15 @@ mod tests {
         assert!((result.gain - gain).norm() < 1e-12);
         assert!((factor.covariance() - posterior).norm() < 1e-12);
         assert_eq!(factor.0.upper_triangle(), Matrix3::from_diagonal(&factor.0.diagonal()));
+    }
+
+    #[test]
+    fn measuring_the_last_component_is_measuring_along_it() {
+        let (mut one, mut other) =
+            (CovarianceFactor::of(&example()).unwrap(), CovarianceFactor::of(&example()).unwrap());
+        let along = one.measure(&Vector3::new(0.0, 0.0, 1.0), 0.5);
+        assert_eq!(other.measure_last(0.5), along);
+        assert_eq!(other, one);
     }
 
     #[test]

@@ -2,20 +2,28 @@
 //! Xie 2019, eq. 24-27; Jin 2020, eq. 22-25).
 
 use std::f64::consts::LOG2_E;
+use std::ops::Range;
+
+use resampling::find_ancestors;
 
 use super::lanes;
 use super::random::Random;
 
+mod resampling;
+
 /// A Markov model of a state of `D` components, observed at every step.
+///
+/// What depends on the step alone is prepared once for all particles: the methods give functions
+/// of a particle.
 pub trait ParticleModel<const D: usize> {
     /// Draws a state of the first step.
     fn draw_initial(&self, random: &mut Random) -> [f64; D];
 
     /// The next step's state without process noise.
-    fn advance(&self, step: usize, state: &[f64; D]) -> [f64; D];
+    fn advance(&self, step: usize) -> impl Fn([f64; D]) -> [f64; D];
 
     /// Draws the process noise of the move that starts at `step`.
-    fn draw_noise(&self, step: usize, random: &mut Random) -> [f64; D];
+    fn draw_noise(&self, step: usize) -> impl Fn(&mut Random) -> [f64; D];
 
     /// Transition densities, up to a common factor, from every advanced state (row) to every
     /// successor (column); states come as one slice for each component.
@@ -28,7 +36,7 @@ pub trait ParticleModel<const D: usize> {
     );
 
     /// Logarithm of the density of the step's measurement given the state.
-    fn log_likelihood(&self, step: usize, state: &[f64; D]) -> f64;
+    fn log_likelihood(&self, step: usize) -> impl Fn([f64; D]) -> f64;
 }
 
 /// Why particles cannot represent the state.
@@ -59,7 +67,8 @@ pub struct ParticleSmoother<const D: usize> {
     densities: Vec<f64>,
     /// Smoothed weight of a successor over its predicted density.
     ratios: Vec<f64>,
-    cumulative: Vec<f64>,
+    /// Which particle of the step before each is moved from; one place more than particles.
+    ancestors: Vec<usize>,
 }
 
 impl<const D: usize> ParticleSmoother<D> {
@@ -77,7 +86,7 @@ impl<const D: usize> ParticleSmoother<D> {
             smoothed: all(),
             densities: vec![0.0; particles * particles],
             ratios: vec![0.0; particles],
-            cumulative: vec![0.0; particles],
+            ancestors: vec![0; particles + 1],
         }
     }
 
@@ -103,57 +112,59 @@ impl<const D: usize> ParticleSmoother<D> {
         assert!(steps <= self.steps_max, "room for {} steps, not {steps}", self.steps_max);
         self.steps = 0;
         for step in 0..steps {
-            let here = step * self.particles;
             if step > 0 {
-                self.resample_and_move(model, step, random);
+                self.advance(model, step - 1);
+                let weights = &self.filtered[self.places(step - 1)];
+                find_ancestors(weights, random.uniform(), &mut self.ancestors);
+                self.move_on(model, step, random);
             } else {
                 for particle in 0..self.particles {
                     let drawn = model.draw_initial(random);
                     self.set_state(particle, drawn);
                 }
             }
-            for particle in 0..self.particles {
-                let state = self.state(here + particle);
-                self.filtered[here + particle] = model.log_likelihood(step, &state);
+            let here = self.places(step);
+            let states = at(&self.states, &here);
+            let weights = &mut self.filtered[here];
+            let log_likelihood = model.log_likelihood(step);
+            for (particle, weight) in weights.iter_mut().enumerate() {
+                *weight = log_likelihood(states.map(|states| states[particle]));
             }
-            normalise_logarithms(&mut self.filtered[here..here + self.particles])
-                .ok_or(ParticleError::Degenerate { step })?;
+            normalise_logarithms(weights).ok_or(ParticleError::Degenerate { step })?;
         }
         self.steps = steps;
         Ok(())
     }
 
-    fn resample_and_move(
-        &mut self,
-        model: &impl ParticleModel<D>,
-        step: usize,
-        random: &mut Random,
-    ) {
-        let before = (step - 1) * self.particles;
-        let mut sum = 0.0;
-        for particle in 0..self.particles {
-            let place = before + particle;
-            let advanced = model.advance(step - 1, &self.state(place));
-            for (component, value) in advanced.into_iter().enumerate() {
-                self.advanced[component][place] = value;
+    /// Where a step's particles lie in every array.
+    fn places(&self, step: usize) -> Range<usize> {
+        step * self.particles..(step + 1) * self.particles
+    }
+
+    /// Moves the particles of a step without noise.
+    fn advance(&mut self, model: &impl ParticleModel<D>, step: usize) {
+        let here = self.places(step);
+        let states = at(&self.states, &here);
+        let advanced = at_mut(&mut self.advanced, &here);
+        let advance = model.advance(step);
+        for particle in 0..here.len() {
+            let moved = advance(states.map(|states| states[particle]));
+            for component in 0..D {
+                advanced[component][particle] = moved[component];
             }
-            sum += self.filtered[place];
-            self.cumulative[particle] = sum;
         }
-        // Weights sum to 1 but for rounding, and so do the levels.
-        let spacing = sum / self.particles as f64;
-        let mut level = random.uniform() * spacing;
-        let mut ancestor = 0;
-        let here = step * self.particles;
-        for particle in 0..self.particles {
-            while ancestor + 1 < self.particles && self.cumulative[ancestor] <= level {
-                ancestor += 1;
-            }
-            level += spacing;
-            let noise = model.draw_noise(step - 1, random);
-            for (component, value) in noise.into_iter().enumerate() {
-                self.states[component][here + particle] =
-                    self.advanced[component][before + ancestor] + value;
+    }
+
+    /// The particles of a step: the advanced ones that they come from, with noise.
+    fn move_on(&mut self, model: &impl ParticleModel<D>, step: usize, random: &mut Random) {
+        let (before, here) = (self.places(step - 1), self.places(step));
+        let advanced = at(&self.advanced, &before);
+        let states = at_mut(&mut self.states, &here);
+        let draw_noise = model.draw_noise(step - 1);
+        for (particle, &ancestor) in self.ancestors[..here.len()].iter().enumerate() {
+            let noise = draw_noise(random);
+            for component in 0..D {
+                states[component][particle] = advanced[component][ancestor] + noise[component];
             }
         }
     }
@@ -189,12 +200,8 @@ impl<const D: usize> ParticleSmoother<D> {
     }
 
     fn fill_densities(&mut self, model: &impl ParticleModel<D>, step: usize) {
-        let n = self.particles;
-        let (here, next) = (step * n, (step + 1) * n);
-        let successors: [&[f64]; D] =
-            std::array::from_fn(|component| &self.states[component][next..next + n]);
-        let advanced: [&[f64]; D] =
-            std::array::from_fn(|component| &self.advanced[component][here..here + n]);
+        let advanced = at(&self.advanced, &self.places(step));
+        let successors = at(&self.states, &self.places(step + 1));
         model.transition_densities(step, advanced, successors, &mut self.densities);
     }
 
@@ -246,8 +253,7 @@ impl<const D: usize> ParticleSmoother<D> {
         if step + 1 >= self.steps {
             return None;
         }
-        let n = self.particles;
-        let (here, next) = (step * n..(step + 1) * n, (step + 1) * n..(step + 2) * n);
+        let (here, next) = (self.places(step), self.places(step + 1));
         Some(std::array::from_fn(|component| {
             let after = &self.states[component][next.clone()];
             let moved = &self.advanced[component][here.clone()];
@@ -257,7 +263,7 @@ impl<const D: usize> ParticleSmoother<D> {
     }
 
     fn moments(&self, step: usize, weight: impl Fn(usize) -> f64) -> ([f64; D], [[f64; D]; D]) {
-        let places = step * self.particles..(step + 1) * self.particles;
+        let places = self.places(step);
         let mut mean = [0.0; D];
         for place in places.clone() {
             for (mean, states) in mean.iter_mut().zip(&self.states) {
@@ -277,10 +283,6 @@ impl<const D: usize> ParticleSmoother<D> {
         (mean, covariance)
     }
 
-    fn state(&self, place: usize) -> [f64; D] {
-        std::array::from_fn(|component| self.states[component][place])
-    }
-
     fn set_state(&mut self, place: usize, state: [f64; D]) {
         for (component, value) in state.into_iter().enumerate() {
             self.states[component][place] = value;
@@ -288,9 +290,24 @@ impl<const D: usize> ParticleSmoother<D> {
     }
 }
 
+/// A step's part of each component.
+fn at<'a, const D: usize>(arrays: &'a [Vec<f64>; D], places: &Range<usize>) -> [&'a [f64]; D] {
+    arrays.each_ref().map(|array| &array[places.clone()])
+}
+
+fn at_mut<'a, const D: usize>(
+    arrays: &'a mut [Vec<f64>; D],
+    places: &Range<usize>,
+) -> [&'a mut [f64]; D] {
+    arrays.each_mut().map(|array| &mut array[places.clone()])
+}
+
 /// Turns logarithms of weights into weights of sum 1; `None` when that cannot be done.
 fn normalise_logarithms(weights: &mut [f64]) -> Option<()> {
-    let greatest = weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    // Passes over NaN, which weighs nothing below.
+    let greatest = weights
+        .iter()
+        .fold(f64::NEG_INFINITY, |greatest, &w| if w > greatest { w } else { greatest });
     if !greatest.is_finite() {
         return None;
     }

@@ -22,12 +22,12 @@ impl ParticleModel<2> for Drifting {
         [random.normal(), 1.0 + 0.5 * random.normal()]
     }
 
-    fn advance(&self, _step: usize, state: &[f64; 2]) -> [f64; 2] {
-        [state[0] + state[1], state[1]]
+    fn advance(&self, _step: usize) -> impl Fn([f64; 2]) -> [f64; 2] {
+        |[position, speed]| [position + speed, speed]
     }
 
-    fn draw_noise(&self, _step: usize, random: &mut Random) -> [f64; 2] {
-        NOISE_STD.map(|std| std * random.normal())
+    fn draw_noise(&self, _step: usize) -> impl Fn(&mut Random) -> [f64; 2] {
+        |random| NOISE_STD.map(|std| std * random.normal())
     }
 
     fn transition_densities(
@@ -48,9 +48,11 @@ impl ParticleModel<2> for Drifting {
         }
     }
 
-    fn log_likelihood(&self, step: usize, state: &[f64; 2]) -> f64 {
-        let off = (self.measured[step] - state[0]) / MEASURED_STD;
-        -0.5 * off * off
+    fn log_likelihood(&self, step: usize) -> impl Fn([f64; 2]) -> f64 {
+        move |[position, _]| {
+            let off = (self.measured[step] - position) / MEASURED_STD;
+            -0.5 * off * off
+        }
     }
 }
 

@@ -48,6 +48,7 @@ pub struct StepInputs {
 
 impl StepInputs {
     /// Deceleration by everything but the brake in m/s², and its derivative by speed.
+    #[inline]
     pub fn resistance_mps2(&self, speed_mps: f64) -> (f64, f64) {
         let [a, b, c] = self.basic_mps2;
         let value = self.tied_mps2 + a + speed_mps * (b + speed_mps * c);
@@ -85,6 +86,7 @@ pub enum Walk {
 
 impl Walk {
     /// Share of the drift that is left after a step, and the time in s over which it acted.
+    #[inline]
     fn drift_transition(self, step_s: f64) -> (f64, f64) {
         match self {
             Walk::Scale(_) => (1.0, step_s),
@@ -119,7 +121,17 @@ pub struct Move {
 
 /// Moves the train over one step.
 pub fn advance(inputs: &StepInputs, law: &Law, speed_mps: f64, scale: f64) -> Move {
-    let (shape, shape_slope) = law.at(speed_mps, inputs.demand);
+    advance_under(inputs, law.at(speed_mps, inputs.demand), speed_mps, scale)
+}
+
+/// As [`advance`], under a law of a given value and slope at the speed.
+#[inline]
+pub fn advance_under(
+    inputs: &StepInputs,
+    (shape, shape_slope): (f64, f64),
+    speed_mps: f64,
+    scale: f64,
+) -> Move {
     let (resistance, resistance_slope) = inputs.resistance_mps2(speed_mps);
     let step_s = inputs.step_s;
     let speed_after = speed_mps - step_s * (inputs.gain_mps2 * shape * scale + resistance);
@@ -162,6 +174,7 @@ pub fn predict(
 
 /// F P Fᵀ + Q for the Jacobian F of [`predict`], exactly symmetric: F is the identity but for six
 /// places, and nothing else is multiplied.
+#[inline]
 pub fn move_covariance(
     jacobian: &SMatrix<f64, STATES, STATES>,
     covariance: &SMatrix<f64, STATES, STATES>,
@@ -172,8 +185,8 @@ pub fn move_covariance(
     const SCALE: usize = State::Scale as usize;
     const DRIFT: usize = State::Drift as usize;
     let times_jacobian = |matrix: SMatrix<f64, STATES, STATES>| {
-        let [distance, speed, scale, drift] =
-            [DISTANCE, SPEED, SCALE, DRIFT].map(|component| matrix.column(component).into_owned());
+        let (distance, speed) = (matrix.column(DISTANCE), matrix.column(SPEED));
+        let (scale, drift) = (matrix.column(SCALE), matrix.column(DRIFT));
         SMatrix::<f64, STATES, STATES>::from_columns(&[
             distance + speed * jacobian[(DISTANCE, SPEED)] + scale * jacobian[(DISTANCE, SCALE)],
             speed * jacobian[(SPEED, SPEED)] + scale * jacobian[(SPEED, SCALE)],

@@ -75,6 +75,7 @@ impl TrackerModel {
     }
 
     /// Moves a belief over one step; gives the Jacobian of the move.
+    #[inline]
     pub fn advance(
         &self,
         inputs: &StepInputs,
@@ -82,8 +83,8 @@ impl TrackerModel {
     ) -> SMatrix<f64, STATES, STATES> {
         let (mean, jacobian) = motion::predict(inputs, &self.law, self.walk, &state.mean);
         let added = motion::process_noise(&self.noise, self.walk, inputs.step_s);
-        let covariance = motion::move_covariance(&jacobian, &state.covariance, &added);
-        *state = GaussianState { mean, covariance };
+        state.mean = mean;
+        state.covariance = motion::move_covariance(&jacobian, &state.covariance, &added);
         jacobian
     }
 

@@ -45,8 +45,10 @@ pub struct JumpBank {
 /// Hypotheses less probable than this do not enter the published estimate: a jump within the
 /// last second is always possible, and would widen every interval by its whole size.
 const WEIGHT_PUBLISHED_MIN: f64 = 0.05;
-/// Log-weight below the best at which a hypothesis is dropped.
-const LOG_WEIGHT_RANGE: f64 = 40.0;
+/// Share of the greatest weight below which a hypothesis is dropped: 40 nats.
+const WEIGHT_MIN: f64 = 4.248_354_255_291_589e-18;
+/// The most that a jump may be probable by itself: 0.7 nats less than none.
+const JUMP_PROBABILITY_MAX: f64 = 0.496_585_303_791_409_5;
 
 impl JumpBank {
     /// A bank of at most `capacity` hypotheses (1 to [`HYPOTHESES_MAX`]) that starts from one.
@@ -79,7 +81,7 @@ impl JumpBank {
     }
 
     fn likeliest_index(&self) -> usize {
-        let weight = |i: &usize| self.hypotheses[*i].log_weight;
+        let weight = |i: &usize| self.hypotheses[*i].weight;
         (0..self.count).max_by(|i, j| weight(i).total_cmp(&weight(j))).unwrap_or(0)
     }
 
@@ -110,6 +112,7 @@ impl JumpBank {
         for (index, hypothesis) in self.hypotheses[..self.count].iter_mut().enumerate() {
             hypothesis.predict(rule, step, duration_s);
             let innovation = hypothesis.measure(measured_mps, &self.noise, &self.outliers);
+            hypothesis.weight *= innovation.likelihood;
             if index == likeliest {
                 told = Some(innovation);
             }
@@ -127,7 +130,8 @@ impl JumpBank {
         }
         let mut child = *self.likeliest();
         let variance = self.jumps.std.component_mul(&self.jumps.std);
-        child.log_weight += (self.since_spawn_s.ln() - self.jumps.evidence).min(-0.7);
+        let probability = self.since_spawn_s * (-self.jumps.evidence).exp();
+        child.weight *= probability.min(JUMP_PROBABILITY_MAX);
         self.since_spawn_s = 0.0;
         if child.jump(&variance) {
             if self.count == self.capacity {
@@ -155,17 +159,20 @@ impl JumpBank {
         self.count -= 1;
     }
 
-    /// Drops what is unsound or out of the question, and sets the greatest log-weight to 0.
+    /// Drops what is unsound or out of the question, and sets the greatest weight to 1.
     fn drop_unlikely(&mut self) {
-        let best = self.hypotheses[..self.count]
-            .iter()
-            .filter(|hypothesis| hypothesis.is_sound())
-            .map(|hypothesis| hypothesis.log_weight)
-            .fold(f64::NEG_INFINITY, f64::max);
+        let mut best = 0.0;
+        for hypothesis in &mut self.hypotheses[..self.count] {
+            if !hypothesis.is_sound() {
+                hypothesis.weight = 0.0;
+            }
+            best = hypothesis.weight.max(best);
+        }
         for index in (0..self.count).rev() {
-            let hypothesis = &mut self.hypotheses[index];
-            hypothesis.log_weight -= best;
-            if !(hypothesis.is_sound() && hypothesis.log_weight > -LOG_WEIGHT_RANGE) {
+            let weight = self.hypotheses[index].weight / best;
+            self.hypotheses[index].weight = weight;
+            // Also drops what became NaN because no weight is above 0.
+            if !(weight > WEIGHT_MIN) {
                 self.remove(index);
             }
         }
@@ -174,19 +181,18 @@ impl JumpBank {
     /// Mean and covariance of (a, b, c) over the hypotheses that count.
     pub fn davis(&self) -> (Davis, Matrix3<f64>) {
         let live = self.hypotheses();
-        let total: f64 = live.iter().map(|hypothesis| hypothesis.log_weight.exp()).sum();
+        let total: f64 = live.iter().map(|hypothesis| hypothesis.weight).sum();
         let published =
-            |hypothesis: &&Hypothesis| hypothesis.log_weight.exp() >= WEIGHT_PUBLISHED_MIN * total;
+            |hypothesis: &&Hypothesis| hypothesis.weight >= WEIGHT_PUBLISHED_MIN * total;
         let (mut mean, mut weight) = (Vector3::zeros(), 0.0);
         for hypothesis in live.iter().filter(published) {
-            let share = hypothesis.log_weight.exp();
-            mean += hypothesis.state.fixed_rows::<3>(0) * share;
-            weight += share;
+            mean += hypothesis.state.fixed_rows::<3>(0) * hypothesis.weight;
+            weight += hypothesis.weight;
         }
         mean /= weight;
         let mut covariance = Matrix3::zeros();
         for hypothesis in live.iter().filter(published) {
-            let share = hypothesis.log_weight.exp() / weight;
+            let share = hypothesis.weight / weight;
             let apart = hypothesis.state.fixed_rows::<3>(0) - mean;
             let own = hypothesis.davis_covariance_over_noise(&self.noise);
             covariance += (own + apart * apart.transpose()) * share;

@@ -32,8 +32,8 @@ pub struct Hypothesis {
     pub noise: LearnedNoise,
     /// Covariance that a disturbance of unit density would have left with the gains used.
     unit: UnitDisturbance,
-    /// Logarithm of the hypothesis' probability.
-    pub log_weight: f64,
+    /// The hypothesis' probability, up to a factor that all of a bank share.
+    pub weight: f64,
     /// Time in s since its jump.
     pub age_s: f64,
     /// Measurements left out in a row.
@@ -43,6 +43,9 @@ pub struct Hypothesis {
 /// After so many measurements left out in a row the speed is taken from the next.
 const REFUSALS_MAX: u32 = 10;
 
+/// The normal density of unit variance at its mean, 1 / √(2π).
+const NORMAL_DENSITY: f64 = 0.398_942_280_401_432_7;
+
 /// What a measured speed said under a hypothesis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Innovation {
@@ -50,6 +53,8 @@ pub struct Innovation {
     pub innovation_mps: f64,
     /// Its predicted standard deviation in m/s.
     pub deviation_mps: f64,
+    /// Density in s/m of the measured speed, as it was predicted with outliers.
+    pub likelihood: f64,
     /// False when the measurement was taken for an outlier and left out.
     pub is_used: bool,
 }
@@ -64,7 +69,7 @@ impl Hypothesis {
             )),
             noise,
             unit: UnitDisturbance::default(),
-            log_weight: 0.0,
+            weight: 1.0,
             age_s: 0.0,
             refusals: 0,
         }
@@ -126,6 +131,7 @@ impl Hypothesis {
     /// # Real-time
     ///
     /// Bounded work, no allocation.
+    #[inline]
     pub fn predict(&mut self, rule: StepRule, step: &Step, duration_s: f64) {
         let (advance, _) = rule.advance_or_crawl(step, &self.davis(), self.state[SPEED]);
         self.state[SPEED] = advance.speed_mps;
@@ -144,12 +150,13 @@ impl Hypothesis {
         self.age_s += duration_s;
     }
 
-    /// Takes in a measured speed, or leaves it out when it more likely is an outlier; the
-    /// weight gains the likelihood of either.
+    /// Takes in a measured speed, or leaves it out when it more likely is an outlier. The weight
+    /// stays; whoever compares hypotheses multiplies it by the likelihood.
     ///
     /// # Real-time
     ///
     /// Bounded work, no allocation.
+    #[inline]
     pub fn measure(
         &mut self,
         measured_mps: f64,
@@ -159,25 +166,24 @@ impl Hypothesis {
         let own_variance = self.factor.0.row(SPEED).norm_squared();
         let noise_variance = self.noise.speed_variance;
         let variance = own_variance + noise_variance;
+        let inverse = 1.0 / variance;
+        let deviation_mps = variance.sqrt();
         let innovation_mps = measured_mps - self.state[SPEED];
-        let normal = (-0.5 * innovation_mps * innovation_mps / variance).exp()
-            / (std::f64::consts::TAU * variance).sqrt();
+        let square = innovation_mps * innovation_mps * inverse;
+        let normal = NORMAL_DENSITY * (-0.5 * square).exp() * inverse * deviation_mps;
         let inlier = (1.0 - outliers.share) * normal;
         let outlier = outliers.share * outliers.density;
-        self.log_weight += (inlier + outlier).ln();
         let is_used = inlier >= outlier;
         self.noise.learn(innovation_mps, own_variance, is_used, model);
         self.refusals = if is_used { 0 } else { self.refusals + 1 };
         if is_used {
-            let mut direction = SVector::<f64, 4>::zeros();
-            direction[SPEED] = 1.0;
-            let gain = self.factor.measure(&direction, noise_variance).gain;
+            let gain = self.factor.measure_last(noise_variance).gain;
             self.state += gain * innovation_mps;
             self.unit.measure(&gain);
         } else if self.refusals > REFUSALS_MAX {
             self.anchor(measured_mps);
         }
-        Innovation { innovation_mps, deviation_mps: variance.sqrt(), is_used }
+        Innovation { innovation_mps, deviation_mps, likelihood: inlier + outlier, is_used }
     }
 
     /// Mean and covariance of two hypotheses by their weights, with the weight of both; the
@@ -186,16 +192,15 @@ impl Hypothesis {
     /// The spread between them stays in the covariance: neither knows exactly when the jump
     /// was, and samples from before it would bias the coefficients.
     pub fn united(&self, other: &Hypothesis) -> Hypothesis {
-        let (more, less) =
-            if self.log_weight >= other.log_weight { (self, other) } else { (other, self) };
-        let odds = (less.log_weight - more.log_weight).exp();
-        let share = odds / (1.0 + odds);
+        let (more, less) = if self.weight >= other.weight { (self, other) } else { (other, self) };
+        let weight = more.weight + less.weight;
+        let share = less.weight / weight;
         let apart = less.state - more.state;
         let covariance = more.factor.covariance() * (1.0 - share)
             + less.factor.covariance() * share
             + apart * apart.transpose() * (share * (1.0 - share));
         let mut united = *more;
-        united.log_weight += odds.ln_1p();
+        united.weight = weight;
         if let Some(factor) = CovarianceFactor::of(&covariance) {
             united.state += apart * share;
             united.factor = factor;
@@ -205,10 +210,9 @@ impl Hypothesis {
     }
 
     /// True while state and covariance are numbers.
+    #[inline]
     pub fn is_sound(&self) -> bool {
-        self.state.iter().all(|entry| entry.is_finite())
-            && self.log_weight.is_finite()
-            && self.factor.is_sound()
+        (self.state.sum() + self.weight).is_finite() && self.factor.is_sound()
     }
 }
 
@@ -344,12 +348,12 @@ mod tests {
         let mut one = first(&model);
         let mut other = first(&model);
         other.state[A] += 1.0;
-        one.log_weight = 0.25_f64.ln();
-        other.log_weight = 0.75_f64.ln();
+        one.weight = 0.25;
+        other.weight = 0.75;
         let united = one.united(&other);
         assert!((united.state[A] - (FAST.a + 0.75)).abs() < 1e-12);
         let variance = united.davis_covariance()[(A, A)];
         assert!((variance - (0.09 + 0.75 * 0.25)).abs() < 1e-12);
-        assert!(united.log_weight.abs() < 1e-12);
+        assert_eq!(united.weight, 1.0);
     }
 }

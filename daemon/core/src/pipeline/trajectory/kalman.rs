@@ -167,7 +167,7 @@ impl TrajectoryKalman {
         };
         self.fault = None;
         self.unexplained.push(motion, sample, &self.filter.bank().likeliest().davis());
-        let Innovation { innovation_mps, deviation_mps, is_used } = innovation;
+        let Innovation { innovation_mps, deviation_mps, is_used, .. } = innovation;
         if !is_used {
             self.innovations.break_here();
             return Outcome::Rejected(RejectionReason::Outlier);

@@ -102,6 +102,7 @@ impl LearnedNoise {
 
     /// The filter has moved over a step of a given time; `by_before` is the derivative of the
     /// speed after it with respect to the speed before.
+    #[inline]
     pub fn predict(&mut self, by_before: f64, duration_s: f64) {
         self.by_speed *= by_before;
         self.by_variance *= by_before * by_before;
@@ -109,11 +110,13 @@ impl LearnedNoise {
     }
 
     /// Learns from an innovation in m/s, given the variance of the predicted speed; call it
-    /// before the filter takes the measurement. `is_used` tells whether it will.
+    /// before the filter takes the measurement. `is_used` tells whether it will. Noise that is
+    /// given, R and q both, is not learned from.
     ///
     /// # Real-time
     ///
     /// Bounded work, no allocation.
+    #[inline]
     pub fn learn(
         &mut self,
         innovation_mps: f64,
@@ -121,7 +124,11 @@ impl LearnedNoise {
         is_used: bool,
         model: &NoiseModel,
     ) {
-        let inverse = 1.0 / (own_variance + self.speed_variance);
+        if !(model.learns_speed_noise || model.learns_disturbance) {
+            return;
+        }
+        let variance = own_variance + self.speed_variance;
+        let inverse = 1.0 / variance;
         let square = innovation_mps * innovation_mps * inverse;
         let mut by_total = self.by_variance;
         by_total[SPEED] += self.speed_variance;
@@ -129,8 +136,8 @@ impl LearnedNoise {
             return;
         }
         let by_total_share = by_total * inverse;
-        let clipped = innovation_mps.signum()
-            * innovation_mps.abs().min(CLIP_DEVIATIONS * inverse.sqrt().recip());
+        let clip_mps = CLIP_DEVIATIONS * variance.sqrt();
+        let clipped = innovation_mps.min(clip_mps).max(-clip_mps);
         let clipped_square = square.min(CLIP_DEVIATIONS * CLIP_DEVIATIONS);
         let score =
             by_total_share * (0.5 * (clipped_square - 1.0)) + self.by_speed * (clipped * inverse);

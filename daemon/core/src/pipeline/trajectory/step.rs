@@ -59,6 +59,7 @@ pub const STALL_SPEED_MPS: f64 = 0.1;
 
 impl StepRule {
     /// The speed after a step; `None` when the train would stop within it (v'² < 0 in eq. 7).
+    #[inline]
     pub fn advance(self, step: &Step, davis: &Davis, speed_mps: f64) -> Option<Advance> {
         match self {
             StepRule::Distance => advance_distance(step, davis, speed_mps),
@@ -68,6 +69,7 @@ impl StepRule {
 
     /// As [`StepRule::advance`], but a train that would stop rolls on at the stall speed,
     /// whatever the parameters: a fit may start from parameters that stop the train.
+    #[inline(always)]
     pub fn advance_or_crawl(self, step: &Step, davis: &Davis, speed_mps: f64) -> (Advance, bool) {
         match self.advance(step, davis, speed_mps) {
             Some(advance) => (advance, false),
@@ -79,6 +81,7 @@ impl StepRule {
     }
 }
 
+#[inline]
 fn advance_distance(step: &Step, davis: &Davis, speed_mps: f64) -> Option<Advance> {
     let reach = step.resistance_gain * step.size;
     let energy = speed_mps * speed_mps + 2.0 * step.size * step.drive_mps2
@@ -96,6 +99,7 @@ fn advance_distance(step: &Step, davis: &Davis, speed_mps: f64) -> Option<Advanc
     })
 }
 
+#[inline]
 fn advance_time(step: &Step, davis: &Davis, speed_mps: f64) -> Option<Advance> {
     let reach = step.resistance_gain * step.size;
     let impulse = step.size * step.drive_mps2;
@@ -121,6 +125,7 @@ fn advance_time(step: &Step, davis: &Davis, speed_mps: f64) -> Option<Advance> {
 }
 
 /// dw0/dv in N/kN per m/s.
+#[inline]
 fn slope(davis: &Davis, speed_mps: f64) -> f64 {
     davis.b + 2.0 * davis.c * speed_mps
 }

@@ -30,6 +30,7 @@ impl UnitDisturbance {
     /// # Real-time
     ///
     /// Bounded work, no allocation.
+    #[inline]
     pub fn predict(&mut self, by_davis: &Vector3<f64>, by_speed: f64, duration_s: f64) {
         let row = SVector::<f64, 4>::new(by_davis[0], by_davis[1], by_davis[2], by_speed);
         let with_speed = self.0 * row;
@@ -44,10 +45,12 @@ impl UnitDisturbance {
     /// # Real-time
     ///
     /// Bounded work, no allocation.
+    #[inline]
     pub fn measure(&mut self, gain: &SVector<f64, 4>) {
         let seen = self.0.column(SPEED).into_owned();
-        let own = seen[SPEED];
-        self.0 += gain * gain.transpose() * own - gain * seen.transpose() - seen * gain.transpose();
+        // (I - K h) U (I - K h)ᵀ, exactly symmetric.
+        let taken = seen - gain * (0.5 * seen[SPEED]);
+        self.0 -= gain * taken.transpose() + taken * gain.transpose();
     }
 
     /// The mean of two by the share of the other.

@@ -81,14 +81,17 @@ impl ParticleModel<2> for WindowModel<'_> {
         [mean[0] + distance_std * x, mean[1] + slope * x + rest * y]
     }
 
-    fn advance(&self, step: usize, state: &[f64; 2]) -> [f64; 2] {
-        WindowModel::advance(self, step, *state).0
+    fn advance(&self, step: usize) -> impl Fn([f64; 2]) -> [f64; 2] {
+        let mover = self.mover(step);
+        move |state| mover(state).0
     }
 
-    fn draw_noise(&self, step: usize, random: &mut Random) -> [f64; 2] {
+    fn draw_noise(&self, step: usize) -> impl Fn(&mut Random) -> [f64; 2] {
         let [distance, speed] = self.move_noise(step).stds;
-        let (x, y) = (random.normal(), random.normal());
-        [distance * x, speed * y]
+        move |random| {
+            let (x, y) = (random.normal(), random.normal());
+            [distance * x, speed * y]
+        }
     }
 
     fn transition_densities(
@@ -113,9 +116,13 @@ impl ParticleModel<2> for WindowModel<'_> {
         }
     }
 
-    fn log_likelihood(&self, step: usize, state: &[f64; 2]) -> f64 {
-        let off_m = self.window.entries[step].observed.distance_m - state[0];
-        -0.5 * off_m * off_m / self.noise.measured_distance_m2
+    fn log_likelihood(&self, step: usize) -> impl Fn([f64; 2]) -> f64 {
+        let measured_m = self.window.entries[step].observed.distance_m;
+        let scale = -0.5 / self.noise.measured_distance_m2;
+        move |[distance_m, _]| {
+            let off_m = measured_m - distance_m;
+            scale * off_m * off_m
+        }
     }
 }
 

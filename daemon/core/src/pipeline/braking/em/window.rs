@@ -98,9 +98,20 @@ impl WindowModel<'_> {
     /// Distance and speed after the move that starts at `step`, without noise, and the
     /// derivative of the final speed by the first.
     pub fn advance(&self, step: usize, state: [f64; 2]) -> ([f64; 2], f64) {
-        let inputs = &self.window.entries[step + 1].inputs;
-        let moved = motion::advance(inputs, &Law::Demand, state[1], self.acting().0);
-        ([state[0] + moved.travelled_m, moved.speed_mps], moved.speed_by_speed)
+        self.mover(step)(state)
+    }
+
+    /// [`WindowModel::advance`] for any number of states.
+    #[inline]
+    pub fn mover(&self, step: usize) -> impl Fn([f64; 2]) -> ([f64; 2], f64) + use<> {
+        let inputs = self.window.entries[step + 1].inputs;
+        let (share, _) = self.acting();
+        // The law is the demand itself.
+        let law = (inputs.demand, 0.0);
+        move |[distance_m, speed_mps]| {
+            let moved = motion::advance_under(&inputs, law, speed_mps, share);
+            ([distance_m + moved.travelled_m, moved.speed_mps], moved.speed_by_speed)
+        }
     }
 
     /// Derivatives of distance and speed after a move by the share.
