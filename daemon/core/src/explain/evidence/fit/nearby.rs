@@ -38,6 +38,6 @@ impl<'a> Nearby<'a> {
             cost += normal.cost;
         }
         let step = Cholesky::new(information)?.solve(&score);
-        Some(cost - score.dot(&step))
+        Some(cost - score.dot(&step)).filter(|reached| reached.is_finite())
     }
 }
