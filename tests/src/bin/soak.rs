@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
+use dynocar::identify::default_estimators;
 use dynocar_tests::fuzz::{self, Target};
 use dynocar_tests::golden;
 use dynocar_tests::sensor_failures::SensorFailure;
@@ -41,7 +43,7 @@ enum Command {
         #[command(flatten)]
         rounds: Rounds,
         /// Kinds of estimator, all when absent
-        #[arg(long, value_delimiter = ',')]
+        #[arg(long, value_delimiter = ',', value_parser = known_kinds())]
         kinds: Vec<String>,
     },
     /// Mutations of `tests/corpus` into every reader
@@ -58,6 +60,10 @@ struct Rounds {
     /// The seed
     #[arg(long, default_value_t = 1)]
     seed: u64,
+}
+
+fn known_kinds() -> PossibleValuesParser {
+    PossibleValuesParser::new(default_estimators().iter().map(|settings| settings.kind().name()))
 }
 
 /// Tallies by the kind of estimator and whether sensors failed.

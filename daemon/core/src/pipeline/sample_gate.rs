@@ -4,7 +4,8 @@
 //! it away is time: a train's force, once it has left its level, stays away for a while, since
 //! actuators are slow; a reading that fails comes back at once. A sample whose force has left the
 //! level of the last one taken is therefore held back until the next ones agree with it, and
-//! dropped when they return. Nothing is lost of a true change: what was held is released in order.
+//! dropped when they return. Nothing is lost of a true change: what was held is released in order,
+//! unless the samples are so far apart that it took longer than is bridged; motion then begins anew.
 //! Where too many readings stand alone, some of them agree by chance, and nothing is taken until
 //! the forces are steady again.
 
