@@ -324,7 +324,15 @@ dynocar_code dynocar_publisher_start_run(dynocar_publisher *publisher);
  * run and published_ns, also when the transport refuses the sample. REAL-TIME */
 dynocar_code dynocar_publisher_publish(dynocar_publisher *publisher, dynocar_train_sample *sample);
 
-/* Closes the publisher and gives the train free; NULL does nothing. */
+/* Waits until every pipeline has taken every sample, for at most patience_ns; *not_taken (or NULL)
+ * is then how many of this publisher's samples the slowest has not taken. Not for the control
+ * cycle. */
+dynocar_code dynocar_publisher_flush(dynocar_publisher *publisher, int64_t patience_ns,
+                                     uint64_t *not_taken);
+
+/* Closes the publisher and gives the train free; NULL does nothing. Waits up to 0.2 s for the
+ * pipelines to take what is on its way, unless dynocar_publisher_flush() has waited since the last
+ * sample; the daemon counts the rest as lost. Not for the control cycle. */
 dynocar_code dynocar_publisher_close(dynocar_publisher *publisher);
 
 /* ---- Polling ---- */

@@ -381,6 +381,7 @@ _FUNCTIONS: List[Tuple[str, Any, List[Any]]] = [
     ("publisher_open", c_int32, _OPEN),
     ("publisher_start_run", c_int32, [_HANDLE]),
     ("publisher_publish", c_int32, [_HANDLE, POINTER(TrainSample)]),
+    ("publisher_flush", c_int32, [_HANDLE, c_int64, POINTER(c_uint64)]),
     ("publisher_close", c_int32, [_HANDLE]),
     ("reader_open", c_int32, _OPEN),
     ("reader_set_stale_after_ns", c_int32, [_HANDLE, c_int64]),
@@ -656,6 +657,16 @@ class SamplePublisher(_End):
                 sample.valid |= bit
         self._call("publish", byref(sample))
         return int(sample.sequence)
+
+    def flush(self, patience_s: float = 0.2) -> int:
+        """Waits until every pipeline has taken every sample; gives the number not taken.
+
+        ``close`` waits up to 0.2 s unless this has waited since the last sample. Not for the
+        control cycle.
+        """
+        not_taken = c_uint64()
+        self._call("flush", int(patience_s * 1e9), byref(not_taken))
+        return not_taken.value
 
 
 class SnapshotReader(_End):

@@ -172,6 +172,24 @@ impl Peer {
         }
     }
 
+    /// The trains for which a living process holds a role, in order.
+    ///
+    /// # Errors
+    ///
+    /// When the run-time directory cannot be read.
+    pub fn trains(host: &Host, role: Role) -> Result<Vec<TrainId>, ChannelError> {
+        let directory = host.trains_directory();
+        let entries = std::fs::read_dir(&directory).map_err(unusable(&directory, "reading"))?;
+        let suffix = format!(".{role}");
+        let train_of = |name: &str| name.strip_suffix(&suffix)?.parse().ok().map(TrainId);
+        let mut trains: Vec<TrainId> = entries
+            .filter_map(|entry| train_of(entry.ok()?.file_name().to_str()?))
+            .filter(|&train| !matches!(Peer::look_up(host, train, role), Ok(Peer::Absent)))
+            .collect();
+        trains.sort_unstable();
+        Ok(trains)
+    }
+
     /// Turns an incompatible peer into an error.
     ///
     /// # Errors
@@ -276,6 +294,17 @@ mod tests {
         assert_eq!(Peer::look_up(&host, TRAIN, Role::Daemon).unwrap(), Peer::Compatible(ours));
         drop(lock);
         assert_eq!(Peer::look_up(&host, TRAIN, Role::Daemon).unwrap(), Peer::Absent);
+    }
+
+    #[test]
+    fn the_trains_of_a_role_are_those_of_living_processes() {
+        let (_directory, host) = host();
+        let claim = |train| RoleLock::claim(&host, TrainId(train), Role::Daemon).unwrap();
+        let (_twelve, _five, gone) = (claim(12), claim(5), claim(7));
+        drop(gone);
+        let _controller = RoleLock::claim(&host, TrainId(9), Role::Controller).unwrap();
+        std::fs::write(host.trains_directory().join("x.daemon"), "").unwrap();
+        assert_eq!(Peer::trains(&host, Role::Daemon).unwrap(), [TrainId(5), TrainId(12)]);
     }
 
     #[test]

@@ -1,24 +1,40 @@
 //! The end a controller writes samples into.
 
+use std::time::{Duration, Instant};
+
 use dynocar_shared::{TrainId, TrainSample};
 
-use crate::channel::{SendRefused, Sender, Transport, Waker};
+use crate::channel::{SampleCount, SendRefused, Sender, Transport, Waker};
 use crate::clock::monotonic_now_ns;
 use crate::error::ChannelError;
 use crate::host::Host;
 use crate::peer::{Peer, Role, RoleLock};
 
+/// How long a publisher that is closed waits for the pipelines to take what is on its way.
+pub const CLOSE_PATIENCE: Duration = Duration::from_millis(200);
+/// How often it looks meanwhile.
+const PAUSE: Duration = Duration::from_millis(1);
+
 /// Publishes one train's samples.
 ///
 /// One controller drives a train: while a publisher lives, a second one for the same train is
-/// refused.
+/// refused. Sequence numbers go on from controller to controller. Dropping it waits for at most
+/// [`CLOSE_PATIENCE`], unless [`SamplePublisher::flush`] has waited already; what is given up the
+/// daemon counts as lost.
 #[derive(Debug)]
 pub struct SamplePublisher {
+    host: Host,
     train: TrainId,
     sender: Sender<TrainSample>,
     waker: Waker,
+    count: SampleCount,
+    /// The number before this publisher's first sample.
+    start: u64,
     sequence: u64,
+    /// The newest number when the pipelines were last waited for.
+    flushed: u64,
     run: u32,
+    /// Last, for the daemon takes a train that nobody drives as one of which nothing more comes.
     _role: RoleLock,
 }
 
@@ -35,12 +51,18 @@ impl SamplePublisher {
         let transport = Transport::open(host, "dynocar-controller")?;
         let sender = transport.sender::<TrainSample>(train)?;
         let waker = Waker::open(&transport, train)?;
+        let count = SampleCount::open(host, train)?;
         transport.reserve()?;
+        let start = count.begun();
         Ok(SamplePublisher {
+            host: host.clone(),
             train,
             sender,
             waker,
-            sequence: 0,
+            count,
+            start,
+            sequence: start,
+            flushed: start,
             // Milliseconds since boot: a restarted controller never repeats its last run.
             run: (monotonic_now_ns() / 1_000_000) as u32,
             _role: role,
@@ -70,13 +92,62 @@ impl SamplePublisher {
         sample.sequence = self.sequence;
         sample.run = self.run;
         sample.published_ns = monotonic_now_ns();
-        self.sender.send(sample)?;
+        self.count.begin(self.sequence);
+        let sent = self.sender.send(sample);
+        self.count.finish(self.sequence);
+        sent?;
         self.waker.wake(sample.published_ns);
         Ok(self.sequence)
     }
 
-    /// Number of samples published so far.
+    /// Number of samples that this publisher has published so far.
     pub fn published(&self) -> u64 {
+        self.sequence - self.start
+    }
+
+    /// Sequence number of the newest sample, of this publisher or of one before it.
+    pub fn sequence(&self) -> u64 {
         self.sequence
+    }
+
+    /// Pipelines of the daemon that serves the train, or served it last.
+    pub fn pipelines(&self) -> usize {
+        self.count.pipelines()
+    }
+
+    /// Samples of the train, of this publisher or of one before it, that the slowest pipeline thread
+    /// has not taken; `None` where there never was one.
+    pub fn untaken(&self) -> Option<u64> {
+        self.count.untaken()
+    }
+
+    /// Waits until every pipeline has taken every sample, for at most `patience`; gives the number
+    /// of this publisher's samples that the slowest has not taken, all of them where nobody ever
+    /// served the train. A daemon that has died is not waited for.
+    ///
+    /// Not for the control cycle.
+    pub fn flush(&mut self, patience: Duration) -> u64 {
+        self.flushed = self.sequence;
+        let start = Instant::now();
+        loop {
+            let untaken = self.untaken();
+            let own = untaken.unwrap_or(u64::MAX).min(self.published());
+            let is_hopeless = || {
+                let daemon = Peer::look_up(&self.host, self.train, Role::Daemon);
+                untaken.is_none() || !matches!(daemon, Ok(Peer::Compatible(_)))
+            };
+            if own == 0 || start.elapsed() >= patience || is_hopeless() {
+                return own;
+            }
+            std::thread::sleep(PAUSE);
+        }
+    }
+}
+
+impl Drop for SamplePublisher {
+    fn drop(&mut self) {
+        if self.flushed != self.sequence {
+            self.flush(CLOSE_PATIENCE);
+        }
     }
 }

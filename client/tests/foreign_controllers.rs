@@ -86,6 +86,7 @@ fn assert_round_trip(command: &mut Command, daemon: &PlayedDaemon) {
     assert_eq!(line("manoeuvres"), "1");
     assert_eq!(line("silent"), "invalid daemon_silent 0");
     assert_eq!(line("refused"), "0");
+    assert_eq!(line("untaken"), "0");
 }
 
 /// Answers once the controller drives by its own parameters, falls silent once it drives by

@@ -66,6 +66,7 @@ fn every_null_is_answered_with_a_code() {
             dynocar_publisher_publish(null_mut(), &mut TrainSample::empty(TrainId(TRAIN))),
             expected
         );
+        assert_eq!(dynocar_publisher_flush(null_mut(), 1, &mut 0), expected);
         assert_eq!(dynocar_publisher_close(null_mut()), 0);
         assert_eq!(dynocar_reader_open(null(), TRAIN, null_mut(), null_mut(), 0), expected);
         assert_eq!(dynocar_reader_set_stale_after_ns(null_mut(), 1), expected);

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use dynocar_client::{ChannelError, Host, SamplePublisher, SnapshotReader, monotonic_now_ns};
+use dynocar_client::{ChannelError, Host, Peer, SamplePublisher, SnapshotReader, monotonic_now_ns};
 use dynocar_shared::services::SAMPLE_BUFFER;
-use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
+use dynocar_shared::{ParameterSnapshot, RejectionReason, TrainId, TrainSample};
 
 /// How fast recorded time passes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,6 +40,51 @@ pub struct ReplayReport {
     pub elapsed_s: f64,
     /// The newest snapshot of each pipeline at the end.
     pub snapshots: Vec<ParameterSnapshot>,
+    /// The newest snapshot of each pipeline before the first sample.
+    before: Vec<ParameterSnapshot>,
+}
+
+/// What one pipeline made of a replay's samples.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Taken {
+    /// Samples that entered the estimate.
+    pub used: u64,
+    /// Samples refused.
+    pub rejected: u64,
+    /// Samples that never arrived.
+    pub lost: u64,
+    /// Samples refused by reason, the most frequent first.
+    pub reasons: Vec<(RejectionReason, u32)>,
+}
+
+impl ReplayReport {
+    /// What a pipeline made of this replay's samples alone, from its snapshot at the end.
+    pub fn taken(&self, after: &ParameterSnapshot) -> Taken {
+        let is_same = |it: &&ParameterSnapshot| {
+            (it.epoch, it.pipeline_index) == (after.epoch, after.pipeline_index)
+        };
+        // A daemon that came meanwhile has counted nothing else.
+        let before = self.before.iter().find(is_same).copied();
+        let before = before.unwrap_or(ParameterSnapshot::empty());
+        let mut reasons: Vec<(RejectionReason, u32)> = RejectionReason::ALL
+            .iter()
+            .map(|&it| (it, after.rejected(it).saturating_sub(before.rejected(it))))
+            .filter(|&(_, count)| count > 0)
+            .collect();
+        reasons.sort_by_key(|&(_, count)| std::cmp::Reverse(count));
+        Taken {
+            used: after.samples_used.saturating_sub(before.samples_used),
+            rejected: after.samples_rejected.saturating_sub(before.samples_rejected),
+            lost: after.samples_lost.saturating_sub(before.samples_lost),
+            reasons,
+        }
+    }
+
+    /// True when at least one pipeline used at least half of the samples.
+    pub fn was_used(&self) -> bool {
+        let used = self.snapshots.iter().map(|it| self.taken(it).used).max();
+        2 * used.unwrap_or(0) >= self.published + self.refused
+    }
 }
 
 /// The most that a replay at full speed runs ahead of the slowest pipeline.
@@ -47,6 +92,8 @@ const AHEAD_MAX: u64 = SAMPLE_BUFFER as u64 / 2;
 /// How long pipelines that do not answer are waited for: on a busy machine a thread may get no
 /// processor for much longer than a controller would wait.
 const PATIENCE: Duration = Duration::from_secs(3);
+/// How long a daemon that has announced itself is waited for until all its pipelines answer.
+const START_PATIENCE: Duration = Duration::from_secs(10);
 
 /// Plays runs one after the other; `progress` hears of each sample's place in its run.
 pub struct Replayer {
@@ -73,20 +120,38 @@ impl Replayer {
         })
     }
 
-    /// Waits until a daemon answers, for at most `patience`; true when one does.
+    /// Waits until every pipeline of a daemon answers; true when one does. Where no daemon has
+    /// announced itself, for at most `patience`.
     pub fn await_daemon(&mut self, patience: Duration) -> bool {
         let deadline_ns = deadline_ns(patience);
+        let late_ns = deadline_ns + START_PATIENCE.as_nanos() as i64;
         loop {
-            self.reader.poll();
-            let now_ns = monotonic_now_ns();
-            if self.reader.readings(now_ns).any(|reading| !reading.is_stale) {
+            let is_there = matches!(self.reader.daemon(), Ok(Peer::Compatible(_)));
+            if is_there && self.all_answer() {
+                // What the controller before has left is not ours.
+                self.await_taken(0);
+                self.report.before = self.newest();
                 return true;
             }
-            if now_ns > deadline_ns {
+            let now_ns = monotonic_now_ns();
+            if now_ns > late_ns || (now_ns > deadline_ns && !is_there) {
                 return false;
             }
             std::thread::sleep(Duration::from_millis(2));
         }
+    }
+
+    /// True when as many pipelines answer as the daemon has.
+    fn all_answer(&mut self) -> bool {
+        self.reader.poll();
+        let now_ns = monotonic_now_ns();
+        let answering = self.reader.readings(now_ns).filter(|reading| !reading.is_stale).count();
+        answering >= self.publisher.pipelines().max(1)
+    }
+
+    fn newest(&mut self) -> Vec<ParameterSnapshot> {
+        self.reader.poll();
+        self.reader.readings(monotonic_now_ns()).map(|reading| *reading.snapshot).collect()
     }
 
     /// Plays one run; `progress` hears how many of its samples are out.
@@ -113,10 +178,8 @@ impl Replayer {
 
     /// Waits until every pipeline has taken the last sample, and reports.
     pub fn finish(mut self) -> ReplayReport {
-        self.await_pipelines(0);
-        let now_ns = monotonic_now_ns();
-        self.report.snapshots =
-            self.reader.readings(now_ns).map(|reading| *reading.snapshot).collect();
+        self.await_taken(0);
+        self.report.snapshots = self.newest();
         self.report.published = self.publisher.published() - self.report.refused;
         self.report
     }
@@ -124,25 +187,21 @@ impl Replayer {
     /// Lets the pipelines catch up before the sample channel overflows.
     fn follow(&mut self) {
         if self.publisher.published().is_multiple_of(AHEAD_MAX / 4) {
-            self.await_pipelines(AHEAD_MAX);
+            self.await_taken(AHEAD_MAX);
         }
     }
 
-    /// Waits until every living pipeline is at most `behind` samples behind. A pipeline that
-    /// stands still for [`PATIENCE`] is not waited for any longer.
-    fn await_pipelines(&mut self, behind: u64) {
-        let deadline_ns = deadline_ns(PATIENCE);
-        loop {
+    /// Waits until the slowest pipeline is at most `behind` samples behind. When it stands still for
+    /// [`PATIENCE`], or nobody is heard of any more, it is not waited for any longer.
+    fn await_taken(&mut self, behind: u64) {
+        let (mut least, mut deadline) = (u64::MAX, 0);
+        while let Some(untaken) = self.publisher.untaken().filter(|&it| it > behind) {
             self.reader.poll();
-            let published = self.publisher.published();
             let now_ns = monotonic_now_ns();
-            let slowest = self
-                .reader
-                .readings(now_ns)
-                .filter(|reading| !reading.is_stale)
-                .map(|reading| published.saturating_sub(reading.snapshot.sample_sequence))
-                .max();
-            if slowest.is_none_or(|distance| distance <= behind) || now_ns > deadline_ns {
+            if untaken < least {
+                (least, deadline) = (untaken, deadline_ns(PATIENCE));
+            }
+            if now_ns > deadline || self.reader.readings(now_ns).all(|reading| reading.is_stale) {
                 return;
             }
             std::thread::sleep(Duration::from_micros(50));

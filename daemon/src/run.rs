@@ -12,6 +12,7 @@ use std::thread::JoinHandle;
 use std::time::Instant;
 
 use crossbeam::channel::{Sender, bounded};
+use dynocar_client::channel::SampleCount;
 use dynocar_client::peer::RoleLock;
 use dynocar_client::{ChannelError, Host, Role, SnapshotReader, monotonic_now_ns};
 use dynocar_core::pipeline::{Pipeline, SettingError};
@@ -72,13 +73,17 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
         .iter()
         .map(|&train| RoleLock::claim(&host, train, Role::Daemon))
         .collect::<Result<Vec<_>, _>>()?;
+    let counts = trains
+        .iter()
+        .map(|&train| SampleCount::open(&host, train).map(Arc::new))
+        .collect::<Result<Vec<_>, _>>()?;
     // Grows with every start: the monotonic clock is common to all processes of the host.
     let epoch = monotonic_now_ns() as u64;
     if config.lock_memory {
         lock_memory();
     }
     let state = state::Taken::up(config);
-    let (plans, watched) = plan_workers(config, &host, epoch, &stop, state.as_ref())?;
+    let (plans, watched) = plan_workers(config, &host, epoch, &stop, state.as_ref(), &counts)?;
     let workers = start_workers(plans)?;
     let keeper = state.map(|state| start_keeper(config, &host, state, &stop)).transpose()?;
     info!(epoch, trains = trains.len(), pipelines = config.pipelines.len(), "serving");
@@ -90,6 +95,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     let alive = watched.iter().map(|it| (it.name.clone(), Arc::clone(&it.tally))).collect();
     let watchdog = Watchdog::new(&supervisor, alive);
     supervisor.tell("READY=1");
+    let trains = trains.into_iter().zip(counts).collect();
     let mut watch = Watch::new(host, trains, watched);
     watch.until_stopped(&stop, || {
         watchdog.round(Instant::now());
@@ -129,6 +135,7 @@ fn plan_workers(
     epoch: u64,
     stop: &Arc<AtomicBool>,
     state: Option<&state::Taken<'_>>,
+    counts: &[Arc<SampleCount>],
 ) -> Result<(Vec<WorkerPlan>, Vec<WatchedPipeline>), RunError> {
     let mut plans: Vec<WorkerPlan> = config
         .threads
@@ -163,12 +170,27 @@ fn plan_workers(
             match lanes.iter_mut().find(|lane| lane.train == train.id) {
                 Some(lane) => lane.pipelines.push((pipeline, tally)),
                 None => {
-                    lanes.push(LanePlan { train: train.id, pipelines: vec![(pipeline, tally)] });
+                    let (count, pipelines) = (Arc::clone(&counts[place]), vec![(pipeline, tally)]);
+                    lanes.push(LanePlan { train: train.id, count, place: 0, pipelines });
                 }
             }
         }
     }
+    for (train, count) in config.trains.iter().zip(counts) {
+        number_lanes(&mut plans, train.id, count);
+    }
     Ok((plans, watched))
+}
+
+/// Numbers the lanes of a train, and tells its controllers how many threads and pipelines serve it.
+fn number_lanes(plans: &mut [WorkerPlan], train: TrainId, count: &SampleCount) {
+    let (mut threads, mut pipelines) = (0, 0);
+    for lane in plans.iter_mut().flat_map(|plan| &mut plan.lanes).filter(|it| it.train == train) {
+        lane.place = threads;
+        threads += 1;
+        pipelines += lane.pipelines.len();
+    }
+    count.serve(threads, pipelines);
 }
 
 fn build_pipeline(

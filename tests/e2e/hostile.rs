@@ -110,9 +110,18 @@ fn another_user_can_neither_read_nor_write_nor_signal() {
 
 #[test]
 fn garbage_in_the_payload_of_samples_and_snapshots_harms_nobody() {
+    garbage_harms_nobody(SegmentKind::Payload);
+}
+
+#[test]
+fn garbage_in_the_counts_of_samples_harms_nobody() {
+    garbage_harms_nobody(SegmentKind::Counts);
+}
+
+fn garbage_harms_nobody(kind: SegmentKind) {
     let Cast { site, mut daemon, mut controller, mut client } = cast();
     let before = used(&client.last_line().unwrap());
-    let summary = vandalise(&site, SegmentKind::Payload, Duration::from_secs(2), 1);
+    let summary = vandalise(&site, kind, Duration::from_secs(2), 1);
     println!("{summary:?}");
     assert!(summary.writes > 100, "{summary:?}");
     let ends = [daemon.try_wait(), controller.try_wait(), client.try_wait()];

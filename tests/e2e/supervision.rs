@@ -100,6 +100,37 @@ fn health_tells_no_daemon_from_ok_from_stale_by_exit_status_and_words() {
 }
 
 #[test]
+fn health_without_options_lists_every_train_and_ends_with_the_worst_verdict() {
+    let site = Site::new();
+    let health = || {
+        let mut process = site.start(DYNOCAR, &["health"]);
+        (process.wait().code(), process.output())
+    };
+    let (code, words) = health();
+    assert_eq!(code, Some(6), "{words}");
+    assert!(words.starts_with("no daemon: nobody serves any train under /"), "{words}");
+    site.write_config(1, "", "");
+    let start = |id: u64| {
+        let text = format!("[[trains]]\nid = {id}\nfile = \"train.toml\"\n{ECHO}");
+        let config = site.write(&format!("daemon-{id}.toml"), &text);
+        let daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().expect("UTF-8")]);
+        daemon.await_error("serving");
+        daemon
+    };
+    let (_seven, twelve) = (start(7), start(12));
+    await_true(|| health().0 == Some(0), || "both trains to be served well".into());
+    let (_, words) = health();
+    let trains = |it: &&str| it.starts_with("train ");
+    let lines: Vec<&str> = words.lines().filter(trains).collect();
+    assert_eq!(lines.len(), 2, "{words}");
+    assert!(lines[0].starts_with("train 7: ok") && lines[1].starts_with("train 12: ok"), "{words}");
+    twelve.stop();
+    let (code, words) = health();
+    assert_eq!(code, Some(4), "{words}");
+    assert!(words.contains("train 7: ok") && words.contains("train 12: stale"), "{words}");
+}
+
+#[test]
 fn health_tells_a_degraded_pipeline_and_an_incompatible_daemon() {
     let site = Site::new();
     let host = site.host();

@@ -4,11 +4,13 @@
 //! the oldest. After the death of either side nothing has to be reopened by the other. Ports
 //! are not `Send`: open them in the thread that uses them.
 
+mod count;
 mod ports;
 mod users;
 mod wake;
 mod wire;
 
+pub use count::SampleCount;
 pub use ports::{Receiver, SendRefused, Sender};
 pub use wake::{Sleeper, Waker};
 pub use wire::{Payload, Wire};

@@ -16,9 +16,11 @@ use crate::error::ChannelError;
 use crate::host::Host;
 
 /// Where the system keeps shared memory by name.
-const SHARED_MEMORY: &str = "/dev/shm";
+pub const SHARED_MEMORY: &str = "/dev/shm";
 /// How the segment's name ends.
 const SUFFIX: &str = ".global_mgmt";
+/// How the names of the pages end that count samples, see [`super::SampleCount`].
+pub const COUNT_SUFFIX: &str = ".count";
 /// What a few ports take with their services and connections, with a margin.
 const FREE_BYTES_MIN: u64 = 4 << 20;
 /// The last one to leave tidies up within microseconds; a newcomer waits for it.
@@ -117,7 +119,8 @@ impl Users {
     }
 }
 
-fn full(free: u64, needed: u64) -> ChannelError {
+/// The refusal where shared memory is full.
+pub fn full(free: u64, needed: u64) -> ChannelError {
     ChannelError::SharedMemoryFull {
         path: SHARED_MEMORY,
         free_kib: free / 1024,
@@ -128,7 +131,7 @@ fn full(free: u64, needed: u64) -> ChannelError {
 impl Drop for Users {
     fn drop(&mut self) {
         if self.lock.try_lock().is_ok() {
-            for segment in self.segments(SUFFIX) {
+            for segment in self.segments(SUFFIX).into_iter().chain(self.segments(COUNT_SUFFIX)) {
                 // Somebody else's rubbish may stay.
                 let _ = std::fs::remove_file(segment);
             }

@@ -1,6 +1,7 @@
 //! The end a C controller writes samples into.
 
 use std::ffi::c_char;
+use std::time::Duration;
 
 use dynocar_shared::{TrainId, TrainSample};
 
@@ -77,7 +78,31 @@ pub unsafe extern "C" fn dynocar_publisher_publish(
     })
 }
 
-/// Closes a publisher and gives the train free; NULL does nothing.
+/// Waits until every pipeline has taken every sample; see [`SamplePublisher::flush`].
+///
+/// # Safety
+///
+/// See [the module](super#safety); `not_taken` is NULL or writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dynocar_publisher_flush(
+    publisher: *mut PublisherHandle,
+    patience_ns: i64,
+    not_taken: *mut u64,
+) -> i32 {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let publisher = unsafe { Handle::end(publisher)? };
+        let left = publisher.flush(Duration::from_nanos(patience_ns.max(0) as u64));
+        // SAFETY: promised by the caller.
+        if let Some(place) = unsafe { not_taken.as_mut() } {
+            *place = left;
+        }
+        Ok(())
+    })
+}
+
+/// Closes a publisher and gives the train free, after a wait of at most
+/// [`CLOSE_PATIENCE`](crate::publisher::CLOSE_PATIENCE); NULL does nothing.
 ///
 /// # Safety
 ///

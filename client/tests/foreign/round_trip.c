@@ -128,7 +128,7 @@ int main(int count, char **arguments)
     dynocar_reader *reader = NULL;
     char message[DYNOCAR_MESSAGE_BYTES];
     int32_t state = -1;
-    uint64_t refused = 99;
+    uint64_t refused = 99, untaken = 99;
 
     printf("matches %d\n", dynocar_header_matches_library());
     must(dynocar_daemon_state(root, train, &state, message, sizeof message), "daemon", message);
@@ -145,6 +145,8 @@ int main(int count, char **arguments)
     wait_for_silence(reader);
     must(dynocar_reader_refused(reader, &refused), "refused", "");
     printf("refused %" PRIu64 "\n", refused);
+    must(dynocar_publisher_flush(publisher, 60000000000, &untaken), "flush", "");
+    printf("untaken %" PRIu64 "\n", untaken);
     must(dynocar_reader_close(reader), "close", "");
     must(dynocar_publisher_close(publisher), "close", "");
     return 0;

@@ -99,6 +99,7 @@ def main(root, train):
             publish(publisher, cycle)
             wait_for_silence(reader)
             print("refused", reader.refused)
+            print("untaken", publisher.flush(60.0))
 
 
 if __name__ == "__main__":

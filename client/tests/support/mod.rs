@@ -9,7 +9,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver as Lines, RecvTimeoutError, channel};
 use std::time::Duration;
 
-use dynocar_client::channel::{Receiver, Sender, Transport};
+use dynocar_client::channel::{Receiver, SampleCount, Sender, Transport};
 use dynocar_client::peer::RoleLock;
 use dynocar_client::{Host, Role, monotonic_now_ns};
 use dynocar_shared::snapshot::packed_index;
@@ -131,6 +131,7 @@ impl Drop for TestRoot {
 pub struct PlayedDaemon {
     receiver: Receiver<TrainSample>,
     sender: Sender<ParameterSnapshot>,
+    count: SampleCount,
     _role: RoleLock,
     // Last, so that it goes after all that uses it.
     root: TestRoot,
@@ -143,7 +144,9 @@ impl PlayedDaemon {
         let transport = Transport::open(&root.host, "played-daemon").unwrap();
         let receiver = transport.receiver(TRAIN).unwrap();
         let sender = transport.sender(TRAIN).unwrap();
-        PlayedDaemon { receiver, sender, _role: role, root }
+        let count = SampleCount::open(&root.host, TRAIN).unwrap();
+        count.serve(1, 1);
+        PlayedDaemon { receiver, sender, count, _role: role, root }
     }
 
     pub fn root(&self) -> &Path {
@@ -151,7 +154,9 @@ impl PlayedDaemon {
     }
 
     pub fn next_sample(&self) -> Option<TrainSample> {
-        self.receiver.receive()
+        let sample = self.receiver.receive()?;
+        self.count.note_taken(0, sample.sequence);
+        Some(sample)
     }
 
     pub fn answer(&self, sample: &TrainSample) {

@@ -3,15 +3,16 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use dynocar_client::Host;
+use dynocar_client::{Host, Peer, Role};
 use dynocar_shared::TrainId;
 
 use super::Failure;
 use crate::config::DaemonConfig;
 use crate::supervision::health::{TrainHealth, Verdict, look_at};
 
-/// Say how well trains are served; the exit status is the verdict: 0 ok, 3 degraded, 4 stale,
-/// 5 incompatible daemon, 6 no daemon (1 and 2 as for every command)
+/// Say how well trains are served: without options, all that any daemon of this host serves; the
+/// exit status is the worst verdict: 0 ok, 3 degraded, 4 stale, 5 incompatible daemon, 6 no daemon
+/// (1 and 2 as for every command)
 #[derive(Debug, Args)]
 pub struct HealthArguments {
     /// The daemon's configuration: its root, all its trains
@@ -41,8 +42,13 @@ pub fn execute(arguments: &HealthArguments) -> Result<(), Failure> {
     let trains: Vec<TrainId> = match (arguments.train, &config) {
         (Some(train), _) => vec![TrainId(train)],
         (None, Some(config)) => config.trains.iter().map(|train| train.id).collect(),
-        (None, None) => vec![TrainId(1)],
+        (None, None) => Peer::trains(&host, Role::Daemon).map_err(work)?,
     };
+    if trains.is_empty() {
+        let root = host.root().display();
+        println!("no daemon: nobody serves any train under {root}");
+        return Err(Failure::Verdict(Verdict::NoDaemon.exit_status()));
+    }
     let mut worst = Verdict::Ok;
     for train in trains {
         let health = look_at(&host, train).map_err(work)?;

@@ -26,8 +26,8 @@ pub struct ReplayArguments {
     /// The train's number on the channels
     #[arg(long, default_value_t = 1, value_name = "ID")]
     train: u64,
-    /// Wait so long for a daemon before the first sample
-    #[arg(long, default_value_t = 0.0, value_name = "SECONDS")]
+    /// Wait so long for a daemon to announce itself before the first sample
+    #[arg(long, default_value_t = 3.0, value_name = "SECONDS")]
     wait: f64,
 }
 
@@ -35,8 +35,8 @@ pub struct ReplayArguments {
 ///
 /// # Errors
 ///
-/// A wrong dataset or run number is an input failure; a channel that cannot be opened is a
-/// failure of the work.
+/// A wrong dataset or run number is an input failure; a channel that cannot be opened, and samples
+/// that nobody used, are a failure of the work.
 pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
     let dataset =
         dataset::load(&arguments.dataset).map_err(|error| Failure::Input(error.to_string()))?;
@@ -58,8 +58,8 @@ pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
     })?;
     if !replayer.await_daemon(wait) {
         eprintln!(
-            "dynocar: no daemon serves train {} yet; publishing all the same",
-            arguments.train
+            "dynocar: no daemon serves train {} after {} s; publishing all the same",
+            arguments.train, arguments.wait
         );
     }
     for run in runs {
@@ -67,8 +67,21 @@ pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
         replayer.play(&run.samples, |count| bar.set_position(count as u64));
         bar.finish();
     }
-    report(&replayer.finish());
-    Ok(())
+    let report = replayer.finish();
+    tell(&report);
+    if report.snapshots.is_empty() {
+        return Err(Failure::Work(format!(
+            "nobody took the samples: no daemon serves train {}",
+            arguments.train
+        )));
+    }
+    if report.was_used() {
+        return Ok(());
+    }
+    let offered = report.published + report.refused;
+    Err(Failure::Work(format!(
+        "no pipeline used half of the {offered} samples; the rest was refused or lost as said above"
+    )))
 }
 
 fn progress_bar(samples: usize, file: &str) -> ProgressBar {
@@ -77,21 +90,26 @@ fn progress_bar(samples: usize, file: &str) -> ProgressBar {
     ProgressBar::new(samples as u64).with_style(style).with_message(file.to_owned())
 }
 
-fn report(report: &ReplayReport) {
+fn tell(report: &ReplayReport) {
     eprintln!(
         "{} samples published in {:.1} s, {} not taken by the transport",
         report.published, report.elapsed_s, report.refused
     );
     for snapshot in &report.snapshots {
         let kind = PipelineKind::from_number(snapshot.pipeline_kind);
+        let taken = report.taken(snapshot);
+        let reasons: Vec<String> =
+            taken.reasons.iter().map(|(reason, count)| format!("{reason} {count}")).collect();
+        let reasons =
+            if reasons.is_empty() { String::new() } else { format!(" ({})", reasons.join(", ")) };
         eprintln!(
-            "  pipeline {} ({}): {}, {} used, {} rejected, {} lost",
+            "  pipeline {} ({}): {}, {} used, {} rejected{reasons}, {} lost",
             snapshot.pipeline_index,
             kind.map_or("unknown kind", PipelineKind::name),
             snapshot.status(),
-            snapshot.samples_used,
-            snapshot.samples_rejected,
-            snapshot.samples_lost
+            taken.used,
+            taken.rejected,
+            taken.lost
         );
     }
 }

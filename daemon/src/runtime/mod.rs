@@ -5,6 +5,7 @@
 //! - [`affinity`]: binding it to a core
 //! - [`scheduling`]: its real-time priority
 //! - [`memory`]: keeping its memory resident
+//! - [`status_log`]: which changes of status the log tells
 //! - [`tally`]: what it tells the main thread without waiting for it
 //! - [`watch`]: what the main thread does meanwhile: signals, peers, the log
 
@@ -12,6 +13,7 @@ pub mod affinity;
 pub mod idle;
 pub mod memory;
 pub mod scheduling;
+pub mod status_log;
 pub mod tally;
 pub mod watch;
 pub mod worker;

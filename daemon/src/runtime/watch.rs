@@ -3,12 +3,14 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use dynocar_client::channel::SampleCount;
 use dynocar_client::{Announcement, ChannelError, Host, Peer, Role};
 use dynocar_shared::{Reason, Status, TrainId};
 use tracing::{info, warn};
 
+use super::status_log::StatusLog;
 use super::tally::{Tally, TallyReading};
 
 /// How often the main thread looks around.
@@ -29,17 +31,23 @@ pub struct WatchedPipeline {
 /// Watches signals, peers and tallies, and writes what changes into the log.
 pub struct Watch {
     host: Host,
-    trains: Vec<TrainId>,
+    trains: Vec<(TrainId, Arc<SampleCount>)>,
     pipelines: Vec<WatchedPipeline>,
     readings: Vec<TallyReading>,
+    statuses: Vec<StatusLog>,
     controllers: HashMap<TrainId, Option<Announcement>>,
 }
 
 impl Watch {
     /// A watch over the daemon's trains and pipelines.
-    pub fn new(host: Host, trains: Vec<TrainId>, pipelines: Vec<WatchedPipeline>) -> Self {
+    pub fn new(
+        host: Host,
+        trains: Vec<(TrainId, Arc<SampleCount>)>,
+        pipelines: Vec<WatchedPipeline>,
+    ) -> Self {
         let readings = vec![TallyReading::default(); pipelines.len()];
-        Watch { host, trains, pipelines, readings, controllers: HashMap::new() }
+        let statuses = pipelines.iter().map(|_| StatusLog::new(Instant::now())).collect();
+        Watch { host, trains, pipelines, readings, statuses, controllers: HashMap::new() }
     }
 
     /// Watches until a signal asks the daemon to stop, or a pipeline thread has ended.
@@ -57,7 +65,7 @@ impl Watch {
 
     /// Logs the final counts.
     pub fn report_totals(&self) {
-        for pipeline in &self.pipelines {
+        for (pipeline, log) in self.pipelines.iter().zip(&self.statuses) {
             let reading = pipeline.tally.read();
             info!(
                 pipeline = pipeline.name,
@@ -65,15 +73,22 @@ impl Watch {
                 used = reading.used,
                 rejected = reading.rejected,
                 lost = reading.lost,
+                status_changes = log.changes(),
                 "stopped"
             );
         }
     }
 
     fn check_controllers(&mut self) {
-        for &train in &self.trains {
+        for (train, count) in &self.trains {
+            let train = *train;
+            // Before the look: what was begun by then is over when nobody is there.
+            let begun = count.begun();
             let seen = match Peer::look_up(&self.host, train, Role::Controller) {
-                Ok(Peer::Absent) => None,
+                Ok(Peer::Absent) => {
+                    count.end(begun);
+                    None
+                }
                 Ok(Peer::Compatible(peer) | Peer::Incompatible(peer)) => Some(peer),
                 Err(error) => {
                     warn!(train = train.0, "{error}");
@@ -88,13 +103,17 @@ impl Watch {
     }
 
     fn report_changes(&mut self) {
-        for (pipeline, last) in self.pipelines.iter().zip(&mut self.readings) {
+        let now = Instant::now();
+        let known = self.readings.iter_mut().zip(&mut self.statuses);
+        for (pipeline, (last, log)) in self.pipelines.iter().zip(known) {
             let reading = pipeline.tally.read();
             let (name, train) = (pipeline.name.as_str(), pipeline.train.0);
-            if reading.status != last.status {
+            if let Some(untold) = log.look(reading.status, now) {
                 let status = Status::from_number(reading.status.0).unwrap_or(Status::Invalid);
                 let reason = Reason::from_number(reading.status.1).unwrap_or(Reason::None);
-                info!(pipeline = name, train, %status, %reason, "status");
+                // Changes to and fro that no line tells.
+                let untold = (untold > 0).then_some(untold);
+                info!(pipeline = name, train, %status, %reason, untold, "status");
             }
             if reading.lost > last.lost {
                 let lost = reading.lost - last.lost;

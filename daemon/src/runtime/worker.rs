@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use dynocar_client::channel::{Receiver, Sender, Sleeper, Transport};
+use dynocar_client::channel::{Receiver, SampleCount, Sender, Sleeper, Transport};
 use dynocar_client::{ChannelError, Host, monotonic_now_ns};
 use dynocar_core::pipeline::Pipeline;
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
@@ -41,6 +41,10 @@ pub struct WorkerPlan {
 pub struct LanePlan {
     /// The train.
     pub train: TrainId,
+    /// How far the train's samples have been counted.
+    pub count: Arc<SampleCount>,
+    /// The thread's number among those that serve the train.
+    pub place: usize,
     /// The pipelines, each with the tally it writes.
     pub pipelines: Vec<(Pipeline, Arc<Tally>)>,
 }
@@ -54,6 +58,8 @@ struct Slot {
 
 struct Lane {
     receiver: Receiver<TrainSample>,
+    count: Arc<SampleCount>,
+    place: usize,
     /// A sample taken while falling asleep, to be processed before the channel's next.
     found: Option<TrainSample>,
     slots: Vec<Slot>,
@@ -137,12 +143,11 @@ impl Worker {
         let mut processed = false;
         for lane in &mut self.lanes {
             for _ in 0..TURN {
-                let Some(sample) = lane.found.take().or_else(|| lane.receiver.receive()) else {
-                    break;
-                };
+                let Some(sample) = lane.next() else { break };
                 for slot in &mut lane.slots {
                     slot.process(&sample, self.epoch);
                 }
+                lane.count.note_taken(lane.place, sample.sequence);
                 processed = true;
             }
         }
@@ -153,6 +158,9 @@ impl Worker {
     fn heartbeat(&mut self, now_ns: i64) {
         self.last_heartbeat_ns = now_ns;
         self.idler.serve_newcomers();
+        for lane in &mut self.lanes {
+            lane.count_what_was_left(self.epoch, now_ns);
+        }
         for slot in self.lanes.iter_mut().flat_map(|lane| &mut lane.slots) {
             if now_ns - slot.last_vouched_ns >= self.heartbeat_ns {
                 slot.vouch(now_ns);
@@ -160,6 +168,29 @@ impl Worker {
                 slot.sender.serve_newcomers();
             }
         }
+    }
+}
+
+impl Lane {
+    fn next(&mut self) -> Option<TrainSample> {
+        self.found.take().or_else(|| self.receiver.receive())
+    }
+
+    /// When nobody drives the train any more, counts as lost what the last one published and no
+    /// port kept.
+    fn count_what_was_left(&mut self, epoch: u64, now_ns: i64) {
+        // Before the look for samples: what is on its way then comes first.
+        let Some(ended) = self.count.ended() else { return };
+        self.found = self.next();
+        if self.found.is_some() {
+            return;
+        }
+        for slot in &mut self.slots {
+            if slot.pipeline.count_up_to(ended) {
+                slot.publish(epoch, now_ns);
+            }
+        }
+        self.count.note_taken(self.place, ended);
     }
 }
 
@@ -192,24 +223,28 @@ impl Slot {
 fn open_lane(transport: &Transport, plan: LanePlan, epoch: u64) -> Result<Lane, ChannelError> {
     // Before the first snapshot: who reads that may publish at once, and loses nothing.
     let receiver = transport.receiver::<TrainSample>(plan.train)?;
+    // After the port is open: what is published from now on can be received, and is counted.
+    let counted_from = plan.count.sent();
+    plan.count.note_taken(plan.place, counted_from);
     let slots = plan
         .pipelines
         .into_iter()
-        .map(|(pipeline, tally)| {
+        .map(|(mut pipeline, tally)| {
+            pipeline.count_from(counted_from);
             let sender = transport.sender::<ParameterSnapshot>(plan.train)?;
             let mut slot = Slot { pipeline, sender, tally, last_vouched_ns: 0 };
             slot.publish(epoch, monotonic_now_ns());
             Ok(slot)
         })
         .collect::<Result<_, ChannelError>>()?;
-    Ok(Lane { receiver, found: None, slots })
+    Ok(Lane { receiver, count: plan.count, place: plan.place, found: None, slots })
 }
 
 /// True when a sample came while the controllers were told of the sleep; keeps it.
 fn look_once_more(lanes: &mut [Lane]) -> bool {
     let mut any = false;
     for lane in lanes {
-        lane.found = lane.receiver.receive();
+        lane.found = lane.next();
         any |= lane.found.is_some();
     }
     any

@@ -24,16 +24,19 @@ pub enum SegmentKind {
     Services,
     /// Who waits to be woken.
     Events,
+    /// How far the samples have been counted.
+    Counts,
 }
 
 impl SegmentKind {
     /// All of them.
-    pub const ALL: [SegmentKind; 5] = [
+    pub const ALL: [SegmentKind; 6] = [
         SegmentKind::Payload,
         SegmentKind::PayloadBooks,
         SegmentKind::Connections,
         SegmentKind::Services,
         SegmentKind::Events,
+        SegmentKind::Counts,
     ];
 
     const fn suffix(self) -> &'static str {
@@ -42,6 +45,7 @@ impl SegmentKind {
             SegmentKind::Connections => ".connection",
             SegmentKind::Services => ".dynamic",
             SegmentKind::Events => ".event_mgmt",
+            SegmentKind::Counts => ".count",
         }
     }
 

@@ -79,6 +79,21 @@ impl Pipeline {
         is_taken
     }
 
+    /// Counts the samples after this number, taken or lost; to be called before the first sample.
+    pub fn count_from(&mut self, sequence: u64) {
+        self.validator.count_from(sequence);
+    }
+
+    /// Counts as lost what has not come up to this number and will not any more; true when there
+    /// was something.
+    pub fn count_up_to(&mut self, sequence: u64) -> bool {
+        self.validator.count_up_to(sequence);
+        let is_news = self.snapshot.samples_lost != self.validator.lost();
+        self.snapshot.samples_lost = self.validator.lost();
+        self.snapshot.sequence += u64::from(is_news);
+        is_news
+    }
+
     /// Takes one sample and gives the snapshot after it.
     ///
     /// The snapshot's epoch and time of publishing are the caller's to fill in; everything else

@@ -87,7 +87,10 @@ pub struct Validator {
     limits: ValidationLimits,
     nominal_mass_kg: f64,
     last: Option<TrainSample>,
-    last_sequence: Option<(u32, u64)>,
+    /// The run of the newest sample.
+    run: Option<u32>,
+    /// The number up to which samples are accounted for.
+    counted: u64,
     gap: Option<Gap>,
     last_refused: Option<TrainSample>,
     refusals_in_a_row: u32,
@@ -103,7 +106,8 @@ impl Validator {
             limits,
             nominal_mass_kg,
             last: None,
-            last_sequence: None,
+            run: None,
+            counted: 0,
             gap: None,
             last_refused: None,
             refusals_in_a_row: 0,
@@ -115,6 +119,19 @@ impl Validator {
     /// Samples that never arrived so far.
     pub fn lost(&self) -> u64 {
         self.lost
+    }
+
+    /// Counts from the sample after this number; to be called before the first sample. Without it
+    /// the count begins with the sample of number 1.
+    pub fn count_from(&mut self, sequence: u64) {
+        self.counted = sequence;
+    }
+
+    /// No sample up to this number will come any more.
+    pub fn count_up_to(&mut self, sequence: u64) {
+        let missing = sequence.saturating_sub(self.counted);
+        self.lost = self.lost.saturating_add(missing);
+        self.counted = self.counted.max(sequence);
     }
 
     /// Passes a sample or says why not.
@@ -143,38 +160,35 @@ impl Validator {
         }
     }
 
-    /// Counts the gap before a sample; a run that starts its count anew is a restart.
+    /// Counts the gap before a sample; a run that starts its count anew is a restart of a controller
+    /// that knows nothing of the one before.
     ///
     /// A number that is wrong once makes all that follow look old: when several in a row go on
     /// counting from before the gap, the gap is taken back.
     fn check_sequence(&mut self, sample: &TrainSample) -> Result<(), RejectionReason> {
-        if let Some((run, sequence)) = self.last_sequence {
-            let lost = match sample.sequence.checked_sub(sequence) {
-                Some(ahead @ 1..) => self.lost.saturating_add(ahead - 1),
-                _ if sample.run != run => {
-                    self.lost.saturating_add(sample.sequence.saturating_sub(1))
-                }
-                _ => {
-                    return match self.gap.and_then(|gap| self.lost_without(gap, sample)) {
-                        Some(lost) => {
-                            self.lost = lost;
-                            self.gap = None;
-                            self.last_sequence = Some((sample.run, sample.sequence));
-                            Ok(())
-                        }
-                        None => Err(RejectionReason::SequenceNotIncreasing),
-                    };
-                }
-            };
-            self.gap = (sample.run == run && lost > self.lost).then_some(Gap {
-                before: sequence,
-                lost_before: self.lost,
-                newest: sequence,
-                refused: 0,
-            });
-            self.lost = lost;
-        }
-        self.last_sequence = Some((sample.run, sample.sequence));
+        let continues = self.run.is_none_or(|run| run == sample.run);
+        let lost = match sample.sequence.checked_sub(self.counted) {
+            Some(ahead @ 1..) => self.lost.saturating_add(ahead - 1),
+            // The first sample came before the count was to begin: it begins with it.
+            _ if self.run.is_none() => self.lost,
+            _ if !continues => self.lost.saturating_add(sample.sequence.saturating_sub(1)),
+            _ => {
+                let gap = self.gap.ok_or(RejectionReason::SequenceNotIncreasing)?;
+                let lost = self.lost_without(gap, sample);
+                self.lost = lost.ok_or(RejectionReason::SequenceNotIncreasing)?;
+                self.gap = None;
+                (self.run, self.counted) = (Some(sample.run), sample.sequence);
+                return Ok(());
+            }
+        };
+        self.gap = (continues && lost > self.lost).then_some(Gap {
+            before: self.counted,
+            lost_before: self.lost,
+            newest: self.counted,
+            refused: 0,
+        });
+        self.lost = lost;
+        (self.run, self.counted) = (Some(sample.run), sample.sequence);
         Ok(())
     }
 

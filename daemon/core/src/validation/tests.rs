@@ -71,6 +71,34 @@ fn missing_sequence_numbers_count_as_lost() {
 }
 
 #[test]
+fn what_came_before_the_first_sample_is_lost_from_where_the_count_begins() {
+    for (counted_from, lost) in [(0, 9), (4, 5), (9, 0), (30, 0)] {
+        let mut validator = validator();
+        validator.count_from(counted_from);
+        validator.check(&cruising(9)).unwrap();
+        assert_eq!(validator.lost(), lost, "counted from {counted_from}");
+        validator.check(&cruising(10)).unwrap();
+        assert_eq!(validator.lost(), lost);
+    }
+}
+
+#[test]
+fn what_will_not_come_any_more_is_lost_and_counted_once() {
+    let mut validator = validator();
+    validator.count_up_to(2);
+    assert_eq!(validator.lost(), 2, "before the first sample");
+    validator.check(&cruising(2)).unwrap();
+    validator.count_up_to(8);
+    validator.count_up_to(8);
+    validator.count_up_to(5);
+    assert_eq!(validator.lost(), 7);
+    let mut next = cruising(300);
+    (next.run, next.sequence) = (9, 9);
+    validator.check(&next).unwrap();
+    assert_eq!(validator.lost(), 7, "the next controller counts on");
+}
+
+#[test]
 fn one_wrong_sequence_number_is_taken_back_when_the_count_goes_on_without_it() {
     let mut validator = validator();
     validator.check(&cruising(0)).unwrap();

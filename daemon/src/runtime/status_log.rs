@@ -1,0 +1,138 @@
+//! Which changes of a pipeline's status the log tells.
+//!
+//! A status that was not told lately is told at once. One that comes back is told when it has
+//! stayed for a while, and the longer the oftener it came back: an estimate at the edge of a
+//! threshold flips between two statuses for as long as it is there.
+
+use std::time::{Duration, Instant};
+
+/// Status and reason by number.
+type State = (u32, u32);
+
+/// How long a status that comes back has to stay until it is told, at first.
+const STAY_MIN: Duration = Duration::from_secs(2);
+/// And at most; a status that was not told for as long is a new one.
+const STAY_MAX: Duration = Duration::from_secs(120);
+/// Statuses that are remembered.
+const REMEMBERED: usize = 8;
+
+/// The statuses of one pipeline as the log knows them.
+#[derive(Clone, Debug)]
+pub struct StatusLog {
+    /// What was told, and when it last held; the newest last.
+    told: Vec<(State, Instant)>,
+    seen: State,
+    since: Instant,
+    stay: Duration,
+    /// Changes since the last one that was told.
+    untold: u64,
+    changes: u64,
+}
+
+impl StatusLog {
+    /// A log in which nothing has been told.
+    pub fn new(now: Instant) -> Self {
+        StatusLog {
+            told: Vec::new(),
+            seen: (0, 0),
+            since: now,
+            stay: STAY_MIN,
+            untold: 0,
+            changes: 0,
+        }
+    }
+
+    /// Looks at the status; when it is to be told, the number of changes since the last that were
+    /// not.
+    pub fn look(&mut self, state: State, now: Instant) -> Option<u64> {
+        if state != self.seen {
+            (self.seen, self.since) = (state, now);
+            self.untold += 1;
+            self.changes += 1;
+        }
+        self.told.retain(|it| now.duration_since(it.1) < STAY_MAX);
+        let Some(place) = self.told.iter().position(|it| it.0 == state) else {
+            self.stay = STAY_MIN;
+            return self.tell(now);
+        };
+        self.told[place].1 = now;
+        if place + 1 == self.told.len() || now.duration_since(self.since) < self.stay {
+            return None;
+        }
+        self.told.remove(place);
+        self.stay = (2 * self.stay).min(STAY_MAX);
+        self.tell(now)
+    }
+
+    /// Changes seen so far, told or not.
+    pub fn changes(&self) -> u64 {
+        self.changes
+    }
+
+    fn tell(&mut self, now: Instant) -> Option<u64> {
+        if self.told.len() == REMEMBERED {
+            self.told.remove(0);
+        }
+        self.told.push((self.seen, now));
+        Some(std::mem::take(&mut self.untold).saturating_sub(1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOOD: State = (2, 0);
+    const AT_BOUND: State = (2, 7);
+    const INVALID: State = (4, 3);
+
+    /// What is told of a status by tenth of a second: (time in s, status, untold changes).
+    fn told(state_at: impl Fn(u64) -> State, seconds: u64) -> Vec<(f64, State, u64)> {
+        let start = Instant::now();
+        let mut log = StatusLog::new(start);
+        (0..10 * seconds)
+            .filter_map(|tenth| {
+                let now = start + Duration::from_millis(100 * tenth);
+                let untold = log.look(state_at(tenth), now)?;
+                Some((tenth as f64 / 10.0, state_at(tenth), untold))
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_status_that_is_new_is_told_at_once_and_once() {
+        let state = |tenth| if tenth < 45 { GOOD } else { INVALID };
+        assert_eq!(told(state, 60), [(0.0, GOOD, 0), (4.5, INVALID, 0)]);
+    }
+
+    #[test]
+    fn a_status_that_flips_is_told_once_and_its_flips_are_counted_when_it_stays() {
+        // Flips each 0.3 s for a minute, then stays.
+        let state = |tenth| {
+            if tenth < 600 && (tenth / 3) % 2 == 0 { GOOD } else { AT_BOUND }
+        };
+        let first = [(0.0, GOOD, 0), (0.3, AT_BOUND, 0)];
+        assert_eq!(told(state, 100), first, "what was told last holds again");
+        let ends_good = |tenth| if tenth < 600 { state(tenth) } else { GOOD };
+        assert_eq!(told(ends_good, 100), [first[0], first[1], (62.0, GOOD, 198)]);
+    }
+
+    #[test]
+    fn a_return_that_stays_is_told_soon() {
+        let state = |tenth| if (100..105).contains(&tenth) { INVALID } else { GOOD };
+        assert_eq!(told(state, 60), [(0.0, GOOD, 0), (10.0, INVALID, 0), (12.5, GOOD, 0)]);
+    }
+
+    #[test]
+    fn slow_flips_are_told_ever_more_seldom() {
+        let state = |tenth| if (tenth / 50) % 2 == 0 { GOOD } else { AT_BOUND };
+        let told = told(state, 3_600);
+        assert!((3..=8).contains(&told.len()), "720 flips in an hour: {told:?}");
+    }
+
+    #[test]
+    fn a_status_comes_as_news_when_it_was_not_told_for_long() {
+        let state = |tenth| if (100..3_000).contains(&tenth) { INVALID } else { GOOD };
+        assert_eq!(told(state, 400), [(0.0, GOOD, 0), (10.0, INVALID, 0), (300.0, GOOD, 0)]);
+    }
+}
