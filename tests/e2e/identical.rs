@@ -18,6 +18,8 @@ fn without_times(snapshot: &ParameterSnapshot) -> ParameterSnapshot {
     ParameterSnapshot {
         epoch: 0,
         pipeline_index: 0,
+        quantities: 0,
+        train_quantities: 0,
         sample_published_ns: 0,
         published_ns: 0,
         vouched_ns: 0,
