@@ -3,23 +3,56 @@
  *
  * stopping [train id] [speed in m/s]
  * README.md beside this folder says how to build it. */
+#define _POSIX_C_SOURCE 200809L
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "dynocar.h"
 
-#define MASS_KG 114500.0
+/* The train of config/demo/train.toml, which config/daemon.toml serves as train 1. */
+#define MASS_KG 1799200.0
 #define DECLARED_FRICTION 0.35
 #define CONFIDENCE 0.99
 
-static const dynocar_effort_point EFFORT[] = {{0.0, 130000.0}, {25.0, 130000.0}, {40.0, 90000.0}};
+static const dynocar_effort_point EFFORT[] = {{0.0, 1216000.0}, {30.0, 1216000.0}};
 
-/* The newest reading of a pipeline, or none that is usable. */
-static int usable(dynocar_reader *reader, uint32_t kind, dynocar_reading *reading)
+static const uint32_t ASKED[] = {DYNOCAR_QUANTITY_RESISTANCE, DYNOCAR_QUANTITY_BRAKE_FRICTION,
+                                 DYNOCAR_QUANTITY_ADHESION};
+
+/* 1 when the daemon's answer may be used; tells where the value comes from. */
+static int learned(dynocar_reader *reader, uint32_t quantity, dynocar_reading *reading)
 {
-    (void)dynocar_reader_latest(reader, kind, dynocar_monotonic_now_ns(), reading);
+    dynocar_code code =
+        dynocar_reader_quantity(reader, quantity, dynocar_monotonic_now_ns(), reading);
+    const char *why = code == DYNOCAR_ERROR_NOT_PROVIDED ? "not_provided" : "no_snapshot";
+    if (code == DYNOCAR_OK) {
+        why = reading->is_usable ? dynocar_status_name(reading->status)
+                                 : dynocar_reason_name(reading->reason);
+    }
+    printf("%s: the %s (%s)\n", dynocar_quantity_name(quantity),
+           reading->is_usable ? "daemon" : "built-in values", why);
     return reading->is_usable != 0;
+}
+
+/* Polls for up to half a second, until every pipeline that answers has been heard. */
+static void listen_to(dynocar_reader *reader)
+{
+    const struct timespec pause = {0, 10000000};
+    size_t heard = 0;
+    for (int round = 0; round < 50 && heard < sizeof ASKED / sizeof *ASKED; round++) {
+        (void)dynocar_reader_poll(reader, NULL);
+        for (heard = 0; heard < sizeof ASKED / sizeof *ASKED; heard++) {
+            dynocar_reading reading;
+            if (dynocar_reader_quantity(reader, ASKED[heard], dynocar_monotonic_now_ns(), &reading)
+                == DYNOCAR_ERROR_NO_SNAPSHOT) {
+                nanosleep(&pause, NULL);
+                break;
+            }
+        }
+    }
 }
 
 static dynocar_stop built_in_stop(double speed_mps)
@@ -28,10 +61,10 @@ static dynocar_stop built_in_stop(double speed_mps)
     memset(&stop, 0, sizeof stop);
     stop.from_speed_mps = speed_mps;
     stop.mass_kg = MASS_KG;
-    stop.rotating_mass_factor = 0.06;
-    stop.davis_a = 1.5;
-    stop.davis_b = 0.02;
-    stop.davis_c = 0.0012;
+    stop.rotating_mass_factor = 0.04;
+    stop.davis_a = 1.498;
+    stop.davis_b = 0.0147;
+    stop.davis_c = 0.00086;
     stop.w0_std_n_per_kn = 0.3;
     stop.brake_scale = 1.0;
     stop.brake_scale_std = 0.1;
@@ -48,7 +81,7 @@ static void take_what_is_learned(dynocar_reader *reader, dynocar_stop *stop)
     const dynocar_parameter_snapshot *snapshot = &reading.snapshot;
     dynocar_resistance resistance;
     double value, std;
-    if (usable(reader, DYNOCAR_PIPELINE_RESISTANCE_KALMAN, &reading)
+    if (learned(reader, DYNOCAR_QUANTITY_RESISTANCE, &reading)
         && dynocar_snapshot_resistance(snapshot, stop->from_speed_mps, 0.0, &resistance)
                == DYNOCAR_OK) {
         dynocar_snapshot_value(snapshot, DYNOCAR_PARAMETER_DAVIS_A, &stop->davis_a, NULL);
@@ -56,13 +89,13 @@ static void take_what_is_learned(dynocar_reader *reader, dynocar_stop *stop)
         dynocar_snapshot_value(snapshot, DYNOCAR_PARAMETER_DAVIS_C, &stop->davis_c, NULL);
         stop->w0_std_n_per_kn = resistance.w0_std_n_per_kn;
     }
-    if (usable(reader, DYNOCAR_PIPELINE_BRAKE_SMOOTHER, &reading)
+    if (learned(reader, DYNOCAR_QUANTITY_BRAKE_FRICTION, &reading)
         && dynocar_snapshot_value(snapshot, DYNOCAR_PARAMETER_DISC_FRICTION, &value, &std)
                == DYNOCAR_OK) {
         stop->brake_scale = value / DECLARED_FRICTION;
         stop->brake_scale_std = std / DECLARED_FRICTION;
     }
-    if (usable(reader, DYNOCAR_PIPELINE_ADHESION_SMOOTHER, &reading)
+    if (learned(reader, DYNOCAR_QUANTITY_ADHESION, &reading)
         && dynocar_snapshot_value(snapshot, DYNOCAR_PARAMETER_ADHESION, &value, &std)
                == DYNOCAR_OK) {
         stop->rail = DYNOCAR_RAIL_COEFFICIENT;
@@ -73,15 +106,15 @@ static void take_what_is_learned(dynocar_reader *reader, dynocar_stop *stop)
 
 int main(int count, char **arguments)
 {
-    uint64_t train = count > 1 ? strtoull(arguments[1], NULL, 10) : 7;
-    double speed_mps = count > 2 ? strtod(arguments[2], NULL) : 30.0;
+    uint64_t train = count > 1 ? strtoull(arguments[1], NULL, 10) : 1;
+    double speed_mps = count > 2 ? strtod(arguments[2], NULL) : 20.0;
     dynocar_reader *reader = NULL;
     char message[DYNOCAR_MESSAGE_BYTES];
     if (dynocar_reader_open(NULL, train, &reader, message, sizeof message) != DYNOCAR_OK) {
         fprintf(stderr, "%s\n", message);
         return 1;
     }
-    (void)dynocar_reader_poll(reader, NULL);
+    listen_to(reader);
     dynocar_stop stop = built_in_stop(speed_mps);
     take_what_is_learned(reader, &stop);
     dynocar_stopping found;

@@ -3,62 +3,94 @@
 //!
 //! `cargo run --release -p dynocar-client --example stopping -- [train id] [speed in m/s]`
 
-use dynocar_client::{Host, Reading, SnapshotReader, monotonic_now_ns};
-use dynocar_shared::stopping::{EffortPoint, RailAdhesion, Stop};
-use dynocar_shared::{Parameter, PipelineKind, RailCondition, TrainId, Uncertain};
+use std::time::Duration;
 
-const MASS_KG: f64 = 114_500.0;
+use dynocar_client::{Host, NoAnswer, SnapshotReader, monotonic_now_ns};
+use dynocar_shared::stopping::{EffortPoint, RailAdhesion, Stop};
+use dynocar_shared::{
+    Parameter, ParameterSnapshot, Quantity, RailCondition, Status, TrainId, Uncertain,
+};
+
+/// The train of config/demo/train.toml, which config/daemon.toml serves as train 1.
+const MASS_KG: f64 = 1_799_200.0;
 const DECLARED_FRICTION: f64 = 0.35;
 const CONFIDENCE: f64 = 0.99;
-const EFFORT: [EffortPoint; 3] = [
-    EffortPoint { speed_mps: 0.0, force_n: 130_000.0 },
-    EffortPoint { speed_mps: 25.0, force_n: 130_000.0 },
-    EffortPoint { speed_mps: 40.0, force_n: 90_000.0 },
+const EFFORT: [EffortPoint; 2] = [
+    EffortPoint { speed_mps: 0.0, force_n: 1_216_000.0 },
+    EffortPoint { speed_mps: 30.0, force_n: 1_216_000.0 },
 ];
+const ASKED: [Quantity; 3] = [Quantity::Resistance, Quantity::BrakeFriction, Quantity::Adhesion];
 
-fn usable(reader: &SnapshotReader, kind: PipelineKind) -> Option<Reading<'_>> {
-    reader.latest(kind, monotonic_now_ns()).filter(|reading| reading.is_usable())
+/// What the daemon says of a quantity, as far as it may be used; tells where it comes from.
+fn learned(reader: &SnapshotReader, quantity: Quantity) -> Option<&ParameterSnapshot> {
+    let answer = reader.quantity(quantity, monotonic_now_ns());
+    if let Ok(reading) = &answer
+        && reading.is_usable()
+    {
+        println!("{quantity}: the daemon ({})", Status::Estimated);
+        return Some(reading.snapshot);
+    }
+    let why = match answer {
+        Ok(reading) => reading.reason().map_or("a reason of another release", |it| it.name()),
+        Err(why) => why.name(),
+    };
+    println!("{quantity}: the built-in values ({why})");
+    None
 }
 
-fn learned(reader: &SnapshotReader, kind: PipelineKind, parameter: Parameter) -> Option<Uncertain> {
-    let snapshot = usable(reader, kind)?.snapshot;
+fn value_of(snapshot: &ParameterSnapshot, parameter: Parameter) -> Option<Uncertain> {
     Some(Uncertain::new(snapshot.value(parameter)?, snapshot.std(parameter)?))
 }
 
 fn stop(reader: &SnapshotReader, speed_mps: f64) -> Stop<'static> {
     let mut stop = Stop {
-        rotating_mass_factor: 0.06,
+        rotating_mass_factor: 0.04,
         w0_std_n_per_kn: 0.3,
         brake_scale: Uncertain::new(1.0, 0.1),
         // A wet rail, until the daemon knows better.
         adhesion: RailAdhesion::Law(RailCondition::Wet, Uncertain::new(1.0, 0.1)),
-        ..Stop::level(speed_mps, MASS_KG, [1.5, 0.02, 0.0012], &EFFORT)
+        ..Stop::level(speed_mps, MASS_KG, [1.498, 0.0147, 0.00086], &EFFORT)
     };
-    if let Some(Reading { snapshot, .. }) = usable(reader, PipelineKind::ResistanceKalman)
+    if let Some(snapshot) = learned(reader, Quantity::Resistance)
         && let Some(resistance) = snapshot.resistance_at(speed_mps)
     {
         let davis = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
         stop.davis = davis.map(|parameter| snapshot.value(parameter).unwrap_or_default());
         stop.w0_std_n_per_kn = resistance.w0_std_n_per_kn;
     }
-    let kind = PipelineKind::BrakeSmoother;
-    if let Some(friction) = learned(reader, kind, Parameter::DiscFriction) {
+    if let Some(snapshot) = learned(reader, Quantity::BrakeFriction)
+        && let Some(friction) = value_of(snapshot, Parameter::DiscFriction)
+    {
         let share = 1.0 / DECLARED_FRICTION;
         stop.brake_scale = Uncertain::new(share * friction.value, share * friction.std);
     }
-    let kind = PipelineKind::AdhesionSmoother;
-    if let Some(adhesion) = learned(reader, kind, Parameter::Adhesion) {
+    if let Some(snapshot) = learned(reader, Quantity::Adhesion)
+        && let Some(adhesion) = value_of(snapshot, Parameter::Adhesion)
+    {
         stop.adhesion = RailAdhesion::Coefficient(adhesion);
     }
     stop
 }
 
+/// Polls for up to half a second, until every pipeline that answers has been heard.
+fn listen(reader: &mut SnapshotReader) {
+    for _ in 0..50 {
+        reader.poll();
+        let now_ns = monotonic_now_ns();
+        let is_heard = |&it| !matches!(reader.quantity(it, now_ns), Err(NoAnswer::NoSnapshot));
+        if ASKED.iter().all(is_heard) {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
-    let train = TrainId(arguments.next().map_or(Ok(7), |text| text.parse())?);
-    let speed_mps: f64 = arguments.next().map_or(Ok(30.0), |text| text.parse())?;
+    let train = TrainId(arguments.next().map_or(Ok(1), |text| text.parse())?);
+    let speed_mps: f64 = arguments.next().map_or(Ok(20.0), |text| text.parse())?;
     let mut reader = SnapshotReader::open(&Host::from_environment()?, train)?;
-    reader.poll();
+    listen(&mut reader);
     let found = stop(&reader, speed_mps).estimate(CONFIDENCE)?;
     println!(
         "from {speed_mps:.1} m/s: {:.0} m and {:.1} s; with {:.0} % confidence within {:.0} m and \

@@ -5,8 +5,11 @@
  *
  *     dynocar_publisher_publish(publisher, &sample);
  *     dynocar_reader_poll(reader, NULL);
- *     dynocar_reader_latest(reader, DYNOCAR_PIPELINE_RESISTANCE_KALMAN, now_ns, &reading);
+ *     dynocar_reader_resistance(reader, now_ns, &reading);
  *     if (reading.is_usable) { ... } else { ... the controller's own parameters ... }
+ *
+ * docs/guides/reading.md tells which pipeline is for what, and what each status and each reason
+ * means for a controller.
  *
  * Rules
  *
@@ -18,8 +21,10 @@
  *     All other calls open files or shared memory: make them before the cycle starts.
  *   - A handle belongs to the thread that opened it; every other thread gets
  *     DYNOCAR_ERROR_WRONG_THREAD. Do not use a handle after fork() or after closing it.
- *   - One controller drives a train: a second publisher for the same train is refused. Any number
- *     of processes, up to 12, may read.
+ *   - One controller drives a train: a second publisher for the same train is refused.
+ *   - A train's snapshots have 12 places. Each open reader takes one until it is closed or its
+ *     process ends; so do the daemon's metrics and its kept estimates. When all are taken, opening
+ *     gives DYNOCAR_ERROR_NO_PLACE_LEFT; readers that are open are not disturbed.
  *   - The daemon may start, die and come back at any time: nothing has to be reopened. While it
  *     is silent for longer than the stale limit (250 ms unless set otherwise), every reading is
  *     stale and not usable.
@@ -44,7 +49,7 @@ extern "C" {
 
 #define DYNOCAR_SCHEMA 1u
 #define DYNOCAR_SAMPLE_LAYOUT UINT64_C(0xdc0c8856b34a4c70)
-#define DYNOCAR_SNAPSHOT_LAYOUT UINT64_C(0x0e65b28ef808a2ec)
+#define DYNOCAR_SNAPSHOT_LAYOUT UINT64_C(0x8e8e8dd9aba836be)
 
 #define DYNOCAR_PIPELINES_MAX 32      /* pipelines of one train */
 #define DYNOCAR_PARAMETERS_MAX 6      /* parameters that one pipeline estimates together */
@@ -70,7 +75,9 @@ enum {
     DYNOCAR_ERROR_NO_SNAPSHOT = 10,        /* none of this pipeline has come yet */
     DYNOCAR_ERROR_NOT_IN_SNAPSHOT = 11,    /* the pipeline does not estimate this parameter */
     DYNOCAR_ERROR_PANIC = 12,              /* a fault inside the library: close the handle */
-    DYNOCAR_ERROR_DOES_NOT_STOP = 13       /* the train does not slow down */
+    DYNOCAR_ERROR_DOES_NOT_STOP = 13,      /* the train does not slow down */
+    DYNOCAR_ERROR_NOT_PROVIDED = 14,       /* no pipeline answers this quantity for the train */
+    DYNOCAR_ERROR_NO_PLACE_LEFT = 15       /* all places of the train's channel are taken */
 };
 
 /* Who serves a train. */
@@ -80,10 +87,19 @@ enum {
     DYNOCAR_DAEMON_INCOMPATIBLE = 2
 };
 
+/* What a controller asks for; the daemon's configuration says which pipeline answers. */
+enum {
+    DYNOCAR_QUANTITY_RESISTANCE = 0,     /* dynocar_snapshot_resistance(), or Davis a, b, c */
+    DYNOCAR_QUANTITY_MASS = 1,           /* DYNOCAR_PARAMETER_MASS */
+    DYNOCAR_QUANTITY_ADHESION = 2,       /* DYNOCAR_PARAMETER_ADHESION or ..._LOWER_BOUND */
+    DYNOCAR_QUANTITY_BRAKE_FRICTION = 3, /* DYNOCAR_PARAMETER_DISC_FRICTION, the ratio held */
+    DYNOCAR_QUANTITY_BRAKING_RATIO = 4   /* DYNOCAR_PARAMETER_BRAKING_RATIO, the friction held */
+};
+
 /* What a controller may do with an estimate. */
 enum {
     DYNOCAR_STATUS_UNESTIMATED = 1, /* not enough data; values are declared or initial ones */
-    DYNOCAR_STATUS_ESTIMATED = 2,   /* the values may be used */
+    DYNOCAR_STATUS_ESTIMATED = 2,   /* the values may be used; the reason may remark on them */
     DYNOCAR_STATUS_DEGRADED = 3,    /* there are values, with a reservation: see the reason */
     DYNOCAR_STATUS_INVALID = 4      /* the values must not be used */
 };
@@ -100,16 +116,15 @@ enum {
     DYNOCAR_REASON_MISSING_QUANTITY = 7,      /* the samples lack what the pipeline needs */
     DYNOCAR_REASON_GRADIENT_UNKNOWN = 8,      /* neither track nor sample gives one */
     DYNOCAR_REASON_NUMERICAL_FAILURE = 9,     /* the filter was reset */
-    DYNOCAR_REASON_INPUT_STALE = 10,          /* no sample has come for a while */
     DYNOCAR_REASON_ESTIMATE_STALE = 11,       /* the last exciting manoeuvre is too long ago */
     DYNOCAR_REASON_ONLY_LOWER_BOUND = 12,     /* these data give no more */
-    DYNOCAR_REASON_NOT_IDENTIFIABLE = 13,     /* other values fit the data as well */
+    DYNOCAR_REASON_NOT_IDENTIFIABLE = 13,     /* other values of some parameters fit as well */
     DYNOCAR_REASON_DAEMON_SILENT = 14         /* set by the client, never by the daemon */
 };
 
-/* The kind of estimator behind a snapshot. */
+/* The kind of estimator behind a snapshot, named as in the configuration. */
 enum {
-    DYNOCAR_PIPELINE_LEAST_SQUARES = 1,      /* regularised, all windows (Liu 2018) */
+    DYNOCAR_PIPELINE_LS = 1,                 /* least squares, regularised (Liu 2018) */
     DYNOCAR_PIPELINE_RLS = 2,                /* recursive least squares (Liu 2018) */
     DYNOCAR_PIPELINE_REGULARISED_RLS = 3,    /* the same, regularised (Liu 2018) */
     DYNOCAR_PIPELINE_MILS = 4,               /* multi-innovation (Liu 2018) */
@@ -130,22 +145,19 @@ enum {
     DYNOCAR_PIPELINE_RESIDUAL_MONITOR = 50,  /* watches model against measurement */
     DYNOCAR_PIPELINE_ECHO = 60               /* estimates nothing: the latency floor */
 };
+#define DYNOCAR_PIPELINE_LEAST_SQUARES DYNOCAR_PIPELINE_LS /* its name in earlier releases */
 
 /* A quantity that a pipeline estimates, with the unit of its value. */
 enum {
     DYNOCAR_PARAMETER_DAVIS_A = 1,              /* N/kN */
     DYNOCAR_PARAMETER_DAVIS_B = 2,              /* N/kN per m/s */
     DYNOCAR_PARAMETER_DAVIS_C = 3,              /* N/kN per (m/s)^2 */
-    DYNOCAR_PARAMETER_SPEED = 4,                /* m/s */
     DYNOCAR_PARAMETER_MASS = 5,                 /* t; a sample's mass is in kg */
     DYNOCAR_PARAMETER_ADHESION = 6,             /* 1, wheel on rail */
     DYNOCAR_PARAMETER_ADHESION_LOWER_BOUND = 7, /* 1 */
     DYNOCAR_PARAMETER_ADHESION_LAW_SCALE = 8,   /* 1 */
     DYNOCAR_PARAMETER_DISC_FRICTION = 9,        /* 1 */
     DYNOCAR_PARAMETER_BRAKING_RATIO = 10,       /* 1 */
-    DYNOCAR_PARAMETER_DISTURBANCE = 11,         /* N/kN that the model does not explain */
-    DYNOCAR_PARAMETER_CURVE_CONSTANT = 12,      /* N/kN m: k in k/R */
-    DYNOCAR_PARAMETER_TUNNEL_CONSTANT = 13,     /* N/kN per m of tunnel */
     DYNOCAR_PARAMETER_ACCELERATION_BIAS = 14,   /* m/s^2 */
     DYNOCAR_PARAMETER_UNEXPLAINED_FORCE = 15    /* N */
 };
@@ -167,7 +179,7 @@ enum {
     DYNOCAR_REJECTED_OUTLIER = 12,       /* by the estimator's own test */
     DYNOCAR_REJECTED_WHEEL_SLIDE = 13,   /* slide or spin: not the train's speed */
     DYNOCAR_REJECTED_OUT_OF_RANGE = 14,  /* another quantity */
-    DYNOCAR_REJECTED_FROZEN = 15         /* the speed stood still although the force changed it */
+    DYNOCAR_REJECTED_FROZEN = 15         /* in motion the same, place and all, for over 2.5 s */
 };
 
 /* Manoeuvres that would tell more: bits of missing_manoeuvres. */
@@ -255,11 +267,13 @@ typedef struct dynocar_parameter_snapshot {
     uint32_t pipeline_kind;  /* DYNOCAR_PIPELINE_... */
     uint32_t status;         /* DYNOCAR_STATUS_... as the daemon wrote it */
     uint32_t reason;         /* DYNOCAR_REASON_... as the daemon wrote it */
+    uint32_t quantities;     /* 1 << DYNOCAR_QUANTITY_...: what this pipeline answers */
+    uint32_t train_quantities; /* the same: what any pipeline answers for the train */
 
     int64_t sample_time_ns;      /* newest sample: when measured, controller's clock */
     int64_t sample_published_ns; /* newest sample: when published, host's monotonic clock */
     int64_t published_ns;        /* this snapshot: when first published, same clock */
-    int64_t vouched_ns;          /* this snapshot: when the daemon last vouched for it, same clock */
+    int64_t vouched_ns;          /* this snapshot: when last vouched for by the daemon, same clock */
     uint64_t sample_sequence;    /* newest sample: its number */
 
     uint64_t samples_used;
@@ -350,8 +364,15 @@ dynocar_code dynocar_reader_set_stale_after_ns(dynocar_reader *reader, int64_t s
  * gets the number of snapshots that told something new. REAL-TIME */
 dynocar_code dynocar_reader_poll(dynocar_reader *reader, uint32_t *news);
 
-/* Copies the newest polled snapshot of the first pipeline of a kind (DYNOCAR_PIPELINE_...).
- * now_ns: dynocar_monotonic_now_ns(). On failure the reading is stale and not usable. REAL-TIME */
+/* Copies the newest polled snapshot of the pipeline that answers a quantity (DYNOCAR_QUANTITY_...);
+ * dynocar_reader_resistance() and the like below are short for it.
+ * now_ns: dynocar_monotonic_now_ns(). On failure the reading is stale and not usable:
+ * DYNOCAR_ERROR_NO_SNAPSHOT before the first, DYNOCAR_ERROR_NOT_PROVIDED when the daemon is there
+ * and its configuration lets no pipeline answer. REAL-TIME */
+dynocar_code dynocar_reader_quantity(dynocar_reader *reader, uint32_t quantity, int64_t now_ns,
+                                     dynocar_reading *reading);
+
+/* The same, of the first pipeline of a kind (DYNOCAR_PIPELINE_...). REAL-TIME */
 dynocar_code dynocar_reader_latest(dynocar_reader *reader, uint32_t pipeline_kind, int64_t now_ns,
                                    dynocar_reading *reading);
 
@@ -443,6 +464,7 @@ int64_t dynocar_monotonic_now_ns(void);
  * REAL-TIME */
 const char *dynocar_code_text(dynocar_code code);
 const char *dynocar_pipeline_name(uint32_t kind);
+const char *dynocar_quantity_name(uint32_t quantity);
 const char *dynocar_parameter_name(uint32_t parameter);
 const char *dynocar_status_name(uint32_t status);
 const char *dynocar_reason_name(uint32_t reason);
@@ -472,6 +494,37 @@ static inline dynocar_train_sample dynocar_sample_empty(void)
     memset(&sample, 0, sizeof sample);
     sample.direction = 1;
     return sample;
+}
+
+/* dynocar_reader_quantity() by the quantity's name. REAL-TIME */
+static inline dynocar_code dynocar_reader_resistance(dynocar_reader *reader, int64_t now_ns,
+                                                     dynocar_reading *reading)
+{
+    return dynocar_reader_quantity(reader, DYNOCAR_QUANTITY_RESISTANCE, now_ns, reading);
+}
+
+static inline dynocar_code dynocar_reader_mass(dynocar_reader *reader, int64_t now_ns,
+                                               dynocar_reading *reading)
+{
+    return dynocar_reader_quantity(reader, DYNOCAR_QUANTITY_MASS, now_ns, reading);
+}
+
+static inline dynocar_code dynocar_reader_adhesion(dynocar_reader *reader, int64_t now_ns,
+                                                   dynocar_reading *reading)
+{
+    return dynocar_reader_quantity(reader, DYNOCAR_QUANTITY_ADHESION, now_ns, reading);
+}
+
+static inline dynocar_code dynocar_reader_brake_friction(dynocar_reader *reader, int64_t now_ns,
+                                                         dynocar_reading *reading)
+{
+    return dynocar_reader_quantity(reader, DYNOCAR_QUANTITY_BRAKE_FRICTION, now_ns, reading);
+}
+
+static inline dynocar_code dynocar_reader_braking_ratio(dynocar_reader *reader, int64_t now_ns,
+                                                        dynocar_reading *reading)
+{
+    return dynocar_reader_quantity(reader, DYNOCAR_QUANTITY_BRAKING_RATIO, now_ns, reading);
 }
 
 #ifdef __cplusplus
@@ -513,7 +566,7 @@ DYNOCAR_AT_(dynocar_train_sample, ambient_temperature_degc, 104);
 DYNOCAR_AT_(dynocar_train_sample, gradient_permille, 112);
 DYNOCAR_AT_(dynocar_train_sample, curve_radius_m, 120);
 
-DYNOCAR_SIZE_(dynocar_parameter_snapshot, 504);
+DYNOCAR_SIZE_(dynocar_parameter_snapshot, 512);
 DYNOCAR_AT_(dynocar_parameter_snapshot, epoch, 0);
 DYNOCAR_AT_(dynocar_parameter_snapshot, sequence, 8);
 DYNOCAR_AT_(dynocar_parameter_snapshot, generation, 16);
@@ -522,33 +575,35 @@ DYNOCAR_AT_(dynocar_parameter_snapshot, pipeline_index, 32);
 DYNOCAR_AT_(dynocar_parameter_snapshot, pipeline_kind, 36);
 DYNOCAR_AT_(dynocar_parameter_snapshot, status, 40);
 DYNOCAR_AT_(dynocar_parameter_snapshot, reason, 44);
-DYNOCAR_AT_(dynocar_parameter_snapshot, sample_time_ns, 48);
-DYNOCAR_AT_(dynocar_parameter_snapshot, sample_published_ns, 56);
-DYNOCAR_AT_(dynocar_parameter_snapshot, published_ns, 64);
-DYNOCAR_AT_(dynocar_parameter_snapshot, vouched_ns, 72);
-DYNOCAR_AT_(dynocar_parameter_snapshot, sample_sequence, 80);
-DYNOCAR_AT_(dynocar_parameter_snapshot, samples_used, 88);
-DYNOCAR_AT_(dynocar_parameter_snapshot, samples_rejected, 96);
-DYNOCAR_AT_(dynocar_parameter_snapshot, samples_lost, 104);
-DYNOCAR_AT_(dynocar_parameter_snapshot, updates, 112);
-DYNOCAR_AT_(dynocar_parameter_snapshot, rejected_by_reason, 120);
-DYNOCAR_AT_(dynocar_parameter_snapshot, parameter_count, 184);
-DYNOCAR_AT_(dynocar_parameter_snapshot, excited, 188);
-DYNOCAR_AT_(dynocar_parameter_snapshot, missing_manoeuvres, 192);
-DYNOCAR_AT_(dynocar_parameter_snapshot, suspected_effect, 196);
-DYNOCAR_AT_(dynocar_parameter_snapshot, parameters, 200);
-DYNOCAR_AT_(dynocar_parameter_snapshot, values, 224);
-DYNOCAR_AT_(dynocar_parameter_snapshot, covariance, 272);
-DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_normalised, 440);
-DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_mean_square, 448);
-DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_correlation, 456);
-DYNOCAR_AT_(dynocar_parameter_snapshot, unexplained_force_n, 464);
-DYNOCAR_AT_(dynocar_parameter_snapshot, unexplained_force_std_n, 472);
-DYNOCAR_AT_(dynocar_parameter_snapshot, suspicion_evidence, 480);
-DYNOCAR_AT_(dynocar_parameter_snapshot, speed_min_mps, 488);
-DYNOCAR_AT_(dynocar_parameter_snapshot, speed_max_mps, 496);
+DYNOCAR_AT_(dynocar_parameter_snapshot, quantities, 48);
+DYNOCAR_AT_(dynocar_parameter_snapshot, train_quantities, 52);
+DYNOCAR_AT_(dynocar_parameter_snapshot, sample_time_ns, 56);
+DYNOCAR_AT_(dynocar_parameter_snapshot, sample_published_ns, 64);
+DYNOCAR_AT_(dynocar_parameter_snapshot, published_ns, 72);
+DYNOCAR_AT_(dynocar_parameter_snapshot, vouched_ns, 80);
+DYNOCAR_AT_(dynocar_parameter_snapshot, sample_sequence, 88);
+DYNOCAR_AT_(dynocar_parameter_snapshot, samples_used, 96);
+DYNOCAR_AT_(dynocar_parameter_snapshot, samples_rejected, 104);
+DYNOCAR_AT_(dynocar_parameter_snapshot, samples_lost, 112);
+DYNOCAR_AT_(dynocar_parameter_snapshot, updates, 120);
+DYNOCAR_AT_(dynocar_parameter_snapshot, rejected_by_reason, 128);
+DYNOCAR_AT_(dynocar_parameter_snapshot, parameter_count, 192);
+DYNOCAR_AT_(dynocar_parameter_snapshot, excited, 196);
+DYNOCAR_AT_(dynocar_parameter_snapshot, missing_manoeuvres, 200);
+DYNOCAR_AT_(dynocar_parameter_snapshot, suspected_effect, 204);
+DYNOCAR_AT_(dynocar_parameter_snapshot, parameters, 208);
+DYNOCAR_AT_(dynocar_parameter_snapshot, values, 232);
+DYNOCAR_AT_(dynocar_parameter_snapshot, covariance, 280);
+DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_normalised, 448);
+DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_mean_square, 456);
+DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_correlation, 464);
+DYNOCAR_AT_(dynocar_parameter_snapshot, unexplained_force_n, 472);
+DYNOCAR_AT_(dynocar_parameter_snapshot, unexplained_force_std_n, 480);
+DYNOCAR_AT_(dynocar_parameter_snapshot, suspicion_evidence, 488);
+DYNOCAR_AT_(dynocar_parameter_snapshot, speed_min_mps, 496);
+DYNOCAR_AT_(dynocar_parameter_snapshot, speed_max_mps, 504);
 
-DYNOCAR_SIZE_(dynocar_reading, 528);
+DYNOCAR_SIZE_(dynocar_reading, 536);
 DYNOCAR_AT_(dynocar_reading, age_ns, 0);
 DYNOCAR_AT_(dynocar_reading, status, 8);
 DYNOCAR_AT_(dynocar_reading, reason, 12);

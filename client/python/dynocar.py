@@ -2,12 +2,14 @@
 
     import dynocar
 
-    with dynocar.SamplePublisher(7) as publisher, dynocar.SnapshotReader(7) as reader:
+    with dynocar.SamplePublisher(1) as publisher, dynocar.SnapshotReader(1) as reader:
         publisher.publish(speed_mps=21.5, traction_force_n=0.0, brake_force_n=0.0)
         reader.poll()
-        snapshot = reader.latest(dynocar.PipelineKind.RESISTANCE_KALMAN)
-        if snapshot is not None and snapshot.is_usable:
+        snapshot = reader.resistance()
+        if snapshot.is_usable:
             print(snapshot.resistance_at(21.5))
+        else:
+            print("built-in parameters, since", snapshot.why)
 
 One file over the shared library ``libdynocar_client.so``, with ctypes and nothing else. The rules
 are those of ``dynocar.h``: no call waits for the daemon, one controller drives a train, an end
@@ -23,17 +25,19 @@ from __future__ import annotations
 import ctypes
 import math
 import os
+import weakref
+from collections import deque
 from ctypes import POINTER, byref, c_char_p, c_double, c_int32, c_int64
 from ctypes import c_size_t, c_uint32, c_uint64
 from enum import IntEnum, IntFlag
 from pathlib import Path
-from typing import Any, Dict, List, NamedTuple, Optional, Tuple, TypeVar, Union
+from typing import Any, Deque, Dict, List, NamedTuple, Optional, Tuple, TypeVar, Union
 
 PathLike = Union[str, "os.PathLike[str]"]
 
 SCHEMA = 1
 SAMPLE_LAYOUT = 0xdc0c8856b34a4c70
-SNAPSHOT_LAYOUT = 0x0e65b28ef808a2ec
+SNAPSHOT_LAYOUT = 0x8e8e8dd9aba836be
 PARAMETERS_MAX = 6
 COVARIANCE_ENTRIES = 21
 REJECTION_REASONS = 16
@@ -71,6 +75,8 @@ class Code(_Vocabulary):
     NOT_IN_SNAPSHOT = 11
     PANIC = 12
     DOES_NOT_STOP = 13
+    NOT_PROVIDED = 14
+    NO_PLACE_LEFT = 15
 
 
 class Rail(_Vocabulary):
@@ -91,7 +97,10 @@ class DaemonState(_Vocabulary):
 
 
 class Status(_Vocabulary):
-    """What a controller may do with an estimate: only ``ESTIMATED`` values may be used."""
+    """What a controller may do with an estimate: only ``ESTIMATED`` values may be used.
+
+    ``docs/guides/reading.md`` tells what each status and each reason means.
+    """
 
     UNESTIMATED = 1
     ESTIMATED = 2
@@ -112,7 +121,6 @@ class Reason(_Vocabulary):
     MISSING_QUANTITY = 7
     GRADIENT_UNKNOWN = 8
     NUMERICAL_FAILURE = 9
-    INPUT_STALE = 10
     ESTIMATE_STALE = 11
     ONLY_LOWER_BOUND = 12
     NOT_IDENTIFIABLE = 13
@@ -122,7 +130,8 @@ class Reason(_Vocabulary):
 class PipelineKind(_Vocabulary):
     """The kind of estimator behind a snapshot."""
 
-    LEAST_SQUARES = 1
+    LS = 1
+    LEAST_SQUARES = 1  # its name in earlier releases
     RLS = 2
     REGULARISED_RLS = 3
     MILS = 4
@@ -144,22 +153,28 @@ class PipelineKind(_Vocabulary):
     ECHO = 60
 
 
+class Quantity(_Vocabulary):
+    """What a controller asks for; the daemon's configuration says which pipeline answers."""
+
+    RESISTANCE = 0
+    MASS = 1
+    ADHESION = 2
+    BRAKE_FRICTION = 3
+    BRAKING_RATIO = 4
+
+
 class Parameter(_Vocabulary):
-    """A quantity that a pipeline estimates."""
+    """A number that a pipeline estimates."""
 
     DAVIS_A = 1  # N/kN
     DAVIS_B = 2  # N/kN per m/s
     DAVIS_C = 3  # N/kN per (m/s)^2
-    SPEED = 4  # m/s
     MASS = 5  # t
     ADHESION = 6
     ADHESION_LOWER_BOUND = 7
     ADHESION_LAW_SCALE = 8
     DISC_FRICTION = 9
     BRAKING_RATIO = 10
-    DISTURBANCE = 11  # N/kN
-    CURVE_CONSTANT = 12  # N/kN m
-    TUNNEL_CONSTANT = 13  # N/kN per m of tunnel
     ACCELERATION_BIAS = 14  # m/s^2
     UNEXPLAINED_FORCE = 15  # N
 
@@ -271,6 +286,8 @@ class ParameterSnapshot(ctypes.Structure):
         ("pipeline_kind", c_uint32),
         ("status", c_uint32),
         ("reason", c_uint32),
+        ("quantities", c_uint32),
+        ("train_quantities", c_uint32),
         ("sample_time_ns", c_int64),
         ("sample_published_ns", c_int64),
         ("published_ns", c_int64),
@@ -386,6 +403,7 @@ _FUNCTIONS: List[Tuple[str, Any, List[Any]]] = [
     ("reader_open", c_int32, _OPEN),
     ("reader_set_stale_after_ns", c_int32, [_HANDLE, c_int64]),
     ("reader_poll", c_int32, [_HANDLE, POINTER(c_uint32)]),
+    ("reader_quantity", c_int32, _LATEST),
     ("reader_latest", c_int32, _LATEST),
     ("reader_latest_by_index", c_int32, _LATEST),
     ("reader_refused", c_int32, [_HANDLE, POINTER(c_uint64)]),
@@ -468,17 +486,27 @@ class Resistance(NamedTuple):
 class Snapshot:
     """A pipeline's knowledge of one train at one moment, with its age.
 
-    ``raw`` holds every field of ``dynocar_parameter_snapshot``.
+    ``raw`` holds every field of ``dynocar_parameter_snapshot``. ``code`` is ``OK``, or why there is
+    none: ``NO_SNAPSHOT`` or ``NOT_PROVIDED``; then nothing may be used.
     """
 
-    def __init__(self, library: _Library, reading: _Reading) -> None:
+    def __init__(self, library: _Library, reading: _Reading, code: Code = Code.OK) -> None:
         self._library = library
+        self.code = code
         self.raw: ParameterSnapshot = reading.snapshot
         self.age_ns: int = reading.age_ns
         self.status = Status(reading.status)
         self.reason = Reason(reading.reason)
         self.is_stale = bool(reading.is_stale)
         self.is_usable = bool(reading.is_usable)
+
+    def _or_none(self) -> "Optional[Snapshot]":
+        return self if self.code == Code.OK else None
+
+    @property
+    def why(self) -> str:
+        """Why, in one word: the reason, ``no_snapshot`` or ``not_provided``."""
+        return (self.reason if self.code == Code.OK else self.code).name.lower()
 
     @property
     def pipeline_kind(self) -> PipelineKind:
@@ -559,8 +587,31 @@ class Snapshot:
 _Self = TypeVar("_Self", bound="_End")
 
 
+# Ends that were dropped in another thread than their own, which alone may close them.
+_dropped_elsewhere: Deque[Tuple[_Library, str, ctypes.c_void_p]] = deque()
+
+
+def _close_dropped(library: _Library, kind: str, handle: ctypes.c_void_p) -> None:
+    """Closes an end that nobody holds any more, or leaves it to its own thread."""
+    if getattr(library, f"{kind}_close")(handle) == Code.WRONG_THREAD:
+        _dropped_elsewhere.append((library, kind, handle))
+
+
+def _close_what_this_thread_dropped() -> None:
+    for _ in range(len(_dropped_elsewhere)):
+        try:
+            dropped = _dropped_elsewhere.popleft()
+        except IndexError:  # another thread was faster
+            return
+        _close_dropped(*dropped)
+
+
 class _End:
-    """One end of a channel; close it, or use it in a ``with`` statement."""
+    """One end of a channel; close it, or use it in a ``with`` statement.
+
+    An end that is dropped is closed. One that another thread drops is closed when its own thread
+    opens the next end.
+    """
 
     _kind = ""
 
@@ -577,16 +628,19 @@ class _End:
         """
         self._library = _Library.load(library)
         self._handle: Optional[ctypes.c_void_p] = None
+        _close_what_this_thread_dropped()
         handle, words = ctypes.c_void_p(), ctypes.create_string_buffer(_MESSAGE_BYTES)
         open_end = getattr(self._library, f"{self._kind}_open")
         code = open_end(_root_bytes(root), train_id, byref(handle), words, len(words))
         self._library.require(code, words.value)
         self._handle = handle
+        self._finalizer = weakref.finalize(self, _close_dropped, self._library, self._kind, handle)
 
     def close(self) -> None:
         """Closes the end; a closed one stays closed."""
         if self._handle is not None:
             self._call("close")
+            self._finalizer.detach()
             self._handle = None
 
     def _call(self, function: str, *arguments: Any) -> None:
@@ -684,27 +738,55 @@ class SnapshotReader(_End):
         self._call("poll", byref(news))
         return news.value
 
+    def quantity(self, quantity: Quantity, now_ns: Optional[int] = None) -> Snapshot:
+        """The newest polled snapshot of the pipeline that answers a quantity.
+
+        Which one that is says the daemon's configuration. Gives a snapshot that is not usable, with
+        its ``code``, when none has come yet or no pipeline answers. ``now_ns`` as in ``latest``.
+        """
+        return self._snapshot("quantity", quantity, now_ns)
+
+    def resistance(self, now_ns: Optional[int] = None) -> Snapshot:
+        """``quantity`` for resistance: see ``resistance_at``."""
+        return self.quantity(Quantity.RESISTANCE, now_ns)
+
+    def mass(self, now_ns: Optional[int] = None) -> Snapshot:
+        """``quantity`` for the gross mass: ``Parameter.MASS`` in t."""
+        return self.quantity(Quantity.MASS, now_ns)
+
+    def adhesion(self, now_ns: Optional[int] = None) -> Snapshot:
+        """``quantity`` for adhesion: ``Parameter.ADHESION`` or ``ADHESION_LOWER_BOUND``."""
+        return self.quantity(Quantity.ADHESION, now_ns)
+
+    def brake_friction(self, now_ns: Optional[int] = None) -> Snapshot:
+        """``quantity`` for ``Parameter.DISC_FRICTION``, the declared braking ratio held."""
+        return self.quantity(Quantity.BRAKE_FRICTION, now_ns)
+
+    def braking_ratio(self, now_ns: Optional[int] = None) -> Snapshot:
+        """``quantity`` for ``Parameter.BRAKING_RATIO``, the declared friction held."""
+        return self.quantity(Quantity.BRAKING_RATIO, now_ns)
+
     def latest(self, kind: PipelineKind, now_ns: Optional[int] = None) -> Optional[Snapshot]:
         """The newest polled snapshot of the first pipeline of a kind, ``None`` before the first.
 
         ``now_ns`` is the host's monotonic clock; without it, the time of the call.
         """
-        return self._snapshot("latest", kind, now_ns)
+        return self._snapshot("latest", kind, now_ns)._or_none()
 
     def latest_by_index(self, index: int, now_ns: Optional[int] = None) -> Optional[Snapshot]:
         """The same, by the pipeline's number in the daemon's configuration."""
-        return self._snapshot("latest_by_index", index, now_ns)
+        return self._snapshot("latest_by_index", index, now_ns)._or_none()
 
-    def _snapshot(self, function: str, number: int, now_ns: Optional[int]) -> Optional[Snapshot]:
-        reading = _Reading()
+    def _snapshot(self, function: str, number: int, now_ns: Optional[int]) -> Snapshot:
+        reading, code = _Reading(), Code.OK
         now_ns = self._library.monotonic_now_ns() if now_ns is None else now_ns
         try:
             self._call(function, number, now_ns, byref(reading))
         except DynocarError as error:
-            if error.code == Code.NO_SNAPSHOT:
-                return None
-            raise
-        return Snapshot(self._library, reading)
+            if error.code not in (Code.NO_SNAPSHOT, Code.NOT_PROVIDED):
+                raise
+            code = error.code
+        return Snapshot(self._library, reading, code)
 
     @property
     def refused(self) -> int:

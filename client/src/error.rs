@@ -62,6 +62,21 @@ pub enum ChannelError {
         /// The transport's reason.
         reason: String,
     },
+    /// Every place of a train's channel is taken.
+    #[error(
+        "{channel} of train {train}: all {limit} places are taken. Each reader and each publisher \
+         takes one until it is closed or its process ends; the daemon takes one for each of its \
+         threads, for metrics and for kept estimates. Close those you no longer need, or let one \
+         reader of a process serve all its parts"
+    )]
+    NoPlaceLeft {
+        /// The train.
+        train: TrainId,
+        /// The channel's name.
+        channel: &'static str,
+        /// The places that there are.
+        limit: usize,
+    },
     /// There is too little shared memory left.
     #[error(
         "{path}: shared memory is full: {free_kib} KiB free, at least {needed_kib} KiB needed; \

@@ -2,10 +2,10 @@
 //!
 //! ```no_run
 //! use dynocar_client::{Host, SamplePublisher, SnapshotReader};
-//! use dynocar_shared::{PipelineKind, SampleField, TrainId, TrainSample};
+//! use dynocar_shared::{SampleField, TrainId, TrainSample};
 //!
 //! let host = Host::from_environment()?;
-//! let train = TrainId(7);
+//! let train = TrainId(1);
 //! let mut publisher = SamplePublisher::open(&host, train)?;
 //! let mut reader = SnapshotReader::open(&host, train)?;
 //! loop {
@@ -14,7 +14,7 @@
 //!     publisher.publish(&mut sample)?;
 //!     reader.poll();
 //!     let now_ns = dynocar_client::monotonic_now_ns();
-//!     if let Some(reading) = reader.latest(PipelineKind::VMils, now_ns)
+//!     if let Ok(reading) = reader.resistance(now_ns)
 //!         && reading.is_usable()
 //!         && let Some(resistance) = reading.snapshot.resistance_at(21.5)
 //!     {
@@ -35,9 +35,11 @@
 //! - [`peer`]: who serves and who drives a train, and whether we understand each other
 //! - [`channel`]: the shared-memory ports, also used by the daemon
 //! - [`publisher`], [`reader`]: the two ends a controller holds
+//! - [`answers`]: which pipeline answers which quantity
 //! - [`clock`]: the host's monotonic clock
 //! - [`ffi`]: the same for C, C++ and Python
 
+pub mod answers;
 pub mod channel;
 pub mod clock;
 pub mod error;
@@ -47,6 +49,7 @@ pub mod peer;
 pub mod publisher;
 pub mod reader;
 
+pub use answers::NoAnswer;
 pub use clock::monotonic_now_ns;
 pub use error::ChannelError;
 pub use host::Host;

@@ -2,8 +2,9 @@
 
 use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::snapshot::PARAMETERS_MAX;
-use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, Status, TrainId};
+use dynocar_shared::{ParameterSnapshot, PipelineKind, Quantity, Reason, Status, TrainId};
 
+use crate::answers::{Answers, NoAnswer};
 use crate::channel::{Receiver, Transport};
 use crate::clock::monotonic_now_ns;
 use crate::error::ChannelError;
@@ -23,6 +24,7 @@ pub struct SnapshotReader {
     train: TrainId,
     receiver: Receiver<ParameterSnapshot>,
     latest: Box<[Option<ParameterSnapshot>; PIPELINES_MAX]>,
+    answers: Answers,
     stale_after_ns: i64,
     refused: u64,
 }
@@ -49,7 +51,8 @@ impl Reading<'_> {
         if self.is_stale { Some(Reason::DaemonSilent) } else { self.snapshot.reason() }
     }
 
-    /// True when a controller may use the values; else it falls back to its own parameters.
+    /// True when a controller may use the values; else it falls back to its own parameters. What
+    /// that promises, whatever the reason says beside it, is told in `docs/guides/reading.md`.
     pub fn is_usable(&self) -> bool {
         self.status() == Status::Estimated
     }
@@ -71,6 +74,7 @@ impl SnapshotReader {
             train,
             receiver,
             latest: Box::new([None; PIPELINES_MAX]),
+            answers: Answers::default(),
             stale_after_ns: STALE_AFTER_NS,
             refused: 0,
         })
@@ -99,6 +103,67 @@ impl SnapshotReader {
         news
     }
 
+    /// The newest snapshot of the pipeline that answers a quantity, by the daemon's configuration;
+    /// `now_ns` is the host's monotonic clock.
+    ///
+    /// # Errors
+    ///
+    /// [`NoAnswer`], when nothing has come yet or no pipeline answers the quantity.
+    ///
+    /// # Real-time
+    ///
+    /// No search, no system call, no allocation; so are the methods named after a quantity.
+    pub fn quantity(&self, quantity: Quantity, now_ns: i64) -> Result<Reading<'_>, NoAnswer> {
+        let place = self.answers.place(quantity)?;
+        let snapshot = self.latest[place].as_ref().ok_or(NoAnswer::NoSnapshot)?;
+        Ok(self.reading(snapshot, now_ns))
+    }
+
+    /// Basic resistance, see [`ParameterSnapshot::resistance_at`]; as [`Self::quantity`].
+    ///
+    /// # Errors
+    ///
+    /// See [`Self::quantity`].
+    pub fn resistance(&self, now_ns: i64) -> Result<Reading<'_>, NoAnswer> {
+        self.quantity(Quantity::Resistance, now_ns)
+    }
+
+    /// Gross mass, parameter `Mass` in t; as [`Self::quantity`].
+    ///
+    /// # Errors
+    ///
+    /// See [`Self::quantity`].
+    pub fn mass(&self, now_ns: i64) -> Result<Reading<'_>, NoAnswer> {
+        self.quantity(Quantity::Mass, now_ns)
+    }
+
+    /// Adhesion, parameter `Adhesion` or `AdhesionLowerBound`; as [`Self::quantity`].
+    ///
+    /// # Errors
+    ///
+    /// See [`Self::quantity`].
+    pub fn adhesion(&self, now_ns: i64) -> Result<Reading<'_>, NoAnswer> {
+        self.quantity(Quantity::Adhesion, now_ns)
+    }
+
+    /// Friction of the brake discs, parameter `DiscFriction`; as [`Self::quantity`].
+    ///
+    /// # Errors
+    ///
+    /// See [`Self::quantity`].
+    pub fn brake_friction(&self, now_ns: i64) -> Result<Reading<'_>, NoAnswer> {
+        self.quantity(Quantity::BrakeFriction, now_ns)
+    }
+
+    /// Braking ratio, parameter `BrakingRatio`; as [`Self::quantity`].
+    ///
+    /// # Errors
+    ///
+    /// See [`Self::quantity`].
+    pub fn braking_ratio(&self, now_ns: i64) -> Result<Reading<'_>, NoAnswer> {
+        self.quantity(Quantity::BrakingRatio, now_ns)
+    }
+
     /// The newest snapshot of the first pipeline of a kind; `now_ns` is the host's monotonic
     /// clock.
     pub fn latest(&self, kind: PipelineKind, now_ns: i64) -> Option<Reading<'_>> {
@@ -107,10 +172,12 @@ impl SnapshotReader {
 
     /// The newest snapshot of every pipeline, by the pipeline's number in the configuration.
     pub fn readings(&self, now_ns: i64) -> impl Iterator<Item = Reading<'_>> {
-        self.latest.iter().flatten().map(move |snapshot| {
-            let age_ns = now_ns.saturating_sub(snapshot.vouched_ns);
-            Reading { snapshot, age_ns, is_stale: age_ns > self.stale_after_ns }
-        })
+        self.latest.iter().flatten().map(move |snapshot| self.reading(snapshot, now_ns))
+    }
+
+    fn reading<'a>(&self, snapshot: &'a ParameterSnapshot, now_ns: i64) -> Reading<'a> {
+        let age_ns = now_ns.saturating_sub(snapshot.vouched_ns);
+        Reading { snapshot, age_ns, is_stale: age_ns > self.stale_after_ns }
     }
 
     /// Messages that no daemon of ours would send: foreign train, number out of range, NaN, a time
@@ -164,6 +231,7 @@ impl SnapshotReader {
             return false;
         }
         *place = Some(*snapshot);
+        self.answers.learn(snapshot);
         before.is_none_or(|(epoch, sequence, _)| {
             (snapshot.epoch, snapshot.sequence) > (epoch, sequence)
         })

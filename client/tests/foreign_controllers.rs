@@ -9,8 +9,8 @@ use dynocar_shared::{Parameter, SampleField, TrainSample};
 
 mod support;
 use support::{
-    Link, PIPELINE_INDEX, PlayedDaemon, Program, TRAIN, client_directory, compiler, is_installed,
-    library_directory, snapshot_for,
+    Link, PIPELINE_INDEX, PlayedDaemon, Program, TRAIN, client_directory, library_directory,
+    snapshot_for,
 };
 
 fn foreign(file: &str) -> PathBuf {
@@ -65,6 +65,7 @@ fn assert_round_trip(command: &mut Command, daemon: &PlayedDaemon) {
     assert_eq!(line("daemon"), "1");
     assert_eq!(line("second"), "6");
     assert_eq!(line("same"), "1");
+    assert_eq!(line("provided"), "1 14");
     assert_eq!(line("status"), "estimated none");
     assert_eq!(*line("pipeline"), format!("{PIPELINE_INDEX} resistance_kalman"));
     assert!(numbers(line("sample_sequence"))[0] >= 20.0);
@@ -138,24 +139,26 @@ fn a_c_controller_with_the_shared_library_goes_the_whole_way() {
 
 #[test]
 fn a_cpp_controller_goes_the_whole_way() {
-    if !is_installed("c++") {
-        return;
-    }
     let directory = tempfile::tempdir().unwrap();
     let program = directory.path().join("program");
-    let mut command = compiler("CXX", "c++", "c++17");
-    command.args(["-x", "c++"]).arg(foreign("round_trip.c")).args(["-x", "none", "-o"]);
-    command.arg(&program).arg(library_directory().join("libdynocar_client.a"));
-    support::must_succeed(command.args(["-lpthread", "-ldl", "-lm"]));
+    support::build_cpp(&foreign("round_trip.c"), &program);
     assert_round_trip(&mut Command::new(program), &PlayedDaemon::start());
 }
 
 #[test]
 fn a_python_controller_goes_the_whole_way() {
-    if is_installed("python3") {
-        let mut command = support::python(&foreign("round_trip.py"));
-        assert_round_trip(&mut command, &PlayedDaemon::start());
-    }
+    let mut command = support::python(&foreign("round_trip.py"));
+    assert_round_trip(&mut command, &PlayedDaemon::start());
+}
+
+/// Runs a script of 100 readers and publishers that are dropped unclosed, and of 13 at once.
+#[test]
+fn python_readers_and_publishers_that_are_dropped_give_their_places_back() {
+    let daemon = PlayedDaemon::start();
+    let mut command = support::python(&foreign("dropped.py"));
+    let said = support::must_succeed(command.arg(daemon.root()).arg(TRAIN.to_string()));
+    assert!(said.contains("12 places, then NO_PLACE_LEFT"), "{said}");
+    assert!(said.contains("all 12 places are taken"), "{said}");
 }
 
 #[test]
@@ -166,9 +169,7 @@ fn the_c_example_uses_the_daemon_and_falls_back() {
 
 #[test]
 fn the_python_example_uses_the_daemon_and_falls_back() {
-    if is_installed("python3") {
-        assert_example_falls_back(&mut support::python(&example("controller.py")));
-    }
+    assert_example_falls_back(&mut support::python(&example("controller.py")));
 }
 
 #[test]
@@ -190,7 +191,10 @@ fn the_stopping_examples_in_c_and_rust_say_the_same() {
         support::must_succeed(&mut program)
     });
     assert_eq!(said[0], said[1]);
-    let words: Vec<f64> = said[0].split_whitespace().filter_map(|it| it.parse().ok()).collect();
+    let lines: Vec<&str> = said[0].lines().collect();
+    let [resistance, _, _, stop] = lines[..] else { panic!("{}", said[0]) };
+    assert_eq!(resistance, "resistance: the built-in values (no_snapshot)");
+    let words: Vec<f64> = stop.split_whitespace().filter_map(|it| it.parse().ok()).collect();
     let [from_mps, distance_m, time_s, _, bound_m, bound_s] = words[..] else {
         panic!("{}", said[0]);
     };

@@ -15,12 +15,12 @@ use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::snapshot::{COVARIANCE_ENTRIES, PARAMETERS_MAX, REJECTION_REASONS};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{
-    Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, SCHEMA_MAJOR,
-    SampleField, Status, TrainSample,
+    Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Quantity, Reason, RejectionReason,
+    SCHEMA_MAJOR, SampleField, Status, TrainSample,
 };
 
 mod support;
-use support::{Link, client_directory, compiler, is_installed, library_directory, must_succeed};
+use support::{Link, client_directory, compiler, library_directory, must_succeed};
 
 struct Struct {
     rust_name: &'static str,
@@ -98,6 +98,7 @@ fn vocabulary_members() -> Vec<(&'static str, String, i64)> {
     Status::ALL.iter().for_each(|it| add("STATUS", it, *it as u32));
     Reason::ALL.iter().for_each(|it| add("REASON", it, *it as u32));
     PipelineKind::ALL.iter().for_each(|it| add("PIPELINE", it, *it as u32));
+    Quantity::ALL.iter().for_each(|it| add("QUANTITY", it, *it as u32));
     Parameter::ALL.iter().for_each(|it| add("PARAMETER", it, *it as u32));
     RejectionReason::ALL.iter().for_each(|it| add("REJECTED", it, *it as u32));
     Manoeuvre::ALL.iter().for_each(|it| add("MANOEUVRE", it, it.bit()));
@@ -210,13 +211,20 @@ fn header_words() -> Vec<String> {
 }
 
 fn header_functions() -> BTreeSet<String> {
-    let inline = ["dynocar_header_matches_library", "dynocar_sample_empty"];
+    let inline = inline_functions();
     header_words()
         .iter()
         .filter_map(|word| word.strip_suffix('('))
-        .filter(|name| name.starts_with("dynocar_") && !inline.contains(name))
+        .filter(|name| name.starts_with("dynocar_") && !inline.contains(*name))
         .map(str::to_owned)
         .collect()
+}
+
+/// The helpers that the header itself holds: `static inline`, a type, a name.
+fn inline_functions() -> BTreeSet<String> {
+    let text = header_text();
+    let name = |part: &str| Some(part.split_once('(')?.0.rsplit([' ', '*']).next()?.to_owned());
+    text.split("static inline ").skip(1).filter_map(name).collect()
 }
 
 #[test]
@@ -227,10 +235,8 @@ fn the_header_is_clean_c99_c11_c17_and_cpp17() {
     for standard in ["c99", "c11", "c17"] {
         must_succeed(compiler("CC", "cc", standard).arg("-fsyntax-only").arg(&source));
     }
-    if is_installed("c++") {
-        let mut command = compiler("CXX", "c++", "c++17");
-        must_succeed(command.args(["-fsyntax-only", "-x", "c++"]).arg(&source));
-    }
+    let mut command = support::cpp_compiler();
+    must_succeed(command.args(["-fsyntax-only", "-x", "c++"]).arg(&source));
 }
 
 #[test]
@@ -260,6 +266,23 @@ fn the_header_declares_no_number_that_the_library_does_not_know() {
     assert!(text.contains(&format!("#define DYNOCAR_FLAG_WHEEL_SLIDE {FLAG_WHEEL_SLIDE} ")));
 }
 
+/// One name for one thing: who reads `ls` in a configuration finds `DYNOCAR_PIPELINE_LS`.
+#[test]
+fn names_in_the_header_are_those_of_the_configuration_and_of_results() {
+    fn assert_named<T: Debug>(members: &[T], name: fn(&T) -> &'static str) {
+        for member in members {
+            assert_eq!(upper_snake(member), name(member).to_uppercase());
+        }
+    }
+    assert_named(PipelineKind::ALL, |it| it.name());
+    assert_named(Quantity::ALL, |it| it.name());
+    assert_named(Status::ALL, |it| it.name());
+    assert_named(Reason::ALL, |it| it.name());
+    assert_named(RejectionReason::ALL, |it| it.name());
+    assert_named(Manoeuvre::ALL, |it| it.name());
+    assert_named(EffectKind::ALL, |it| it.name());
+}
+
 #[test]
 fn both_libraries_hold_every_function_of_the_header() {
     let functions = header_functions();
@@ -282,9 +305,7 @@ fn both_libraries_hold_every_function_of_the_header() {
 
 #[test]
 fn the_shared_library_exports_the_functions_of_the_header_and_no_other_of_ours() {
-    if !is_installed("nm") {
-        return;
-    }
+    support::require("nm", "binutils");
     let library = library_directory().join("libdynocar_client.so");
     let table = must_succeed(Command::new("nm").args(["-D", "--defined-only"]).arg(&library));
     // The transport exports a symbol of its own.
@@ -299,9 +320,6 @@ fn the_shared_library_exports_the_functions_of_the_header_and_no_other_of_ours()
 
 #[test]
 fn python_file_and_library_agree_on_every_field_and_number() {
-    if !is_installed("python3") {
-        return;
-    }
     let script = Path::new("tests/foreign/layout.py");
     let mut command = support::python(&client_directory().join(script));
     assert_same(&must_succeed(&mut command), "dynocar.py");

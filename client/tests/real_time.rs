@@ -13,7 +13,7 @@ use dynocar_client::ffi::publisher::*;
 use dynocar_client::ffi::reader::*;
 use dynocar_client::ffi::snapshot::*;
 use dynocar_client::ffi::{ReadingCopy, Resistance, about, error, names};
-use dynocar_shared::{PipelineKind, TrainSample};
+use dynocar_shared::{PipelineKind, Quantity, TrainSample};
 
 mod support;
 use support::{Link, PlayedDaemon, Program, TRAIN, client_directory};
@@ -73,11 +73,12 @@ fn open() -> Ends {
 }
 
 /// One control cycle; gives the allocations of publishing and of each other real-time call.
-fn cycle(ends: &Ends) -> ((u64, usize), [(u64, usize); 5]) {
+fn cycle(ends: &Ends) -> ((u64, usize), [(u64, usize); 6]) {
     let mut sample = TrainSample::empty(TRAIN);
     let mut reading = ReadingCopy::none();
     let mut resistance = Resistance::default();
     let kind = PipelineKind::ResistanceKalman as u32;
+    let quantity = Quantity::Resistance as u32;
     // SAFETY: the handles are open and of this thread, all other pointers of living objects.
     let counts = unsafe {
         let publish = allocations_of(|| dynocar_publisher_publish(ends.publisher, &mut sample));
@@ -87,6 +88,7 @@ fn cycle(ends: &Ends) -> ((u64, usize), [(u64, usize); 5]) {
             allocations_of(|| dynocar_publisher_start_run(ends.publisher)),
             allocations_of(|| dynocar_reader_poll(ends.reader, null_mut())),
             allocations_of(|| dynocar_reader_latest(ends.reader, kind, now_ns, &mut reading)),
+            allocations_of(|| dynocar_reader_quantity(ends.reader, quantity, now_ns, &mut reading)),
             allocations_of(|| {
                 dynocar_snapshot_resistance(&reading.snapshot, 20.0, 1e5, &mut resistance)
             }),
@@ -113,7 +115,7 @@ fn only_publishing_allocates_and_that_once_and_little() {
     for number in 0..2000 {
         let ((count, bytes), others) = cycle(&ends);
         assert!(count <= 1 && bytes <= 128, "cycle {number}: {count} allocations, {bytes} bytes");
-        assert_eq!(others, [(0, 0); 5], "cycle {number}");
+        assert_eq!(others, [(0, 0); 6], "cycle {number}");
     }
     // SAFETY: the handles are given up here.
     let codes =

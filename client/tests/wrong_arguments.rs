@@ -199,7 +199,7 @@ fn a_reading_that_could_not_be_had_cannot_be_used() {
     assert_eq!(open_reader(directory.path(), &mut reader).0, Code::Ok);
     let kind = PipelineKind::Rls as u32;
     let used = || ReadingCopy { is_usable: 1, is_stale: 0, ..ReadingCopy::none() };
-    let mut readings = [used(), used(), used(), used()];
+    let mut readings = [used(), used(), used(), used(), used(), used()];
     // SAFETY: all pointers are of living objects.
     let codes = unsafe {
         [
@@ -207,10 +207,12 @@ fn a_reading_that_could_not_be_had_cannot_be_used() {
             dynocar_reader_latest(reader, 9999, 0, &mut readings[1]),
             dynocar_reader_latest_by_index(reader, 0, 0, &mut readings[2]),
             dynocar_reader_latest_by_index(reader, 32, 0, &mut readings[3]),
+            dynocar_reader_quantity(reader, 0, 0, &mut readings[4]),
+            dynocar_reader_quantity(reader, 5, 0, &mut readings[5]),
         ]
     };
     let [missing, bad] = [Code::NoSnapshot as i32, Code::BadNumber as i32];
-    assert_eq!(codes, [missing, bad, missing, bad]);
+    assert_eq!(codes, [missing, bad, missing, bad, missing, bad]);
     for reading in readings {
         assert_eq!((reading.is_usable, reading.is_stale), (0, 1));
         assert_eq!(reading.status, Status::Invalid as u32);

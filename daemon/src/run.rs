@@ -16,7 +16,7 @@ use dynocar_client::channel::SampleCount;
 use dynocar_client::peer::RoleLock;
 use dynocar_client::{ChannelError, Host, Role, SnapshotReader, monotonic_now_ns};
 use dynocar_core::pipeline::{Pipeline, SettingError};
-use dynocar_shared::TrainId;
+use dynocar_shared::{Quantity, TrainId};
 use tracing::{info, warn};
 
 use crate::config::{DaemonConfig, IdleStrategy, PipelineConfig, ThreadConfig, TrainConfig};
@@ -86,6 +86,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     let (plans, watched) = plan_workers(config, &host, epoch, &stop, state.as_ref(), &counts)?;
     let workers = start_workers(plans)?;
     let keeper = state.map(|state| start_keeper(config, &host, state, &stop)).transpose()?;
+    tell_who_answers(config);
     info!(epoch, trains = trains.len(), pipelines = config.pipelines.len(), "serving");
 
     let listener = config.metrics.map(|address| start_metrics(config, address, &host, &stop));
@@ -116,6 +117,22 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     match ended {
         Some(name) if !was_asked => Err(RunError::ThreadEnded(name)),
         _ => Ok(()),
+    }
+}
+
+/// One line for each train: which pipeline answers which question.
+fn tell_who_answers(config: &DaemonConfig) {
+    for train in &config.trains {
+        let name = |it| train.answers.place(it).map_or("-", |place| &config.pipelines[place].name);
+        info!(
+            train = train.id.0,
+            resistance = name(Quantity::Resistance),
+            mass = name(Quantity::Mass),
+            adhesion = name(Quantity::Adhesion),
+            brake_friction = name(Quantity::BrakeFriction),
+            braking_ratio = name(Quantity::BrakingRatio),
+            "answers"
+        );
     }
 }
 
@@ -202,7 +219,12 @@ fn build_pipeline(
         .estimator
         .build(&train.model)
         .map_err(|source| RunError::Setting { pipeline: settings.name.clone(), source })?;
-    Ok(Pipeline::new(train.id, index, Arc::clone(&train.model), train.track.clone(), estimator))
+    let (model, track) = (Arc::clone(&train.model), train.track.clone());
+    let mut pipeline = Pipeline::new(train.id, index, model, track, estimator);
+    let snapshot = pipeline.snapshot_mut();
+    snapshot.quantities = train.answers.bits_of(index as usize);
+    snapshot.train_quantities = train.answers.all_bits();
+    Ok(pipeline)
 }
 
 /// Starts one thread for each plan and waits until all of them have their ports open.

@@ -35,4 +35,6 @@ pub use services::SCHEMA_MAJOR;
 pub use sleeper::SleeperState;
 pub use snapshot::ParameterSnapshot;
 pub use stopping::{EffortPoint, RailAdhesion, Stop, StoppingError, StoppingEstimate};
-pub use vocabulary::{Manoeuvre, Parameter, PipelineKind, Reason, RejectionReason, Status};
+pub use vocabulary::{
+    Manoeuvre, Parameter, PipelineKind, Quantity, Reason, RejectionReason, Status,
+};

@@ -1,6 +1,6 @@
 //! What the daemon answers, one snapshot for each train and pipeline.
 
-use crate::vocabulary::{Parameter, PipelineKind, Reason, RejectionReason, Status};
+use crate::vocabulary::{Parameter, PipelineKind, Quantity, Reason, RejectionReason, Status};
 use crate::wire_struct;
 
 /// The most parameters one pipeline estimates together.
@@ -32,6 +32,11 @@ wire_struct! {
         pub status: u32,
         /// [`Reason`] by number.
         pub reason: u32,
+        /// One bit for each [`Quantity`] that this pipeline answers for the train, by the daemon's
+        /// configuration.
+        pub quantities: u32,
+        /// One bit for each [`Quantity`] that any pipeline of the daemon answers for the train.
+        pub train_quantities: u32,
 
         /// Measurement time of the newest sample behind the snapshot, controller's clock, in ns.
         pub sample_time_ns: i64,
@@ -102,6 +107,8 @@ impl ParameterSnapshot {
             pipeline_kind: 0,
             status: Status::Unestimated as u32,
             reason: Reason::TooFewSamples as u32,
+            quantities: 0,
+            train_quantities: 0,
             sample_time_ns: 0,
             sample_published_ns: 0,
             published_ns: 0,
@@ -146,6 +153,11 @@ impl ParameterSnapshot {
     /// The estimator's kind.
     pub const fn pipeline_kind(&self) -> Option<PipelineKind> {
         PipelineKind::from_number(self.pipeline_kind)
+    }
+
+    /// True when this pipeline answers a quantity for the train.
+    pub const fn answers(&self, quantity: Quantity) -> bool {
+        self.quantities & quantity.bit() != 0
     }
 
     /// Samples refused for one reason.

@@ -43,7 +43,7 @@ vocabulary! {
     /// The kind of estimator behind a snapshot.
     PipelineKind: u32 {
         /// Regularised least squares over all windows (Liu 2018, eq. 7).
-        LeastSquares = 1 "ls",
+        Ls = 1 "ls",
         /// Recursive least squares (Liu 2018, eq. 9-11).
         Rls = 2 "rls",
         /// Regularised recursive least squares (Liu 2018, eq. 12-16).
@@ -86,7 +86,32 @@ vocabulary! {
 }
 
 vocabulary! {
-    /// A quantity that a pipeline estimates; the unit is part of the name where it has one.
+    /// What a controller asks for; the daemon's configuration says which pipeline answers it, and
+    /// each snapshot repeats that.
+    Quantity: u32 {
+        /// Basic resistance over speed: Davis a, b and c.
+        Resistance = 0 "resistance",
+        /// Gross mass.
+        Mass = 1 "mass",
+        /// Adhesion of wheel on rail.
+        Adhesion = 2 "adhesion",
+        /// Friction of the brake discs, the declared braking ratio held.
+        BrakeFriction = 3 "brake_friction",
+        /// Braking ratio, the declared friction held.
+        BrakingRatio = 4 "braking_ratio",
+    }
+}
+
+impl Quantity {
+    /// The quantity's bit in [`crate::ParameterSnapshot::quantities`].
+    pub const fn bit(self) -> u32 {
+        1 << self as u32
+    }
+}
+
+vocabulary! {
+    /// A number that a pipeline estimates; the unit is part of the name where it has one. The
+    /// numbers 4, 11, 12 and 13 meant something once and stay unused.
     Parameter: u32 {
         /// Davis a in N/kN.
         DavisA = 1 "a",
@@ -94,8 +119,6 @@ vocabulary! {
         DavisB = 2 "b",
         /// Davis c in N/kN per (m/s)².
         DavisC = 3 "c",
-        /// Speed in m/s.
-        Speed = 4 "speed_mps",
         /// Mass in t.
         Mass = 5 "mass_t",
         /// Wheel-rail adhesion coefficient.
@@ -108,12 +131,6 @@ vocabulary! {
         DiscFriction = 9 "disc_friction",
         /// Braking ratio.
         BrakingRatio = 10 "braking_ratio",
-        /// Disturbance force in N/kN that the model does not explain.
-        Disturbance = 11 "disturbance_n_per_kn",
-        /// Curve resistance constant k in k/R, in N/kN m.
-        CurveConstant = 12 "curve_constant_n_per_kn_m",
-        /// Tunnel resistance in N/kN per m of tunnel.
-        TunnelConstant = 13 "tunnel_constant_n_per_kn_m",
         /// Acceleration bias in m/s².
         AccelerationBias = 14 "acceleration_bias_mps2",
         /// Unexplained force in N.
@@ -136,7 +153,7 @@ vocabulary! {
 }
 
 vocabulary! {
-    /// Why a status is what it is.
+    /// Why a status is what it is. The number 10 meant something once and stays unused.
     Reason: u32 {
         /// Nothing to remark.
         None = 0 "none",
@@ -158,8 +175,6 @@ vocabulary! {
         GradientUnknown = 8 "gradient_unknown",
         /// A factorisation failed; the filter was reset.
         NumericalFailure = 9 "numerical_failure",
-        /// No sample has come for a while.
-        InputStale = 10 "input_stale",
         /// The last manoeuvre that could excite the parameter lies too far back.
         EstimateStale = 11 "estimate_stale",
         /// Only a lower bound can be had from these data.
@@ -204,7 +219,7 @@ vocabulary! {
         WheelSlide = 13 "wheel_slide",
         /// Another quantity lies outside its physical range.
         OutOfRange = 14 "out_of_range",
-        /// The speed did not change while the force says that it must have.
+        /// A moving train has sent the same speed, place and forces for more than 2.5 s.
         Frozen = 15 "frozen",
     }
 }
@@ -279,6 +294,9 @@ mod tests {
 
     #[test]
     fn numbers_and_names_lead_back_to_the_member() {
+        for &quantity in Quantity::ALL {
+            assert_eq!(Quantity::from_name(quantity.name()), Some(quantity));
+        }
         for &kind in PipelineKind::ALL {
             assert_eq!(PipelineKind::from_number(kind as u32), Some(kind));
             assert_eq!(PipelineKind::from_name(kind.name()), Some(kind));

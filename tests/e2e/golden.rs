@@ -10,7 +10,7 @@ use dynocar::identify::{default_estimators, identify, published_samples};
 use dynocar::replay::{Rate, Replayer};
 use dynocar_core::dataset::Dataset;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId};
-use dynocar_tests::golden::{self, Golden, TOLERANCE};
+use dynocar_tests::golden::{self, Golden, TOLERANCE, without_stamps};
 use dynocar_tests::process::Site;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
@@ -59,18 +59,6 @@ fn the_golden_files_form_leads_back_to_the_same_bits() {
     assert_eq!(Golden::from_text(&golden.to_text()), Some(golden));
 }
 
-/// What is left of a snapshot without the times of this run of the daemon.
-fn without_times(snapshot: &ParameterSnapshot) -> ParameterSnapshot {
-    ParameterSnapshot {
-        epoch: 0,
-        pipeline_index: 0,
-        sample_published_ns: 0,
-        published_ns: 0,
-        vouched_ns: 0,
-        ..*snapshot
-    }
-}
-
 /// The snapshot of `v_mils` after a replay to a daemon with these pipelines.
 fn online(dataset: &Dataset, rate: Rate, kinds: &[PipelineKind]) -> ParameterSnapshot {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo");
@@ -114,7 +102,7 @@ fn rate_and_other_pipelines_change_no_bit() {
     let samples = published_samples(&dataset, TRAIN);
     let estimators = default_estimators();
     let v_mils = estimators.iter().find(|it| it.kind() == PipelineKind::VMils).expect("v_mils");
-    let offline = without_times(&identify(&dataset, &samples, v_mils).expect("default settings"));
+    let offline = without_stamps(&identify(&dataset, &samples, v_mils).expect("default settings"));
     let all: Vec<PipelineKind> = estimators.iter().map(|it| it.kind()).collect();
     let few = [PipelineKind::MassKalman, PipelineKind::VMils];
     let cases: [(Rate, &[PipelineKind]); 3] =
@@ -124,7 +112,7 @@ fn rate_and_other_pipelines_change_no_bit() {
         let complete = (0..5).find_map(|_| {
             let snapshot = online(&dataset, rate, kinds);
             let taken = snapshot.samples_used + snapshot.samples_rejected;
-            (taken == samples.len() as u64).then(|| without_times(&snapshot))
+            (taken == samples.len() as u64).then(|| without_stamps(&snapshot))
         });
         assert_eq!(complete.expect("a replay without loss"), offline, "{rate:?}, {kinds:?}");
     }

@@ -8,22 +8,11 @@ use dynocar::dataset;
 use dynocar::identify::{default_estimators, identify, published_samples};
 use dynocar::replay::{Rate, ReplayReport, Replayer};
 use dynocar_shared::{ParameterSnapshot, TrainId};
+use dynocar_tests::golden::without_stamps;
 use dynocar_tests::process::Site;
 use rustix::process::Signal;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
-
-/// What is left of a snapshot without the times of this run of the daemon.
-fn without_times(snapshot: &ParameterSnapshot) -> ParameterSnapshot {
-    ParameterSnapshot {
-        epoch: 0,
-        pipeline_index: 0,
-        sample_published_ns: 0,
-        published_ns: 0,
-        vouched_ns: 0,
-        ..*snapshot
-    }
-}
 
 /// Equal to the bit, so that NaN and the sign of zero count.
 fn bits(snapshot: &ParameterSnapshot) -> Vec<u64> {
@@ -74,10 +63,10 @@ fn every_pipeline_gives_the_same_bits_online_and_offline() {
     assert_eq!(report.snapshots.len(), estimators.len());
     for settings in &estimators {
         let kind = settings.kind();
-        let offline = without_times(&identify(&dataset, &samples, settings).unwrap());
+        let offline = without_stamps(&identify(&dataset, &samples, settings).unwrap());
         let number = kind as u32;
         let online = report.snapshots.iter().find(|it| it.pipeline_kind == number).unwrap();
-        let online = without_times(online);
+        let online = without_stamps(online);
         assert_eq!(bits(&online), bits(&offline), "{kind}");
         assert_eq!(online, offline, "{kind}");
         assert_eq!(online.samples_lost, 0, "{kind}");

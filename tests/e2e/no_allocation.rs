@@ -6,8 +6,10 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use dynocar_client::channel::{Sender, Transport};
-use dynocar_client::{SamplePublisher, SnapshotReader, monotonic_now_ns};
-use dynocar_shared::{ParameterSnapshot, PipelineKind, SampleField, TrainId, TrainSample};
+use dynocar_client::{NoAnswer, SamplePublisher, SnapshotReader, monotonic_now_ns};
+use dynocar_shared::{
+    ParameterSnapshot, PipelineKind, Quantity, SampleField, TrainId, TrainSample,
+};
 use dynocar_tests::process::Site;
 
 thread_local! {
@@ -70,10 +72,13 @@ fn receiving_and_polling_allocate_nothing_and_sending_only_the_transports_refere
         let mut snapshot = ParameterSnapshot::empty();
         (snapshot.train_id, snapshot.sequence) = (TRAIN.0, sequence);
         snapshot.pipeline_kind = PipelineKind::Rls as u32;
+        snapshot.quantities = Quantity::Resistance.bit();
         sending += allocations_of(|| snapshots.send(&snapshot).unwrap());
         receiving += allocations_of(|| {
             assert_eq!(reader.poll(), 1);
             assert!(reader.latest(PipelineKind::Rls, monotonic_now_ns()).is_some());
+            assert!(reader.resistance(monotonic_now_ns()).is_ok());
+            assert_eq!(reader.mass(0).unwrap_err(), NoAnswer::NotProvided);
         });
         (sending, receiving)
     };

@@ -53,6 +53,60 @@ fn every_test_that_the_promises_name_exists() {
 }
 
 #[test]
+fn the_reading_guide_has_a_line_for_every_member_of_the_vocabularies() {
+    use dynocar_shared::{PipelineKind, Quantity, Reason, RejectionReason, Status};
+    let guide = read("docs/guides/reading.md");
+    let sections: Vec<&str> = guide.split("\n## ").collect();
+    let names_in = |title: &str| -> Vec<&str> {
+        let is_wanted = |it: &&&str| it.starts_with(title);
+        let section = sections.iter().find(is_wanted).unwrap_or_else(|| panic!("no {title}"));
+        section
+            .lines()
+            .filter_map(|line| line.strip_prefix("| `")?.split_once('`'))
+            .map(|(name, _)| name)
+            .collect()
+    };
+    fn assert_all(names: &[&str], members: impl Iterator<Item = &'static str>) {
+        let members: Vec<&str> = members.collect();
+        for name in &members {
+            assert!(names.contains(name), "the page has no line for {name}");
+        }
+        for name in names {
+            assert!(members.contains(name), "the page tells of {name}, which is not there");
+        }
+    }
+    assert_all(&names_in("Every pipeline"), PipelineKind::ALL.iter().map(|it| it.name()));
+    assert_all(&names_in("Status"), Status::ALL.iter().map(|it| it.name()));
+    assert_all(&names_in("Reason"), Reason::ALL.iter().map(|it| it.name()));
+    let refusals = RejectionReason::ALL.iter().map(|it| it.name());
+    assert_all(&names_in("Why samples"), refusals);
+    for quantity in Quantity::ALL {
+        assert!(guide.contains(&format!("\n| `{quantity}` |")), "no line for {quantity}");
+    }
+}
+
+/// The page, the order in the code and the shipped configuration recommend the same.
+#[test]
+fn what_the_reading_guide_recommends_is_the_default_and_what_is_shipped() {
+    use dynocar_core::pipeline::quantities::candidates;
+    use dynocar_shared::Quantity;
+    let guide = read("docs/guides/reading.md");
+    let config = read("config/daemon.toml");
+    for &quantity in Quantity::ALL {
+        let best = candidates(quantity)[0].name();
+        let row = guide.lines().find(|line| line.starts_with(&format!("| `{quantity}` |")));
+        assert!(row.expect("a row").contains(&format!("| `{best}`")), "{quantity}: {row:?}");
+        assert!(guide.contains(&format!("| `{best}` | **recommended** for")), "{best}");
+        assert!(config.contains(&format!("kind = \"{best}\"")), "{best} is not in the default");
+    }
+    let recommended = guide.matches("**recommended**").count();
+    assert_eq!(
+        recommended, 5,
+        "one for each quantity, the two of the brake alike, and the monitor"
+    );
+}
+
+#[test]
 fn every_unsafe_block_is_counted_and_justified() {
     let mut files = Vec::new();
     for folder in ["shared/src", "client/src", "daemon/src", "daemon/core/src"] {

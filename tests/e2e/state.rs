@@ -172,7 +172,7 @@ fn a_warm_start_is_sooner_estimated_and_no_less_right_than_a_cold_one() {
     let dataset = dataset::load(&demo_folder()).unwrap();
     let samples = published_samples(&dataset, TRAIN);
     let kinds = [
-        PipelineKind::LeastSquares,
+        PipelineKind::Ls,
         PipelineKind::Rls,
         PipelineKind::RegularisedRls,
         PipelineKind::Mils,

@@ -74,6 +74,21 @@ pub fn fingerprint() -> u64 {
     hash
 }
 
+/// What the samples made of a snapshot: without the times of this run of the daemon, and without
+/// what its configuration stamps on it.
+pub fn without_stamps(snapshot: &ParameterSnapshot) -> ParameterSnapshot {
+    ParameterSnapshot {
+        epoch: 0,
+        pipeline_index: 0,
+        quantities: 0,
+        train_quantities: 0,
+        sample_published_ns: 0,
+        published_ns: 0,
+        vouched_ns: 0,
+        ..*snapshot
+    }
+}
+
 /// Takes a snapshot into a hash, but for what a daemon's clock stamps on it.
 fn mix_snapshot(hash: &mut u64, it: &ParameterSnapshot) {
     let floats = it.values.iter().chain(&it.covariance).chain([

@@ -120,10 +120,18 @@ impl Transport {
                 Err(error) if is_settling(&error) && start.elapsed() < SETTLING_TIME => {
                     std::thread::sleep(Duration::from_millis(2));
                 }
+                Err(PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(
+                    PublishSubscribeOpenError::ExceedsMaxNumberOfNodes,
+                )) => return Err(no_place_left::<T>(train, T::SENDERS_MAX + T::RECEIVERS_MAX)),
                 Err(error) => return Err(refused(explain(&error))),
             }
         }
     }
+}
+
+/// The refusal where every place of a channel is taken.
+fn no_place_left<T: Payload>(train: TrainId, limit: usize) -> ChannelError {
+    ChannelError::NoPlaceLeft { train, channel: T::CHANNEL.name(), limit }
 }
 
 fn service_name<T: Payload>(train: TrainId) -> String {
@@ -162,9 +170,6 @@ fn explain(error: &PublishSubscribeOpenOrCreateError) -> String {
     let hint = match error {
         Error::PublishSubscribeOpenError(Open::IncompatibleTypes) => {
             "; a process of another Dynocar release uses this channel: stop it, or update"
-        }
-        Error::PublishSubscribeOpenError(Open::ExceedsMaxNumberOfNodes) => {
-            "; too many processes use this channel"
         }
         Error::PublishSubscribeOpenError(Open::ServiceInCorruptedState) => {
             "; files in the run-time directory or /dev/shm were removed or overwritten: stop every \

@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use dynocar_shared::TrainId;
-use iceoryx2::port::publisher::Publisher;
-use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
+use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{BackpressureStrategy, ipc};
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
+use super::no_place_left;
 use super::users::Users;
 use super::wire::{Payload, Wire};
 use crate::error::ChannelError;
@@ -46,7 +47,12 @@ impl<T: Payload> Sender<T> {
             .max_loaned_samples(1)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
-            .map_err(|error| refused::<T>(train, "sender", error))?;
+            .map_err(|error| match error {
+                PublisherCreateError::ExceedsMaxSupportedPublishers => {
+                    no_place_left::<T>(train, T::SENDERS_MAX)
+                }
+                error => refused::<T>(train, "sender", error),
+            })?;
         Ok(Sender { publisher, _users: Arc::clone(users) })
     }
 
@@ -85,11 +91,15 @@ impl<T: Payload> Receiver<T> {
         train: TrainId,
         users: &Arc<Users>,
     ) -> Result<Self, ChannelError> {
-        let subscriber = service
-            .subscriber_builder()
-            .buffer_size(T::BUFFER)
-            .create()
-            .map_err(|error| refused::<T>(train, "receiver", error))?;
+        let subscriber =
+            service.subscriber_builder().buffer_size(T::BUFFER).create().map_err(|error| {
+                match error {
+                    SubscriberCreateError::ExceedsMaxSupportedSubscribers => {
+                        no_place_left::<T>(train, T::RECEIVERS_MAX)
+                    }
+                    error => refused::<T>(train, "receiver", error),
+                }
+            })?;
         Ok(Receiver { subscriber, _users: Arc::clone(users) })
     }
 

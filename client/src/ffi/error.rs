@@ -3,6 +3,7 @@
 use std::ffi::{CStr, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use crate::answers::NoAnswer;
 use crate::channel::SendRefused;
 use crate::error::ChannelError;
 
@@ -60,6 +61,10 @@ codes! {
     Panic = 12 c"a fault inside the library",
     /// The train does not slow down, at the values given or at the edge of the bound.
     DoesNotStop = 13 c"the train does not slow down",
+    /// The daemon's configuration lets no pipeline answer this quantity for the train.
+    NotProvided = 14 c"no pipeline answers this quantity for the train",
+    /// Every place of the train's channel is taken: close what is no longer needed.
+    NoPlaceLeft = 15 c"all places of the train's channel are taken",
 }
 
 impl From<&ChannelError> for Code {
@@ -72,7 +77,17 @@ impl From<&ChannelError> for Code {
             ChannelError::Transport { .. } | ChannelError::SharedMemoryFull { .. } => {
                 Code::Transport
             }
+            ChannelError::NoPlaceLeft { .. } => Code::NoPlaceLeft,
             ChannelError::Send(_) => Code::SendRefused,
+        }
+    }
+}
+
+impl From<NoAnswer> for Code {
+    fn from(why: NoAnswer) -> Self {
+        match why {
+            NoAnswer::NoSnapshot => Code::NoSnapshot,
+            NoAnswer::NotProvided => Code::NotProvided,
         }
     }
 }

@@ -3,7 +3,9 @@
 use std::ffi::{CStr, c_char};
 
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_shared::{Manoeuvre, Parameter, PipelineKind, Reason, RejectionReason, Status};
+use dynocar_shared::{
+    Manoeuvre, Parameter, PipelineKind, Quantity, Reason, RejectionReason, Status,
+};
 
 /// Room for the longest name and its NUL.
 const NAME_BYTES: usize = 40;
@@ -52,6 +54,8 @@ macro_rules! export_names {
 export_names! {
     /// The name of a [`PipelineKind`].
     dynocar_pipeline_name: PipelineKind by |it| it as u32,
+    /// The name of a [`Quantity`].
+    dynocar_quantity_name: Quantity by |it| it as u32,
     /// The name of a [`Parameter`].
     dynocar_parameter_name: Parameter by |it| it as u32,
     /// The name of a [`Status`].

@@ -3,7 +3,9 @@
 use std::ffi::c_char;
 
 use dynocar_shared::services::PIPELINES_MAX;
-use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, Status, TrainId, wire_struct};
+use dynocar_shared::{
+    ParameterSnapshot, PipelineKind, Quantity, Reason, Status, TrainId, wire_struct,
+};
 
 use super::about::host_of;
 use super::error::{Code, Message, guard, guard_in_words};
@@ -127,6 +129,32 @@ pub unsafe extern "C" fn dynocar_reader_poll(reader: *mut ReaderHandle, news: *m
     })
 }
 
+/// Copies the newest snapshot of the pipeline that answers a quantity; after a failure the reading
+/// holds nothing that may be used.
+///
+/// # Safety
+///
+/// See [the module](super#safety).
+///
+/// # Real-time
+///
+/// Safe for the control cycle, see [`SnapshotReader::quantity`].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dynocar_reader_quantity(
+    reader: *mut ReaderHandle,
+    quantity: u32,
+    now_ns: i64,
+    reading: *mut ReadingCopy,
+) -> i32 {
+    // SAFETY: promised by the caller.
+    unsafe {
+        copy_reading(reader, reading, |reader| {
+            let quantity = Quantity::from_number(quantity).ok_or(Code::BadNumber)?;
+            Ok(reader.quantity(quantity, now_ns)?)
+        })
+    }
+}
+
 /// Copies the newest snapshot of the first pipeline of a kind; after a failure the reading holds
 /// nothing that may be used.
 ///
@@ -148,7 +176,7 @@ pub unsafe extern "C" fn dynocar_reader_latest(
     unsafe {
         copy_reading(reader, reading, |reader| {
             let kind = PipelineKind::from_number(pipeline_kind).ok_or(Code::BadNumber)?;
-            Ok(reader.latest(kind, now_ns))
+            reader.latest(kind, now_ns).ok_or(Code::NoSnapshot)
         })
     }
 }
@@ -177,7 +205,7 @@ pub unsafe extern "C" fn dynocar_reader_latest_by_index(
             }
             let is_wanted =
                 |reading: &Reading<'_>| reading.snapshot.pipeline_index == pipeline_index;
-            Ok(reader.readings(now_ns).find(is_wanted))
+            reader.readings(now_ns).find(is_wanted).ok_or(Code::NoSnapshot)
         })
     }
 }
@@ -219,7 +247,7 @@ pub unsafe extern "C" fn dynocar_reader_close(reader: *mut ReaderHandle) -> i32 
 unsafe fn copy_reading(
     reader: *mut ReaderHandle,
     place: *mut ReadingCopy,
-    pick: impl for<'a> FnOnce(&'a SnapshotReader) -> Result<Option<Reading<'a>>, Code>,
+    pick: impl for<'a> FnOnce(&'a SnapshotReader) -> Result<Reading<'a>, Code>,
 ) -> i32 {
     guard(|| {
         // SAFETY: promised by the caller; every bit pattern is a reading.
@@ -227,7 +255,7 @@ unsafe fn copy_reading(
         *place = ReadingCopy::none();
         // SAFETY: promised by the caller.
         let reader = unsafe { Handle::end(reader)? };
-        *place = pick(reader)?.ok_or(Code::NoSnapshot)?.into();
+        *place = pick(reader)?.into();
         Ok(())
     })
 }

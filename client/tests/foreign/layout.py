@@ -31,6 +31,7 @@ VOCABULARIES = {
     "STATUS": dynocar.Status,
     "REASON": dynocar.Reason,
     "PIPELINE": dynocar.PipelineKind,
+    "QUANTITY": dynocar.Quantity,
     "PARAMETER": dynocar.Parameter,
     "REJECTED": dynocar.RejectionReason,
     "MANOEUVRE": dynocar.Manoeuvre,

@@ -47,9 +47,7 @@ static int cycle(dynocar_publisher *publisher, dynocar_reader *reader)
     dynocar_resistance resistance;
     if (dynocar_publisher_publish(publisher, &sample) != DYNOCAR_OK
         || dynocar_reader_poll(reader, NULL) != DYNOCAR_OK
-        || dynocar_reader_latest(reader, DYNOCAR_PIPELINE_RESISTANCE_KALMAN,
-                                 dynocar_monotonic_now_ns(), &reading)
-               != DYNOCAR_OK) {
+        || dynocar_reader_resistance(reader, dynocar_monotonic_now_ns(), &reading) != DYNOCAR_OK) {
         return 0;
     }
     return dynocar_snapshot_resistance(&reading.snapshot, 20.0, 1e5, &resistance) == DYNOCAR_OK;

@@ -78,16 +78,21 @@ static void print_snapshot(const dynocar_reading *reading)
 /* Publishes until an answer to the 20th sample or a later one is usable. */
 static long drive(dynocar_publisher *publisher, dynocar_reader *reader)
 {
-    dynocar_reading reading, same;
+    dynocar_reading reading, same, kind;
     for (long cycle = 0; cycle < PATIENCE_CYCLES; cycle++) {
         int64_t now_ns = dynocar_monotonic_now_ns();
         publish(publisher, (double)cycle);
         must(dynocar_reader_poll(reader, NULL), "poll", "");
-        dynocar_code code =
-            dynocar_reader_latest(reader, DYNOCAR_PIPELINE_RESISTANCE_KALMAN, now_ns, &reading);
+        dynocar_code code = dynocar_reader_resistance(reader, now_ns, &reading);
         if (code == DYNOCAR_OK && reading.is_usable && reading.snapshot.sample_sequence >= 20) {
             must(dynocar_reader_latest_by_index(reader, 3, now_ns, &same), "by index", "");
-            printf("same %d\n", same.snapshot.sequence == reading.snapshot.sequence);
+            must(dynocar_reader_latest(reader, DYNOCAR_PIPELINE_RESISTANCE_KALMAN, now_ns, &kind),
+                 "by kind", "");
+            printf("same %d\n", same.snapshot.sequence == reading.snapshot.sequence
+                                    && kind.snapshot.sequence == reading.snapshot.sequence);
+            must(dynocar_reader_braking_ratio(reader, now_ns, &same), "braking ratio", "");
+            printf("provided %" PRIu32 " %" PRId32 "\n", same.is_usable,
+                   dynocar_reader_mass(reader, now_ns, &kind));
             print_snapshot(&reading);
             return cycle + 1;
         }

@@ -55,10 +55,15 @@ def drive(publisher, reader):
         now_ns = dynocar.monotonic_now_ns()
         publish(publisher, cycle)
         reader.poll()
-        snapshot = reader.latest(PipelineKind.RESISTANCE_KALMAN, now_ns)
-        if snapshot is not None and snapshot.is_usable and snapshot.raw.sample_sequence >= 20:
+        snapshot = reader.resistance(now_ns)
+        if snapshot.is_usable and snapshot.raw.sample_sequence >= 20:
             same = reader.latest_by_index(3, now_ns)
-            print("same", int(same.raw.sequence == snapshot.raw.sequence))
+            kind = reader.latest(PipelineKind.RESISTANCE_KALMAN, now_ns)
+            sequences = {same.raw.sequence, kind.raw.sequence, snapshot.raw.sequence}
+            print("same", int(len(sequences) == 1))
+            mass = reader.mass(now_ns)
+            print("provided", int(reader.braking_ratio(now_ns).is_usable), int(mass.code))
+            assert (mass.why, mass.is_usable, mass.is_stale) == ("not_provided", False, True)
             print_snapshot(snapshot)
             return cycle + 1
         time.sleep(0.001)

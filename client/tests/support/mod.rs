@@ -14,7 +14,8 @@ use dynocar_client::peer::RoleLock;
 use dynocar_client::{Host, Role, monotonic_now_ns};
 use dynocar_shared::snapshot::packed_index;
 use dynocar_shared::{
-    Parameter, ParameterSnapshot, PipelineKind, RejectionReason, Status, TrainId, TrainSample,
+    Parameter, ParameterSnapshot, PipelineKind, Quantity, RejectionReason, Status, TrainId,
+    TrainSample,
 };
 
 pub const TRAIN: TrainId = TrainId(11);
@@ -23,8 +24,9 @@ pub const PIPELINE_INDEX: u32 = 3;
 /// A child that says nothing for so long has failed.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-pub fn client_directory() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
+/// The client's folder, from its own tests and from those of its siblings.
+pub fn client_directory() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../client")
 }
 
 /// The folder in which cargo put this test and, with the same build, the libraries.
@@ -46,6 +48,20 @@ pub fn compiler(variable: &str, default: &str, standard: &str) -> Command {
     command.args(["-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror"]);
     command.arg("-I").arg(client_directory().join("include"));
     command
+}
+
+/// [`compiler`] for C++.
+pub fn cpp_compiler() -> Command {
+    require("c++", "g++");
+    compiler("CXX", "c++", "c++17")
+}
+
+/// Compiles and links a program as C++ into `out`.
+pub fn build_cpp(source: &Path, out: &Path) {
+    let mut command = cpp_compiler();
+    command.args(["-x", "c++"]).arg(source).args(["-x", "none", "-o"]).arg(out);
+    command.arg(library_directory().join("libdynocar_client.a"));
+    must_succeed(command.args(["-lpthread", "-ldl", "-lm"]));
 }
 
 /// Compiles and links a C program into `out`.
@@ -81,6 +97,7 @@ pub fn must_succeed(command: &mut Command) -> String {
 
 /// A call of a script that finds `dynocar.py` and the library just built.
 pub fn python(script: &Path) -> Command {
+    require("python3", "python3");
     let mut command = Command::new("python3");
     command.arg("-B").arg(script);
     command.env("PYTHONPATH", client_directory().join("python"));
@@ -88,13 +105,14 @@ pub fn python(script: &Path) -> Command {
     command
 }
 
-/// True when the program is there; says so when it is not.
-pub fn is_installed(program: &str) -> bool {
-    let found = Command::new(program).arg("--version").output().is_ok_and(|it| it.status.success());
-    if !found {
-        println!("{program} was not found: what needs it is NOT tested");
+/// Sees to a program: installs Debian's or Ubuntu's package where there is none, or fails.
+pub fn require(program: &str, package: &str) {
+    let is_there =
+        Command::new(program).arg("--version").output().is_ok_and(|it| it.status.success());
+    if !is_there {
+        let script = client_directory().join("../tests/install_tool.sh");
+        must_succeed(Command::new(script).args([package, program]));
     }
-    found
 }
 
 /// A root of its own; takes the shared memory away that killed processes left under it.
@@ -172,6 +190,8 @@ pub fn snapshot_for(sample: &TrainSample) -> ParameterSnapshot {
     snapshot.pipeline_kind = PipelineKind::ResistanceKalman as u32;
     snapshot.status = Status::Estimated as u32;
     snapshot.reason = 0;
+    snapshot.quantities = Quantity::Resistance.bit() | Quantity::BrakingRatio.bit();
+    snapshot.train_quantities = snapshot.quantities;
     snapshot.sample_sequence = sample.sequence;
     snapshot.published_ns = monotonic_now_ns();
     snapshot.vouched_ns = snapshot.published_ns;

@@ -9,9 +9,11 @@ use dynocar_core::pipeline::EstimatorSettings;
 use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::{PipelineKind, TrainId};
 
-use super::raw::{RawConfig, RawMetrics, RawPipeline, RawState, RawThread, RawTrain};
+use super::raw::{
+    RawConfig, RawMetrics, RawPipeline, RawQuantities, RawState, RawThread, RawTrain,
+};
 use super::{
-    ConfigError, DaemonConfig, IdleStrategy, PipelineConfig, StateConfig, ThreadConfig,
+    Answers, ConfigError, DaemonConfig, IdleStrategy, PipelineConfig, StateConfig, ThreadConfig,
     TrainConfig, is_slow,
 };
 use crate::dataset::{load_track, load_train};
@@ -20,12 +22,12 @@ use crate::dataset::{load_track, load_train};
 const THREADS_MAX: usize = 10;
 
 /// Names the configuration's file in every refusal.
-struct Checker<'a> {
+pub(super) struct Checker<'a> {
     path: &'a Path,
 }
 
 impl Checker<'_> {
-    fn refuse<T>(
+    pub(super) fn refuse<T>(
         &self,
         key: impl Into<String>,
         value: impl ToString,
@@ -54,10 +56,14 @@ pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
         message: error.to_string().trim_end().to_owned(),
     })?;
     let checker = Checker { path };
-    let trains = check_trains(&checker, raw.trains)?;
+    let (mut trains, named): (Vec<_>, Vec<_>) =
+        check_trains(&checker, raw.trains)?.into_iter().unzip();
     let mut threads = check_threads(&checker, raw.threads, raw.daemon.idle)?;
     let pipelines =
         check_pipelines(&checker, raw.pipelines, &trains, &mut threads, raw.daemon.idle)?;
+    for (train, named) in trains.iter_mut().zip(&named) {
+        train.answers = Answers::settle(&checker, train.id, named, &raw.quantities, &pipelines)?;
+    }
     keep_slow_apart(&checker, &pipelines, &threads)?;
     let in_use: HashSet<usize> = pipelines.iter().map(|pipeline| pipeline.thread).collect();
     if let Some(unused) = (0..threads.len()).find(|thread| !in_use.contains(thread)) {
@@ -107,7 +113,11 @@ fn check_state(checker: &Checker, raw: RawState) -> Result<StateConfig, ConfigEr
     })
 }
 
-fn check_trains(checker: &Checker, raw: Vec<RawTrain>) -> Result<Vec<TrainConfig>, ConfigError> {
+/// Checks the trains; which pipelines answer for them is known only with the pipelines.
+fn check_trains(
+    checker: &Checker,
+    raw: Vec<RawTrain>,
+) -> Result<Vec<(TrainConfig, RawQuantities)>, ConfigError> {
     if raw.is_empty() {
         return checker.refuse("trains", "none", "at least one [[trains]] table");
     }
@@ -119,12 +129,10 @@ fn check_trains(checker: &Checker, raw: Vec<RawTrain>) -> Result<Vec<TrainConfig
                 return checker.refuse("trains.id", train.id, "a number that no other train has");
             }
             let track = train.track.map(|file| load_track(&folder.join(file))).transpose()?;
-            Ok(TrainConfig {
-                id: TrainId(train.id),
-                model: Arc::new(load_train(&folder.join(train.file))?),
-                track: track.map(Arc::new),
-                wheel_set: train.wheel_set,
-            })
+            let model = Arc::new(load_train(&folder.join(train.file))?);
+            let (id, track, wheel_set) = (TrainId(train.id), track.map(Arc::new), train.wheel_set);
+            let config = TrainConfig { id, model, track, wheel_set, answers: Answers::default() };
+            Ok((config, train.quantities))
         })
         .collect()
 }

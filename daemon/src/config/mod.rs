@@ -5,9 +5,11 @@
 
 mod check;
 mod pace;
+mod quantities;
 mod raw;
 
 pub use pace::is_slow;
+pub use quantities::Answers;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -61,6 +63,8 @@ pub struct TrainConfig {
     pub track: Option<Arc<Track>>,
     /// Which wheels it runs on; estimates are not kept across a change. Empty when not told.
     pub wheel_set: String,
+    /// The pipelines that answer a controller's questions, each by its number.
+    pub answers: Answers,
 }
 
 /// Where and how estimates are kept over restarts.

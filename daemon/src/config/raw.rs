@@ -1,5 +1,6 @@
 //! The shape of a configuration's text, before anything is checked.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::Deserialize;
@@ -17,6 +18,8 @@ pub struct RawConfig {
     pub threads: Vec<RawThread>,
     #[serde(default)]
     pub pipelines: Vec<RawPipeline>,
+    #[serde(default)]
+    pub quantities: RawQuantities,
     pub state: Option<RawState>,
     pub metrics: Option<RawMetrics>,
 }
@@ -61,7 +64,12 @@ pub struct RawTrain {
     pub track: Option<PathBuf>,
     #[serde(default)]
     pub wheel_set: String,
+    #[serde(default)]
+    pub quantities: RawQuantities,
 }
+
+/// Name of the pipeline that answers, by the quantity's name.
+pub type RawQuantities = BTreeMap<String, String>;
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]

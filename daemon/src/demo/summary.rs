@@ -1,6 +1,6 @@
 //! What the demo found.
 
-use dynocar_shared::{ParameterSnapshot, PipelineKind};
+use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Quantity, Reason, SampleField};
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
@@ -22,8 +22,12 @@ pub struct DemoAnswer {
 pub struct PipelineAnswer {
     /// The estimator's name.
     pub name: &'static str,
+    /// The quantities that it answers a controller for: the recommended pipeline for each.
+    pub answers: Vec<&'static str>,
     /// Its status at the end.
     pub status: &'static str,
+    /// Why.
+    pub reason: &'static str,
     /// Samples that entered the estimate.
     pub used: u64,
     /// Samples refused.
@@ -95,15 +99,24 @@ impl Summary<'_> {
         println!();
         self.print_resistance();
         println!(
-            "\n{:<20} {:<12} {:>9} {:>9} {:>9}",
-            "pipeline", "status", "used", "rejected", "lost"
+            "\n{:<18} {:<12} {:<32} {:>7} {:>9} {:>5}",
+            "pipeline", "answers", "status", "used", "rejected", "lost"
         );
         for it in &answer.pipelines {
+            let status = match it.reason {
+                "none" => it.status.to_owned(),
+                reason => format!("{} ({reason})", it.status),
+            };
             println!(
-                "{:<20} {:<12} {:>9} {:>9} {:>9}",
-                it.name, it.status, it.used, it.rejected, it.lost
+                "{:<18} {:<12} {status:<32} {:>7} {:>9} {:>5}",
+                it.name,
+                it.answers.join(" "),
+                it.used,
+                it.rejected,
+                it.lost
             );
         }
+        self.print_mass();
         println!(
             "\n{} samples published at {} times the recorded rate, {} lost",
             answer.samples.published, self.rate, answer.samples.lost
@@ -114,6 +127,24 @@ impl Summary<'_> {
             answer.latency.p99_ns as f64 * 1e-3,
             answer.latency.count
         );
+    }
+
+    /// Declared and estimated mass of the last run.
+    fn print_mass(&self) {
+        let last = self.dataset.runs.last().and_then(|run| run.samples.last());
+        let declared_kg = last.and_then(|sample| sample.get(SampleField::Mass));
+        let declared_t = 1e-3 * declared_kg.unwrap_or(self.dataset.train.mass_kg);
+        for it in self.snapshots.iter().filter(|it| it.answers(Quantity::Mass)) {
+            if let (Some(mass_t), Some(std_t)) =
+                (it.value(Parameter::Mass), it.std(Parameter::Mass))
+            {
+                let half_width_t = 1.96 * std_t;
+                println!(
+                    "\nmass on the last run: declared {declared_t:.0} t, \
+                     estimated {mass_t:.0} ± {half_width_t:.0} t"
+                );
+            }
+        }
     }
 
     /// Declared and estimated resistance over the driven speeds.
@@ -148,9 +179,12 @@ fn name(snapshot: &ParameterSnapshot) -> &'static str {
 }
 
 fn pipeline_answer(snapshot: &ParameterSnapshot) -> PipelineAnswer {
+    let answered = Quantity::ALL.iter().filter(|&&it| snapshot.answers(it));
     PipelineAnswer {
         name: name(snapshot),
+        answers: answered.map(|it| it.name()).collect(),
         status: snapshot.status().name(),
+        reason: snapshot.reason().map_or("?", Reason::name),
         used: snapshot.samples_used,
         rejected: snapshot.samples_rejected,
         lost: snapshot.samples_lost,

@@ -94,13 +94,19 @@ pub fn look_at(host: &Host, train: TrainId) -> Result<TrainHealth, ChannelError>
         return Ok(TrainHealth { train, verdict, daemon, pipelines: Vec::new() });
     }
     let pipelines = pipelines_of(&mut SnapshotReader::open(host, train)?);
-    let of_pipeline = |it: &PipelineHealth| match it.status {
-        _ if it.is_stale => Verdict::Stale,
-        Status::Degraded | Status::Invalid => Verdict::Degraded,
-        Status::Estimated | Status::Unestimated => Verdict::Ok,
-    };
-    let verdict = pipelines.iter().map(of_pipeline).max().unwrap_or(Verdict::Stale);
+    let verdict = pipelines.iter().map(verdict_of).max().unwrap_or(Verdict::Stale);
     Ok(TrainHealth { train, verdict, daemon, pipelines })
+}
+
+/// A bound of adhesion, or adhesion of an earlier braking, is what every train has that brakes well on
+/// a good rail: nothing is amiss.
+fn verdict_of(it: &PipelineHealth) -> Verdict {
+    match (it.status, it.reason) {
+        _ if it.is_stale => Verdict::Stale,
+        (Status::Degraded, Some(Reason::OnlyLowerBound | Reason::EstimateStale)) => Verdict::Ok,
+        (Status::Degraded | Status::Invalid, _) => Verdict::Degraded,
+        (Status::Estimated | Status::Unestimated, _) => Verdict::Ok,
+    }
 }
 
 /// The pipelines that speak up within [`PATIENCE`]; all of them do within a heartbeat.
@@ -128,4 +134,23 @@ fn pipelines_of(reader: &mut SnapshotReader) -> Vec<PipelineHealth> {
         is_stale: reading.is_stale,
     };
     reader.readings(monotonic_now_ns()).map(of_reading).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn good_brakes_on_a_good_rail_are_no_degradation() {
+        let verdict = |status, reason, is_stale| {
+            let (reason, age_ms) = (Some(reason), 0);
+            let kind = "adhesion_law";
+            verdict_of(&PipelineHealth { index: 0, kind, status, reason, age_ms, is_stale })
+        };
+        let degraded = Status::Degraded;
+        assert_eq!(verdict(degraded, Reason::OnlyLowerBound, false), Verdict::Ok);
+        assert_eq!(verdict(degraded, Reason::EstimateStale, false), Verdict::Ok);
+        assert_eq!(verdict(degraded, Reason::InnovationsTooLarge, false), Verdict::Degraded);
+        assert_eq!(verdict(Status::Invalid, Reason::DaemonSilent, true), Verdict::Stale);
+    }
 }

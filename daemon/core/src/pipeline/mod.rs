@@ -11,6 +11,7 @@ mod kept;
 pub mod mass;
 pub mod monitor;
 pub mod output;
+pub mod quantities;
 pub mod resistance;
 pub mod sample_gate;
 pub mod settings;
@@ -96,7 +97,8 @@ impl Pipeline {
 
     /// Takes one sample and gives the snapshot after it.
     ///
-    /// The snapshot's epoch and time of publishing are the caller's to fill in; everything else
+    /// The snapshot's epoch, its time of publishing and what it answers are the caller's to fill in;
+    /// everything else
     /// depends on the samples alone.
     ///
     /// # Real-time

@@ -116,7 +116,7 @@ estimator_kinds! {
     /// No estimate: the latency floor.
     Echo(NoSettings) = Echo, |_, _| boxed(Ok(Echo));
     /// Regularised least squares over all rows.
-    Ls(LsSettings) = LeastSquares, |s, t| boxed(resistance::ls(t, s));
+    Ls(LsSettings) = Ls, |s, t| boxed(resistance::ls(t, s));
     /// Recursive least squares with directional forgetting.
     Rls(RlsSettings) = Rls, |s, t| boxed(resistance::rls(t, s));
     /// Regularised recursive least squares.

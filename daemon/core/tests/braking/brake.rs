@@ -33,7 +33,7 @@ fn one_factor_is_reported_with_the_other_held_and_the_snapshot_says_so() {
             assert!((value - truth).abs() < 4.0 * std, "{kind}: {value} ± {std}, not {truth}");
             assert!((value / truth - 1.0).abs() < 0.1, "{kind}: {value} instead of {truth}");
             assert_eq!(snapshot.value(held), None, "{kind} cannot know the held factor");
-            assert_eq!(snapshot.status(), Status::Degraded);
+            assert_eq!(snapshot.status(), Status::Estimated);
             assert_eq!(snapshot.reason(), Some(Reason::NotIdentifiable));
         }
     }

@@ -1,13 +1,15 @@
 //! A daemon configuration: what it serves, with which estimators, on which threads.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
+use dynocar_shared::Quantity;
 use serde::Serialize;
 
 use super::Understood;
 use super::report::line;
 use crate::cli::text::{TextTable, short};
-use crate::config::DaemonConfig;
+use crate::config::{DaemonConfig, TrainConfig};
 
 /// Reads a configuration with the train and track files it names, and builds every estimator, so
 /// that a setting out of range is found here and not when the daemon starts.
@@ -57,7 +59,24 @@ pub(super) fn report(config: &DaemonConfig) -> String {
             trains.join(" "),
         ]);
     }
-    format!("{text}\n{trains}\n{pipelines}")
+    let mut answers = TextTable::new(&["quantity", "answered for train", "by"], &[1, 2]);
+    for train in &config.trains {
+        for (quantity, name) in answers_of(config, train) {
+            answers.push(vec![quantity.into(), train.id.to_string(), name.into()]);
+        }
+    }
+    format!("{text}\n{trains}\n{pipelines}\n{answers}")
+}
+
+/// Each quantity that a train's controller may ask for, with the pipeline that answers.
+fn answers_of<'a>(
+    config: &'a DaemonConfig,
+    train: &'a TrainConfig,
+) -> impl Iterator<Item = (&'static str, &'a str)> {
+    Quantity::ALL.iter().filter_map(|&quantity| {
+        let place = train.answers.place(quantity)?;
+        Some((quantity.name(), config.pipelines[place].name.as_str()))
+    })
 }
 
 /// A daemon configuration, machine-readable.
@@ -72,6 +91,7 @@ struct DaemonTrainAnswer<'a> {
     id: u64,
     name: &'a str,
     track: Option<&'a str>,
+    answers: BTreeMap<&'static str, &'a str>,
 }
 
 #[derive(Debug, Serialize)]
@@ -95,6 +115,7 @@ pub(super) fn answer(config: &DaemonConfig) -> DaemonAnswer<'_> {
                 id: train.id.0,
                 name: &train.model.name,
                 track: train.track.as_ref().map(|track| track.name.as_str()),
+                answers: answers_of(config, train).collect(),
             })
             .collect(),
         pipelines: config

@@ -132,8 +132,9 @@ fn judge(
     } else if !is_number {
         (Status::Degraded, Reason::OnlyLowerBound)
     } else if quantity != Quantity::Adhesion {
-        // Only friction times ratio acts on the train: the other factor is held as declared.
-        (Status::Degraded, Reason::NotIdentifiable)
+        // Only friction times ratio acts on the train, and the other factor is held as declared:
+        // who reckons with both has the force that acts.
+        (Status::Estimated, Reason::NotIdentifiable)
     } else {
         (Status::Estimated, Reason::None)
     }

@@ -51,7 +51,7 @@ pub fn ls(
     settings: &LsSettings,
 ) -> Result<ResistanceLeastSquares, SettingError> {
     settings.check()?;
-    let kind = PipelineKind::LeastSquares;
+    let kind = PipelineKind::Ls;
     let (data, lambda) = (settings.data, settings.lambda);
     Ok(ResistanceLeastSquares::new(kind, train, data, Solver::Batch, lambda, 1.0))
 }

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use dynocar_shared::{Manoeuvre, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 
 use super::kalman::TrajectoryKalmanSettings;
+use super::motion::tests::sample;
 use super::newton_settings::{FitMethod, TrajectoryNewtonSettings};
-use super::test_runs::{METRO, metro};
+use super::test_runs::{METRO, metro, normal, random};
 use crate::force::ResolvedSample;
 use crate::pipeline::settings::EstimatorSettings;
 use crate::pipeline::{Estimator, Outcome};
@@ -222,4 +223,46 @@ fn settings_are_read_by_name_and_unknown_names_are_refused() {
     assert_eq!(settings.kind(), PipelineKind::TrajectoryNewton);
     assert!(read("kind = \"trajectory_kalman\"\nhypotheses = 4").is_ok());
     assert!(read("kind = \"trajectory_kalman\"\nhypothesis = 4").is_err());
+}
+
+/// A train that holds a speed, within 1 m/s of it, over 20 minutes.
+fn cruise(seed: u64) -> Vec<ResolvedSample> {
+    let mut random = random(seed);
+    let mut speed_mps = 15.0;
+    let force_at = |time_s: f64| {
+        let wave = 9_000.0 * (std::f64::consts::TAU * time_s / 60.0).cos();
+        981.0 * METRO.w0_n_per_kn(15.0) + wave
+    };
+    (0..6_000)
+        .map(|index| {
+            let time_s = 0.2 * f64::from(index);
+            let measured_mps = speed_mps + 0.02 * normal(&mut random);
+            let taken = sample(index, measured_mps, force_at(time_s));
+            let force_n = 0.5 * (force_at(time_s) + force_at(time_s + 0.2));
+            let pull_n = force_n - 981.0 * METRO.w0_n_per_kn(speed_mps);
+            speed_mps += 0.2 * pull_n / 1.06e5 + 5e-4 * 0.2_f64.sqrt() * normal(&mut random);
+            taken
+        })
+        .collect()
+}
+
+#[test]
+fn in_cruise_the_resistance_there_may_be_used_although_its_coefficients_are_not_told_apart() {
+    const SEEDS: u64 = 30;
+    let mut held = 0;
+    for seed in 0..SEEDS {
+        let mut estimator = TrajectoryKalmanSettings::default().build(&train()).unwrap();
+        let snapshot = feed(&mut estimator, &cruise(seed));
+        let said = (snapshot.status(), snapshot.reason());
+        assert_eq!(said, (Status::Estimated, Some(Reason::WeakExcitation)), "seed {seed}");
+        let there = snapshot.resistance_at(15.0).unwrap();
+        let normalised = (there.w0_n_per_kn - METRO.w0_n_per_kn(15.0)) / there.w0_std_n_per_kn;
+        assert!(normalised.abs() < 4.0, "seed {seed}: {normalised} deviations off");
+        held += u64::from(normalised.abs() < 1.96);
+        let elsewhere = snapshot.resistance_at(40.0).unwrap();
+        assert!(elsewhere.is_extrapolated && !there.is_extrapolated);
+        assert!(elsewhere.w0_std_n_per_kn > 3.0 * there.w0_std_n_per_kn);
+    }
+    // 95 % of 30; 24 or fewer would come by chance once in 500 times.
+    assert!(held > 24, "{held} of {SEEDS} intervals of 95 % hold the truth");
 }

@@ -1,0 +1,67 @@
+//! What is shipped together works together: the daemon with `config/daemon.toml`, the demo's
+//! recording, and the examples in C, C++, Python and Rust as they are.
+
+use std::path::Path;
+use std::process::Command;
+
+use dynocar_shared::services::ROOT_VARIABLE;
+use dynocar_tests::process::{Process, Site};
+
+#[path = "../../client/tests/support/mod.rs"]
+mod support;
+use support::{Link, Program};
+
+const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
+const CONTROLLER: &str = env!("CARGO_BIN_EXE_dynocar-example-controller");
+const STOPPING: &str = env!("CARGO_BIN_EXE_dynocar-example-stopping");
+
+fn shipped(path: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path);
+    path.to_str().expect("a UTF-8 path").to_owned()
+}
+
+/// The daemon as shipped, once it has seen the demo's recording.
+fn daemon_that_has_learned(site: &Site) -> Process {
+    let daemon = site.start(DYNOCAR, &["run", "--config", &shipped("config/daemon.toml")]);
+    daemon.await_error("serving");
+    let mut replay = site.start(DYNOCAR, &["replay", &shipped("config/demo"), "--rate", "1000"]);
+    assert_eq!(replay.wait().code(), Some(0), "{}", replay.errors());
+    daemon
+}
+
+/// The shipped example of a file, built as its language is.
+fn examples(folder: &Path) -> Vec<(&'static str, Command)> {
+    let source = support::client_directory().join("examples");
+    let built = |name: &str| Command::new(folder.join(name));
+    for name in ["controller", "stopping"] {
+        let file = source.join(format!("{name}.c"));
+        support::build_c(&file, "c99", Link::Shared, &folder.join(format!("{name}-c")));
+        support::build_cpp(&file, &folder.join(format!("{name}-cpp")));
+    }
+    vec![
+        ("C", built("controller-c")),
+        ("C++", built("controller-cpp")),
+        ("Python", support::python(&source.join("controller.py"))),
+        ("Rust", Command::new(CONTROLLER)),
+        ("C, stopping", built("stopping-c")),
+        ("C++, stopping", built("stopping-cpp")),
+        ("Rust, stopping", Command::new(STOPPING)),
+    ]
+}
+
+#[test]
+fn every_shipped_example_comes_to_a_usable_resistance_from_the_shipped_daemon() {
+    let site = Site::new();
+    let daemon = daemon_that_has_learned(&site);
+    let folder = tempfile::tempdir().expect("a folder for programs");
+    for (name, mut command) in examples(folder.path()) {
+        let program = Program::start(command.env(ROOT_VARIABLE, site.host().root()));
+        let mut said = Vec::new();
+        let is_answered = std::iter::from_fn(|| program.next_line(|| {})).any(|line| {
+            let is_answer = line.contains("the daemon (estimated)");
+            said.push(line);
+            is_answer
+        });
+        assert!(is_answered, "{name} said {said:#?}; the daemon said:\n{}", daemon.errors());
+    }
+}
