@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Failure;
 use crate::dataset;
+use crate::output::tell;
 use crate::replay::{Rate, ReplayReport, Replayer};
 
 /// Play recorded runs into the sample channel, as a controller would.
@@ -38,8 +39,7 @@ pub struct ReplayArguments {
 /// A wrong dataset or run number is an input failure; a channel that cannot be opened is a
 /// failure of the work.
 pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
-    let dataset =
-        dataset::load(&arguments.dataset).map_err(|error| Failure::Input(error.to_string()))?;
+    let dataset = dataset::load(&arguments.dataset)?;
     let runs = match arguments.run {
         None => &dataset.runs[..],
         Some(number) if (1..=dataset.runs.len()).contains(&number) => {
@@ -57,10 +57,10 @@ pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
         Failure::Input(format!("--wait {}: expected a time in s from 0", arguments.wait))
     })?;
     if !replayer.await_daemon(wait) {
-        eprintln!(
+        tell(&format!(
             "dynocar: no daemon serves train {} yet; publishing all the same",
             arguments.train
-        );
+        ));
     }
     for run in runs {
         let bar = progress_bar(run.samples.len(), &run.file);
@@ -78,13 +78,13 @@ fn progress_bar(samples: usize, file: &str) -> ProgressBar {
 }
 
 fn report(report: &ReplayReport) {
-    eprintln!(
+    tell(&format!(
         "{} samples published in {:.1} s, {} not taken by the transport",
         report.published, report.elapsed_s, report.refused
-    );
+    ));
     for snapshot in &report.snapshots {
         let kind = PipelineKind::from_number(snapshot.pipeline_kind);
-        eprintln!(
+        tell(&format!(
             "  pipeline {} ({}): {}, {} used, {} rejected, {} lost",
             snapshot.pipeline_index,
             kind.map_or("unknown kind", PipelineKind::name),
@@ -92,6 +92,6 @@ fn report(report: &ReplayReport) {
             snapshot.samples_used,
             snapshot.samples_rejected,
             snapshot.samples_lost
-        );
+        ));
     }
 }
