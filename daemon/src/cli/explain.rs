@@ -103,10 +103,10 @@ fn require_names(arguments: &ExplainArguments) -> Result<(), Failure> {
         }
     }
     match (&arguments.json, &arguments.report) {
-        (Some(json), Some(report)) if json == report => Err(Failure::Input(format!(
-            "{}: expected another file for --report than for --json",
-            json.display()
-        ))),
+        (Some(json), Some(report)) if json == report => Err(Failure::Output(OutputError::Name {
+            path: report.clone(),
+            problem: "expected another file for --report than for --json",
+        })),
         _ => Ok(()),
     }
 }
