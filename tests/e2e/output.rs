@@ -183,15 +183,24 @@ fn names_of_results_that_would_cost_data_are_refused_before_the_work() {
     let at = |name: &str| site.path().join(name).display().to_string();
     let (manifest, folder, run) = (at("dataset.toml"), at(""), run.display().to_string());
     let new = at("new.html");
-    let cases: [&[&str]; 9] = [
+    let wrong: [&[&str]; 3] = [
+        &["explain", DEMO, "--report", &folder],
+        &["explain", DEMO, "--plots", &run],
+        &["explain", DEMO, "--report", "/no/such/folder/a.html"],
+    ];
+    for arguments in wrong {
+        let output = command(&site, (DYNOCAR, arguments)).output().unwrap();
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {}", said(&output));
+        let words = format!("dynocar: {}: cannot be written: ", arguments[3]);
+        assert!(said(&output).starts_with(&words), "{arguments:?}: {}", said(&output));
+    }
+    let cases: [&[&str]; 7] = [
         &["explain", DEMO, "--report", &manifest],
         &["explain", DEMO, "--json", &manifest],
         &["explain", "/nowhere", "--json", &manifest],
         &["identify", DEMO, "--json", &run],
         &["check", DEMO, "--json", &manifest],
         &["explain", DEMO, "--grown", &folder],
-        &["explain", DEMO, "--report", &folder],
-        &["explain", DEMO, "--plots", &run],
         &["explain", DEMO, "--report", &new, "--json", &new],
     ];
     let before = std::fs::read_to_string(&manifest).unwrap();
@@ -235,7 +244,8 @@ fn machines_get_errors_as_json_with_the_same_exit_status() {
                     speed = { column = \"v\", unit = \"m/s\" }\n[[runs]]\nfile = \"1.csv\"\n";
     let manifest = site.write("dataset.toml", manifest).display().to_string();
     let file = site.path().join("a.json").display().to_string();
-    let cases: [(&[&str], Option<&str>, Option<u64>); 6] = [
+    let cases: [(&[&str], Option<&str>, Option<u64>); 7] = [
+        (&["explain", DEMO, "--report", &manifest], None, None),
         (&["check", &train], Some(&train), Some(2)),
         (&["identify", &manifest], Some(&train), Some(2)),
         (&["explain", &manifest], Some(&train), Some(2)),

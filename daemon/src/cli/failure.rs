@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::config::ConfigError;
 use crate::dataset::LoadError;
-use crate::output::{OutputError, is_standard_output, require_file, tell, write_json};
+use crate::output::{OutputError, require_file, tell, write_json};
 
 /// Why a command ended without a result; says which exit status follows.
 #[derive(Debug)]
@@ -19,7 +19,7 @@ pub enum Failure {
     At(Place, String),
     /// The work failed: exit status 1.
     Work(String),
-    /// A result cannot be given: exit status 1, or 2 when its name is wrong.
+    /// A result cannot be given: exit status 1, or 2 when its name would cost data.
     Output(OutputError),
     /// The result, already told, is bad news: this exit status.
     Verdict(u8),
@@ -79,11 +79,15 @@ impl Failure {
         status
     }
 
-    /// False where the result could not be written either, or nothing of ours may be.
+    /// False where the file holds the result already, cannot be written or must not be.
     fn can_be_told_in(&self, file: &Path) -> bool {
         match self {
-            Failure::Output(OutputError::Name { .. }) => is_standard_output(file),
-            Failure::Output(_) => false,
+            Failure::Output(OutputError::StandardOutput(_)) => false,
+            Failure::Output(OutputError::File { path, .. } | OutputError::Name { path, .. })
+                if path == file =>
+            {
+                false
+            }
             _ => require_file(file, "{").is_ok(),
         }
     }
