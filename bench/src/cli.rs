@@ -4,6 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
+use dynocar::cli::parse;
+use dynocar::output::{self, tell};
 use serde::Serialize;
 
 use crate::estimators::measure::Effort;
@@ -91,7 +93,10 @@ const QUICK_SEEDS: usize = 8;
 
 /// Parses the command line, runs the command, reports a failure on standard error.
 pub fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let arguments = match parse::<Arguments>("dynocar-bench") {
+        Ok(arguments) => arguments,
+        Err(status) => return status,
+    };
     let result = match &arguments.command {
         Command::Estimators(arguments) => estimators(arguments),
         Command::Explain(arguments) => explain(arguments),
@@ -103,7 +108,7 @@ pub fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err((message, status)) => {
-            eprintln!("dynocar-bench: {message}");
+            tell(&format!("dynocar-bench: {message}"));
             ExitCode::from(status)
         }
     }
@@ -139,7 +144,7 @@ fn papers(arguments: &PapersArguments) -> Result<(), (String, u8)> {
     }
     let mut rows = Vec::new();
     for source in chosen {
-        eprintln!("{}: {} seeds from {}", source.name, seeds.count, seeds.first);
+        tell(&format!("{}: {} seeds from {}", source.name, seeds.count, seeds.first));
         rows.extend((source.rows)(seeds));
     }
     let judged =
@@ -153,7 +158,8 @@ fn papers(arguments: &PapersArguments) -> Result<(), (String, u8)> {
         .collect();
     give(&arguments.json, &PapersAnswer { rows: judged }, || table::for_terminal(&rows))?;
     if let Some(file) = &arguments.markdown {
-        write(file, &table::for_documentation(&rows))?;
+        output::write_file(file, &table::for_documentation(&rows))
+            .map_err(|error| (error.to_string(), 1))?;
     }
     match broken.is_empty() {
         true => Ok(()),
@@ -181,25 +187,11 @@ fn load(arguments: &LoadArguments) -> Result<(), (String, u8)> {
     give(&arguments.json, &report, || load::report::table(&report))
 }
 
-/// Writes a result for machines where it is wanted, and for people unless standard output is taken.
+/// Gives a result; an error has its text and the exit status.
 pub(crate) fn give(
     json: &Option<PathBuf>,
     result: &impl Serialize,
     for_people: impl FnOnce() -> String,
 ) -> Result<(), (String, u8)> {
-    if let Some(file) = json {
-        let text = serde_json::to_string_pretty(result).map_err(|error| (error.to_string(), 1))?;
-        if file.as_os_str() == "-" {
-            println!("{text}");
-            return Ok(());
-        }
-        write(file, &(text + "\n"))?;
-    }
-    print!("{}", for_people());
-    Ok(())
-}
-
-fn write(file: &PathBuf, text: &str) -> Result<(), (String, u8)> {
-    std::fs::write(file, text)
-        .map_err(|error| (format!("{}: cannot be written: {error}", file.display()), 1))
+    output::give(json.as_deref(), result, for_people).map_err(|error| (error.to_string(), 1))
 }

@@ -1,11 +1,13 @@
 //! Datasets on disk.
 
-use std::io::ErrorKind;
+use std::fs::{File, FileType};
+use std::io::{ErrorKind, Read};
+use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 
 use dynocar_core::dataset::{
     Dataset, DatasetError, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Place, Problem,
-    parse_track, parse_train,
+    parse_track, parse_train, top_keys,
 };
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
@@ -24,6 +26,14 @@ pub enum LoadError {
     NotADataset {
         /// The folder.
         path: PathBuf,
+    },
+    /// The file is no manifest.
+    #[error("{}: {found}; expected a dataset's folder or its {MANIFEST_FILE}", path.display())]
+    NoManifest {
+        /// The file.
+        path: PathBuf,
+        /// What it is.
+        found: &'static str,
     },
     /// A file of the dataset is wrong.
     #[error(transparent)]
@@ -55,6 +65,9 @@ impl DatasetFolder {
         if !path.exists() {
             return Err(LoadError::NoSuchPath { path: path.into() });
         }
+        if path.is_file() && path.extension().is_none_or(|extension| extension != "toml") {
+            return Err(LoadError::NoManifest { path: path.into(), found: "not a TOML file" });
+        }
         let folder = path.parent().unwrap_or(Path::new("")).into();
         Ok(DatasetFolder { folder, manifest: path.into() })
     }
@@ -81,8 +94,53 @@ impl DatasetFiles for DatasetFolder {
 /// The first mistake, with file, line and choices.
 pub fn open(path: &Path) -> Result<(DatasetFolder, DatasetHead), LoadError> {
     let folder = DatasetFolder::at(path)?;
-    let head = DatasetHead::open(&folder)?;
+    let head = DatasetHead::open(&folder).map_err(|error| other_kind(path, error))?;
     Ok((folder, head))
+}
+
+/// The error of a file that is a train, a line or a configuration where a dataset is expected;
+/// else the one that there was.
+fn other_kind(path: &Path, error: DatasetError) -> LoadError {
+    let label = path.display().to_string();
+    let keys = match read_text(path).map(|text| top_keys(&label, &text)) {
+        Ok(Ok(keys)) => keys,
+        _ => return error.into(),
+    };
+    let found = match kind_of(&keys) {
+        Some(FileKind::Train) => "a train's file",
+        Some(FileKind::Track) => "a line's file",
+        Some(FileKind::Daemon) => "a daemon's configuration",
+        Some(FileKind::Dataset) | None => return error.into(),
+    };
+    LoadError::NoManifest { path: path.into(), found }
+}
+
+/// What a TOML file is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FileKind {
+    /// A `dataset.toml`.
+    Dataset,
+    /// A `train.toml`.
+    Train,
+    /// A `track.toml`.
+    Track,
+    /// A `daemon.toml`.
+    Daemon,
+}
+
+/// What a TOML file is, by its tables. A dataset names its train and track in tables of the
+/// same names, so that `[dataset]` decides first.
+pub fn kind_of(keys: &[String]) -> Option<FileKind> {
+    let has = |name: &str| keys.iter().any(|key| key == name);
+    let kinds = [
+        ("dataset", FileKind::Dataset),
+        ("daemon", FileKind::Daemon),
+        ("pipelines", FileKind::Daemon),
+        ("train", FileKind::Train),
+        ("track", FileKind::Track),
+    ];
+    kinds.into_iter().find(|(table, _)| has(table)).map(|(_, kind)| kind)
 }
 
 /// Reads a dataset with all its runs.
@@ -91,7 +149,11 @@ pub fn open(path: &Path) -> Result<(DatasetFolder, DatasetHead), LoadError> {
 ///
 /// The first mistake, with file, line and choices.
 pub fn load(path: &Path) -> Result<Dataset, LoadError> {
-    Ok(Dataset::load(&DatasetFolder::at(path)?)?)
+    let folder = DatasetFolder::at(path)?;
+    Dataset::load(&folder).map_err(|error| match error.place.file == folder.label(MANIFEST_FILE) {
+        true => other_kind(&folder.manifest, error),
+        false => error.into(),
+    })
 }
 
 /// Reads a train file.
@@ -116,22 +178,80 @@ pub fn load_track(path: &Path) -> Result<Track, LoadError> {
 
 fn labelled_text(path: &Path) -> Result<(String, String), LoadError> {
     let label = path.display().to_string();
-    let text =
-        read_text(path).map_err(|problem| Place::whole(&label).problem(Problem::File(problem)))?;
+    let text = read_text(path).map_err(|problem| file_error(&label, problem))?;
     Ok((label, text))
+}
+
+/// The error of a file that was named itself and cannot be read.
+pub fn file_error(label: &str, problem: FileProblem) -> DatasetError {
+    let line = match problem {
+        FileProblem::NotUtf8 { line } => Some(line),
+        _ => None,
+    };
+    Place { file: label.into(), line }.problem(Problem::File(problem))
+}
+
+/// A longer file is refused instead of filling the memory.
+const BYTES_MAX: u64 = 4 << 30;
+/// So many bytes tell other formats from text.
+const HEAD_BYTES: u64 = 1024;
+
+/// What a path leads to that is neither a file nor a folder.
+fn irregular(kind: FileType) -> Option<&'static str> {
+    let kinds = [
+        (kind.is_fifo(), "a pipe"),
+        (kind.is_socket(), "a socket"),
+        (kind.is_char_device() || kind.is_block_device(), "a device"),
+    ];
+    kinds.into_iter().find(|(is_it, _)| *is_it).map(|(_, name)| name)
+}
+
+/// The format of a file that begins so and is no text in UTF-8; `None` for what may be.
+fn other_format(head: &[u8]) -> Option<&'static str> {
+    let begins: [(&[u8], &'static str); 5] = [
+        (&[0x1f, 0x8b], "a gzip file: unpack it first"),
+        (b"PK\x03\x04", "a zip file or a workbook: unpack it, or save the sheet as CSV"),
+        (b"\xd0\xcf\x11\xe0", "a workbook: save the sheet as CSV"),
+        (&[0xff, 0xfe], "UTF-16: save the file as UTF-8"),
+        (&[0xfe, 0xff], "UTF-16: save the file as UTF-8"),
+    ];
+    let known = begins.into_iter().find(|(mark, _)| head.starts_with(mark)).map(|(_, name)| name);
+    known.or_else(|| match head.iter().position(|&byte| byte == 0) {
+        Some(0) => Some("binary data"),
+        // Every other byte of letters and digits.
+        Some(1) => Some("UTF-16: save the file as UTF-8"),
+        _ => None,
+    })
 }
 
 /// Reads a text file.
 ///
 /// # Errors
 ///
-/// When there is none, it is a folder, not UTF-8 or not readable.
+/// When there is none, it is no regular file, too large, of another format, not UTF-8 or not
+/// readable.
 pub fn read_text(path: &Path) -> Result<String, FileProblem> {
-    let bytes = std::fs::read(path).map_err(|error| match error.kind() {
+    let unreadable = |error: std::io::Error| match error.kind() {
         ErrorKind::NotFound => FileProblem::Missing,
         ErrorKind::IsADirectory => FileProblem::IsFolder,
         kind => FileProblem::Unreadable(kind),
-    })?;
+    };
+    // Asked before it is opened: opening a pipe may wait for ever.
+    let found = std::fs::metadata(path).map_err(unreadable)?;
+    if let Some(what) = irregular(found.file_type()) {
+        return Err(FileProblem::NotRegular(what));
+    }
+    if found.len() > BYTES_MAX {
+        return Err(FileProblem::TooLarge { most: BYTES_MAX, found: found.len() });
+    }
+    let mut file = File::open(path).map_err(unreadable)?;
+    let mut bytes = Vec::new();
+    file.by_ref().take(HEAD_BYTES).read_to_end(&mut bytes).map_err(unreadable)?;
+    if let Some(what) = other_format(&bytes) {
+        return Err(FileProblem::NotText(what));
+    }
+    // A file that grows while it is read is no longer than it was said to be by much.
+    file.take(BYTES_MAX).read_to_end(&mut bytes).map_err(unreadable)?;
     String::from_utf8(bytes).map_err(|error| {
         let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
         FileProblem::NotUtf8 { line: 1 + good.iter().filter(|&&byte| byte == b'\n').count() }

@@ -13,6 +13,7 @@ use dynocar_core::explain::{Explanation, evidence::Fit};
 use toml::{Table, Value};
 
 use crate::dataset::{LoadError, open};
+use crate::output::{OutputError, write_in_folder};
 
 /// Greatest `tunnel_c_factor` that a train file may hold.
 const TUNNEL_C_FACTOR_MAX: f64 = 100.0;
@@ -32,14 +33,14 @@ pub enum GrownError {
         problem: String,
     },
     /// A file cannot be written.
-    #[error("{}: cannot be written: {source}", path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Output(#[from] OutputError),
 }
+
+/// How a grown file begins.
+pub const GROWN_MARK: &str = "# Grown from ";
+/// The files of a grown model: the train, and the line when it is known.
+pub const GROWN_FILES: [&str; 2] = ["train.toml", "track.toml"];
 
 /// What was written.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,20 +74,15 @@ pub fn write_grown(
     let mut track = head.manifest.track_file.as_ref().map(|file| table(&file.path)).transpose()?;
     let not_expressed = grow(&explanation.answer, &explanation.grown, &mut train, track.as_mut());
     let write = |name: &str, table: &Table, declared: &str| -> Result<PathBuf, GrownError> {
-        let path = folder.join(name);
-        let failed = |source| GrownError::Write { path: path.clone(), source };
-        std::fs::create_dir_all(folder).map_err(failed)?;
-        let failed = |source| GrownError::Write { path: path.clone(), source };
         let note = format!(
-            "# Grown from {declared} of {MANIFEST_FILE} by `dynocar explain`.\n# {}\n",
+            "{GROWN_MARK}{declared} of {MANIFEST_FILE} by `dynocar explain`.\n# {}\n",
             explanation.answer.statement
         );
-        std::fs::write(&path, format!("{note}{table}")).map_err(failed)?;
-        Ok(path)
+        Ok(write_in_folder(folder, name, &format!("{note}{table}"))?)
     };
-    let mut files = vec![write("train.toml", &train, &head.manifest.train_file.path)?];
+    let mut files = vec![write(GROWN_FILES[0], &train, &head.manifest.train_file.path)?];
     if let (Some(track), Some(file)) = (&track, &head.manifest.track_file) {
-        files.push(write("track.toml", track, &file.path)?);
+        files.push(write(GROWN_FILES[1], track, &file.path)?);
     }
     Ok(GrownFiles { files, not_expressed })
 }

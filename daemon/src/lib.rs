@@ -7,6 +7,7 @@
 //! - [`dataset`]: recorded runs from disk
 //! - [`identify`]: the pipelines over recorded runs
 //! - [`grown`]: the model with its effects as train and track files
+//! - [`output`]: where results go
 //! - [`report`]: an explanation as a page of HTML
 //! - [`demo`]: the main job as a show
 //! - [`run`]: the daemon, every stage on one screen
@@ -21,6 +22,7 @@ pub mod dataset;
 pub mod demo;
 pub mod grown;
 pub mod identify;
+pub mod output;
 pub mod replay;
 pub mod report;
 pub mod run;

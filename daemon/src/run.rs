@@ -136,7 +136,8 @@ fn tell_who_answers(config: &DaemonConfig) {
     }
 }
 
-fn stop_on_signals() -> Result<Arc<AtomicBool>, RunError> {
+/// A flag that SIGTERM and SIGINT set.
+pub(crate) fn stop_on_signals() -> Result<Arc<AtomicBool>, RunError> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
         signal_hook::flag::register(signal, Arc::clone(&stop))

@@ -337,7 +337,10 @@ pub fn run(target: Target, rounds: u64, seed: u64) -> u64 {
                 let path = target.folder().join(format!("panic-{seed}-{round}.bin"));
                 // The panic tells more than a failure to keep the input.
                 let _ = std::fs::write(&path, &input);
-                eprintln!("{target:?}, seed {seed}, round {round}: {}", path.display());
+                dynocar::output::tell(&format!(
+                    "{target:?}, seed {seed}, round {round}: {}",
+                    path.display()
+                ));
                 std::panic::resume_unwind(cause);
             }
         }

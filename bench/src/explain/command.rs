@@ -64,7 +64,12 @@ pub fn explain(arguments: &ExplainArguments) -> Result<(), (String, u8)> {
     let (seeds, first) = (arguments.seeds, arguments.first_seed);
     if arguments.growth {
         let sizes = growth::measure(&scenarios, first, &|size| {
-            eprintln!("{} x{}: {:.1} s", size.axis.name(), size.factor, size.seconds);
+            dynocar::output::tell(&format!(
+                "{} x{}: {:.1} s",
+                size.axis.name(),
+                size.factor,
+                size.seconds
+            ));
         });
         return give(&arguments.json, &sizes, || growth::table(&sizes));
     }
@@ -90,7 +95,7 @@ fn tell(case: &Case, grade: &Grade) {
         .iter()
         .map(|p| format!("{} {:+.3} ({:+.1} sd)", p.name, p.error, p.z))
         .collect();
-    eprintln!(
+    dynocar::output::tell(&format!(
         "{} seed {}: {} {} {} iou {:?} ends {}/{} share {:?} {}",
         if grade.is_right { "right" } else { "WRONG" },
         case.seed,
@@ -102,9 +107,9 @@ fn tell(case: &Case, grade: &Grade) {
         grade.ends_held.len(),
         grade.share,
         parameters.join(", ")
-    );
-    eprintln!("    strength {:.2}", grade.strength);
+    ));
+    dynocar::output::tell(&format!("    strength {:.2}", grade.strength));
     for detail in &grade.details {
-        eprintln!("    {detail}");
+        dynocar::output::tell(&format!("    {detail}"));
     }
 }

@@ -169,7 +169,7 @@ pub fn run(arguments: &LatencyArguments) -> Result<Measured, LatencyError> {
     })?;
     let mut random = ChaCha8Rng::seed_from_u64(arguments.seed);
     for round in 1..=rounds {
-        eprintln!("round {round} of {rounds}");
+        dynocar::output::tell(&format!("round {round} of {rounds}"));
         let mut order: Vec<usize> = (0..cases.len()).collect();
         order.shuffle(&mut random);
         for place in order {
@@ -203,7 +203,9 @@ pub fn in_thread<T: Send>(
 /// Binds the calling thread to a core; without that the figures vary more, which is said.
 pub fn bind(core: usize) {
     if let Err(error) = pin_to_core(core) {
-        eprintln!("dynocar-bench: not bound to core {core}, figures will vary more: {error}");
+        dynocar::output::tell(&format!(
+            "dynocar-bench: not bound to core {core}, figures will vary more: {error}"
+        ));
     }
 }
 
@@ -213,6 +215,8 @@ pub fn prioritise(priority: Option<u8>) {
     if let Some(priority) = priority
         && let Err(error) = set_fifo_priority(priority)
     {
-        eprintln!("dynocar-bench: no priority {priority}, figures will vary more: {error}");
+        dynocar::output::tell(&format!(
+            "dynocar-bench: no priority {priority}, figures will vary more: {error}"
+        ));
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use dynocar::output::write_file;
 use hdrhistogram::Histogram;
 use plotters::prelude::*;
 
@@ -22,12 +23,14 @@ const NINES: f64 = 4.5;
 ///
 /// When the file cannot be written.
 pub fn draw(measured: &Measured, file: &Path) -> Result<(), RigError> {
-    draw_into(measured, file)
-        .map_err(|error| RigError::File { path: file.into(), reason: error.to_string() })
+    let mut svg = String::new();
+    draw_into(measured, &mut svg)
+        .map_err(|error| RigError::File { path: file.into(), reason: error.to_string() })?;
+    Ok(write_file(file, &svg)?)
 }
 
-fn draw_into(measured: &Measured, file: &Path) -> Result<(), Box<dyn std::error::Error>> {
-    let area = SVGBackend::new(file, SIZE).into_drawing_area();
+fn draw_into(measured: &Measured, svg: &mut String) -> Result<(), Box<dyn std::error::Error>> {
+    let area = SVGBackend::with_string(svg, SIZE).into_drawing_area();
     area.fill(&WHITE)?;
     let caption = format!("Sample → snapshot polled at {} Hz", measured.schedule.rate_hz);
     let mut chart = ChartBuilder::on(&area)

@@ -61,14 +61,14 @@ pub fn highest_rate(plan: &TrialPlan) -> Result<Found, RigError> {
         let mut plan = plan.clone();
         plan.traffic.rate_hz = rate_hz;
         let verdict = judge(&in_thread(|| trial::run(&plan))?);
-        eprintln!(
+        dynocar::output::tell(&format!(
             "{rate_hz:.0} Hz: {}",
             match verdict {
                 Verdict::Clean => "nothing lost",
                 Verdict::Lost => "samples lost",
                 Verdict::PublishersLate => "the publishers fall behind",
             }
-        );
+        ));
         match verdict {
             Verdict::Clean => found.rate_hz = rate_hz,
             failure => {
@@ -128,7 +128,7 @@ pub fn growth(plan: &TrialPlan) -> Result<Vec<Size>, RigError> {
             let mut plan = plan.clone();
             plan.trains = trains;
             plan.pipelines.truncate(width);
-            eprintln!("{trains} trains, {width} pipelines");
+            dynocar::output::tell(&format!("{trains} trains, {width} pipelines"));
             sizes.push(size(&plan, &in_thread(|| trial::run(&plan))?));
         }
     }

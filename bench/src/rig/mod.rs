@@ -40,6 +40,9 @@ pub enum RigError {
         /// Why.
         reason: String,
     },
+    /// A result cannot be written.
+    #[error(transparent)]
+    Output(#[from] dynocar::output::OutputError),
     /// A channel cannot be opened.
     #[error(transparent)]
     Channel(#[from] ChannelError),

@@ -10,14 +10,15 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use dynocar_core::dataset::{
-    DatasetError, DatasetHead, Place, Problem, Run, parse_track, parse_train, top_keys,
+    DatasetError, DatasetHead, Place, Run, parse_track, parse_train, top_keys,
 };
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
 
-use super::{Failure, output};
+use super::Failure;
 use crate::config::DaemonConfig;
-use crate::dataset::{self, LoadError, read_text};
+use crate::dataset::{self, FileKind, LoadError, file_error, kind_of, read_text};
+use crate::output::{give, require_file, tell, write_json};
 
 /// Validate a dataset, train, track or daemon configuration and say what was understood.
 #[derive(Clone, Debug, Args)]
@@ -27,16 +28,6 @@ pub struct CheckArguments {
     /// Also write the result as JSON; '-' for standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-}
-
-/// What a path was understood to be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-enum Kind {
-    Dataset,
-    Train,
-    Track,
-    Daemon,
 }
 
 /// What was understood.
@@ -54,86 +45,70 @@ enum Understood {
 /// When the path leads to nothing known or a file is wrong; everything that could be read has
 /// been reported by then.
 pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
-    let path = &arguments.path;
+    let (path, json) = (&arguments.path, arguments.json.as_deref());
+    if let Some(file) = json {
+        require_file(file, "{")?;
+    }
     let understood = match read(path) {
         Ok(understood) => understood,
-        Err(message) => {
-            if let Some(file) = &arguments.json {
-                output::write_json(file, &json::refusal(path, &message))?;
+        Err(failure) => {
+            if let (Some(file), Some(error)) = (json, failure.answer()) {
+                // The exit status is that of what is wrong with the input.
+                if let Err(error) = write_json(file, &json::refusal(path, error)) {
+                    tell(&format!("dynocar: {error}"));
+                }
             }
-            return Err(Failure::Input(message));
+            return Err(failure);
         }
     };
-    let errors = understood.errors();
-    let goes_to_output = arguments.json.as_deref().is_some_and(output::is_standard_output);
-    if !goes_to_output {
-        output::print(&report::report(&understood))?;
-    }
-    if let Some(file) = &arguments.json {
-        output::write_json(file, &json::answer(path, &understood))?;
-    }
+    give(json, &json::answer(path, &understood), || report::report(&understood))?;
+    let errors: Vec<_> = understood.errors().map(ToString::to_string).collect();
     if errors.is_empty() { Ok(()) } else { Err(Failure::Input(errors.join("\ndynocar: "))) }
 }
 
 impl Understood {
-    fn kind(&self) -> Kind {
+    fn kind(&self) -> FileKind {
         match self {
-            Understood::Dataset(..) => Kind::Dataset,
-            Understood::Train(_) => Kind::Train,
-            Understood::Track(_) => Kind::Track,
-            Understood::Daemon(_) => Kind::Daemon,
+            Understood::Dataset(..) => FileKind::Dataset,
+            Understood::Train(_) => FileKind::Train,
+            Understood::Track(_) => FileKind::Track,
+            Understood::Daemon(_) => FileKind::Daemon,
         }
     }
 
     /// What is wrong with single runs.
-    fn errors(&self) -> Vec<String> {
-        match self {
-            Understood::Dataset(_, runs) => {
-                runs.iter().filter_map(|run| run.as_ref().err()).map(ToString::to_string).collect()
-            }
-            Understood::Train(_) | Understood::Track(_) | Understood::Daemon(_) => Vec::new(),
-        }
+    fn errors(&self) -> impl Iterator<Item = &DatasetError> {
+        let runs = match self {
+            Understood::Dataset(_, runs) => &runs[..],
+            Understood::Train(_) | Understood::Track(_) | Understood::Daemon(_) => &[],
+        };
+        runs.iter().filter_map(|run| run.as_ref().err())
     }
 }
 
-fn read(path: &Path) -> Result<Understood, String> {
+fn read(path: &Path) -> Result<Understood, Failure> {
     if !path.is_file() {
         return read_dataset(path);
     }
     let label = path.display().to_string();
-    let text = read_text(path)
-        .map_err(|problem| Place::whole(&label).problem(Problem::File(problem)).to_string())?;
+    let refuse = |message| Err(Failure::At(Place::whole(&label), message));
+    let text = read_text(path).map_err(|problem| file_error(&label, problem))?;
     if path.extension().is_none_or(|extension| extension != "toml") {
-        return Err(format!("{label}: not a TOML file; {EXPECTED}"));
+        return refuse(format!("{label}: not a TOML file; {EXPECTED}"));
     }
-    let keys = top_keys(&label, &text).map_err(|error| error.to_string())?;
-    let understood = match kind_of(&keys) {
-        Some(Kind::Dataset) => return read_dataset(path),
-        Some(Kind::Train) => parse_train(&label, &text).map(Box::new).map(Understood::Train),
-        Some(Kind::Track) => parse_track(&label, &text).map(Box::new).map(Understood::Track),
-        Some(Kind::Daemon) => return daemon::read(path),
-        None => return Err(format!("{label}: {}; {EXPECTED}", found(&keys))),
-    };
-    understood.map_err(|error| error.to_string())
+    let keys = top_keys(&label, &text)?;
+    Ok(match kind_of(&keys) {
+        Some(FileKind::Dataset) => return read_dataset(path),
+        Some(FileKind::Train) => Understood::Train(Box::new(parse_train(&label, &text)?)),
+        Some(FileKind::Track) => Understood::Track(Box::new(parse_track(&label, &text)?)),
+        Some(FileKind::Daemon) => return daemon::read(path),
+        None => return refuse(format!("{label}: {}; {EXPECTED}", found(&keys))),
+    })
 }
 
 const EXPECTED: &str = "expected a dataset's folder or its dataset.toml (with a table [dataset]), \
                         a train.toml ([train]), a track.toml ([track]) or a daemon.toml ([trains] \
                         and [pipelines])";
-
-/// What a TOML file is, by its tables. A dataset names its train and track in tables of the
-/// same names, so that `[dataset]` decides first.
-fn kind_of(keys: &[String]) -> Option<Kind> {
-    let has = |name: &str| keys.iter().any(|key| key == name);
-    let kinds = [
-        ("dataset", Kind::Dataset),
-        ("daemon", Kind::Daemon),
-        ("pipelines", Kind::Daemon),
-        ("train", Kind::Train),
-        ("track", Kind::Track),
-    ];
-    kinds.into_iter().find(|(table, _)| has(table)).map(|(_, kind)| kind)
-}
 
 fn found(keys: &[String]) -> String {
     if keys.is_empty() {
@@ -144,10 +119,13 @@ fn found(keys: &[String]) -> String {
     format!("not a file that can be checked: it holds {}{more}", names.join(", "))
 }
 
-fn read_dataset(path: &Path) -> Result<Understood, String> {
+fn read_dataset(path: &Path) -> Result<Understood, Failure> {
     let (folder, head) = dataset::open(path).map_err(|error| match error {
-        LoadError::NotADataset { .. } => format!("{error}; {EXPECTED}"),
-        other => other.to_string(),
+        LoadError::NotADataset { .. } => {
+            let place = Place::whole(&path.display().to_string());
+            Failure::At(place, format!("{error}; {EXPECTED}"))
+        }
+        other => other.into(),
     })?;
     let runs = (0..head.manifest.runs.len()).map(|index| head.read_run(&folder, index)).collect();
     Ok(Understood::Dataset(Box::new(head), runs))

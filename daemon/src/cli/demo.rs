@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::Failure;
-use super::output::write_json;
-use crate::demo::play;
+use crate::demo::{DemoError, play};
+use crate::output::{give, require_file};
 
 /// Show the whole way of a sample: controller, daemon and client on embedded recorded runs.
 #[derive(Debug, Args)]
@@ -16,7 +16,7 @@ pub struct DemoArguments {
     rate: f64,
     /// Write the result for machines; - for standard output
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    pub(super) json: Option<PathBuf>,
 }
 
 /// Plays the demo.
@@ -29,6 +29,19 @@ pub fn execute(arguments: &DemoArguments) -> Result<(), Failure> {
     if !(1.0..=1000.0).contains(&rate) {
         return Err(Failure::Input(format!("--rate {rate}: expected 1 to 1000")));
     }
-    let answer = play(rate).map_err(|error| Failure::Work(error.to_string()))?;
-    arguments.json.as_ref().map_or(Ok(()), |file| write_json(file, &answer))
+    if let Some(file) = &arguments.json {
+        require_file(file, "{")?;
+    }
+    let summary = match play(rate) {
+        Err(DemoError::Interrupted) => return Err(Failure::Verdict(130)),
+        played => played.map_err(|error| Failure::Work(error.to_string()))?,
+    };
+    let answer = summary.answer();
+    give(arguments.json.as_deref(), &answer, || summary.text())?;
+    match answer.samples.lost {
+        0 => Ok(()),
+        lost => Err(Failure::Work(format!(
+            "{lost} samples were lost at {rate} times the recorded rate"
+        ))),
+    }
 }

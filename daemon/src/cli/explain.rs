@@ -6,17 +6,22 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
-use dynocar_core::dataset::Dataset;
-use dynocar_core::explain::score::PredictedRun;
+use dynocar_core::dataset::{Dataset, DatasetFiles, Place, Role};
+use dynocar_core::explain::evidence::RunDataError;
 use dynocar_core::explain::{Explanation, explain};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Failure;
-use super::output::write_json;
-use crate::dataset;
-use crate::grown::write_grown;
+use crate::dataset::{self, DatasetFolder};
+use crate::grown::{GROWN_FILES, GROWN_MARK, GrownError, write_grown};
+use crate::output::{
+    OutputError, give, require_file, require_folder, tell, write_file, write_in_folder,
+};
 use crate::report;
 use crate::report::provenance::Provenance;
+
+/// First line of a file with predictions.
+const PREDICTIONS_HEADER: &str = "time_s,speed_mps\n";
 
 /// Find what the declared model leaves, trace it to an effect, and score the grown model.
 #[derive(Debug, Args)]
@@ -28,7 +33,7 @@ pub struct ExplainArguments {
     traction_only: bool,
     /// Write the answer for machines; - for standard output
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    pub(super) json: Option<PathBuf>,
     /// Write the speeds that the model with the effect predicts for the holdout runs
     #[arg(long, value_name = "DIR")]
     predictions: Option<PathBuf>,
@@ -47,10 +52,15 @@ pub struct ExplainArguments {
 ///
 /// # Errors
 ///
-/// A wrong dataset is an input failure.
+/// A wrong dataset or name of a result is an input failure.
 pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
-    let mut dataset =
-        dataset::load(&arguments.dataset).map_err(|error| Failure::Input(error.to_string()))?;
+    require_names(arguments)?;
+    let mut dataset = dataset::load(&arguments.dataset)?;
+    if let Some(folder) = &arguments.predictions {
+        for name in prediction_names(&dataset).values() {
+            require_replaceable(&folder.join(name), PREDICTIONS_HEADER)?;
+        }
+    }
     if arguments.traction_only {
         dataset.keep_traction_only();
     }
@@ -62,20 +72,12 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
     };
     let explained = explain(&dataset, &progress);
     bar.finish_and_clear();
-    let mut explanation = explained.map_err(|error| Failure::Input(error.to_string()))?;
+    let mut explanation = explained.map_err(|error| unusable(&arguments.dataset, error))?;
     if let Some(folder) = &arguments.predictions {
-        explanation.answer.predictions = write_predictions(folder, &explanation)?;
+        explanation.answer.predictions = write_predictions(folder, &dataset, &explanation)?;
     }
     if let Some(folder) = &arguments.grown {
-        let grown = write_grown(&arguments.dataset, &explanation, folder)
-            .map_err(|error| Failure::Work(error.to_string()))?;
-        for file in &grown.files {
-            eprintln!("grown model: {}", file.display());
-        }
-        if !grown.not_expressed.is_empty() {
-            let kinds = grown.not_expressed.join(", ");
-            eprintln!("the files cannot express {kinds}: use the answer of --json for it");
-        }
+        grow(folder, &arguments.dataset, &explanation)?;
     }
     if let Some(file) = &arguments.report {
         write_report(file, &arguments.dataset, &dataset, &explanation)?;
@@ -83,9 +85,55 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
     if let Some(folder) = &arguments.plots {
         write_plots(folder, &dataset, &explanation)?;
     }
-    match &arguments.json {
-        Some(file) => write_json(file, &explanation.answer)?,
-        None => print_answer(&explanation),
+    Ok(give(arguments.json.as_deref(), &explanation.answer, || text(&explanation))?)
+}
+
+/// Refuses wrong names of results before the work begins.
+fn require_names(arguments: &ExplainArguments) -> Result<(), Failure> {
+    let files = [(&arguments.json, "{"), (&arguments.report, "<!DOCTYPE html>")];
+    for (file, mark) in files {
+        file.as_deref().map_or(Ok(()), |file| require_file(file, mark))?;
+    }
+    for folder in [&arguments.plots, &arguments.predictions, &arguments.grown] {
+        folder.as_deref().map_or(Ok(()), require_folder)?;
+    }
+    if let Some(folder) = &arguments.grown {
+        for name in GROWN_FILES {
+            require_replaceable(&folder.join(name), GROWN_MARK)?;
+        }
+    }
+    match (&arguments.json, &arguments.report) {
+        (Some(json), Some(report)) if json == report => Err(Failure::Output(OutputError::Name {
+            path: report.clone(),
+            problem: "expected another file for --report than for --json",
+        })),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses a file in a folder for results that is there and is none of ours.
+fn require_replaceable(file: &Path, mark: &str) -> Result<(), OutputError> {
+    if file.exists() { require_file(file, mark) } else { Ok(()) }
+}
+
+/// The failure of a run that cannot be used.
+fn unusable(dataset: &Path, error: RunDataError) -> Failure {
+    let RunDataError::Simulate { file, source } = error;
+    let label = DatasetFolder::at(dataset).map_or(file.clone(), |folder| folder.label(&file));
+    Failure::At(Place::whole(&label), format!("{label}: {source}"))
+}
+
+fn grow(folder: &Path, dataset: &Path, explanation: &Explanation) -> Result<(), Failure> {
+    let grown = write_grown(dataset, explanation, folder).map_err(|error| match error {
+        GrownError::Output(error) => error.into(),
+        error => Failure::Work(error.to_string()),
+    })?;
+    for file in &grown.files {
+        tell(&format!("grown model: {}", file.display()));
+    }
+    if !grown.not_expressed.is_empty() {
+        let kinds = grown.not_expressed.join(", ");
+        tell(&format!("the files cannot express {kinds}: use the answer of --json for it"));
     }
     Ok(())
 }
@@ -107,13 +155,11 @@ fn write_report(
     dataset: &Dataset,
     explanation: &Explanation,
 ) -> Result<(), Failure> {
-    let provenance = Provenance::of(path).map_err(|error| Failure::Input(error.to_string()))?;
+    let provenance = Provenance::of(path)?;
     let page = report::page(dataset, explanation, provenance)
         .map_err(|error| Failure::Work(format!("{}: {error}", file.display())))?;
-    std::fs::write(file, page).map_err(|error| {
-        Failure::Work(format!("{}: cannot be written: {error}", file.display()))
-    })?;
-    eprintln!("report: {}", file.display());
+    write_file(file, &page)?;
+    tell(&format!("report: {}", file.display()));
     Ok(())
 }
 
@@ -121,61 +167,67 @@ fn write_plots(folder: &Path, dataset: &Dataset, explanation: &Explanation) -> R
     let images = report::images::images(dataset, explanation)
         .map_err(|error| Failure::Work(error.to_string()))?;
     for image in images {
-        let path = folder.join(&image.name);
-        let written =
-            std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&path, image.svg));
-        written.map_err(|error| {
-            Failure::Work(format!("{}: cannot be written: {error}", path.display()))
-        })?;
-        eprintln!("plot: {}", path.display());
+        let path = write_in_folder(folder, &image.name, &image.svg)?;
+        tell(&format!("plot: {}", path.display()));
     }
     Ok(())
+}
+
+/// Names of the files with predictions by the holdout run's file: the same name, with its folders
+/// where several runs would share it.
+fn prediction_names(dataset: &Dataset) -> BTreeMap<String, String> {
+    let last = |file: &str| file.rsplit('/').next().unwrap_or(file).to_string();
+    let holdout: Vec<&str> = dataset.with_role(Role::Holdout).map(|run| &run.file[..]).collect();
+    let name = |file: &str| match holdout.iter().filter(|it| last(it) == last(file)).count() {
+        1 => last(file),
+        _ => file.replace('/', "_"),
+    };
+    holdout.iter().map(|file| ((*file).into(), name(file))).collect()
 }
 
 /// Writes one file for each holdout run; gives the files by run.
 fn write_predictions(
     folder: &Path,
+    dataset: &Dataset,
     explanation: &Explanation,
-) -> Result<BTreeMap<String, String>, Failure> {
-    let is_holdout =
-        |run: &&PredictedRun| explanation.holdout.iter().any(|holdout| holdout.file == run.file);
+) -> Result<BTreeMap<String, String>, OutputError> {
+    let names = prediction_names(dataset);
     let mut files = BTreeMap::new();
-    for run in explanation.predictions.iter().filter(is_holdout) {
-        let name = run.file.rsplit('/').next().unwrap_or(&run.file);
-        let path = folder.join(name);
-        let failed = |error: std::io::Error| {
-            Failure::Work(format!("{}: cannot be written: {error}", path.display()))
-        };
-        std::fs::create_dir_all(folder).map_err(failed)?;
-        let mut text = String::from("time_s,speed_mps\n");
+    for run in &explanation.predictions {
+        let Some(name) = names.get(&run.file) else { continue };
+        let mut text = String::from(PREDICTIONS_HEADER);
         for (time_s, speed_mps) in run.time_s.iter().zip(&run.speed_mps) {
             // Writing to a string cannot fail.
             let _ = writeln!(text, "{time_s:.3},{speed_mps:.4}");
         }
-        std::fs::write(&path, text).map_err(failed)?;
+        let path = write_in_folder(folder, name, &text)?;
         files.insert(run.file.clone(), path.display().to_string());
     }
     Ok(files)
 }
 
-fn print_answer(explanation: &Explanation) {
+fn text(explanation: &Explanation) -> String {
     let answer = &explanation.answer;
-    println!("{}", answer.statement);
+    let mut text = format!("{}\n", answer.statement);
     if let Some(experiment) = &answer.experiment {
-        println!("To settle it: {experiment}");
+        text += &format!("To settle it: {experiment}\n");
     }
     let (base, std) = (&answer.base, &answer.base.std);
     let [a, b, c] = [std.a, std.b, std.c].map(|deviation| 1.96 * deviation);
-    println!(
-        "a = {:.3} ± {a:.3} N/kN, b = {:.4} ± {b:.4}, c = {:.6} ± {c:.6} (95 %, v in m/s)",
+    text += &format!(
+        "a = {:.3} ± {a:.3} N/kN, b = {:.4} ± {b:.4}, c = {:.6} ± {c:.6} (95 %, v in m/s)\n",
         base.a, base.b, base.c
     );
     if let (Some(before), Some(after)) = (answer.rmse_before, answer.rmse_after) {
-        println!("holdout runs, open loop: {before:.3} m/s before, {after:.3} m/s after");
+        text += &format!("holdout runs, open loop: {before:.3} m/s before, {after:.3} m/s after\n");
+    }
+    if let Some(unscored) = &answer.unscored {
+        text += &format!("{unscored}\n");
     }
     for considered in &answer.considered {
         let evidence =
             considered.evidence.map_or("     -".into(), |evidence| format!("{evidence:6.0}"));
-        println!("  {evidence}  {:20} {}", considered.kind, considered.remark);
+        text += &format!("  {evidence}  {:20} {}\n", considered.kind, considered.remark);
     }
+    text
 }

@@ -8,6 +8,7 @@ use dynocar_shared::TrainId;
 
 use super::Failure;
 use crate::config::DaemonConfig;
+use crate::output::{print, tell};
 use crate::supervision::health::{TrainHealth, Verdict, look_at};
 
 /// Say how well trains are served: without options, all that any daemon of this host serves; the
@@ -29,11 +30,7 @@ pub struct HealthArguments {
 ///
 /// The worst verdict of all trains unless it is ok; an unusable configuration or directory.
 pub fn execute(arguments: &HealthArguments) -> Result<(), Failure> {
-    let config = arguments
-        .config
-        .as_ref()
-        .map(|path| DaemonConfig::load(path).map_err(|error| Failure::Input(error.to_string())))
-        .transpose()?;
+    let config = arguments.config.as_deref().map(DaemonConfig::load).transpose()?;
     let work = |error: dynocar_client::ChannelError| Failure::Work(error.to_string());
     let host = match config.as_ref().and_then(|config| config.root.as_ref()) {
         Some(root) => Host::at(root).map_err(work)?,
@@ -44,26 +41,34 @@ pub fn execute(arguments: &HealthArguments) -> Result<(), Failure> {
         (None, Some(config)) => config.trains.iter().map(|train| train.id).collect(),
         (None, None) => Peer::trains(&host, Role::Daemon).map_err(work)?,
     };
+    let (mut worst, mut text) = (Verdict::Ok, String::new());
     if trains.is_empty() {
         let root = host.root().display();
-        println!("no daemon: nobody serves any train under {root}");
-        return Err(Failure::Verdict(Verdict::NoDaemon.exit_status()));
+        text = format!("no daemon: nobody serves any train under {root}\n");
+        worst = Verdict::NoDaemon;
     }
-    let mut worst = Verdict::Ok;
     for train in trains {
         let health = look_at(&host, train).map_err(work)?;
-        print(&health);
+        text += &told(&health);
         worst = worst.max(health.verdict);
+    }
+    if let Err(error) = print(&text) {
+        // The exit status is the verdict, whether or not it can be told in words.
+        tell(&format!("dynocar: {error}"));
     }
     if worst == Verdict::Ok { Ok(()) } else { Err(Failure::Verdict(worst.exit_status())) }
 }
 
-fn print(health: &TrainHealth) {
+fn told(health: &TrainHealth) -> String {
     let daemon = health.daemon.as_deref().unwrap_or("nobody serves it");
-    println!("train {}: {}: {daemon}", health.train, health.verdict);
+    let mut text = format!("train {}: {}: {daemon}\n", health.train, health.verdict);
     for it in &health.pipelines {
         let reason = it.reason.map_or("unknown", dynocar_shared::Reason::name);
         let (kind, status, age_ms) = (it.kind, it.status, it.age_ms);
-        println!("  pipeline {} ({kind}): {status} ({reason}), vouched {age_ms} ms ago", it.index);
+        text += &format!(
+            "  pipeline {} ({kind}): {status} ({reason}), vouched {age_ms} ms ago\n",
+            it.index
+        );
     }
+    text
 }

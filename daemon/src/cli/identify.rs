@@ -14,9 +14,9 @@ use serde::Serialize;
 use self::answer::EstimatorAnswer;
 use self::runs::{EstimatorSpread, RunAnswer};
 use super::Failure;
-use super::output::{print, write_json};
 use crate::dataset;
 use crate::identify::{default_estimators, identify, samples_of_runs};
+use crate::output::{give, require_file};
 
 /// Learn the train's parameters from recorded runs with the daemon's own pipelines.
 #[derive(Debug, Args)]
@@ -34,7 +34,7 @@ pub struct IdentifyArguments {
     traction_only: bool,
     /// Write the result for machines; - for standard output
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    pub(super) json: Option<PathBuf>,
 }
 
 #[derive(Debug, Serialize)]
@@ -55,9 +55,11 @@ struct Answer {
 ///
 /// A wrong dataset or estimator name is an input failure.
 pub fn execute(arguments: &IdentifyArguments) -> Result<(), Failure> {
+    if let Some(file) = &arguments.json {
+        require_file(file, "{")?;
+    }
     let estimators = chosen_estimators(arguments.estimator.as_deref())?;
-    let mut dataset =
-        dataset::load(&arguments.dataset).map_err(|error| Failure::Input(error.to_string()))?;
+    let mut dataset = dataset::load(&arguments.dataset)?;
     if arguments.traction_only {
         dataset.keep_traction_only();
     }
@@ -70,10 +72,7 @@ pub fn execute(arguments: &IdentifyArguments) -> Result<(), Failure> {
         between_runs: runs.as_deref().map(runs::spreads),
         runs,
     };
-    match &arguments.json {
-        Some(file) => write_json(file, &answer),
-        None => print_answer(&answer),
-    }
+    Ok(give(arguments.json.as_deref(), &answer, || text(&answer))?)
 }
 
 /// What every estimator learns from some runs, one after the other.
@@ -114,26 +113,26 @@ fn chosen_estimators(name: Option<&str>) -> Result<Vec<EstimatorSettings>, Failu
     Ok(chosen)
 }
 
-fn print_answer(answer: &Answer) -> Result<(), Failure> {
-    println!("{}", answer.dataset);
+fn text(answer: &Answer) -> String {
+    let mut text = format!("{}\n", answer.dataset);
     for it in &answer.estimators {
         let reason = if it.reason == "none" { String::new() } else { format!(", {}", it.reason) };
         let rejected: u32 = it.samples.rejected.values().sum();
-        println!(
-            "\n{} ({}{reason}): {} samples used, {rejected} rejected, {} lost, {} updates",
+        text += &format!(
+            "\n{} ({}{reason}): {} samples used, {rejected} rejected, {} lost, {} updates\n",
             it.name, it.status, it.samples.used, it.samples.lost, it.updates
         );
         for (reason, count) in &it.samples.rejected {
-            println!("    rejected as {reason}: {count}");
+            text += &format!("    rejected as {reason}: {count}\n");
         }
         for (name, value) in &it.values {
             let std = it.std.get(name).copied().unwrap_or(f64::NAN);
-            println!("    {name:<24} {value:>12.6} ± {:.6}", 1.96 * std);
+            text += &format!("    {name:<24} {value:>12.6} ± {:.6}\n", 1.96 * std);
         }
         let step = (it.resistance.len() / 6).max(1);
         for point in it.resistance.iter().step_by(step) {
-            println!(
-                "    w0 at {:>5.1} m/s          {:>12.4} ± {:.4} N/kN",
+            text += &format!(
+                "    w0 at {:>5.1} m/s          {:>12.4} ± {:.4} N/kN\n",
                 point.speed_mps,
                 point.w0_n_per_kn,
                 1.96 * point.std
@@ -141,8 +140,7 @@ fn print_answer(answer: &Answer) -> Result<(), Failure> {
         }
     }
     if let Some(runs) = &answer.runs {
-        print(&runs::report(runs))?;
+        text += &runs::report(runs);
     }
-    println!("\n± is the half width of the 95 % interval");
-    Ok(())
+    text + "\n± is the half width of the 95 % interval\n"
 }

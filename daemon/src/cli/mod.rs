@@ -6,16 +6,21 @@
 mod check;
 mod demo;
 mod explain;
+mod failure;
 mod health;
 mod identify;
-mod output;
 mod replay;
 mod run;
 mod text;
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+pub use failure::{ErrorAnswer, Failure};
+
+use crate::output::{OutputError, write_json};
 
 /// Dynocar, a dynamometer car in software.
 #[derive(Debug, Parser)]
@@ -36,20 +41,25 @@ enum Command {
     Identify(identify::IdentifyArguments),
 }
 
-/// Why a command ended without a result; says which exit status follows.
-#[derive(Debug)]
-pub enum Failure {
-    /// The command line or an input file is wrong: exit status 2.
-    Input(String),
-    /// The work failed: exit status 1.
-    Work(String),
-    /// The result, already told, is bad news: this exit status.
-    Verdict(u8),
+impl Command {
+    /// Where machines want the result.
+    fn json(&self) -> Option<&Path> {
+        match self {
+            Command::Demo(arguments) => arguments.json.as_deref(),
+            Command::Explain(arguments) => arguments.json.as_deref(),
+            Command::Identify(arguments) => arguments.json.as_deref(),
+            // `check` has an answer of its own for what is wrong.
+            Command::Check(_) | Command::Run(_) | Command::Health(_) | Command::Replay(_) => None,
+        }
+    }
 }
 
 /// Parses the command line, runs the command, reports a failure on standard error.
 pub fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let arguments = match parse::<Arguments>("dynocar") {
+        Ok(arguments) => arguments,
+        Err(status) => return status,
+    };
     let result: Result<(), Failure> = match &arguments.command {
         Command::Demo(arguments) => demo::execute(arguments),
         Command::Explain(arguments) => explain::execute(arguments),
@@ -61,14 +71,38 @@ pub fn main() -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(Failure::Verdict(status)) => ExitCode::from(status),
-        Err(Failure::Input(message)) => {
-            eprintln!("dynocar: {message}");
-            ExitCode::from(2)
+        Err(failure) => failure.report("dynocar", arguments.command.json()),
+    }
+}
+
+/// The command line of a program of the project; where it asks for help or is wrong, the exit
+/// status after that was told.
+///
+/// # Errors
+///
+/// The exit status.
+pub fn parse<A: Parser>(program: &str) -> Result<A, ExitCode> {
+    let error = match A::try_parse() {
+        Ok(arguments) => return Ok(arguments),
+        Err(error) => error,
+    };
+    let printed = error.print().and_then(|()| std::io::Write::flush(&mut std::io::stdout()));
+    if error.use_stderr() {
+        let words: Vec<_> = std::env::args_os().collect();
+        let wants_json = words.iter().any(|word| word == "--json=-")
+            || words.windows(2).any(|pair| pair[0] == "--json" && pair[1] == "-");
+        let message = error.render().to_string();
+        let message = message.trim().trim_start_matches("error: ").to_string();
+        if let (true, Some(error)) = (wants_json, Failure::Input(message).answer()) {
+            // People know already; that machines cannot be told changes no status.
+            let _ = write_json(Path::new("-"), &failure::Answer { error });
         }
-        Err(Failure::Work(message)) => {
-            eprintln!("dynocar: {message}");
-            ExitCode::from(1)
+        return Err(ExitCode::from(2));
+    }
+    match printed {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Failure::from(OutputError::StandardOutput(error)).report(program, None))
         }
+        _ => Err(ExitCode::SUCCESS),
     }
 }

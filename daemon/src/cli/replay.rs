@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Failure;
 use crate::dataset;
+use crate::output::tell;
 use crate::replay::{Rate, ReplayReport, Replayer};
 
 /// Play recorded runs into the sample channel, as a controller would.
@@ -38,8 +39,7 @@ pub struct ReplayArguments {
 /// A wrong dataset or run number is an input failure; a channel that cannot be opened, and samples
 /// that nobody used, are a failure of the work.
 pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
-    let dataset =
-        dataset::load(&arguments.dataset).map_err(|error| Failure::Input(error.to_string()))?;
+    let dataset = dataset::load(&arguments.dataset)?;
     let runs = match arguments.run {
         None => &dataset.runs[..],
         Some(number) if (1..=dataset.runs.len()).contains(&number) => {
@@ -57,10 +57,10 @@ pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
         Failure::Input(format!("--wait {}: expected a time in s from 0", arguments.wait))
     })?;
     if !replayer.await_daemon(wait) {
-        eprintln!(
+        tell(&format!(
             "dynocar: no daemon serves train {} after {} s; publishing all the same",
             arguments.train, arguments.wait
-        );
+        ));
     }
     for run in runs {
         let bar = progress_bar(run.samples.len(), &run.file);
@@ -68,7 +68,7 @@ pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
         bar.finish();
     }
     let report = replayer.finish();
-    tell(&report);
+    tell_report(&report);
     if report.snapshots.is_empty() {
         return Err(Failure::Work(format!(
             "nobody took the samples: no daemon serves train {}",
@@ -90,11 +90,11 @@ fn progress_bar(samples: usize, file: &str) -> ProgressBar {
     ProgressBar::new(samples as u64).with_style(style).with_message(file.to_owned())
 }
 
-fn tell(report: &ReplayReport) {
-    eprintln!(
+fn tell_report(report: &ReplayReport) {
+    tell(&format!(
         "{} samples published in {:.1} s, {} not taken by the transport",
         report.published, report.elapsed_s, report.refused
-    );
+    ));
     for snapshot in &report.snapshots {
         let kind = PipelineKind::from_number(snapshot.pipeline_kind);
         let taken = report.taken(snapshot);
@@ -102,7 +102,7 @@ fn tell(report: &ReplayReport) {
             taken.reasons.iter().map(|(reason, count)| format!("{reason} {count}")).collect();
         let reasons =
             if reasons.is_empty() { String::new() } else { format!(" ({})", reasons.join(", ")) };
-        eprintln!(
+        tell(&format!(
             "  pipeline {} ({}): {}, {} used, {} rejected{reasons}, {} lost",
             snapshot.pipeline_index,
             kind.map_or("unknown kind", PipelineKind::name),
@@ -110,6 +110,6 @@ fn tell(report: &ReplayReport) {
             taken.used,
             taken.rejected,
             taken.lost
-        );
+        ));
     }
 }

@@ -24,8 +24,7 @@ pub struct RunArguments {
 ///
 /// A wrong configuration is an input failure, anything later a failure of the work.
 pub fn execute(arguments: &RunArguments) -> Result<(), Failure> {
-    let config =
-        DaemonConfig::load(&arguments.config).map_err(|error| Failure::Input(error.to_string()))?;
+    let config = DaemonConfig::load(&arguments.config)?;
     start_log(&config)?;
     run(&config).map_err(|error| match error {
         RunError::Setting { .. } => {
@@ -43,6 +42,8 @@ fn start_log(config: &DaemonConfig) -> Result<(), Failure> {
     let log = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
+        // A log that cannot be written is told nowhere, and ends no daemon.
+        .log_internal_errors(false)
         .with_ansi(std::io::stderr().is_terminal());
     match config.log_format {
         LogFormat::Text => log.with_target(false).init(),

@@ -14,11 +14,14 @@ pub use quantities::Answers;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use dynocar_core::dataset::FileProblem;
 use dynocar_core::pipeline::EstimatorSettings;
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
 use dynocar_shared::TrainId;
 use serde::Deserialize;
+
+use crate::dataset::read_text;
 
 /// What a pipeline thread does while no sample comes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -134,13 +137,13 @@ pub struct DaemonConfig {
 /// Why a configuration is refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
-    /// The file cannot be read.
-    #[error("{path}: cannot be read: {source}")]
+    /// The file's text cannot be had.
+    #[error("{path}: {problem}")]
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// The system's answer.
-        source: std::io::Error,
+        /// Why not.
+        problem: FileProblem,
     },
     /// The file is no TOML, or has a key or type that is not expected.
     #[error("{path}: {message}")]
@@ -174,8 +177,8 @@ impl DaemonConfig {
     ///
     /// See [`ConfigError`]; every message names the file and what was expected.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| ConfigError::Unreadable { path: path.into(), source })?;
+        let text = read_text(path)
+            .map_err(|problem| ConfigError::Unreadable { path: path.into(), problem })?;
         DaemonConfig::from_text(path, &text)
     }
 

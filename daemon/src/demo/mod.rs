@@ -8,6 +8,7 @@ mod stage;
 mod summary;
 mod view;
 
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use dynocar_client::{SnapshotReader, monotonic_now_ns};
@@ -15,13 +16,13 @@ use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::{ParameterSnapshot, TrainId};
 use hdrhistogram::Histogram;
 
-pub use summary::DemoAnswer;
+pub use summary::{DemoAnswer, Summary};
 
 use dynocar_core::dataset::Dataset;
 
 use crate::dataset::{self, LoadError};
+use crate::run::{RunError, stop_on_signals};
 use stage::{Stage, StageError};
-use summary::Summary;
 use view::View;
 
 /// Number of the demo's train on the channels.
@@ -43,22 +44,22 @@ pub enum DemoError {
     /// A channel could not be opened.
     #[error(transparent)]
     Channel(#[from] dynocar_client::ChannelError),
-    /// Samples were lost although the rate allows for none to be.
-    #[error("{lost} samples were lost at {rate} times the recorded rate")]
-    Lost {
-        /// Samples lost by the pipeline that lost most.
-        lost: u64,
-        /// The rate of the replay.
-        rate: f64,
-    },
+    /// The system gives no signal handler.
+    #[error(transparent)]
+    Signals(#[from] RunError),
+    /// Somebody wanted it to end; daemon and controller have ended, too.
+    #[error("interrupted")]
+    Interrupted,
 }
 
-/// Plays the demo at so many times the recorded rate, and gives the summary.
+/// Plays the demo at so many times the recorded rate, and gives what was found.
 ///
 /// # Errors
 ///
 /// See [`DemoError`].
-pub fn play(rate: f64) -> Result<DemoAnswer, DemoError> {
+pub fn play(rate: f64) -> Result<Summary, DemoError> {
+    // Else the two other processes and the temporary folder would stay.
+    let stop = stop_on_signals()?;
     let mut stage = Stage::build()?;
     let dataset = dataset::load(stage.dataset())?;
     let mut reader = SnapshotReader::open(stage.host(), TRAIN)?;
@@ -73,6 +74,9 @@ pub fn play(rate: f64) -> Result<DemoAnswer, DemoError> {
     let mut last_draw = Instant::now();
     let mut ended: Option<Instant> = None;
     loop {
+        if stop.load(Ordering::Relaxed) {
+            return Err(DemoError::Interrupted);
+        }
         let news = reader.poll();
         let now_ns = monotonic_now_ns();
         if news > 0 {
@@ -99,14 +103,7 @@ pub fn play(rate: f64) -> Result<DemoAnswer, DemoError> {
         reader.readings(monotonic_now_ns()).map(|reading| *reading.snapshot).collect();
     stage.stop_daemon()?;
     let latency = latency.histogram;
-    let summary =
-        Summary { dataset: &dataset, published: total, rate, snapshots: &snapshots, latency };
-    summary.print();
-    let answer = summary.answer();
-    match answer.samples.lost {
-        0 => Ok(answer),
-        lost => Err(DemoError::Lost { lost, rate }),
-    }
+    Ok(Summary { dataset, published: total, rate, snapshots, latency })
 }
 
 fn await_fresh(reader: &mut SnapshotReader, stage: &mut Stage) -> Result<(), DemoError> {

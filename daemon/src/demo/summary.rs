@@ -61,20 +61,20 @@ pub struct LatencyAnswer {
 }
 
 /// What the demo found, for people and for machines.
-pub struct Summary<'a> {
+pub struct Summary {
     /// What was played.
-    pub dataset: &'a Dataset,
+    pub dataset: Dataset,
     /// Samples played.
     pub published: u64,
     /// How fast.
     pub rate: f64,
     /// The last snapshot of each pipeline.
-    pub snapshots: &'a [ParameterSnapshot],
+    pub snapshots: Vec<ParameterSnapshot>,
     /// Time from sample to snapshot in ns.
     pub latency: Histogram<u64>,
 }
 
-impl Summary<'_> {
+impl Summary {
     /// The result for machines.
     pub fn answer(&self) -> DemoAnswer {
         let pipelines: Vec<PipelineAnswer> = self.snapshots.iter().map(pipeline_answer).collect();
@@ -93,22 +93,26 @@ impl Summary<'_> {
         DemoAnswer { pipelines, samples, latency }
     }
 
-    /// Prints the result for people.
-    pub fn print(&self) {
+    /// The result for people.
+    pub fn text(&self) -> String {
         let answer = self.answer();
-        println!();
-        self.print_resistance();
-        println!(
-            "\n{:<18} {:<12} {:<32} {:>7} {:>9} {:>5}",
-            "pipeline", "answers", "status", "used", "rejected", "lost"
+        let mut text = format!(
+            "\n{}\n{:<18} {:<12} {:<32} {:>7} {:>9} {:>5}\n",
+            self.resistance(),
+            "pipeline",
+            "answers",
+            "status",
+            "used",
+            "rejected",
+            "lost"
         );
         for it in &answer.pipelines {
             let status = match it.reason {
                 "none" => it.status.to_owned(),
                 reason => format!("{} ({reason})", it.status),
             };
-            println!(
-                "{:<18} {:<12} {status:<32} {:>7} {:>9} {:>5}",
+            text += &format!(
+                "{:<18} {:<12} {status:<32} {:>7} {:>9} {:>5}\n",
                 it.name,
                 it.answers.join(" "),
                 it.used,
@@ -116,61 +120,64 @@ impl Summary<'_> {
                 it.lost
             );
         }
-        self.print_mass();
-        println!(
-            "\n{} samples published at {} times the recorded rate, {} lost",
-            answer.samples.published, self.rate, answer.samples.lost
+        text += &self.mass();
+        let DemoAnswer { samples, latency, .. } = answer;
+        text += &format!(
+            "\n{} samples published at {} times the recorded rate, {} lost\n",
+            samples.published, self.rate, samples.lost
         );
-        println!(
-            "sample → snapshot: p50 {:.1} µs, p99 {:.1} µs over {} snapshots",
-            answer.latency.p50_ns as f64 * 1e-3,
-            answer.latency.p99_ns as f64 * 1e-3,
-            answer.latency.count
-        );
+        text + &format!(
+            "sample → snapshot: p50 {:.1} µs, p99 {:.1} µs over {} snapshots\n",
+            latency.p50_ns as f64 * 1e-3,
+            latency.p99_ns as f64 * 1e-3,
+            latency.count
+        )
     }
 
     /// Declared and estimated mass of the last run.
-    fn print_mass(&self) {
+    fn mass(&self) -> String {
         let last = self.dataset.runs.last().and_then(|run| run.samples.last());
         let declared_kg = last.and_then(|sample| sample.get(SampleField::Mass));
         let declared_t = 1e-3 * declared_kg.unwrap_or(self.dataset.train.mass_kg);
-        for it in self.snapshots.iter().filter(|it| it.answers(Quantity::Mass)) {
-            if let (Some(mass_t), Some(std_t)) =
-                (it.value(Parameter::Mass), it.std(Parameter::Mass))
-            {
-                let half_width_t = 1.96 * std_t;
-                println!(
-                    "\nmass on the last run: declared {declared_t:.0} t, \
-                     estimated {mass_t:.0} ± {half_width_t:.0} t"
-                );
-            }
-        }
+        let told = |it: &ParameterSnapshot| {
+            let mass_t = it.value(Parameter::Mass)?;
+            let half_width_t = 1.96 * it.std(Parameter::Mass)?;
+            Some(format!(
+                "\nmass on the last run: declared {declared_t:.0} t, \
+                 estimated {mass_t:.0} ± {half_width_t:.0} t\n"
+            ))
+        };
+        self.snapshots.iter().filter(|it| it.answers(Quantity::Mass)).filter_map(told).collect()
     }
 
-    /// Declared and estimated resistance over the driven speeds.
-    fn print_resistance(&self) {
+    /// Declared and estimated resistance over the driven speeds; empty without motion.
+    fn resistance(&self) -> String {
         let estimates: Vec<&ParameterSnapshot> =
             self.snapshots.iter().filter(|it| it.resistance_at(10.0).is_some()).collect();
         let low = estimates.iter().map(|it| it.speed_min_mps).fold(f64::INFINITY, f64::min);
         let high = estimates.iter().map(|it| it.speed_max_mps).fold(0.0, f64::max);
         if estimates.is_empty() || low >= high {
-            return;
+            return String::new();
         }
-        println!("Basic resistance in N/kN: declared, and estimated with its 95 % interval");
-        print!("{:>8} {:>9}", "m/s", "declared");
-        estimates.iter().for_each(|it| print!(" {:>17}", name(it)));
-        println!();
+        let mut text = String::from(
+            "Basic resistance in N/kN: declared, and estimated with its 95 % interval\n",
+        );
+        text += &format!("{:>8} {:>9}", "m/s", "declared");
+        estimates.iter().for_each(|it| text += &format!(" {:>17}", name(it)));
+        text.push('\n');
         let steps = 6;
         for step in 0..=steps {
             let speed_mps = low + (high - low) * f64::from(step) / f64::from(steps);
             let declared = self.dataset.train.resistance.w0_n_per_kn(speed_mps);
-            print!("{speed_mps:>8.1} {declared:>9.3}");
+            text += &format!("{speed_mps:>8.1} {declared:>9.3}");
             for estimate in estimates.iter().filter_map(|it| it.resistance_at(speed_mps)) {
                 let half_width = 1.96 * estimate.w0_std_n_per_kn;
-                print!(" {:>17}", format!("{:.3} ± {half_width:.3}", estimate.w0_n_per_kn));
+                text +=
+                    &format!(" {:>17}", format!("{:.3} ± {half_width:.3}", estimate.w0_n_per_kn));
             }
-            println!();
+            text.push('\n');
         }
+        text
     }
 }
 

@@ -9,6 +9,8 @@ use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
 use dynocar_core::dataset::Dataset;
 
+use crate::output::tell;
+
 /// How often a plain line is written for each pipeline.
 const PLAIN_EVERY: Duration = Duration::from_secs(3);
 
@@ -28,12 +30,12 @@ struct Bars {
 impl View {
     /// A view of the replay of a dataset with so many samples.
     pub fn new(dataset: &Dataset, total: u64, rate: f64) -> Self {
-        eprintln!(
+        tell(&format!(
             "{}: {} recorded runs at {rate} times their speed",
             dataset.train.name,
             dataset.runs.len()
-        );
-        eprintln!("controller, daemon and client are three processes; ± is a 95 % interval");
+        ));
+        tell("controller, daemon and client are three processes; ± is a 95 % interval");
         let bars = std::io::stderr().is_terminal().then(|| Bars::new(total));
         View { total, bars, last_plain: None }
     }
@@ -62,7 +64,7 @@ impl View {
     fn write_lines(&self, reader: &SnapshotReader, now_ns: i64) {
         for reading in reader.readings(now_ns) {
             let percent = 100 * reading.snapshot.sample_sequence / self.total.max(1);
-            eprintln!("{percent:3} %  {}", describe(&reading));
+            tell(&format!("{percent:3} %  {}", describe(&reading)));
         }
     }
 }

@@ -122,6 +122,9 @@ fn verdict(subject: &Subject) -> String {
         );
     }
     html += &figures(subject);
+    if let Some(unscored) = &answer.unscored {
+        let _ = writeln!(html, "<p class=\"note\">{}</p>", escape(unscored));
+    }
     html + "</section>\n"
 }
 

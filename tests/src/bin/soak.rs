@@ -1,10 +1,13 @@
 //! Seeded faults for as long as one likes.
 
 use std::collections::BTreeMap;
+use std::process::ExitCode;
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
+use dynocar::cli::parse;
 use dynocar::identify::default_estimators;
+use dynocar::output::{OutputError, print, tell, write_file};
 use dynocar_tests::fuzz::{self, Target};
 use dynocar_tests::golden;
 use dynocar_tests::sensor_failures::SensorFailure;
@@ -69,41 +72,57 @@ fn known_kinds() -> PossibleValuesParser {
 /// Tallies by the kind of estimator and whether sensors failed.
 type Tallies = BTreeMap<(String, bool), Tally>;
 
-fn main() {
+fn main() -> ExitCode {
     let programs = Programs::beside(&std::env::current_exe().expect("the program's path"));
-    match Arguments::parse().command {
+    let arguments = match parse::<Arguments>("dynocar-soak") {
+        Ok(arguments) => arguments,
+        Err(status) => return status,
+    };
+    match arguments.command {
         Command::Faults(Rounds { rounds, seed }) => {
             let summary = faults::run(&programs, rounds, seed);
-            println!("{rounds} rounds: {summary:?}");
+            say(format!("{rounds} rounds: {summary:?}"));
         }
         Command::Load { seconds, seed } => {
-            println!("{:#?}", load::run(&programs, seconds, seed));
+            say(format!("{:#?}", load::run(&programs, seconds, seed)));
         }
         Command::Hostile(Rounds { rounds, seed }) => {
-            hostile::measure(&programs, rounds, seed).iter().for_each(|it| println!("{it:?}"));
+            hostile::measure(&programs, rounds, seed).iter().for_each(|it| say(format!("{it:?}")));
         }
         Command::State(Rounds { rounds, seed }) => {
             let states = state_kills::kill_writers(&programs.peer, rounds, seed);
-            println!("{rounds} kills among {states} writes, every state readable");
+            say(format!("{rounds} kills among {states} writes, every state readable"));
         }
         Command::Samples { rounds: Rounds { rounds, seed }, kinds } => {
             let mut tallies = Tallies::new();
             (0..rounds).for_each(|round| samples(round, seed + round, &kinds, &mut tallies));
             print_tallies(&tallies);
-            println!("{rounds} scenes, every sample accounted for, every snapshot finite");
+            say(format!("{rounds} scenes, every sample accounted for, every snapshot finite"));
         }
         Command::Fuzz(Rounds { rounds, seed }) => {
             for target in Target::ALL {
                 let accepted = fuzz::run(target, rounds, seed);
-                println!("{target:?}: {rounds} inputs, {accepted} accepted, none misbehaved");
+                say(format!("{target:?}: {rounds} inputs, {accepted} accepted, none misbehaved"));
             }
         }
         Command::Golden => {
             let text = golden::compute().to_text();
-            std::fs::write(golden::path(), text).expect("the golden file to be written");
-            println!("{} made anew", golden::path().display());
+            write_file(&golden::path(), &text).unwrap_or_else(|error| give_up(&error));
+            say(format!("{} made anew", golden::path().display()));
         }
     }
+    ExitCode::SUCCESS
+}
+
+/// A line of the result on standard output.
+fn say(line: String) {
+    print(&(line + "\n")).unwrap_or_else(|error| give_up(&error));
+}
+
+/// Ends the program when nobody can be given the result.
+fn give_up(error: &OutputError) {
+    tell(&format!("dynocar-soak: {error}"));
+    std::process::exit(1);
 }
 
 /// One scene without and with every failure at six rates; adds to the tallies of the kinds.
@@ -113,7 +132,7 @@ fn samples(round: u64, seed: u64, kinds: &[String], tallies: &mut Tallies) {
     let is_wanted = |kind: &str| kinds.is_empty() || kinds.iter().any(|wanted| wanted == kind);
     let mut watch = |failure, rate| {
         for watched in scene.watch(failure, rate, seed, is_wanted) {
-            watched.misled_at_end.iter().for_each(|it| println!("{train_type:?} {it:?}"));
+            watched.misled_at_end.iter().for_each(|it| say(format!("{train_type:?} {it:?}")));
             *tallies.entry((watched.kind, failure.is_some())).or_default() += watched.tally;
         }
     };
@@ -129,9 +148,9 @@ fn print_tallies(tallies: &Tallies) {
     for ((kind, is_failing), tally) in tallies {
         let samples = if *is_failing { "failing" } else { "good" };
         let Tally { looks, trusted, wrong, wrong_at_end } = tally;
-        println!(
+        say(format!(
             "{kind}, {samples} samples: {looks} looks, {trusted} trusted, {wrong} of them wrong; \
              {wrong_at_end} wrong at the end of a scene"
-        );
+        ));
     }
 }

@@ -271,7 +271,7 @@ pub fn run(programs: &Programs, rounds: u64, seed: u64) -> Summary {
         summary.polls += cast.check_polls();
         summary.daemons += u64::from(cast.epoch != epoch);
         if round % 100 == 0 {
-            eprintln!("{told}: {summary:?}");
+            dynocar::output::tell(&format!("{told}: {summary:?}"));
         }
     }
     cast.client.end(Signal::KILL);

@@ -1,6 +1,7 @@
 //! What can be wrong with a dataset's files, and where.
 
 use super::names::Choices;
+use super::quantity::Quantity;
 use crate::track::TrackError;
 
 /// A place in a file.
@@ -57,6 +58,20 @@ pub enum FileProblem {
     /// It is a folder.
     #[error("expected a file, found a folder")]
     IsFolder,
+    /// It is neither a file nor a folder: reading it may never end.
+    #[error("expected a file, found {0}")]
+    NotRegular(&'static str),
+    /// Its first bytes tell of another format.
+    #[error("expected text, found {0}")]
+    NotText(&'static str),
+    /// More bytes than are read.
+    #[error("expected at most {most} bytes, found {found}: split the recording into runs")]
+    TooLarge {
+        /// The bound.
+        most: u64,
+        /// The file's size.
+        found: u64,
+    },
     /// The bytes are not UTF-8.
     #[error("not UTF-8: save the file as UTF-8")]
     NotUtf8 {
@@ -183,13 +198,36 @@ pub enum Problem {
     /// A run's file without rows.
     #[error("expected rows of values below the header, found none")]
     NoRows,
-    /// No row of a run has a time.
-    #[error("column '{column}': expected times, found none in {rows} rows")]
-    NoTimes {
+    /// No row of a run has a value of a quantity without which there is no run.
+    #[error("column '{column}': expected values of {quantity}, found none in {rows} rows")]
+    NoValues {
+        /// The quantity.
+        quantity: Quantity,
         /// The column's name.
         column: String,
         /// Number of rows.
         rows: usize,
+    },
+    /// All rows of a run have one time.
+    #[error("column '{column}': expected times that grow, found {time_s} s in all {rows} rows")]
+    OneTime {
+        /// The column's name.
+        column: String,
+        /// The time in s.
+        time_s: f64,
+        /// Number of rows.
+        rows: usize,
+    },
+    /// The header has one column and another delimiter in it.
+    #[error(
+        "expected columns separated by {expected:?}, found {found:?} in the header: set \
+         delimiter = \"{}\" in [dataset]", found.escape_default()
+    )]
+    OtherDelimiter {
+        /// The declared delimiter.
+        expected: char,
+        /// What the header has instead.
+        found: char,
     },
     /// A mapped column occurs more than once.
     #[error("column '{column}' occurs {count} times in the header")]

@@ -1,5 +1,7 @@
 //! `dataset.toml`.
 
+use std::path::{Component, Path};
+
 use super::document::{Document, Section};
 use super::error::{DatasetError, Place, Problem};
 use super::names::Choices;
@@ -122,7 +124,8 @@ impl Manifest {
         dataset.allow(&["name", "description", "position_reference", "delimiter", "decimal"])?;
         let columns = columns(&root.required_table("columns")?)?;
         let (delimiter, decimal) = (delimiter(&dataset)?, decimal(&dataset)?);
-        if delimiter == decimal {
+        // A comma between the digits of a quoted cell separates no cells.
+        if delimiter == decimal && decimal != b',' {
             let shown = format!("{:?}", char::from(decimal).to_string());
             return Err(dataset.out_of_range("decimal", &shown, "another mark than the delimiter"));
         }
@@ -242,7 +245,7 @@ fn runs(root: &Section) -> Result<Vec<RunEntry>, DatasetError> {
     let mut runs: Vec<RunEntry> = Vec::new();
     for section in root.tables("runs")? {
         let run = run(&section)?;
-        let twin = runs.iter().find(|other| other.file == run.file);
+        let twin = runs.iter().find(|other| is_same_path(&other.file, &run.file));
         if let Some(first_line) = twin.and_then(|twin| twin.place.line) {
             let (key, file) = (section.full("file"), run.file);
             let problem = Problem::RepeatedRun { key, file, first_line };
@@ -255,6 +258,12 @@ fn runs(root: &Section) -> Result<Vec<RunEntry>, DatasetError> {
     } else {
         Ok(runs)
     }
+}
+
+/// True for two spellings of one path, as `1.csv` and `./1.csv`.
+fn is_same_path(one: &str, other: &str) -> bool {
+    let parts = |path| Path::new(path).components().filter(|part| *part != Component::CurDir);
+    parts(one).eq(parts(other))
 }
 
 fn run(section: &Section) -> Result<RunEntry, DatasetError> {

@@ -207,6 +207,7 @@ fn text(
             (FileProblem::NotUtf8 { line }, _) => {
                 Place::line(&file, line).problem(Problem::File(problem))
             }
+            (FileProblem::NotText(_), _) => Place::whole(&file).problem(Problem::File(problem)),
             (_, None) => Place::whole(&file).problem(Problem::File(problem)),
             (_, Some(place)) => place.clone().problem(Problem::ListedFile { file, problem }),
         }

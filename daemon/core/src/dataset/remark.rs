@@ -132,6 +132,24 @@ pub enum Remark {
         /// The speed in m/s that is repeated.
         speed_mps: f64,
     },
+    /// A column without a single value.
+    #[error("{quantity} is mapped, but no row has a value of it")]
+    NoValues {
+        /// The quantity.
+        quantity: Quantity,
+    },
+    /// The train stands all the time.
+    #[error(
+        "the train hardly moves, at {highest_mps} m/s at most: nothing can be learned; is the unit \
+         of speed right?"
+    )]
+    NeverMoves {
+        /// The highest speed in m/s.
+        highest_mps: f64,
+    },
+    /// No two rows follow each other in time.
+    #[error("only one row is in order of time: motion cannot be seen in it")]
+    OneRow,
     /// Values outside what the quantity can be on a railway.
     #[error(
         "{quantity} lies outside {low} to {high} {unit} in {count} rows, and those samples are \
@@ -155,6 +173,7 @@ pub enum Remark {
 pub(super) fn remarks(context: Context, run: &Resolved, quality: &RunQuality) -> Vec<Remark> {
     let mut remarks = Vec::new();
     of_time(quality, &mut remarks);
+    of_content(context, run, quality, &mut remarks);
     remarks.extend(stands_still(run));
     of_position(context, run, quality, &mut remarks);
     if run.speeds.negative > 0 {
@@ -174,6 +193,20 @@ fn of_time(quality: &RunQuality, remarks: &mut Vec<Remark>) {
     let step_s = quality.order.step_s;
     if step_s > 0.0 && !(USUAL_STEP_S.0..=USUAL_STEP_S.1).contains(&step_s) {
         remarks.push(Remark::UnusualStep { step_s });
+    }
+}
+
+/// What a run lacks altogether.
+fn of_content(context: Context, run: &Resolved, quality: &RunQuality, remarks: &mut Vec<Remark>) {
+    let quantities = context.manifest.columns.iter().map(|mapping| mapping.quantity);
+    let empty = quantities.filter(|&quantity| run.table.filled(quantity).is_none());
+    remarks.extend(empty.map(|quantity| Remark::NoValues { quantity }));
+    if run.order.in_order.iter().filter(|&&mark| mark).count() < 2 {
+        remarks.push(Remark::OneRow);
+    } else if let Some((_, highest_mps)) = quality.speed_range_mps
+        && highest_mps < MOVING_MPS
+    {
+        remarks.push(Remark::NeverMoves { highest_mps });
     }
 }
 

@@ -118,11 +118,21 @@ pub(super) fn read(
 ) -> Result<Run, DatasetError> {
     let table = Table::parse(label, text, context.manifest)?;
     let rows = table.lines.rows;
+    let has_speed = table.filled(Quantity::Speed).is_some();
     let resolved = Resolved::of(context, entry, table);
-    if resolved.times_s.is_empty() {
-        let mapping = context.manifest.mapping(Quantity::Time);
-        let column = mapping.map(|mapping| mapping.column.clone()).unwrap_or_default();
-        return Err(Place::whole(label).problem(Problem::NoTimes { column, rows }));
+    let refuse = |problem| Err(Place::whole(label).problem(problem));
+    let column =
+        |quantity| context.manifest.mapping(quantity).map_or(String::new(), |it| it.column.clone());
+    for (quantity, is_there) in
+        [(Quantity::Time, !resolved.times_s.is_empty()), (Quantity::Speed, has_speed)]
+    {
+        if !is_there {
+            return refuse(Problem::NoValues { quantity, column: column(quantity), rows });
+        }
+    }
+    let (time_s, rows) = (resolved.times_s[0], resolved.times_s.len());
+    if rows > 1 && resolved.times_s.iter().all(|&other| other == time_s) {
+        return refuse(Problem::OneTime { column: column(Quantity::Time), time_s, rows });
     }
     let samples = resolved.samples(number);
     let quality = quality::assess(context, &resolved, &samples);

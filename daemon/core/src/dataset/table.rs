@@ -91,6 +91,7 @@ impl Table {
 struct Rows<'m> {
     label: &'m str,
     width: usize,
+    delimiter: u8,
     decimal: u8,
     columns: Vec<Column<'m>>,
     lines: LineCounts,
@@ -122,8 +123,15 @@ impl<'m> Rows<'m> {
             let index = find_column(label, mapping, header, manifest.delimiter)?;
             columns.push(Column { mapping, index, values: Vec::new() });
         }
-        let (width, decimal) = (header.len(), manifest.decimal);
-        Ok(Rows { label, width, decimal, columns, lines: LineCounts::default(), pending: None })
+        Ok(Rows {
+            label,
+            width: header.len(),
+            delimiter: manifest.delimiter,
+            decimal: manifest.decimal,
+            columns,
+            lines: LineCounts::default(),
+            pending: None,
+        })
     }
 
     /// Takes in a row; what is wrong with it stays pending.
@@ -136,6 +144,9 @@ impl<'m> Rows<'m> {
         if record.iter().skip(self.width).any(|cell| !cell.trim_ascii().is_empty()) {
             let hint = match self.decimal {
                 b'.' if record.len() > self.width + 1 => "; are there decimal commas?",
+                decimal if decimal == self.delimiter => {
+                    "; where commas separate the cells, numbers with decimal commas need quotes"
+                }
                 _ => "",
             };
             let (expected, found) = (self.width, record.len());
@@ -204,16 +215,16 @@ fn find_column(
         1 => return Ok(header.iter().position(|other| other == name).unwrap_or(0)),
         0 => {
             let other = [';', ',', '\t', '|'].into_iter().find(|mark| header[0].contains(*mark));
-            let hint = match (header.len(), other) {
-                (1, Some(mark)) => {
-                    let delimiter = char::from(delimiter);
-                    format!("; the header has no {delimiter:?}: is the delimiter {mark:?}?")
+            match (header.len(), other) {
+                (1, Some(found)) => {
+                    Problem::OtherDelimiter { expected: char::from(delimiter), found }
                 }
-                _ => String::new(),
-            };
-            let context = format!(" (for {} in {}{hint})", mapping.quantity, mapping.place);
-            let choices = Choices::new(name, header.iter().cloned());
-            Problem::UnknownName { what: "column", name: name.clone(), context, choices }
+                _ => {
+                    let context = format!(" (for {} in {})", mapping.quantity, mapping.place);
+                    let choices = Choices::new(name, header.iter().cloned());
+                    Problem::UnknownName { what: "column", name: name.clone(), context, choices }
+                }
+            }
         }
         _ => Problem::RepeatedColumn { column: name.clone(), count },
     };
@@ -233,13 +244,16 @@ fn parse_cell(cell: &[u8], decimal: u8) -> Option<f64> {
     text.parse().ok()
 }
 
-/// A cell's number as it is kept: in the quantity's unit, missing when infinite.
+/// A greater number in SI units is none of a railway's; its square or sum might be infinite.
+const MAGNITUDE_MAX: f64 = 1e15;
+
+/// A cell's number as it is kept: in the quantity's unit, missing when infinite or as good as that.
 fn held(mapping: &ColumnMapping, cell: f64) -> f64 {
     if mapping.quantity == Quantity::CurveRadius && cell.is_infinite() {
         return 0.0;
     }
     let value = mapping.convert(cell);
-    if value.is_finite() { value } else { f64::NAN }
+    if value.abs() <= MAGNITUDE_MAX { value } else { f64::NAN }
 }
 
 fn not_a_number(mapping: &ColumnMapping, cell: &[u8], decimal: u8) -> Problem {

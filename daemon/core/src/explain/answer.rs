@@ -214,6 +214,11 @@ pub struct Answer {
     pub base: BaseAnswer,
     /// Always `full_run`.
     pub metric: &'static str,
+    /// Holdout runs with motion, which judge the model.
+    pub scored_runs: usize,
+    /// Why nothing was scored, and what the errors on the fit runs are worth; absent when it was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unscored: Option<String>,
     /// RMSE in m/s on the holdout runs without the effects.
     pub rmse_before: Option<f64>,
     /// RMSE in m/s on the holdout runs with the effects.

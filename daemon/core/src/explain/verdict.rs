@@ -48,6 +48,8 @@ pub fn answer(
             std: DavisDeviations { a: deviation[0], b: deviation[1], c: deviation[2] },
         },
         metric: "full_run",
+        scored_runs: score.holdout_runs.iter().filter(|run| run[0].count > 0).count(),
+        unscored: unscored(search, score),
         rmse_before,
         rmse_after,
         error_reduction_interval: score.reduction_interval(),
@@ -56,6 +58,32 @@ pub fn answer(
         considered: considered(search, outcome, &rivals),
         predictions: BTreeMap::new(),
     }
+}
+
+/// Why nothing was scored, and what is known instead; `None` when something was.
+fn unscored(search: &Search, score: &Score) -> Option<String> {
+    if score.holdout_rmse_mps()[0].is_some() {
+        return None;
+    }
+    let why = match search.holdout {
+        [] => "No run is held out (role = \"holdout\")",
+        _ => "The runs held out hold no motion",
+    };
+    let [before, after] = score.fit_runs.map(|error| error.rmse_mps());
+    let figure = match (before, after) {
+        (Some(before), Some(after)) => format!(
+            ": the open-loop error on the fit runs, {before:.3} m/s before and {after:.3} m/s \
+             after, is of runs that the model was fitted to, and tells nothing of others"
+        ),
+        _ => String::new(),
+    };
+    Some(format!("{why}, so that nothing was scored{figure}."))
+}
+
+/// Time in s of usable motion in the fit runs.
+fn moving_s(search: &Search) -> f64 {
+    // A sum of nothing would be -0.
+    search.problem.runs.iter().fold(0.0, |sum, run| sum + run.moving_s())
 }
 
 fn effect_answers(
@@ -102,8 +130,7 @@ fn effect_answers(
 }
 
 fn verdict(search: &Search, outcome: &Outcome, rivals: &[EffectKind]) -> Verdict {
-    let moving_s: f64 = search.problem.runs.iter().map(|run| run.moving_s()).sum();
-    if outcome.rounds.is_empty() || moving_s < MOVING_MIN_S {
+    if outcome.rounds.is_empty() || moving_s(search) < MOVING_MIN_S {
         return Verdict::InsufficientData;
     }
     let effects = &outcome.fit.model.effects;
@@ -159,8 +186,13 @@ fn statement(
     let described: Vec<String> = effects.iter().map(describe).collect();
     let described = described.join("; ");
     match verdict {
+        Verdict::InsufficientData if search.problem.runs.is_empty() => {
+            let held_out = search.holdout.len();
+            let text = format!("No run is there to fit: all {held_out} are held out.");
+            (text, Some("Give some of the runs the role \"fit\".".into()))
+        }
         Verdict::InsufficientData => {
-            let moving_s: f64 = search.problem.runs.iter().map(|run| run.moving_s()).sum();
+            let moving_s = moving_s(search);
             let observations = outcome.base.observations();
             let text = format!(
                 "The fit runs hold {moving_s:.0} s of usable motion ({observations} observations): too little to tell."

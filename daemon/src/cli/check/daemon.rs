@@ -3,22 +3,26 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use dynocar_core::dataset::Place;
 use dynocar_shared::Quantity;
 use serde::Serialize;
 
 use super::Understood;
 use super::report::line;
+use crate::cli::Failure;
 use crate::cli::text::{TextTable, short};
 use crate::config::{DaemonConfig, TrainConfig};
 
 /// Reads a configuration with the train and track files it names, and builds every estimator, so
 /// that a setting out of range is found here and not when the daemon starts.
-pub(super) fn read(path: &Path) -> Result<Understood, String> {
-    let config = DaemonConfig::load(path).map_err(|error| error.to_string())?;
+pub(super) fn read(path: &Path) -> Result<Understood, Failure> {
+    let config = DaemonConfig::load(path)?;
     for pipeline in &config.pipelines {
         for train in config.trains.iter().filter(|train| pipeline.trains.contains(&train.id)) {
             pipeline.estimator.build(&train.model).map_err(|error| {
-                format!("{}: pipelines.{}.settings.{error}", path.display(), pipeline.name)
+                let label = path.display().to_string();
+                let words = format!("{label}: pipelines.{}.settings.{error}", pipeline.name);
+                Failure::At(Place::whole(&label), words)
             })?;
         }
     }

@@ -10,16 +10,21 @@ use dynocar_core::track::Track;
 use dynocar_core::train::{Corrections, EffortCurve, TrainModel};
 use serde::Serialize;
 
+use super::Understood;
 use super::daemon::{self, DaemonAnswer};
-use super::{Kind, Understood};
+use crate::cli::{ErrorAnswer, Failure};
+use crate::dataset::FileKind;
 
 /// The answer of `dynocar check --json`.
 #[derive(Debug, Serialize)]
 pub(super) struct Answer<'a> {
     path: String,
-    kind: Option<Kind>,
+    kind: Option<FileKind>,
     valid: bool,
     errors: Vec<String>,
+    /// The first of them, as every command gives it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<ErrorAnswer>,
     #[serde(skip_serializing_if = "Option::is_none")]
     dataset: Option<DatasetAnswer<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -123,12 +128,13 @@ struct TrackAnswer<'a> {
 }
 
 /// The answer when nothing could be understood.
-pub(super) fn refusal(path: &Path, message: &str) -> Answer<'static> {
+pub(super) fn refusal(path: &Path, error: ErrorAnswer) -> Answer<'static> {
     Answer {
         path: path.display().to_string(),
         kind: None,
         valid: false,
-        errors: vec![message.into()],
+        errors: vec![error.message.clone()],
+        error: Some(error),
         dataset: None,
         train: None,
         track: None,
@@ -138,7 +144,8 @@ pub(super) fn refusal(path: &Path, message: &str) -> Answer<'static> {
 
 /// The answer to what was understood.
 pub(super) fn answer<'a>(path: &Path, understood: &'a Understood) -> Answer<'a> {
-    let errors = understood.errors();
+    let errors: Vec<String> = understood.errors().map(ToString::to_string).collect();
+    let first = understood.errors().next().cloned();
     let (dataset, train, track) = match understood {
         Understood::Dataset(head, runs) => {
             let DatasetHead { manifest, train, track } = &**head;
@@ -153,6 +160,7 @@ pub(super) fn answer<'a>(path: &Path, understood: &'a Understood) -> Answer<'a> 
         kind: Some(understood.kind()),
         valid: errors.is_empty(),
         errors,
+        error: first.and_then(|error| Failure::from(error).answer()),
         dataset,
         train: train.map(train_answer),
         track: track.map(track_answer),

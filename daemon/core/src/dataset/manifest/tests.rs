@@ -105,8 +105,8 @@ fn mistakes_are_named_with_line_and_choices() {
              \",\" \";\" or \"\\t\"",
         ),
         (
-            ("delimiter = \";\"", "delimiter = \",\""),
-            "dataset.toml:6: dataset.decimal = \",\": expected another mark than the delimiter",
+            ("delimiter = \";\"\ndecimal = \",\"", "delimiter = \".\""),
+            "dataset.toml:1: dataset.decimal = \".\": expected another mark than the delimiter",
         ),
         (
             ("scale = 2.0", "scale = 0"),
@@ -115,6 +115,10 @@ fn mistakes_are_named_with_line_and_choices() {
         (
             ("runs/02.csv", "runs/01.csv"),
             "dataset.toml:21: runs[2].file: runs/01.csv is listed in line 15 already",
+        ),
+        (
+            ("runs/02.csv", "./runs//01.csv"),
+            "dataset.toml:21: runs[2].file: ./runs//01.csv is listed in line 15 already",
         ),
         (
             ("{ column = \"i\", unit = \"%\" }", "{ column = \"i\" }"),

@@ -32,6 +32,8 @@ fn any_common_spelling_of_csv_is_read() {
         ("delimiter = \";\"", "t;v;\n0;1.5;\n1;;\n2;-2;\n"),
         ("delimiter = \"\\t\"", "t\tv\n0\t1.5\n1\tinf\n2\t-2\n"),
         ("delimiter = \";\"\ndecimal = \",\"", "t;v\n0;1,5\n1;\n2;-2\n"),
+        ("decimal = \",\"", "t,v\n0,\"1,5\"\n1,\n\"2\",-2\n"),
+        ("", "t,v\r0,1.5\r1,1e308\r2,-2\r"),
     ];
     for (dataset, text) in cases {
         assert_eq!(speeds(dataset, text), expected, "{text:?}");
@@ -49,9 +51,11 @@ fn a_missing_column_is_named_with_the_header() {
     let message = table("", "t;v\n0;1\n").unwrap_err();
     assert_eq!(
         message,
-        "a.csv:1: unknown column 't' (for time in dataset.toml:7; the header has no ',': is \
-         the delimiter ';'?); did you mean 't;v'? (choices: 't;v')"
+        "a.csv:1: expected columns separated by ',', found ';' in the header: set delimiter = \
+         \";\" in [dataset]"
     );
+    let message = table("", "t\tv\n0\t1\n").unwrap_err();
+    assert!(message.ends_with("set delimiter = \"\\t\" in [dataset]"), "{message}");
     let message = table("", "t,v,v\n0,1,2\n").unwrap_err();
     assert_eq!(message, "a.csv:1: column 'v' occurs 2 times in the header");
 }
@@ -76,6 +80,15 @@ fn a_cell_that_is_no_number_is_named_with_line_and_column() {
     assert!(message.starts_with("a.csv:3: column 'v': expected a number"), "{message}");
     let message = table("", "t,v,x\n0,1,2\n1,\"2,3\n2,3,4\n").unwrap_err();
     assert!(message.starts_with("a.csv:3: a quoted cell runs over"), "{message}");
+}
+
+#[test]
+fn decimal_commas_without_quotes_are_told_apart_from_delimiters() {
+    let message = table("", "t,v\n0,\"1,5\"\n").unwrap_err();
+    assert!(message.ends_with("for decimal commas set decimal = \",\" in [dataset]"), "{message}");
+    let message = table("decimal = \",\"", "t,v\n0,1,5\n").unwrap_err();
+    let hint = "where commas separate the cells, numbers with decimal commas need quotes";
+    assert_eq!(message, format!("a.csv:2: 3 cells, but the header has 2 columns; {hint}"));
 }
 
 #[test]

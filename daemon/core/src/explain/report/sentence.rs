@@ -246,6 +246,8 @@ mod tests {
             experiment: None,
             base: BaseAnswer { a: 1.0, b: 0.0, c: 0.0, std: none },
             metric: "full_run",
+            scored_runs: 1,
+            unscored: None,
             rmse_before: None,
             rmse_after: None,
             error_reduction_interval: None,

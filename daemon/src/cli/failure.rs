@@ -1,0 +1,134 @@
+//! Why a command ends without its result: the words, the place and the exit status.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use dynocar_core::dataset::{DatasetError, Place};
+use serde::Serialize;
+
+use crate::config::ConfigError;
+use crate::dataset::LoadError;
+use crate::output::{OutputError, require_file, tell, write_json};
+
+/// Why a command ended without a result; says which exit status follows.
+#[derive(Debug)]
+pub enum Failure {
+    /// The command line or an input file is wrong: exit status 2.
+    Input(String),
+    /// An input file is wrong at a known place: exit status 2.
+    At(Place, String),
+    /// The work failed: exit status 1.
+    Work(String),
+    /// A result cannot be given: exit status 1, or 2 when its name would cost data.
+    Output(OutputError),
+    /// The result, already told, is bad news: this exit status.
+    Verdict(u8),
+}
+
+/// A failure for machines.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ErrorAnswer {
+    /// As on standard error.
+    pub message: String,
+    /// The file where it is, when one is wrong.
+    pub file: Option<String>,
+    /// Line in the file, from 1.
+    pub line: Option<usize>,
+    /// Exit status of the command.
+    pub exit_status: u8,
+}
+
+/// What stands in the place of a result.
+#[derive(Serialize)]
+pub struct Answer {
+    /// Why there is none.
+    pub error: ErrorAnswer,
+}
+
+impl Failure {
+    /// The failure for machines; `None` when the result is told already.
+    pub fn answer(&self) -> Option<ErrorAnswer> {
+        let (message, place, exit_status) = match self {
+            Failure::Input(message) => (message.clone(), None, 2),
+            Failure::At(place, message) => (message.clone(), Some(place), 2),
+            Failure::Work(message) => (message.clone(), None, 1),
+            Failure::Output(error) => {
+                let is_name = matches!(error, OutputError::Name { .. });
+                (error.to_string(), None, if is_name { 2 } else { 1 })
+            }
+            Failure::Verdict(_) => return None,
+        };
+        let (file, line) = place.map_or((None, None), |it| (Some(it.file.clone()), it.line));
+        Some(ErrorAnswer { message, file, line, exit_status })
+    }
+
+    /// Tells people on standard error, and machines where they wanted the result.
+    pub fn report(&self, program: &str, json: Option<&Path>) -> ExitCode {
+        let Some(error) = self.answer() else {
+            let Failure::Verdict(status) = self else { return ExitCode::FAILURE };
+            return ExitCode::from(*status);
+        };
+        tell(&format!("{program}: {}", error.message));
+        let status = ExitCode::from(error.exit_status);
+        if let Some(file) = json
+            && self.can_be_told_in(file)
+            && let Err(error) = write_json(file, &Answer { error })
+        {
+            tell(&format!("{program}: {error}"));
+        }
+        status
+    }
+
+    /// False where the file holds the result already, cannot be written or must not be.
+    fn can_be_told_in(&self, file: &Path) -> bool {
+        match self {
+            Failure::Output(OutputError::StandardOutput(_)) => false,
+            Failure::Output(OutputError::File { path, .. } | OutputError::Name { path, .. })
+                if path == file =>
+            {
+                false
+            }
+            _ => require_file(file, "{").is_ok(),
+        }
+    }
+}
+
+impl From<OutputError> for Failure {
+    fn from(error: OutputError) -> Self {
+        Failure::Output(error)
+    }
+}
+
+impl From<DatasetError> for Failure {
+    fn from(error: DatasetError) -> Self {
+        Failure::At(error.place.clone(), error.to_string())
+    }
+}
+
+impl From<LoadError> for Failure {
+    fn from(error: LoadError) -> Self {
+        let message = error.to_string();
+        match error {
+            LoadError::Dataset(error) => error.into(),
+            LoadError::NoSuchPath { path }
+            | LoadError::NotADataset { path }
+            | LoadError::NoManifest { path, .. } => {
+                Failure::At(Place::whole(&path.display().to_string()), message)
+            }
+        }
+    }
+}
+
+impl From<ConfigError> for Failure {
+    fn from(error: ConfigError) -> Self {
+        let message = error.to_string();
+        match error {
+            ConfigError::Model(error) => error.into(),
+            ConfigError::Unreadable { path, .. }
+            | ConfigError::Malformed { path, .. }
+            | ConfigError::OutOfRange { path, .. } => {
+                Failure::At(Place::whole(&path.display().to_string()), message)
+            }
+        }
+    }
+}

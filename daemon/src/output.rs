@@ -1,0 +1,244 @@
+//! Where results go: standard output, standard error and files, for every program of the project.
+//!
+//! A reader that has gone away ends the telling and nothing else; a full disk is an error in words.
+//! A file is written beside and takes its name once it is whole, so that whenever the program ends
+//! the old or the new one is there, never a part of one.
+
+use std::fs::{File, Metadata, OpenOptions};
+use std::io::{self, ErrorKind, Read, Write};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+/// Why a result cannot be given.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    /// Standard output cannot be written.
+    #[error("standard output: cannot be written: {0}")]
+    StandardOutput(io::Error),
+    /// A file cannot be written.
+    #[error("{}: cannot be written: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// A name under which a result would cost data.
+    #[error("{}: {problem}", path.display())]
+    Name {
+        /// The file.
+        path: PathBuf,
+        /// What is there, and what was expected.
+        problem: &'static str,
+    },
+    /// A number or name that JSON cannot hold.
+    #[error("the result cannot be written as JSON: {0}")]
+    Json(#[from] serde_json::Error),
+}
+
+/// Writes text to standard output; a reader that has gone away is no failure.
+///
+/// # Errors
+///
+/// When standard output cannot be written.
+pub fn print(text: &str) -> Result<(), OutputError> {
+    let mut output = io::stdout().lock();
+    match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(OutputError::StandardOutput(error))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes a line to standard error. What cannot be written there can be told nowhere.
+pub fn tell(line: &str) {
+    let _ = io::stderr().lock().write_all(format!("{line}\n").as_bytes());
+}
+
+/// True when `--json` is to go to standard output, where then nothing else may go.
+pub fn is_standard_output(file: &Path) -> bool {
+    file == Path::new("-")
+}
+
+/// Gives a result: to machines where they want it, and to people unless standard output is taken.
+///
+/// # Errors
+///
+/// When it cannot be written.
+pub fn give(
+    json: Option<&Path>,
+    result: &impl Serialize,
+    for_people: impl FnOnce() -> String,
+) -> Result<(), OutputError> {
+    if let Some(file) = json {
+        write_json(file, result)?;
+    }
+    if json.is_some_and(is_standard_output) { Ok(()) } else { print(&for_people()) }
+}
+
+/// Writes a machine-readable result to a file, `-` for standard output.
+///
+/// # Errors
+///
+/// When it cannot be written.
+pub fn write_json(file: &Path, value: &impl Serialize) -> Result<(), OutputError> {
+    let text = serde_json::to_string_pretty(value)? + "\n";
+    if is_standard_output(file) { print(&text) } else { write_file(file, &text) }
+}
+
+/// Refuses, before the work begins, a name under which no file that begins with `mark` can be
+/// written: a folder, a file in a folder that is not there, or a `.toml` or `.csv` file that begins
+/// otherwise and so is most likely somebody's data.
+///
+/// # Errors
+///
+/// What is wrong with the name.
+pub fn require_file(path: &Path, mark: &str) -> Result<(), OutputError> {
+    let refuse = |kind, words| {
+        Err(OutputError::File { path: path.into(), source: io::Error::new(kind, words) })
+    };
+    if is_standard_output(path) {
+        return Ok(());
+    }
+    let has_folder = path.file_name().is_some() && folder_of(path).is_dir();
+    match std::fs::metadata(path) {
+        Ok(found) if found.is_dir() => refuse(ErrorKind::IsADirectory, "it is a folder"),
+        Ok(found) if found.is_file() && is_data(path) && !begins_with(path, mark) => {
+            let problem = "exists and is none of this command's results: give another name";
+            Err(OutputError::Name { path: path.into(), problem })
+        }
+        Ok(_) => Ok(()),
+        Err(_) if has_folder => Ok(()),
+        Err(_) => refuse(ErrorKind::NotFound, "there is no such folder"),
+    }
+}
+
+/// Refuses, before the work begins, a file in the place of a folder for results.
+///
+/// # Errors
+///
+/// When there is a file.
+pub fn require_folder(path: &Path) -> Result<(), OutputError> {
+    if !path.exists() || path.is_dir() {
+        return Ok(());
+    }
+    let source = io::Error::new(ErrorKind::NotADirectory, "it is no folder");
+    Err(OutputError::File { path: path.into(), source })
+}
+
+fn is_data(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "toml" || extension == "csv")
+}
+
+fn begins_with(path: &Path, mark: &str) -> bool {
+    let mut start = Vec::new();
+    let read = File::open(path).and_then(|it| it.take(mark.len() as u64).read_to_end(&mut start));
+    // An empty file holds nothing that could be lost.
+    read.is_ok() && (start.is_empty() || start == mark.as_bytes())
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Writes a file of a folder, which is made when it is not there.
+///
+/// # Errors
+///
+/// When the folder cannot be made or the file not be written.
+pub fn write_in_folder(folder: &Path, name: &str, content: &str) -> Result<PathBuf, OutputError> {
+    let path = folder.join(name);
+    std::fs::create_dir_all(folder)
+        .map_err(|source| OutputError::File { path: path.clone(), source })?;
+    write_file(&path, content)?;
+    Ok(path)
+}
+
+/// Writes a file as a whole. A link stays a link; a device or a pipe is written as it is.
+///
+/// # Errors
+///
+/// When it cannot be written; the file there was stays as it is.
+pub fn write_file(path: &Path, content: &str) -> Result<(), OutputError> {
+    let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.into());
+    let known = std::fs::metadata(&target).ok();
+    let written = match known {
+        Some(known) if !known.is_file() => std::fs::write(&target, content),
+        known => replace(&target, known.as_ref(), content.as_bytes()),
+    };
+    written.map_err(|source| OutputError::File { path: path.into(), source })
+}
+
+fn replace(target: &Path, known: Option<&Metadata>, content: &[u8]) -> io::Result<()> {
+    let mut name = std::ffi::OsString::from(".");
+    name.push(target.file_name().unwrap_or_default());
+    name.push(format!(".{}.part", std::process::id()));
+    let beside = folder_of(target).join(name);
+    let mut file =
+        OpenOptions::new().write(true).create(true).truncate(true).mode(0o666).open(&beside)?;
+    let written = known
+        .map_or(Ok(()), |known| file.set_permissions(known.permissions()))
+        .and_then(|()| file.write_all(content))
+        .and_then(|()| file.sync_data())
+        .and_then(|()| std::fs::rename(&beside, target));
+    if written.is_err() {
+        // The half-written file is of no use; that it cannot be removed changes nothing.
+        let _ = std::fs::remove_file(&beside);
+    }
+    written
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = std::fs::read_dir(folder).unwrap();
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_file_is_replaced_as_a_whole_with_its_rights_and_through_links() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("a.json"), folder.path().join("link"));
+        write_file(&file, "a longer one\n").unwrap();
+        std::fs::set_permissions(&file, PermissionsExt::from_mode(0o640)).unwrap();
+        symlink(&file, &link).unwrap();
+        write_file(&link, "new\n").unwrap();
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "new\n");
+        assert_eq!(std::fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o640);
+        assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(names(folder.path()), ["a.json", "link"], "nothing beside it");
+    }
+
+    #[test]
+    fn a_full_disk_is_named() {
+        let error = write_file(Path::new("/dev/full"), "x").unwrap_err().to_string();
+        assert!(error.starts_with("/dev/full: cannot be written: No space left"), "{error}");
+    }
+
+    #[test]
+    fn names_that_would_cost_somebody_data_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("dataset.toml"), "[dataset]\n").unwrap();
+        std::fs::write(at("grown.toml"), "# Grown from train.toml\n").unwrap();
+        std::fs::write(at("old.json"), "anything").unwrap();
+        let refused = |name: &str, mark: &str| require_file(&at(name), mark).is_err();
+        assert!(refused("dataset.toml", "{"));
+        assert!(require_file(Path::new(""), "{").is_err());
+        assert!(refused("", "{") && refused("nowhere/a.json", "{"));
+        assert!(!refused("grown.toml", "# Grown") && refused("grown.toml", "{"));
+        assert!(!refused("old.json", "{") && !refused("new.csv", "{"));
+        assert!(require_folder(&at("old.json")).is_err() && require_folder(&at("new")).is_ok());
+        assert!(require_file(Path::new("-"), "{").is_ok());
+    }
+}
