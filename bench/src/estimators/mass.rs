@@ -45,9 +45,8 @@ fn drive(train: &TrainModel) -> Arc<Drive> {
             stretch: 0,
             speed_mps: speed_mps + SPEED_VARIANCE.sqrt() * random.normal(),
             force_n,
-            gradient_permille: 2.0 * (0.01 * index as f64).sin(),
-            declared_curve_n_per_kn: 0.0,
-            declared_tunnel_n_per_kn: 0.0,
+            declared_kg: 1e5,
+            known_n_per_kn: 2.0 * (0.01 * index as f64).sin(),
             curvature_per_m: 0.0,
             tunnel_share: 0.0,
         };

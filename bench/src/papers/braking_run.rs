@@ -27,6 +27,7 @@ pub fn resolved(train: &TrainModel, moment: &Moment, is_first: bool) -> Resolved
         curve_n_per_kn: 0.0,
         curvature_per_m: None,
         tunnel_n_per_kn: 0.0,
+        other_n_per_kn: 0.0,
         tunnel_share: None,
         brake_cylinder_pressure_pa: Some(PRESSURE_PA),
         ambient_temperature_degc: None,

@@ -53,8 +53,8 @@ impl Corrector {
         let warmth_k = sample
             .ambient_temperature_degc
             .map_or(0.0, |degc| degc + ZERO_DEGC_K - known.ambient_reference_k);
-        sample.tunnel_n_per_kn += in_tunnel * (known.tunnel_c_factor - 1.0) * air
-            + (1.0 - in_tunnel) * (windy - air)
+        sample.tunnel_n_per_kn += in_tunnel * (known.tunnel_c_factor - 1.0) * air;
+        sample.other_n_per_kn += (1.0 - in_tunnel) * (windy - air)
             + known.bearing_delta_a_n_per_kn * (-cold_s / known.bearing_tau_s).exp()
             + known.ambient_w0_per_k * warmth_k * davis.w0_n_per_kn(speed_mps);
     }
@@ -94,6 +94,7 @@ mod tests {
             tunnel_share: Some(0.25),
             ambient_temperature_degc: Some(5.0),
             tunnel_n_per_kn: 0.3,
+            other_n_per_kn: 0.2,
             ..ResolvedSample::coasting()
         }
     }
@@ -106,7 +107,7 @@ mod tests {
 
     /// What a correction adds to the resistance in N/kN.
     fn added_n_per_kn(corrections: Corrections, sample: ResolvedSample) -> f64 {
-        corrected(corrections, sample).tunnel_n_per_kn - sample.tunnel_n_per_kn
+        corrected(corrections, sample).extra_n_per_kn() - sample.extra_n_per_kn()
     }
 
     #[track_caller]
@@ -179,7 +180,7 @@ mod tests {
             let time_ns = 7_000_000_000 + (time_s * 1e9) as i64;
             let mut sample = ResolvedSample { time_ns, ..sample() };
             corrector.correct(&train, &mut sample);
-            sample.tunnel_n_per_kn - 0.3
+            sample.other_n_per_kn - 0.2
         };
         assert_close(added_at(0.0), 0.8);
         assert_close(added_at(400.0), 0.8 / std::f64::consts::E);

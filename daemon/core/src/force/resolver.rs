@@ -43,8 +43,11 @@ pub struct ResolvedSample {
     pub curve_n_per_kn: f64,
     /// Mean of 1/R along the train in 1/m, when curves are known.
     pub curvature_per_m: Option<f64>,
-    /// Declared resistance in N/kN of tunnels and places, and what corrections add.
+    /// Declared tunnel resistance in N/kN; with a factor on c v² its part of the basic one, too.
     pub tunnel_n_per_kn: f64,
+    /// Every other resistance in N/kN that is declared: of places, wind, cold bearings and the
+    /// outside temperature. Negative where one of them pushes.
+    pub other_n_per_kn: f64,
     /// Share of the train inside tunnels, when tunnels are known.
     pub tunnel_share: Option<f64>,
     /// Brake-cylinder pressure in Pa.
@@ -61,11 +64,23 @@ impl ResolvedSample {
         Some(self.traction_force_n? - self.brake_force_n?)
     }
 
+    /// Every declared resistance beyond the basic one, in N/kN.
+    pub fn extra_n_per_kn(&self) -> f64 {
+        self.curve_n_per_kn + self.tunnel_n_per_kn + self.other_n_per_kn
+    }
+
+    /// Everything known that retards the train in proportion to its weight, in N/kN: gradient
+    /// and every declared resistance beyond the basic one; `None` while no gradient is known.
+    ///
+    /// What an estimator looks for is what the motion shows beyond this sum.
+    pub fn known_n_per_kn(&self) -> Option<f64> {
+        Some(self.gradient_permille? + self.extra_n_per_kn())
+    }
+
     /// Everything that drives the train but its basic resistance, in N: traction minus brake
-    /// minus gradient, declared curve and declared tunnel resistance.
+    /// minus all that is known to retard it.
     pub fn driving_force_n(&self) -> Option<f64> {
-        let tied_n_per_kn = self.gradient_permille? + self.curve_n_per_kn + self.tunnel_n_per_kn;
-        Some(self.control_force_n()? - self.weight_kn * tied_n_per_kn)
+        Some(self.control_force_n()? - self.weight_kn * self.known_n_per_kn()?)
     }
 }
 
@@ -89,6 +104,7 @@ impl ResolvedSample {
             curve_n_per_kn: 0.0,
             curvature_per_m: None,
             tunnel_n_per_kn: 0.0,
+            other_n_per_kn: 0.0,
             tunnel_share: None,
             brake_cylinder_pressure_pa: None,
             ambient_temperature_degc: None,
@@ -164,8 +180,8 @@ impl ForceResolver {
             gradient_permille,
             curve_n_per_kn: train.curve_constant_n_per_kn_m * curvature_per_m.unwrap_or(0.0),
             curvature_per_m,
-            tunnel_n_per_kn: train.tunnel_constant_n_per_kn_m * tunnel_length_m.unwrap_or(0.0)
-                + place_n_per_kn,
+            tunnel_n_per_kn: train.tunnel_constant_n_per_kn_m * tunnel_length_m.unwrap_or(0.0),
+            other_n_per_kn: place_n_per_kn,
             tunnel_share,
             brake_cylinder_pressure_pa: sample.get(SampleField::BrakeCylinderPressure),
             ambient_temperature_degc: sample.get(SampleField::AmbientTemperature),

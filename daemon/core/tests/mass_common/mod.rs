@@ -146,6 +146,7 @@ impl Simulation {
             curve_n_per_kn: 0.0,
             curvature_per_m: Some(0.0),
             tunnel_n_per_kn: 0.0,
+            other_n_per_kn: 0.0,
             tunnel_share: Some(0.0),
             brake_cylinder_pressure_pa: None,
             ambient_temperature_degc: None,

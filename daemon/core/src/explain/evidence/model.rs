@@ -26,7 +26,7 @@ pub struct SampleForces {
     pub rotating_mass_factor: f64,
     /// Gradient in ‰ along the travel.
     pub gradient_permille: f64,
-    /// Resistance tied to the place in N/kN, as declared: curves and tunnels.
+    /// Declared resistance in N/kN beyond the basic one.
     pub tied_n_per_kn: f64,
     /// Factor on the basic resistance.
     pub resistance_factor: f64,
@@ -51,7 +51,7 @@ impl SampleForces {
             mass_factor: 1.0,
             rotating_mass_factor,
             gradient_permille: sample.gradient_permille.unwrap_or(0.0),
-            tied_n_per_kn: sample.curve_n_per_kn + sample.tunnel_n_per_kn,
+            tied_n_per_kn: sample.extra_n_per_kn(),
             resistance_factor: 1.0,
             c_extra: 0.0,
             headwind_mps: 0.0,

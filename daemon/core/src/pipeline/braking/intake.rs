@@ -19,6 +19,9 @@ pub enum Quantity {
     Ratio,
 }
 
+/// Traction per weight below which nothing pulls: a lagging actuator never quite lets go.
+const PULLING_MIN_PER_WEIGHT: f64 = 1e-4;
+
 /// When samples are taken and what a braking is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IntakeSettings {
@@ -186,8 +189,10 @@ impl BrakingIntake {
         let weight_n = 1000.0 * sample.weight_kn;
         let inertial_mass_kg = sample.inertial_mass_kg;
         let brake_force_n = self.brake_force_n(sample).ok_or(Reason::MissingQuantity)?;
-        let gradient_permille = sample.gradient_permille.ok_or(Reason::GradientUnknown)?;
-        let is_pulling = sample.traction_force_n.is_some_and(|force_n| force_n > 0.0);
+        let known_n_per_kn = sample.known_n_per_kn().ok_or(Reason::GradientUnknown)?;
+        let is_pulling = sample
+            .traction_force_n
+            .is_some_and(|force_n| force_n > PULLING_MIN_PER_WEIGHT * weight_n);
         if is_pulling || brake_force_n < self.settings.braking_min_per_weight * weight_n {
             return Ok(None);
         }
@@ -198,12 +203,11 @@ impl BrakingIntake {
             (_, None) => return Err(Reason::MissingQuantity),
         };
         let per_n_per_kn = sample.weight_kn / inertial_mass_kg;
-        let tied_n_per_kn = gradient_permille + sample.curve_n_per_kn + sample.tunnel_n_per_kn;
         let Davis { a, b, c } = self.resistance;
         Ok(Some(Known {
             gain_mps2: gain_n / inertial_mass_kg,
             demand,
-            tied_mps2: per_n_per_kn * tied_n_per_kn,
+            tied_mps2: per_n_per_kn * known_n_per_kn,
             basic_mps2: [a, b, c].map(|coefficient| per_n_per_kn * coefficient),
         }))
     }

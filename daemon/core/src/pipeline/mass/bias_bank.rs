@@ -61,8 +61,7 @@ impl Dynamics {
 
     /// Deceleration in m/s² by resistance and gradient, which does not depend on the mass.
     pub fn drag_mps2(&self, motion: &Motion, speed_mps: f64) -> f64 {
-        let w_n_per_kn = self.resistance.w_n_per_kn(motion, speed_mps);
-        self.mps2_per_n_per_kn() * (w_n_per_kn + motion.gradient_permille)
+        self.mps2_per_n_per_kn() * self.resistance.w_n_per_kn(motion, speed_mps)
     }
 }
 
@@ -269,9 +268,8 @@ mod tests {
             stretch: 1,
             speed_mps: 0.0,
             force_n,
-            gradient_permille: 3.0,
-            declared_curve_n_per_kn: 0.0,
-            declared_tunnel_n_per_kn: 0.0,
+            declared_kg: 1e5,
+            known_n_per_kn: 3.0,
             curvature_per_m: 0.0,
             tunnel_share: 0.0,
         }

@@ -3,8 +3,11 @@
 //! With u = m_ref / m, q = g / (1000 (1 + gamma)) and the coefficients theta of z1, z2, z3,
 //!
 //! ```text
-//! v(t) + q ∫ gradient dt = level + u ∫ F / (m_ref (1 + gamma)) dt - q Σ theta_j ∫ phi_j(v) dt
+//! v(t) + q ∫ known dt = level + u ∫ F / (m_ref (1 + gamma)) dt - q Σ theta_j ∫ phi_j(v) dt
 //! ```
+//!
+//! where `known` is the gradient and every declared resistance beyond the basic one, so that z2
+//! and z3 are what curves and tunnels add to what is declared of them.
 //!
 //! Wang 2022 fits eq. (11)-(18) to a differentiated speed, whose noise at 5 Hz is five hundred
 //! times the acceleration that 0.02 N/kN makes. The integrals hold the same equation with the
@@ -81,9 +84,9 @@ impl Regressors {
         for (at, share) in POLYNOMIALS.into_iter().zip(shares) {
             row.fixed_rows_mut::<3>(at).copy_from(&(phi * -share));
         }
-        let gradient_mps = self.mps2_per_n_per_kn() * motion.gradient_permille;
-        let tied = motion.gradient_permille + TYPICAL_N_PER_KN * (shares[1] + shares[2]);
-        Integrals { row, gradient_mps, tied_mps: self.mps2_per_n_per_kn() * tied }
+        let known_mps = self.mps2_per_n_per_kn() * motion.known_n_per_kn;
+        let tied = motion.known_n_per_kn + TYPICAL_N_PER_KN * (shares[1] + shares[2]);
+        Integrals { row, known_mps, tied_mps: self.mps2_per_n_per_kn() * tied }
     }
 }
 
@@ -92,8 +95,8 @@ impl Regressors {
 pub struct Integrals {
     /// Of what each parameter multiplies, in m/s; 0 at the level.
     row: Row,
-    /// Of the gradient's deceleration, in m/s.
-    gradient_mps: f64,
+    /// Of the deceleration by gradient and declared resistance, in m/s.
+    known_mps: f64,
     /// Of the size that accelerations tied to the place may have, in m/s.
     tied_mps: f64,
 }
@@ -101,13 +104,13 @@ pub struct Integrals {
 impl Integrals {
     /// At the start.
     pub fn zero() -> Self {
-        Integrals { row: Row::zeros(), gradient_mps: 0.0, tied_mps: 0.0 }
+        Integrals { row: Row::zeros(), known_mps: 0.0, tied_mps: 0.0 }
     }
 
     /// Moves on by a step between two rates (trapezoid).
     pub fn add(&mut self, from: &Integrals, to: &Integrals, step_s: f64) {
         self.row += (from.row + to.row) * (0.5 * step_s);
-        self.gradient_mps += 0.5 * step_s * (from.gradient_mps + to.gradient_mps);
+        self.known_mps += 0.5 * step_s * (from.known_mps + to.known_mps);
     }
 
     /// Replaces the rate at the end of the last step.
@@ -125,7 +128,7 @@ impl Integrals {
     pub fn equation(&self, speed_mps: f64) -> (Row, f64) {
         let mut row = self.row;
         row[LEVEL] = 1.0;
-        (row, speed_mps + self.gradient_mps)
+        (row, speed_mps + self.known_mps)
     }
 }
 

@@ -78,7 +78,6 @@ impl JointLeastSquares {
         mean[INVERSE_MASS] = 1.0;
         let basic = regressors.basis.of_davis(&train.resistance);
         mean.fixed_rows_mut::<3>(POLYNOMIALS[0]).copy_from(&basic);
-        mean[POLYNOMIALS[1]] = train.curve_constant_n_per_kn_m / settings.reference_radius_m;
         let mut std = Row::repeat(settings.resistance_std_n_per_kn);
         std[INVERSE_MASS] = 0.01 * settings.mass_std_percent;
         let initial = settings.bias_models().map(|model| Hypothesis::new(model, &mean, &std));
@@ -105,7 +104,7 @@ impl JointLeastSquares {
             generation: 0,
         })
     }
-    /// z1, z2 and z3; `None` when the regression is not sound.
+    /// z1, z2 and z3, the latter two beyond what is declared; `None` when the regression is not sound.
     pub fn resistance(&self) -> Option<LineResistance> {
         let solution = self.hypotheses[self.best].regression().solve()?;
         let [basic, curve, tunnel] = Section::ALL.map(|section| self.davis(&solution, section));

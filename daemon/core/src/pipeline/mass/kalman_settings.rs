@@ -29,9 +29,9 @@ pub struct MassKalmanSettings {
     pub speed_min_mps: f64,
     /// Basic resistance [a, b, c] in place of the declared one, speeds in m/s.
     pub basic_resistance: Option<[f64; 3]>,
-    /// Curve resistance [a, b, c] at the reference radius in place of the declared one.
+    /// Curve resistance [a, b, c] at the reference radius beyond the declared one.
     pub curve_resistance: Option<[f64; 3]>,
-    /// Tunnel resistance [a, b, c] in place of the declared one.
+    /// Tunnel resistance [a, b, c] beyond the declared one.
     pub tunnel_resistance: Option<[f64; 3]>,
     /// Radius in m that the curve resistance refers to.
     pub reference_radius_m: f64,

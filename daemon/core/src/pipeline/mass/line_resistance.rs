@@ -8,14 +8,15 @@ use crate::train::{Davis, TrainModel};
 ///
 /// The paper's curve resistance z2 knows no radius. Here it holds at a reference radius and
 /// goes with 1/R, as all curve formulas do; on a line of equal radii the two are the same.
-/// Without a polynomial, the declared curve or tunnel resistance acts.
+/// All of it comes beside what is declared of curves, tunnels and the rest
+/// ([`Motion::known_n_per_kn`]), which acts in any case: the paper declares none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineResistance {
     /// z1: basic resistance.
     pub basic: Davis,
-    /// z2: curve resistance with the whole train at the reference radius.
+    /// z2: curve resistance with the whole train at the reference radius, beyond the declared.
     pub curve: Option<Davis>,
-    /// z3: tunnel resistance with the whole train in a tunnel.
+    /// z3: tunnel resistance with the whole train in a tunnel, beyond the declared.
     pub tunnel: Option<Davis>,
     /// Radius in m that z2 holds at.
     pub reference_radius_m: f64,
@@ -32,15 +33,14 @@ impl LineResistance {
         }
     }
 
-    /// Resistance in N/kN at a speed in m/s, without the gradient.
+    /// All that retards in N/kN at a speed in m/s: this resistance beside what is known.
     pub fn w_n_per_kn(&self, motion: &Motion, speed_mps: f64) -> f64 {
-        let curve = self.curve.map_or(motion.declared_curve_n_per_kn, |curve| {
+        let curve = self.curve.map_or(0.0, |curve| {
             self.reference_radius_m * motion.curvature_per_m * curve.w0_n_per_kn(speed_mps)
         });
-        let tunnel = self.tunnel.map_or(motion.declared_tunnel_n_per_kn, |tunnel| {
-            motion.tunnel_share * tunnel.w0_n_per_kn(speed_mps)
-        });
-        self.basic.w0_n_per_kn(speed_mps) + curve + tunnel
+        let tunnel =
+            self.tunnel.map_or(0.0, |tunnel| motion.tunnel_share * tunnel.w0_n_per_kn(speed_mps));
+        self.basic.w0_n_per_kn(speed_mps) + curve + tunnel + motion.known_n_per_kn
     }
 
     /// Derivative of the resistance after speed, in N/kN per m/s.

@@ -22,13 +22,11 @@ pub struct Motion {
     pub speed_mps: f64,
     /// Traction minus brake in N.
     pub force_n: f64,
-    /// Gradient along the travel in ‰.
-    pub gradient_permille: f64,
-    /// Declared curve resistance in N/kN.
-    pub declared_curve_n_per_kn: f64,
-    /// Declared resistance in N/kN of tunnels and places, and what corrections add: negative in
-    /// warm weather or with the wind behind.
-    pub declared_tunnel_n_per_kn: f64,
+    /// Declared gross mass in kg, as far as it is known here.
+    pub declared_kg: f64,
+    /// Everything known that retards in proportion to the weight, in N/kN: see
+    /// [`ResolvedSample::known_n_per_kn`].
+    pub known_n_per_kn: f64,
     /// Mean of 1/R along the train in 1/m; 0 where no curves are known.
     pub curvature_per_m: f64,
     /// Share of the train inside tunnels; 0 where no tunnels are known.
@@ -47,24 +45,22 @@ impl Motion {
             return Err(RejectionReason::WheelSlide);
         }
         let force_n = sample.control_force_n().ok_or(RejectionReason::Missing)?;
-        let gradient_permille = sample.gradient_permille.ok_or(RejectionReason::Missing)?;
+        let known_n_per_kn = sample.known_n_per_kn().ok_or(RejectionReason::Missing)?;
         let motion = Motion {
             time_ns: sample.time_ns,
             stretch: sample.stretch,
             speed_mps: sample.speed_mps,
             force_n,
-            gradient_permille,
-            declared_curve_n_per_kn: sample.curve_n_per_kn,
-            declared_tunnel_n_per_kn: sample.tunnel_n_per_kn,
+            declared_kg: sample.mass_kg,
+            known_n_per_kn,
             curvature_per_m: sample.curvature_per_m.unwrap_or(0.0),
             tunnel_share: sample.tunnel_share.unwrap_or(0.0),
         };
         let bounds = [
             (motion.speed_mps, 0.0, 200.0),
             (motion.force_n, -1e8, 1e8),
-            (motion.gradient_permille, -500.0, 500.0),
-            (motion.declared_curve_n_per_kn, 0.0, 500.0),
-            (motion.declared_tunnel_n_per_kn, -500.0, 500.0),
+            (motion.declared_kg, 1.0, 1e9),
+            (motion.known_n_per_kn, -500.0, 500.0),
             (motion.curvature_per_m, 0.0, 1.0),
             (motion.tunnel_share, 0.0, 1.0 + 1e-9),
         ];
@@ -137,9 +133,9 @@ mod tests {
 
     #[test]
     fn a_correction_that_takes_resistance_away_is_no_reason_to_refuse_a_sample() {
-        let warm = ResolvedSample { tunnel_n_per_kn: -1.7, ..ResolvedSample::coasting() };
-        assert_eq!(Motion::of(&warm).unwrap().declared_tunnel_n_per_kn, -1.7);
-        let absurd = ResolvedSample { tunnel_n_per_kn: -501.0, ..warm };
+        let warm = ResolvedSample { other_n_per_kn: -1.7, ..ResolvedSample::coasting() };
+        assert_eq!(Motion::of(&warm).unwrap().known_n_per_kn, -1.7);
+        let absurd = ResolvedSample { other_n_per_kn: -501.0, ..warm };
         assert_eq!(Motion::of(&absurd), Err(RejectionReason::OutOfRange));
     }
 
@@ -174,9 +170,8 @@ mod tests {
             stretch,
             speed_mps: 10.0,
             force_n: 0.0,
-            gradient_permille: 0.0,
-            declared_curve_n_per_kn: 0.0,
-            declared_tunnel_n_per_kn: 0.0,
+            declared_kg: 1e5,
+            known_n_per_kn: 0.0,
             curvature_per_m: 0.0,
             tunnel_share: 0.0,
         };

@@ -57,9 +57,8 @@ mod tests {
             stretch: 1,
             speed_mps: 10.0,
             force_n: 0.0,
-            gradient_permille: 0.0,
-            declared_curve_n_per_kn: 0.0,
-            declared_tunnel_n_per_kn: 0.0,
+            declared_kg: 1e5,
+            known_n_per_kn: 0.0,
             curvature_per_m,
             tunnel_share,
         }

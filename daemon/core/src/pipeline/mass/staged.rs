@@ -99,7 +99,7 @@ impl StagedDescent {
         })
     }
 
-    /// z1, z2 and z3 as learned so far.
+    /// z1, z2 and z3 as learned so far, the latter two beyond what is declared.
     pub fn resistance(&self) -> LineResistance {
         let [basic, curve, tunnel] = Section::ALL.map(|section| self.davis(section));
         LineResistance {
@@ -151,22 +151,22 @@ impl StagedDescent {
     fn learn(&mut self, from: &Motion, to: &Motion, step_s: f64) -> Outcome {
         let speed_mps = 0.5 * (from.speed_mps + to.speed_mps);
         let force_n = 0.5 * (from.force_n + to.force_n);
-        let gradient = 0.5 * (from.gradient_permille + to.gradient_permille);
+        let known = 0.5 * (from.known_n_per_kn + to.known_n_per_kn);
         let acceleration_mps2 = (to.speed_mps - from.speed_mps) / step_s;
         let inertia_mps2 = self.inertia_factor * acceleration_mps2;
         let (low, high) = self.speed_range_mps.unwrap_or((speed_mps, speed_mps));
         self.speed_range_mps = Some((low.min(speed_mps), high.max(speed_mps)));
         if self.learned >= self.settings.resistance_samples {
-            let at = Motion { speed_mps, ..*to };
-            let w = self.resistance().w_n_per_kn(&at, speed_mps) + gradient;
+            let at = Motion { speed_mps, known_n_per_kn: known, ..*to };
+            let w = self.resistance().w_n_per_kn(&at, speed_mps);
             return self.learn_mass(force_n, inertia_mps2 + 1e-3 * STANDARD_GRAVITY_MPS2 * w);
         }
         self.learned += 1;
         let Some(section) = Section::of(from, to) else { return Outcome::Used };
         // Eq. (11), (12) and (18), uphill positive where the text has it negative, G in N and
         // the resistance per kN of it, and the rotating mass that (18) leaves out.
-        let specific_mps2 = force_n / self.nominal_mass_kg - inertia_mps2;
-        let target = 1e3 * specific_mps2 / STANDARD_GRAVITY_MPS2 - gradient;
+        let specific_mps2 = force_n / to.declared_kg - inertia_mps2;
+        let target = 1e3 * specific_mps2 / STANDARD_GRAVITY_MPS2 - known;
         match self.settings.variant {
             DescentVariant::Normalised => self.descend(section, speed_mps, target, to),
             DescentVariant::Printed => self.printed.learn(section, speed_mps, target),

@@ -165,8 +165,8 @@ impl ResistanceKalman {
         let step_s = now.seconds_since(before);
         let speed_mps = now.speed_mps.max(data.speed_min_mps);
         let place_s = data.position_std_m / speed_mps;
-        let bend = now.gradient_permille - before.gradient_permille;
-        // A change of gradient passes under the train in many steps, all early or all late.
+        let bend = now.known - before.known;
+        // A change of gradient or curve passes under the train in many steps, all early or all late.
         let steps = (self.train_length_m / (speed_mps * step_s)).max(1.0);
         self.noise.scale * ((step_s * change).powi(2) / 12.0 + steps * (place_s * bend).powi(2))
     }

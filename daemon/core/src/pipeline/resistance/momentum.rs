@@ -204,8 +204,7 @@ impl Block {
     /// Variance of the impulse by what is not known of when and where the forces acted.
     fn impulse_variance(&self, last: &UnitSample, settings: &DataSettings) -> f64 {
         let speed_mps = (self.speed_sum / self.rest.count()).max(settings.speed_min_mps);
-        let place = settings.position_std_m / speed_mps
-            * (last.gradient_permille - self.first.gradient_permille);
+        let place = settings.position_std_m / speed_mps * (last.known - self.first.known);
         self.edge_variance + place * place
     }
 }
@@ -288,7 +287,7 @@ mod tests {
         let mut samples: Vec<_> =
             (0..100).map(|i| unit_sample(0.2 * f64::from(i), 20.0, 1.0)).collect();
         for sample in &mut samples[40..] {
-            sample.gradient_permille = 8.0;
+            sample.known = 8.0;
         }
         let variances: Vec<_> =
             blocks_of(&samples).iter().map(|block| block.impulse_variance).collect();

@@ -17,14 +17,15 @@ pub struct UnitSample {
     pub stretch: u32,
     /// Speed in m/s.
     pub speed_mps: f64,
-    /// Traction minus brake minus gradient, declared curve and tunnel resistance, in N/kN.
+    /// Traction minus brake minus all that is known to retard, in N/kN.
     pub driving: f64,
     /// Traction in N/kN.
     pub traction: f64,
     /// Brake in N/kN, retarding.
     pub brake: f64,
-    /// Gradient in ‰ along the travel.
-    pub gradient_permille: f64,
+    /// All that is known to retard beyond the basic resistance, in N/kN: see
+    /// [`ResolvedSample::known_n_per_kn`].
+    pub known: f64,
     /// s = 1000 (1 + gamma) / g in N/kN per m/s²: momentum per weight and speed.
     pub inertia: f64,
 }
@@ -50,7 +51,7 @@ impl UnitSample {
             driving: per_weight(sample.driving_force_n())?,
             traction: per_weight(sample.traction_force_n)?,
             brake: per_weight(sample.brake_force_n)?,
-            gradient_permille: sample.gradient_permille.ok_or(RejectionReason::Missing)?,
+            known: sample.known_n_per_kn().ok_or(RejectionReason::Missing)?,
             inertia: 1000.0 * sample.inertial_mass_kg / (sample.mass_kg * STANDARD_GRAVITY_MPS2),
         })
     }
@@ -123,7 +124,7 @@ pub(super) mod tests {
             driving,
             traction: driving.max(0.0),
             brake: (-driving).max(0.0),
-            gradient_permille: 0.0,
+            known: 0.0,
             inertia: 100.0,
         }
     }

@@ -122,6 +122,7 @@ pub(super) mod tests {
             curve_n_per_kn: 0.0,
             curvature_per_m: None,
             tunnel_n_per_kn: 0.0,
+            other_n_per_kn: 0.0,
             tunnel_share: None,
             brake_cylinder_pressure_pa: None,
             ambient_temperature_degc: None,
