@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use dynocar_core::force::ResolvedSample;
 use dynocar_core::pipeline::{EstimatorSettings, Outcome};
+use dynocar_core::terms::Resistance;
 use dynocar_core::train::TrainModel;
 use dynocar_shared::{Parameter, ParameterSnapshot};
 
@@ -24,10 +25,10 @@ pub fn resolved(train: &TrainModel, moment: &Moment, is_first: bool) -> Resolved
         traction_force_n: None,
         brake_force_n: None,
         gradient_permille: Some(0.0),
-        curve_n_per_kn: 0.0,
         curvature_per_m: None,
-        tunnel_n_per_kn: 0.0,
-        other_n_per_kn: 0.0,
+        resistance: Resistance::BASIC,
+        extra_n_per_kn: 0.0,
+        since_cold_s: 0.0,
         tunnel_share: None,
         brake_cylinder_pressure_pa: Some(PRESSURE_PA),
         ambient_temperature_degc: None,

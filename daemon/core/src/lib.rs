@@ -9,6 +9,7 @@
 //! - [`train`], [`track`]: what is declared of the train and the line
 //! - [`dataset`]: recorded runs, from texts to the samples that a controller would publish
 //! - [`validation`]: which samples are fit for use, and why the others are not
+//! - [`terms`]: the physical terms of the model, one law each, that all of the following share
 //! - [`force`]: the known forces on the train at a sample
 //! - [`filter`]: recursive estimators of fixed size, without knowledge of trains
 //! - [`energy`]: traction energy of a run
@@ -23,6 +24,7 @@ pub mod filter;
 pub mod force;
 pub mod pipeline;
 pub mod simulate;
+pub mod terms;
 pub mod track;
 pub mod train;
 pub mod validation;

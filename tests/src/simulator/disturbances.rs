@@ -1,5 +1,8 @@
 //! How the effects change the physics and the sensors of one run.
 
+use dynocar_core::terms::{
+    Resistance, adhesion, ambient, bearings, brake, curve, place, tunnel, wind,
+};
 use dynocar_core::track::StepProfile;
 
 use super::effects::{Effect, MassSection, RunWindow};
@@ -78,6 +81,31 @@ pub struct Disturbances {
     pub adhesion: Option<AdhesionCap>,
     /// A resistance outside every library.
     pub speed_band: Option<SpeedBand>,
+}
+
+/// What the disturbances act on at an instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seen {
+    /// Time in s from the run's first sample, when bearings are cold.
+    pub time_s: f64,
+    /// Mean of 1/R along the train in 1/m.
+    pub curvature_per_m: f64,
+    /// Share of the train inside tunnels.
+    pub tunnel_share: f64,
+    /// Headwind in m/s along the travel.
+    pub headwind_mps: f64,
+    /// Outside temperature in °C.
+    pub degc: Option<f64>,
+    /// Resistance in N/kN of places.
+    pub local_n_per_kn: f64,
+}
+
+impl SpeedBand {
+    /// The resistance in N/kN at a speed in m/s.
+    pub fn extra_n_per_kn(&self, speed_mps: f64) -> f64 {
+        let away = (speed_mps - self.centre_mps) / self.width_mps;
+        self.extra_n_per_kn * (-0.5 * away * away).exp()
+    }
 }
 
 impl Disturbances {
@@ -209,6 +237,24 @@ impl Disturbances {
         }
     }
 
+    /// What resists at an instant by the laws of the terms; basic and curve resistance among it.
+    pub fn resistance(&self, seen: Seen) -> Resistance {
+        let mut resistance = Resistance::BASIC;
+        let share = Some(seen.tunnel_share);
+        curve::act(self.curve_constant_n_per_kn_m, Some(seen.curvature_per_m), &mut resistance);
+        tunnel::enter(share, &mut resistance);
+        tunnel::act_by_factor(self.tunnel_c_factor, share, &mut resistance);
+        wind::act(seen.headwind_mps, 1.0, &mut resistance);
+        place::act(seen.local_n_per_kn, &mut resistance);
+        if let Some((delta_a, tau_s)) = self.cold_bearings {
+            bearings::act(delta_a, tau_s, seen.time_s, &mut resistance);
+        }
+        if let Some((w0_per_k, reference_k)) = self.ambient {
+            ambient::act(w0_per_k, reference_k, seen.degc, &mut resistance);
+        }
+        resistance
+    }
+
     /// True over declared mass at a time in s from the start and a chainage in m.
     pub fn mass_factor(&self, time_s: f64, centre_m: f64) -> f64 {
         let by_time = self
@@ -231,7 +277,7 @@ impl Disturbances {
             .drag_windows
             .iter()
             .filter(|window| (window.start_s..=window.end_s).contains(&time_s))
-            .map(|window| ((time_s - window.start_s) / 10.0).min(1.0))
+            .map(|window| brake::build_up(time_s - window.start_s))
             .fold(0.0, f64::max);
         share * self.drag_force_n
     }
@@ -242,7 +288,7 @@ impl AdhesionCap {
     pub fn carried_n(&self, brake_n: f64, weight_n: f64, centre_m: f64) -> f64 {
         let is_inside = self.intervals_m.is_empty()
             || self.intervals_m.iter().any(|&(from_m, to_m)| (from_m..=to_m).contains(&centre_m));
-        if is_inside { brake_n.min(self.adhesion * weight_n) } else { brake_n }
+        if is_inside { adhesion::carried_n(brake_n, self.adhesion, weight_n) } else { brake_n }
     }
 }
 

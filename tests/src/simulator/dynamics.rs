@@ -2,7 +2,7 @@
 
 use dynocar_core::train::TrainModel;
 
-use super::disturbances::Disturbances;
+use super::disturbances::{Disturbances, Seen};
 use super::line_maker::Line;
 use super::run_maker::RunPlan;
 use super::train_maker::TrueTrain;
@@ -88,34 +88,27 @@ impl TruePhysics<'_> {
     /// Everything that holds the train back at a speed in m/s.
     pub fn resistance(&self, speed_mps: f64, under: &LineUnderTrain, now: &Instant) -> Resistance {
         let disturbances = self.disturbances;
-        let declared_k = self.train.declared.curve_constant_n_per_kn_m;
         let davis = self.train.resistance;
         let w0_n_per_kn = disturbances.resistance_factor * davis.w0_n_per_kn(speed_mps);
-        let air_mps = speed_mps + now.headwind_mps;
-        let outside = 1.0 - under.tunnel_share;
-        let mut extra_n_per_kn = under.local_n_per_kn
-            + (disturbances.curve_constant_n_per_kn_m - declared_k) * under.curvature_per_m
-            + davis.c
-                * (disturbances.tunnel_c_factor - 1.0)
-                * under.tunnel_share
-                * speed_mps.powi(2)
-            + davis.c * outside * (air_mps * air_mps.abs() - speed_mps * speed_mps);
-        if let Some((delta_a, tau_s)) = disturbances.cold_bearings {
-            extra_n_per_kn += delta_a * (-now.time_s / tau_s).exp();
-        }
-        if let Some((w0_per_k, reference_k)) = disturbances.ambient {
-            extra_n_per_kn +=
-                w0_n_per_kn * w0_per_k * (now.temperature_degc + 273.15 - reference_k);
-        }
-        if let Some(band) = disturbances.speed_band {
-            let away = (speed_mps - band.centre_mps) / band.width_mps;
-            extra_n_per_kn += band.extra_n_per_kn * (-0.5 * away * away).exp();
-        }
+        let declared_k = self.train.declared.curve_constant_n_per_kn_m;
+        let ordinary_n_per_kn = w0_n_per_kn + declared_k * under.curvature_per_m;
+        let mut all = disturbances.resistance(Seen {
+            time_s: now.time_s,
+            curvature_per_m: under.curvature_per_m,
+            tunnel_share: under.tunnel_share,
+            headwind_mps: now.headwind_mps,
+            degc: Some(now.temperature_degc),
+            local_n_per_kn: under.local_n_per_kn,
+        });
+        all.factor *= disturbances.resistance_factor;
+        all.other_n_per_kn =
+            disturbances.speed_band.map_or(0.0, |band| band.extra_n_per_kn(speed_mps));
+        let all_n_per_kn = davis.w0_n_per_kn(speed_mps) + all.extra_n_per_kn(davis, speed_mps);
         let drag_n = disturbances.drag_n(now.time_s);
         let weight_kn = TrainModel::weight_kn(now.mass_kg);
         Resistance {
-            ordinary_n: weight_kn * (w0_n_per_kn + declared_k * under.curvature_per_m),
-            extra_n: weight_kn * extra_n_per_kn + drag_n,
+            ordinary_n: weight_kn * ordinary_n_per_kn,
+            extra_n: weight_kn * (all_n_per_kn - ordinary_n_per_kn) + drag_n,
             gradient_n: weight_kn * under.gradient_permille,
         }
     }

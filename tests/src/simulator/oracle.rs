@@ -9,9 +9,11 @@ use dynocar_core::force::{ForceResolver, ResolvedSample};
 use dynocar_core::simulate::{
     BridgeLimits, ForceModel, Prediction, QuadraticForces, Recording, Restart, SpeedError,
 };
+use dynocar_core::terms::delay::DelayLine;
+use dynocar_core::terms::{gradient, traction};
 use dynocar_core::validation::{ValidationLimits, Validator};
 
-use super::disturbances::{Disturbances, SpeedBand};
+use super::disturbances::{Disturbances, Seen, SpeedBand};
 use super::sensors::SIMULATED_TRAIN;
 use super::{SimulatedDataset, SimulatedRun};
 
@@ -97,10 +99,7 @@ pub struct OracleForces {
 
 impl ForceModel for OracleForces {
     fn acceleration_mps2(&self, index: usize, speed_mps: f64) -> f64 {
-        let band_n_per_kn = self.speed_band.map_or(0.0, |band| {
-            let away = (speed_mps - band.centre_mps) / band.width_mps;
-            band.extra_n_per_kn * (-0.5 * away * away).exp()
-        });
+        let band_n_per_kn = self.speed_band.map_or(0.0, |band| band.extra_n_per_kn(speed_mps));
         self.quadratic.acceleration_mps2(index, speed_mps) - self.weight_per_kg * band_n_per_kn
     }
 
@@ -158,90 +157,43 @@ fn extra_n_per_kn(
     let davis = dataset.train.resistance;
     let disturbances = &run.disturbances;
     let length_m = dataset.train.declared.length_m;
-    let tunnel_share = sample.tunnel_share.unwrap_or(0.0);
-    let outside = 1.0 - tunnel_share;
-    let declared_k = dataset.train.declared.curve_constant_n_per_kn_m;
-    let curvature = sample.curvature_per_m.unwrap_or(0.0);
-    let headwind_mps = disturbances.headwind_mps;
-    let mut constant = (disturbances.curve_constant_n_per_kn_m - declared_k) * curvature
-        + davis.c * outside * headwind_mps * headwind_mps;
-    let mut linear = 2.0 * davis.c * outside * headwind_mps;
-    let mut quadratic = davis.c * (disturbances.tunnel_c_factor - 1.0) * tunnel_share;
-    let mapped_permille = |chainage_m: f64| {
-        let permille = dataset.track().gradient_permille(chainage_m, length_m).unwrap_or(0.0);
-        run.plan.direction * permille
+    let mut all = disturbances.resistance(Seen {
+        time_s,
+        curvature_per_m: sample.curvature_per_m.unwrap_or(0.0),
+        tunnel_share: sample.tunnel_share.unwrap_or(0.0),
+        headwind_mps: disturbances.headwind_mps,
+        degc: sample.ambient_temperature_degc,
+        local_n_per_kn: disturbances
+            .local
+            .as_ref()
+            .map_or(0.0, |local| local.mean_around(position_m, length_m)),
+    });
+    let permille = |shift_m: f64| {
+        let at = (position_m, run.plan.direction);
+        gradient::along_travel_permille(dataset.track(), at, length_m, shift_m).unwrap_or(0.0)
     };
-    constant +=
-        mapped_permille(position_m - disturbances.gradient_shift_m) - mapped_permille(position_m);
-    if let Some(local) = &disturbances.local {
-        constant += local.mean_around(position_m, length_m);
-    }
-    if let Some((delta_a, tau_s)) = disturbances.cold_bearings {
-        constant += delta_a * (-time_s / tau_s).exp();
-    }
-    if let (Some((w0_per_k, reference_k)), Some(temperature_degc)) =
-        (disturbances.ambient, sample.ambient_temperature_degc)
-    {
-        let change = w0_per_k * (temperature_degc + 273.15 - reference_k);
-        constant += change * davis.a;
-        linear += change * davis.b;
-        quadratic += change * davis.c;
-    }
-    [constant, linear, quadratic]
+    all.other_n_per_kn = permille(disturbances.gradient_shift_m) - permille(0.0);
+    // What the declared model holds already.
+    all.curve_n_per_kn -= sample.resistance.curve_n_per_kn;
+    let [constant, linear, quadratic] = all.polynomial(davis, sample.speed_mps);
+    [constant - davis.a, linear - davis.b, quadratic - davis.c]
 }
 
 /// Traction minus brake in N that acts behind the reported forces, at each sample.
 fn acting_forces_n(recording: &Recording, disturbances: &Disturbances) -> Vec<f64> {
-    let samples = recording.samples();
-    let time_s = recording.time_s();
-    let mut from = 0;
-    let mut arrived = delayed(recording, 0, time_s[0]);
-    let mut acting = arrived;
-    (0..samples.len())
-        .map(|index| {
-            let late_s = time_s[index] - disturbances.delay_s;
-            while from + 1 < samples.len() && time_s[from + 1] <= late_s {
-                from += 1;
+    let mut late = DelayLine::new(disturbances.delay_s, disturbances.lag_s);
+    let acting = |sample: &ResolvedSample| {
+        let force = |field: Option<f64>| field.unwrap_or(0.0);
+        let reported = [force(sample.traction_force_n), force(sample.brake_force_n)];
+        let at = (sample.time_ns, sample.stretch);
+        let [traction_n, brake_n] = late.acting(at, Some(reported)).unwrap_or(reported);
+        let carried_n = match (&disturbances.adhesion, sample.position_m) {
+            (Some(cap), Some(position_m)) => {
+                cap.carried_n(brake_n, 1000.0 * sample.weight_kn, position_m)
             }
-            let before = arrived;
-            arrived = delayed(recording, from, late_s);
-            let step_s = if index > 0 { time_s[index] - time_s[index - 1] } else { 0.0 };
-            let behind = |acting_n: f64, before_n: f64, arrived_n: f64| {
-                lagged_ramp(acting_n, (before_n, arrived_n), step_s, disturbances.lag_s)
-            };
-            acting = (behind(acting.0, before.0, arrived.0), behind(acting.1, before.1, arrived.1));
-            let sample = &samples[index];
-            let carried_n = match (&disturbances.adhesion, sample.position_m) {
-                (Some(cap), Some(position_m)) => {
-                    cap.carried_n(acting.1, 1000.0 * sample.weight_kn, position_m)
-                }
-                _ => acting.1,
-            };
-            acting.0 / disturbances.traction_gain - carried_n
-        })
-        .collect()
-}
-
-/// A first-order lag after one step in which its input runs linearly between two values.
-fn lagged_ramp(value: f64, (from, to): (f64, f64), step_s: f64, lag_s: f64) -> f64 {
-    if lag_s <= 0.0 || step_s <= 0.0 {
-        return if lag_s <= 0.0 { to } else { value };
-    }
-    let kept = (-step_s / lag_s).exp();
-    let slope_n_per_s = (to - from) / step_s;
-    kept * (value - from + slope_n_per_s * lag_s) + to - slope_n_per_s * lag_s
-}
-
-/// Reported traction and brake force in N at a time in s, interpolated after sample `from`.
-fn delayed(recording: &Recording, from: usize, late_s: f64) -> (f64, f64) {
-    let (samples, time_s) = (recording.samples(), recording.time_s());
-    let next = (from + 1).min(samples.len() - 1);
-    let span_s = time_s[next] - time_s[from];
-    let share = if span_s > 0.0 { ((late_s - time_s[from]) / span_s).clamp(0.0, 1.0) } else { 0.0 };
-    let between = |field: fn(&ResolvedSample) -> Option<f64>| {
-        let (here, there) =
-            (field(&samples[from]).unwrap_or(0.0), field(&samples[next]).unwrap_or(0.0));
-        here + share * (there - here)
+            _ => brake_n,
+        };
+        traction::true_force_n(traction_n, disturbances.traction_gain) - carried_n
     };
-    (between(|sample| sample.traction_force_n), between(|sample| sample.brake_force_n))
+    recording.samples().iter().map(acting).collect()
 }

@@ -2,36 +2,21 @@
 
 use super::document::Section;
 use super::error::DatasetError;
-use crate::train::Corrections;
+use crate::terms::CORRECTIONS;
+use crate::train::TrainModel;
 
-/// A key, what is allowed, and where its value goes.
-type Key = (&'static str, &'static str, [f64; 2], fn(&mut Corrections) -> &mut f64);
-
-const KEYS: [Key; 10] = [
-    ("speed_scale", "from 0.8 to 1.25", [0.8, 1.25], |it| &mut it.speed_scale),
-    ("traction_gain", "from 0.5 to 2", [0.5, 2.0], |it| &mut it.traction_gain),
-    ("actuator_delay_s", "from 0 to 6 s", [0.0, 6.0], |it| &mut it.actuator_delay_s),
-    ("actuator_lag_s", "from 0 to 10 s", [0.0, 10.0], |it| &mut it.actuator_lag_s),
-    ("tunnel_c_factor", "from 0 to 100", [0.0, 100.0], |it| &mut it.tunnel_c_factor),
-    ("wind_plus_mps", "from -50 to 50 m/s", [-50.0, 50.0], |it| &mut it.wind_plus_mps),
-    ("bearing_delta_a_n_per_kn", "from 0 to 50 N/kN", [0.0, 50.0], |it| {
-        &mut it.bearing_delta_a_n_per_kn
-    }),
-    ("bearing_tau_s", "from 1 to 100000 s", [1.0, 1e5], |it| &mut it.bearing_tau_s),
-    ("ambient_w0_per_k", "from -0.1 to 0.1 per kelvin", [-0.1, 0.1], |it| &mut it.ambient_w0_per_k),
-    ("ambient_reference_k", "from 200 to 350 K", [200.0, 350.0], |it| &mut it.ambient_reference_k),
-];
-
-/// Reads the table; what is absent corrects nothing.
-pub(super) fn corrections(section: &Section) -> Result<Corrections, DatasetError> {
-    section.allow(&KEYS.map(|key| key.0))?;
-    let mut corrections = Corrections::NONE;
-    for (key, allowed, [low, high], field) in KEYS {
-        if let Some(value) = section.number(key, allowed, |value| (low..=high).contains(&value))? {
-            *field(&mut corrections) = value;
+/// Reads the table into a train; what is absent corrects nothing.
+pub(super) fn read_corrections(
+    section: &Section,
+    train: &mut TrainModel,
+) -> Result<(), DatasetError> {
+    section.allow(&CORRECTIONS.map(|key| key.name))?;
+    for key in CORRECTIONS {
+        if let Some(value) = section.number(key.name, key.allowed, |value| key.allows(value))? {
+            *(key.of)(train) = value;
         }
     }
-    Ok(corrections)
+    Ok(())
 }
 
 #[cfg(test)]

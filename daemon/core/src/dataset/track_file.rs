@@ -2,6 +2,7 @@
 
 use super::document::{Document, Section};
 use super::error::{DatasetError, Place, Problem};
+use crate::terms::{gradient, masses, place};
 use crate::track::{Curve, MassSection, ProfileError, Track, TrackError, Tunnel};
 
 /// A steeper gradient in ‰ than any adhesion railway has is a mistake of unit.
@@ -21,13 +22,14 @@ pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
         "name",
         "length_m",
         "gradient",
+        gradient::SHIFT,
         "curves",
         "tunnels",
-        "resistance",
-        "masses",
+        place::LIST,
+        masses::LIST,
     ])?;
     let length_m = section.number("length_m", "a length in m above 0", |length| length > 0.0)?;
-    let (gradient, gradient_places) = gradient(&section)?.unzip();
+    let (gradient, gradient_places) = gradient_profile(&section)?.unzip();
     let curves = section.entries::<3>("curves", "[start_m, end_m, radius_m]")?.map(split);
     let (curves, curve_places) = curves.unzip();
     let tunnels = section.entries::<2>("tunnels", "[start_m, end_m]")?.map(split);
@@ -58,30 +60,35 @@ pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
 /// Adds what measured runs have shown of the line: resistance at places, other masses in sections.
 fn with_corrections(mut track: Track, section: &Section) -> Result<Track, DatasetError> {
     const RESISTANCE: &str = "[start_m, end_m, extra N/kN]";
-    if let Some(entries) = section.entries::<3>("resistance", RESISTANCE)? {
+    let shift = "a shift in m from -10000 to 10000";
+    let is_shift = |shift_m: f64| shift_m.abs() <= 1e4;
+    if let Some(shift_m) = section.number(gradient::SHIFT, shift, is_shift)? {
+        track = track.with_gradient_shift(shift_m);
+    }
+    if let Some(entries) = section.entries::<3>(place::LIST, RESISTANCE)? {
         let places: Vec<_> =
             entries.iter().map(|([start_m, end_m, extra], _)| (*start_m, *end_m, *extra)).collect();
         track = track
             .with_resistance(&places)
-            .map_err(|error| section.place_of("resistance").problem(Problem::Track(error)))?;
+            .map_err(|error| section.place_of(place::LIST).problem(Problem::Track(error)))?;
     }
     const MASSES: &str = "[from_m, to_m, direction (1 or -1), mass factor]";
-    if let Some(entries) = section.entries::<4>("masses", MASSES)? {
-        let mut masses = Vec::with_capacity(entries.len());
+    if let Some(entries) = section.entries::<4>(masses::LIST, MASSES)? {
+        let mut sections = Vec::with_capacity(entries.len());
         for (index, ([from_m, to_m, direction, mass_factor], place)) in
             entries.into_iter().enumerate()
         {
             let is_sound =
                 from_m < to_m && direction.abs() == 1.0 && (0.1..=10.0).contains(&mass_factor);
             if !is_sound {
-                let key = format!("{} entry {}", section.full("masses"), index + 1);
+                let key = format!("{} entry {}", section.full(masses::LIST), index + 1);
                 let value = format!("[{from_m}, {to_m}, {direction}, {mass_factor}]");
                 let allowed = "from_m < to_m, direction 1 or -1, a factor from 0.1 to 10".into();
                 return Err(place.problem(Problem::OutOfRange { key, value, allowed }));
             }
-            masses.push(MassSection { from_m, to_m, direction, mass_factor });
+            sections.push(MassSection { from_m, to_m, direction, mass_factor });
         }
-        track = track.with_masses(masses);
+        track = track.with_masses(sections);
     }
     Ok(track)
 }
@@ -131,7 +138,7 @@ fn split<const N: usize>(entries: Vec<([f64; N], Place)>) -> (Vec<[f64; N]>, Vec
 
 type Gradient = (Vec<(f64, f64)>, Vec<Place>);
 
-fn gradient(section: &Section) -> Result<Option<Gradient>, DatasetError> {
+fn gradient_profile(section: &Section) -> Result<Option<Gradient>, DatasetError> {
     const KEY: &str = "gradient";
     let Some(entries) = section.entries::<2>(KEY, "[chainage_m, permille]")? else {
         return Ok(None);

@@ -1,8 +1,9 @@
 //! `train.toml`.
 
-use super::corrections::corrections;
+use super::corrections::read_corrections;
 use super::document::{Document, Section};
 use super::error::{DatasetError, Problem};
+use crate::terms::{Key, curve, rotating, tunnel};
 use crate::train::{BrakeGear, Corrections, Davis, EffortCurve, TrainModel};
 
 /// k in the declared curve resistance k/R in N/kN, R in m, unless a train says otherwise.
@@ -31,10 +32,6 @@ pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> 
         Some(section) => brake(&section)?,
         None => (None, BrakeGear::default()),
     };
-    let corrections = match root.table("corrections")? {
-        Some(section) => corrections(&section)?,
-        None => Corrections::NONE,
-    };
     let mass_t =
         train.required_number("mass_t", "a mass in t above 0, at most 100000", |mass| {
             mass > 0.0 && mass <= 1e5
@@ -46,11 +43,11 @@ pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> 
     let cars = train.number("cars", "a whole number from 1 to 1000", |cars| {
         (1.0..=1000.0).contains(&cars) && cars.fract() == 0.0
     })?;
-    let gamma = "a rotating-mass factor from 0 to 1";
-    let rotating_mass_factor = train
-        .required_number("rotating_mass_factor", gamma, |gamma| (0.0..=1.0).contains(&gamma))?;
+    let gamma = &rotating::FACTOR;
+    let rotating_mass_factor =
+        train.required_number(gamma.name, gamma.allowed, |value| gamma.allows(value))?;
     let (davis, curve_constant_n_per_kn_m, tunnel_constant_n_per_kn_m) = declared(&resistance)?;
-    Ok(TrainModel {
+    let mut model = TrainModel {
         name: train.text("name")?.unwrap_or("unnamed train").into(),
         mass_kg: mass_t * 1000.0,
         length_m,
@@ -62,13 +59,17 @@ pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> 
         traction,
         brake,
         brake_gear,
-        corrections,
-    })
+        corrections: Corrections::NONE,
+    };
+    if let Some(section) = root.table("corrections")? {
+        read_corrections(&section, &mut model)?;
+    }
+    Ok(model)
 }
 
 /// Davis coefficients, curve constant and tunnel constant.
 fn declared(section: &Section) -> Result<(Davis, f64, f64), DatasetError> {
-    section.allow(&["a", "b", "c", "curve_constant_n_per_kn_m", "tunnel_constant_n_per_kn_m"])?;
+    section.allow(&["a", "b", "c", curve::CONSTANT.name, tunnel::CONSTANT.name])?;
     // Fitted coefficients may be negative one by one; forces in N instead of N/kN are far out.
     let within = |limit: f64| move |value: f64| value.abs() <= limit;
     let davis = Davis {
@@ -76,12 +77,8 @@ fn declared(section: &Section) -> Result<(Davis, f64, f64), DatasetError> {
         b: section.required_number("b", "N/kN per m/s, from -10 to 10", within(10.0))?,
         c: section.required_number("c", "N/kN per (m/s)², from -1 to 1", within(1.0))?,
     };
-    let curve = section.number("curve_constant_n_per_kn_m", "from 0 to 5000", |constant| {
-        (0.0..=5000.0).contains(&constant)
-    })?;
-    let tunnel = section.number("tunnel_constant_n_per_kn_m", "from 0 to 1", |constant| {
-        (0.0..=1.0).contains(&constant)
-    })?;
+    let number = |key: &Key| section.number(key.name, key.allowed, |value| key.allows(value));
+    let (curve, tunnel) = (number(&curve::CONSTANT)?, number(&tunnel::CONSTANT)?);
     Ok((davis, curve.unwrap_or(CURVE_CONSTANT_DEFAULT_N_PER_KN_M), tunnel.unwrap_or(0.0)))
 }
 

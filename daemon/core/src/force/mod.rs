@@ -10,10 +10,8 @@
 //!
 //! with the gradient in ‰ and the means taken along the train. [`ForceResolver`] gives
 //! everything but w0(v), which is what the estimators look for.
-//! The corrections of a train ([`crate::train::Corrections`]) are applied on the way.
+//! Each part is a law of [`crate::terms`], with what is declared of it in the train and the line.
 
-mod corrections;
-mod delay;
 mod resolver;
 
 pub use resolver::{ForceResolver, ResolvedSample};

@@ -5,9 +5,13 @@ use std::sync::Arc;
 use dynocar_shared::SampleField;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
-use super::corrections::Corrector;
+use crate::terms::bearings::WarmUp;
+use crate::terms::delay::DelayLine;
+use crate::terms::{
+    Resistance, ambient, bearings, curve, gradient, place, rotating, traction, tunnel, wheel, wind,
+};
 use crate::track::Track;
-use crate::train::TrainModel;
+use crate::train::{Corrections, TrainModel};
 use crate::validation::ValidSample;
 
 /// A sample with the forces that the declared model knows.
@@ -39,21 +43,20 @@ pub struct ResolvedSample {
     pub brake_force_n: Option<f64>,
     /// Mean gradient under the train in ‰ along the direction of travel.
     pub gradient_permille: Option<f64>,
-    /// Declared curve resistance in N/kN.
-    pub curve_n_per_kn: f64,
     /// Mean of 1/R along the train in 1/m, when curves are known.
     pub curvature_per_m: Option<f64>,
-    /// Declared tunnel resistance in N/kN; with a factor on c v² its part of the basic one, too.
-    pub tunnel_n_per_kn: f64,
-    /// Every other resistance in N/kN that is declared: of places, wind, cold bearings and the
-    /// outside temperature. Negative where one of them pushes.
-    pub other_n_per_kn: f64,
+    /// What resists beyond the declared basic resistance, part by part.
+    pub resistance: Resistance,
+    /// All of it in N/kN at this speed. Negative where something pushes.
+    pub extra_n_per_kn: f64,
     /// Share of the train inside tunnels, when tunnels are known.
     pub tunnel_share: Option<f64>,
     /// Brake-cylinder pressure in Pa.
     pub brake_cylinder_pressure_pa: Option<f64>,
-    /// Outside temperature in °C.
+    /// Outside temperature in °C: the sample's, else the last that was measured.
     pub ambient_temperature_degc: Option<f64>,
+    /// Time in s since the bearings were cold.
+    pub since_cold_s: f64,
     /// True while the controller's wheel-slide protection is active.
     pub is_sliding: bool,
 }
@@ -64,17 +67,12 @@ impl ResolvedSample {
         Some(self.traction_force_n? - self.brake_force_n?)
     }
 
-    /// Every declared resistance beyond the basic one, in N/kN.
-    pub fn extra_n_per_kn(&self) -> f64 {
-        self.curve_n_per_kn + self.tunnel_n_per_kn + self.other_n_per_kn
-    }
-
     /// Everything known that retards the train in proportion to its weight, in N/kN: gradient
     /// and every declared resistance beyond the basic one; `None` while no gradient is known.
     ///
     /// What an estimator looks for is what the motion shows beyond this sum.
     pub fn known_n_per_kn(&self) -> Option<f64> {
-        Some(self.gradient_permille? + self.extra_n_per_kn())
+        Some(self.gradient_permille? + self.extra_n_per_kn)
     }
 
     /// Everything that drives the train but its basic resistance, in N: traction minus brake
@@ -101,13 +99,13 @@ impl ResolvedSample {
             traction_force_n: Some(0.0),
             brake_force_n: Some(0.0),
             gradient_permille: Some(0.0),
-            curve_n_per_kn: 0.0,
             curvature_per_m: None,
-            tunnel_n_per_kn: 0.0,
-            other_n_per_kn: 0.0,
+            resistance: Resistance::BASIC,
+            extra_n_per_kn: 0.0,
             tunnel_share: None,
             brake_cylinder_pressure_pa: None,
             ambient_temperature_degc: None,
+            since_cold_s: 0.0,
             is_sliding: false,
         }
     }
@@ -118,15 +116,25 @@ impl ResolvedSample {
 pub struct ForceResolver {
     train: Arc<TrainModel>,
     track: Option<Arc<Track>>,
-    corrector: Option<Corrector>,
+    delay: Option<DelayLine>,
+    warm_up: WarmUp,
+    ambient_temperature_degc: Option<f64>,
     last: Option<(u32, f64)>,
 }
 
 impl ForceResolver {
     /// A resolver for one train on one line; without a line the gradient comes from the sample.
     pub fn new(train: Arc<TrainModel>, track: Option<Arc<Track>>) -> Self {
-        let corrector = Corrector::of(&train);
-        ForceResolver { train, track, corrector, last: None }
+        let Corrections { actuator_delay_s, actuator_lag_s, .. } = train.corrections;
+        let is_late = actuator_delay_s > 0.0 || actuator_lag_s > 0.0;
+        ForceResolver {
+            train,
+            track,
+            delay: is_late.then(|| DelayLine::new(actuator_delay_s, actuator_lag_s)),
+            warm_up: WarmUp::default(),
+            ambient_temperature_degc: None,
+            last: None,
+        }
     }
 
     /// The known forces at a sample.
@@ -140,30 +148,32 @@ impl ForceResolver {
     pub fn resolve(&mut self, valid: &ValidSample) -> ResolvedSample {
         let sample = &valid.sample;
         let train = &*self.train;
+        let known = &train.corrections;
         let direction = f64::from(sample.direction);
         let position_m = sample.get(SampleField::Position);
-        let mass_factor = match (self.track.as_deref(), position_m) {
-            (Some(track), Some(position_m)) => track.mass_factor(position_m, direction),
-            _ => 1.0,
-        };
-        let mass_kg = mass_factor * sample.get(SampleField::Mass).unwrap_or(train.mass_kg);
+        let track = self.track.as_deref();
         let on_track = |look_up: fn(&Track, f64, f64) -> Option<f64>| {
-            look_up(self.track.as_deref()?, position_m?, train.length_m)
+            look_up(track?, position_m?, train.length_m)
         };
-        let gradient_permille = on_track(Track::gradient_permille)
-            .or_else(|| sample.get(SampleField::Gradient))
-            .map(|gradient| direction * gradient)
+        let mass_factor = track
+            .zip(position_m)
+            .map_or(1.0, |(track, position_m)| track.mass_factor(position_m, direction));
+        let mass_kg = sample.get(SampleField::Mass).unwrap_or(train.mass_kg) * mass_factor;
+        let gradient_permille = track
+            .zip(position_m)
+            .and_then(|(track, at_m)| {
+                gradient::along_travel_permille(track, (at_m, direction), train.length_m, 0.0)
+            })
+            .or_else(|| Some(direction * sample.get(SampleField::Gradient)?))
             .or_else(|| self.accelerometer_gradient_permille(valid));
         let curvature_per_m = on_track(Track::curvature_per_m).or_else(|| {
             let radius_m = sample.get(SampleField::CurveRadius)?;
             Some(if radius_m > 0.0 { 1.0 / radius_m } else { 0.0 })
         });
         let tunnel_share = on_track(Track::tunnel_share);
-        let tunnel_length_m = match train.tunnel_constant_n_per_kn_m {
-            0.0 => None,
-            _ => on_track(Track::tunnel_length_m),
-        };
-        let place_n_per_kn = on_track(Track::resistance_n_per_kn).unwrap_or(0.0);
+        let traction_n = sample.get(SampleField::TractionForce);
+        let degc = sample.get(SampleField::AmbientTemperature).or(self.ambient_temperature_degc);
+        self.ambient_temperature_degc = degc;
         self.last = Some((valid.stretch, sample.speed_mps));
         let mut resolved = ResolvedSample {
             time_ns: sample.time_ns,
@@ -171,26 +181,69 @@ impl ForceResolver {
             stretch: valid.stretch,
             direction,
             position_m,
-            speed_mps: sample.speed_mps,
+            speed_mps: wheel::true_speed_mps(sample.speed_mps, known.speed_scale),
             mass_kg,
-            inertial_mass_kg: mass_kg * (1.0 + train.rotating_mass_factor),
+            inertial_mass_kg: rotating::inertial_mass_kg(mass_kg, train.rotating_mass_factor),
             weight_kn: TrainModel::weight_kn(mass_kg),
-            traction_force_n: sample.get(SampleField::TractionForce),
+            traction_force_n: traction_n.map(|n| traction::true_force_n(n, known.traction_gain)),
             brake_force_n: sample.get(SampleField::BrakeForce),
             gradient_permille,
-            curve_n_per_kn: train.curve_constant_n_per_kn_m * curvature_per_m.unwrap_or(0.0),
             curvature_per_m,
-            tunnel_n_per_kn: train.tunnel_constant_n_per_kn_m * tunnel_length_m.unwrap_or(0.0),
-            other_n_per_kn: place_n_per_kn,
+            resistance: Resistance::BASIC,
+            extra_n_per_kn: 0.0,
             tunnel_share,
             brake_cylinder_pressure_pa: sample.get(SampleField::BrakeCylinderPressure),
-            ambient_temperature_degc: sample.get(SampleField::AmbientTemperature),
+            ambient_temperature_degc: degc,
+            since_cold_s: self.warm_up.since_cold_s(sample.time_ns),
             is_sliding: valid.is_sliding(),
         };
-        if let Some(corrector) = &mut self.corrector {
-            corrector.correct(train, &mut resolved);
+        if let Some(delay) = &mut self.delay {
+            let reported = resolved.traction_force_n.zip(resolved.brake_force_n);
+            let at = (sample.time_ns, valid.stretch);
+            if let Some([traction_n, brake_n]) = delay.acting(at, reported.map(Into::into)) {
+                resolved.traction_force_n = Some(traction_n);
+                resolved.brake_force_n = Some(brake_n);
+            }
         }
+        resolved.resistance = self.declared_resistance(&resolved);
+        resolved.extra_n_per_kn =
+            resolved.resistance.extra_n_per_kn(self.train.resistance, resolved.speed_mps);
         resolved
+    }
+
+    /// Every declared term of resistance at a sample; what c and w0 scale is left open.
+    fn declared_resistance(&self, sample: &ResolvedSample) -> Resistance {
+        let train = &*self.train;
+        let known = &train.corrections;
+        let track = self.track.as_deref();
+        let on_track = |look_up: fn(&Track, f64, f64) -> Option<f64>| {
+            look_up(track?, sample.position_m?, train.length_m)
+        };
+        let mut resistance = Resistance::BASIC;
+        curve::act(train.curve_constant_n_per_kn_m, sample.curvature_per_m, &mut resistance);
+        tunnel::enter(sample.tunnel_share, &mut resistance);
+        if train.tunnel_constant_n_per_kn_m != 0.0 {
+            let length_m = on_track(Track::tunnel_length_m);
+            tunnel::act_by_length(train.tunnel_constant_n_per_kn_m, length_m, &mut resistance);
+        }
+        tunnel::act_by_factor(known.tunnel_c_factor, sample.tunnel_share, &mut resistance);
+        tunnel::act(known.tunnel_dc_n_per_kn_per_mps2, sample.tunnel_share, &mut resistance);
+        wind::act(known.wind_plus_mps, sample.direction, &mut resistance);
+        ambient::act(
+            known.ambient_w0_per_k,
+            known.ambient_reference_k,
+            sample.ambient_temperature_degc,
+            &mut resistance,
+        );
+        if known.bearing_delta_a_n_per_kn != 0.0 {
+            let Corrections { bearing_delta_a_n_per_kn, bearing_tau_s, .. } = *known;
+            let since_cold_s = sample.since_cold_s;
+            bearings::act(bearing_delta_a_n_per_kn, bearing_tau_s, since_cold_s, &mut resistance);
+        }
+        if let Some(extra_n_per_kn) = on_track(Track::resistance_n_per_kn) {
+            place::act(extra_n_per_kn, &mut resistance);
+        }
+        resistance
     }
 
     /// Gradient in ‰ along the travel from specific force = dv/dt + g * gradient, with dv/dt

@@ -111,7 +111,7 @@ impl ForceModel for QuadraticForces {
 /// A gradient that is not known counts as level track; [`Recording::knows_gradient`] tells.
 fn declared_polynomial(sample: &ResolvedSample, resistance: Davis) -> Polynomial {
     let gradient_permille = sample.gradient_permille.unwrap_or(0.0);
-    let tied_n_per_kn = gradient_permille + sample.extra_n_per_kn();
+    let tied_n_per_kn = gradient_permille + sample.extra_n_per_kn;
     let control_force_n = sample.control_force_n().unwrap_or(0.0);
     let weight_per_kg = sample.weight_kn / sample.inertial_mass_kg;
     [

@@ -41,6 +41,14 @@ pub struct MassSection {
     pub mass_factor: f64,
 }
 
+impl MassSection {
+    /// True at a chainage in m in a direction of travel.
+    #[inline]
+    pub fn holds(&self, centre_m: f64, direction: f64) -> bool {
+        self.direction == direction && (self.from_m..self.to_m).contains(&centre_m)
+    }
+}
+
 /// Why a list of track entries is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TrackError {
@@ -96,6 +104,7 @@ pub struct Track {
     tunnel: Option<TunnelProfiles>,
     curves: Vec<Curve>,
     tunnels: Vec<Tunnel>,
+    gradient_shift_m: f64,
     resistance_n_per_kn: Option<StepProfile>,
     masses: Vec<MassSection>,
 }
@@ -137,6 +146,7 @@ impl Track {
             tunnel,
             curves: curves.unwrap_or_default(),
             tunnels: tunnels.unwrap_or_default(),
+            gradient_shift_m: 0.0,
             resistance_n_per_kn: None,
             masses: Vec::new(),
         })
@@ -150,6 +160,13 @@ impl Track {
     pub fn with_resistance(mut self, places: &[(f64, f64, f64)]) -> Result<Self, TrackError> {
         self.resistance_n_per_kn = Some(interval_profile("resistance", places)?);
         Ok(self)
+    }
+
+    /// The same line whose true gradient lies so many m further towards growing chainage.
+    #[must_use]
+    pub fn with_gradient_shift(mut self, shift_m: f64) -> Self {
+        self.gradient_shift_m = shift_m;
+        self
     }
 
     /// The same line with sections on which trains weigh more or less than declared.
@@ -166,9 +183,7 @@ impl Track {
 
     /// True over declared mass at a chainage in a direction of travel.
     pub fn mass_factor(&self, centre_m: f64, direction: f64) -> f64 {
-        let holds = |section: &&MassSection| {
-            section.direction == direction && (section.from_m..section.to_m).contains(&centre_m)
-        };
+        let holds = |section: &&MassSection| section.holds(centre_m, direction);
         self.masses.iter().filter(holds).map(|section| section.mass_factor).product()
     }
 
@@ -176,7 +191,8 @@ impl Track {
     ///
     /// `centre_m` is the chainage of the train's centre. `None` when no gradient is known.
     pub fn gradient_permille(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
-        Some(self.gradient_permille.as_ref()?.mean_around(centre_m, train_length_m))
+        let true_m = centre_m - self.gradient_shift_m;
+        Some(self.gradient_permille.as_ref()?.mean_around(true_m, train_length_m))
     }
 
     /// Mean of 1/R in 1/m along a train; `None` when no curves are known.
@@ -195,7 +211,12 @@ impl Track {
         Some(self.tunnel.as_ref()?.length_m.mean_around(centre_m, train_length_m))
     }
 
-    /// The gradient profile, when known.
+    /// How far in m the true gradient lies from the profile, towards growing chainage.
+    pub fn gradient_shift_m(&self) -> f64 {
+        self.gradient_shift_m
+    }
+
+    /// The gradient profile as surveyed, when known.
     pub fn gradient(&self) -> Option<&StepProfile> {
         self.gradient_permille.as_ref()
     }
@@ -258,7 +279,11 @@ fn tunnel_profiles(tunnels: &[Tunnel]) -> Result<TunnelProfiles, TrackError> {
 const CHAINAGE_MAX_M: f64 = 1e9;
 
 /// A profile that is zero outside the given (start, end, value) intervals.
-fn interval_profile(
+///
+/// # Errors
+///
+/// When intervals overlap, are reversed or not finite; `list` names them.
+pub fn interval_profile(
     list: &'static str,
     intervals: &[(f64, f64, f64)],
 ) -> Result<StepProfile, TrackError> {

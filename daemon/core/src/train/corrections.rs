@@ -14,6 +14,8 @@ pub struct Corrections {
     pub actuator_lag_s: f64,
     /// Factor on c v² for the part of the train in tunnels.
     pub tunnel_c_factor: f64,
+    /// What is added to c for the part of the train in tunnels, in N/kN per (m/s)².
+    pub tunnel_dc_n_per_kn_per_mps2: f64,
     /// Headwind in m/s for the direction of growing chainage, outside tunnels.
     pub wind_plus_mps: f64,
     /// Further a in N/kN of cold bearings at the start.
@@ -34,6 +36,7 @@ impl Corrections {
         actuator_delay_s: 0.0,
         actuator_lag_s: 0.0,
         tunnel_c_factor: 1.0,
+        tunnel_dc_n_per_kn_per_mps2: 0.0,
         wind_plus_mps: 0.0,
         bearing_delta_a_n_per_kn: 0.0,
         bearing_tau_s: 300.0,

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use dynocar_core::force::ResolvedSample;
 use dynocar_core::pipeline::Estimator;
+use dynocar_core::terms::Resistance;
 use dynocar_core::train::{BrakeGear, Davis, EffortCurve, TrainModel};
 use dynocar_shared::ParameterSnapshot;
 use rand::{RngExt, SeedableRng};
@@ -143,10 +144,10 @@ impl Simulation {
             traction_force_n: Some(force_n.max(0.0)),
             brake_force_n: Some((-force_n).max(0.0)),
             gradient_permille: Some(0.0),
-            curve_n_per_kn: 0.0,
             curvature_per_m: Some(0.0),
-            tunnel_n_per_kn: 0.0,
-            other_n_per_kn: 0.0,
+            resistance: Resistance::BASIC,
+            extra_n_per_kn: 0.0,
+            since_cold_s: 0.0,
             tunnel_share: Some(0.0),
             brake_cylinder_pressure_pa: None,
             ambient_temperature_degc: None,
@@ -209,7 +210,7 @@ pub fn garbage(seed: u64, count: usize) -> Vec<ResolvedSample> {
             9 => sample.time_ns = i64::MAX,
             10 => sample.stretch = random.random(),
             11 => sample.is_sliding = true,
-            12 => sample.curve_n_per_kn = value,
+            12 => sample.extra_n_per_kn = value,
             _ => {}
         }
     }

@@ -134,6 +134,10 @@ fn corrections(known: &Corrections) -> Vec<String> {
         format!("{} c v² in tunnels", short(known.tunnel_c_factor, 4)),
     );
     say(
+        known.tunnel_dc_n_per_kn_per_mps2 != 0.0,
+        format!("c {} in tunnels", signed(known.tunnel_dc_n_per_kn_per_mps2, 4)),
+    );
+    say(
         known.wind_plus_mps != 0.0,
         format!("headwind {} m/s as the chainage grows", signed(known.wind_plus_mps, 3)),
     );

@@ -2,14 +2,11 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Parameter, Proposal, ReportContext, Reported};
+use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal, ReportContext, Reported};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
+use crate::terms::ambient;
 
-/// Air density alone gives -0.0035 per kelvin; grease makes it more.
-const PARAMETERS: [Parameter; 1] = [Parameter::new("w0_per_k", (-0.05, 0.05), 0.0005)];
-/// The standard atmosphere's 15 °C, at which the fitted a, b, c hold.
-const REFERENCE_DEGC: f64 = 15.0;
 /// Mean temperatures of the runs must differ by so many K.
 const SPREAD_MIN_K: f64 = 4.0;
 
@@ -59,25 +56,31 @@ impl Hypothesis for Linear {
     }
 
     fn parameters(&self) -> &[Parameter] {
-        &PARAMETERS
+        &ambient::PARAMETERS
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
-        parameters[0].abs() > 0.001
+        parameters[0].abs() > ambient::LEAST_PER_K
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
-        let mut degc = mean_degc(run).unwrap_or(REFERENCE_DEGC);
         for (force, sample) in forces.iter_mut().zip(run.samples()) {
-            degc = sample.ambient_temperature_degc.unwrap_or(degc);
-            force.resistance_factor *= 1.0 + parameters[0] * (degc - REFERENCE_DEGC);
+            let degc = sample.ambient_temperature_degc;
+            ambient::act(parameters[0], ambient::REFERENCE_K, degc, &mut force.resistance);
         }
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        Some(vec![
+            Entry::Number(&ambient::W0_PER_K, parameters[0]),
+            Entry::Number(&ambient::REFERENCE, ambient::REFERENCE_K),
+        ])
     }
 
     fn report(&self, context: &ReportContext) -> Reported {
         let mut reported = Reported::default();
         reported.push("w0_per_k", context.parameters[0], context.deviations[0]);
-        reported.push("reference_k", REFERENCE_DEGC + 273.15, 0.0);
+        reported.push("reference_k", ambient::REFERENCE_K, 0.0);
         reported
     }
 }

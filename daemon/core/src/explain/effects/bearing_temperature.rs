@@ -1,15 +1,11 @@
-//! Cold bearings that warm up: a grows by delta exp(-t / tau), t from the start of the run.
+//! Cold bearings that warm up.
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
+use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
-
-const PARAMETERS: [Parameter; 2] = [
-    Parameter::new("delta_a_n_per_kn", (0.0, 20.0), 0.02),
-    Parameter::new("tau_s", (40.0, 3000.0), 5.0),
-];
+use crate::terms::{Resistance, bearings};
 
 /// The kind.
 pub struct BearingTemperature;
@@ -31,8 +27,10 @@ impl Effect for BearingTemperature {
             .into_iter()
             .map(|tau_s| {
                 let tuple = scan.tuple(|run, i| {
-                    let fade = (-run.recording.time_s()[i] / tau_s).exp();
-                    -fade * scan.per_unit_resistance_mps2(&run.samples()[i])
+                    let sample = &run.samples()[i];
+                    let mut cold = Resistance::BASIC;
+                    bearings::act(1.0, tau_s, sample.since_cold_s, &mut cold);
+                    -cold.bearing_n_per_kn * scan.per_unit_resistance_mps2(sample)
                 });
                 let (gain, estimate) = scan.gain(&tuple);
                 (if estimate > 0.0 { gain } else { 0.0 }, estimate, tau_s)
@@ -49,12 +47,20 @@ impl Hypothesis for Warming {
     }
 
     fn parameters(&self) -> &[Parameter] {
-        &PARAMETERS
+        &bearings::PARAMETERS
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
-        for (force, time_s) in forces.iter_mut().zip(run.recording.time_s()) {
-            force.extra_n_per_kn += parameters[0] * (-time_s / parameters[1]).exp();
+        for (force, sample) in forces.iter_mut().zip(run.samples()) {
+            let since_cold_s = sample.since_cold_s;
+            bearings::act(parameters[0], parameters[1], since_cold_s, &mut force.resistance);
         }
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        Some(vec![
+            Entry::Number(&bearings::DELTA_A, parameters[0]),
+            Entry::Number(&bearings::TAU, parameters[1]),
+        ])
     }
 }

@@ -2,13 +2,11 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
+use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal};
 use crate::explain::answer::Place;
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
-
-/// Total k is between none and about ten times the usual.
-const PARAMETERS: [Parameter; 1] = [Parameter::new("k_n_per_kn_m", (0.0, 6000.0), 20.0)];
+use crate::terms::curve;
 
 /// The kind.
 pub struct CurveResistance;
@@ -48,7 +46,7 @@ impl Hypothesis for Curves {
     }
 
     fn parameters(&self) -> &[Parameter] {
-        &PARAMETERS
+        &curve::PARAMETERS
     }
 
     fn none(&self) -> f64 {
@@ -56,14 +54,17 @@ impl Hypothesis for Curves {
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
-        (parameters[0] - self.declared_k).abs() > 100.0
+        (parameters[0] - self.declared_k).abs() > curve::LEAST_N_PER_KN_M
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
-        let excess = parameters[0] - self.declared_k;
         for (force, sample) in forces.iter_mut().zip(run.samples()) {
-            force.tied_n_per_kn += excess * sample.curvature_per_m.unwrap_or(0.0);
+            curve::act(parameters[0], sample.curvature_per_m, &mut force.resistance);
         }
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        Some(vec![Entry::Number(&curve::CONSTANT, parameters[0])])
     }
 
     fn place(&self) -> Place {

@@ -13,10 +13,8 @@ use crate::explain::evidence::{RunData, SampleForces, SharedHypothesis};
 use crate::explain::places::{Axis, End, Reach};
 use crate::explain::residual_pressure;
 use crate::explain::scan::{Scan, Tuple};
+use crate::terms::brake::{self, BUILD_UP_S, build_up};
 
-const PARAMETERS: [Parameter; 1] = [Parameter::new("force_n", (0.0, 3e5), 20.0)];
-/// The force builds up over this time in s.
-const BUILD_UP_S: f64 = 10.0;
 /// Onsets are first looked for at least this far apart in s, and at so many places of a run.
 const GRID_MIN_S: f64 = 12.0;
 const GRID_PLACES: f64 = 120.0;
@@ -55,11 +53,6 @@ fn onset_tuple(scan: &Scan, index: usize, onset_s: f64) -> Tuple {
     scan.run_tuple(index, |run, i| {
         -build_up(run.recording.time_s()[i] - onset_s) / run.samples()[i].inertial_mass_kg
     })
-}
-
-/// Share of the force so many s after the onset.
-fn build_up(since_s: f64) -> f64 {
-    (since_s / BUILD_UP_S).clamp(0.0, 1.0)
 }
 
 impl Onsets {
@@ -261,7 +254,7 @@ impl Hypothesis for Dragging {
     }
 
     fn parameters(&self) -> &[Parameter] {
-        &PARAMETERS
+        &brake::PARAMETERS
     }
 
     fn choice_cost(&self) -> f64 {

@@ -4,13 +4,12 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
+use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
+use crate::terms::gradient;
 use crate::track::Track;
 
-const SHIFT_MAX_M: f64 = 1600.0;
-const PARAMETERS: [Parameter; 1] = [Parameter::new("shift_m", (-SHIFT_MAX_M, SHIFT_MAX_M), 2.0)];
 /// Shifts that a search starts from are this far apart in m.
 const GRID_M: f64 = 25.0;
 
@@ -34,7 +33,7 @@ impl Effect for GradientShift {
         };
         let hypothesis = Shift { track: Arc::clone(track), length_m: scan.train.length_m };
         let mut best: Option<(f64, f64)> = None;
-        let count = (SHIFT_MAX_M / GRID_M) as i32;
+        let count = (gradient::SHIFT_MAX_M / GRID_M) as i32;
         for k in (-count..=count).filter(|&k| k != 0) {
             let shift_m = GRID_M * f64::from(k);
             let tuple = scan.tuple(|run, i| {
@@ -61,9 +60,8 @@ impl Shift {
     /// Gradient in ‰ along the travel under a shifted profile.
     fn gradient_permille(&self, run: &RunData, index: usize, shift_m: f64) -> Option<f64> {
         let sample = &run.samples()[index];
-        let position_m = sample.position_m?;
-        let gradient = self.track.gradient_permille(position_m - shift_m, self.length_m)?;
-        Some(sample.direction * gradient)
+        let at = (sample.position_m?, sample.direction);
+        gradient::along_travel_permille(&self.track, at, self.length_m, shift_m)
     }
 }
 
@@ -73,7 +71,7 @@ impl Hypothesis for Shift {
     }
 
     fn parameters(&self) -> &[Parameter] {
-        &PARAMETERS
+        &gradient::SHIFT_PARAMETERS
     }
 
     fn choice_cost(&self) -> f64 {
@@ -82,7 +80,7 @@ impl Hypothesis for Shift {
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
-        parameters[0].abs() > 5.0
+        parameters[0].abs() > gradient::SHIFT_LEAST_M
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
@@ -91,5 +89,9 @@ impl Hypothesis for Shift {
                 force.gradient_permille = gradient;
             }
         }
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        Some(vec![Entry::TrackNumber(gradient::SHIFT, parameters[0])])
     }
 }

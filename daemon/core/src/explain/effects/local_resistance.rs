@@ -4,13 +4,12 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
+use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal};
 use crate::explain::answer::Place;
 use crate::explain::evidence::{RunData, SampleForces, SharedHypothesis};
 use crate::explain::places::{End, Inside, Stretches, find};
 use crate::explain::scan::Scan;
-
-const PARAMETERS: [Parameter; 1] = [Parameter::new("extra_n_per_kn", (0.0, 100.0), 0.02)];
+use crate::terms::place;
 
 /// The kind.
 pub struct LocalResistance;
@@ -18,7 +17,7 @@ pub struct LocalResistance;
 #[derive(Clone, Debug)]
 struct Local {
     stretches: Stretches,
-    inside: Inside,
+    length_m: f64,
     /// Files of the runs; `None` for all.
     runs: Option<Vec<String>>,
     choice_cost: f64,
@@ -42,7 +41,7 @@ impl Effect for LocalResistance {
         let candidate = |runs: Option<Vec<String>>| {
             let hypothesis = Local {
                 stretches: found.stretches(),
-                inside,
+                length_m: scan.train.length_m,
                 runs,
                 choice_cost: found.choice_cost,
                 map_error: found.map_error,
@@ -63,7 +62,7 @@ impl Hypothesis for Local {
     }
 
     fn parameters(&self) -> &[Parameter] {
-        &PARAMETERS
+        &place::PARAMETERS
     }
 
     fn choice_cost(&self) -> f64 {
@@ -78,10 +77,21 @@ impl Hypothesis for Local {
         if self.runs.as_ref().is_some_and(|runs| !runs.contains(&run.file)) {
             return;
         }
+        let Ok(profile) = place::profile(&self.stretches.intervals_m, parameters[0]) else {
+            return;
+        };
         for (force, sample) in forces.iter_mut().zip(run.samples()) {
-            force.extra_n_per_kn +=
-                parameters[0] * self.inside.share(sample.position_m, &self.stretches.intervals_m);
+            if let Some(position_m) = sample.position_m {
+                let extra_n_per_kn = profile.mean_around(position_m, self.length_m);
+                place::act(extra_n_per_kn, &mut force.resistance);
+            }
         }
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        let row = |&[from_m, to_m]: &[f64; 2]| vec![from_m, to_m, parameters[0]];
+        let rows = self.stretches.intervals_m.iter().map(row).collect();
+        self.runs.is_none().then(|| vec![Entry::Rows(place::LIST, rows)])
     }
 
     fn ends(&self) -> Vec<End> {

@@ -11,9 +11,8 @@ use crate::explain::evidence::{RunData, SampleForces, SharedHypothesis};
 use crate::explain::places::{End, Found, Inside, Stretches, best_of_runs, find};
 use crate::explain::scan::{Scan, Tuple};
 use crate::force::ResolvedSample;
+use crate::terms::adhesion;
 
-const ADHESION: [Parameter; 1] = [Parameter::new("adhesion", (0.005, 0.5), 0.0005)];
-const RATIO: [Parameter; 1] = [Parameter::new("achieved_ratio", (0.05, 1.0), 0.005)];
 /// Caps that a search starts from, as share of the strongest braking seen.
 const CAP_SHARES: [f64; 4] = [0.3, 0.5, 0.65, 0.8];
 /// Braking for less than this in s says nothing.
@@ -132,8 +131,8 @@ impl Hypothesis for Slippery {
 
     fn parameters(&self) -> &[Parameter] {
         match self.form {
-            Form::Cap => &ADHESION,
-            Form::Ratio => &RATIO,
+            Form::Cap => &adhesion::CAP,
+            Form::Ratio => &adhesion::RATIO,
         }
     }
 
@@ -150,7 +149,7 @@ impl Hypothesis for Slippery {
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
-        self.form == Form::Cap || parameters[0] < 0.97
+        self.form == Form::Cap || parameters[0] < adhesion::RATIO_LEAST
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
@@ -164,7 +163,8 @@ impl Hypothesis for Slippery {
             if is_there {
                 force.brake_n = match self.form {
                     Form::Cap => {
-                        force.brake_n.min(parameters[0] * weight_n(sample) * force.mass_factor)
+                        let weight_n = weight_n(sample) * force.mass_factor;
+                        adhesion::carried_n(force.brake_n, parameters[0], weight_n)
                     }
                     Form::Ratio => force.brake_n * parameters[0],
                 };

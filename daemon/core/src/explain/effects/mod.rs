@@ -1,9 +1,10 @@
 //! The library of effects, declared beforehand: one file for each kind.
 //!
 //! A kind ([`Effect`]) proposes [`Hypothesis`] structures for the data at hand: which tunnels,
-//! which interval, which windows. A hypothesis says how it changes the forces on the train for
-//! given parameters, and nothing else is needed: the same code fits it, simulates it and predicts
-//! with it. A new kind is one file and one line in [`LIBRARY`].
+//! which interval, which windows. A hypothesis changes the forces on the train for given
+//! parameters by the law of its term ([`crate::terms`]), and nothing else is needed: the same code
+//! fits it, simulates it and predicts with it, and the daemon applies the same law to what is
+//! written of it into the files. A new kind is one file and one line in [`LIBRARY`].
 
 mod actuator_delay;
 mod ambient_temperature;
@@ -29,6 +30,8 @@ use super::answer::{ParameterValue, Place};
 use super::evidence::{RunData, SampleForces, SharedHypothesis};
 use super::places::End;
 use super::scan::Scan;
+use crate::terms::Entry;
+pub use crate::terms::Parameter;
 
 /// Every kind, in the order of the search: timing, scales, mass and gain, what is tied to a
 /// place, environment, actuators. What is in no library comes last.
@@ -49,26 +52,6 @@ pub const LIBRARY: [&dyn Effect; 15] = [
     &low_adhesion::LowAdhesion,
     &residual_band::ResidualBand,
 ];
-
-/// A parameter of a hypothesis.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Parameter {
-    /// Its name in the answer.
-    pub name: &'static str,
-    /// Least value.
-    pub lower: f64,
-    /// Greatest value.
-    pub upper: f64,
-    /// Step for finite differences.
-    pub step: f64,
-}
-
-impl Parameter {
-    /// A parameter with its bounds.
-    pub const fn new(name: &'static str, (lower, upper): (f64, f64), step: f64) -> Self {
-        Parameter { name, lower, upper, step }
-    }
-}
 
 /// What an estimate says outside: values and standard deviations by the names of the answer.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -173,6 +156,11 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
     /// The value of each parameter at which there is no effect.
     fn none(&self) -> f64 {
         0.0
+    }
+
+    /// What the effect is in the files of a train and a line; `None` where these cannot hold it.
+    fn entries(&self, _parameters: &[f64]) -> Option<Vec<Entry>> {
+        None
     }
 
     /// Parameters by the names of the answer.

@@ -3,12 +3,10 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
+use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
-
-/// Locomotives with small loads reach 0.25 to 0.3.
-const PARAMETERS: [Parameter; 1] = [Parameter::new("rotating_mass_factor", (0.0, 0.5), 0.005)];
+use crate::terms::rotating;
 
 /// The kind.
 pub struct RotatingMass;
@@ -35,7 +33,7 @@ impl Hypothesis for Gamma {
     }
 
     fn parameters(&self) -> &[Parameter] {
-        &PARAMETERS
+        &rotating::PARAMETERS
     }
 
     fn none(&self) -> f64 {
@@ -43,12 +41,16 @@ impl Hypothesis for Gamma {
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
-        (parameters[0] - self.declared).abs() > 0.01
+        (parameters[0] - self.declared).abs() > rotating::LEAST
     }
 
     fn apply(&self, parameters: &[f64], _run: &RunData, forces: &mut [SampleForces]) {
         for force in forces {
             force.rotating_mass_factor = parameters[0];
         }
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        Some(vec![Entry::Number(&rotating::FACTOR, parameters[0])])
     }
 }

@@ -2,11 +2,10 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
+use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
-
-const PARAMETERS: [Parameter; 1] = [Parameter::new("gain", (0.6, 1.6), 0.005)];
+use crate::terms::traction;
 
 /// The kind.
 pub struct TractionGain;
@@ -35,7 +34,7 @@ impl Hypothesis for Gain {
     }
 
     fn parameters(&self) -> &[Parameter] {
-        &PARAMETERS
+        &traction::PARAMETERS
     }
 
     fn none(&self) -> f64 {
@@ -43,12 +42,16 @@ impl Hypothesis for Gain {
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
-        (parameters[0] - 1.0).abs() > 0.01
+        (parameters[0] - 1.0).abs() > traction::LEAST
     }
 
     fn apply(&self, parameters: &[f64], _run: &RunData, forces: &mut [SampleForces]) {
         for force in forces {
-            force.traction_n /= parameters[0];
+            force.traction_n = traction::true_force_n(force.traction_n, parameters[0]);
         }
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        Some(vec![Entry::Number(&traction::GAIN, parameters[0])])
     }
 }

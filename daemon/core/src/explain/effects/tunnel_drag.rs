@@ -4,14 +4,12 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Parameter, Proposal, ReportContext, Reported};
+use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal, ReportContext, Reported};
 use crate::explain::answer::Place;
 use crate::explain::evidence::{RunData, SampleForces, SharedHypothesis};
 use crate::explain::places::{End, Inside, Stretches, find};
 use crate::explain::scan::Scan;
-
-/// Single-track tunnels reach several times c; the bound is in N/kN per (m/s)².
-const PARAMETERS: [Parameter; 1] = [Parameter::new("dc_n_per_kn_per_mps2", (0.0, 0.2), 1e-5)];
+use crate::terms::{place, tunnel};
 
 /// The kind.
 pub struct TunnelDrag;
@@ -19,7 +17,8 @@ pub struct TunnelDrag;
 #[derive(Clone, Debug)]
 struct Tunnels {
     /// Where they were found; `None`: the mapped ones.
-    found: Option<(Stretches, Inside)>,
+    found: Option<Stretches>,
+    length_m: f64,
     mapped_m: Vec<[f64; 2]>,
     choice_cost: f64,
     map_error: f64,
@@ -31,6 +30,7 @@ impl Effect for TunnelDrag {
     }
 
     fn propose(&self, scan: &Scan) -> Proposal {
+        let length_m = scan.train.length_m;
         let inside_s = scan.seconds_where(|_, sample| sample.tunnel_share.is_some_and(|s| s > 0.0));
         let is_mapped = scan.track.is_some_and(|track| track.knows_tunnels());
         if is_mapped && inside_s < 10.0 {
@@ -40,13 +40,14 @@ impl Effect for TunnelDrag {
             let mapped_m = scan.track.map_or_else(Vec::new, |track| {
                 track.tunnels().iter().map(|tunnel| [tunnel.start_m, tunnel.end_m]).collect()
             });
-            let mapped = Tunnels { found: None, mapped_m, choice_cost: 0.0, map_error: 0.0 };
+            let mapped =
+                Tunnels { found: None, length_m, mapped_m, choice_cost: 0.0, map_error: 0.0 };
             return Proposal::Candidates(vec![Candidate::new(mapped, vec![0.0])]);
         }
         if scan.track.is_none() {
             return Proposal::NotTestable("the line is not known".into());
         }
-        let inside = Inside::Share { length_m: scan.train.length_m };
+        let inside = Inside::Share { length_m };
         let shape = |run: &RunData, i: usize| {
             let speed = run.smooth_mps[i];
             -scan.per_unit_resistance_mps2(&run.samples()[i]) * speed * speed
@@ -56,7 +57,8 @@ impl Effect for TunnelDrag {
             return Proposal::Candidates(Vec::new());
         };
         let hypothesis = Tunnels {
-            found: Some((found.stretches(), inside)),
+            found: Some(found.stretches()),
+            length_m,
             mapped_m: Vec::new(),
             // A tunnel that nobody mapped is less likely than some resistance at a place.
             choice_cost: found.choice_cost + 4.0,
@@ -72,7 +74,7 @@ impl Hypothesis for Tunnels {
     }
 
     fn parameters(&self) -> &[Parameter] {
-        &PARAMETERS
+        &tunnel::PARAMETERS
     }
 
     fn choice_cost(&self) -> f64 {
@@ -84,31 +86,45 @@ impl Hypothesis for Tunnels {
     }
 
     fn is_material(&self, parameters: &[f64], c: f64) -> bool {
-        parameters[0] > 0.08 * c
+        parameters[0] > tunnel::LEAST_SHARE_OF_C * c
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        let found = self.found.as_ref().map(|found| place::profile(&found.intervals_m, 1.0));
         for (force, sample) in forces.iter_mut().zip(run.samples()) {
-            let share = match &self.found {
-                None => sample.tunnel_share.unwrap_or(0.0),
-                Some((at, inside)) => inside.share(sample.position_m, &at.intervals_m),
+            let share = match &found {
+                None => sample.tunnel_share,
+                Some(profile) => profile
+                    .as_ref()
+                    .ok()
+                    .zip(sample.position_m)
+                    .map(|(profile, position_m)| profile.mean_around(position_m, self.length_m)),
             };
-            force.c_extra += share * parameters[0];
+            tunnel::act(parameters[0], share, &mut force.resistance);
+            tunnel::enter(share, &mut force.resistance);
         }
     }
 
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        let mut entries = vec![Entry::Number(&tunnel::DC, parameters[0])];
+        if let Some(found) = &self.found {
+            let rows = found.intervals_m.iter().map(|interval_m| interval_m.to_vec()).collect();
+            entries.push(Entry::Rows("tunnels", rows));
+        }
+        Some(entries)
+    }
+
     fn ends(&self) -> Vec<End> {
-        self.found.as_ref().map_or_else(Vec::new, |(stretches, _)| stretches.ends())
+        self.found.as_ref().map_or_else(Vec::new, Stretches::ends)
     }
 
     fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
-        let (stretches, inside) = self.found.as_ref()?;
-        let found = Some((stretches.moved(end, at)?, *inside));
+        let found = Some(self.found.as_ref()?.moved(end, at)?);
         Some(Arc::new(Tunnels { found, ..self.clone() }))
     }
 
     fn place(&self) -> Place {
-        let found = self.found.as_ref().map(|(stretches, _)| &stretches.intervals_m);
+        let found = self.found.as_ref().map(|stretches| &stretches.intervals_m);
         Place::of_intervals(found.unwrap_or(&self.mapped_m).clone())
     }
 

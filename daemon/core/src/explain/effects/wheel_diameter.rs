@@ -3,12 +3,10 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
+use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
-
-/// Wheels are turned down by at most about a tenth of their diameter.
-const PARAMETERS: [Parameter; 1] = [Parameter::new("speed_scale", (0.88, 1.12), 0.002)];
+use crate::terms::wheel;
 
 /// The kind.
 pub struct WheelDiameter;
@@ -35,7 +33,7 @@ impl Hypothesis for Scale {
     }
 
     fn parameters(&self) -> &[Parameter] {
-        &PARAMETERS
+        &wheel::PARAMETERS
     }
 
     fn none(&self) -> f64 {
@@ -43,7 +41,7 @@ impl Hypothesis for Scale {
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
-        (parameters[0] - 1.0).abs() > 0.003
+        (parameters[0] - 1.0).abs() > wheel::LEAST
     }
 
     fn apply(&self, _parameters: &[f64], _run: &RunData, _forces: &mut [SampleForces]) {}
@@ -54,5 +52,9 @@ impl Hypothesis for Scale {
 
     fn changes_speed_scale(&self) -> bool {
         true
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        Some(vec![Entry::Number(&wheel::SPEED_SCALE, parameters[0])])
     }
 }

@@ -1,18 +1,14 @@
-//! Wind along the line: air resistance c (v + w)² with the headwind w, whose sign turns with the
-//! direction of travel. One wind for all runs, or one for each run.
+//! Wind along the line. One wind for all runs, or one for each run.
 
 use std::collections::BTreeMap;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Parameter, Proposal, ReportContext, Reported};
+use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal, ReportContext, Reported};
 use crate::explain::answer::ParameterValue;
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
-
-const SPEED_MAX_MPS: f64 = 35.0;
-/// Less wind than this is in the noise of any day.
-const MATERIAL_MPS: f64 = 1.0;
+use crate::terms::wind;
 
 /// The kind.
 pub struct Wind;
@@ -29,10 +25,6 @@ struct ByRun {
     parameters: Vec<Parameter>,
 }
 
-fn parameter() -> Parameter {
-    Parameter::new("wind_plus_mps", (-SPEED_MAX_MPS, SPEED_MAX_MPS), 0.05)
-}
-
 impl Effect for Wind {
     fn kind(&self) -> EffectKind {
         EffectKind::Wind
@@ -47,9 +39,10 @@ impl Effect for Wind {
         }
         let by_run = ByRun {
             runs: runs.iter().map(|run| (run.file.clone(), run.direction)).collect(),
-            parameters: vec![parameter(); runs.len()],
+            parameters: vec![wind::PARAMETER; runs.len()],
         };
-        let mut candidates = vec![Candidate::new(Steady { parameters: [parameter()] }, vec![0.0])];
+        let mut candidates =
+            vec![Candidate::new(Steady { parameters: [wind::PARAMETER] }, vec![0.0])];
         if runs.len() >= 3 {
             candidates.push(Candidate::new(by_run, vec![0.0; runs.len()]));
         }
@@ -57,11 +50,9 @@ impl Effect for Wind {
     }
 }
 
-/// Only the part of the train outside tunnels feels the wind.
 fn blow(wind_plus_mps: f64, run: &RunData, forces: &mut [SampleForces]) {
     for (force, sample) in forces.iter_mut().zip(run.samples()) {
-        let outside = 1.0 - sample.tunnel_share.unwrap_or(0.0);
-        force.headwind_mps += wind_plus_mps * sample.direction * outside;
+        wind::act(wind_plus_mps, sample.direction, &mut force.resistance);
     }
 }
 
@@ -75,11 +66,15 @@ impl Hypothesis for Steady {
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
-        parameters[0].abs() > MATERIAL_MPS
+        parameters[0].abs() > wind::LEAST_MPS
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         blow(parameters[0], run, forces);
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        Some(vec![Entry::Number(&wind::WIND_PLUS, parameters[0])])
     }
 }
 
@@ -93,7 +88,7 @@ impl Hypothesis for ByRun {
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
-        parameters.iter().any(|wind| wind.abs() > MATERIAL_MPS)
+        parameters.iter().any(|mps| mps.abs() > wind::LEAST_MPS)
     }
 
     fn touches(&self, parameter: usize, run: &RunData) -> bool {

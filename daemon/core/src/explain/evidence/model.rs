@@ -6,6 +6,7 @@ use super::run_data::RunData;
 use crate::explain::effects::Hypothesis;
 use crate::force::ResolvedSample;
 use crate::simulate::ForceModel;
+use crate::terms::{Resistance, rotating, wheel};
 use crate::train::{Davis, TrainModel};
 
 /// An effect with its structure (places, windows, runs) fixed, shared by models.
@@ -26,16 +27,8 @@ pub struct SampleForces {
     pub rotating_mass_factor: f64,
     /// Gradient in ‰ along the travel.
     pub gradient_permille: f64,
-    /// Declared resistance in N/kN beyond the basic one.
-    pub tied_n_per_kn: f64,
-    /// Factor on the basic resistance.
-    pub resistance_factor: f64,
-    /// Added to c, in N/kN per (m/s)².
-    pub c_extra: f64,
-    /// Headwind in m/s.
-    pub headwind_mps: f64,
-    /// Further resistance in N/kN.
-    pub extra_n_per_kn: f64,
+    /// What resists, part by part, but for a, b and c.
+    pub resistance: Resistance,
     /// Further resistance in N.
     pub extra_n: f64,
 }
@@ -51,53 +44,38 @@ impl SampleForces {
             mass_factor: 1.0,
             rotating_mass_factor,
             gradient_permille: sample.gradient_permille.unwrap_or(0.0),
-            tied_n_per_kn: sample.extra_n_per_kn(),
-            resistance_factor: 1.0,
-            c_extra: 0.0,
-            headwind_mps: 0.0,
-            extra_n_per_kn: 0.0,
+            resistance: sample.resistance,
             extra_n: 0.0,
         }
     }
 
-    /// Acceleration in m/s² that 1 N/kN of basic resistance takes away.
+    /// Acceleration in m/s² that 1 N/kN of resistance takes away.
     #[inline]
     fn per_unit_resistance_mps2(&self) -> f64 {
-        self.resistance_factor * TrainModel::weight_kn(1.0) / (1.0 + self.rotating_mass_factor)
+        TrainModel::weight_kn(1.0) / (1.0 + self.rotating_mass_factor)
     }
 
-    /// Sign of the air resistance c (v + w) |v + w|.
-    #[inline]
-    fn air_sign(&self, speed_mps: f64) -> f64 {
-        if speed_mps + self.headwind_mps < 0.0 { -1.0 } else { 1.0 }
-    }
-
-    /// The acceleration p0 + p1 v + p2 v² in m/s² for speeds near `speed_mps`: the sign of the air
-    /// resistance is taken at that speed.
+    /// The acceleration p0 + p1 v + p2 v² in m/s² for speeds near `speed_mps`.
     #[inline]
     fn polynomial(&self, davis: Davis, speed_mps: f64) -> [f64; 3] {
         let mass_kg = self.mass_kg * self.mass_factor;
-        let per_kg = 1.0 / (mass_kg * (1.0 + self.rotating_mass_factor));
+        let per_kg = 1.0 / rotating::inertial_mass_kg(mass_kg, self.rotating_mass_factor);
         let weight_kn = TrainModel::weight_kn(mass_kg);
-        let wind = self.headwind_mps;
-        let air = self.air_sign(speed_mps) * (davis.c + self.c_extra);
-        let factor = self.per_unit_resistance_mps2();
-        let other_n_per_kn = self.gradient_permille + self.tied_n_per_kn + self.extra_n_per_kn;
         let force_n = self.traction_n - self.brake_n - self.extra_n;
+        let unit = self.per_unit_resistance_mps2();
+        let [w0, w1, w2] = self.resistance.polynomial(davis, speed_mps);
         [
-            per_kg * (force_n - weight_kn * other_n_per_kn)
-                - factor * (davis.a + air * wind * wind),
-            -factor * (davis.b + 2.0 * air * wind),
-            -factor * air,
+            per_kg * (force_n - weight_kn * self.gradient_permille) - unit * w0,
+            -unit * w1,
+            -unit * w2,
         ]
     }
 
     /// What the acceleration changes by for each unit of a, b and c.
     #[inline]
     fn davis_slopes(&self, speed_mps: f64) -> [f64; 3] {
-        let factor = -self.per_unit_resistance_mps2();
-        let air_mps = speed_mps + self.headwind_mps;
-        [factor, factor * speed_mps, factor * self.air_sign(speed_mps) * air_mps * air_mps]
+        let unit = self.per_unit_resistance_mps2();
+        self.resistance.davis_slopes(speed_mps).map(|slope| -unit * slope)
     }
 }
 
@@ -149,12 +127,12 @@ impl GrownModel {
     pub fn forces(&self, run: &RunData, theta: &[f64], forces: &mut GrownForces) {
         self.act(run, theta, forces);
         let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
-        let per_scale = 1.0 / forces.speed_scale;
+        let scale = forces.speed_scale;
         forces.polynomials.clear();
         let samples = forces.samples.iter().zip(&run.smooth_mps);
-        forces
-            .polynomials
-            .extend(samples.map(|(state, speed)| state.polynomial(davis, speed * per_scale)));
+        forces.polynomials.extend(samples.map(|(state, &speed_mps)| {
+            state.polynomial(davis, wheel::true_speed_mps(speed_mps, scale))
+        }));
     }
 
     /// Modelled measured speed at each bin, each segment starting from zero: the integral of the
@@ -168,9 +146,9 @@ impl GrownModel {
     ) {
         self.act(run, theta, forces);
         let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
-        let (scale, per_scale) = (forces.speed_scale, 1.0 / forces.speed_scale);
+        let scale = forces.speed_scale;
         let acceleration = |i: usize| {
-            let speed_mps = run.smooth_mps[i] * per_scale;
+            let speed_mps = wheel::true_speed_mps(run.smooth_mps[i], scale);
             let [p0, p1, p2] = forces.samples[i].polynomial(davis, speed_mps);
             scale * (p0 + speed_mps * (p1 + speed_mps * p2))
         };
@@ -212,9 +190,10 @@ pub struct GrownForces {
 impl GrownForces {
     /// What the bins of the prediction made last change by for each unit of a (0), b (1) or c (2).
     pub fn davis_slopes(&self, run: &RunData, coefficient: usize, bins: &mut Vec<f64>) {
-        let (scale, per_scale) = (self.speed_scale, 1.0 / self.speed_scale);
+        let scale = self.speed_scale;
         let slope = |i: usize| {
-            scale * self.samples[i].davis_slopes(run.smooth_mps[i] * per_scale)[coefficient]
+            let speed_mps = wheel::true_speed_mps(run.smooth_mps[i], scale);
+            scale * self.samples[i].davis_slopes(speed_mps)[coefficient]
         };
         integrate_bins(run, slope, bins);
     }

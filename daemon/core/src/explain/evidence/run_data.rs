@@ -1,8 +1,11 @@
 //! A run made ready for fitting: resolved, cleaned and binned.
 
-use crate::dataset::{Dataset, PositionSource, Role};
+use dynocar_shared::TrainSample;
+
+use crate::dataset::{Dataset, PositionSource, Role, Run};
 use crate::force::{ForceResolver, ResolvedSample};
 use crate::simulate::{BridgeLimits, Recording, SimulateError};
+use crate::train::TrainModel;
 use crate::validation::{ValidationLimits, Validator};
 
 use super::cleaning;
@@ -106,21 +109,23 @@ impl RunData {
 ///
 /// The first run without usable samples.
 pub fn prepare(dataset: &Dataset) -> Result<Vec<RunData>, RunDataError> {
-    (0..dataset.runs.len()).map(|index| prepare_run(dataset, index)).collect()
+    let train = &dataset.train;
+    let limits = ValidationLimits::for_train(train.mass_kg);
+    let mut validator = Validator::new(crate::dataset::DATASET_TRAIN, train.mass_kg, limits);
+    let mut resolver = ForceResolver::new(train.clone(), dataset.track.clone());
+    let mut resolve =
+        |sample: &TrainSample| validator.check(sample).ok().map(|valid| resolver.resolve(&valid));
+    dataset.runs.iter().map(|run| prepare_run(train, run, &mut resolve)).collect()
 }
 
-fn prepare_run(dataset: &Dataset, index: usize) -> Result<RunData, RunDataError> {
-    let run = &dataset.runs[index];
-    let limits = ValidationLimits::for_train(dataset.train.mass_kg);
-    let mut validator =
-        Validator::new(crate::dataset::DATASET_TRAIN, dataset.train.mass_kg, limits);
-    let mut resolver = ForceResolver::new(dataset.train.clone(), dataset.track.clone());
-    let mut samples = Vec::with_capacity(run.samples.len());
-    for sample in &run.samples {
-        if let Ok(valid) = validator.check(sample) {
-            samples.push(resolver.resolve(&valid));
-        }
-    }
+/// A run whose samples are resolved one after the other, as a daemon takes them.
+fn prepare_run(
+    train: &TrainModel,
+    run: &Run,
+    resolve: &mut dyn FnMut(&TrainSample) -> Option<ResolvedSample>,
+) -> Result<RunData, RunDataError> {
+    let numbered = run.samples.iter().map(|it| TrainSample { run: run.number, ..*it });
+    let mut samples: Vec<ResolvedSample> = numbered.filter_map(|sample| resolve(&sample)).collect();
     let rejected = run.samples.len() - samples.len();
     let replaced = cleaning::clean(&mut samples);
     let first_ns = samples.first().map_or(0, |sample| sample.time_ns);
@@ -129,7 +134,7 @@ fn prepare_run(dataset: &Dataset, index: usize) -> Result<RunData, RunDataError>
     let declared = recording
         .samples()
         .iter()
-        .map(|sample| SampleForces::declared(sample, dataset.train.rotating_mass_factor))
+        .map(|sample| SampleForces::declared(sample, train.rotating_mass_factor))
         .collect();
     let smooth_mps = smoothed(&recording);
     let bins = bins(&recording);

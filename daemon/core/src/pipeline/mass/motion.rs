@@ -133,9 +133,9 @@ mod tests {
 
     #[test]
     fn a_correction_that_takes_resistance_away_is_no_reason_to_refuse_a_sample() {
-        let warm = ResolvedSample { other_n_per_kn: -1.7, ..ResolvedSample::coasting() };
+        let warm = ResolvedSample { extra_n_per_kn: -1.7, ..ResolvedSample::coasting() };
         assert_eq!(Motion::of(&warm).unwrap().known_n_per_kn, -1.7);
-        let absurd = ResolvedSample { other_n_per_kn: -501.0, ..warm };
+        let absurd = ResolvedSample { extra_n_per_kn: -501.0, ..warm };
         assert_eq!(Motion::of(&absurd), Err(RejectionReason::OutOfRange));
     }
 

@@ -3,43 +3,31 @@
 use nalgebra::SVector;
 
 use super::place_memory::PlaceMemory;
-use super::suspects::{Place, SUSPECTS};
+use super::suspects::SUSPECTS;
 use crate::force::ResolvedSample;
 use crate::pipeline::resistance::sample::UnitSample;
+use crate::terms::{SUSPECTS as BANK, Seen};
 use crate::train::Davis;
 
 /// One value for each suspect of the bank.
 pub type Covariates = SVector<f64, SUSPECTS>;
 
-/// Time constant in s with which bearings warm up.
-const WARM_UP_S: f64 = 200.0;
-/// A longer standstill in s cools the bearings and counts as the start of a new run.
-const COLD_AFTER_S: f64 = 900.0;
-/// Temperature in °C for which coefficients are declared.
-const REFERENCE_DEGC: f64 = 15.0;
+/// A longer gap in s between two samples is the start of a new run.
+const RUN_GAP_S: f64 = 900.0;
 
-/// Since when the train has been running.
+/// Tells one run from the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RunClock {
-    start_ns: Option<i64>,
-    last_ns: i64,
+    last_ns: Option<i64>,
 }
 
 impl RunClock {
     /// Takes in the time of a sample; true when a run starts with it: the first sample, a clock
     /// set back, or a long gap.
     pub fn push(&mut self, time_ns: i64) -> bool {
-        let gap_s = time_ns.saturating_sub(self.last_ns) as f64 * 1e-9;
-        self.last_ns = time_ns;
-        let starts = self.start_ns.is_none() || !(0.0..=COLD_AFTER_S).contains(&gap_s);
-        if starts {
-            self.start_ns = Some(time_ns);
-        }
-        starts
-    }
-
-    fn seconds(&self) -> f64 {
-        self.start_ns.map_or(0.0, |start| self.last_ns.saturating_sub(start) as f64 * 1e-9)
+        let last_ns = self.last_ns.replace(time_ns);
+        let gap_s = last_ns.map(|last_ns| time_ns.saturating_sub(last_ns) as f64 * 1e-9);
+        !gap_s.is_some_and(|gap_s| (0.0..=RUN_GAP_S).contains(&gap_s))
     }
 }
 
@@ -48,27 +36,22 @@ pub fn covariates(
     sample: &ResolvedSample,
     unit: &UnitSample,
     declared: &Davis,
-    clock: &RunClock,
     places: &PlaceMemory,
 ) -> Covariates {
-    let speed = sample.speed_mps;
-    let tunnel_share = sample.tunnel_share.unwrap_or(0.0);
-    let w0 = declared.w0_n_per_kn(speed);
-    let air = declared.c * speed * speed;
-    let mut values = Covariates::zeros();
-    let mut set = |place: Place, value: f64| values[place as usize] = value;
-    set(Place::TunnelDrag, tunnel_share * air);
-    set(Place::CurveResistance, 1000.0 * sample.curvature_per_m.unwrap_or(0.0).abs());
-    set(Place::Wind, sample.direction * 2.0 * declared.c * speed * (1.0 - tunnel_share));
-    set(Place::MassChange, unit.traction - unit.brake);
-    set(Place::TractionGain, unit.traction);
-    set(Place::RotatingMass, unit.driving - w0);
-    set(Place::BearingTemperature, declared.a * (-clock.seconds() / WARM_UP_S).exp());
-    let warmer_k = sample.ambient_temperature_degc.map_or(0.0, |degc| degc - REFERENCE_DEGC);
-    set(Place::AmbientTemperature, w0 * 0.1 * warmer_k);
-    set(Place::LocalResistance, sample.position_m.map_or(0.0, |m| places.earlier(m)));
-    set(Place::LowAdhesion, unit.brake);
-    values
+    let seen = Seen {
+        speed_mps: sample.speed_mps,
+        direction: sample.direction,
+        curvature_per_m: sample.curvature_per_m,
+        tunnel_share: sample.tunnel_share,
+        ambient_temperature_degc: sample.ambient_temperature_degc,
+        since_cold_s: sample.since_cold_s,
+        davis: *declared,
+        traction: unit.traction,
+        brake: unit.brake,
+        driving: unit.driving,
+        earlier: sample.position_m.map_or(0.0, |m| places.earlier(m)),
+    };
+    Covariates::from_fn(|place, _| (BANK[place].unit)(&seen))
 }
 
 /// Integrals of the covariates from the mean of one block to that of the next, weighed as the

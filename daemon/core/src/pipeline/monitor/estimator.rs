@@ -11,7 +11,7 @@ use super::place_memory::PlaceMemory;
 use super::pressure::ReleasedPressure;
 use super::rows::{Parameters, Rows};
 use super::settings::MonitorSettings;
-use super::suspects::{BANK, BASE, FIRST_ONSET, ONSETS, Place, SUSPECTS, parameter_of, suspect_of};
+use super::suspects::{BASE, FIRST_ONSET, ONSETS, SUSPECTS, suspect_of};
 use super::verdict::{Evidence, Verdict};
 use crate::force::ResolvedSample;
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
@@ -22,6 +22,7 @@ use crate::pipeline::resistance::regression::{
 use crate::pipeline::resistance::sample::UnitSample;
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
+use crate::terms::SUSPECTS as BANK;
 use crate::train::{Davis, TrainModel};
 
 /// Rows before anything is called estimated.
@@ -220,7 +221,7 @@ impl ResidualMonitor {
         });
         let suspect = self.verdict.named().and_then(|named| named.parameter);
         // Without a suspect the joint solution has a parameter that no row sees.
-        let parameter = suspect.unwrap_or(parameter_of(Place::TunnelDrag));
+        let parameter = suspect.unwrap_or(BASE);
         let prior_std = if suspect.is_some() { suspect_of(parameter).prior_std } else { 1e-6 };
         let Ok((values, covariance)) = self.information.joint(parameter, prior_std) else {
             return self.reset();
@@ -295,7 +296,7 @@ impl Estimator for ResidualMonitor {
             Err(reason) => return Outcome::Rejected(reason),
         };
         let Some(chain_start_ns) = self.blocks.chain_start_ns() else { return Outcome::Used };
-        let values = covariates(sample, &unit, &self.declared, &self.clock, &self.places);
+        let values = covariates(sample, &unit, &self.declared, &self.places);
         self.impulse.push(chain_start_ns, unit.time_ns, &values);
         match closed {
             Some(block) if self.take_block(&block, sample) => Outcome::Updated,

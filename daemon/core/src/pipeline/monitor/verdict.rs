@@ -6,8 +6,9 @@ use super::information::{BaseSolution, Information};
 use super::onsets::Onsets;
 use super::rows::Parameters;
 use super::settings::MonitorSettings;
-use super::suspects::{BASE, FIRST_ONSET, Least, ONSETS, PARAMETERS, SUSPECTS, suspect_of};
+use super::suspects::{BASE, FIRST_ONSET, ONSETS, PARAMETERS, SUSPECTS, suspect_of};
 use crate::pipeline::InnovationMonitor;
+use crate::terms::Least;
 
 /// Blocks that a dragging brake must have dragged.
 const ONSET_AGE_MIN: u32 = 5;

@@ -103,6 +103,7 @@ impl MotionTracker {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::terms::Resistance;
 
     /// A sample of a 100 t train with γ = 0.06 and every force known.
     pub fn sample(index: u32, speed_mps: f64, control_force_n: f64) -> ResolvedSample {
@@ -119,10 +120,10 @@ pub(super) mod tests {
             traction_force_n: Some(control_force_n.max(0.0)),
             brake_force_n: Some((-control_force_n).max(0.0)),
             gradient_permille: Some(0.0),
-            curve_n_per_kn: 0.0,
             curvature_per_m: None,
-            tunnel_n_per_kn: 0.0,
-            other_n_per_kn: 0.0,
+            resistance: Resistance::BASIC,
+            extra_n_per_kn: 0.0,
+            since_cold_s: 0.0,
             tunnel_share: None,
             brake_cylinder_pressure_pa: None,
             ambient_temperature_degc: None,

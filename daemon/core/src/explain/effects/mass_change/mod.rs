@@ -8,17 +8,14 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Effect, Hypothesis, Parameter, Proposal, ReportContext, Reported};
+use super::{Effect, Entry, Hypothesis, Parameter, Proposal, ReportContext, Reported};
 use crate::explain::answer::{MassSection, MassWindow, ParameterValue, Place, RunWindow};
 use crate::explain::evidence::{RunData, SampleForces, SharedHypothesis};
 use crate::explain::places::{Axis, End, Reach};
 use crate::explain::scan::Scan;
+use crate::terms::masses;
 use parts::Part;
 use search::{all_sections, all_windows, everywhere, grow};
-
-const PARAMETER: Parameter = Parameter::new("mass_factor", (0.5, 2.0), 0.005);
-/// A smaller change of mass is not worth a word.
-const MATERIAL: f64 = 0.012;
 
 /// The kind.
 pub struct MassChange;
@@ -34,7 +31,12 @@ struct Masses {
 
 impl Masses {
     fn new(part: Part, edges: Vec<f64>, choice_cost: f64) -> Self {
-        Masses { parts: vec![part], edges: vec![edges], parameters: vec![PARAMETER], choice_cost }
+        Masses {
+            parts: vec![part],
+            edges: vec![edges],
+            parameters: vec![masses::PARAMETER],
+            choice_cost,
+        }
     }
 }
 
@@ -73,7 +75,7 @@ impl Hypothesis for Masses {
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
-        parameters.iter().any(|factor| (factor - 1.0).abs() > MATERIAL)
+        parameters.iter().any(|factor| (factor - 1.0).abs() > masses::LEAST_SHARE)
     }
 
     fn touches(&self, parameter: usize, run: &RunData) -> bool {
@@ -91,6 +93,16 @@ impl Hypothesis for Masses {
                 }
             }
         }
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        let mut rows = Vec::new();
+        for (part, &factor) in self.parts.iter().zip(parameters) {
+            let Part::Section { from_m, to_m, direction } = *part else { return None };
+            let towards = direction.map_or(vec![1.0, -1.0], |direction| vec![direction]);
+            rows.extend(towards.into_iter().map(|towards| vec![from_m, to_m, towards, factor]));
+        }
+        Some(vec![Entry::Rows(masses::LIST, rows)])
     }
 
     fn ends(&self) -> Vec<End> {

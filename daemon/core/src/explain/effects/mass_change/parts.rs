@@ -3,6 +3,7 @@
 use crate::explain::evidence::RunData;
 use crate::explain::places::span_m;
 use crate::explain::scan::Scan;
+use crate::track::MassSection;
 
 /// Standing for less than this in s lets nobody on or off.
 pub const STOP_MIN_S: f64 = 8.0;
@@ -32,8 +33,10 @@ impl Part {
         match self {
             Part::Section { from_m, to_m, direction } => {
                 let sample = &run.samples()[index];
-                direction.is_none_or(|direction| sample.direction == direction)
-                    && sample.position_m.is_some_and(|at| (*from_m..*to_m).contains(&at))
+                let (from_m, to_m) = (*from_m, *to_m);
+                let direction = direction.unwrap_or(sample.direction);
+                let section = MassSection { from_m, to_m, direction, mass_factor: 1.0 };
+                sample.position_m.is_some_and(|at_m| section.holds(at_m, sample.direction))
             }
             Part::Window { run: file, from_s, to_s, .. } => {
                 *file == run.file && (*from_s..=*to_s).contains(&run.recording.time_s()[index])

@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
+use super::Masses;
 use super::parts::{Part, STATION_M, STOP_MIN_S, stations, stops};
-use super::{MATERIAL, Masses, PARAMETER};
 use crate::explain::effects::Candidate;
 use crate::explain::evidence::RunData;
 use crate::explain::places::span_m;
 use crate::explain::scan::{Scan, Tuple};
+use crate::terms::masses::{LEAST_SHARE, PARAMETER};
 
 /// Sections or windows at most.
 const PARTS_MAX: usize = 5;
@@ -105,7 +106,7 @@ pub fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Option<Candidate> {
                 let (gain, estimate) = scan.gain(&tuple);
                 (gain, estimate, part)
             })
-            .filter(|(_, estimate, _)| estimate.abs() > MATERIAL)
+            .filter(|(_, estimate, _)| estimate.abs() > LEAST_SHARE)
             .max_by(|one, other| one.0.total_cmp(&other.0))
     };
     let (_, estimate, part) = best(scan, &mut parts.iter().cloned())?;
@@ -131,7 +132,7 @@ pub fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Option<Candidate> {
         });
         match best(&next, &mut fresh) {
             Some((gain, estimate, part))
-                if gain > part_cost + GAIN_MIN && estimate.abs() > MATERIAL =>
+                if gain > part_cost + GAIN_MIN && estimate.abs() > LEAST_SHARE =>
             {
                 masses.edges.push(edges(&part));
                 masses.parts.push(part);

@@ -191,7 +191,7 @@ impl Hypothesis for Band {
                 }
                 Covariate::TractionForce => force.traction_n *= 1.0 + parameters[0],
                 Covariate::BrakeForce => force.brake_n *= 1.0 + parameters[0],
-                _ => force.extra_n_per_kn += parameters[0],
+                _ => force.resistance.other_n_per_kn += parameters[0],
             }
         }
     }

@@ -1,18 +1,44 @@
 //! Forces that act later than they are reported: a dead time, then a first-order lag.
 
-use super::ResolvedSample;
+use super::{Joined, Key, Parameter};
+
+/// Dead time in s.
+pub const DELAY: Key = Key {
+    table: "corrections",
+    name: "actuator_delay_s",
+    range: [0.0, 6.0],
+    allowed: "from 0 to 6 s",
+    joined: Joined::Added,
+    of: |train| &mut train.corrections.actuator_delay_s,
+};
+/// Time constant in s of the lag.
+pub const LAG: Key = Key {
+    table: "corrections",
+    name: "actuator_lag_s",
+    range: [0.0, 10.0],
+    allowed: "from 0 to 10 s",
+    joined: Joined::Added,
+    of: |train| &mut train.corrections.actuator_lag_s,
+};
+/// Delay and lag.
+pub const PARAMETERS: [Parameter; 2] = [
+    Parameter::new("delay_s", (0.0, DELAY.range[1]), 0.05),
+    Parameter::new("lag_s", (0.0, 8.0), 0.05),
+];
+/// A shorter delay and lag together in s are within a cycle of most controllers.
+pub const LEAST_S: f64 = 0.15;
 
 /// Samples kept: six seconds of the fastest controllers.
 const CAPACITY: usize = 2048;
 /// A shorter lag in s is none.
 const LAG_MIN_S: f64 = 1e-3;
 
-/// Forces (traction, brake) in N.
-type Forces = [f64; 2];
+/// Traction and brake force in N.
+pub type Forces = [f64; 2];
 
 /// The forces of the last seconds, and what of them acts now.
 #[derive(Clone, Debug)]
-pub(super) struct DelayLine {
+pub struct DelayLine {
     delay_s: f64,
     lag_s: f64,
     /// Times in s and forces, a ring.
@@ -26,7 +52,8 @@ pub(super) struct DelayLine {
 }
 
 impl DelayLine {
-    pub(super) fn new(delay_s: f64, lag_s: f64) -> Self {
+    /// A line of a dead time and a lag in s, without forces.
+    pub fn new(delay_s: f64, lag_s: f64) -> Self {
         DelayLine {
             delay_s,
             lag_s,
@@ -39,21 +66,23 @@ impl DelayLine {
         }
     }
 
-    /// Replaces the reported forces of a sample by those that act; unknown forces stay unknown.
-    pub(super) fn pass(&mut self, sample: &mut ResolvedSample) {
-        if self.count == 0 || sample.stretch != self.stretch {
+    /// The forces that act at a time in ns behind those that are reported then; `None` while they
+    /// are not. A new stretch of motion forgets what was before it.
+    pub fn acting(
+        &mut self,
+        (time_ns, stretch): (i64, u32),
+        reported: Option<Forces>,
+    ) -> Option<Forces> {
+        if self.count == 0 || stretch != self.stretch {
             (self.count, self.next, self.last) = (0, 0, None);
-            (self.stretch, self.origin_ns) = (sample.stretch, sample.time_ns);
+            (self.stretch, self.origin_ns) = (stretch, time_ns);
         }
-        let (Some(traction), Some(brake)) = (sample.traction_force_n, sample.brake_force_n) else {
-            return;
-        };
-        let time_s = sample.time_ns.saturating_sub(self.origin_ns) as f64 * 1e-9;
-        self.past[self.next] = (time_s, [traction, brake]);
+        let reported = reported?;
+        let time_s = time_ns.saturating_sub(self.origin_ns) as f64 * 1e-9;
+        self.past[self.next] = (time_s, reported);
         self.next = (self.next + 1) % CAPACITY;
         self.count = (self.count + 1).min(CAPACITY);
-        let acting = self.lagged(time_s, self.at(time_s - self.delay_s));
-        (sample.traction_force_n, sample.brake_force_n) = (Some(acting[0]), Some(acting[1]));
+        Some(self.lagged(time_s, self.at(time_s - self.delay_s)))
     }
 
     /// The reported forces at a time, linear between samples, the oldest before all of them.
@@ -100,19 +129,12 @@ impl DelayLine {
 
 #[cfg(test)]
 mod tests {
-    use super::super::ResolvedSample;
     use super::*;
 
     const STEP_S: f64 = 0.1;
 
-    fn sample(time_s: f64, stretch: u32, forces: Option<Forces>) -> ResolvedSample {
-        ResolvedSample {
-            time_ns: 5_000_000_000 + (time_s * 1e9).round() as i64,
-            stretch,
-            traction_force_n: forces.map(|forces| forces[0]),
-            brake_force_n: forces.map(|forces| forces[1]),
-            ..ResolvedSample::coasting()
-        }
+    fn at(time_s: f64, stretch: u32) -> (i64, u32) {
+        (5_000_000_000 + (time_s * 1e9).round() as i64, stretch)
     }
 
     /// Forces that act at the times of a recording with reported traction and brake forces.
@@ -124,9 +146,7 @@ mod tests {
         (0..count)
             .map(|k| {
                 let time_s = k as f64 * STEP_S;
-                let mut sample = sample(time_s, 1, Some(reported(time_s)));
-                line.pass(&mut sample);
-                (time_s, [sample.traction_force_n.unwrap(), sample.brake_force_n.unwrap()])
+                (time_s, line.acting(at(time_s, 1), Some(reported(time_s))).unwrap())
             })
             .collect()
     }
@@ -170,20 +190,15 @@ mod tests {
     fn a_new_stretch_forgets_the_forces_before_it() {
         let mut line = DelayLine::new(1.0, 0.5);
         acting(&mut line, |_| [9000.0, 0.0], 50);
-        let mut first = sample(60.0, 2, Some([100.0, 20.0]));
-        line.pass(&mut first);
-        assert_eq!((first.traction_force_n, first.brake_force_n), (Some(100.0), Some(20.0)));
+        assert_eq!(line.acting(at(60.0, 2), Some([100.0, 20.0])), Some([100.0, 20.0]));
     }
 
     #[test]
     fn unknown_forces_stay_unknown_and_the_known_ones_bridge_them() {
         let mut line = DelayLine::new(0.2, 0.0);
         for k in 0..10 {
-            let is_known = k != 4;
-            let mut sample = sample(f64::from(k) * STEP_S, 1, is_known.then_some([7.0, 1.0]));
-            line.pass(&mut sample);
-            assert_eq!(sample.traction_force_n, is_known.then_some(7.0), "{k}");
-            assert_eq!(sample.brake_force_n, is_known.then_some(1.0), "{k}");
+            let known = (k != 4).then_some([7.0, 1.0]);
+            assert_eq!(line.acting(at(f64::from(k) * STEP_S, 1), known), known, "{k}");
         }
     }
 }

@@ -1,0 +1,29 @@
+//! A brake force that the rail does not carry: achieved = min(reported, mu · weight), or a share
+//! of the reported one. It belongs to certain runs and is declared nowhere.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Least, Parameter, Suspect};
+
+/// The cap mu.
+pub const CAP: [Parameter; 1] = [Parameter::new("adhesion", (0.005, 0.5), 0.0005)];
+/// The share.
+pub const RATIO: [Parameter; 1] = [Parameter::new("achieved_ratio", (0.05, 1.0), 0.005)];
+/// A brake that achieves more of its force is as good as declared.
+pub const RATIO_LEAST: f64 = 0.97;
+
+/// The brake force in N that the rail carries.
+#[inline]
+pub fn carried_n(brake_n: f64, adhesion: f64, weight_n: f64) -> f64 {
+    brake_n.min(adhesion * weight_n)
+}
+
+/// Unit: the share of the brake force that is missing.
+pub const SUSPECT: Suspect = Suspect {
+    effect: EffectKind::LowAdhesion,
+    prior_std: 0.2,
+    is_positive: true,
+    least: Least::Size(0.04),
+    changes_at_stops: true,
+    unit: |seen| seen.brake,
+};

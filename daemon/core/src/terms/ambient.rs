@@ -1,0 +1,64 @@
+//! Basic resistance that follows the outside temperature: w0 (1 + beta (T - reference)).
+//!
+//! A sample without temperature has that of the last one that had; before the first nothing is
+//! corrected.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use crate::train::Corrections;
+
+use super::{Joined, Key, Least, Parameter, Resistance, Suspect};
+
+/// 0 °C in K.
+const ZERO_DEGC_K: f64 = 273.15;
+/// The standard atmosphere's 15 °C in K, for which coefficients are declared.
+pub const REFERENCE_K: f64 = Corrections::NONE.ambient_reference_k;
+
+/// Relative change of the basic resistance per kelvin.
+pub const W0_PER_K: Key = Key {
+    table: "corrections",
+    name: "ambient_w0_per_k",
+    range: [-0.1, 0.1],
+    allowed: "from -0.1 to 0.1 per kelvin",
+    joined: Joined::Added,
+    of: |train| &mut train.corrections.ambient_w0_per_k,
+};
+/// Temperature in K at which the basic resistance holds.
+pub const REFERENCE: Key = Key {
+    table: "corrections",
+    name: "ambient_reference_k",
+    range: [200.0, 350.0],
+    allowed: "from 200 to 350 K",
+    joined: Joined::Replaced,
+    of: |train| &mut train.corrections.ambient_reference_k,
+};
+/// Air density alone gives -0.0035 per kelvin; grease makes it more.
+pub const PARAMETERS: [Parameter; 1] = [Parameter::new("w0_per_k", (-0.05, 0.05), 0.0005)];
+/// A smaller change per kelvin does not matter over the temperatures of a year.
+pub const LEAST_PER_K: f64 = 0.001;
+
+/// How much warmer than a reference in K it is outside, in K.
+#[inline]
+pub fn warmer_k(degc: Option<f64>, reference_k: f64) -> f64 {
+    degc.map_or(0.0, |degc| degc + ZERO_DEGC_K - reference_k)
+}
+
+/// The basic resistance changes with the temperature.
+#[inline]
+pub fn act(w0_per_k: f64, reference_k: f64, degc: Option<f64>, resistance: &mut Resistance) {
+    resistance.factor *= 1.0 + w0_per_k * warmer_k(degc, reference_k);
+}
+
+/// Unit: the share of w0 added for 10 K more.
+pub const SUSPECT: Suspect = Suspect {
+    effect: EffectKind::AmbientTemperature,
+    prior_std: 0.1,
+    is_positive: false,
+    least: Least::Share(0.7),
+    changes_at_stops: false,
+    unit: |seen| {
+        let mut warm = Resistance::BASIC;
+        act(0.1, REFERENCE_K, seen.ambient_temperature_degc, &mut warm);
+        warm.extra_n_per_kn(seen.davis, seen.speed_mps)
+    },
+};

@@ -1,0 +1,95 @@
+//! Cold bearings that warm up: a is larger by delta exp(-t / tau), t from when they were cold.
+//!
+//! They are cold at the first sample, after a gap of half an hour, and where a clock that was set
+//! back leaves unknown how long the train stood. A new trip soon after the last finds them warm.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Joined, Key, Least, Parameter, Resistance, Suspect};
+
+/// What is added to a at a cold start, in N/kN.
+pub const DELTA_A: Key = Key {
+    table: "corrections",
+    name: "bearing_delta_a_n_per_kn",
+    range: [0.0, 50.0],
+    allowed: "from 0 to 50 N/kN",
+    joined: Joined::Added,
+    of: |train| &mut train.corrections.bearing_delta_a_n_per_kn,
+};
+/// Time constant in s with which they warm up.
+pub const TAU: Key = Key {
+    table: "corrections",
+    name: "bearing_tau_s",
+    range: [1.0, 1e5],
+    allowed: "from 1 to 100000 s",
+    joined: Joined::Replaced,
+    of: |train| &mut train.corrections.bearing_tau_s,
+};
+/// Delta and tau.
+pub const PARAMETERS: [Parameter; 2] = [
+    Parameter::new("delta_a_n_per_kn", (0.0, 20.0), 0.02),
+    Parameter::new("tau_s", (40.0, 3000.0), 5.0),
+];
+/// Time constant in s that is assumed before any is known.
+pub const TYPICAL_TAU_S: f64 = 200.0;
+/// Bearings are cold again after a gap of so many s between two samples.
+pub const COLD_AGAIN_S: f64 = 1800.0;
+
+/// Since when the bearings have been warming up.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WarmUp {
+    /// When they were cold, and the newest sample, in ns.
+    from_and_last_ns: Option<(i64, i64)>,
+}
+
+impl WarmUp {
+    /// Time in s since the bearings were cold, at a sample.
+    pub fn since_cold_s(&mut self, time_ns: i64) -> f64 {
+        let seconds = |from_ns: i64| time_ns.saturating_sub(from_ns) as f64 * 1e-9;
+        let from_ns = match self.from_and_last_ns {
+            Some((from_ns, last_ns)) if (0.0..COLD_AGAIN_S).contains(&seconds(last_ns)) => from_ns,
+            _ => time_ns,
+        };
+        self.from_and_last_ns = Some((from_ns, time_ns));
+        seconds(from_ns)
+    }
+}
+
+/// Bearings that were cold so many s ago resist.
+#[inline]
+pub fn act(delta_a_n_per_kn: f64, tau_s: f64, since_cold_s: f64, resistance: &mut Resistance) {
+    resistance.bearing_n_per_kn += delta_a_n_per_kn * (-since_cold_s / tau_s).exp();
+}
+
+/// Unit: the declared a, added at a cold start.
+pub const SUSPECT: Suspect = Suspect {
+    effect: EffectKind::BearingTemperature,
+    prior_std: 1.0,
+    is_positive: true,
+    least: Least::Share(1.0),
+    changes_at_stops: false,
+    unit: |seen| {
+        let mut cold = Resistance::BASIC;
+        act(seen.davis.a, TYPICAL_TAU_S, seen.since_cold_s, &mut cold);
+        cold.bearing_n_per_kn
+    },
+};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const S: i64 = 1_000_000_000;
+
+    #[test]
+    fn bearings_are_cold_first_after_a_long_gap_and_after_a_clock_set_back_and_warm_after_a_trip() {
+        let mut warm_up = WarmUp::default();
+        assert_eq!(warm_up.since_cold_s(7 * S), 0.0);
+        assert_eq!(warm_up.since_cold_s(407 * S), 400.0);
+        assert_eq!(warm_up.since_cold_s(2000 * S), 1993.0, "the next trip");
+        assert_eq!(warm_up.since_cold_s(3800 * S), 0.0);
+        assert_eq!(warm_up.since_cold_s(3900 * S), 100.0);
+        assert_eq!(warm_up.since_cold_s(10 * S), 0.0);
+        assert_eq!(warm_up.since_cold_s(30 * S), 20.0);
+    }
+}

@@ -1,0 +1,27 @@
+//! A brake that does not release: a force that builds up from some instant on. It belongs to
+//! certain runs and is declared nowhere.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Least, Parameter, Suspect};
+
+/// The force builds up over this time in s.
+pub const BUILD_UP_S: f64 = 10.0;
+/// The force.
+pub const PARAMETERS: [Parameter; 1] = [Parameter::new("force_n", (0.0, 3e5), 20.0)];
+
+/// Share of the force so many s after the onset.
+#[inline]
+pub fn build_up(since_s: f64) -> f64 {
+    (since_s / BUILD_UP_S).clamp(0.0, 1.0)
+}
+
+/// Unit: 1 N/kN.
+pub const SUSPECT: Suspect = Suspect {
+    effect: EffectKind::DraggingBrake,
+    prior_std: 1.5,
+    is_positive: true,
+    least: Least::Share(1.0),
+    changes_at_stops: false,
+    unit: |_| 1.0,
+};

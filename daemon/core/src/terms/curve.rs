@@ -1,0 +1,39 @@
+//! Curve resistance k/R (Röckl, Schmidt).
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Joined, Key, Least, Parameter, Resistance, Suspect};
+
+/// k in N/kN m; R in m.
+pub const CONSTANT: Key = Key {
+    table: "resistance",
+    name: "curve_constant_n_per_kn_m",
+    range: [0.0, 5000.0],
+    allowed: "from 0 to 5000",
+    joined: Joined::Replaced,
+    of: |train| &mut train.curve_constant_n_per_kn_m,
+};
+/// Total k is between none and about eight times the usual.
+pub const PARAMETERS: [Parameter; 1] = [Parameter::new("k_n_per_kn_m", (0.0, 5000.0), 20.0)];
+/// A k that differs by less from the declared one is within what formulas differ by.
+pub const LEAST_N_PER_KN_M: f64 = 100.0;
+
+/// Curves of a mean 1/R along the train resist.
+#[inline]
+pub fn act(k_n_per_kn_m: f64, curvature_per_m: Option<f64>, resistance: &mut Resistance) {
+    resistance.curve_n_per_kn = k_n_per_kn_m * curvature_per_m.unwrap_or(0.0);
+}
+
+/// Unit: 1000 N/kN m of k.
+pub const SUSPECT: Suspect = Suspect {
+    effect: EffectKind::CurveResistance,
+    prior_std: 0.7,
+    is_positive: false,
+    least: Least::Share(1.0),
+    changes_at_stops: false,
+    unit: |seen| {
+        let mut curves = Resistance::BASIC;
+        act(1000.0, seen.curvature_per_m, &mut curves);
+        curves.curve_n_per_kn
+    },
+};

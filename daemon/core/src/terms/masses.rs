@@ -1,0 +1,23 @@
+//! Another mass than declared, between certain stops or for some time: everything that goes with
+//! the weight grows alike, traction and brake do not.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Least, Parameter, Suspect};
+
+/// The list of `[track]` that holds [from in m, to in m, direction, factor].
+pub const LIST: &str = "masses";
+/// True over declared mass.
+pub const PARAMETER: Parameter = Parameter::new("mass_factor", (0.5, 2.0), 0.005);
+/// A smaller share of the mass is not worth a word.
+pub const LEAST_SHARE: f64 = 0.012;
+
+/// Unit: the share of the mass that is added.
+pub const SUSPECT: Suspect = Suspect {
+    effect: EffectKind::MassChange,
+    prior_std: 0.1,
+    is_positive: false,
+    least: Least::Size(0.025),
+    changes_at_stops: true,
+    unit: |seen| seen.traction - seen.brake,
+};

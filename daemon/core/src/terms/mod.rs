@@ -1,0 +1,94 @@
+//! The physical terms of the model: one file holds one law with its numbers.
+//!
+//! A term says what its numbers do to the forces at a sample, where they stand in `train.toml` or
+//! `track.toml`, within which bounds they make sense, how large they must be to count, and what
+//! one unit of it does where the monitor looks for it. The daemon's forces, `explain`, the
+//! monitor, the simulator and the writer of the grown model all take the law from here, so that
+//! what was found is what is then applied, to the bit.
+
+pub mod adhesion;
+pub mod ambient;
+pub mod bearings;
+pub mod brake;
+pub mod curve;
+pub mod delay;
+pub mod gradient;
+mod key;
+pub mod masses;
+pub mod place;
+mod resistance;
+pub mod rotating;
+mod suspect;
+pub mod traction;
+pub mod tunnel;
+pub mod wheel;
+pub mod wind;
+
+pub use key::{Entry, Joined, Key};
+pub use resistance::Resistance;
+pub use suspect::{Least, Seen, Suspect};
+
+/// Every number of a term that stands in `[corrections]` of `train.toml`.
+pub const CORRECTIONS: [&Key; 11] = [
+    &wheel::SPEED_SCALE,
+    &traction::GAIN,
+    &delay::DELAY,
+    &delay::LAG,
+    &tunnel::C_FACTOR,
+    &tunnel::DC,
+    &wind::WIND_PLUS,
+    &bearings::DELTA_A,
+    &bearings::TAU,
+    &ambient::W0_PER_K,
+    &ambient::REFERENCE,
+];
+
+/// What the monitor looks for, one column of its regression each.
+pub const SUSPECTS: [Suspect; 10] = [
+    tunnel::SUSPECT,
+    curve::SUSPECT,
+    wind::SUSPECT,
+    masses::SUSPECT,
+    traction::SUSPECT,
+    rotating::SUSPECT,
+    bearings::SUSPECT,
+    ambient::SUSPECT,
+    place::SUSPECT,
+    adhesion::SUSPECT,
+];
+
+/// A parameter of a term, as a fit knows it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Its name in the answer.
+    pub name: &'static str,
+    /// Least value.
+    pub lower: f64,
+    /// Greatest value.
+    pub upper: f64,
+    /// Step for finite differences.
+    pub step: f64,
+}
+
+impl Parameter {
+    /// A parameter with its bounds.
+    pub const fn new(name: &'static str, (lower, upper): (f64, f64), step: f64) -> Self {
+        Parameter { name, lower, upper, step }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_two_terms_claim_a_key_or_a_suspicion() {
+        for (k, key) in CORRECTIONS.iter().enumerate() {
+            assert!(!CORRECTIONS[..k].contains(key), "{}", key.name);
+            assert_eq!(key.table, "corrections", "{}", key.name);
+        }
+        for (k, suspect) in SUSPECTS.iter().enumerate() {
+            assert!(SUSPECTS[..k].iter().all(|other| other.effect != suspect.effect));
+        }
+    }
+}

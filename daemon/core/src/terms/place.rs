@@ -1,0 +1,38 @@
+//! Further resistance at places, on the part of the train there.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Least, Parameter, Resistance, Suspect};
+use crate::track::{StepProfile, TrackError, interval_profile};
+
+/// The list of `[track]` that holds [start in m, end in m, extra in N/kN].
+pub const LIST: &str = "resistance";
+/// A snow drift or a tight superelevation; a hundred N/kN is a steep hill.
+pub const PARAMETERS: [Parameter; 1] = [Parameter::new("extra_n_per_kn", (0.0, 100.0), 0.02)];
+
+/// The resistance of some disjoint intervals in m along the line.
+///
+/// # Errors
+///
+/// When intervals overlap, are reversed or not finite.
+pub fn profile(intervals_m: &[[f64; 2]], extra_n_per_kn: f64) -> Result<StepProfile, TrackError> {
+    let places: Vec<(f64, f64, f64)> =
+        intervals_m.iter().map(|&[from_m, to_m]| (from_m, to_m, extra_n_per_kn)).collect();
+    interval_profile(LIST, &places)
+}
+
+/// A place resists.
+#[inline]
+pub fn act(extra_n_per_kn: f64, resistance: &mut Resistance) {
+    resistance.place_n_per_kn += extra_n_per_kn;
+}
+
+/// Unit: the force that was found at the same place in earlier passes.
+pub const SUSPECT: Suspect = Suspect {
+    effect: EffectKind::LocalResistance,
+    prior_std: 1.0,
+    is_positive: true,
+    least: Least::Share(1.0),
+    changes_at_stops: false,
+    unit: |seen| seen.earlier,
+};

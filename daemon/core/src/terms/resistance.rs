@@ -1,0 +1,149 @@
+//! Every resistance at one sample, put together from its terms.
+
+use crate::train::Davis;
+
+/// What resists at one sample, but for the Davis coefficients: each term writes its own part.
+///
+/// ```text
+/// w(v) = factor (a + b v + c v²) + c (c_share v² + outside ((v + u)|v + u| - v²)) + dc v²
+///        + curve + tunnel + place + bearing
+/// ```
+///
+/// in N/kN, with the headwind u on the part of the train outside tunnels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Resistance {
+    /// Of curves, in N/kN.
+    pub curve_n_per_kn: f64,
+    /// Of tunnels by their length, in N/kN.
+    pub tunnel_n_per_kn: f64,
+    /// Of places, in N/kN.
+    pub place_n_per_kn: f64,
+    /// Of cold bearings, in N/kN.
+    pub bearing_n_per_kn: f64,
+    /// Of everything in no library, in N/kN.
+    pub other_n_per_kn: f64,
+    /// Factor on the basic resistance.
+    pub factor: f64,
+    /// What tunnels add to c, as share of it.
+    pub c_share: f64,
+    /// What tunnels add to c, in N/kN per (m/s)².
+    pub dc: f64,
+    /// Headwind in m/s.
+    pub headwind_mps: f64,
+    /// Share of the train that feels it.
+    pub outside: f64,
+}
+
+impl Resistance {
+    /// The basic resistance alone.
+    pub const BASIC: Resistance = Resistance {
+        curve_n_per_kn: 0.0,
+        tunnel_n_per_kn: 0.0,
+        place_n_per_kn: 0.0,
+        bearing_n_per_kn: 0.0,
+        other_n_per_kn: 0.0,
+        factor: 1.0,
+        c_share: 0.0,
+        dc: 0.0,
+        headwind_mps: 0.0,
+        outside: 1.0,
+    };
+
+    /// What does not depend on speed, in N/kN.
+    #[inline]
+    fn constant_n_per_kn(&self) -> f64 {
+        self.curve_n_per_kn
+            + self.tunnel_n_per_kn
+            + self.place_n_per_kn
+            + self.bearing_n_per_kn
+            + self.other_n_per_kn
+    }
+
+    /// Sign of the air resistance c (v + u) |v + u|.
+    #[inline]
+    fn air_sign(&self, speed_mps: f64) -> f64 {
+        if speed_mps + self.headwind_mps < 0.0 { -1.0 } else { 1.0 }
+    }
+
+    /// Everything but the basic resistance of these coefficients, in N/kN.
+    #[inline]
+    pub fn extra_n_per_kn(&self, davis: Davis, speed_mps: f64) -> f64 {
+        let square = speed_mps * speed_mps;
+        let ahead_mps = speed_mps + self.headwind_mps;
+        self.constant_n_per_kn()
+            + self.c_share * davis.c * square
+            + self.dc * square
+            + self.outside * davis.c * (ahead_mps * ahead_mps.abs() - square)
+            + (self.factor - 1.0) * davis.w0_n_per_kn(speed_mps)
+    }
+
+    /// All resistance in N/kN as p0 + p1 v + p2 v², for speeds near `near_mps`: the sign of the
+    /// air resistance is taken there.
+    #[inline]
+    pub fn polynomial(&self, davis: Davis, near_mps: f64) -> [f64; 3] {
+        let (factor, wind) = (self.factor, self.headwind_mps);
+        let sign = self.air_sign(near_mps);
+        let blown = self.outside * sign * davis.c;
+        [
+            self.constant_n_per_kn() + factor * davis.a + blown * wind * wind,
+            factor * davis.b + 2.0 * blown * wind,
+            self.dc + davis.c * (factor + self.c_share + self.outside * (sign - 1.0)),
+        ]
+    }
+
+    /// What the resistance in N/kN changes by for each unit of a, b and c.
+    #[inline]
+    pub fn davis_slopes(&self, speed_mps: f64) -> [f64; 3] {
+        let square = speed_mps * speed_mps;
+        let ahead_mps = speed_mps + self.headwind_mps;
+        let blown = self.outside * (ahead_mps * ahead_mps.abs() - square);
+        let factor = self.factor;
+        [factor, factor * speed_mps, (factor + self.c_share) * square + blown]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DAVIS: Davis = Davis { a: 1.7, b: 0.03, c: 0.0011 };
+
+    fn everything() -> Resistance {
+        Resistance {
+            curve_n_per_kn: 0.7,
+            tunnel_n_per_kn: 0.2,
+            place_n_per_kn: 0.4,
+            bearing_n_per_kn: 0.3,
+            other_n_per_kn: -0.1,
+            factor: 1.08,
+            c_share: 0.4,
+            dc: 2e-4,
+            headwind_mps: -6.0,
+            outside: 0.7,
+        }
+    }
+
+    #[test]
+    fn polynomial_slopes_and_sum_are_the_same_law() {
+        let all = everything();
+        for speed_mps in [0.0, 3.0, 9.0, 31.0] {
+            let [p0, p1, p2] = all.polynomial(DAVIS, speed_mps);
+            let by_polynomial = p0 + speed_mps * (p1 + speed_mps * p2);
+            let w0 = DAVIS.w0_n_per_kn(speed_mps);
+            let by_sum = w0 + all.extra_n_per_kn(DAVIS, speed_mps);
+            assert!((by_polynomial - by_sum).abs() < 1e-12, "{speed_mps}");
+            let [a, b, c] = all.davis_slopes(speed_mps);
+            let constant = Resistance { dc: 0.0, ..all }.constant_n_per_kn();
+            let by_slopes =
+                a * DAVIS.a + b * DAVIS.b + c * DAVIS.c + constant + all.dc * speed_mps * speed_mps;
+            assert!((by_slopes - by_sum).abs() < 1e-12, "{speed_mps}");
+        }
+    }
+
+    #[test]
+    fn a_tail_wind_faster_than_the_train_pushes() {
+        let behind = Resistance { headwind_mps: -8.0, ..Resistance::BASIC };
+        let expected = DAVIS.c * (-(2.0 - 8.0_f64).powi(2) - 4.0);
+        assert!((behind.extra_n_per_kn(DAVIS, 2.0) - expected).abs() < 1e-15);
+    }
+}

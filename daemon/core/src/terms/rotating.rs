@@ -1,0 +1,35 @@
+//! Rotating parts: inertial mass = mass (1 + gamma). Unlike the mass they feel no gradient.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Joined, Key, Least, Parameter, Suspect};
+
+/// gamma.
+pub const FACTOR: Key = Key {
+    table: "train",
+    name: "rotating_mass_factor",
+    range: [0.0, 1.0],
+    allowed: "a rotating-mass factor from 0 to 1",
+    joined: Joined::Replaced,
+    of: |train| &mut train.rotating_mass_factor,
+};
+/// Locomotives with small loads reach 0.25 to 0.3.
+pub const PARAMETERS: [Parameter; 1] = [Parameter::new("rotating_mass_factor", (0.0, 0.5), 0.005)];
+/// What a load makes of the factor is more.
+pub const LEAST: f64 = 0.01;
+
+/// Inertial mass in kg.
+#[inline]
+pub fn inertial_mass_kg(mass_kg: f64, factor: f64) -> f64 {
+    mass_kg * (1.0 + factor)
+}
+
+/// Unit: what is added to gamma.
+pub const SUSPECT: Suspect = Suspect {
+    effect: EffectKind::RotatingMass,
+    prior_std: 0.05,
+    is_positive: false,
+    least: Least::Size(0.02),
+    changes_at_stops: false,
+    unit: |seen| seen.driving - seen.davis.w0_n_per_kn(seen.speed_mps),
+};

@@ -1,0 +1,58 @@
+//! How a term is looked for while the train runs.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use crate::train::Davis;
+
+/// How large an effect must be to be worth naming.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Least {
+    /// Its parameter itself.
+    Size(f64),
+    /// Its force where it acts, as so many times the monitor's share of the resistance there.
+    Share(f64),
+}
+
+/// What is seen at a sample, forces in N/kN.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// Speed in m/s.
+    pub speed_mps: f64,
+    /// +1 while the chainage grows, -1 while it falls.
+    pub direction: f64,
+    /// Mean of 1/R along the train in 1/m, where curves are known.
+    pub curvature_per_m: Option<f64>,
+    /// Share of the train inside tunnels, where these are known.
+    pub tunnel_share: Option<f64>,
+    /// Outside temperature in °C.
+    pub ambient_temperature_degc: Option<f64>,
+    /// Time in s since the bearings were cold.
+    pub since_cold_s: f64,
+    /// The declared Davis coefficients.
+    pub davis: Davis,
+    /// Traction.
+    pub traction: f64,
+    /// Brake, retarding.
+    pub brake: f64,
+    /// Traction minus brake minus all that is known to retard.
+    pub driving: f64,
+    /// The force found at the same place in earlier passes.
+    pub earlier: f64,
+}
+
+/// One effect that is looked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Suspect {
+    /// The effect.
+    pub effect: EffectKind,
+    /// Standard deviation of its parameter before the data.
+    pub prior_std: f64,
+    /// True when only positive parameters make sense.
+    pub is_positive: bool,
+    /// The least size worth naming.
+    pub least: Least,
+    /// True when it may be another after each stop.
+    pub changes_at_stops: bool,
+    /// The retarding force in N/kN of one unit.
+    pub unit: fn(&Seen) -> f64,
+}

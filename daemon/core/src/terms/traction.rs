@@ -1,0 +1,35 @@
+//! A reported traction force that is not the true one: gain = reported over true.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Joined, Key, Least, Parameter, Suspect};
+
+/// Reported over true traction force.
+pub const GAIN: Key = Key {
+    table: "corrections",
+    name: "traction_gain",
+    range: [0.5, 2.0],
+    allowed: "from 0.5 to 2",
+    joined: Joined::Multiplied,
+    of: |train| &mut train.corrections.traction_gain,
+};
+/// Beyond these a controller reports something else.
+pub const PARAMETERS: [Parameter; 1] = [Parameter::new("gain", (0.6, 1.6), 0.005)];
+/// Force sensors are good to this.
+pub const LEAST: f64 = 0.01;
+
+/// The true force in N behind a reported one.
+#[inline]
+pub fn true_force_n(reported_n: f64, gain: f64) -> f64 {
+    reported_n / gain
+}
+
+/// Unit: the share of the traction force that is missing.
+pub const SUSPECT: Suspect = Suspect {
+    effect: EffectKind::TractionGain,
+    prior_std: 0.06,
+    is_positive: false,
+    least: Least::Size(0.02),
+    changes_at_stops: false,
+    unit: |seen| seen.traction,
+};

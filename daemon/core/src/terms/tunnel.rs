@@ -1,0 +1,77 @@
+//! Tunnels: a resistance by their length (Xie 2019, Jin 2020), and a greater c v² for the part of
+//! the train inside.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Joined, Key, Least, Parameter, Resistance, Suspect};
+
+/// Resistance in N/kN of each metre of tunnel around the train.
+pub const CONSTANT: Key = Key {
+    table: "resistance",
+    name: "tunnel_constant_n_per_kn_m",
+    range: [0.0, 1.0],
+    allowed: "from 0 to 1",
+    joined: Joined::Added,
+    of: |train| &mut train.tunnel_constant_n_per_kn_m,
+};
+/// Factor on c v² inside.
+pub const C_FACTOR: Key = Key {
+    table: "corrections",
+    name: "tunnel_c_factor",
+    range: [0.0, 100.0],
+    allowed: "from 0 to 100",
+    joined: Joined::Multiplied,
+    of: |train| &mut train.corrections.tunnel_c_factor,
+};
+/// What is added to c inside, whatever c is: so it is found, for c itself may hardly be known.
+pub const DC: Key = Key {
+    table: "corrections",
+    name: "tunnel_dc_n_per_kn_per_mps2",
+    range: [-0.2, 0.2],
+    allowed: "from -0.2 to 0.2 N/kN per (m/s)²",
+    joined: Joined::Added,
+    of: |train| &mut train.corrections.tunnel_dc_n_per_kn_per_mps2,
+};
+/// Single-track tunnels reach several times c; the bound is in N/kN per (m/s)².
+pub const PARAMETERS: [Parameter; 1] =
+    [Parameter::new("dc_n_per_kn_per_mps2", (0.0, DC.range[1]), 1e-5)];
+/// A smaller share of c is not told from its error.
+pub const LEAST_SHARE_OF_C: f64 = 0.08;
+
+/// Tunnels of a length, weighted by the share of the train inside, resist.
+#[inline]
+pub fn act_by_length(n_per_kn_m: f64, length_m: Option<f64>, resistance: &mut Resistance) {
+    resistance.tunnel_n_per_kn = n_per_kn_m * length_m.unwrap_or(0.0);
+}
+
+/// The share of the train inside tunnels; where none are known, none are assumed.
+#[inline]
+pub fn enter(share: Option<f64>, resistance: &mut Resistance) {
+    resistance.outside = 1.0 - share.unwrap_or(0.0);
+}
+
+/// c is larger by a factor for a share of the train.
+#[inline]
+pub fn act_by_factor(c_factor: f64, share: Option<f64>, resistance: &mut Resistance) {
+    resistance.c_share += share.unwrap_or(0.0) * (c_factor - 1.0);
+}
+
+/// c is larger by so many N/kN per (m/s)² for a share of the train.
+#[inline]
+pub fn act(dc_n_per_kn_per_mps2: f64, share: Option<f64>, resistance: &mut Resistance) {
+    resistance.dc += share.unwrap_or(0.0) * dc_n_per_kn_per_mps2;
+}
+
+/// Unit: the share of c v² that is added inside.
+pub const SUSPECT: Suspect = Suspect {
+    effect: EffectKind::TunnelDrag,
+    prior_std: 1.0,
+    is_positive: true,
+    least: Least::Share(1.0),
+    changes_at_stops: false,
+    unit: |seen| {
+        let mut inside = Resistance::BASIC;
+        act_by_factor(2.0, seen.tunnel_share, &mut inside);
+        inside.extra_n_per_kn(seen.davis, seen.speed_mps)
+    },
+};

@@ -1,0 +1,23 @@
+//! Wheels of another diameter than declared: measured speed = scale · true speed.
+
+use super::{Joined, Key, Parameter};
+
+/// Measured over true speed.
+pub const SPEED_SCALE: Key = Key {
+    table: "corrections",
+    name: "speed_scale",
+    range: [0.8, 1.25],
+    allowed: "from 0.8 to 1.25",
+    joined: Joined::Multiplied,
+    of: |train| &mut train.corrections.speed_scale,
+};
+/// Wheels are turned down by at most about a tenth of their diameter.
+pub const PARAMETERS: [Parameter; 1] = [Parameter::new("speed_scale", (0.88, 1.12), 0.002)];
+/// What the wear of a wheel between two measurements makes is less.
+pub const LEAST: f64 = 0.003;
+
+/// The true speed in m/s behind a measured one.
+#[inline]
+pub fn true_speed_mps(measured_mps: f64, speed_scale: f64) -> f64 {
+    measured_mps / speed_scale
+}

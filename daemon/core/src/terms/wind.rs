@@ -1,0 +1,44 @@
+//! Wind along the line: air resistance c (v + u)|v + u| with the headwind u, whose sign turns with
+//! the direction of travel, on the part of the train outside tunnels.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Joined, Key, Least, Parameter, Resistance, Suspect};
+
+/// Headwind in m/s for the direction of growing chainage.
+pub const WIND_PLUS: Key = Key {
+    table: "corrections",
+    name: "wind_plus_mps",
+    range: [-50.0, 50.0],
+    allowed: "from -50 to 50 m/s",
+    joined: Joined::Added,
+    of: |train| &mut train.corrections.wind_plus_mps,
+};
+/// Faster wind stops the trains.
+pub const PARAMETER: Parameter = Parameter::new("wind_plus_mps", (-35.0, 35.0), 0.05);
+/// Less wind than this is in the noise of any day.
+pub const LEAST_MPS: f64 = 1.0;
+
+/// The wind blows against a train in a direction of travel.
+#[inline]
+pub fn act(wind_plus_mps: f64, direction: f64, resistance: &mut Resistance) {
+    resistance.headwind_mps += wind_plus_mps * direction;
+}
+
+/// Unit: 1 m/s, as far as a little wind acts in proportion to its speed.
+pub const SUSPECT: Suspect = Suspect {
+    effect: EffectKind::Wind,
+    prior_std: 5.0,
+    is_positive: false,
+    least: Least::Share(1.0),
+    changes_at_stops: false,
+    unit: |seen| {
+        let blows = |wind_plus_mps: f64| {
+            let mut air = Resistance::BASIC;
+            super::tunnel::enter(seen.tunnel_share, &mut air);
+            act(wind_plus_mps, seen.direction, &mut air);
+            air.extra_n_per_kn(seen.davis, seen.speed_mps)
+        };
+        0.5 * (blows(1.0) - blows(-1.0))
+    },
+};

@@ -1,0 +1,112 @@
+//! What `explain` fits, written as files, is what the daemon then applies, to the bit.
+
+use dynocar::grown::grow;
+use dynocar_core::dataset::{Dataset, parse_track, parse_train};
+use dynocar_core::explain::effects::{Candidate, LIBRARY, Proposal};
+use dynocar_core::explain::evidence::prepare;
+use dynocar_core::explain::evidence::{Fit, FitProblem, GrownModel, Noise, RunData, SampleForces};
+use dynocar_core::explain::scan::Scan;
+use dynocar_core::terms::wheel;
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_tests::simulator::dataset_writer::dataset_files;
+use dynocar_tests::simulator::{
+    Effect, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate,
+};
+
+/// A dataset on which every kind can be tried, without wheel slip and outliers.
+fn simulated() -> SimulatedDataset {
+    let effects = vec![
+        Effect::TunnelDrag { c_factor: 2.2 },
+        Effect::LocalResistance {
+            extra_n_per_kn: 3.0,
+            intervals_m: vec![(2000.0, 3500.0)],
+            runs: Vec::new(),
+        },
+    ];
+    simulate(&SimulatorSettings {
+        train_type: Some(TrainType::Regional),
+        wheel_slips_per_run: 0.0,
+        duration_s: 600.0,
+        ..SimulatorSettings::new(9001, EffectRequest::Exactly(effects))
+    })
+}
+
+/// The text of one of the dataset's files.
+fn text<'f>(files: &'f [(String, String)], name: &str) -> &'f str {
+    &files.iter().find(|(path, _)| path == name).expect("a file").1
+}
+
+/// The forces on a run under a fitted model, and its speed scale.
+fn fitted_forces(fit: &Fit, run: &RunData) -> (Vec<SampleForces>, f64) {
+    let (mut forces, mut speed_scale) = (run.declared.clone(), 1.0);
+    for (effect, range) in fit.model.effects.iter().zip(fit.model.ranges()) {
+        effect.apply(&fit.theta[range.clone()], run, &mut forces);
+        speed_scale *= effect.speed_scale(&fit.theta[range]);
+    }
+    (forces, speed_scale)
+}
+
+/// What the daemon resolves, in the terms of a fit: its mass is that of the section.
+fn assert_same_forces(kind: EffectKind, fit: &Fit, declared: &RunData, grown: &RunData) {
+    let (fitted, speed_scale) = fitted_forces(fit, declared);
+    assert_eq!(fitted.len(), grown.declared.len());
+    let speeds = declared.samples().iter().zip(grown.samples());
+    for (k, ((fitted, applied), (before, after))) in
+        fitted.iter().zip(&grown.declared).zip(speeds).enumerate()
+    {
+        let fitted = SampleForces {
+            mass_kg: fitted.mass_kg * fitted.mass_factor,
+            mass_factor: 1.0,
+            ..*fitted
+        };
+        assert_eq!(&fitted, applied, "{kind}, {} sample {k}", declared.file);
+        let speed_mps = wheel::true_speed_mps(before.speed_mps, speed_scale);
+        assert_eq!(speed_mps, after.speed_mps, "{kind}, {} sample {k}", declared.file);
+    }
+}
+
+#[test]
+fn every_kind_written_as_a_grown_model_is_applied_to_the_bit() {
+    let files = dataset_files(&simulated());
+    let texts: Vec<(&str, &str)> =
+        files.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
+    let dataset = Dataset::load(&texts[..]).expect("a simulated dataset");
+    let runs = prepare(&dataset).expect("usable runs");
+    assert!(runs.iter().all(|run| run.replaced == 0), "no outliers");
+    let problem = FitProblem::new(runs.clone(), dataset.train.resistance);
+    let base = problem.fit(&GrownModel::default(), problem.start(&[]), Noise::START);
+    let track = dataset.track.as_ref();
+    let scan = Scan::new(&problem, &[], &dataset.train, track, &base).expect("a sound fit");
+    let mut applied = Vec::new();
+    for effect in LIBRARY {
+        let Proposal::Candidates(candidates) = effect.propose(&scan) else { continue };
+        for Candidate { hypothesis, start } in candidates {
+            let theta = base.theta.iter().chain(&start).copied().collect();
+            let fit = problem.fit(&base.model.with(hypothesis), theta, base.noise);
+            let mut train_table = text(&files, "train.toml").parse().expect("TOML");
+            let mut track_table = text(&files, "track.toml").parse().expect("TOML");
+            if !grow(&fit, &mut train_table, Some(&mut track_table)).is_empty() {
+                continue;
+            }
+            let train = parse_train("train.toml", &train_table.to_string()).expect("a train");
+            let track = parse_track("track.toml", &track_table.to_string()).expect("a line");
+            assert_eq!(train.resistance.a, fit.theta[0]);
+            assert_eq!([train.resistance.b, train.resistance.c], fit.theta[1..3]);
+            let grown =
+                Dataset { train: train.into(), track: Some(track.into()), ..dataset.clone() };
+            let grown = prepare(&grown).expect("usable runs");
+            for (declared, grown) in runs.iter().zip(&grown) {
+                assert_same_forces(effect.kind(), &fit, declared, grown);
+            }
+            applied.push(effect.kind());
+        }
+    }
+    applied.sort_unstable();
+    applied.dedup();
+    // Events of certain runs are no property of a train or a line.
+    let events =
+        [EffectKind::None, EffectKind::DraggingBrake, EffectKind::LowAdhesion, EffectKind::Unknown];
+    let expected: Vec<EffectKind> =
+        EffectKind::ALL.iter().copied().filter(|kind| !events.contains(kind)).collect();
+    assert_eq!(applied, expected);
+}
