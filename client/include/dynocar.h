@@ -209,7 +209,8 @@ enum {
     DYNOCAR_EFFECT_AMBIENT_TEMPERATURE = 12,
     DYNOCAR_EFFECT_LOCAL_RESISTANCE = 13,
     DYNOCAR_EFFECT_LOW_ADHESION = 14,
-    DYNOCAR_EFFECT_UNKNOWN = 15 /* a real residual that no known effect explains */
+    DYNOCAR_EFFECT_UNKNOWN = 15, /* a real residual that no known effect explains */
+    DYNOCAR_EFFECT_GRADIENT_ERROR = 16 /* a declared gradient that is wrong along the line */
 };
 
 /* Measured quantities: bits of valid. */

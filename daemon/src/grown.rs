@@ -111,8 +111,10 @@ pub fn grow(fit: &Fit, train: &mut Table, mut track: Option<&mut Table>) -> Vec<
 fn can_hold(entry: &Entry, train: &Table, track: Option<&Table>) -> bool {
     match entry {
         Entry::Number(key, found) => key.allows(joined(key, train, *found)),
-        Entry::TrackNumber(..) | Entry::Rows(..) => {
-            track.is_some_and(|track| track.get("track").is_some_and(Value::is_table))
+        Entry::TrackNumber(..) | Entry::Rows(..) | Entry::List(..) => {
+            let section = track.and_then(|track| track.get("track")?.as_table());
+            let stands_alone = |name: &str| !section.is_some_and(|own| own.contains_key(name));
+            section.is_some() && !matches!(entry, Entry::List(name, _) if !stands_alone(name))
         }
     }
 }
@@ -127,7 +129,7 @@ fn write_entry(entry: Entry, train: &mut Table, track: Option<&mut Table>) {
             let declared = number(track, "track", name).unwrap_or(0.0);
             set(track, "track", name, declared + found);
         }
-        (Entry::Rows(name, rows), Some(track)) => {
+        (Entry::Rows(name, rows) | Entry::List(name, rows), Some(track)) => {
             if let Some(list) = track_list(track, name) {
                 list.extend(rows.into_iter().map(Value::from));
             }

@@ -285,6 +285,8 @@ vocabulary! {
         LowAdhesion = 14 "low_adhesion",
         /// A real residual that no known effect explains.
         Unknown = 15 "unknown",
+        /// A declared gradient that is wrong by a smooth function of the chainage.
+        GradientError = 16 "gradient_error",
     }
 }
 

@@ -52,6 +52,10 @@ fn undo(kind: EffectKind, disturbances: &mut Disturbances, neutral: &Disturbance
             d.gradient = neutral.gradient;
             d.gradient_shift_m = neutral.gradient_shift_m;
         }
+        EffectKind::GradientError => {
+            d.gradient = neutral.gradient;
+            d.gradient_error = neutral.gradient_error;
+        }
         EffectKind::MassChange => {
             d.mass_sections = neutral.mass_sections;
             d.mass_windows = neutral.mass_windows;

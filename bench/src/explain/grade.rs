@@ -2,6 +2,7 @@
 
 use dynocar_core::explain::Explanation;
 use dynocar_core::explain::answer::Verdict;
+use dynocar_core::track::LinearProfile;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};
@@ -142,6 +143,7 @@ fn graded(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Vec<Par
         Effect::DraggingBrake { force_n, .. } => vec![one("force_n", *force_n, 0.0)],
         Effect::WheelDiameter { speed_scale } => vec![one("speed_scale", *speed_scale, 1.0)],
         Effect::GradientShift { shift_m } => vec![one("shift_m", *shift_m, 0.0)],
+        Effect::GradientError { profile } => gradient_errors(profile, own),
         Effect::TractionGain { gain } => vec![one("gain", *gain, 1.0)],
         Effect::ActuatorDelay { delay_s, lag_s } => {
             vec![one("delay_s", *delay_s, 0.0), one("lag_s", *lag_s, 0.0)]
@@ -162,6 +164,23 @@ fn graded(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Vec<Par
         }
     };
     list.into_iter().flatten().collect()
+}
+
+/// The error of the gradient at every node that was found, over its true root mean square.
+fn gradient_errors(profile: &[(f64, f64)], own: &Value) -> Vec<Option<ParameterGrade>> {
+    let Ok(truth) = LinearProfile::new(profile.to_vec()) else { return Vec::new() };
+    let squares: f64 = profile.iter().map(|(_, permille)| permille * permille).sum();
+    let rms = (squares / profile.len() as f64).sqrt();
+    let found = own["parameters"]["profile"].as_array().into_iter().flatten();
+    let deviations = own["std"]["profile"].as_array().into_iter().flatten();
+    found
+        .zip(deviations)
+        .map(|(node, deviation)| {
+            let away = node[1].as_f64()? - truth.at(node[0].as_f64()?);
+            let z = away / deviation[1].as_f64()?;
+            Some(ParameterGrade { name: "permille".into(), error: away / rms, z })
+        })
+        .collect()
 }
 
 /// Every true factor against the factor found where it holds longest.

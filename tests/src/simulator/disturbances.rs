@@ -3,7 +3,7 @@
 use dynocar_core::terms::{
     Resistance, adhesion, ambient, bearings, brake, curve, place, tunnel, wind,
 };
-use dynocar_core::track::StepProfile;
+use dynocar_core::track::{LinearProfile, StepProfile};
 
 use super::effects::{Effect, MassSection, RunWindow};
 use super::line_maker::Line;
@@ -39,6 +39,8 @@ pub struct Disturbances {
     pub gradient: StepProfile,
     /// How far in m the true gradient lies towards +chainage of the map's.
     pub gradient_shift_m: f64,
+    /// What the map's gradient lacks in ‰ by chainage.
+    pub gradient_error: Option<LinearProfile>,
     /// Basic resistance of this run over the train's ordinary one.
     pub resistance_factor: f64,
     /// Reading of the force sensors of this run over the reported forces.
@@ -118,6 +120,7 @@ impl Disturbances {
         Disturbances {
             gradient: line.track.gradient().expect("a generated line has a gradient").clone(),
             gradient_shift_m: 0.0,
+            gradient_error: None,
             resistance_factor: 1.0,
             force_reading_factor: 1.0,
             curve_constant_n_per_kn_m: train.declared.curve_constant_n_per_kn_m,
@@ -197,6 +200,11 @@ impl Disturbances {
                     self.gradient.entries().map(|(m, permille)| (m + shift_m, permille)).collect();
                 self.gradient = StepProfile::new(&moved).expect("a moved profile keeps its order");
                 self.gradient_shift_m = *shift_m;
+            }
+            Effect::GradientError { profile } => {
+                let error = LinearProfile::new(profile.clone()).expect("ascending chainages");
+                self.gradient = with_error(&self.gradient, profile, &error);
+                self.gradient_error = Some(error);
             }
             Effect::MassChangeSections(sections) => {
                 let of_direction =
@@ -290,6 +298,23 @@ impl AdhesionCap {
             || self.intervals_m.iter().any(|&(from_m, to_m)| (from_m..=to_m).contains(&centre_m));
         if is_inside { adhesion::carried_n(brake_n, self.adhesion, weight_n) } else { brake_n }
     }
+}
+
+/// A step profile with an error added, in steps as fine as the error is given.
+fn with_error(
+    map: &StepProfile,
+    error_entries: &[(f64, f64)],
+    error: &LinearProfile,
+) -> StepProfile {
+    let mut starts: Vec<f64> =
+        map.entries().map(|(m, _)| m).chain(error_entries.iter().map(|(m, _)| *m)).collect();
+    starts.sort_by(f64::total_cmp);
+    starts.dedup();
+    let middle = |k: usize| 0.5 * (starts[k] + starts.get(k + 1).unwrap_or(&starts[k]));
+    let entries: Vec<(f64, f64)> = (0..starts.len())
+        .map(|k| (starts[k], map.value_at(starts[k]) + error.at(middle(k))))
+        .collect();
+    StepProfile::new(&entries).expect("sorted chainages")
 }
 
 /// A profile of `value` within ordered intervals and zero elsewhere.

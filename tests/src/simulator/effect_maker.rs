@@ -125,6 +125,7 @@ pub fn make_effect(
         EffectKind::GradientShift => Effect::GradientShift {
             shift_m: random.sign() * random.uniform(0.15, 0.4) * mean_gradient_length_m(scene),
         },
+        EffectKind::GradientError => gradient_error(scene, random),
         EffectKind::MassChange => mass_change(scene, random),
         EffectKind::TractionGain => {
             Effect::TractionGain { gain: 1.0 + random.sign() * random.uniform(0.03, 0.08) }
@@ -163,6 +164,26 @@ pub fn make_effect(
 fn mean_gradient_length_m(scene: &EffectScene<'_>) -> f64 {
     let entries = scene.line.track.gradient().map_or(1, |gradient| gradient.entries().len());
     scene.line.length_m / entries as f64
+}
+
+/// Three waves of 3 to 9 km, together about 1 ‰.
+fn gradient_error(scene: &EffectScene<'_>, random: &mut Random) -> Effect {
+    const APART_M: f64 = 100.0;
+    let waves: Vec<[f64; 3]> = (0..3)
+        .map(|_| {
+            let wave_m = random.uniform(3000.0, 9000.0);
+            [random.uniform(0.6, 1.1), wave_m, random.uniform(0.0, std::f64::consts::TAU)]
+        })
+        .collect();
+    let at = |chainage_m: f64| {
+        let wave = |[permille, wave_m, phase]: &[f64; 3]| {
+            permille * (std::f64::consts::TAU * chainage_m / wave_m + phase).sin()
+        };
+        waves.iter().map(wave).sum::<f64>()
+    };
+    let count = (scene.line.length_m / APART_M).ceil() as usize;
+    let chainages = (0..=count).map(|k| APART_M * k as f64);
+    Effect::GradientError { profile: chainages.map(|m| (m, rounded(at(m), 0.001))).collect() }
 }
 
 /// In half of the runs, from somewhere in their first half to the end.

@@ -70,6 +70,11 @@ pub enum Effect {
         /// True profile = map moved by this many m towards +chainage.
         shift_m: f64,
     },
+    /// The gradient is wrong by a smooth function of the chainage.
+    GradientError {
+        /// (chainage in m, ‰ that the map lacks), linear between.
+        profile: Vec<(f64, f64)>,
+    },
     /// Another mass between certain places.
     MassChangeSections(Vec<MassSection>),
     /// Another mass in certain stretches of time, with true over declared mass.
@@ -144,6 +149,7 @@ impl Effect {
             Effect::DraggingBrake { .. } => EffectKind::DraggingBrake,
             Effect::WheelDiameter { .. } => EffectKind::WheelDiameter,
             Effect::GradientShift { .. } => EffectKind::GradientShift,
+            Effect::GradientError { .. } => EffectKind::GradientError,
             Effect::MassChangeSections(_) | Effect::MassChangeWindows(_) => EffectKind::MassChange,
             Effect::TractionGain { .. } => EffectKind::TractionGain,
             Effect::ActuatorDelay { .. } => EffectKind::ActuatorDelay,
@@ -180,6 +186,7 @@ impl Effect {
             Effect::DraggingBrake { force_n, .. } => json!({ "force_n": force_n }),
             Effect::WheelDiameter { speed_scale } => json!({ "speed_scale": speed_scale }),
             Effect::GradientShift { shift_m } => json!({ "shift_m": shift_m }),
+            Effect::GradientError { profile } => json!({ "profile": profile }),
             Effect::MassChangeSections(sections) => json!({
                 "sections": sections.iter().map(|section| json!({
                     "from_m": section.from_m,

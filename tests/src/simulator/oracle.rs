@@ -173,6 +173,9 @@ fn extra_n_per_kn(
         gradient::along_travel_permille(dataset.track(), at, length_m, shift_m).unwrap_or(0.0)
     };
     all.other_n_per_kn = permille(disturbances.gradient_shift_m) - permille(0.0);
+    if let Some(error) = &disturbances.gradient_error {
+        gradient::err(error, (position_m, run.plan.direction), &mut all.other_n_per_kn);
+    }
     // What the declared model holds already.
     all.curve_n_per_kn -= sample.resistance.curve_n_per_kn;
     let [constant, linear, quadratic] = all.polynomial(davis, sample.speed_mps);

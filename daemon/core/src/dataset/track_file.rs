@@ -3,7 +3,7 @@
 use super::document::{Document, Section};
 use super::error::{DatasetError, Place, Problem};
 use crate::terms::{gradient, masses, place};
-use crate::track::{Curve, MassSection, ProfileError, Track, TrackError, Tunnel};
+use crate::track::{Curve, LinearProfile, MassSection, ProfileError, Track, TrackError, Tunnel};
 
 /// A steeper gradient in ‰ than any adhesion railway has is a mistake of unit.
 const GRADIENT_MAX_PERMILLE: f64 = 150.0;
@@ -23,6 +23,7 @@ pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
         "length_m",
         "gradient",
         gradient::SHIFT,
+        gradient::ERROR,
         "curves",
         "tunnels",
         place::LIST,
@@ -64,6 +65,14 @@ fn with_corrections(mut track: Track, section: &Section) -> Result<Track, Datase
     let is_shift = |shift_m: f64| shift_m.abs() <= 1e4;
     if let Some(shift_m) = section.number(gradient::SHIFT, shift, is_shift)? {
         track = track.with_gradient_shift(shift_m);
+    }
+    if let Some(entries) = section.entries::<2>(gradient::ERROR, "[chainage_m, permille]")? {
+        let entries = entries.into_iter().map(|([at_m, permille], _)| (at_m, permille)).collect();
+        let refused = |error| {
+            let problem = Problem::Track(TrackError::Gradient(error));
+            section.place_of(gradient::ERROR).problem(problem)
+        };
+        track = track.with_gradient_error(LinearProfile::new(entries).map_err(refused)?);
     }
     if let Some(entries) = section.entries::<3>(place::LIST, RESISTANCE)? {
         let places: Vec<_> =

@@ -135,6 +135,8 @@ pub enum ParameterValue {
     ByRun(BTreeMap<String, f64>),
     /// Numbers in the order of a list.
     List(Vec<f64>),
+    /// [chainage in m, value] along the line.
+    Profile(Vec<[f64; 2]>),
     /// Masses by place.
     Sections(Vec<MassSection>),
     /// Masses by time.

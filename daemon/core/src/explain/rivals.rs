@@ -10,7 +10,7 @@ const REDUCTION_SHARE: f64 = 0.7;
 
 /// Kinds that could stand in the place of the effect accepted last.
 ///
-/// A rival explains the data as well, takes away about as much of the open-loop error, and has
+/// Beside those that the runs could not tell from it whatever they showed, a rival explains the data as well, takes away about as much of the open-loop error, and has
 /// nothing left to explain once the effect is in: what keeps its evidence acts beside the effect
 /// and not in its place.
 pub fn rivals(outcome: &Outcome) -> Vec<EffectKind> {
@@ -22,7 +22,10 @@ pub fn rivals(outcome: &Outcome) -> Vec<EffectKind> {
         let last = outcome.rounds.last().into_iter().flatten().find(|trial| trial.kind == kind);
         last.map_or(0.0, |trial| trial.evidence)
     };
-    accepted
+    let twins = outcome.fit.model.effects.iter().flat_map(|effect| effect.twins());
+    let mut kinds: Vec<EffectKind> =
+        twins.copied().filter(|&twin| !is_in(&outcome.fit, twin)).collect();
+    let close = accepted
         .iter()
         .filter(|trial| {
             !is_in(&outcome.fit, trial.kind)
@@ -32,8 +35,13 @@ pub fn rivals(outcome: &Outcome) -> Vec<EffectKind> {
                 && left(trial.kind) < 0.5 * trial.evidence
                 && trial.advantage > best.advantage - AMBIGUOUS
         })
-        .map(|trial| trial.kind)
-        .collect()
+        .map(|trial| trial.kind);
+    for kind in close {
+        if !kinds.contains(&kind) {
+            kinds.push(kind);
+        }
+    }
+    kinds
 }
 
 /// Whether a model has an effect of a kind.
@@ -50,11 +58,17 @@ fn accepted_round(outcome: &Outcome) -> Option<&Vec<Trial>> {
 /// What is known to separate the kinds that are easily confused.
 pub fn separating_run(kind: EffectKind, rivals: &[EffectKind]) -> String {
     use EffectKind::{
-        AmbientTemperature, BearingTemperature, CurveResistance, DraggingBrake, GradientShift,
-        LocalResistance, MassChange, RotatingMass, TractionGain, TunnelDrag, WheelDiameter, Wind,
+        AmbientTemperature, BearingTemperature, CurveResistance, DraggingBrake, GradientError,
+        GradientShift, LocalResistance, MassChange, RotatingMass, TractionGain, TunnelDrag,
+        WheelDiameter, Wind,
     };
     let has = |wanted: EffectKind| kind == wanted || rivals.contains(&wanted);
-    let pairs: [(EffectKind, EffectKind, &str); 11] = [
+    let pairs: [(EffectKind, EffectKind, &str); 12] = [
+        (
+            GradientError,
+            LocalResistance,
+            "Drive the line in the other direction: a gradient changes its sign there.",
+        ),
         (
             MassChange,
             TractionGain,

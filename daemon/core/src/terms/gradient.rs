@@ -1,7 +1,8 @@
-//! The gradient under the train, and a profile that lies elsewhere than the map says.
+//! The gradient under the train, a profile that lies elsewhere than the map says, and one that is
+//! wrong by a smooth function of the chainage, with opposite forces in the two directions.
 
 use super::Parameter;
-use crate::track::Track;
+use crate::track::{LinearProfile, Track};
 
 /// The number of `[track]` by which the true profile is the map's moved towards growing chainage.
 pub const SHIFT: &str = "gradient_shift_m";
@@ -12,6 +13,23 @@ pub const SHIFT_PARAMETERS: [Parameter; 1] =
     [Parameter::new("shift_m", (-SHIFT_MAX_M, SHIFT_MAX_M), 2.0)];
 /// A surveyor's chainage is good to this in m.
 pub const SHIFT_LEAST_M: f64 = 5.0;
+
+/// The list of `[track]` that holds [chainage in m, permille]: what the declared gradient lacks.
+pub const ERROR: &str = "gradient_error";
+/// What it lacks at one chainage.
+pub const ERROR_PARAMETER: Parameter = Parameter::new("permille", (-30.0, 30.0), 0.05);
+/// Standard deviation in ‰ of such an error before the data: that of a map drawn from altitudes.
+pub const ERROR_PRIOR_PERMILLE: f64 = 1.5;
+/// Length in m over which it changes: a wrong vertical curve, a smoothed hill.
+pub const ERROR_LENGTH_M: f64 = 1500.0;
+/// A root mean square in ‰ below this is what good surveys differ by.
+pub const ERROR_LEAST_PERMILLE: f64 = 0.25;
+
+/// The gradient is steeper in ‰ along growing chainage by what a profile says.
+#[inline]
+pub fn err(error: &LinearProfile, (position_m, direction): (f64, f64), permille: &mut f64) {
+    *permille += direction * error.at(position_m);
+}
 
 /// Gradient in ‰ along the travel under a train of a length in m, whose profile is moved by
 /// `shift_m` beyond what the line declares.

@@ -37,6 +37,8 @@ pub enum Entry {
     Number(&'static Key, f64),
     /// A number of `[track]` that adds to a declared one.
     TrackNumber(&'static str, f64),
+    /// A list of `[track]` that stands alone.
+    List(&'static str, Vec<Vec<f64>>),
     /// Further rows of a list of `[track]`.
     Rows(&'static str, Vec<Vec<f64>>),
 }

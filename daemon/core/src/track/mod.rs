@@ -4,50 +4,11 @@
 //! cumulative sum, so that the mean over a train costs two look-ups whatever the number of
 //! entries.
 
+mod entries;
 mod profile;
 
-pub use profile::{ProfileError, StepProfile};
-
-/// A curve of the line.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Curve {
-    /// Chainage in m where it starts.
-    pub start_m: f64,
-    /// Chainage in m where it ends.
-    pub end_m: f64,
-    /// Radius in m.
-    pub radius_m: f64,
-}
-
-/// A tunnel of the line.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tunnel {
-    /// Chainage in m of the lower portal.
-    pub start_m: f64,
-    /// Chainage in m of the upper portal.
-    pub end_m: f64,
-}
-
-/// A section between stations on which trains in one direction weigh more or less than declared.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MassSection {
-    /// Chainage in m where it starts.
-    pub from_m: f64,
-    /// Chainage in m where it ends.
-    pub to_m: f64,
-    /// Direction of travel, +1 or -1.
-    pub direction: f64,
-    /// True over declared mass.
-    pub mass_factor: f64,
-}
-
-impl MassSection {
-    /// True at a chainage in m in a direction of travel.
-    #[inline]
-    pub fn holds(&self, centre_m: f64, direction: f64) -> bool {
-        self.direction == direction && (self.from_m..self.to_m).contains(&centre_m)
-    }
-}
+pub use entries::{Curve, MassSection, Tunnel};
+pub use profile::{LinearProfile, ProfileError, StepProfile};
 
 /// Why a list of track entries is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -105,6 +66,7 @@ pub struct Track {
     curves: Vec<Curve>,
     tunnels: Vec<Tunnel>,
     gradient_shift_m: f64,
+    gradient_error_permille: Option<LinearProfile>,
     resistance_n_per_kn: Option<StepProfile>,
     masses: Vec<MassSection>,
 }
@@ -147,6 +109,7 @@ impl Track {
             curves: curves.unwrap_or_default(),
             tunnels: tunnels.unwrap_or_default(),
             gradient_shift_m: 0.0,
+            gradient_error_permille: None,
             resistance_n_per_kn: None,
             masses: Vec::new(),
         })
@@ -166,6 +129,13 @@ impl Track {
     #[must_use]
     pub fn with_gradient_shift(mut self, shift_m: f64) -> Self {
         self.gradient_shift_m = shift_m;
+        self
+    }
+
+    /// The same line whose true gradient is steeper in ‰ by a profile.
+    #[must_use]
+    pub fn with_gradient_error(mut self, error_permille: LinearProfile) -> Self {
+        self.gradient_error_permille = Some(error_permille);
         self
     }
 
@@ -192,7 +162,11 @@ impl Track {
     /// `centre_m` is the chainage of the train's centre. `None` when no gradient is known.
     pub fn gradient_permille(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
         let true_m = centre_m - self.gradient_shift_m;
-        Some(self.gradient_permille.as_ref()?.mean_around(true_m, train_length_m))
+        let mapped = self.gradient_permille.as_ref()?.mean_around(true_m, train_length_m);
+        Some(match &self.gradient_error_permille {
+            Some(error) => mapped + error.at(centre_m),
+            None => mapped,
+        })
     }
 
     /// Mean of 1/R in 1/m along a train; `None` when no curves are known.
@@ -214,6 +188,11 @@ impl Track {
     /// How far in m the true gradient lies from the profile, towards growing chainage.
     pub fn gradient_shift_m(&self) -> f64 {
         self.gradient_shift_m
+    }
+
+    /// What the declared gradient lacks in ‰, when known.
+    pub fn gradient_error_permille(&self) -> Option<&LinearProfile> {
+        self.gradient_error_permille.as_ref()
     }
 
     /// The gradient profile as surveyed, when known.

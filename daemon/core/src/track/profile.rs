@@ -129,6 +129,42 @@ impl StepProfile {
     }
 }
 
+/// A function of the chainage that is linear between its entries and holds beyond them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinearProfile {
+    entries: Vec<(f64, f64)>,
+}
+
+impl LinearProfile {
+    /// A profile through (chainage in m, value) entries of strictly increasing chainage.
+    ///
+    /// # Errors
+    ///
+    /// See [`ProfileError`].
+    pub fn new(entries: Vec<(f64, f64)>) -> Result<Self, ProfileError> {
+        StepProfile::new(&entries)?;
+        Ok(LinearProfile { entries })
+    }
+
+    /// The value at a chainage in m.
+    #[inline]
+    pub fn at(&self, chainage_m: f64) -> f64 {
+        let after = self.entries.partition_point(|&(m, _)| m <= chainage_m);
+        match (after.checked_sub(1).map(|before| self.entries[before]), self.entries.get(after)) {
+            (Some((m, from)), Some(&(to_m, to))) => {
+                from + (to - from) * (chainage_m - m) / (to_m - m)
+            }
+            (Some((_, value)), None) | (None, Some(&(_, value))) => value,
+            (None, None) => 0.0,
+        }
+    }
+
+    /// The entries.
+    pub fn entries(&self) -> &[(f64, f64)] {
+        &self.entries
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

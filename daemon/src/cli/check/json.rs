@@ -122,6 +122,9 @@ struct TrackAnswer<'a> {
     gradient_range_permille: Option<(f64, f64)>,
     curves: Option<usize>,
     tunnels: Option<usize>,
+    gradient_shift_m: f64,
+    /// (m, ‰) that the declared gradient lacks.
+    gradient_error: Vec<(f64, f64)>,
     /// Steps (m, N/kN) of further resistance; `null`: not known.
     resistance: Option<Vec<(f64, f64)>>,
     /// [from_m, to_m, direction, mass factor]
@@ -255,6 +258,10 @@ fn track_answer(track: &Track) -> TrackAnswer<'_> {
         gradient_range_permille: range,
         curves: track.knows_curves().then(|| track.curves().len()),
         tunnels: track.knows_tunnels().then(|| track.tunnels().len()),
+        gradient_shift_m: track.gradient_shift_m(),
+        gradient_error: track
+            .gradient_error_permille()
+            .map_or_else(Vec::new, |error| error.entries().to_vec()),
         resistance: track.resistance().map(|profile| profile.entries().collect()),
         masses: track
             .masses()

@@ -248,6 +248,15 @@ fn track(track: &Track) -> String {
             }
         },
     );
+    if track.gradient_shift_m() != 0.0 {
+        let shift = signed(track.gradient_shift_m(), 1);
+        text += &line("gradient shift", &format!("{shift} m along growing chainage"));
+    }
+    if let Some(error) = track.gradient_error_permille() {
+        let (low, high) = range(error.entries().iter().map(|(_, permille)| *permille));
+        let (low, high, count) = (signed(low, 3), signed(high, 3), error.entries().len());
+        text += &line("gradient error", &format!("{low} to {high} ‰ at {count} chainages"));
+    }
     if let Some(profile) = track.resistance() {
         let places: Vec<f64> =
             profile.entries().map(|(_, extra)| extra).filter(|extra| *extra != 0.0).collect();

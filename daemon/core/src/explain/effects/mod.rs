@@ -11,6 +11,7 @@ mod ambient_temperature;
 mod bearing_temperature;
 mod curve_resistance;
 mod dragging_brake;
+mod gradient_error;
 mod gradient_shift;
 mod local_resistance;
 mod low_adhesion;
@@ -25,6 +26,7 @@ mod wind;
 use std::collections::BTreeMap;
 
 use dynocar_shared::vocabulary::EffectKind;
+use nalgebra::DMatrix;
 
 use super::answer::{ParameterValue, Place};
 use super::evidence::{RunData, SampleForces, SharedHypothesis};
@@ -35,13 +37,14 @@ pub use crate::terms::Parameter;
 
 /// Every kind, in the order of the search: timing, scales, mass and gain, what is tied to a
 /// place, environment, actuators. What is in no library comes last.
-pub const LIBRARY: [&dyn Effect; 15] = [
+pub const LIBRARY: [&dyn Effect; 16] = [
     &actuator_delay::ActuatorDelay,
     &wheel_diameter::WheelDiameter,
     &traction_gain::TractionGain,
     &mass_change::MassChange,
     &rotating_mass::RotatingMass,
     &gradient_shift::GradientShift,
+    &gradient_error::GradientError,
     &curve_resistance::CurveResistance,
     &tunnel_drag::TunnelDrag,
     &local_resistance::LocalResistance,
@@ -156,6 +159,22 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
     /// The value of each parameter at which there is no effect.
     fn none(&self) -> f64 {
         0.0
+    }
+
+    /// How far it is from no effect, in the unit of its first parameter.
+    fn size(&self, parameters: &[f64]) -> f64 {
+        parameters[0] - self.none()
+    }
+
+    /// Information about its parameters before the data, around no effect; `None` for a flat
+    /// prior.
+    fn prior_information(&self) -> Option<&DMatrix<f64>> {
+        None
+    }
+
+    /// Kinds that none of the runs at hand could tell from it.
+    fn twins(&self) -> &[EffectKind] {
+        &[]
     }
 
     /// What the effect is in the files of a train and a line; `None` where these cannot hold it.

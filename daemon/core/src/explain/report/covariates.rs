@@ -65,7 +65,10 @@ impl Covariate {
     pub fn of_kind(kind: EffectKind) -> Option<Self> {
         use EffectKind as Kind;
         Some(match kind {
-            Kind::TunnelDrag | Kind::GradientShift | Kind::LocalResistance => Covariate::Chainage,
+            Kind::TunnelDrag
+            | Kind::GradientShift
+            | Kind::GradientError
+            | Kind::LocalResistance => Covariate::Chainage,
             Kind::CurveResistance => Covariate::Curvature,
             Kind::Wind => Covariate::Direction,
             Kind::WheelDiameter => Covariate::Speed,

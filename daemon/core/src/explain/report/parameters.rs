@@ -105,6 +105,15 @@ fn effect_rows(dataset: &Dataset, effect: &EffectAnswer) -> Vec<ParameterRow> {
                     );
                 }
             }
+            ParameterValue::Profile(entries) => {
+                for (i, [at_m, value]) in entries.iter().enumerate() {
+                    let deviation = match std {
+                        Some(ParameterValue::Profile(std)) => std.get(i).map(|entry| entry[1]),
+                        _ => None,
+                    };
+                    push(format!("{meaning} at km {:.2}", at_m / 1000.0), *value, deviation);
+                }
+            }
             ParameterValue::List(values) => {
                 for (i, value) in values.iter().enumerate() {
                     push(format!("{meaning}, number {}", i + 1), *value, listed(i));

@@ -121,7 +121,7 @@ fn sizes(effect: &EffectAnswer) -> Vec<String> {
                     format!("{percent} in {} from {:.0} to {:.0} s", w.run, w.t_start_s, w.t_end_s)
                 }));
             }
-            ParameterValue::List(_) => {}
+            ParameterValue::List(_) | ParameterValue::Profile(_) => {}
         }
     }
     sizes

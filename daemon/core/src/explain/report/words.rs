@@ -20,6 +20,7 @@ pub fn kind(kind: EffectKind) -> &'static str {
         EffectKind::AmbientTemperature => "resistance that follows the outside temperature",
         EffectKind::LocalResistance => "a local resistance",
         EffectKind::LowAdhesion => "low adhesion",
+        EffectKind::GradientError => "a gradient that is wrong along the line",
         EffectKind::Unknown => "something outside the library",
     }
 }
@@ -42,6 +43,8 @@ pub fn parameter(name: &str) -> (&str, &'static str) {
         "headwind_mps" => ("headwind", "m/s"),
         "force_n" => ("drag force", "N"),
         "speed_scale" => ("measured over true speed", ""),
+        "rms_permille" => ("root mean square of the gradient's error", "‰"),
+        "profile" => ("error of the gradient", "‰"),
         "shift_m" => ("shift towards growing chainage", "m"),
         "mass_factor" => ("true over declared mass", ""),
         "gain" => ("reported over true force", ""),

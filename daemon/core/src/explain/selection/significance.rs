@@ -24,15 +24,16 @@ pub fn penalty(hypothesis: &SharedHypothesis, observations: usize) -> f64 {
 }
 
 /// Decrease of -2 log likelihood by an effect of a fitted model, less what errors that all runs
-/// share would bring: (x/s)² becomes x²/(s² + e²).
+/// share would bring: (x/s)² becomes x²/(s² + e²), for each parameter.
 pub fn discounted(fit: &Fit, index: usize, decrease: f64) -> f64 {
     let effect = &fit.model.effects[index];
     let shared = effect.shared_error();
     if shared == 0.0 || decrease <= 0.0 {
         return decrease;
     }
-    let size = fit.effect_parameters(index)[0] - effect.none();
-    decrease / (1.0 + decrease * (shared / size).powi(2))
+    let parameters = fit.effect_parameters(index);
+    let each = decrease / parameters.len() as f64;
+    decrease / (1.0 + each * (shared / effect.size(parameters)).powi(2))
 }
 
 /// The price of all effects of a model.

@@ -45,6 +45,17 @@ impl FitProblem {
             score[i] += weight * away;
             cost += weight * away * away;
         }
+        for (effect, range) in model.effects.iter().zip(model.ranges()) {
+            let Some(own) = effect.prior_information() else { continue };
+            let at = DVector::from_column_slice(&theta[range.clone()]);
+            let pull = own * &at;
+            cost += at.dot(&pull);
+            let (start, count) = (range.start, range.len());
+            let mut block = information.view_mut((start, start), (count, count));
+            block += own;
+            let mut part = score.rows_mut(start, count);
+            part -= pull;
+        }
         if let Some((ratio, deviation)) = self.way_ratio {
             let mut scale = 1.0;
             let mut at = None;
