@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use dynocar_shared::SampleField;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::{SampleField, TrainSample};
 
 use super::corrections::Corrector;
 use crate::track::Track;
@@ -134,9 +134,8 @@ impl ForceResolver {
         let on_track = |look_up: fn(&Track, f64, f64) -> Option<f64>| {
             look_up(self.track.as_deref()?, position_m?, train.length_m)
         };
-        let gradient_permille = on_track(Track::gradient_permille)
-            .or_else(|| sample.get(SampleField::Gradient))
-            .map(|gradient| direction * gradient)
+        let gradient_permille = self
+            .stated_gradient_permille(sample)
             .or_else(|| self.accelerometer_gradient_permille(valid));
         let curvature_per_m = on_track(Track::curvature_per_m).or_else(|| {
             let radius_m = sample.get(SampleField::CurveRadius)?;
@@ -175,6 +174,20 @@ impl ForceResolver {
             corrector.correct(train, &mut resolved);
         }
         resolved
+    }
+
+    /// Gradient in ‰ along the travel by the track at the sample's position, else by the sample.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    pub fn stated_gradient_permille(&self, sample: &TrainSample) -> Option<f64> {
+        let on_track = || {
+            let position_m = sample.get(SampleField::Position)?;
+            self.track.as_deref()?.gradient_permille(position_m, self.train.length_m)
+        };
+        let gradient = on_track().or_else(|| sample.get(SampleField::Gradient))?;
+        Some(f64::from(sample.direction) * gradient)
     }
 
     /// Gradient in ‰ along the travel from specific force = dv/dt + g * gradient, with dv/dt

@@ -5,17 +5,18 @@ use dynocar_core::track::Track;
 use dynocar_core::train::{BrakeGear, Corrections, EffortCurve, TrainModel};
 
 use super::{Understood, daemon, runs};
-use crate::cli::text::{short, wrap};
+use crate::cli::text::{self, WIDTH, short, wrap};
 
-/// Widest line of running text.
-pub(super) const WIDTH: usize = 96;
 /// Width of the keys of an entry.
 const KEY_WIDTH: usize = 12;
 
 /// The whole report.
 pub(super) fn report(understood: &Understood) -> String {
     match understood {
-        Understood::Train(model) => train(model),
+        Understood::Train(model) => match &text::notes(&understood.notes())[..] {
+            "" => train(model),
+            notes => format!("{}\nnotes\n{notes}", train(model)),
+        },
         Understood::Track(line) => track(line),
         Understood::Daemon(config) => daemon::report(config),
         Understood::Dataset(head, read) => {
@@ -28,7 +29,7 @@ pub(super) fn report(understood: &Understood) -> String {
                 train(&head.train),
                 track,
                 columns(&head.manifest),
-                runs::report(&head.manifest, read),
+                runs::report(&head.manifest, read, &understood.notes()),
             ];
             parts.join("\n")
         }
