@@ -119,7 +119,12 @@ enum {
     DYNOCAR_REASON_ESTIMATE_STALE = 11,       /* the last exciting manoeuvre is too long ago */
     DYNOCAR_REASON_ONLY_LOWER_BOUND = 12,     /* these data give no more */
     DYNOCAR_REASON_NOT_IDENTIFIABLE = 13,     /* other values of some parameters fit as well */
-    DYNOCAR_REASON_DAEMON_SILENT = 14         /* set by the client, never by the daemon */
+    DYNOCAR_REASON_DAEMON_SILENT = 14,        /* set by the client, never by the daemon */
+    DYNOCAR_REASON_IMPLAUSIBLE_FORCES = 15,   /* a wrong unit, exchanged, of the wrong sign */
+    DYNOCAR_REASON_IMPLAUSIBLE_MOTION = 16,   /* speed, position, time, direction: unit or sign */
+    DYNOCAR_REASON_IMPLAUSIBLE_MASS = 17,     /* a wrong unit */
+    DYNOCAR_REASON_IMPLAUSIBLE_GRADIENT = 18, /* a wrong unit or sign */
+    DYNOCAR_REASON_IMPLAUSIBLE_PRESSURE = 19  /* a wrong unit */
 };
 
 /* The kind of estimator behind a snapshot, named as in the configuration. */

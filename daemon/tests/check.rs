@@ -173,11 +173,13 @@ fn what_a_grown_model_adds_is_told_and_nothing_else() {
     let folder = dataset(RUN_2);
     let grown_train = format!(
         "{TRAIN}[corrections]\nspeed_scale = 0.985\nactuator_lag_s = 0.4\ntunnel_c_factor = 1.9\n\
+         tunnel_dc_n_per_kn_per_mps2 = 0.0003\n\
          wind_plus_mps = -2.5\nbearing_delta_a_n_per_kn = 0.6\nbearing_tau_s = 420\n\
          ambient_w0_per_k = -0.004\n"
     );
     let grown_track = format!(
-        "{TRACK}resistance = [[100, 200, 1.25], [300, 400, -0.5]]\nmasses = [[0, 900, 1, 1.04]]\n"
+        "{TRACK}gradient_shift_m = -40\ngradient_error = [[0, 0.5], [900, -1]]\n\
+         resistance = [[100, 200, 1.25], [300, 400, -0.5]]\nmasses = [[0, 900, 1, 1.04]]\n"
     );
     std::fs::write(folder.path().join("train.toml"), grown_train).unwrap();
     std::fs::write(folder.path().join("track.toml"), grown_track).unwrap();
@@ -186,13 +188,16 @@ fn what_a_grown_model_adds_is_told_and_nothing_else() {
     let expected = "  corrections measured over true speed 0.985
               forces build up with a time constant of 0.4 s
               1.9 c v² in tunnels
+              c 0.0003 greater in tunnels
               headwind -2.5 m/s as the chainage grows
               +0.6 N/kN of cold bearings, fading in 420 s
               -0.4 % of w0 per kelvin above 288.15 K\n";
     assert!(report.ends_with(expected), "{report}");
     let output = check(folder.path(), &["track.toml"]);
     let report = text(&output.stdout);
-    let expected = "  resistance  further -0.5 to 1.25 N/kN at 2 places\n  \
+    let expected = "  shift       the gradient lies -40 m further\n  \
+                    error       the gradient lacks -1 to 0.5 ‰ at 2 chainages\n  \
+                    resistance  further -0.5 to 1.25 N/kN at 2 places\n  \
                     masses      1.04 to 1.04 of the declared, 1 section\n";
     assert!(report.ends_with(expected), "{report}");
 

@@ -183,6 +183,16 @@ vocabulary! {
         NotIdentifiable = 13 "not_identifiable",
         /// The daemon has not been heard of lately; set by the client, never by the daemon.
         DaemonSilent = 14 "daemon_silent",
+        /// Forces that cannot be true: a wrong unit, exchanged, of the wrong sign.
+        ImplausibleForces = 15 "implausible_forces",
+        /// Speed, position, time or direction that contradict each other: a wrong unit or sign.
+        ImplausibleMotion = 16 "implausible_motion",
+        /// A mass that cannot be true: a wrong unit.
+        ImplausibleMass = 17 "implausible_mass",
+        /// A gradient that cannot be true: a wrong unit or sign.
+        ImplausibleGradient = 18 "implausible_gradient",
+        /// A brake-cylinder pressure that cannot be true: a wrong unit.
+        ImplausiblePressure = 19 "implausible_pressure",
     }
 }
 
@@ -240,6 +250,20 @@ vocabulary! {
         Brake = 4 "brake",
         /// Any motion.
         Move = 5 "move",
+    }
+}
+
+impl Reason {
+    /// True when the samples themselves cannot be true, so that no estimate from them is.
+    pub const fn is_implausible_input(self) -> bool {
+        matches!(
+            self,
+            Reason::ImplausibleForces
+                | Reason::ImplausibleMotion
+                | Reason::ImplausibleMass
+                | Reason::ImplausibleGradient
+                | Reason::ImplausiblePressure
+        )
     }
 }
 

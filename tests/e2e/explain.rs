@@ -66,6 +66,7 @@ fn the_grown_files_of_other_kinds_leave_nothing_either() {
         EffectKind::WheelDiameter,
         EffectKind::ActuatorDelay,
         EffectKind::BearingTemperature,
+        EffectKind::GradientError,
     ];
     for kind in kinds {
         let folder = tempfile::tempdir().unwrap();

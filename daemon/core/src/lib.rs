@@ -9,6 +9,7 @@
 //! - [`train`], [`track`]: what is declared of the train and the line
 //! - [`dataset`]: recorded runs, from texts to the samples that a controller would publish
 //! - [`validation`]: which samples are fit for use, and why the others are not
+//! - [`plausibility`]: whether samples can be true: units, exchanged forces, signs
 //! - [`terms`]: the physical terms of the model, one law each, that all of the following share
 //! - [`force`]: the known forces on the train at a sample
 //! - [`filter`]: recursive estimators of fixed size, without knowledge of trains
@@ -23,6 +24,7 @@ pub mod explain;
 pub mod filter;
 pub mod force;
 pub mod pipeline;
+pub mod plausibility;
 pub mod simulate;
 pub mod terms;
 pub mod track;

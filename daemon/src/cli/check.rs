@@ -9,8 +9,9 @@ mod runs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use dynocar_core::dataset::note::notes;
 use dynocar_core::dataset::{
-    DatasetError, DatasetHead, Place, Run, parse_track, parse_train, top_keys,
+    DatasetError, DatasetHead, Note, Place, Run, parse_track, parse_train, top_keys,
 };
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
@@ -73,6 +74,17 @@ impl Understood {
             Understood::Train(_) => FileKind::Train,
             Understood::Track(_) => FileKind::Track,
             Understood::Daemon(_) => FileKind::Daemon,
+        }
+    }
+
+    /// What may spoil results, the worst first.
+    fn notes(&self) -> Vec<Note> {
+        match self {
+            Understood::Dataset(head, runs) => {
+                notes(&head.train, head.track.as_deref(), runs.iter().flatten())
+            }
+            Understood::Train(train) => notes(train, None, []),
+            Understood::Track(_) | Understood::Daemon(_) => Vec::new(),
         }
     }
 

@@ -12,6 +12,7 @@ use dynocar_core::explain::{Explanation, explain};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Failure;
+use super::text::notes;
 use crate::dataset::{self, DatasetFolder};
 use crate::grown::{GROWN_FILES, GROWN_MARK, GrownError, write_grown};
 use crate::output::{
@@ -72,12 +73,17 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
     };
     let explained = explain(&dataset, &progress);
     bar.finish_and_clear();
-    let mut explanation = explained.map_err(|error| unusable(&arguments.dataset, error))?;
+    let mut explanation =
+        explained.map_err(|error| unusable(&arguments.dataset, &dataset, error))?;
     if let Some(folder) = &arguments.predictions {
         explanation.answer.predictions = write_predictions(folder, &dataset, &explanation)?;
     }
     if let Some(folder) = &arguments.grown {
-        grow(folder, &arguments.dataset, &explanation)?;
+        if explanation.answer.impossibilities().next().is_none() {
+            grow(folder, &arguments.dataset, &explanation)?;
+        } else {
+            tell("no grown model is written: the data cannot be true");
+        }
     }
     if let Some(file) = &arguments.report {
         write_report(file, &arguments.dataset, &dataset, &explanation)?;
@@ -116,11 +122,12 @@ fn require_replaceable(file: &Path, mark: &str) -> Result<(), OutputError> {
     if file.exists() { require_file(file, mark) } else { Ok(()) }
 }
 
-/// The failure of a run that cannot be used.
-fn unusable(dataset: &Path, error: RunDataError) -> Failure {
+/// The failure of a run that cannot be used, with what may be the matter.
+fn unusable(path: &Path, dataset: &Dataset, error: RunDataError) -> Failure {
     let RunDataError::Simulate { file, source } = error;
-    let label = DatasetFolder::at(dataset).map_or(file.clone(), |folder| folder.label(&file));
-    Failure::At(Place::whole(&label), format!("{label}: {source}"))
+    let label = DatasetFolder::at(path).map_or(file.clone(), |folder| folder.label(&file));
+    let notes: String = dataset.notes().iter().map(|note| format!("; {note}")).collect();
+    Failure::At(Place::whole(&label), format!("{label}: {source}{notes}"))
 }
 
 fn grow(folder: &Path, dataset: &Path, explanation: &Explanation) -> Result<(), Failure> {
@@ -208,7 +215,7 @@ fn write_predictions(
 
 fn text(explanation: &Explanation) -> String {
     let answer = &explanation.answer;
-    let mut text = format!("{}\n", answer.statement);
+    let mut text = notes(&answer.notes) + &format!("{}\n", answer.statement);
     if let Some(experiment) = &answer.experiment {
         text += &format!("To settle it: {experiment}\n");
     }

@@ -6,7 +6,7 @@ mod runs;
 use std::path::PathBuf;
 
 use clap::Args;
-use dynocar_core::dataset::Dataset;
+use dynocar_core::dataset::{Dataset, Note};
 use dynocar_core::pipeline::EstimatorSettings;
 use dynocar_shared::TrainId;
 use serde::Serialize;
@@ -14,6 +14,7 @@ use serde::Serialize;
 use self::answer::EstimatorAnswer;
 use self::runs::{EstimatorSpread, RunAnswer};
 use super::Failure;
+use super::text::notes;
 use crate::dataset;
 use crate::identify::{default_estimators, identify, samples_of_runs};
 use crate::output::{give, require_file};
@@ -40,6 +41,8 @@ pub struct IdentifyArguments {
 #[derive(Debug, Serialize)]
 struct Answer {
     dataset: String,
+    /// What may spoil the results, the worst first.
+    notes: Vec<Note>,
     /// From all runs, one after the other.
     estimators: Vec<EstimatorAnswer>,
     /// From each run alone.
@@ -68,6 +71,7 @@ pub fn execute(arguments: &IdentifyArguments) -> Result<(), Failure> {
     let runs = if arguments.per_run { Some(by_run(&dataset, &estimators)?) } else { None };
     let answer = Answer {
         dataset: dataset.name.clone(),
+        notes: dataset.notes(),
         estimators: learned,
         between_runs: runs.as_deref().map(runs::spreads),
         runs,
@@ -114,7 +118,7 @@ fn chosen_estimators(name: Option<&str>) -> Result<Vec<EstimatorSettings>, Failu
 }
 
 fn text(answer: &Answer) -> String {
-    let mut text = format!("{}\n", answer.dataset);
+    let mut text = format!("{}\n{}", answer.dataset, notes(&answer.notes));
     for it in &answer.estimators {
         let reason = if it.reason == "none" { String::new() } else { format!(", {}", it.reason) };
         let rejected: u32 = it.samples.rejected.values().sum();

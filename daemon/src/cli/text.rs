@@ -1,5 +1,11 @@
 //! Aligned text for people.
 
+use dynocar_core::dataset::Note;
+use dynocar_core::plausibility::Severity;
+
+/// Widest line of running text.
+pub const WIDTH: usize = 96;
+
 /// Rows of cells under a header, aligned in columns.
 #[derive(Clone, Debug)]
 pub struct TextTable {
@@ -45,6 +51,18 @@ impl std::fmt::Display for TextTable {
         }
         Ok(())
     }
+}
+
+/// Notes on a dataset, each from a line of its own; those by which it cannot be true say so.
+pub fn notes(notes: &[Note]) -> String {
+    let line = |note: &Note| {
+        let head = match note.severity {
+            Severity::Fundamental => "cannot be true",
+            _ => "note",
+        };
+        format!("{}\n", wrap(&format!("{head}: {note}"), WIDTH).join("\n  "))
+    };
+    notes.iter().map(line).collect()
 }
 
 /// Breaks words into lines of at most `width` letters (a longer word has its own line).

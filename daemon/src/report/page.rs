@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use dynocar_core::dataset::Role;
 use dynocar_core::explain::answer::Verdict;
 use dynocar_core::explain::report::words;
+use dynocar_core::plausibility::Severity;
 
 use super::html::{escape, tonnes};
 use super::plots::colour_rules;
@@ -41,6 +42,7 @@ pub fn html(subject: &Subject) -> Result<String, ReportError> {
     );
     html += &header(subject, &name);
     html += "<main>\n";
+    html += &notes(subject);
     html += &verdict(subject);
     html += &contents(&sections);
     for section in &sections {
@@ -99,6 +101,27 @@ fn badge(verdict: Verdict) -> (&'static str, &'static str) {
         Verdict::Unknown => ("open", "Unknown cause"),
         Verdict::InsufficientData => ("open", "Insufficient data"),
     }
+}
+
+/// What may spoil the verdict, above it; empty when all is well.
+fn notes(subject: &Subject) -> String {
+    let notes = &subject.explanation.answer.notes;
+    if notes.is_empty() {
+        return String::new();
+    }
+    let is_impossible = subject.explanation.answer.impossibilities().next().is_some();
+    let (class, title) =
+        if is_impossible { (" impossible", "These data cannot be true") } else { ("", "Notes") };
+    let mut html = format!(
+        "<section id=\"notes\" class=\"notes{class}\" aria-labelledby=\"notes-title\">\n\
+         <h2 id=\"notes-title\">{title}</h2>\n<ul>\n"
+    );
+    for note in notes {
+        let class =
+            if note.severity == Severity::Fundamental { " class=\"impossible\"" } else { "" };
+        let _ = writeln!(html, "<li{class}>{}</li>", escape(&note.to_string()));
+    }
+    html + "</ul>\n</section>\n"
 }
 
 fn verdict(subject: &Subject) -> String {

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use dynocar_client::channel::SampleCount;
 use dynocar_client::{Announcement, ChannelError, Host, Peer, Role};
+use dynocar_core::plausibility::Slip;
 use dynocar_shared::{Reason, Status, TrainId};
 use tracing::{info, warn};
 
@@ -103,6 +104,12 @@ impl Watch {
     }
 
     fn report_changes(&mut self) {
+        // Once for all pipelines of a train.
+        let known = |(pipeline, last): (&WatchedPipeline, &TallyReading)| {
+            Some((pipeline.train.0, last.implausible?.slip))
+        };
+        let mut told: Vec<(u64, Slip)> =
+            self.pipelines.iter().zip(&self.readings).filter_map(known).collect();
         let now = Instant::now();
         let known = self.readings.iter_mut().zip(&mut self.statuses);
         for (pipeline, (last, log)) in self.pipelines.iter().zip(known) {
@@ -114,6 +121,13 @@ impl Watch {
                 // Changes to and fro that no line tells.
                 let untold = (untold > 0).then_some(untold);
                 info!(pipeline = name, train, %status, %reason, untold, "status");
+            }
+            if let Some(finding) = reading.implausible
+                && !told.contains(&(train, finding.slip))
+            {
+                told.push((train, finding.slip));
+                let code = finding.slip.code();
+                warn!(train, code, "the samples cannot be true: {finding}");
             }
             if reading.lost > last.lost {
                 let lost = reading.lost - last.lost;

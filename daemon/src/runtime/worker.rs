@@ -216,7 +216,7 @@ impl Slot {
         if self.sender.send(snapshot).is_err() {
             self.tally.note_unsent();
         }
-        self.tally.note(snapshot);
+        self.tally.note(self.pipeline.snapshot(), self.pipeline.implausible());
     }
 }
 

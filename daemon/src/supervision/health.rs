@@ -14,7 +14,7 @@ const PATIENCE: Duration = Duration::from_millis(1_500);
 pub enum Verdict {
     /// Every pipeline is vouched for, none with a reservation.
     Ok,
-    /// A pipeline is degraded or invalid.
+    /// A pipeline is degraded or invalid, or fed with samples that cannot be true.
     Degraded,
     /// There is a daemon, but a pipeline, or all, have not been heard of lately.
     Stale,
@@ -105,6 +105,7 @@ fn verdict_of(it: &PipelineHealth) -> Verdict {
         _ if it.is_stale => Verdict::Stale,
         (Status::Degraded, Some(Reason::OnlyLowerBound | Reason::EstimateStale)) => Verdict::Ok,
         (Status::Degraded | Status::Invalid, _) => Verdict::Degraded,
+        (_, Some(reason)) if reason.is_implausible_input() => Verdict::Degraded,
         (Status::Estimated | Status::Unestimated, _) => Verdict::Ok,
     }
 }

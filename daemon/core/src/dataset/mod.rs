@@ -16,7 +16,7 @@
 //! - `table`: a CSV file as columns of numbers
 //! - `order`, `spikes`, `motion`, `forces`, `altitude`: from columns to time, speed, position,
 //!   forces and gradient
-//! - [`run`], [`quality`], [`remark`]: samples, counts and warnings
+//! - [`run`], [`quality`], [`remark`], [`note`]: samples, counts and warnings
 
 mod altitude;
 mod corrections;
@@ -26,6 +26,7 @@ mod forces;
 pub mod manifest;
 mod motion;
 mod names;
+pub mod note;
 mod order;
 pub mod quality;
 pub mod quantity;
@@ -46,6 +47,7 @@ pub use forces::ForceSource;
 pub use manifest::{ColumnMapping, FileEntry, Manifest, PositionReference, Role, RunEntry};
 pub use motion::PositionSource;
 pub use names::Choices;
+pub use note::Note;
 pub use order::OrderCounts;
 pub use quality::{Phases, RunQuality};
 pub use quantity::Quantity;
@@ -168,7 +170,7 @@ impl DatasetHead {
         let context = run::Context {
             manifest: &self.manifest,
             train: &self.train,
-            track: self.track.as_deref(),
+            track: self.track.as_ref(),
         };
         let text = text(files, &entry.file, Some(&entry.place))?;
         run::read(context, index as u32 + 1, entry, &files.label(&entry.file), &text)

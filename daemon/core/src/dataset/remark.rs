@@ -4,12 +4,16 @@ use serde::Serialize;
 
 use super::forces::{Force, ForceSource};
 use super::motion::PositionSource;
+use super::note::{read_as, unit_of};
 use super::quality::RunQuality;
 use super::quantity::Quantity;
 use super::run::{Context, GradientSource, Resolved};
+use crate::plausibility::{Finding, Findings, Severity, Slip};
 
 /// Below this distance in m, comparisons of position and speed say nothing.
 const DISTANCE_MIN_M: f64 = 200.0;
+/// Rows at either end that tell where a run begins and ends.
+const END_ROWS: usize = 5;
 /// Position and integrated speed may differ by this share: wheel wear, balises, gaps.
 const DISTANCE_TOLERANCE: f64 = 0.05;
 /// So far in m off the line's ends a train's end may be.
@@ -26,6 +30,15 @@ const MOVING_MPS: f64 = 1.0;
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "remark", rename_all = "snake_case")]
 pub enum Remark {
+    /// The samples cannot be true: a wrong unit, an exchange, a wrong sign.
+    #[error("{}", finding.words(&unit_of(*finding, read_as)))]
+    Slip {
+        /// What it is, and by how much.
+        #[serde(flatten)]
+        finding: Finding,
+        /// The unit that the quantity was read in.
+        read_as: &'static str,
+    },
     /// The chainage runs against the declared direction.
     #[error("the position changes by {net_m:.0} m in all, against direction = {direction}")]
     AgainstDirection {
@@ -169,13 +182,54 @@ pub enum Remark {
     },
 }
 
+impl Remark {
+    /// The name for machines.
+    pub const fn code(&self) -> &'static str {
+        self.code_and_severity().0
+    }
+
+    /// How much it matters.
+    pub const fn severity(&self) -> Severity {
+        self.code_and_severity().1
+    }
+
+    const fn code_and_severity(&self) -> (&'static str, Severity) {
+        use Severity::{Fundamental, Info, Warning};
+        match self {
+            Remark::Slip { finding, .. } => (finding.slip.code(), finding.slip.severity()),
+            Remark::AgainstDirection { .. } => ("against_direction", Fundamental),
+            Remark::DistanceMismatch { .. } => ("distance_mismatch", Warning),
+            Remark::OffTheLine { .. } => ("off_the_line", Warning),
+            Remark::StartUnknown => ("start_unknown", Info),
+            Remark::NegativeForce { .. } => ("negative_force", Warning),
+            Remark::NegativeSpeed { .. } => ("negative_speed", Warning),
+            Remark::HandleOutOfRange { .. } => ("handle_out_of_range", Warning),
+            Remark::UnusedHandle { .. } => ("unused_handle", Info),
+            Remark::ForceNotRecorded { .. } => ("force_not_recorded", Info),
+            Remark::GradientUnknown => ("gradient_unknown", Info),
+            Remark::UnusualStep { .. } => ("unusual_step", Warning),
+            Remark::NoValues { .. } => ("no_values", Info),
+            Remark::NeverMoves { .. } => ("never_moves", Warning),
+            Remark::OneRow => ("one_row", Warning),
+            Remark::StandsStill { .. } => ("stands_still", Warning),
+            Remark::Implausible { .. } => ("implausible", Warning),
+        }
+    }
+}
+
 /// Looks for what may be wrong with a run.
-pub(super) fn remarks(context: Context, run: &Resolved, quality: &RunQuality) -> Vec<Remark> {
-    let mut remarks = Vec::new();
+pub(super) fn remarks(
+    context: Context,
+    run: &Resolved,
+    quality: &RunQuality,
+    findings: &Findings,
+) -> Vec<Remark> {
+    let slip = |finding| Remark::Slip { finding, read_as: read_as(context.manifest, finding) };
+    let mut remarks: Vec<Remark> = findings.iter().map(slip).collect();
     of_time(quality, &mut remarks);
     of_content(context, run, quality, &mut remarks);
     remarks.extend(stands_still(run));
-    of_position(context, run, quality, &mut remarks);
+    of_position(context, run, quality, findings, &mut remarks);
     if run.speeds.negative > 0 {
         remarks.push(Remark::NegativeSpeed { count: run.speeds.negative });
     }
@@ -237,7 +291,13 @@ fn stands_still(run: &Resolved) -> Option<Remark> {
     Some(Remark::StandsStill { from_s, for_s, speed_mps })
 }
 
-fn of_position(context: Context, run: &Resolved, quality: &RunQuality, remarks: &mut Vec<Remark>) {
+fn of_position(
+    context: Context,
+    run: &Resolved,
+    quality: &RunQuality,
+    findings: &Findings,
+    remarks: &mut Vec<Remark>,
+) {
     if run.position_source == PositionSource::IntegratedSpeed {
         if context.track.is_some() && run.entry.start_m.is_none() {
             remarks.push(Remark::StartUnknown);
@@ -245,16 +305,30 @@ fn of_position(context: Context, run: &Resolved, quality: &RunQuality, remarks: 
         return;
     }
     let ordered = |row: &usize| run.order.in_order[*row] && !run.position_m[*row].is_nan();
-    let mut rows = (0..run.position_m.len()).filter(ordered);
-    let (Some(first), Some(last)) = (rows.next(), rows.next_back()) else { return };
-    let net_m = run.position_m[last] - run.position_m[first];
+    let rows: Vec<usize> = (0..run.position_m.len()).filter(ordered).collect();
+    if rows.len() < 2 {
+        return;
+    }
+    // The medians of a few rows, since a row at an end may be an outlier.
+    let few = END_ROWS.min(rows.len() / 2);
+    let median_m = |rows: &[usize]| {
+        let mut positions: Vec<f64> = rows.iter().map(|&row| run.position_m[row]).collect();
+        positions.sort_by(f64::total_cmp);
+        positions[(positions.len() - 1) / 2]
+    };
+    let net_m = median_m(&rows[rows.len() - few..]) - median_m(&rows[..few]);
     let direction = run.entry.direction;
-    if net_m * f64::from(direction) < -DISTANCE_MIN_M {
+    let is_told = |slips: &[Slip]| findings.iter().any(|finding| slips.contains(&finding.slip));
+    if net_m * f64::from(direction) < -DISTANCE_MIN_M && !is_told(&[Slip::DirectionReversed]) {
         remarks.push(Remark::AgainstDirection { direction, net_m });
     }
     let (position_m, speed_m) = (net_m.abs(), quality.distance_m);
     let is_long = position_m.max(speed_m) > DISTANCE_MIN_M;
-    if is_long && (position_m - speed_m).abs() > DISTANCE_TOLERANCE * position_m.max(speed_m) {
+    let is_mismatch_told = is_told(&[Slip::TimeScale, Slip::SpeedScale, Slip::PositionScale]);
+    if !is_mismatch_told
+        && is_long
+        && (position_m - speed_m).abs() > DISTANCE_TOLERANCE * position_m.max(speed_m)
+    {
         remarks.push(Remark::DistanceMismatch { position_m, speed_m });
     }
     let length_m = context.track.and_then(|track| track.length_m);

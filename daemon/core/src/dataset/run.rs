@@ -1,5 +1,7 @@
 //! One run, from its file to the samples that the pipelines take.
 
+use std::sync::Arc;
+
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use serde::Serialize;
@@ -14,6 +16,7 @@ use super::quality::{self, RunQuality};
 use super::quantity::Quantity;
 use super::remark::{self, Remark};
 use super::table::Table;
+use crate::plausibility;
 use crate::track::Track;
 use crate::train::TrainModel;
 
@@ -89,8 +92,8 @@ pub struct Run {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Context<'d> {
     pub manifest: &'d Manifest,
-    pub train: &'d TrainModel,
-    pub track: Option<&'d Track>,
+    pub train: &'d Arc<TrainModel>,
+    pub track: Option<&'d Arc<Track>>,
 }
 
 /// The columns of a run after all that is particular to its file.
@@ -136,7 +139,10 @@ pub(super) fn read(
     }
     let samples = resolved.samples(number);
     let quality = quality::assess(context, &resolved, &samples);
-    let remarks = remark::remarks(context, &resolved, &quality);
+    let is_position_recorded = resolved.position_source == PositionSource::Column;
+    let findings =
+        plausibility::of_samples(context.train, context.track, &samples, is_position_recorded);
+    let remarks = remark::remarks(context, &resolved, &quality, &findings);
     Ok(Run {
         file: entry.file.clone(),
         number,
@@ -175,7 +181,8 @@ impl<'d> Resolved<'d> {
                 (position_m, PositionSource::IntegratedSpeed)
             }
         };
-        let (gradient_permille, gradient_source) = gradient(context.track, &table, &position_m);
+        let (gradient_permille, gradient_source) =
+            gradient(context.track.map(Arc::as_ref), &table, &position_m);
         Resolved {
             entry,
             times_s,

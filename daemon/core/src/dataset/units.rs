@@ -107,6 +107,11 @@ impl Unit {
             .expect("every dimension has its base unit")
     }
 
+    /// One of this unit in units of another of the same dimension, shifts left out.
+    pub fn in_terms_of(&self, other: &Unit) -> f64 {
+        self.multiply / self.divide * other.divide / other.multiply
+    }
+
     /// The name, as written in a dataset.
     pub fn name(&self) -> &'static str {
         self.name

@@ -4,6 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::dataset::Note;
+use crate::plausibility::Severity;
+
 /// What the data say, in a word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -90,6 +93,13 @@ pub struct Place {
     /// How surely that is known, where it was estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uncertainty_95: Option<PlaceUncertainty>,
+}
+
+impl Answer {
+    /// The notes by which the data cannot be true.
+    pub fn impossibilities(&self) -> impl Iterator<Item = &Note> {
+        self.notes.iter().filter(|note| note.severity == Severity::Fundamental)
+    }
 }
 
 impl Place {
@@ -205,6 +215,8 @@ pub struct Answer {
     pub verdict: Verdict,
     /// The verdict in a sentence or two.
     pub statement: String,
+    /// What may spoil the verdict, the worst first; with a fundamental one there is none.
+    pub notes: Vec<Note>,
     /// The effects found, the strongest first.
     pub effects: Vec<EffectAnswer>,
     /// Kinds that explain the data as well as the first effect.

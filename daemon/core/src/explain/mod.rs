@@ -29,6 +29,7 @@ pub mod verdict;
 use std::collections::BTreeMap;
 
 use crate::dataset::{Dataset, Role};
+use crate::plausibility::Severity;
 use answer::Answer;
 use evidence::{Fit, FitProblem, RunData, RunDataError};
 use score::{PredictedRun, Score};
@@ -78,12 +79,15 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
         track: dataset.track.as_ref(),
         progress,
     };
-    let mut outcome = search.run();
+    let notes = dataset.notes();
+    // An effect that explains wrong units is none.
+    let is_possible = notes.iter().all(|note| note.severity < Severity::Fundamental);
+    let mut outcome = if is_possible { search.run() } else { search.base() };
     let known = places::settle(&problem, &mut outcome.fit);
     progress(0.95, "scoring the holdout runs");
     let score = Score::of(&problem, &holdout, &outcome.base, &outcome.fit);
     let predictions = score::predictions(&problem, &holdout, &outcome.fit);
-    let answer = verdict::answer(&search, &outcome, &known, &score);
+    let answer = verdict::answer(&search, &outcome, &known, &score, notes);
     let strength = search.greatest_strength(&outcome);
     progress(1.0, "done");
     let (base, grown) = (outcome.base.clone(), outcome.fit.clone());

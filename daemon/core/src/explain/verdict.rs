@@ -13,6 +13,8 @@ use super::effects::ReportContext;
 use super::rivals::{is_in, rivals, separating_run};
 use super::score::{self, Score};
 use super::selection::{Outcome, Search, deviations, discounted, p_value, penalty};
+use crate::dataset::Note;
+use crate::plausibility::Severity;
 use crate::simulate::SpeedError;
 
 /// Moving time in s of the fit runs below which nothing is said.
@@ -26,6 +28,7 @@ pub fn answer(
     outcome: &Outcome,
     known: &[Option<PlaceUncertainty>],
     score: &Score,
+    notes: Vec<Note>,
 ) -> Answer {
     let fit = &outcome.fit;
     let (deviation, covariance) = deviations(fit);
@@ -34,10 +37,21 @@ pub fn answer(
     let verdict = verdict(search, outcome, &rivals);
     let [rmse_before, rmse_after] = score.holdout_rmse_mps();
     let pair = |errors: [SpeedError; 2]| Some([errors[0].rmse_mps()?, errors[1].rmse_mps()?]);
-    let (statement, experiment) = statement(search, outcome, verdict, &effects, &rivals);
+    let impossible: Vec<String> = notes
+        .iter()
+        .filter(|note| note.severity == Severity::Fundamental)
+        .map(ToString::to_string)
+        .collect();
+    let (statement, experiment) = if impossible.is_empty() {
+        statement(search, outcome, verdict, &effects, &rivals)
+    } else {
+        let text = format!("The data cannot be true as described: {}", impossible.join("; "));
+        (text, Some("Set right what is named and run this again.".into()))
+    };
     Answer {
         verdict,
         statement,
+        notes,
         effects,
         ambiguous_with: rivals.iter().map(|kind| kind.name()).collect(),
         experiment,

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use dynocar_shared::SampleField;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::{SampleField, TrainSample};
 
 use crate::terms::bearings::WarmUp;
 use crate::terms::delay::DelayLine;
@@ -159,12 +159,8 @@ impl ForceResolver {
             .zip(position_m)
             .map_or(1.0, |(track, position_m)| track.mass_factor(position_m, direction));
         let mass_kg = sample.get(SampleField::Mass).unwrap_or(train.mass_kg) * mass_factor;
-        let gradient_permille = track
-            .zip(position_m)
-            .and_then(|(track, at_m)| {
-                gradient::along_travel_permille(track, (at_m, direction), train.length_m, 0.0)
-            })
-            .or_else(|| Some(direction * sample.get(SampleField::Gradient)?))
+        let gradient_permille = self
+            .stated_gradient_permille(sample)
             .or_else(|| self.accelerometer_gradient_permille(valid));
         let curvature_per_m = on_track(Track::curvature_per_m).or_else(|| {
             let radius_m = sample.get(SampleField::CurveRadius)?;
@@ -244,6 +240,20 @@ impl ForceResolver {
             place::act(extra_n_per_kn, &mut resistance);
         }
         resistance
+    }
+
+    /// Gradient in ‰ along the travel by the track at the sample's position, else by the sample.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    pub fn stated_gradient_permille(&self, sample: &TrainSample) -> Option<f64> {
+        let direction = f64::from(sample.direction);
+        let on_track = || {
+            let at = (sample.get(SampleField::Position)?, direction);
+            gradient::along_travel_permille(self.track.as_deref()?, at, self.train.length_m, 0.0)
+        };
+        on_track().or_else(|| Some(direction * sample.get(SampleField::Gradient)?))
     }
 
     /// Gradient in ‰ along the travel from specific force = dv/dt + g * gradient, with dv/dt

@@ -28,6 +28,7 @@ use std::sync::Arc;
 use dynocar_shared::{ParameterSnapshot, Reason, RejectionReason, Status, TrainId, TrainSample};
 
 use crate::force::ForceResolver;
+use crate::plausibility::{Finding, Plausibility};
 use crate::track::Track;
 use crate::train::TrainModel;
 use crate::validation::{ValidationLimits, Validator};
@@ -37,6 +38,7 @@ pub struct Pipeline {
     validator: Validator,
     resolver: ForceResolver,
     estimator: Box<dyn Estimator>,
+    plausibility: Plausibility,
     /// Share of the samples lately that validation refused.
     refused_share: f64,
     snapshot: ParameterSnapshot,
@@ -65,6 +67,7 @@ impl Pipeline {
         estimator.write(&mut snapshot);
         Pipeline {
             validator: Validator::new(train_id, train.mass_kg, limits),
+            plausibility: Plausibility::new(Arc::clone(&train)),
             resolver: ForceResolver::new(train, track),
             estimator,
             refused_share: 0.0,
@@ -108,8 +111,16 @@ impl Pipeline {
         let valid = self.validator.check(sample);
         self.refused_share += (f64::from(valid.is_err()) - self.refused_share) / REFUSALS_MEMORY;
         let outcome = match valid {
-            Ok(valid) => self.estimator.update(&self.resolver.resolve(&valid)),
-            Err(reason) => Outcome::Rejected(reason),
+            Ok(valid) => {
+                let resolved = self.resolver.resolve(&valid);
+                self.plausibility.take(sample, Ok(()), resolved.gradient_permille);
+                self.estimator.update(&resolved)
+            }
+            Err(reason) => {
+                let gradient_permille = self.resolver.stated_gradient_permille(sample);
+                self.plausibility.take(sample, Err(reason), gradient_permille);
+                Outcome::Rejected(reason)
+            }
         };
         let snapshot = &mut self.snapshot;
         match outcome {
@@ -126,10 +137,23 @@ impl Pipeline {
         snapshot.sample_published_ns = sample.published_ns;
         snapshot.sample_sequence = sample.sequence;
         self.estimator.write(snapshot);
-        if self.refused_share > REFUSED_SHARE_MAX && snapshot.status() == Status::Estimated {
-            output::write_status(snapshot, Status::Degraded, Reason::BadInput);
+        let is_estimated = snapshot.status() == Status::Estimated;
+        if let Some(Finding { slip, .. }) = self.implausible() {
+            let snapshot = &mut self.snapshot;
+            snapshot.reason = slip.reason() as u32;
+            if is_estimated {
+                snapshot.status = Status::Degraded as u32;
+            }
+        } else if is_estimated && self.refused_share > REFUSED_SHARE_MAX {
+            output::write_status(&mut self.snapshot, Status::Degraded, Reason::BadInput);
         }
-        snapshot
+        &self.snapshot
+    }
+
+    /// What cannot be true of the samples lately and spoils the estimate.
+    pub fn implausible(&self) -> Option<Finding> {
+        let kind = self.estimator.kind();
+        self.plausibility.findings().iter().find(|finding| finding.slip.concerns(kind))
     }
 
     /// The snapshot after the last sample.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use dynocar_core::dataset::{
-    ColumnMapping, DatasetError, DatasetHead, ForceSource, GradientSource, Manifest,
+    ColumnMapping, DatasetError, DatasetHead, ForceSource, GradientSource, Manifest, Note,
     PositionSource, Quantity, Remark, Role, Run, RunEntry, RunQuality,
 };
 use dynocar_core::track::Track;
@@ -25,6 +25,8 @@ pub(super) struct Answer<'a> {
     /// The first of them, as every command gives it.
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<ErrorAnswer>,
+    /// What may spoil results, the worst first.
+    notes: Vec<Note>,
     #[serde(skip_serializing_if = "Option::is_none")]
     dataset: Option<DatasetAnswer<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -139,6 +141,7 @@ pub(super) fn refusal(path: &Path, error: ErrorAnswer) -> Answer<'static> {
         valid: false,
         errors: vec![error.message.clone()],
         error: Some(error),
+        notes: Vec::new(),
         dataset: None,
         train: None,
         track: None,
@@ -165,6 +168,7 @@ pub(super) fn answer<'a>(path: &Path, understood: &'a Understood) -> Answer<'a> 
         valid: errors.is_empty(),
         errors,
         error: first.and_then(|error| Failure::from(error).answer()),
+        notes: understood.notes(),
         dataset,
         train: train.map(train_answer),
         track: track.map(track_answer),

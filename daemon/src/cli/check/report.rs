@@ -5,17 +5,18 @@ use dynocar_core::track::Track;
 use dynocar_core::train::{BrakeGear, Corrections, EffortCurve, TrainModel};
 
 use super::{Understood, daemon, runs};
-use crate::cli::text::{short, wrap};
+use crate::cli::text::{self, WIDTH, short, wrap};
 
-/// Widest line of running text.
-pub(super) const WIDTH: usize = 96;
 /// Width of the keys of an entry.
 const KEY_WIDTH: usize = 12;
 
 /// The whole report.
 pub(super) fn report(understood: &Understood) -> String {
     match understood {
-        Understood::Train(model) => train(model),
+        Understood::Train(model) => match &text::notes(&understood.notes())[..] {
+            "" => train(model),
+            notes => format!("{}\nnotes\n{notes}", train(model)),
+        },
         Understood::Track(line) => track(line),
         Understood::Daemon(config) => daemon::report(config),
         Understood::Dataset(head, read) => {
@@ -28,7 +29,7 @@ pub(super) fn report(understood: &Understood) -> String {
                 train(&head.train),
                 track,
                 columns(&head.manifest),
-                runs::report(&head.manifest, read),
+                runs::report(&head.manifest, read, &understood.notes()),
             ];
             parts.join("\n")
         }
@@ -135,7 +136,7 @@ fn corrections(known: &Corrections) -> Vec<String> {
     );
     say(
         known.tunnel_dc_n_per_kn_per_mps2 != 0.0,
-        format!("c {} in tunnels", signed(known.tunnel_dc_n_per_kn_per_mps2, 4)),
+        format!("c {} greater in tunnels", short(known.tunnel_dc_n_per_kn_per_mps2, 6)),
     );
     say(
         known.wind_plus_mps != 0.0,
@@ -249,13 +250,14 @@ fn track(track: &Track) -> String {
         },
     );
     if track.gradient_shift_m() != 0.0 {
-        let shift = signed(track.gradient_shift_m(), 1);
-        text += &line("gradient shift", &format!("{shift} m along growing chainage"));
+        let shift = short(track.gradient_shift_m(), 1);
+        text += &line("shift", &format!("the gradient lies {shift} m further"));
     }
     if let Some(error) = track.gradient_error_permille() {
         let (low, high) = range(error.entries().iter().map(|(_, permille)| *permille));
-        let (low, high, count) = (signed(low, 3), signed(high, 3), error.entries().len());
-        text += &line("gradient error", &format!("{low} to {high} ‰ at {count} chainages"));
+        let (low, high, count) = (short(low, 3), short(high, 3), error.entries().len());
+        let lacks = format!("the gradient lacks {low} to {high} ‰ at {count} chainages");
+        text += &line("error", &lacks);
     }
     if let Some(profile) = track.resistance() {
         let places: Vec<f64> =

@@ -2,16 +2,16 @@
 
 use dynocar_core::dataset::quality::QuantityCount;
 use dynocar_core::dataset::{
-    DatasetError, ForceSource, GradientSource, Manifest, PositionSource, Role, Run,
+    DatasetError, ForceSource, GradientSource, Manifest, Note, PositionSource, Remark, Role, Run,
 };
+use dynocar_core::plausibility::Slip;
 
-use super::report::WIDTH;
-use crate::cli::text::{TextTable, short, wrap};
+use crate::cli::text::{TextTable, WIDTH, short, wrap};
 
 type Read = Result<Run, DatasetError>;
 
 /// The tables and notes of all runs.
-pub(super) fn report(manifest: &Manifest, runs: &[Read]) -> String {
+pub(super) fn report(manifest: &Manifest, runs: &[Read], of_dataset: &[Note]) -> String {
     let count = |role| manifest.runs.iter().filter(|run| run.role == role).count();
     let (fit, holdout) = (count(Role::Fit), count(Role::Holdout));
     let mut text = format!("runs     {}: {fit} to fit, {holdout} held out\n", runs.len());
@@ -21,7 +21,7 @@ pub(super) fn report(manifest: &Manifest, runs: &[Read]) -> String {
     text += &data_table(runs).to_string();
     text.push('\n');
     text += &sources(runs);
-    text += &notes(runs);
+    text += &notes(runs, of_dataset);
     text
 }
 
@@ -162,9 +162,17 @@ fn source(name: &str, runs: &[Read], of: impl Fn(&Run) -> &'static str) -> Strin
     format!("  {name:12}{}\n", parts.join("; "))
 }
 
-/// What to know of single runs, each note once with its runs; nothing when all is well.
-fn notes(runs: &[Read]) -> String {
-    let mut notes: Vec<(String, Vec<String>)> = Vec::new();
+/// What to know, each note once with its runs, first what cannot be true; nothing when all is well.
+fn notes(runs: &[Read], of_dataset: &[Note]) -> String {
+    let number = |file: &String| {
+        let run = runs.iter().flatten().find(|run| run.file == *file);
+        run.map_or_else(String::new, |run| run.number.to_string())
+    };
+    let is_slip = |note: &&Note| Slip::ALL.iter().any(|slip| slip.code() == note.code);
+    let told_first = of_dataset.iter().filter(|note| note.runs.is_empty() || is_slip(note));
+    let mut notes: Vec<(String, Vec<String>)> = told_first
+        .map(|note| (note.text.clone(), note.runs.iter().map(number).collect()))
+        .collect();
     for (index, run) in runs.iter().enumerate() {
         let of_run = match run {
             Ok(run) => notes_on(run),
@@ -180,8 +188,12 @@ fn notes(runs: &[Read]) -> String {
     }
     let mut text = String::new();
     for (note, numbers) in notes {
-        let plural = if numbers.len() > 1 { "s" } else { "" };
-        let lines = wrap(&format!("run{plural} {}: {note}", numbers.join(", ")), WIDTH);
+        let runs = match numbers.len() {
+            0 => "train and line".into(),
+            1 => format!("run {}", numbers[0]),
+            _ => format!("runs {}", numbers.join(", ")),
+        };
+        let lines = wrap(&format!("{runs}: {note}"), WIDTH);
         text += &format!("  {}\n", lines.join("\n    "));
     }
     if text.is_empty() { text } else { format!("\nnotes\n{text}") }
@@ -216,6 +228,7 @@ fn notes_on(run: &Run) -> Vec<String> {
     if !quality.order.is_regular {
         notes.push("the time step varies, so that missing rows cannot be counted".into());
     }
-    notes.extend(run.remarks.iter().map(ToString::to_string));
+    let by_run = run.remarks.iter().filter(|remark| !matches!(remark, Remark::Slip { .. }));
+    notes.extend(by_run.map(ToString::to_string));
     notes
 }

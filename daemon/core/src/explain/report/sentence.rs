@@ -241,6 +241,7 @@ mod tests {
         let mut answer = Answer {
             verdict: Verdict::Ambiguous,
             statement: String::new(),
+            notes: Vec::new(),
             effects: vec![effect("local_resistance", "extra_n_per_kn")],
             ambiguous_with: vec!["tunnel_drag"],
             experiment: None,

@@ -82,15 +82,19 @@ pub struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Searches.
-    pub fn run(&self) -> Outcome {
+    /// The declared model with a, b, c refitted, and no search for effects.
+    pub fn base(&self) -> Outcome {
         (self.progress)(0.05, "fitting a, b, c");
         let declared = GrownModel::default();
         let start = self.problem.start(&[]);
         let first = self.problem.fit_with_noise(&declared, start, Noise::START);
         let base = self.problem.fit_with_noise(&declared, first.theta, first.noise);
-        let mut outcome =
-            Outcome { base: base.clone(), fit: base, rounds: Vec::new(), not_testable: Vec::new() };
+        Outcome { base: base.clone(), fit: base, rounds: Vec::new(), not_testable: Vec::new() }
+    }
+
+    /// Searches.
+    pub fn run(&self) -> Outcome {
+        let mut outcome = self.base();
         if outcome.base.observations() < OBSERVATIONS_MIN {
             return outcome;
         }

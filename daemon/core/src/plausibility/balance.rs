@@ -1,0 +1,146 @@
+//! What the acceleration says of the forces, by least squares over windows of motion.
+//!
+//! In the mean of a window of a few seconds, (1 + gamma) dv/dt = T/m - B/m - g i - p - q v². With
+//! right units the factors of traction T, brake B and gradient i are 1; p and q are whatever the
+//! resistance is, so that only pronounced accelerations tell of the forces and a wrong declared
+//! resistance tells nothing.
+
+use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use nalgebra::{SMatrix, SVector};
+
+/// Traction, brake, gradient, 1, v².
+const COLUMNS: usize = 5;
+/// Windows that the sums look back over.
+const MEMORY: f64 = 400.0;
+/// Windows of motion that are enough to judge.
+const WINDOWS_MIN: f64 = 12.0;
+/// Accelerations in m/s² beyond this are none in whatever unit.
+const BELIEVED_MAX: f64 = 1e9;
+/// Share of a column's scatter that the others must leave to it.
+const OWN_SHARE_MIN: f64 = 1e-3;
+/// A factor is known when it is so many of its standard deviations away from 0.
+const KNOWN_DEVIATIONS: f64 = 8.0;
+
+/// The means over a window of motion, accelerations in m/s².
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WindowMean {
+    /// (1 + gamma) dv/dt.
+    pub inertia_mps2: f64,
+    /// Traction over mass.
+    pub traction_mps2: f64,
+    /// Brake force over mass.
+    pub brake_mps2: f64,
+    /// Weight along the track over mass, climbing positive.
+    pub gradient_mps2: f64,
+    /// Speed in m/s.
+    pub speed_mps: f64,
+}
+
+/// By how much the acceleration exceeds what a reported quantity would give; 1 in right units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slope {
+    /// The factor.
+    pub factor: f64,
+    /// Its standard deviation.
+    pub std: f64,
+}
+
+impl Slope {
+    /// True when it is surely not 0.
+    fn is_known(&self) -> bool {
+        self.factor.abs() > KNOWN_DEVIATIONS * self.std
+    }
+}
+
+/// The factors of traction, brake and gradient, where the motion tells them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Slopes {
+    /// Of the traction force.
+    pub traction: Option<Slope>,
+    /// Of the brake force.
+    pub brake: Option<Slope>,
+    /// Of the gradient.
+    pub gradient: Option<Slope>,
+}
+
+/// Sums over the windows lately.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Balance {
+    gram: SMatrix<f64, COLUMNS, COLUMNS>,
+    with_inertia: SVector<f64, COLUMNS>,
+    inertia_square: f64,
+    windows: f64,
+}
+
+impl Default for Balance {
+    fn default() -> Self {
+        Balance {
+            gram: SMatrix::zeros(),
+            with_inertia: SVector::zeros(),
+            inertia_square: 0.0,
+            windows: 0.0,
+        }
+    }
+}
+
+impl Balance {
+    /// Takes in a window.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    pub fn push(&mut self, mean: &WindowMean) {
+        let row = SVector::from([
+            mean.traction_mps2,
+            -mean.brake_mps2,
+            -mean.gradient_mps2,
+            -1.0,
+            -mean.speed_mps * mean.speed_mps,
+        ]);
+        // What is beyond any unit is no measurement.
+        if !row.iter().chain([&mean.inertia_mps2]).all(|value| value.abs() < BELIEVED_MAX) {
+            return;
+        }
+        let keep = 1.0 - 1.0 / MEMORY;
+        self.gram = self.gram * keep + row * row.transpose();
+        self.with_inertia = self.with_inertia * keep + row * mean.inertia_mps2;
+        self.inertia_square = self.inertia_square * keep + mean.inertia_mps2 * mean.inertia_mps2;
+        self.windows = self.windows * keep + 1.0;
+    }
+
+    /// Root mean square of the gradients in ‰.
+    pub fn gradient_rms_permille(&self) -> f64 {
+        1e3 / STANDARD_GRAVITY_MPS2 * (self.gram[(2, 2)] / self.windows.max(1.0)).sqrt()
+    }
+
+    /// The factors by least squares.
+    pub fn slopes(&self) -> Slopes {
+        if self.windows < WINDOWS_MIN {
+            return Slopes::default();
+        }
+        // Each column over its own size: quantities in wrong units differ by many powers of ten.
+        let scale =
+            self.gram.diagonal().map(|square| if square > 0.0 { square.sqrt() } else { 1.0 });
+        let scaled = SMatrix::<f64, COLUMNS, COLUMNS>::from_fn(|i, j| {
+            let entry = self.gram[(i, j)] / (scale[i] * scale[j]);
+            // A column that is not there stands alone.
+            if i == j { entry.max(f64::MIN_POSITIVE) + 1e-9 } else { entry }
+        });
+        let Some(factored) = scaled.cholesky() else { return Slopes::default() };
+        let inverse = factored.inverse();
+        let right = self.with_inertia.component_div(&scale);
+        let solution = inverse * right;
+        let left = (self.inertia_square - solution.dot(&right)).max(0.0);
+        let variance = left / (self.windows - COLUMNS as f64).max(1.0);
+        let slope = |column: usize| {
+            let own_share = 1.0 / inverse[(column, column)];
+            let slope = Slope {
+                factor: solution[column] / scale[column],
+                std: (variance * inverse[(column, column)]).sqrt() / scale[column],
+            };
+            let is_there = self.gram[(column, column)] > 0.0 && own_share > OWN_SHARE_MIN;
+            (is_there && slope.is_known()).then_some(slope)
+        };
+        Slopes { traction: slope(0), brake: slope(1), gradient: slope(2) }
+    }
+}

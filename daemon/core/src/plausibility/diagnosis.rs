@@ -1,0 +1,204 @@
+//! From figures to slips: which one would make all of them come out as they did.
+//!
+//! | slip by a factor f of reported over true | forces' factor | way by position / by speed | gradient's factor |
+//! | --- | --- | --- | --- |
+//! | forces | 1/f | 1 | 1 |
+//! | mass | f | 1 | 1 |
+//! | speed | f | 1/f | f |
+//! | time | 1/f | 1/f | 1/f |
+//! | position | 1 | f | not known |
+//! | traction and brake exchanged | -1 | 1 | 1 |
+
+use super::balance::Slope;
+use super::slip::{Finding, Slip};
+use super::watch::Figures;
+
+/// Factors of forces within these bounds are effects that a train can have.
+const FORCE_FACTORS: (f64, f64) = (0.4, 2.5);
+/// Way by position over way by speed within these bounds is wear, gaps and drift.
+const WAY_RATIOS: (f64, f64) = (0.8, 1.25);
+/// Masses over the declared one within these bounds are loads, as in validation.
+const MASS_RATIOS: (f64, f64) = (0.2, 5.0);
+/// Factors of traction and brake that differ by less are one factor.
+const SAME_FACTOR: f64 = 1.6;
+/// Steps in s outside these bounds are unusual for a recorder of a train.
+const USUAL_STEP_S: (f64, f64) = (0.002, 20.0);
+/// Greatest share of the effort curve that a train may show, and the least that is worth a word.
+const EFFORT_SHARES: (f64, f64) = (0.02, 4.0);
+/// Gradients in ‰ (root mean square) below and beyond which a wrong unit is credible.
+const GRADIENT_RMS_PERMILLE: (f64, f64) = (3.0, 25.0);
+/// The least mean pressure in Pa of brakes that are applied; what is too high is out of range.
+const BRAKING_PRESSURE_MIN_PA: f64 = 5e3;
+/// An ordinary one.
+const ORDINARY_PRESSURE_PA: f64 = 1e5;
+
+/// Findings at most.
+const FINDINGS_MAX: usize = 4;
+
+/// What was found, the most fundamental first.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Findings {
+    list: [Option<Finding>; FINDINGS_MAX],
+}
+
+impl Findings {
+    fn add(&mut self, slip: Slip, factor: f64) {
+        if let Some(place) = self.list.iter_mut().find(|place| place.is_none()) {
+            *place = Some(Finding { slip, factor });
+        }
+    }
+
+    /// All of them.
+    pub fn iter(&self) -> impl Iterator<Item = Finding> {
+        self.list.into_iter().flatten()
+    }
+}
+
+/// Judges figures.
+///
+/// # Real-time
+///
+/// Bounded work, no allocation.
+pub fn diagnose(figures: &Figures) -> Findings {
+    let mut found = Findings::default();
+    let kinematic = kinematic(figures);
+    let (forces_by, gradients_by) = match kinematic {
+        Some(Finding { slip: Slip::SpeedScale, factor }) => (factor, factor),
+        Some(Finding { slip: Slip::TimeScale, factor }) => (1.0 / factor, 1.0 / factor),
+        _ => (1.0, 1.0),
+    };
+    if let Some(Finding { slip, factor }) = kinematic {
+        found.add(slip, factor);
+    }
+    let mut forces_by = forces_by;
+    if let Some(ratio) = figures.mass_ratio.filter(|&ratio| is_outside(ratio, MASS_RATIOS)) {
+        found.add(Slip::MassScale, ratio);
+        forces_by *= ratio;
+    }
+    of_forces(figures, forces_by, kinematic.is_some(), &mut found);
+    if kinematic.is_none() {
+        of_gradient(figures, gradients_by, &mut found);
+    }
+    if let Some(pressure_pa) = figures.braking_pressure_pa
+        && pressure_pa < BRAKING_PRESSURE_MIN_PA
+    {
+        found.add(Slip::PressureScale, pressure_factor(pressure_pa));
+    }
+    found
+}
+
+fn is_outside(value: f64, (low, high): (f64, f64)) -> bool {
+    !(low..=high).contains(&value)
+}
+
+/// The slip that explains how position and speed go together.
+fn kinematic(figures: &Figures) -> Option<Finding> {
+    let ratio = figures.way_ratio?;
+    if (-WAY_RATIOS.1..-WAY_RATIOS.0).contains(&ratio) {
+        return Some(Finding { slip: Slip::DirectionReversed, factor: ratio });
+    }
+    if !(ratio > 0.0) || !is_outside(ratio, WAY_RATIOS) {
+        return None;
+    }
+    let candidates = [
+        (Slip::SpeedScale, 1.0 / ratio, 1.0 / ratio),
+        (Slip::TimeScale, 1.0 / ratio, ratio),
+        (Slip::PositionScale, ratio, 1.0),
+    ];
+    let of_forces = common_factor(figures);
+    let has_usual_step = !is_outside(figures.step_s, USUAL_STEP_S);
+    let is_unlikely = |slip| match slip {
+        Slip::TimeScale => has_usual_step,
+        Slip::PositionScale => !has_usual_step,
+        _ => false,
+    };
+    let misfit = |(slip, factor, expected): &(Slip, f64, f64)| {
+        let of_unit = slip.misfit(*factor)?;
+        Some(match of_forces {
+            Some(of_forces) if of_forces > 0.0 => of_unit + (of_forces / expected).ln().abs(),
+            // The forces do not tell: a time in another unit shows in the steps.
+            _ => of_unit + if is_unlikely(*slip) { 1.0 } else { 0.0 },
+        })
+    };
+    let known = candidates.iter().filter_map(|candidate| Some((misfit(candidate)?, candidate)));
+    let (_, (slip, factor, _)) = known.min_by(|one, other| one.0.total_cmp(&other.0))?;
+    Some(Finding { slip: *slip, factor: *factor })
+}
+
+/// The factor of both forces, when they have one.
+fn common_factor(figures: &Figures) -> Option<f64> {
+    match (figures.slopes.traction, figures.slopes.brake) {
+        (Some(one), Some(other)) => {
+            let ratio = one.factor / other.factor;
+            (1.0 / SAME_FACTOR..SAME_FACTOR).contains(&ratio).then(|| {
+                // The geometric mean, with their sign.
+                one.factor.signum() * (one.factor * other.factor).sqrt()
+            })
+        }
+        (one, other) => one.or(other).map(|slope| slope.factor),
+    }
+}
+
+fn of_forces(figures: &Figures, by: f64, is_kinematic: bool, found: &mut Findings) {
+    let slopes = figures.slopes;
+    if let Some(common) = common_factor(figures).map(|factor| factor / by) {
+        if common < -FORCE_FACTORS.0 {
+            found.add(Slip::ForcesSwapped, common);
+        } else if is_outside(common, FORCE_FACTORS) {
+            let (slip, factor) = blamed(figures, common, is_kinematic);
+            found.add(slip, factor);
+        }
+        return;
+    }
+    let of_one = [(Slip::TractionScale, slopes.traction), (Slip::BrakeScale, slopes.brake)];
+    for (slip, slope) in of_one {
+        let Some(Slope { factor, .. }) = slope else { continue };
+        let factor = factor / by;
+        if is_outside(factor, FORCE_FACTORS) {
+            found.add(slip, 1.0 / factor);
+        }
+    }
+}
+
+/// Who is to blame when both forces miss the acceleration by a factor: the speed where its units
+/// explain it and no position contradicts, the mass where the forces are such as the effort curves
+/// allow and would not be otherwise, else the forces.
+fn blamed(figures: &Figures, common: f64, is_kinematic: bool) -> (Slip, f64) {
+    let of_forces = Slip::ForcesScale.misfit(common).unwrap_or(f64::INFINITY);
+    let of_speed = Slip::SpeedScale.misfit(common).filter(|_| !is_kinematic);
+    if of_speed.is_some_and(|misfit| misfit < of_forces) {
+        return (Slip::SpeedScale, common);
+    }
+    let shares = figures.effort_shares.iter().flatten().copied();
+    let is_mass = shares.reduce(f64::max).is_some_and(|share| {
+        !is_outside(share, EFFORT_SHARES) && is_outside(share * common, EFFORT_SHARES)
+    });
+    if is_mass { (Slip::MassScale, common) } else { (Slip::ForcesScale, 1.0 / common) }
+}
+
+fn of_gradient(figures: &Figures, by: f64, found: &mut Findings) {
+    let Some(slope) = figures.slopes.gradient else { return };
+    let factor = slope.factor / by;
+    if factor < 0.0 {
+        if !is_outside(-factor, WAY_RATIOS) {
+            found.add(Slip::GradientSign, factor);
+        }
+        return;
+    }
+    let rms = figures.gradient_rms_permille;
+    let is_credible =
+        if factor > 1.0 { rms < GRADIENT_RMS_PERMILLE.0 } else { rms > GRADIENT_RMS_PERMILLE.1 };
+    if is_credible && Slip::GradientScale.misfit(1.0 / factor).is_some() {
+        found.add(Slip::GradientScale, 1.0 / factor);
+    }
+}
+
+/// The factor of units that brings a pressure next to an ordinary one.
+fn pressure_factor(pressure_pa: f64) -> f64 {
+    let distance = |factor: &f64| (pressure_pa / factor / ORDINARY_PRESSURE_PA).ln().abs();
+    let factors = [1e-5, 1e-3, 1e-2];
+    factors
+        .into_iter()
+        .min_by(|one, other| distance(one).total_cmp(&distance(other)))
+        .unwrap_or(1.0)
+}

@@ -1,0 +1,213 @@
+//! What may have gone wrong with a quantity, by what factor, and which unit would explain it.
+
+use dynocar_shared::{PipelineKind, Reason};
+use serde::Serialize;
+
+use crate::dataset::units::{Dimension, Unit};
+
+/// A unit is named when its factor and the one found differ by no more than this share.
+const UNIT_TOLERANCE: f64 = 0.2;
+
+/// How much a note matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Severity {
+    /// Good to know.
+    Info,
+    /// May spoil results.
+    Warning,
+    /// The data cannot be true: no result from them is.
+    Fundamental,
+}
+
+/// A slip of the pen or of the wiring.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[repr(u8)]
+pub enum Slip {
+    /// Time in another unit.
+    TimeScale = 1,
+    /// Speed in another unit.
+    SpeedScale = 2,
+    /// Position in another unit.
+    PositionScale = 3,
+    /// The chainage runs against the stated direction.
+    DirectionReversed = 4,
+    /// Mass in another unit.
+    MassScale = 5,
+    /// Traction and brake exchanged, or the sign of their difference reversed.
+    ForcesSwapped = 6,
+    /// Both forces in another unit.
+    ForcesScale = 7,
+    /// The traction force alone in another unit, or against the motion (factor below zero).
+    TractionScale = 8,
+    /// The brake force alone, likewise.
+    BrakeScale = 9,
+    /// The gradient falls where it should climb.
+    GradientSign = 10,
+    /// Gradient in another unit.
+    GradientScale = 11,
+    /// Brake-cylinder pressure in another unit.
+    PressureScale = 12,
+}
+
+impl Slip {
+    /// Every member, in the order in which they are told.
+    pub const ALL: [Slip; 12] = {
+        use Slip::*;
+        [
+            TimeScale,
+            SpeedScale,
+            PositionScale,
+            DirectionReversed,
+            MassScale,
+            ForcesSwapped,
+            ForcesScale,
+            TractionScale,
+            BrakeScale,
+            GradientSign,
+            GradientScale,
+            PressureScale,
+        ]
+    };
+
+    /// The member with this number.
+    pub fn from_number(number: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|slip| *slip as u8 == number)
+    }
+
+    /// The name for machines.
+    pub const fn code(self) -> &'static str {
+        match self {
+            Slip::TimeScale => "time_scale",
+            Slip::SpeedScale => "speed_scale",
+            Slip::PositionScale => "position_scale",
+            Slip::DirectionReversed => "direction_reversed",
+            Slip::MassScale => "mass_scale",
+            Slip::ForcesSwapped => "forces_swapped",
+            Slip::ForcesScale => "forces_scale",
+            Slip::TractionScale => "traction_scale",
+            Slip::BrakeScale => "brake_scale",
+            Slip::GradientSign => "gradient_sign",
+            Slip::GradientScale => "gradient_scale",
+            Slip::PressureScale => "pressure_scale",
+        }
+    }
+
+    /// How much it matters: the pressure enters no balance of forces.
+    pub const fn severity(self) -> Severity {
+        match self {
+            Slip::PressureScale => Severity::Warning,
+            _ => Severity::Fundamental,
+        }
+    }
+
+    /// Why a pipeline that is fed with it is not to be trusted.
+    pub const fn reason(self) -> Reason {
+        match self {
+            Slip::TimeScale | Slip::SpeedScale | Slip::PositionScale | Slip::DirectionReversed => {
+                Reason::ImplausibleMotion
+            }
+            Slip::MassScale => Reason::ImplausibleMass,
+            Slip::ForcesSwapped | Slip::ForcesScale | Slip::TractionScale | Slip::BrakeScale => {
+                Reason::ImplausibleForces
+            }
+            Slip::GradientSign | Slip::GradientScale => Reason::ImplausibleGradient,
+            Slip::PressureScale => Reason::ImplausiblePressure,
+        }
+    }
+
+    /// True when it spoils what a kind of pipeline estimates: only brakes are judged by pressure.
+    pub const fn concerns(self, kind: PipelineKind) -> bool {
+        use PipelineKind::*;
+        match self {
+            Slip::PressureScale => matches!(
+                kind,
+                AdhesionEm
+                    | AdhesionEkf
+                    | AdhesionSmoother
+                    | AdhesionLaw
+                    | BrakeEm
+                    | BrakeEkf
+                    | BrakeSmoother
+                    | ResidualMonitor
+            ),
+            _ => true,
+        }
+    }
+
+    /// What the units of the quantity measure.
+    pub const fn dimension(self) -> Dimension {
+        match self {
+            Slip::TimeScale => Dimension::Time,
+            Slip::SpeedScale => Dimension::Speed,
+            Slip::PositionScale | Slip::DirectionReversed => Dimension::Length,
+            Slip::MassScale => Dimension::Mass,
+            Slip::ForcesSwapped | Slip::ForcesScale | Slip::TractionScale | Slip::BrakeScale => {
+                Dimension::Force
+            }
+            Slip::GradientSign | Slip::GradientScale => Dimension::Ratio,
+            Slip::PressureScale => Dimension::Pressure,
+        }
+    }
+
+    /// How well two units of the quantity explain a factor of reported over true: the logarithm of
+    /// what is left, for the nearest two; `None` where none is near.
+    pub fn misfit(self, factor: f64) -> Option<f64> {
+        let pairs = Unit::of(self.dimension())
+            .flat_map(|of| Unit::of(self.dimension()).map(move |read_as| read_as.in_terms_of(&of)));
+        pairs
+            .filter(|&pair| pair != 1.0)
+            .map(|pair| (factor / pair).abs().ln().abs())
+            .filter(|misfit| *misfit < UNIT_TOLERANCE)
+            .reduce(f64::min)
+    }
+}
+
+/// A slip with its size.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// What it is.
+    pub slip: Slip,
+    /// Reported over true value, as far as the samples tell.
+    pub factor: f64,
+}
+
+impl Finding {
+    /// The unit that the values are in, when they were read as another and that explains the
+    /// factor.
+    pub fn true_unit(&self, read_as: &Unit) -> Option<Unit> {
+        let misfit = |of: &Unit| (self.factor / read_as.in_terms_of(of)).abs().ln().abs();
+        Unit::of(self.slip.dimension())
+            .filter(|of| of.name() != read_as.name() && misfit(of) < UNIT_TOLERANCE)
+            .min_by(|one, other| misfit(one).total_cmp(&misfit(other)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_lead_back_to_the_slip_and_names_are_unique() {
+        for slip in Slip::ALL {
+            assert_eq!(Slip::from_number(slip as u8), Some(slip));
+            assert_eq!(Slip::ALL.iter().filter(|other| other.code() == slip.code()).count(), 1);
+        }
+        assert_eq!(Slip::from_number(0), None);
+    }
+
+    #[test]
+    fn the_unit_is_named_that_explains_the_factor() {
+        let unit = |slip: Slip, factor, read_as| {
+            let read_as = Unit::find(slip.dimension(), read_as).unwrap();
+            Finding { slip, factor }.true_unit(&read_as).map(|unit| unit.name())
+        };
+        assert_eq!(unit(Slip::ForcesScale, 0.001, "N"), Some("kN"));
+        assert_eq!(unit(Slip::ForcesScale, 1010.0, "kN"), Some("N"));
+        assert_eq!(unit(Slip::ForcesScale, 0.225, "N"), Some("lbf"));
+        assert_eq!(unit(Slip::SpeedScale, 3.6, "m/s"), Some("km/h"));
+        assert_eq!(unit(Slip::GradientScale, 0.1, "permille"), Some("%"));
+        assert_eq!(unit(Slip::ForcesScale, 50.0, "N"), None);
+    }
+}

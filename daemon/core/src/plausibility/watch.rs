@@ -1,0 +1,259 @@
+//! Sample by sample: from a stream of samples to what they say of units, signs and swaps.
+
+use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::{SampleField, TrainSample};
+
+use super::balance::{Balance, Slopes, WindowMean};
+use super::pressure::PressureContrast;
+use crate::filter::RunningMedian;
+use crate::train::TrainModel;
+
+/// Time in s over which accelerations are averaged; one step where the steps are longer.
+const WINDOW_S: f64 = 5.0;
+/// A step so many times as long as the usual one is a gap.
+const GAP_STEPS: f64 = 4.0;
+/// A new step's share in the usual one.
+const STEP_SHARE: f64 = 0.1;
+/// Below this speed in m/s holding brakes and stiction act.
+const MOVING_MPS: f64 = 1.0;
+/// Share of a window that is refused, when any of it is and it counts nevertheless.
+const REFUSED_SHARE_MIN: f64 = 0.9;
+/// Way in m over which position and speed are compared.
+const WAY_M: f64 = 200.0;
+/// Comparisons of position and speed that the median looks back over, and that are enough.
+const WAYS: usize = 21;
+const WAYS_MIN: usize = 5;
+/// The greatest share of the effort curve loses this share with each window.
+const EFFORT_FADE: f64 = 1.0 / 400.0;
+/// Windows with a mass that are enough to judge it.
+const MASSES_MIN: f64 = 5.0;
+
+/// What the samples say; every ratio is 1 in right units.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Figures {
+    /// Acceleration over what the forces and the gradient would give.
+    pub slopes: Slopes,
+    /// Way by position, counted in the direction of travel, over way by speed.
+    pub way_ratio: Option<f64>,
+    /// Reported over declared mass.
+    pub mass_ratio: Option<f64>,
+    /// Greatest traction and brake force lately as shares of their effort curves.
+    pub effort_shares: [Option<f64>; 2],
+    /// Brake-cylinder pressure in Pa while braking, where it follows the brake.
+    pub braking_pressure_pa: Option<f64>,
+    /// Root mean square of the gradients in ‰.
+    pub gradient_rms_permille: f64,
+    /// Time in s from sample to sample.
+    pub step_s: f64,
+}
+
+/// Integrals over the window that is being filled.
+#[derive(Clone, Copy, Debug, Default)]
+struct Window {
+    start_mps: f64,
+    elapsed_s: f64,
+    refused_s: f64,
+    traction_mps: f64,
+    brake_mps: f64,
+    gradient_mps: f64,
+    way_m: f64,
+}
+
+/// Where position and speed are compared from.
+#[derive(Clone, Copy, Debug, Default)]
+struct Way {
+    by_position_m: f64,
+    by_speed_m: f64,
+}
+
+/// Follows the samples of one train; of fixed size.
+#[derive(Clone, Debug)]
+pub struct Watch {
+    nominal_mass_kg: f64,
+    rotating_mass_factor: f64,
+    last: Option<TrainSample>,
+    usual_step_s: f64,
+    gradient_permille: f64,
+    window: Window,
+    way: Way,
+    balance: Balance,
+    ways: RunningMedian<WAYS>,
+    masses: f64,
+    mass_ratio: f64,
+    effort_shares: [f64; 2],
+    pressure: PressureContrast,
+}
+
+impl Watch {
+    /// A watch over the samples of a train as it is declared.
+    pub fn new(train: &TrainModel) -> Self {
+        Watch {
+            nominal_mass_kg: train.mass_kg,
+            rotating_mass_factor: train.rotating_mass_factor,
+            last: None,
+            usual_step_s: 0.0,
+            gradient_permille: 0.0,
+            window: Window::default(),
+            way: Way::default(),
+            balance: Balance::default(),
+            ways: RunningMedian::default(),
+            masses: 0.0,
+            mass_ratio: 1.0,
+            effort_shares: [0.0; 2],
+            pressure: PressureContrast::default(),
+        }
+    }
+
+    /// Takes in a sample, valid or refused for a value out of range, with the gradient in ‰ along
+    /// the travel; true when the figures are new.
+    ///
+    /// Samples that are no measurement (out of order, not finite, jumps of speed) are the
+    /// caller's to leave out.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    pub fn take(
+        &mut self,
+        train: &TrainModel,
+        sample: &TrainSample,
+        is_valid: bool,
+        gradient_permille: Option<f64>,
+    ) -> bool {
+        if let Some(gradient) = gradient_permille.filter(|gradient| gradient.is_finite()) {
+            self.gradient_permille = gradient;
+        }
+        let Some(last) = self.last.replace(*sample) else { return false };
+        let step_s = sample.time_ns.saturating_sub(last.time_ns) as f64 * 1e-9;
+        if sample.run != last.run || sample.direction != last.direction || !(step_s > 0.0) {
+            self.begin();
+            return false;
+        }
+        let is_gap = self.usual_step_s > 0.0 && step_s > GAP_STEPS * self.usual_step_s;
+        if self.usual_step_s == 0.0 {
+            self.usual_step_s = step_s;
+        }
+        self.usual_step_s += STEP_SHARE * (step_s - self.usual_step_s);
+        if is_gap {
+            self.begin();
+            return false;
+        }
+        if is_valid {
+            self.pressure.take(sample, step_s);
+        } else {
+            self.window.refused_s += step_s;
+        }
+        let is_compared = self.compare_way(&last, sample, step_s);
+        self.extend_window(train, &last, sample, step_s) || is_compared
+    }
+
+    /// What the samples so far say.
+    pub fn figures(&self) -> Figures {
+        let share = |share: f64| (share > 0.0).then_some(share);
+        Figures {
+            slopes: self.balance.slopes(),
+            way_ratio: if self.ways.count() >= WAYS_MIN { self.ways.median() } else { None },
+            mass_ratio: (self.masses >= MASSES_MIN).then_some(self.mass_ratio),
+            effort_shares: self.effort_shares.map(share),
+            braking_pressure_pa: self.pressure.braking_pa(),
+            gradient_rms_permille: self.balance.gradient_rms_permille(),
+            step_s: self.usual_step_s,
+        }
+    }
+
+    fn begin(&mut self) {
+        self.window = Window::default();
+        self.way = Way::default();
+    }
+
+    fn compare_way(&mut self, last: &TrainSample, now: &TrainSample, step_s: f64) -> bool {
+        let (Some(from_m), Some(to_m)) =
+            (last.get(SampleField::Position), now.get(SampleField::Position))
+        else {
+            self.way = Way::default();
+            return false;
+        };
+        self.way.by_position_m += f64::from(now.direction) * (to_m - from_m);
+        self.way.by_speed_m += 0.5 * (last.speed_mps + now.speed_mps) * step_s;
+        let Way { by_position_m, by_speed_m } = self.way;
+        if by_speed_m.max(by_position_m.abs()) < WAY_M {
+            return false;
+        }
+        self.ways.push(by_position_m / by_speed_m);
+        self.way = Way::default();
+        true
+    }
+
+    fn extend_window(
+        &mut self,
+        train: &TrainModel,
+        last: &TrainSample,
+        now: &TrainSample,
+        step_s: f64,
+    ) -> bool {
+        let (Some(before), Some(after)) = (forces_n(last), forces_n(now)) else {
+            self.window = Window::default();
+            return false;
+        };
+        let is_sliding = now.flags & dynocar_shared::sample::FLAG_WHEEL_SLIDE != 0;
+        if last.speed_mps < MOVING_MPS || now.speed_mps < MOVING_MPS || is_sliding {
+            self.window = Window::default();
+            return false;
+        }
+        let mass_kg = now.get(SampleField::Mass).unwrap_or(self.nominal_mass_kg);
+        let window = &mut self.window;
+        if window.elapsed_s == 0.0 {
+            window.start_mps = last.speed_mps;
+        }
+        window.elapsed_s += step_s;
+        window.traction_mps += 0.5 * (before.0 + after.0) / mass_kg * step_s;
+        window.brake_mps += 0.5 * (before.1 + after.1) / mass_kg * step_s;
+        window.gradient_mps += 1e-3 * STANDARD_GRAVITY_MPS2 * self.gradient_permille * step_s;
+        window.way_m += 0.5 * (last.speed_mps + now.speed_mps) * step_s;
+        // The margin keeps rounded times from lengthening a window.
+        if window.elapsed_s < WINDOW_S * (1.0 - 1e-6) {
+            return false;
+        }
+        let window = std::mem::take(&mut self.window);
+        // Single refusals are failures of a sensor, a whole window of them may be a wrong unit.
+        if window.refused_s > 0.0 && window.refused_s < REFUSED_SHARE_MIN * window.elapsed_s {
+            return false;
+        }
+        self.close(train, window, now.speed_mps, mass_kg);
+        true
+    }
+
+    fn close(&mut self, train: &TrainModel, window: Window, end_mps: f64, mass_kg: f64) {
+        let per_s = 1.0 / window.elapsed_s;
+        let mean = WindowMean {
+            inertia_mps2: (1.0 + self.rotating_mass_factor) * (end_mps - window.start_mps) * per_s,
+            traction_mps2: window.traction_mps * per_s,
+            brake_mps2: window.brake_mps * per_s,
+            gradient_mps2: window.gradient_mps * per_s,
+            speed_mps: window.way_m * per_s,
+        };
+        self.balance.push(&mean);
+        self.masses += 1.0;
+        self.mass_ratio = mass_kg / self.nominal_mass_kg;
+        let curves = [(&train.traction, mean.traction_mps2), (&train.brake, mean.brake_mps2)];
+        for (share, (curve, force_mps2)) in self.effort_shares.iter_mut().zip(curves) {
+            *share -= EFFORT_FADE * *share;
+            if let Some(curve) = curve {
+                let greatest_n = curve.force_n(mean.speed_mps);
+                if greatest_n > 0.0 {
+                    *share = share.max(force_mps2 * mass_kg / greatest_n);
+                }
+            }
+        }
+    }
+}
+
+/// Traction and brake force in N. One that is not recorded is 0 while the other acts.
+fn forces_n(sample: &TrainSample) -> Option<(f64, f64)> {
+    match (sample.get(SampleField::TractionForce), sample.get(SampleField::BrakeForce)) {
+        (Some(traction), Some(brake)) => Some((traction, brake)),
+        (Some(traction), None) if traction > 0.0 => Some((traction, 0.0)),
+        (None, Some(brake)) if brake > 0.0 => Some((0.0, brake)),
+        _ => None,
+    }
+}

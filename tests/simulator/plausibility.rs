@@ -1,0 +1,259 @@
+//! Slips of the pen in simulated datasets: each is named by `check`, `identify` and `explain`, no
+//! pipeline stays trusted, and nothing is said of data that are right, whatever effect acts.
+
+use std::path::Path;
+use std::process::Command;
+
+use dynocar::dataset;
+use dynocar::identify::{default_estimators, identify, published_samples};
+use dynocar_core::plausibility::Severity;
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::{Reason, Status, TrainId};
+use dynocar_tests::simulator::dataset_writer::dataset_files;
+use dynocar_tests::simulator::{
+    Defects, Effect, EffectRequest, SimulatorSettings, TrainType, simulate,
+};
+use serde_json::Value;
+
+const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
+
+/// A change of the description that no file contradicts.
+#[derive(Clone, Copy, Debug)]
+enum Slip {
+    /// Quantities are read so many times too large.
+    Scale(&'static [&'static str], f64),
+    /// Two columns are exchanged, or the sign of their difference.
+    Exchange,
+    /// The masses of the runs.
+    Mass(f64),
+    /// The line's gradients.
+    Gradient(f64),
+    /// The direction of every run.
+    Direction,
+}
+
+const FORCES: &[&str] = &["traction_force", "brake_force", "control_force"];
+
+/// What goes wrong, the code of the note, and the reason of the pipelines.
+const SLIPS: [(&str, Slip, &str, Reason); 17] = [
+    ("kN as N", Slip::Scale(FORCES, 1e-3), "forces_scale", Reason::ImplausibleForces),
+    ("N as kN", Slip::Scale(FORCES, 1e3), "forces_scale", Reason::ImplausibleForces),
+    ("lbf as N", Slip::Scale(FORCES, 0.224_809), "forces_scale", Reason::ImplausibleForces),
+    ("exchanged", Slip::Exchange, "forces_swapped", Reason::ImplausibleForces),
+    ("km/h as m/s", Slip::Scale(&["speed"], 3.6), "speed_scale", Reason::ImplausibleMotion),
+    ("m/s as km/h", Slip::Scale(&["speed"], 1.0 / 3.6), "speed_scale", Reason::ImplausibleMotion),
+    ("mph as m/s", Slip::Scale(&["speed"], 2.236_936), "speed_scale", Reason::ImplausibleMotion),
+    ("km as m", Slip::Scale(&["position"], 1e-3), "position_scale", Reason::ImplausibleMotion),
+    ("m as km", Slip::Scale(&["position"], 1e3), "position_scale", Reason::ImplausibleMotion),
+    ("ms as s", Slip::Scale(&["time"], 1e3), "time_scale", Reason::ImplausibleMotion),
+    ("s as ms", Slip::Scale(&["time"], 1e-3), "time_scale", Reason::ImplausibleMotion),
+    ("t as kg", Slip::Mass(1e-3), "mass_scale", Reason::ImplausibleMass),
+    ("direction", Slip::Direction, "direction_reversed", Reason::ImplausibleMotion),
+    ("% as permille", Slip::Gradient(0.1), "gradient_scale", Reason::ImplausibleGradient),
+    ("falls for climbs", Slip::Gradient(-1.0), "gradient_sign", Reason::ImplausibleGradient),
+    ("kPa as Pa", PRESSURE_KPA, "pressure_scale", Reason::ImplausiblePressure),
+    ("bar as Pa", PRESSURE_BAR, "pressure_scale", Reason::ImplausiblePressure),
+];
+const PRESSURE_KPA: Slip = Slip::Scale(&["brake_cylinder_pressure"], 1e-3);
+const PRESSURE_BAR: Slip = Slip::Scale(&["brake_cylinder_pressure"], 1e-5);
+
+impl Slip {
+    /// Applies it to a line of a file.
+    fn line(self, file: &str, line: &str) -> String {
+        let key = line.split(" =").next().unwrap_or_default();
+        match self {
+            Slip::Scale(quantities, factor) if quantities.contains(&key) => scaled(line, factor),
+            Slip::Exchange if key == "control_force" => scaled(line, -1.0),
+            Slip::Exchange if key == "traction_force" => {
+                line.replacen("traction_force =", "brake_force =", 1)
+            }
+            Slip::Exchange if key == "brake_force" => {
+                line.replacen("brake_force =", "traction_force =", 1)
+            }
+            Slip::Mass(factor) if file == "dataset.toml" && key == "mass_t" => {
+                let mass_t: f64 = line.split("= ").nth(1).unwrap().parse().unwrap();
+                format!("mass_t = {:.4}", mass_t * factor)
+            }
+            Slip::Direction if key == "direction" => {
+                let direction: i32 = line.split("= ").nth(1).unwrap().parse().unwrap();
+                format!("direction = {}", -direction)
+            }
+            // Curves have three numbers.
+            Slip::Gradient(factor) if file == "track.toml" && line.matches(',').count() == 2 => {
+                let Some((from, permille)) =
+                    line.trim().trim_matches(['[', ']', ',']).split_once(", ")
+                else {
+                    return line.into();
+                };
+                let permille: f64 = permille.parse().unwrap();
+                // Tunnels have two numbers as well, the second a chainage.
+                if permille.abs() > 100.0 {
+                    return line.into();
+                }
+                format!("  [{from}, {:.4}],", permille * factor)
+            }
+            _ => line.into(),
+        }
+    }
+}
+
+/// A column's mapping with one more factor.
+fn scaled(line: &str, factor: f64) -> String {
+    let (mapping, own) = match line.split_once(", scale = ") {
+        Some((mapping, scale)) => (mapping, scale.trim_end_matches(" }").parse().unwrap()),
+        None => (line.trim_end_matches(" }"), 1.0),
+    };
+    format!("{mapping}, scale = {} }}", own * factor)
+}
+
+fn settings(seed: u64, train_type: TrainType, effects: EffectRequest) -> SimulatorSettings {
+    SimulatorSettings {
+        train_type: Some(train_type),
+        runs: 3,
+        holdout_runs: 1,
+        ..SimulatorSettings::new(seed, effects)
+    }
+}
+
+/// Writes a dataset with a slip.
+fn write(settings: &SimulatorSettings, slip: Option<Slip>, folder: &Path) {
+    std::fs::create_dir_all(folder.join("runs")).unwrap();
+    for (path, text) in dataset_files(&simulate(settings)) {
+        let changed = |slip: Slip| {
+            let lines = text.lines().map(|line| slip.line(&path, line) + "\n");
+            lines.collect::<String>()
+        };
+        let text = match slip {
+            Some(slip) if path.ends_with(".toml") => changed(slip),
+            _ => text.clone(),
+        };
+        std::fs::write(folder.join(path), text).unwrap();
+    }
+}
+
+/// Standard output of a command on a dataset.
+fn output(folder: &Path, command: &[&str]) -> String {
+    let path = folder.to_str().unwrap();
+    let run = Command::new(DYNOCAR).arg(command[0]).arg(path).args(&command[1..]).output().unwrap();
+    String::from_utf8(run.stdout).unwrap() + &String::from_utf8(run.stderr).unwrap()
+}
+
+/// The answer of a command; null when there is none, as where no sample is usable.
+fn json(folder: &Path, command: &[&str]) -> Value {
+    let file = folder.join(format!("{}.json", command[0]));
+    let mut with_file = command.to_vec();
+    with_file.extend(["--json", file.to_str().unwrap()]);
+    output(folder, &with_file);
+    std::fs::read(file).map_or(Value::Null, |bytes| serde_json::from_slice(&bytes).unwrap())
+}
+
+fn has_note(answer: &Value, code: &str) -> bool {
+    let notes = answer["notes"].as_array().expect("a list of notes");
+    notes.iter().any(|note| {
+        note["code"] == code && note["text"].as_str().is_some_and(|text| text.contains('?'))
+    })
+}
+
+/// A freight train with forces of their own, and a metro with a signed one.
+const TRAINS: [(u64, TrainType); 2] = [(401, TrainType::Freight), (402, TrainType::Metro)];
+
+#[test]
+fn every_slip_is_named_by_check_identify_and_explain_on_the_terminal_and_in_json() {
+    for (name, slip, code, _) in SLIPS {
+        for (seed, train_type) in TRAINS {
+            let folder = tempfile::tempdir().unwrap();
+            let folder = folder.path();
+            write(&settings(seed, train_type, EffectRequest::none()), Some(slip), folder);
+            let case = format!("{name}, {}", train_type.name());
+            assert!(has_note(&json(folder, &["check"]), code), "check: {case}");
+            let identified = json(folder, &["identify", "--estimator", "rls"]);
+            assert!(has_note(&identified, code), "identify: {case}");
+            let dataset = dataset::load(folder).unwrap();
+            let note = dataset.notes().into_iter().find(|note| note.code == code).unwrap();
+            assert_eq!(note.runs.len(), 3, "{case}: {note}");
+            let words: String = note.text.split_whitespace().take(4).collect::<Vec<_>>().join(" ");
+            for command in ["check", "identify", "explain"] {
+                let text = output(folder, &[command]).replace("\n  ", " ").replace("  ", " ");
+                assert!(text.contains(&words), "{command}: {case}: {text}");
+            }
+            if note.severity < Severity::Fundamental {
+                assert!(has_note(&json(folder, &["explain"]), code), "explain: {case}");
+                continue;
+            }
+            // Where no sample is usable there is no answer, and the error names the slip.
+            let report = folder.join("report.html");
+            let explained = json(folder, &["explain", "--report", report.to_str().unwrap()]);
+            if explained.is_null() {
+                continue;
+            }
+            assert!(has_note(&explained, code), "explain: {case}");
+            assert_eq!(explained["verdict"], "insufficient_data", "{case}");
+            assert_eq!(explained["effects"], Value::Array(Vec::new()), "{case}");
+            let page = std::fs::read_to_string(report).unwrap();
+            let (notes, verdict) = (page.find("id=\"notes\""), page.find("id=\"verdict\""));
+            assert!(notes.unwrap() < verdict.unwrap(), "{case}: the notes stand above");
+            assert!(!page.contains("class=\"verdict none\""), "{case}: no green box");
+        }
+    }
+}
+
+#[test]
+fn no_pipeline_trusts_samples_that_cannot_be_true() {
+    for (name, slip, _, reason) in SLIPS {
+        let (seed, train_type) = TRAINS[1];
+        let folder = tempfile::tempdir().unwrap();
+        write(&settings(seed, train_type, EffectRequest::none()), Some(slip), folder.path());
+        let dataset = dataset::load(folder.path()).unwrap();
+        let samples = published_samples(&dataset, TrainId(1));
+        for settings in default_estimators() {
+            let kind = settings.kind();
+            let snapshot = identify(&dataset, &samples, &settings).unwrap();
+            if reason == Reason::ImplausiblePressure && snapshot.reason() != Some(reason) {
+                // Masses and resistances do not rest on the pressure.
+                assert!(!kind.name().starts_with("brake_"), "{name}: {kind}");
+                continue;
+            }
+            assert_ne!(snapshot.status(), Status::Estimated, "{name}: {kind}");
+            assert_eq!(snapshot.reason(), Some(reason), "{name}: {kind}");
+        }
+    }
+}
+
+/// Notes that are no account of single bad rows.
+fn notes_on(settings: &SimulatorSettings) -> Vec<String> {
+    let folder = tempfile::tempdir().unwrap();
+    write(settings, None, folder.path());
+    let notes = dataset::load(folder.path()).unwrap().notes();
+    let of_rows = ["off_the_line", "stands_still"];
+    notes.iter().filter(|it| !of_rows.contains(&it.code)).map(ToString::to_string).collect()
+}
+
+#[test]
+fn no_effect_however_large_and_no_poor_recording_is_taken_for_a_slip() {
+    let none: [String; 0] = [];
+    let mut cases: Vec<EffectRequest> = EffectKind::ALL
+        .iter()
+        .filter(|&&kind| kind != EffectKind::None)
+        .map(|&kind| EffectRequest::Kinds(vec![kind]))
+        .collect();
+    let heavier = |run| {
+        let window = dynocar_tests::simulator::effects::RunWindow { run, start_s: 0.0, end_s: 1e4 };
+        (window, 1.4)
+    };
+    cases.push(EffectRequest::Exactly(vec![
+        Effect::TractionGain { gain: 0.85 },
+        Effect::WheelDiameter { speed_scale: 1.04 },
+        Effect::MassChangeWindows((0..3).map(heavier).collect()),
+    ]));
+    cases.push(EffectRequest::none());
+    for (seed, effects) in (500..).zip(cases) {
+        for (train_type, defects) in [
+            (TrainType::ALL[seed as usize % 4], Defects::NONE),
+            (TrainType::ALL[(seed as usize + 1) % 4], Defects::ALL),
+        ] {
+            let settings =
+                SimulatorSettings { defects, ..settings(seed, train_type, effects.clone()) };
+            assert_eq!(notes_on(&settings), none, "seed {seed}, {effects:?}, {train_type:?}");
+        }
+    }
+}
