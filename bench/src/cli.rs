@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 use dynocar::cli::parse;
-use dynocar::output::{self, tell};
+use dynocar::output::{tell, write_file};
 use serde::Serialize;
 
 use crate::estimators::measure::Effort;
@@ -14,6 +14,7 @@ use crate::explain::command::{ExplainArguments, explain};
 use crate::latency::server::{PeerArguments, serve};
 use crate::latency::{self, LatencyArguments, plot};
 use crate::load::{self, LoadArguments};
+use crate::output::give;
 use crate::papers::{self, Row, Seeds, Verdict, table};
 
 /// Measures Dynocar: accuracy against the statistical bound, speed against peers.
@@ -158,7 +159,7 @@ fn papers(arguments: &PapersArguments) -> Result<(), (String, u8)> {
         .collect();
     give(&arguments.json, &PapersAnswer { rows: judged }, || table::for_terminal(&rows))?;
     if let Some(file) = &arguments.markdown {
-        output::write_file(file, &table::for_documentation(&rows))
+        write_file(file, &table::for_documentation(&rows))
             .map_err(|error| (error.to_string(), 1))?;
     }
     match broken.is_empty() {
@@ -185,13 +186,4 @@ fn load(arguments: &LoadArguments) -> Result<(), (String, u8)> {
         (error.to_string(), status)
     })?;
     give(&arguments.json, &report, || load::report::table(&report))
-}
-
-/// Gives a result; an error has its text and the exit status.
-pub(crate) fn give(
-    json: &Option<PathBuf>,
-    result: &impl Serialize,
-    for_people: impl FnOnce() -> String,
-) -> Result<(), (String, u8)> {
-    output::give(json.as_deref(), result, for_people).map_err(|error| (error.to_string(), 1))
 }

@@ -6,6 +6,7 @@
 //! - [`latency`]: sample → snapshot through real processes, beside the floor and alternatives
 //! - [`load`]: many trains against one daemon
 //! - [`rig`]: what the two share
+//! - [`output`]: results for people and for machines
 //! - [`papers`]: accuracy of every estimator over seeded runs, beside the statistical bound
 
 pub mod cli;
@@ -13,5 +14,6 @@ pub mod estimators;
 pub mod explain;
 pub mod latency;
 pub mod load;
+pub mod output;
 pub mod papers;
 pub mod rig;

@@ -4,8 +4,7 @@ use std::path::PathBuf;
 
 use dynocar_shared::TrainId;
 
-use crate::channel::SendRefused;
-use crate::peer::{Announcement, Role};
+use crate::announcement::{Announcement, Role};
 
 /// Why a channel cannot be opened or used.
 #[derive(Debug, thiserror::Error)]
@@ -94,3 +93,8 @@ pub enum ChannelError {
     #[error(transparent)]
     Send(#[from] SendRefused),
 }
+
+/// The transport took no message; the sender goes on, the message is lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the transport took no message")]
+pub struct SendRefused;

@@ -39,6 +39,7 @@
 //! - [`clock`]: the host's monotonic clock
 //! - [`ffi`]: the same for C, C++ and Python
 
+mod announcement;
 pub mod answers;
 pub mod channel;
 pub mod clock;
@@ -49,10 +50,11 @@ pub mod peer;
 pub mod publisher;
 pub mod reader;
 
+pub use announcement::{Announcement, Role};
 pub use answers::NoAnswer;
 pub use clock::monotonic_now_ns;
-pub use error::ChannelError;
+pub use error::{ChannelError, SendRefused};
 pub use host::Host;
-pub use peer::{Announcement, Peer, Role};
+pub use peer::Peer;
 pub use publisher::SamplePublisher;
 pub use reader::{Reading, SnapshotReader};

@@ -4,11 +4,12 @@ use std::time::{Duration, Instant};
 
 use dynocar_shared::{TrainId, TrainSample};
 
-use crate::channel::{SampleCount, SendRefused, Sender, Transport, Waker};
+use crate::announcement::Role;
+use crate::channel::{SampleCount, Sender, Transport, Waker};
 use crate::clock::monotonic_now_ns;
-use crate::error::ChannelError;
+use crate::error::{ChannelError, SendRefused};
 use crate::host::Host;
-use crate::peer::{Peer, Role, RoleLock};
+use crate::peer::{Peer, RoleLock};
 
 /// How long a publisher that is closed waits for the pipelines to take what is on its way.
 pub const CLOSE_PATIENCE: Duration = Duration::from_millis(200);

@@ -4,12 +4,13 @@ use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::snapshot::PARAMETERS_MAX;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Quantity, Reason, Status, TrainId};
 
+use crate::announcement::Role;
 use crate::answers::{Answers, NoAnswer};
 use crate::channel::{Receiver, Transport};
 use crate::clock::monotonic_now_ns;
 use crate::error::ChannelError;
 use crate::host::Host;
-use crate::peer::{Peer, Role};
+use crate::peer::Peer;
 
 /// A snapshot older than this counts as stale, in ns. The daemon republishes every 50 ms.
 pub const STALE_AFTER_NS: i64 = 250_000_000;

@@ -6,13 +6,13 @@ use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 use std::ptr::{null, null_mut};
 
-use dynocar_client::Role;
 use dynocar_client::ffi::about::*;
 use dynocar_client::ffi::publisher::*;
 use dynocar_client::ffi::reader::*;
 use dynocar_client::ffi::snapshot::*;
 use dynocar_client::ffi::{Code, ReadingCopy, Resistance};
-use dynocar_client::peer::{Announcement, RoleLock};
+use dynocar_client::peer::RoleLock;
+use dynocar_client::{Announcement, Role};
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Status, TrainId, TrainSample};
 
 mod support;

@@ -1,7 +1,6 @@
 //! The daemon as a user runs it: start, stop, refusals.
 
-use dynocar_client::peer::{Announcement, Role};
-use dynocar_client::{SamplePublisher, SnapshotReader};
+use dynocar_client::{Announcement, Role, SamplePublisher, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, SampleField, TrainId, TrainSample};
 use dynocar_tests::process::{Process, Site, await_true};
 use rustix::process::Signal;

@@ -9,8 +9,8 @@ use std::process::Command;
 use std::time::Duration;
 
 use dynocar_client::channel::Transport;
-use dynocar_client::peer::{Announcement, Role, RoleLock};
-use dynocar_client::{SamplePublisher, monotonic_now_ns};
+use dynocar_client::peer::RoleLock;
+use dynocar_client::{Announcement, Role, SamplePublisher, monotonic_now_ns};
 use dynocar_shared::{ParameterSnapshot, SampleField, Status, TrainId, TrainSample};
 use dynocar_tests::process::{Process, Site, await_true};
 use rustix::process::Signal;

@@ -3,48 +3,27 @@
 
 use std::sync::Arc;
 
-use dynocar_core::filter::kalman::GaussianState;
+use dynocar_core::filter::Gaussian;
 use dynocar_core::filter::random::Random;
 use dynocar_core::pipeline::braking::em::{
     EmModel, EmWindow, Expectation, KalmanExpectation, ParticleExpectation,
 };
 use dynocar_core::pipeline::braking::engine::{Engine, Observation};
 use dynocar_core::pipeline::braking::law::Law;
-use dynocar_core::pipeline::braking::motion::{self, MotionNoise, STATES, State, StepInputs, Walk};
+use dynocar_core::pipeline::braking::motion::{self, STATES, State, Walk};
 use dynocar_core::pipeline::braking::tracker::{Prior, PriorScale, Tracker, TrackerModel};
 use dynocar_shared::Uncertain;
 use nalgebra::RowVector4;
 
-use super::em_peers::{textbook_kalman_em, textbook_particle_em};
+use super::em_peers::{
+    FIRST_SPEED_STD_MPS, INITIAL, INPUTS, ITERATIONS, NOISE, PARTICLES, textbook_kalman_em,
+    textbook_particle_em,
+};
 use super::measure::{Agreement, Case, Contender};
 use super::textbook::{Said, TextbookFilter, TextbookStep, smooth};
 
-/// Noise of motion and measurement (Xie 2019), as variances.
-pub const NOISE: MotionNoise = MotionNoise {
-    distance_m2_per_s: 0.0167,
-    speed_m2_per_s3: 0.00129,
-    measured_distance_m2: 0.01,
-    measured_speed_m2_per_s2: None,
-};
 /// Samples of a window.
-pub const SAMPLES: usize = 40;
-/// Particles of the papers' E-step.
-pub const PARTICLES: usize = 20;
-/// Iterations of EM in a window.
-pub const ITERATIONS: usize = 50;
-/// Where EM starts.
-pub const INITIAL: f64 = 0.07;
-/// Standard deviation in m/s of a window's first speed.
-pub const FIRST_SPEED_STD_MPS: f64 = 0.1;
-/// The step of every sample.
-pub const INPUTS: StepInputs = StepInputs {
-    step_s: 0.2,
-    gain_mps2: 9.81,
-    demand: 0.0942,
-    tied_mps2: 0.0,
-    basic_mps2: [0.0077, 2.3e-4, 1.46e-5],
-};
-
+const SAMPLES: usize = 40;
 const TRUTH: f64 = 0.08;
 const FIRST_MPS: f64 = 80.0;
 /// Windows in a pass.
@@ -155,7 +134,7 @@ fn tracker_model(walk: Walk) -> TrackerModel {
 }
 
 fn textbook_first(model: &TrackerModel, first: &Observation) -> TextbookFilter<STATES> {
-    let GaussianState { mean, covariance } = model.initial(first);
+    let Gaussian { mean, covariance } = model.initial(first);
     TextbookFilter { mean, covariance }
 }
 

@@ -3,11 +3,34 @@
 use dynocar_core::filter::random::Random;
 use dynocar_core::pipeline::braking::engine::Observation;
 use dynocar_core::pipeline::braking::law::Law;
-use dynocar_core::pipeline::braking::motion::{self, Move};
+use dynocar_core::pipeline::braking::motion::{self, MotionNoise, Move, StepInputs};
 use nalgebra::{Matrix2, RowVector2, Vector2};
 
-use super::braking::{FIRST_SPEED_STD_MPS, INITIAL, INPUTS, ITERATIONS, NOISE, PARTICLES};
 use super::textbook::{TextbookFilter, TextbookStep, smooth};
+
+/// Noise of motion and measurement (Xie 2019), as variances.
+pub const NOISE: MotionNoise = MotionNoise {
+    distance_m2_per_s: 0.0167,
+    speed_m2_per_s3: 0.00129,
+    measured_distance_m2: 0.01,
+    measured_speed_m2_per_s2: None,
+};
+/// Particles of the papers' E-step.
+pub const PARTICLES: usize = 20;
+/// Iterations of EM in a window.
+pub const ITERATIONS: usize = 50;
+/// Where EM starts.
+pub const INITIAL: f64 = 0.07;
+/// Standard deviation in m/s of a window's first speed.
+pub const FIRST_SPEED_STD_MPS: f64 = 0.1;
+/// The step of every sample.
+pub const INPUTS: StepInputs = StepInputs {
+    step_s: 0.2,
+    gain_mps2: 9.81,
+    demand: 0.0942,
+    tied_mps2: 0.0,
+    basic_mps2: [0.0077, 2.3e-4, 1.46e-5],
+};
 
 /// Variances of distance and speed over a step.
 fn step_variances() -> [f64; 2] {

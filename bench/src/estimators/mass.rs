@@ -78,10 +78,10 @@ fn ours(drive: &Drive) -> Vec<f64> {
     bank.restart_speed(drive.motions[0].speed_mps, SPEED_VARIANCE);
     for pair in drive.motions.windows(2) {
         bank.predict(&pair[0], &pair[1], STEP_S);
-        bank.measure(pair[1].speed_mps, SPEED_VARIANCE);
+        bank.measure(pair[1].speed_mps, SPEED_VARIANCE).expect("a sound speed");
     }
     let best = bank.best();
-    vec![best.state[SPEED], best.state[INVERSE_MASS], best.covariance[(INVERSE_MASS, INVERSE_MASS)]]
+    vec![best.mean[SPEED], best.mean[INVERSE_MASS], best.covariance[(INVERSE_MASS, INVERSE_MASS)]]
 }
 
 struct Member {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dynocar_core::filter::JointState;
+use dynocar_core::filter::Gaussian;
 use dynocar_core::filter::random::Random;
 use nalgebra::{RowSVector, SMatrix, SVector};
 
@@ -77,19 +77,19 @@ pub fn cases() -> Vec<Case> {
 
 fn ours(samples: &[Sample]) -> Vec<f64> {
     let (mean, covariance) = first();
-    let mut filter = JointState::new(mean, covariance);
+    let mut filter = Gaussian { mean, covariance };
     for (gradient, measured) in samples {
-        let speed = gradient.dot(filter.mean());
+        let speed = gradient.dot(&filter.mean);
         filter.rewrite(SPEED, speed, gradient, IMPULSE_VARIANCE);
         let mut decay = SVector::<f64, STATES>::zeros();
         decay[DISTURBANCE] = KEPT;
-        filter.rewrite(DISTURBANCE, KEPT * filter.mean()[DISTURBANCE], &decay, RENEWED);
+        filter.rewrite(DISTURBANCE, KEPT * filter.mean[DISTURBANCE], &decay, RENEWED);
         for coefficient in COEFFICIENTS {
             filter.disturb(coefficient, DRIFT_VARIANCE);
         }
-        filter.correct(SPEED, *measured, SPEED_VARIANCE).expect("a sound speed");
+        filter.measure(SPEED, *measured, SPEED_VARIANCE).expect("a sound speed");
     }
-    filter.mean().as_slice().to_vec()
+    filter.mean.as_slice().to_vec()
 }
 
 fn textbook(samples: &[Sample]) -> Vec<f64> {

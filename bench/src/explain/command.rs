@@ -8,7 +8,7 @@ use super::case::Case;
 use super::grade::Grade;
 use super::scenario::Scenario;
 use super::{growth, matrix};
-use crate::cli::give;
+use crate::output::give;
 use dynocar_shared::vocabulary::EffectKind;
 
 /// Every kind of undeclared effect, and nulls, over simulated datasets: power, false alarms,

@@ -9,9 +9,9 @@ use super::schedule::{Schedule, Slice, await_ready, drive};
 use super::server::TRAIN;
 #[cfg(feature = "zeromq")]
 use super::zeromq::ZeroMqLink;
-use super::{Cores, bind, prioritise};
 use crate::rig::RigError;
 use crate::rig::child::Peer;
+use crate::rig::cores::{Cores, bind, prioritise};
 use crate::rig::motion::Motion;
 use crate::rig::pipelines;
 use crate::rig::site::{DaemonPlan, Site, ThreadPlan};

@@ -33,13 +33,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use dynocar::config::IdleStrategy;
-use dynocar::runtime::affinity::pin_to_core;
-use dynocar::runtime::scheduling::set_fifo_priority;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
 use crate::rig::RigError;
+use crate::rig::cores::{Cores, bind, in_thread, prioritise};
 use case::{Case, Outcome};
 use costs::Costs;
 use rest::AtRest;
@@ -81,27 +80,6 @@ pub struct LatencyArguments {
     /// Draw the distributions
     #[arg(long, value_name = "FILE.svg")]
     pub plot: Option<PathBuf>,
-}
-
-/// The two cores of a measurement, and the priority of what runs there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Cores {
-    /// Where the controller publishes and polls.
-    pub controller: usize,
-    /// Where the answering thread runs.
-    pub server: usize,
-    /// Real-time priority on both; ordinary when absent.
-    pub priority: Option<u8>,
-}
-
-impl Cores {
-    /// The cores asked for, else the first two; on a machine with one core both are the same.
-    pub fn choose(controller: Option<usize>, server: Option<usize>, priority: Option<u8>) -> Self {
-        let count = std::thread::available_parallelism().map_or(1, usize::from);
-        let controller = controller.unwrap_or(0);
-        let other = (controller + 1) % count.max(1);
-        Cores { controller, server: server.unwrap_or(other), priority }
-    }
 }
 
 /// What was measured.
@@ -183,40 +161,4 @@ pub fn run(arguments: &LatencyArguments) -> Result<Measured, LatencyError> {
         .map(|idle| rest::measure(idle, cores, seconds))
         .collect::<Result<_, _>>()?;
     Ok(Measured { cases, costs, at_rest, schedule, cores })
-}
-
-/// Runs something in a thread of its own, which it may bind to a core: threads and processes
-/// that are started before are not bound with it.
-///
-/// # Errors
-///
-/// The work's own.
-pub fn in_thread<T: Send>(
-    work: impl FnOnce() -> Result<T, RigError> + Send,
-) -> Result<T, RigError> {
-    std::thread::scope(|scope| match scope.spawn(work).join() {
-        Ok(result) => result,
-        Err(panic) => std::panic::resume_unwind(panic),
-    })
-}
-
-/// Binds the calling thread to a core; without that the figures vary more, which is said.
-pub fn bind(core: usize) {
-    if let Err(error) = pin_to_core(core) {
-        dynocar::output::tell(&format!(
-            "dynocar-bench: not bound to core {core}, figures will vary more: {error}"
-        ));
-    }
-}
-
-/// Gives the calling thread, and every thread it starts from then on, a real-time priority; without
-/// it the figures vary more, which is said.
-pub fn prioritise(priority: Option<u8>) {
-    if let Some(priority) = priority
-        && let Err(error) = set_fifo_priority(priority)
-    {
-        dynocar::output::tell(&format!(
-            "dynocar-bench: no priority {priority}, figures will vary more: {error}"
-        ));
-    }
 }

@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 use dynocar::config::IdleStrategy;
 use serde::Serialize;
 
-use super::Cores;
 use crate::rig::RigError;
 use crate::rig::child::Peer;
+use crate::rig::cores::Cores;
 use crate::rig::pipelines;
 use crate::rig::site::{DaemonPlan, Site, ThreadPlan};
 use crate::rig::usage::{self, ProcessUsage};

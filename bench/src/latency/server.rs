@@ -9,8 +9,9 @@ use dynocar_client::{Host, monotonic_now_ns};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
 
 use super::plain::PlainNode;
-use super::{bind, prioritise, sockets};
+use super::sockets;
 use crate::rig::RigError;
+use crate::rig::cores::{bind, prioritise};
 
 /// The train of every latency case.
 pub const TRAIN: TrainId = TrainId(1);

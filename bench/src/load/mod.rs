@@ -19,8 +19,8 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use dynocar::config::IdleStrategy;
 
-use crate::latency::{Cores, in_thread};
 use crate::rig::RigError;
+use crate::rig::cores::{Cores, in_thread};
 use crate::rig::host::HostGaps;
 use crate::rig::pipelines;
 use report::Report;

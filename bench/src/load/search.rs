@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::trial::{self, Trial, TrialPlan};
-use crate::latency::in_thread;
 use crate::rig::RigError;
+use crate::rig::cores::in_thread;
 use crate::rig::quantiles::{Quantiles, histogram};
 
 /// A publisher that is later than this has itself reached its limit, in ns.

@@ -8,9 +8,9 @@ use hdrhistogram::Histogram;
 
 use super::traffic::{Traffic, TrafficPlan};
 use super::waits::Waits;
-use crate::latency::{Cores, bind, prioritise};
 use crate::rig::RigError;
 use crate::rig::child::Peer;
+use crate::rig::cores::{Cores, bind, prioritise};
 use crate::rig::pipelines;
 use crate::rig::quantiles::{histogram, record};
 use crate::rig::site::{DaemonPlan, Site, ThreadPlan};

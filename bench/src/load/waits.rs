@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::latency::Cores;
+use crate::rig::cores::Cores;
 use crate::rig::usage;
 
 /// What was taken from publishers and daemon, in s.

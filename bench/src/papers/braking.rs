@@ -11,6 +11,8 @@ use dynocar_shared::RailCondition;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::seeds::normal;
+
 /// Time in s between two measurements.
 pub const STEP_S: f64 = 0.2;
 /// Observations in a window of the papers' EM.
@@ -28,17 +30,10 @@ pub const MPS_PER_KMH: f64 = 1.0 / 3.6;
 
 /// CRH3 as in table 1 of both papers.
 pub fn train() -> TrainModel {
+    let resistance = Davis { a: 0.79, b: 0.0064 * 3.6, c: 0.000_115 * 3.6 * 3.6 };
     TrainModel {
-        name: "CRH3".into(),
-        mass_kg: 536_000.0,
         length_m: 200.0,
         cars: 8,
-        rotating_mass_factor: 0.0,
-        resistance: Davis { a: 0.79, b: 0.0064 * 3.6, c: 0.000_115 * 3.6 * 3.6 },
-        curve_constant_n_per_kn_m: 0.0,
-        tunnel_constant_n_per_kn_m: 0.0,
-        traction: None,
-        brake: None,
         brake_gear: BrakeGear {
             cylinder_diameter_mm: Some(203.0),
             disc_radius_mm: Some(297.6),
@@ -48,7 +43,7 @@ pub fn train() -> TrainModel {
             friction: Some(0.28),
             pads: Some(95.0),
         },
-        corrections: Default::default(),
+        ..TrainModel::bare("CRH3", 536_000.0, resistance)
     }
 }
 
@@ -274,10 +269,4 @@ pub fn declared(sought: Sought) -> f64 {
 /// Uniform in -1 to 1.
 pub fn uniform(random: &mut ChaCha8Rng) -> f64 {
     2.0 * random.random::<f64>() - 1.0
-}
-
-/// Standard normal, by Box and Muller.
-pub fn normal(random: &mut ChaCha8Rng) -> f64 {
-    let radius = (-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt();
-    radius * (std::f64::consts::TAU * random.random::<f64>()).cos()
 }

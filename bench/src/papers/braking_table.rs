@@ -37,21 +37,7 @@ impl Table {
 
     /// A row without figures.
     pub fn row(&self, what: &str, unit: &'static str, seeds: Seeds) -> Row {
-        Row {
-            paper: self.paper,
-            table: self.table,
-            quantity: format!("{}, {what}", self.name),
-            unit,
-            published: None,
-            paper_method: None,
-            baseline: None,
-            ours: None,
-            bound: None,
-            seeds: seeds.count,
-            coverage: None,
-            nees: None,
-            nees_freedom: None,
-        }
+        Row::new(self.paper, self.table, format!("{}, {what}", self.name), unit, seeds)
     }
 
     /// The rows that every table has: the present, 5 s back, and the baseline on its own.

@@ -10,56 +10,31 @@ pub mod scenario;
 
 use std::sync::Arc;
 
-use dynocar_core::pipeline::resistance::output_error::{
-    DrivenRun, DrivenSpeed, OutputErrorSettings, fit_output_error,
-};
+use dynocar_core::pipeline::trajectory::fit::{FitSettings, Stretch, TrajectoryFitter};
+use dynocar_core::pipeline::trajectory::step::{Step, StepRule, resistance_gain};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
 use dynocar_core::train::{Davis, TrainModel};
 use dynocar_shared::snapshot::packed_index;
 use dynocar_shared::{PipelineKind, SampleField, TrainId, TrainSample};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 
 use self::methods::Method;
-use self::scenario::{COMPARED_KMH, Condition, Measured, ROTATING_MASS_FACTOR, STEP_S, davis};
+use self::scenario::{
+    Condition, Measured, ROTATING_MASS_FACTOR, STEP_S, compared_speeds_mps, davis, truth,
+};
 use super::row::Row;
+use super::score::{Score, w0_errors};
 use super::seeds::Seeds;
 use super::statistics::{mean, root_mean_square};
 
 const PAPER: &str = "Liu 2018";
 
-/// An estimate with its covariance, for speeds in m/s.
-#[derive(Clone, Copy, Debug)]
-struct Estimate {
-    davis: Davis,
-    covariance: Matrix3<f64>,
-}
+/// Residuals of the fit beyond so many standard deviations count linearly: 5 % of outliers then
+/// cost a fifth of the accuracy, and their absence 1 %.
+const OUTLIER_THRESHOLD: f64 = 2.5;
 
-/// Errors, coverage and consistency of one method over the seeds.
-#[derive(Clone, Debug, Default)]
-struct Score {
-    errors: Vec<f64>,
-    held: Vec<f64>,
-    nees: Vec<f64>,
-}
-
-impl Score {
-    fn take(&mut self, estimate: &Estimate) {
-        let errors = scenario::errors(&estimate.davis);
-        for (kmh, error) in COMPARED_KMH.zip(&errors) {
-            let speed_mps = f64::from(kmh) / 3.6;
-            let powers = Vector3::new(1.0, speed_mps, speed_mps * speed_mps);
-            let std = powers.dot(&(estimate.covariance * powers)).sqrt();
-            self.held.push(f64::from(error.abs() < 1.96 * std));
-        }
-        self.errors.extend(errors);
-        let truth = scenario::truth();
-        let Davis { a, b, c } = estimate.davis;
-        let error = Vector3::new(a - truth.a, b - truth.b, c - truth.c);
-        if let Some(factor) = estimate.covariance.cholesky() {
-            self.nees.push(error.dot(&factor.solve(&error)) / 3.0);
-        }
-    }
-}
+/// Coefficients with their covariance, for speeds in m/s.
+type Estimate = (Davis, Matrix3<f64>);
 
 /// Rows for every method under every condition, over seeded runs.
 pub fn rows(seeds: Seeds) -> Vec<Row> {
@@ -72,35 +47,31 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
 fn accuracy(condition: Condition, seeds: Seeds) -> Vec<Row> {
     let mut of_methods = vec![Vec::new(); Method::ALL.len()];
     let (mut ours, mut online) = (Score::default(), Score::default());
-    let mut bounds = Vec::new();
+    let (speeds, truth) = (compared_speeds_mps(), truth());
     for seed in seeds.range() {
         let runs = scenario::measure(condition, seed);
         let segments = methods::segments(&runs);
         for (errors, method) in of_methods.iter_mut().zip(Method::ALL) {
             if let Some(theta_kmh) = method.estimate(&segments) {
-                errors.extend(scenario::errors(&davis(theta_kmh)));
+                errors.extend(w0_errors(&davis(theta_kmh), &truth, &speeds));
             }
         }
-        if let Some(estimate) = output_error(&runs) {
-            ours.take(&estimate);
+        if let Some((found, covariance)) = whole_runs(&runs) {
+            ours.take_resistance((&found, &covariance), &truth, &speeds);
         }
-        online.take(&live(&runs));
-        bounds.push(bound_of(condition, &runs));
+        let (found, covariance) = live(&runs);
+        online.take_resistance((&found, &covariance), &truth, &speeds);
+        let bound = bound_of(condition, &runs);
+        ours.take_bound(&bound, &speeds);
+        online.take_bound(&bound, &speeds);
     }
-    let row = |quantity: String, method: Option<f64>, score: &Score| Row {
-        paper: PAPER,
-        table: "Table 1, section 4.2",
-        quantity: format!("w0 over 40-72 km/h, {quantity}, {}", condition.name()),
-        unit: "N/kN",
-        published: None,
-        paper_method: method,
-        baseline: Some(root_mean_square(&of_methods[0])),
-        ours: Some(root_mean_square(&score.errors)),
-        bound: Some(root_mean_square(&bounds)),
-        seeds: seeds.count,
-        coverage: Some(mean(&score.held)),
-        nees: Some(mean(&score.nees)),
-        nees_freedom: Some(3.0 * score.nees.len() as f64),
+    let row = |quantity: String, method: Option<f64>, score: &Score| {
+        let quantity = format!("w0 over 40-72 km/h, {quantity}, {}", condition.name());
+        Row {
+            paper_method: method,
+            baseline: Some(root_mean_square(&of_methods[0])),
+            ..score.row(Row::new(PAPER, "Table 1, section 4.2", quantity, "N/kN", seeds))
+        }
     };
     let mut rows: Vec<Row> = Method::ALL
         .iter()
@@ -112,7 +83,7 @@ fn accuracy(condition: Condition, seeds: Seeds) -> Vec<Row> {
 }
 
 /// The bound for the samples that a seed kept.
-fn bound_of(condition: Condition, runs: &[Vec<Measured>]) -> f64 {
+fn bound_of(condition: Condition, runs: &[Vec<Measured>]) -> Matrix3<f64> {
     let kept: Vec<Vec<bool>> = runs
         .iter()
         .map(|run| {
@@ -125,48 +96,40 @@ fn bound_of(condition: Condition, runs: &[Vec<Measured>]) -> f64 {
         })
         .collect();
     let is_kept = |run: usize, index: usize| kept[run].get(index).copied().unwrap_or(false);
-    bound::root_mean_variance(&bound::covariance(condition, is_kept))
+    bound::covariance(condition, is_kept)
 }
 
-/// Our fit of whole runs: output error with Student's t.
-fn output_error(runs: &[Vec<Measured>]) -> Option<Estimate> {
-    let samples: Vec<Vec<DrivenSpeed>> = runs
+/// Our fit of whole runs: the computed speed against the measured one, all along each run.
+fn whole_runs(runs: &[Vec<Measured>]) -> Option<Estimate> {
+    let step = |pair: &[Measured]| Step {
+        size: pair[1].time_s - pair[0].time_s,
+        drive_mps2: 0.0,
+        resistance_gain: resistance_gain(ROTATING_MASS_FACTOR),
+    };
+    let steps: Vec<Vec<Step>> = runs.iter().map(|run| run.windows(2).map(step).collect()).collect();
+    let speed_mps = |sample: &Measured| sample.speed_kmh / 3.6;
+    let speeds: Vec<Vec<f64>> =
+        runs.iter().map(|run| run.iter().map(speed_mps).collect()).collect();
+    let stretches: Vec<Stretch<'_>> = steps
         .iter()
-        .map(|run| {
-            run.iter()
-                .map(|sample| DrivenSpeed {
-                    time_s: sample.time_s,
-                    speed_mps: sample.speed_kmh / 3.6,
-                    driving_n_per_kn: 0.0,
-                })
-                .collect()
-        })
+        .zip(&speeds)
+        .map(|(steps, speeds_mps)| Stretch { steps, speeds_mps })
         .collect();
-    let runs: Vec<DrivenRun> = samples
-        .iter()
-        .map(|samples| DrivenRun { samples, rotating_mass_factor: ROTATING_MASS_FACTOR })
-        .collect();
-    let settings = OutputErrorSettings::default();
-    let fit = fit_output_error(&runs, &settings).ok()?;
-    Some(Estimate { davis: fit.davis, covariance: fit.covariance })
+    let settings =
+        FitSettings { outlier_threshold: OUTLIER_THRESHOLD, ..FitSettings::new(StepRule::Time) };
+    let fit = TrajectoryFitter::default().fit(&stretches, None, &settings).ok()?;
+    Some((fit.davis, fit.covariance))
 }
 
 /// The live pipeline over the same samples, with its default settings.
 fn live(runs: &[Vec<Measured>]) -> Estimate {
+    // Declared wrongly, as in practice.
+    let declared = Davis { a: 1.5, b: 0.03, c: 0.012 };
     let train = Arc::new(TrainModel {
-        name: "Liu 2018".into(),
-        mass_kg: 200_000.0,
         length_m: 120.0,
         cars: 6,
         rotating_mass_factor: ROTATING_MASS_FACTOR,
-        // Declared wrongly, as in practice.
-        resistance: Davis { a: 1.5, b: 0.03, c: 0.012 },
-        curve_constant_n_per_kn_m: 0.0,
-        tunnel_constant_n_per_kn_m: 0.0,
-        traction: None,
-        brake: None,
-        brake_gear: Default::default(),
-        corrections: Default::default(),
+        ..TrainModel::bare("Liu 2018", 200_000.0, declared)
     });
     let settings = EstimatorSettings::default_of(PipelineKind::ResistanceKalman)
         .expect("the kind can be built");
@@ -188,10 +151,10 @@ fn live(runs: &[Vec<Measured>]) -> Estimate {
     }
     let snapshot = pipeline.snapshot();
     let values = snapshot.values;
-    Estimate {
-        davis: Davis { a: values[0], b: values[1], c: values[2] },
-        covariance: Matrix3::from_fn(|i, j| snapshot.covariance[packed_index(i, j)]),
-    }
+    (
+        Davis { a: values[0], b: values[1], c: values[2] },
+        Matrix3::from_fn(|i, j| snapshot.covariance[packed_index(i, j)]),
+    )
 }
 
 /// Table 1's last column: the variance of the segments' residuals. The paper's are of its own
@@ -213,25 +176,17 @@ fn table_1(seeds: Seeds) -> Vec<Row> {
                 let segments = methods::segments(&runs);
                 let variance = |theta_kmh| methods::residual_variance(&segments, theta_kmh);
                 variances.extend(method.estimate(&segments).map(variance));
-                ours.extend(output_error(&runs).map(|estimate| {
-                    let Davis { a, b, c } = estimate.davis;
-                    variance([a, b / 3.6, c / (3.6 * 3.6)])
-                }));
+                ours.extend(
+                    whole_runs(&runs)
+                        .map(|(Davis { a, b, c }, _)| variance([a, b / 3.6, c / (3.6 * 3.6)])),
+                );
             }
+            let quantity = format!("variance of the segments' residuals, {}", method.name());
             Row {
-                paper: PAPER,
-                table: "Table 1",
-                quantity: format!("variance of the segments' residuals, {}", method.name()),
-                unit: "(N/kN)^2",
                 published: Some(published),
                 paper_method: Some(mean(&variances)),
-                baseline: None,
                 ours: Some(mean(&ours)),
-                bound: None,
-                seeds: seeds.count,
-                coverage: None,
-                nees: None,
-                nees_freedom: None,
+                ..Row::new(PAPER, "Table 1", quantity, "(N/kN)^2", seeds)
             }
         })
         .collect()

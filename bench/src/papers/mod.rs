@@ -10,6 +10,7 @@ pub mod literal_em;
 pub mod liu;
 pub mod promise;
 pub mod row;
+pub mod score;
 pub mod seeds;
 pub mod statistics;
 pub mod table;

@@ -152,22 +152,17 @@ fn nees_band(freedom: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::papers::Seeds;
 
     fn row(quantity: &str, ours: f64, seeds: usize) -> Row {
+        let seeds = Seeds::from_zero(seeds);
         Row {
-            paper: "Liu 2018",
-            table: "Table 1, section 4.2",
-            quantity: quantity.into(),
-            unit: "N/kN",
-            published: None,
-            paper_method: None,
-            baseline: None,
             ours: Some(ours),
             bound: Some(1.0),
-            seeds,
             coverage: Some(0.95),
             nees: Some(1.0),
-            nees_freedom: Some(3.0 * seeds as f64),
+            nees_freedom: Some(3.0 * seeds.count as f64),
+            ..Row::new("Liu 2018", "Table 1, section 4.2", quantity, "N/kN", seeds)
         }
     }
 

@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::seeds::Seeds;
+
 /// A figure of a paper, measured here with the paper's method, its baseline and ours.
 ///
 /// Errors are in `unit`; a method that a table does not have is `None`.
@@ -33,4 +35,31 @@ pub struct Row {
     pub nees: Option<f64>,
     /// Degrees of freedom behind that mean over all runs, those of independent errors.
     pub nees_freedom: Option<f64>,
+}
+
+impl Row {
+    /// A row without figures.
+    pub fn new(
+        paper: &'static str,
+        table: &'static str,
+        quantity: impl Into<String>,
+        unit: &'static str,
+        seeds: Seeds,
+    ) -> Self {
+        Row {
+            paper,
+            table,
+            quantity: quantity.into(),
+            unit,
+            published: None,
+            paper_method: None,
+            baseline: None,
+            ours: None,
+            bound: None,
+            seeds: seeds.count,
+            coverage: None,
+            nees: None,
+            nees_freedom: None,
+        }
+    }
 }

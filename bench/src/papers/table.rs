@@ -132,22 +132,21 @@ pub fn for_documentation(rows: &[Row]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::papers::Seeds;
 
     fn row() -> Row {
         Row {
-            paper: "Xia 2023",
-            table: "Table 3",
-            quantity: "w0 over driven speeds".into(),
-            unit: "N/kN",
             published: Some(0.04),
-            paper_method: None,
-            baseline: None,
             ours: Some(0.0297),
             bound: Some(0.027),
-            seeds: 200,
             coverage: Some(0.951),
-            nees: None,
-            nees_freedom: None,
+            ..Row::new(
+                "Xia 2023",
+                "Table 3",
+                "w0 over driven speeds",
+                "N/kN",
+                Seeds::from_zero(200),
+            )
         }
     }
 

@@ -3,6 +3,7 @@
 //! - [`mod@line`], [`shuttle`], [`driver`], [`disturbance`], [`sensor`]: the scenario, from line to
 //!   samples
 //! - [`bound`]: what no estimator can beat
+//! - [`printed`]: the descent as printed
 //! - [`resistance_rows`], [`leg`], [`mass_rows`], [`step_row`], [`energy_rows`]: the comparison
 
 pub mod bound;
@@ -12,6 +13,7 @@ pub mod energy_rows;
 pub mod leg;
 pub mod line;
 pub mod mass_rows;
+pub mod printed;
 pub mod resistance_rows;
 pub mod sensor;
 pub mod shuttle;

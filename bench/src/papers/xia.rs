@@ -27,21 +27,7 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
 
 /// A line of this paper without any figure yet.
 fn row(table: &'static str, quantity: String, unit: &'static str, seeds: Seeds) -> Row {
-    Row {
-        paper: "Xia 2023",
-        table,
-        quantity,
-        unit,
-        published: None,
-        paper_method: None,
-        baseline: None,
-        ours: None,
-        bound: None,
-        seeds: seeds.count,
-        coverage: None,
-        nees: None,
-        nees_freedom: None,
-    }
+    Row::new("Xia 2023", table, quantity, unit, seeds)
 }
 
 #[cfg(test)]

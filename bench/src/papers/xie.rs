@@ -197,19 +197,10 @@ pub fn stop_rows(
     ours: (f64, f64),
 ) -> Vec<Row> {
     let row = |quantity: String, unit, published, in_steps, ours| Row {
-        paper,
-        table,
-        quantity,
-        unit,
         published: Some(published),
         paper_method: Some(in_steps),
-        baseline: None,
         ours: Some(ours),
-        bound: None,
-        seeds: 1,
-        coverage: None,
-        nees: None,
-        nees_freedom: None,
+        ..Row::new(paper, table, quantity, unit, Seeds::from_zero(1))
     };
     vec![
         row(format!("braking distance, {what}"), "m", published.0, in_steps.0, ours.0),

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 
 use super::RigError;
-use crate::latency::{Cores, bind, in_thread, prioritise};
+use super::cores::{Cores, bind, in_thread, prioritise};
 
 /// A look at the clock that comes so long after the last one was kept from it.
 const GAP_MIN: Duration = Duration::from_micros(20);

@@ -2,6 +2,7 @@
 //!
 //! - [`site`]: a run-time directory with a daemon configuration, gone afterwards
 //! - [`child`]: processes beside this one, each bound to a core
+//! - [`cores`]: cores and priorities
 //! - [`host`]: what the host takes away from threads that are always busy
 //! - [`motion`]: the samples of a train that swings between 10 and 30 m/s
 //! - [`pipelines`]: which pipelines a measurement names
@@ -9,6 +10,7 @@
 //! - [`usage`]: what the kernel says of a process: processor time, memory, faults, switches
 
 pub mod child;
+pub mod cores;
 pub mod host;
 pub mod motion;
 pub mod pipelines;
@@ -18,8 +20,7 @@ pub mod usage;
 
 use std::path::PathBuf;
 
-use dynocar_client::ChannelError;
-use dynocar_client::channel::SendRefused;
+use dynocar_client::{ChannelError, SendRefused};
 
 /// Why a measurement cannot be made.
 #[derive(Debug, thiserror::Error)]

@@ -11,7 +11,7 @@ mod wake;
 mod wire;
 
 pub use count::SampleCount;
-pub use ports::{Receiver, SendRefused, Sender};
+pub use ports::{Receiver, Sender};
 pub use wake::{Sleeper, Waker};
 pub use wire::{Payload, Wire};
 

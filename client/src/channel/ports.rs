@@ -12,14 +12,9 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use super::no_place_left;
 use super::users::Users;
 use super::wire::{Payload, Wire};
-use crate::error::ChannelError;
+use crate::error::{ChannelError, SendRefused};
 
 type Service<T> = PortFactory<ipc::Service, Wire<T>, ()>;
-
-/// The transport took no message; the sender goes on, the message is lost.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the transport took no message")]
-pub struct SendRefused;
 
 fn refused<T: Payload>(train: TrainId, port: &str, reason: impl std::fmt::Debug) -> ChannelError {
     let channel = T::CHANNEL.name();

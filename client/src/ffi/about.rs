@@ -7,9 +7,10 @@ use std::path::Path;
 use dynocar_shared::{ParameterSnapshot, SCHEMA_MAJOR, TrainId, TrainSample};
 
 use super::error::{Code, Failure, Message, guard_in_words};
+use crate::announcement::Role;
 use crate::error::ChannelError;
 use crate::host::Host;
-use crate::peer::{Peer, Role};
+use crate::peer::Peer;
 
 /// Who serves a train; `DYNOCAR_DAEMON_…` in C.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

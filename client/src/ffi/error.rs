@@ -4,8 +4,7 @@ use std::ffi::{CStr, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::answers::NoAnswer;
-use crate::channel::SendRefused;
-use crate::error::ChannelError;
+use crate::error::{ChannelError, SendRefused};
 
 /// Declares the codes with their numbers and texts, so that none is without a text.
 macro_rules! codes {

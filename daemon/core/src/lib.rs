@@ -13,13 +13,11 @@
 //! - [`terms`]: the physical terms of the model, one law each, that all of the following share
 //! - [`force`]: the known forces on the train at a sample
 //! - [`filter`]: recursive estimators of fixed size, without knowledge of trains
-//! - [`energy`]: traction energy of a run
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
-//! - [`simulate`]: the speed that a force model predicts, over a recorded run or with a driver
+//! - [`simulate`]: the speed that a force model predicts over a recorded run
 //! - [`explain`]: which undeclared effect explains what the declared model leaves
 
 pub mod dataset;
-pub mod energy;
 pub mod explain;
 pub mod filter;
 pub mod force;

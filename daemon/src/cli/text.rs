@@ -5,6 +5,8 @@ use dynocar_core::plausibility::Severity;
 
 /// Widest line of running text.
 pub const WIDTH: usize = 96;
+/// Width of the keys of an entry.
+const KEY_WIDTH: usize = 12;
 
 /// Rows of cells under a header, aligned in columns.
 #[derive(Clone, Debug)]
@@ -88,6 +90,14 @@ pub fn short(value: f64, decimals: usize) -> String {
         false => &text,
     };
     if text == "-0" { "0".into() } else { text.into() }
+}
+
+/// An entry: a key and what is said of it, broken into lines.
+pub fn line(key: &str, value: &str) -> String {
+    let mut lines = wrap(value, WIDTH - KEY_WIDTH).into_iter();
+    let first = lines.next().unwrap_or_default();
+    let rest = lines.map(|line| format!("  {:KEY_WIDTH$}{line}\n", ""));
+    format!("  {key:KEY_WIDTH$}{first}\n{}", rest.collect::<String>())
 }
 
 #[cfg(test)]

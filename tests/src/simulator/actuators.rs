@@ -2,8 +2,7 @@
 
 use std::collections::VecDeque;
 
-use dynocar_core::simulate::Controls;
-
+use super::driving::Controls;
 use super::train_maker::TrueTrain;
 
 /// First-order lag over one step.

@@ -1,8 +1,8 @@
 //! A driver who keeps to the limits, coasts and stops at the stations.
 
 use dynocar_core::simulate::motion::Motion;
-use dynocar_core::simulate::{Controls, Driver, TrainOnLine};
 
+use super::driving::{Controls, Driver, TrainOnLine};
 use super::line_maker::Line;
 use super::permitted_speed::{Leg, PermittedSpeed};
 use super::random::Random;

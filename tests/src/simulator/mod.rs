@@ -11,7 +11,7 @@
 //! - [`settings`]: what is asked of a dataset; [`random`]: a stream of numbers per subject
 //! - [`train_maker`], [`line_maker`], [`run_maker`]: what there is
 //! - [`effects`], [`effect_maker`], [`disturbances`]: what is undeclared, and what it changes
-//! - [`permitted_speed`], [`driver`], [`actuators`], [`dynamics`], [`true_run`]: what happens
+//! - [`driving`], [`permitted_speed`], [`driver`], [`actuators`], [`dynamics`], [`true_run`]: what happens
 //! - [`sensors`], [`defects`]: what is recorded of it
 //! - [`truth`], [`oracle`]: what a perfect explainer would find, and how well it would predict
 //! - [`columns`], [`dataset_writer`]: the recording as a dataset folder
@@ -22,6 +22,7 @@ pub mod dataset_writer;
 pub mod defects;
 pub mod disturbances;
 pub mod driver;
+pub mod driving;
 pub mod dynamics;
 pub mod effect_maker;
 pub mod effects;

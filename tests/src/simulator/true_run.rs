@@ -1,11 +1,11 @@
 //! One run as it truly happened.
 
 use dynocar_core::simulate::motion::{Motion, advance};
-use dynocar_core::simulate::{Controls, Driver};
 use dynocar_core::train::TrainModel;
 
 use super::actuators::{Actuators, LateForces};
 use super::driver::TrainDriver;
+use super::driving::{Controls, Driver};
 use super::dynamics::{Instant, Resistance, TruePhysics};
 use super::random::{Random, Stream};
 use super::settings::SimulatorSettings;
@@ -100,7 +100,7 @@ pub fn drive_run(physics: &TruePhysics<'_>, settings: &SimulatorSettings) -> Vec
             mass_kg,
             inertial_mass_kg,
         });
-        motion = advance(motion, TRUE_STEP_S, |at| {
+        motion = advance(motion, TRUE_STEP_S, |_, at| {
             (control_n - physics.resistance(at.speed_mps, &under, &now).total_n())
                 / inertial_mass_kg
         });

@@ -1,8 +1,11 @@
 //! Liu's coasting runs, with what the paper leaves out.
 
+use dynocar_core::simulate::motion::{Motion, advance};
 use dynocar_core::train::Davis;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+
+use crate::papers::seeds::normal;
 
 /// Table 1's last row, near enough: w0 = 2.2 + 0.025 v + 0.0013 v² in N/kN, v in km/h.
 pub const THETA_KMH: [f64; 3] = [2.2, 0.025, 0.0013];
@@ -22,8 +25,6 @@ pub const OUTLIER_SHARE: f64 = 0.05;
 pub const OUTLIER_KMH: (f64, f64) = (1.0, 5.0);
 /// Share of missing samples.
 pub const MISSING_SHARE: f64 = 0.2;
-/// The speeds at which w0 is compared, in km/h.
-pub const COMPARED_KMH: std::ops::RangeInclusive<u32> = 40..=72;
 
 /// What is wrong with the data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,16 +97,11 @@ pub fn inertia() -> f64 {
 
 /// True speeds in km/h of a run, every [`STEP_S`], until it reaches its last speed.
 pub fn true_speeds_kmh((from_kmh, to_kmh): (f64, f64), davis: &Davis) -> Vec<f64> {
-    let rate = |speed_mps: f64| -davis.w0_n_per_kn(speed_mps) / inertia();
-    let (mut speed_mps, h) = (from_kmh / 3.6, STEP_S);
+    let mut motion = Motion { distance_m: 0.0, speed_mps: from_kmh / 3.6 };
     let mut speeds = Vec::new();
-    while speed_mps * 3.6 >= to_kmh {
-        speeds.push(speed_mps * 3.6);
-        let k1 = rate(speed_mps);
-        let k2 = rate(speed_mps + 0.5 * h * k1);
-        let k3 = rate(speed_mps + 0.5 * h * k2);
-        let k4 = rate(speed_mps + h * k3);
-        speed_mps += h * (k1 + 2.0 * (k2 + k3) + k4) / 6.0;
+    while motion.speed_mps * 3.6 >= to_kmh {
+        speeds.push(motion.speed_mps * 3.6);
+        motion = advance(motion, STEP_S, |_, at| -davis.w0_n_per_kn(at.speed_mps) / inertia());
     }
     speeds
 }
@@ -136,20 +132,9 @@ pub fn measure(condition: Condition, seed: u64) -> Vec<Vec<Measured>> {
         .collect()
 }
 
-/// A standard normal number (Box and Muller 1958).
-fn normal(random: &mut ChaCha8Rng) -> f64 {
-    let radius = (-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt();
-    radius * (std::f64::consts::TAU * random.random::<f64>()).cos()
-}
-
-/// Errors of w0 in N/kN at every compared speed.
-pub fn errors(estimate: &Davis) -> Vec<f64> {
-    COMPARED_KMH
-        .map(|kmh| {
-            let speed_mps = f64::from(kmh) / 3.6;
-            estimate.w0_n_per_kn(speed_mps) - truth().w0_n_per_kn(speed_mps)
-        })
-        .collect()
+/// The speeds in m/s at which w0 is compared: where the runs coast.
+pub fn compared_speeds_mps() -> Vec<f64> {
+    (40..=72).map(|kmh| f64::from(kmh) / 3.6).collect()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Cramér–Rao bounds of the scenario, from the sensitivities of the true motion.
 
-use dynocar_core::filter::JosephFilter;
+use dynocar_core::filter::Gaussian;
 use dynocar_core::pipeline::mass::speed_basis::SpeedBasis;
 use dynocar_core::train::Davis;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
@@ -107,11 +107,12 @@ fn leg_information(
 pub fn mass_std_in_wind(shuttle: &Shuttle, leg: &[Instant]) -> f64 {
     let per_n_per_kn = 1e-3 * STANDARD_GRAVITY_MPS2;
     let std = Vector4::new(10.0, 1.0, MEAN_WIND_STD_MPS, GUST_STD_MPS);
-    let mut filter = JosephFilter::new(Vector4::zeros(), std);
+    let mut filter = Gaussian::independent(Vector4::zeros(), std);
     let keep = (-PERIOD_S / GUST_TIME_S).exp();
-    let noise = Vector4::new(0.0, 0.0, 0.0, GUST_STD_MPS * GUST_STD_MPS * (1.0 - keep * keep));
+    let gusts = GUST_STD_MPS * GUST_STD_MPS * (1.0 - keep * keep);
+    let noise = Matrix4::from_diagonal(&Vector4::new(0.0, 0.0, 0.0, gusts));
     for instant in leg.iter().filter(|instant| instant.speed_mps > 0.0) {
-        filter.measure(0, 0.0, speed_variance());
+        filter.measure(0, 0.0, speed_variance()).expect("a sound covariance");
         let c = shuttle.truth.basic.c;
         let wind = -PERIOD_S * per_n_per_kn * 2.0 * c * instant.speed_mps;
         let damping = per_n_per_kn * (shuttle.truth.basic.b + 2.0 * c * instant.speed_mps);

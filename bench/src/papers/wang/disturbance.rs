@@ -6,8 +6,8 @@ use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::sensor::normal;
 use super::shuttle::{Disturbance, PERIOD_S};
+use crate::papers::seeds::normal;
 
 /// Standard deviation in m/s of a leg's mean headwind: a fresh breeze.
 pub const MEAN_WIND_STD_MPS: f64 = 3.0;

@@ -1,12 +1,83 @@
-//! The leg on which masses are learned, and the estimators that learn them.
+//! The rides: crossings of the line, the leg on which masses are learned, and the estimators that
+//! learn them.
 
 use dynocar_core::pipeline::mass::line_resistance::LineResistance;
 use dynocar_core::pipeline::mass::{
     MassKalman, MassKalmanSettings, MassRegression, StagedDescent, StagedDescentSettings,
 };
 
+use super::driver::{Driver, LimitDriver};
 use super::line::{CURVE_RADIUS_M, STATIONS_M};
 use super::shuttle::{Disturbance, EMPTY_MASS_KG, Instant, PERIOD_S, Shuttle};
+
+const FORCE_SLEW_N_PER_S: f64 = 80_000.0;
+
+impl Shuttle {
+    /// Drives like [`LimitDriver`].
+    pub fn drive(
+        &self,
+        start: &Instant,
+        to_m: f64,
+        dwell_s: f64,
+        disturbance: &mut dyn Disturbance,
+    ) -> Vec<Instant> {
+        self.drive_with(&mut LimitDriver::new(), start, to_m, dwell_s, disturbance)
+    }
+
+    /// Drives from standstill to standstill at `to_m`, then stands for `dwell_s`.
+    pub fn drive_with(
+        &self,
+        driver: &mut dyn Driver,
+        start: &Instant,
+        to_m: f64,
+        dwell_s: f64,
+        disturbance: &mut dyn Disturbance,
+    ) -> Vec<Instant> {
+        let mut now = Instant { speed_mps: 0.0, force_n: 0.0, ..*start };
+        now.direction = (to_m - now.position_m).signum();
+        let mut ride = vec![now];
+        loop {
+            let wanted_n = driver.force_n(self, &now, to_m);
+            let change = FORCE_SLEW_N_PER_S * PERIOD_S;
+            let to_n = wanted_n.clamp(now.force_n - change, now.force_n + change);
+            let next = self.advance(&now, to_n, disturbance);
+            if next.speed_mps <= 0.0 && now.force_n < 0.0 {
+                break;
+            }
+            now = next;
+            ride.push(now);
+        }
+        let standing = (dwell_s / PERIOD_S).round() as usize;
+        for _ in 0..standing {
+            now.time_s += PERIOD_S;
+            (now.speed_mps, now.force_n) = (0.0, -20_000.0);
+            ride.push(now);
+        }
+        ride
+    }
+
+    /// Drives to and fro until there are `count` samples, the empty train throughout.
+    pub fn crossing(&self, count: usize, disturbance: &mut dyn Disturbance) -> Vec<Instant> {
+        let mut ride: Vec<Instant> = Vec::with_capacity(count + 8_000);
+        let mut now = self.standing_at(STATIONS_M[0], EMPTY_MASS_KG);
+        let mut station = 0_usize;
+        let mut is_outbound = true;
+        while ride.len() < count {
+            station = if is_outbound { station + 1 } else { station - 1 };
+            let leg = self.drive(&now, STATIONS_M[station], 30.0, disturbance);
+            now = leg[leg.len() - 1];
+            now.time_s += PERIOD_S;
+            ride.extend(leg);
+            is_outbound = match station {
+                0 => true,
+                3 => false,
+                _ => is_outbound,
+            };
+        }
+        ride.truncate(count);
+        ride
+    }
+}
 
 /// The leg of 3 km from the first station: power, coasting around 80 km/h, braking.
 pub fn leg(shuttle: &Shuttle, mass_kg: f64, disturbance: &mut dyn Disturbance) -> Vec<Instant> {

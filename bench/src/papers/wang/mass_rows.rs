@@ -15,6 +15,7 @@ use super::resistance_rows::{CROSSING, joint_least_squares};
 use super::sensor::measure;
 use super::shuttle::{Calm, Disturbance, Shuttle};
 use crate::papers::row::Row;
+use crate::papers::score::Score;
 use crate::papers::seeds::Seeds;
 use crate::papers::statistics::{mean, root_mean_square};
 
@@ -48,9 +49,7 @@ impl Condition {
 struct Errors {
     force_on_acceleration: Vec<f64>,
     acceleration_on_force: Vec<f64>,
-    ours: Vec<f64>,
-    covered: Vec<f64>,
-    nees: Vec<f64>,
+    ours: Score,
 }
 
 /// Legs for each seed asked for: a leg is one error, and 200 of them tell a coverage of 95 % only
@@ -76,7 +75,7 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
     rows.push(Row {
         paper_method: Some(mean(&calm.force_on_acceleration)),
         baseline: Some(mean(&calm.acceleration_on_force)),
-        ours: Some(mean(&calm.ours)),
+        ours: Some(mean(&calm.ours.errors)),
         coverage: None,
         nees: None,
         nees_freedom: None,
@@ -162,7 +161,7 @@ fn misdeclared_rows(shuttle: &Shuttle, mass_kg: f64, seeds: Seeds) -> [Row; 2] {
         Row {
             paper_method: Some(mean(&errors.force_on_acceleration)),
             baseline: Some(mean(&errors.acceleration_on_force)),
-            ours: Some(mean(&errors.ours)),
+            ours: Some(mean(&errors.ours.errors)),
             coverage: None,
             nees: None,
             nees_freedom: None,
@@ -184,22 +183,15 @@ fn error_row(
     bound: Option<f64>,
     seeds: Seeds,
 ) -> Row {
+    let quantity = format!(
+        "{quantity} (paper's method: force on differentiated speed; baseline: the reverse)"
+    );
     Row {
-        paper: PAPER,
-        table: "Table 3",
-        quantity: format!(
-            "{quantity} (paper's method: force on differentiated speed; baseline: the reverse)"
-        ),
-        unit: "%",
         published,
         paper_method: Some(root_mean_square(&errors.force_on_acceleration)),
         baseline: Some(root_mean_square(&errors.acceleration_on_force)),
-        ours: Some(root_mean_square(&errors.ours)),
         bound,
-        seeds: seeds.count,
-        coverage: Some(mean(&errors.covered)),
-        nees: Some(mean(&errors.nees)),
-        nees_freedom: Some(1.0 * errors.nees.len() as f64),
+        ..errors.ours.row(Row::new(PAPER, "Table 3", quantity, "%", seeds))
     }
 }
 
@@ -244,11 +236,8 @@ impl Errors {
             reverse.update(sample);
         }
         let (estimate_kg, std_kg) = kalman.mass_kg();
-        self.ours.push(percent(estimate_kg));
         self.force_on_acceleration.push(percent(forward.mass_kg()));
         self.acceleration_on_force.push(percent(reverse.mass_kg()));
-        let normalised = (estimate_kg - mass_kg) / std_kg;
-        self.covered.push(f64::from(u8::from(normalised.abs() <= 1.96)));
-        self.nees.push(normalised * normalised);
+        self.ours.take(percent(estimate_kg), 100.0 * std_kg / mass_kg);
     }
 }

@@ -2,22 +2,21 @@
 
 use dynocar_core::pipeline::Estimator;
 use dynocar_core::pipeline::mass::line_resistance::LineResistance;
-use dynocar_core::pipeline::mass::printed_descent::SpeedUnit;
 use dynocar_core::pipeline::mass::section::Section;
 use dynocar_core::pipeline::mass::{
-    DescentVariant, JointLeastSquares, JointLeastSquaresSettings, StagedDescent,
-    StagedDescentSettings,
+    JointLeastSquares, JointLeastSquaresSettings, StagedDescent, StagedDescentSettings,
 };
 use dynocar_core::train::Davis;
-use nalgebra::{Matrix3, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::PAPER;
 use super::bound::Information;
+use super::printed::PrintedDescent;
 use super::sensor::measure;
 use super::shuttle::{Calm, Instant, Shuttle};
 use crate::papers::row::Row;
+use crate::papers::score::{Score, w0_errors};
 use crate::papers::seeds::Seeds;
 use crate::papers::statistics::{mean, root_mean_square};
 
@@ -30,9 +29,7 @@ const NAMES: [&str; 3] = ["basic resistance z1", "curve resistance z2", "tunnel 
 #[derive(Clone, Debug, Default)]
 struct Errors {
     staged: Vec<f64>,
-    ours: Vec<f64>,
-    covered: Vec<f64>,
-    nees: Vec<f64>,
+    ours: Score,
 }
 
 /// The rows for resistance.
@@ -52,7 +49,7 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
         })
         .collect();
     let empirical = Davis { a: 2.7551, b: 0.014 * 3.6, c: 0.00075 * 12.96 };
-    let empirical = differences(&empirical, &shuttle.truth.basic, &speeds[0]);
+    let empirical = w0_errors(&empirical, &shuttle.truth.basic, &speeds[0]);
     rows[0].baseline = Some(root_mean_square(&empirical));
     rows.push(curve_in_tunnel_row(seeds.at_most(20)));
     rows.extend(printed_rows(&shuttle, &ride, seeds.at_most(20)));
@@ -72,23 +69,14 @@ fn curve_in_tunnel_row(seeds: Seeds) -> Row {
 }
 
 fn error_row(quantity: String, errors: &Errors, bound: Option<f64>, seeds: Seeds) -> Row {
+    let quantity = format!(
+        "{quantity}, error over the speeds driven there (paper's method: staged descent, \
+         features normalised; baseline: Table 1's empirical values)"
+    );
     Row {
-        paper: PAPER,
-        table: "Table 2",
-        quantity: format!(
-            "{quantity}, error over the speeds driven there (paper's method: staged descent, \
-             features normalised; baseline: Table 1's empirical values)"
-        ),
-        unit: "N/kN",
-        published: None,
         paper_method: Some(root_mean_square(&errors.staged)),
-        baseline: None,
-        ours: Some(root_mean_square(&errors.ours)),
         bound,
-        seeds: seeds.count,
-        coverage: Some(mean(&errors.covered)),
-        nees: Some(mean(&errors.nees)),
-        nees_freedom: Some(3.0 * errors.nees.len() as f64),
+        ..errors.ours.row(Row::new(PAPER, "Table 2", quantity, "N/kN", seeds))
     }
 }
 
@@ -97,7 +85,7 @@ fn run(shuttle: &Shuttle, ride: &[Instant], speeds: &[Vec<f64>; 3], seeds: Seeds
     let mut errors: [Errors; 3] = Default::default();
     for seed in seeds.range() {
         let samples = measure(shuttle, ride, &mut ChaCha8Rng::seed_from_u64(seed));
-        let mut staged = staged_descent(shuttle, DescentVariant::Normalised, SpeedUnit::default());
+        let mut staged = staged_descent(shuttle);
         let mut joint = joint_least_squares(shuttle);
         for sample in &samples {
             staged.update(sample);
@@ -108,32 +96,11 @@ fn run(shuttle: &Shuttle, ride: &[Instant], speeds: &[Vec<f64>; 3], seeds: Seeds
         for section in Section::ALL {
             let i = section as usize;
             let covariance = joint.resistance_covariance(section).expect("a sound regression");
-            errors[i].staged.extend(differences(&theirs[i], &truths[i], &speeds[i]));
-            errors[i].add_ours(&ours[i], &truths[i], &covariance, &speeds[i]);
+            errors[i].staged.extend(w0_errors(&theirs[i], &truths[i], &speeds[i]));
+            errors[i].ours.take_resistance((&ours[i], &covariance), &truths[i], &speeds[i]);
         }
     }
     errors
-}
-
-impl Errors {
-    fn add_ours(
-        &mut self,
-        own: &Davis,
-        truth: &Davis,
-        covariance: &Matrix3<f64>,
-        speeds_mps: &[f64],
-    ) {
-        let differences = differences(own, truth, speeds_mps);
-        for (error, &speed) in differences.iter().zip(speeds_mps) {
-            let powers = Vector3::new(1.0, speed, speed * speed);
-            let std = powers.dot(&(covariance * powers)).sqrt();
-            self.covered.push(f64::from(u8::from(error.abs() <= 1.96 * std)));
-        }
-        self.ours.extend(differences);
-        let apart = Vector3::new(own.a - truth.a, own.b - truth.b, own.c - truth.c);
-        let inverse = covariance.try_inverse().expect("positive definite");
-        self.nees.push(apart.dot(&(inverse * apart)) / 3.0);
-    }
 }
 
 /// Our estimator with its default settings: the mass is not known to it.
@@ -147,32 +114,19 @@ fn printed_rows(shuttle: &Shuttle, ride: &[Instant], seeds: Seeds) -> [Row; 2] {
     let (mut until, mut moved) = (Vec::new(), Vec::new());
     for seed in seeds.range() {
         let samples = measure(shuttle, ride, &mut ChaCha8Rng::seed_from_u64(seed));
-        let mut in_kmh =
-            staged_descent(shuttle, DescentVariant::Printed, SpeedUnit::KilometresPerHour);
-        let mut in_mps =
-            staged_descent(shuttle, DescentVariant::Printed, SpeedUnit::MetresPerSecond);
-        let start = in_mps.resistance().basic.a;
+        let mut in_kmh = PrintedDescent::new(3.6, &shuttle.train);
+        let mut in_mps = PrintedDescent::new(1.0, &shuttle.train);
+        let start = in_mps.first_coefficient();
         for sample in &samples {
             in_kmh.update(sample);
             in_mps.update(sample);
         }
         until.extend(in_kmh.diverged_after().map(|count| count as f64));
-        moved.push((in_mps.resistance().basic.a - start).abs());
+        moved.push((in_mps.first_coefficient() - start).abs());
     }
     let row = |quantity: &str, unit, value| Row {
-        paper: PAPER,
-        table: "section 3.1",
-        quantity: quantity.into(),
-        unit,
-        published: None,
         paper_method: Some(value),
-        baseline: None,
-        ours: None,
-        bound: None,
-        seeds: seeds.count,
-        coverage: None,
-        nees: None,
-        nees_freedom: None,
+        ..Row::new(PAPER, "section 3.1", quantity, unit, seeds)
     };
     [
         row("learning rate 1e-7, speed in km/h: samples until it has diverged", "1", mean(&until)),
@@ -184,13 +138,8 @@ fn printed_rows(shuttle: &Shuttle, ride: &[Instant], seeds: Seeds) -> [Row; 2] {
     ]
 }
 
-fn staged_descent(shuttle: &Shuttle, variant: DescentVariant, unit: SpeedUnit) -> StagedDescent {
-    let settings = StagedDescentSettings {
-        variant,
-        printed_speed_unit: unit,
-        ..StagedDescentSettings::default()
-    };
-    StagedDescent::new(settings, &shuttle.train).expect("default settings")
+fn staged_descent(shuttle: &Shuttle) -> StagedDescent {
+    StagedDescent::new(StagedDescentSettings::default(), &shuttle.train).expect("default settings")
 }
 
 fn polynomials(resistance: &LineResistance) -> [Davis; 3] {
@@ -217,8 +166,4 @@ fn driven_speeds(shuttle: &Shuttle, ride: &[Instant], section: Section) -> Vec<f
     let at = |share: f64| speeds[(share * (speeds.len() - 1) as f64) as usize];
     let (low, high) = (at(0.05), at(0.95));
     (0..20).map(|k| low + (high - low) * f64::from(k) / 19.0).collect()
-}
-
-fn differences(one: &Davis, other: &Davis, speeds_mps: &[f64]) -> Vec<f64> {
-    speeds_mps.iter().map(|&speed| one.w0_n_per_kn(speed) - other.w0_n_per_kn(speed)).collect()
 }

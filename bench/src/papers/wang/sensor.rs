@@ -3,10 +3,10 @@
 use dynocar_core::force::{ForceResolver, ResolvedSample};
 use dynocar_core::validation::{ValidationLimits, Validator};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
-use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::shuttle::{Instant, Shuttle};
+use crate::papers::seeds::normal;
 
 /// Standard deviation of the speed sensor in m/s: 0.05 km/h.
 pub const SPEED_STD_MPS: f64 = 0.05 / 3.6;
@@ -18,33 +18,11 @@ pub fn speed_variance() -> f64 {
     SPEED_STD_MPS * SPEED_STD_MPS + SPEED_QUANTUM_MPS * SPEED_QUANTUM_MPS / 12.0
 }
 
-/// A standard normal deviate (Box and Muller 1958).
-pub fn normal(random: &mut ChaCha8Rng) -> f64 {
-    let radius = (-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt();
-    radius * (std::f64::consts::TAU * random.random::<f64>()).cos()
-}
-
 /// The samples of a drive with noise and rounding, through validation and force resolution.
 pub fn measure(
     shuttle: &Shuttle,
     ride: &[Instant],
     random: &mut ChaCha8Rng,
-) -> Vec<ResolvedSample> {
-    observe(shuttle, ride, |speed_mps| {
-        let noisy = speed_mps + SPEED_STD_MPS * normal(random);
-        ((noisy / SPEED_QUANTUM_MPS).round() * SPEED_QUANTUM_MPS).max(0.0)
-    })
-}
-
-/// The samples of a drive without noise.
-pub fn exact(shuttle: &Shuttle, ride: &[Instant]) -> Vec<ResolvedSample> {
-    observe(shuttle, ride, |speed_mps| speed_mps)
-}
-
-fn observe(
-    shuttle: &Shuttle,
-    ride: &[Instant],
-    mut sensor: impl FnMut(f64) -> f64,
 ) -> Vec<ResolvedSample> {
     let train = &shuttle.train;
     let limits = ValidationLimits::for_train(train.mass_kg);
@@ -53,7 +31,13 @@ fn observe(
     let mut resolved = Vec::with_capacity(ride.len());
     for (index, instant) in ride.iter().enumerate() {
         let is_standing = instant.speed_mps <= 0.0;
-        let speed_mps = if is_standing { 0.0 } else { sensor(instant.speed_mps) };
+        let speed_mps = match is_standing {
+            true => 0.0,
+            false => {
+                let noisy = instant.speed_mps + SPEED_STD_MPS * normal(random);
+                ((noisy / SPEED_QUANTUM_MPS).round() * SPEED_QUANTUM_MPS).max(0.0)
+            }
+        };
         let mut sample = TrainSample::empty(TrainId(1))
             .with(SampleField::Speed, speed_mps)
             .with(SampleField::Position, instant.position_m)

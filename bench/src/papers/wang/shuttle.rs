@@ -6,10 +6,10 @@
 
 use std::sync::Arc;
 
-use super::driver::{Driver, LimitDriver};
-use super::line::{CURVE_RADIUS_M, STATIONS_M, curves, gradients, tunnels};
+use super::line::{CURVE_RADIUS_M, curves, gradients, tunnels};
+use dynocar_core::simulate::motion::{Motion, advance};
 use dynocar_core::track::Track;
-use dynocar_core::train::{BrakeGear, Davis, EffortCurve, TrainModel};
+use dynocar_core::train::{Davis, EffortCurve, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
 /// Time in s between two samples: the controller's period of the paper.
@@ -21,8 +21,6 @@ pub const EMPTY_MASS_KG: f64 = 110_000.0;
 pub const KMH: f64 = 1.0 / 3.6;
 /// Greatest brake force in N.
 pub const BRAKE_MAX_N: f64 = 110_000.0;
-const SUBSTEPS: usize = 4;
-const FORCE_SLEW_N_PER_S: f64 = 80_000.0;
 
 /// Basic, curve and tunnel resistance as functions of speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -119,18 +117,11 @@ impl Shuttle {
             })
             .collect();
         let train = TrainModel {
-            name: "four-car airport train".into(),
-            mass_kg: EMPTY_MASS_KG,
             length_m: 70.0,
             cars: 4,
-            rotating_mass_factor: 0.0,
-            resistance: truth.basic,
-            curve_constant_n_per_kn_m: 0.0,
-            tunnel_constant_n_per_kn_m: 0.0,
             traction: EffortCurve::new(effort),
             brake: EffortCurve::new(vec![(0.0, BRAKE_MAX_N)]),
-            brake_gear: BrakeGear::default(),
-            corrections: Default::default(),
+            ..TrainModel::bare("four-car airport train", EMPTY_MASS_KG, truth.basic)
         };
         let track = Track::new(
             "synthetic 28 km shuttle".into(),
@@ -153,108 +144,31 @@ impl Shuttle {
         }
     }
 
-    /// Acceleration in m/s² under a force, with `extra` N/kN of resistance.
-    pub fn acceleration_mps2(&self, at: &Instant, force_n: f64, extra_n_per_kn: f64) -> f64 {
+    /// Acceleration in m/s² with `extra` N/kN of resistance.
+    pub fn acceleration_mps2(&self, at: &Instant, extra_n_per_kn: f64) -> f64 {
         let gradient = self.track.gradient_permille(at.position_m, self.train.length_m);
         let w = self.truth.w_n_per_kn(at.speed_mps, self.shares(at.position_m))
             + at.direction * gradient.unwrap_or(0.0)
             + extra_n_per_kn;
-        (force_n / at.mass_kg - 1e-3 * STANDARD_GRAVITY_MPS2 * w) / self.inertia_factor
+        (at.force_n / at.mass_kg - 1e-3 * STANDARD_GRAVITY_MPS2 * w) / self.inertia_factor
     }
 
-    /// One sampling period further, the force linear between `from.force_n` and `to_n`; by
-    /// Runge and Kutta's fourth order on a quarter of the period.
+    /// One sampling period further, the force linear between `from.force_n` and `to_n`.
     pub fn advance(&self, from: &Instant, to_n: f64, disturbance: &mut dyn Disturbance) -> Instant {
         let extra = disturbance.resistance_n_per_kn(from.time_s, from.speed_mps);
-        let step_s = PERIOD_S / SUBSTEPS as f64;
-        let slew = (to_n - from.force_n) / PERIOD_S;
-        let mut now = *from;
-        for _ in 0..SUBSTEPS {
-            let slope = |ahead_s: f64, speed_mps: f64, position_m: f64| {
-                let at = Instant { speed_mps, position_m, ..now };
-                self.acceleration_mps2(&at, now.force_n + slew * ahead_s, extra)
-            };
-            let (v0, x0, half) = (now.speed_mps, now.position_m, 0.5 * step_s);
-            let sign = now.direction;
-            let a1 = slope(0.0, v0, x0);
-            let v1 = v0 + half * a1;
-            let a2 = slope(half, v1, x0 + sign * half * v0);
-            let v2 = v0 + half * a2;
-            let a3 = slope(half, v2, x0 + sign * half * v1);
-            let v3 = v0 + step_s * a3;
-            let a4 = slope(step_s, v3, x0 + sign * step_s * v2);
-            now.speed_mps = v0 + step_s / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4);
-            now.position_m = x0 + sign * step_s / 6.0 * (v0 + 2.0 * v1 + 2.0 * v2 + v3);
-            now.force_n += slew * step_s;
-            now.time_s += step_s;
-        }
-        now
-    }
-
-    /// Drives like [`LimitDriver`].
-    pub fn drive(
-        &self,
-        start: &Instant,
-        to_m: f64,
-        dwell_s: f64,
-        disturbance: &mut dyn Disturbance,
-    ) -> Vec<Instant> {
-        self.drive_with(&mut LimitDriver::new(), start, to_m, dwell_s, disturbance)
-    }
-
-    /// Drives from standstill to standstill at `to_m`, then stands for `dwell_s`.
-    pub fn drive_with(
-        &self,
-        driver: &mut dyn Driver,
-        start: &Instant,
-        to_m: f64,
-        dwell_s: f64,
-        disturbance: &mut dyn Disturbance,
-    ) -> Vec<Instant> {
-        let mut now = Instant { speed_mps: 0.0, force_n: 0.0, ..*start };
-        now.direction = (to_m - now.position_m).signum();
-        let mut ride = vec![now];
-        loop {
-            let wanted_n = driver.force_n(self, &now, to_m);
-            let change = FORCE_SLEW_N_PER_S * PERIOD_S;
-            let to_n = wanted_n.clamp(now.force_n - change, now.force_n + change);
-            let next = self.advance(&now, to_n, disturbance);
-            if next.speed_mps <= 0.0 && now.force_n < 0.0 {
-                break;
-            }
-            // The pull-away: brakes hold the train until the force outweighs the slope.
-            now = Instant { speed_mps: next.speed_mps.max(0.0), ..next };
-            ride.push(now);
-        }
-        let standing = (dwell_s / PERIOD_S).round() as usize;
-        for _ in 0..standing {
-            now.time_s += PERIOD_S;
-            (now.speed_mps, now.force_n) = (0.0, -20_000.0);
-            ride.push(now);
-        }
-        ride
-    }
-
-    /// Drives to and fro until there are `count` samples, the empty train throughout.
-    pub fn crossing(&self, count: usize, disturbance: &mut dyn Disturbance) -> Vec<Instant> {
-        let mut ride: Vec<Instant> = Vec::with_capacity(count + 8_000);
-        let mut now = self.standing_at(STATIONS_M[0], EMPTY_MASS_KG);
-        let mut station = 0_usize;
-        let mut is_outbound = true;
-        while ride.len() < count {
-            station = if is_outbound { station + 1 } else { station - 1 };
-            let leg = self.drive(&now, STATIONS_M[station], 30.0, disturbance);
-            now = leg[leg.len() - 1];
-            now.time_s += PERIOD_S;
-            ride.extend(leg);
-            is_outbound = match station {
-                0 => true,
-                3 => false,
-                _ => is_outbound,
-            };
-        }
-        ride.truncate(count);
-        ride
+        let slew_n_per_s = (to_n - from.force_n) / PERIOD_S;
+        let at = |ahead_s: f64, motion: Motion| Instant {
+            time_s: from.time_s + ahead_s,
+            position_m: from.position_m + from.direction * motion.distance_m,
+            speed_mps: motion.speed_mps,
+            force_n: from.force_n + slew_n_per_s * ahead_s,
+            ..*from
+        };
+        let start = Motion { distance_m: 0.0, speed_mps: from.speed_mps };
+        let end = advance(start, PERIOD_S, |ahead_s, motion| {
+            self.acceleration_mps2(&at(ahead_s, motion), extra)
+        });
+        at(PERIOD_S, end)
     }
 
     /// The train at rest.

@@ -18,10 +18,11 @@ use rand_chacha::ChaCha8Rng;
 
 use super::bound::{davis_covariance, disturbed_davis_covariance};
 use super::row;
-use super::scenario::{CASES, KMH, Profile, Run, drive};
+use super::scenario::{CASES, Profile, Run, all_speeds_mps, drive, fast_speeds_mps};
 use crate::papers::row::Row;
+use crate::papers::score::{Score, w0_errors};
 use crate::papers::seeds::Seeds;
-use crate::papers::statistics::{mean, root_mean_square};
+use crate::papers::statistics::root_mean_square;
 
 /// Identified a of Table 3, case by case.
 const PUBLISHED_A: [f64; 4] = [0.7901, 0.2956, 1.0525, 0.3485];
@@ -153,60 +154,23 @@ pub fn noise_free_rows(seeds: Seeds) -> Vec<Row> {
     rows
 }
 
-/// Errors and consistency over seeds of noise.
-#[derive(Default)]
-struct Consistency {
-    squares: Vec<f64>,
-    bounds: Vec<f64>,
-    covered: Vec<f64>,
-    nees: Vec<f64>,
-}
-
-impl Consistency {
-    fn push(
-        &mut self,
-        found: &TrajectoryFit,
-        truth: &Davis,
-        bound: &nalgebra::Matrix3<f64>,
-        speeds_kmh: &[f64],
-    ) {
-        for speed_mps in speeds_kmh.iter().map(|speed| speed * KMH) {
-            let error = found.davis.w0_n_per_kn(speed_mps) - truth.w0_n_per_kn(speed_mps);
-            let powers = Vector3::new(1.0, speed_mps, speed_mps * speed_mps);
-            self.squares.push(error);
-            self.bounds.push(powers.dot(&(bound * powers)).sqrt());
-            let is_covered = error.abs() <= 1.96 * found.w0_std_n_per_kn(speed_mps);
-            self.covered.push(f64::from(u8::from(is_covered)));
-        }
-        let Davis { a, b, c } = found.davis;
-        let error = Vector3::new(a - truth.a, b - truth.b, c - truth.c);
-        if let Some(factor) = found.covariance.cholesky() {
-            self.nees.push(error.dot(&factor.solve(&error)) / 3.0);
-        }
-    }
-}
-
 /// Figure 4: w0 from noisy runs beside the bound.
 pub fn noise_rows(seeds: Seeds) -> Vec<Row> {
     let truth = CASES[0];
-    let fast: Vec<f64> = (0..=7).map(|i| 270.0 + 5.0 * f64::from(i)).collect();
-    let all: Vec<f64> = (1..=10).map(|i| 30.0 * f64::from(i)).collect();
+    let (fast, all) = (fast_speeds_mps(), all_speeds_mps());
     let cruise = drive(Profile::Cruise, 120e3, 1, |_| truth);
     let full = drive(Profile::Full, 40e3, 1, |_| truth);
-    let (mut free, mut profile) = (Consistency::default(), Consistency::default());
+    let (mut free, mut profile) = (Score::default(), Score::default());
     let (mut paper_free, mut paper_boxed, mut boxed) = (Vec::new(), Vec::new(), Vec::new());
     let (cruise_bound, full_bound) =
         (davis_covariance(&cruise, &truth), davis_covariance(&full, &truth));
     for seed in seeds.range() {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let speeds = cruise.measured_mps(0, &mut random);
-        let errors = |davis: &Davis| -> Vec<f64> {
-            let error =
-                |speed: &f64| davis.w0_n_per_kn(speed * KMH) - truth.w0_n_per_kn(speed * KMH);
-            fast.iter().map(error).collect()
-        };
+        let errors = |davis: &Davis| w0_errors(davis, &truth, &fast);
         if let Some(found) = fit(&cruise, &speeds, None, anywhere()) {
-            free.push(&found, &truth, &cruise_bound, &fast);
+            free.take_resistance((&found.davis, &found.covariance), &truth, &fast);
+            free.take_bound(&cruise_bound, &fast);
             let minimum = paper_minimum(&cruise, &speeds, &found.davis, &anywhere());
             paper_free.extend(minimum.iter().flat_map(errors));
         }
@@ -217,21 +181,13 @@ pub fn noise_rows(seeds: Seeds) -> Vec<Row> {
         }
         let speeds = full.measured_mps(0, &mut random);
         if let Some(found) = fit(&full, &speeds, None, anywhere()) {
-            profile.push(&found, &truth, &full_bound, &all);
+            profile.take_resistance((&found.davis, &found.covariance), &truth, &all);
+            profile.take_bound(&full_bound, &all);
         }
     }
-    let published = fast
-        .iter()
-        .map(|speed| PUBLISHED_NOISY.w0_n_per_kn(speed * KMH) - truth.w0_n_per_kn(speed * KMH));
-    let published: Vec<f64> = published.collect();
-    let line = |quantity: &str, consistency: &Consistency| Row {
-        ours: Some(root_mean_square(&consistency.squares)),
-        bound: Some(root_mean_square(&consistency.bounds)),
-        coverage: Some(mean(&consistency.covered)),
-        nees: Some(mean(&consistency.nees)),
-        nees_freedom: Some(3.0 * consistency.nees.len() as f64),
-        ..row("Figure 4", quantity.into(), "N/kN", seeds)
-    };
+    let published = w0_errors(&PUBLISHED_NOISY, &truth, &fast);
+    let line =
+        |quantity: &str, score: &Score| score.row(row("Figure 4", quantity.into(), "N/kN", seeds));
     vec![
         Row {
             paper_method: Some(root_mean_square(&paper_free)),
@@ -302,16 +258,16 @@ fn paper_minimum(
 /// the fit that estimates the disturbance, and generalised least squares that knows it.
 fn disturbed_row(seeds: Seeds) -> Row {
     let truth = CASES[0];
-    let fast: Vec<f64> = (0..=7).map(|i| 270.0 + 5.0 * f64::from(i)).collect();
+    let fast = fast_speeds_mps();
     let cruise = drive(Profile::Cruise, 120e3, 1, |_| truth);
     let bound = disturbed_davis_covariance(&cruise, &truth);
-    let (mut output_error, mut ours) = (Consistency::default(), Consistency::default());
+    let (mut output_error, mut ours) = (Score::default(), Score::default());
     for seed in seeds.range() {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let run = cruise.disturbed(&truth, &mut random);
         let speeds = run.measured_mps(0, &mut random);
         let stretches = [Stretch { steps: &run.steps, speeds_mps: &speeds }];
-        for (disturbance, consistency) in
+        for (disturbance, score) in
             [(Disturbance::None, &mut output_error), (Disturbance::Estimated, &mut ours)]
         {
             let settings = FitSettings {
@@ -320,19 +276,15 @@ fn disturbed_row(seeds: Seeds) -> Row {
                 ..FitSettings::new(StepRule::Distance)
             };
             if let Ok(found) = TrajectoryFitter::default().fit(&stretches, None, &settings) {
-                consistency.push(&found, &truth, &bound, &fast);
+                score.take_resistance((&found.davis, &found.covariance), &truth, &fast);
+                score.take_bound(&bound, &fast);
             }
         }
     }
     let quantity = "w0 over 270-305 km/h, cruise of 120 km, resistance disturbed by 0.25 N/kN for \
                     5 s (AR 1); paper's method: output error with v_0 free";
     Row {
-        paper_method: Some(root_mean_square(&output_error.squares)),
-        ours: Some(root_mean_square(&ours.squares)),
-        bound: Some(root_mean_square(&ours.bounds)),
-        coverage: Some(mean(&ours.covered)),
-        nees: Some(mean(&ours.nees)),
-        nees_freedom: Some(3.0 * ours.nees.len() as f64),
-        ..row("Figure 4", quantity.into(), "N/kN", seeds)
+        paper_method: Some(root_mean_square(&output_error.errors)),
+        ..ours.row(row("Figure 4", quantity.into(), "N/kN", seeds))
     }
 }

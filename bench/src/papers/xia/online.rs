@@ -20,12 +20,13 @@ use rand_chacha::ChaCha8Rng;
 
 use super::bound::disturbed_davis_covariance;
 use super::scenario::{
-    CASES, KMH, Profile, ROTATING_MASS_FACTOR, Run, SAMPLING_M, SPEED_NOISE_MPS, drive,
-    standard_normal,
+    CASES, Profile, ROTATING_MASS_FACTOR, Run, SAMPLING_M, SPEED_NOISE_MPS, all_speeds_mps, drive,
+    fast_speeds_mps,
 };
 use super::{offline, row};
 use crate::papers::row::Row;
-use crate::papers::seeds::Seeds;
+use crate::papers::score::{Score, w0_std};
+use crate::papers::seeds::{Seeds, normal};
 use crate::papers::statistics::{mean, root_mean_square};
 
 /// Data capacity I of the paper's window.
@@ -151,13 +152,13 @@ fn paper(run: &Run, speeds_mps: &[f64], seed: u64) -> Estimates {
 
 /// Errors and settling of one method over all lines.
 #[derive(Default)]
-struct Score {
+struct Following {
     errors: Vec<f64>,
     deviations: Vec<f64>,
     settling_km: [Vec<f64>; SWITCHES.len()],
 }
 
-impl Score {
+impl Following {
     fn push(&mut self, run: &Run, estimates: &Estimates) {
         let errors: Vec<f64> = estimates
             .iter()
@@ -172,8 +173,7 @@ impl Score {
             self.errors.push(errors[i]);
             if let Some(covariance) = estimates[i].1 {
                 let speed_mps = run.speeds_mps[i + 1];
-                let powers = Vector3::new(1.0, speed_mps, speed_mps * speed_mps);
-                self.deviations.push(powers.dot(&(covariance * powers)).max(0.0).sqrt());
+                self.deviations.push(w0_std(&covariance, speed_mps));
             }
         }
         for (settling, (at, tolerance)) in self.settling_km.iter_mut().zip(SWITCHES) {
@@ -196,7 +196,7 @@ impl Score {
 pub fn rows(seeds: Seeds) -> Vec<Row> {
     let (davis, std) = declared();
     let (mut filter, mut bound, mut windows) =
-        (Score::default(), Score::default(), Score::default());
+        (Following::default(), Following::default(), Following::default());
     let paper_lines = seeds.count.div_ceil(10);
     for seed in seeds.range() {
         let run = drive(Profile::Cruise, 120e3, seed, table_4);
@@ -238,49 +238,6 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
     ]
 }
 
-/// Consistency where the coefficients stay: the filter must be as sure as it is right.
-#[derive(Default)]
-struct Consistency {
-    errors: Vec<f64>,
-    bounds: Vec<f64>,
-    covered: Vec<f64>,
-    nees: Vec<f64>,
-}
-
-impl Consistency {
-    fn push(
-        &mut self,
-        (found, covariance): (Davis, Matrix3<f64>),
-        bound: &Matrix3<f64>,
-        truth: &Davis,
-        speeds_mps: &[f64],
-    ) {
-        for &speed_mps in speeds_mps {
-            let powers = Vector3::new(1.0, speed_mps, speed_mps * speed_mps);
-            let error = found.w0_n_per_kn(speed_mps) - truth.w0_n_per_kn(speed_mps);
-            let deviation = powers.dot(&(covariance * powers)).sqrt();
-            self.errors.push(error);
-            self.covered.push(f64::from(u8::from(error.abs() <= 1.96 * deviation)));
-            self.bounds.push(powers.dot(&(bound * powers)).sqrt());
-        }
-        let error = Vector3::new(found.a - truth.a, found.b - truth.b, found.c - truth.c);
-        if let Some(factor) = covariance.cholesky() {
-            self.nees.push(error.dot(&factor.solve(&error)) / 3.0);
-        }
-    }
-
-    fn row(&self, quantity: &str, seeds: Seeds) -> Row {
-        Row {
-            ours: Some(root_mean_square(&self.errors)),
-            bound: Some(root_mean_square(&self.bounds)),
-            coverage: Some(mean(&self.covered)),
-            nees: Some(mean(&self.nees)),
-            nees_freedom: Some(3.0 * self.nees.len() as f64),
-            ..row("Table 4", quantity.into(), "N/kN", seeds)
-        }
-    }
-}
-
 /// Mean and standard deviations that the constant truths are drawn from.
 fn constant_prior() -> (Davis, Vector3<f64>) {
     (CASES[0], Vector3::new(0.3, 0.01, 0.0003))
@@ -288,17 +245,17 @@ fn constant_prior() -> (Davis, Vector3<f64>) {
 
 fn drawn((mean, std): (Davis, Vector3<f64>), random: &mut ChaCha8Rng) -> Davis {
     Davis {
-        a: mean.a + std[0] * standard_normal(random),
-        b: mean.b + std[1] * standard_normal(random),
-        c: mean.c + std[2] * standard_normal(random),
+        a: mean.a + std[0] * normal(random),
+        b: mean.b + std[1] * normal(random),
+        c: mean.c + std[2] * normal(random),
     }
 }
 
 /// A full speed profile; the forces are exact, which the filter is told.
 fn exact_forces_row(seeds: Seeds) -> Row {
     let (mean_davis, std) = constant_prior();
-    let speeds_mps: Vec<f64> = (1..=10).map(|i| 30.0 * f64::from(i) * KMH).collect();
-    let mut consistency = Consistency::default();
+    let speeds_mps = all_speeds_mps();
+    let mut score = Score::default();
     for seed in seeds.range() {
         let mut random = ChaCha8Rng::seed_from_u64(9000 + seed);
         let truth = drawn(constant_prior(), &mut random);
@@ -311,24 +268,26 @@ fn exact_forces_row(seeds: Seeds) -> Row {
         if let Some((_, Some(bound))) = told
             && let Some((davis, Some(covariance))) = ours(&run, &measured, settings).pop()
         {
-            consistency.push((davis, covariance), &bound, &truth, &speeds_mps);
+            score.take_resistance((&davis, &covariance), &truth, &speeds_mps);
+            score.take_bound(&bound, &speeds_mps);
         }
     }
-    consistency.row("online, no switch: w0 over 30-300 km/h after a full profile of 40 km", seeds)
+    let quantity = "online, no switch: w0 over 30-300 km/h after a full profile of 40 km";
+    score.row(row("Table 4", quantity.into(), "N/kN", seeds))
 }
 
 /// Cruise under a disturbance that lasts for seconds, of which the filter knows nothing; the
 /// bound knows its strength and correlation.
 fn disturbed_row(seeds: Seeds) -> Row {
     let (mean_davis, std) = constant_prior();
-    let speeds_mps: Vec<f64> = (0..=7).map(|i| (270.0 + 5.0 * f64::from(i)) * KMH).collect();
+    let speeds_mps = fast_speeds_mps();
     let nominal = drive(Profile::Cruise, 120e3, 1, |_| mean_davis);
     let prior = Matrix3::from_diagonal(&std.map(|std| 1.0 / (std * std)));
     let bound = disturbed_davis_covariance(&nominal, &mean_davis)
         .try_inverse()
         .and_then(|information| (information + prior).try_inverse())
         .expect("a positive definite information");
-    let mut consistency = Consistency::default();
+    let mut score = Score::default();
     for seed in seeds.range() {
         let mut random = ChaCha8Rng::seed_from_u64(9000 + seed);
         let truth = drawn(constant_prior(), &mut random);
@@ -337,10 +296,11 @@ fn disturbed_row(seeds: Seeds) -> Row {
         if let Some((davis, Some(covariance))) =
             ours(&run, &measured, settings(mean_davis, std)).pop()
         {
-            consistency.push((davis, covariance), &bound, &truth, &speeds_mps);
+            score.take_resistance((&davis, &covariance), &truth, &speeds_mps);
+            score.take_bound(&bound, &speeds_mps);
         }
     }
     let quantity = "online, no switch, resistance disturbed by 0.25 N/kN for 5 s (AR 1): \
                     w0 over 270-305 km/h after 120 km";
-    consistency.row(quantity, seeds)
+    score.row(row("Table 4", quantity.into(), "N/kN", seeds))
 }

@@ -10,6 +10,8 @@ use dynocar_core::train::Davis;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use crate::papers::seeds::normal;
+
 /// Mass in t.
 pub const MASS_T: f64 = 981.7;
 /// Train length in m.
@@ -40,6 +42,16 @@ pub const CASES: [Davis; 4] = [
     Davis { a: 0.3488, b: 0.0596, c: 0.00112 },
 ];
 
+/// The speeds in m/s of cruise at which w0 is compared.
+pub fn fast_speeds_mps() -> Vec<f64> {
+    (0..=7).map(|i| (270.0 + 5.0 * f64::from(i)) * KMH).collect()
+}
+
+/// The speeds in m/s of a full profile at which w0 is compared.
+pub fn all_speeds_mps() -> Vec<f64> {
+    (1..=10).map(|i| 30.0 * f64::from(i) * KMH).collect()
+}
+
 /// How the train is driven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Profile {
@@ -62,7 +74,7 @@ impl Run {
     /// The speeds with white noise from a step on.
     pub fn measured_mps(&self, noisy_from: usize, random: &mut ChaCha8Rng) -> Vec<f64> {
         let noise = |i: usize, random: &mut ChaCha8Rng| {
-            if i >= noisy_from { SPEED_NOISE_MPS * standard_normal(random) } else { 0.0 }
+            if i >= noisy_from { SPEED_NOISE_MPS * normal(random) } else { 0.0 }
         };
         self.speeds_mps.iter().enumerate().map(|(i, v)| v + noise(i, random)).collect()
     }
@@ -73,22 +85,16 @@ impl Run {
     /// first-order autoregression of [`DISTURBANCE_N_PER_KN`] and [`DISTURBANCE_S`].
     pub fn disturbed(&self, davis: &Davis, random: &mut ChaCha8Rng) -> Run {
         let mut speeds_mps = vec![self.speeds_mps[0]];
-        let mut disturbance = DISTURBANCE_N_PER_KN * standard_normal(random);
+        let mut disturbance = DISTURBANCE_N_PER_KN * normal(random);
         for (i, step) in self.steps.iter().enumerate() {
             let disturbed = Davis { a: davis.a + disturbance, ..*davis };
             speeds_mps.push(next_speed_mps(step, &disturbed, speeds_mps[i]));
             let kept = (-step.size / (self.speeds_mps[i] * DISTURBANCE_S)).exp();
             disturbance = kept * disturbance
-                + (1.0 - kept * kept).sqrt() * DISTURBANCE_N_PER_KN * standard_normal(random);
+                + (1.0 - kept * kept).sqrt() * DISTURBANCE_N_PER_KN * normal(random);
         }
         Run { steps: self.steps.clone(), speeds_mps }
     }
-}
-
-/// A standard normal number (Box, Muller 1958).
-pub fn standard_normal(random: &mut ChaCha8Rng) -> f64 {
-    let radius = (-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt();
-    radius * (std::f64::consts::TAU * random.random::<f64>()).cos()
 }
 
 /// The speed after a step by eq. 7; the truth's own formula, apart from the estimators'.

@@ -16,7 +16,7 @@
 //! - `table`: a CSV file as columns of numbers
 //! - `order`, `spikes`, `motion`, `forces`, `altitude`: from columns to time, speed, position,
 //!   forces and gradient
-//! - [`run`], [`quality`], [`remark`], [`note`]: samples, counts and warnings
+//! - `resolved`, [`run`], [`quality`], [`remark`], [`note`]: samples, counts and warnings
 
 mod altitude;
 mod corrections;
@@ -31,6 +31,7 @@ mod order;
 pub mod quality;
 pub mod quantity;
 pub mod remark;
+mod resolved;
 pub mod run;
 mod spikes;
 mod table;
@@ -52,7 +53,8 @@ pub use order::OrderCounts;
 pub use quality::{Phases, RunQuality};
 pub use quantity::Quantity;
 pub use remark::Remark;
-pub use run::{DATASET_TRAIN, Extras, GradientSource, Run};
+pub use resolved::{DATASET_TRAIN, GradientSource};
+pub use run::{Extras, Run};
 pub use table::LineCounts;
 pub use track_file::parse_track;
 pub use train_file::parse_train;
@@ -167,7 +169,7 @@ impl DatasetHead {
         index: usize,
     ) -> Result<Run, DatasetError> {
         let entry = &self.manifest.runs[index];
-        let context = run::Context {
+        let context = resolved::Context {
             manifest: &self.manifest,
             train: &self.train,
             track: self.track.as_ref(),

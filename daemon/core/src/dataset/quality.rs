@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::forces::Force;
 use super::order::OrderCounts;
 use super::quantity::Quantity;
-use super::run::{Context, DATASET_TRAIN, Resolved};
+use super::resolved::{Context, DATASET_TRAIN, Resolved};
 use super::table::LineCounts;
 use crate::validation::{ValidationLimits, Validator};
 

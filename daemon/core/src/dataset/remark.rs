@@ -7,7 +7,7 @@ use super::motion::PositionSource;
 use super::note::{read_as, unit_of};
 use super::quality::RunQuality;
 use super::quantity::Quantity;
-use super::run::{Context, GradientSource, Resolved};
+use super::resolved::{Context, GradientSource, Resolved};
 use crate::plausibility::{Finding, Findings, Severity, Slip};
 
 /// Below this distance in m, comparisons of position and speed say nothing.

@@ -26,14 +26,12 @@ pub mod score;
 pub mod selection;
 pub mod verdict;
 
-use std::collections::BTreeMap;
-
 use crate::dataset::{Dataset, Role};
 use crate::plausibility::Severity;
 use answer::Answer;
 use evidence::{Fit, FitProblem, RunData, RunDataError};
 use score::{PredictedRun, Score};
-use selection::{Outcome, Search};
+use selection::{Outcome, Progress, Search};
 
 /// Fit and holdout runs with the models that were fitted.
 pub struct Explanation {
@@ -56,9 +54,6 @@ pub struct Explanation {
     /// Greatest strength of a candidate in the first round of the search.
     pub strength: f64,
 }
-
-/// Told how far the work is: share done, and what is being done.
-pub type Progress<'p> = &'p dyn Fn(f64, &str);
 
 /// Explains what the declared model of a dataset leaves.
 ///
@@ -92,9 +87,4 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
     progress(1.0, "done");
     let (base, grown) = (outcome.base.clone(), outcome.fit.clone());
     Ok(Explanation { strength, answer, base, grown, score, predictions, outcome, problem, holdout })
-}
-
-/// Where predictions were written, for the answer.
-pub fn set_prediction_files(answer: &mut Answer, files: BTreeMap<String, String>) {
-    answer.predictions = files;
 }

@@ -7,17 +7,21 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::kalman::{GaussianState, ScalarUpdate};
+use super::{Gaussian, Innovation};
 
 /// One step of a forward pass of a Kalman filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForwardStep<const N: usize> {
     /// Belief before the step's measurement.
-    pub predicted: GaussianState<N>,
+    pub predicted: Gaussian<N>,
     /// Belief after it.
-    pub filtered: GaussianState<N>,
-    /// What the measurement did.
-    pub update: ScalarUpdate<N>,
+    pub filtered: Gaussian<N>,
+    /// The component that was measured.
+    pub component: usize,
+    /// What the measurement said.
+    pub innovation: Innovation,
+    /// How far it moved the state, for an innovation of 1.
+    pub gain: SVector<f64, N>,
     /// Jacobian of the move from the step before to this one.
     pub jacobian: SMatrix<f64, N, N>,
 }
@@ -38,17 +42,18 @@ pub fn smooth_means<const N: usize>(forward: &[ForwardStep<N>], means: &mut [SVe
     let mut later = SVector::<f64, N>::zeros();
     for (step, mean) in forward.iter().zip(means).rev() {
         *mean = step.filtered.mean - step.filtered.covariance * later;
-        let ScalarUpdate { component, gain, innovation, inverse_variance, .. } = &step.update;
-        let shift = gain.dot(&later) + inverse_variance * innovation;
+        let Innovation { value, inverse_variance, .. } = step.innovation;
+        let shift = step.gain.dot(&later) + inverse_variance * value;
         // Chosen, not indexed: the vector stays in registers.
-        later = SVector::from_fn(|i, _| if i == *component { later[i] - shift } else { later[i] });
+        later =
+            SVector::from_fn(|i, _| if i == step.component { later[i] - shift } else { later[i] });
         later = step.jacobian.tr_mul(&later);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::batch_twin::MovingState;
+    use super::super::test_runs::MovingState;
     use super::*;
 
     #[test]
@@ -66,7 +71,7 @@ mod tests {
     #[test]
     fn a_state_that_is_known_for_certain_is_no_obstacle() {
         let mut moving = MovingState::new(5);
-        moving.prior = GaussianState { mean: moving.prior.mean, covariance: SMatrix::zeros() };
+        moving.prior = Gaussian { mean: moving.prior.mean, covariance: SMatrix::zeros() };
         moving.noise = SMatrix::zeros();
         let forward = moving.forward(|_, _| {});
         let mut means = vec![SVector::zeros(); forward.len()];

@@ -9,7 +9,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::kalman::{GaussianState, ScalarUpdate};
+use super::{Gaussian, Innovation};
 
 /// A component of the state at an earlier moment, given all measurements since.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,7 +53,7 @@ impl<const N: usize, T: Copy> FixedLagSmoother<N, T> {
     ///
     /// Allocates nothing.
     #[inline]
-    pub fn remember(&mut self, state: &GaussianState<N>, component: usize, tag: T) {
+    pub fn remember(&mut self, state: &Gaussian<N>, component: usize, tag: T) {
         let cross = state.covariance.column(component).into_owned();
         let mean = state.mean[component];
         let moment = Lagged { tag, mean, variance: cross[component], cross };
@@ -72,14 +72,14 @@ impl<const N: usize, T: Copy> FixedLagSmoother<N, T> {
         }
     }
 
-    /// Follows a measurement of the present state.
-    pub fn apply(&mut self, update: &ScalarUpdate<N>) {
+    /// Follows a measurement of a component of the present state, with the gain that it had there.
+    pub fn take(&mut self, component: usize, innovation: &Innovation, gain: &SVector<f64, N>) {
         for moment in &mut self.moments {
-            let covariance = moment.cross[update.component];
-            let share = covariance * update.inverse_variance;
-            moment.mean += share * update.innovation;
+            let covariance = moment.cross[component];
+            let share = covariance * innovation.inverse_variance;
+            moment.mean += share * innovation.value;
             moment.variance -= share * covariance;
-            moment.cross -= update.gain * covariance;
+            moment.cross -= gain * covariance;
         }
     }
 
@@ -104,20 +104,20 @@ impl<const N: usize, T: Copy> FixedLagSmoother<N, T> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::batch_twin::MovingState;
+    use super::super::test_runs::MovingState;
     use super::*;
 
     const SECOND: usize = 1;
 
     /// The smoother's moments after a forward pass over 40 steps, and the last state.
-    fn run(capacity: usize) -> (GaussianState<2>, FixedLagSmoother<2, usize>) {
+    fn run(capacity: usize) -> (Gaussian<2>, FixedLagSmoother<2, usize>) {
         let mut smoother = FixedLagSmoother::new(capacity);
         let mut number = 0;
         let forward = MovingState::new(40).forward(|step, jacobian| {
             if let Some(jacobian) = jacobian {
                 smoother.predict(jacobian);
             }
-            smoother.apply(&step.update);
+            smoother.take(step.component, &step.innovation, &step.gain);
             smoother.remember(&step.filtered, SECOND, number);
             number += 1;
         });
@@ -144,9 +144,9 @@ mod tests {
         let (mut state, mut smoother) = run(5);
         smoother.freeze();
         let before = smoother.oldest().unwrap().mean;
-        let update = state.innovation(0, 99.0, 0.25).unwrap();
-        state.apply(&update);
-        smoother.apply(&update);
+        let innovation = state.innovation(0, 99.0, 0.25).unwrap();
+        let gain = state.take(0, &innovation, 0.25);
+        smoother.take(0, &innovation, &gain);
         assert_eq!(smoother.oldest().unwrap().mean, before);
     }
 }

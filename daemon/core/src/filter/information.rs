@@ -3,16 +3,16 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::NotPositiveDefinite;
+use super::triangular::TriangularSystem;
 
-/// All rows seen so far, condensed into an upper triangle R and a right side z.
+/// All rows seen so far, condensed into a triangular system, with the sum of their residuals.
 ///
-/// `|R theta - z|^2` plus the residual sum equals the sum of squares over all rows, so that
-/// the solution is the batch solution at any time (Bierman 1977, chapter IV). Rows enter by
-/// Givens rotations; the normal equations and their squared condition are never formed.
+/// The system's square plus the residual sum equals the sum of squares over all rows, so that the
+/// solution is the batch solution at any time (Bierman 1977, chapter IV). Rows enter by Givens
+/// rotations; the normal equations and their squared condition are never formed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SquareRootInformation<const N: usize> {
-    triangle: SMatrix<f64, N, N>,
-    side: SVector<f64, N>,
+    system: TriangularSystem<N>,
     residual_sum: f64,
     count: f64,
 }
@@ -21,12 +21,11 @@ impl<const N: usize> SquareRootInformation<N> {
     /// No rows yet, but the penalty `sum of weight * (theta - prior)^2`; a weight of 0 is none.
     pub fn new(weights: &SVector<f64, N>, prior: &SVector<f64, N>) -> Self {
         let roots = weights.map(|weight| weight.max(0.0).sqrt());
-        SquareRootInformation {
-            triangle: SMatrix::from_diagonal(&roots),
-            side: roots.component_mul(prior),
-            residual_sum: 0.0,
-            count: 0.0,
-        }
+        let system = TriangularSystem {
+            factor: SMatrix::from_diagonal(&roots),
+            residual: -roots.component_mul(prior),
+        };
+        SquareRootInformation { system, residual_sum: 0.0, count: 0.0 }
     }
 
     /// Takes in a row `observed = features . theta + error`, the error of unit variance.
@@ -35,7 +34,7 @@ impl<const N: usize> SquareRootInformation<N> {
     ///
     /// Bounded work, no allocation.
     pub fn update(&mut self, features: &SVector<f64, N>, observed: f64) {
-        let rest = self.rotate_in(features, observed);
+        let rest = self.system.append(*features, -observed);
         self.residual_sum += rest * rest;
         self.count += 1.0;
     }
@@ -45,46 +44,21 @@ impl<const N: usize> SquareRootInformation<N> {
         for i in (0..N).filter(|&i| weights[i] > 0.0) {
             let mut unit = SVector::zeros();
             unit[i] = weights[i].sqrt();
-            self.rotate_in(&unit, 0.0);
+            self.system.append(unit, 0.0);
         }
     }
 
     /// Adds what is known from elsewhere, as a row of unit variance that counts neither as a row
     /// nor as residual.
     pub fn add_knowledge(&mut self, features: &SVector<f64, N>, observed: f64) {
-        self.rotate_in(features, observed);
-    }
-
-    /// Rotates a row into the triangle; gives what is left of its observed value.
-    fn rotate_in(&mut self, features: &SVector<f64, N>, observed: f64) -> f64 {
-        let mut row = *features;
-        let mut rest = observed;
-        for i in 0..N {
-            if row[i] == 0.0 {
-                continue;
-            }
-            let pivot = self.triangle[(i, i)];
-            // Rows are scaled, so that the squares need no guard against overflow.
-            let length = (pivot * pivot + row[i] * row[i]).sqrt();
-            let (cosine, sine) = (pivot / length, row[i] / length);
-            self.triangle[(i, i)] = length;
-            for j in i + 1..N {
-                let held = self.triangle[(i, j)];
-                self.triangle[(i, j)] = cosine * held + sine * row[j];
-                row[j] = cosine * row[j] - sine * held;
-            }
-            let held = self.side[i];
-            self.side[i] = cosine * held + sine * rest;
-            rest = cosine * rest - sine * held;
-        }
-        rest
+        self.system.append(*features, -observed);
     }
 
     /// Multiplies the weight of everything seen so far, penalty included, by `factor`.
     pub fn forget(&mut self, factor: f64) {
         let root = factor.sqrt();
-        self.triangle *= root;
-        self.side *= root;
+        self.system.factor *= root;
+        self.system.residual *= root;
         self.residual_sum *= factor;
         self.count *= factor;
     }
@@ -95,10 +69,7 @@ impl<const N: usize> SquareRootInformation<N> {
     ///
     /// When the rows do not determine all parameters.
     pub fn solve(&self) -> Result<SVector<f64, N>, NotPositiveDefinite> {
-        if !self.is_regular() {
-            return Err(NotPositiveDefinite);
-        }
-        self.triangle.solve_upper_triangular(&self.side).ok_or(NotPositiveDefinite)
+        self.system.minimiser().ok_or(NotPositiveDefinite)
     }
 
     /// Covariance of the solution for errors of unit variance.
@@ -107,24 +78,17 @@ impl<const N: usize> SquareRootInformation<N> {
     ///
     /// When the rows do not determine all parameters.
     pub fn covariance(&self) -> Result<SMatrix<f64, N, N>, NotPositiveDefinite> {
-        if !self.is_regular() {
-            return Err(NotPositiveDefinite);
-        }
-        let inverse = self
-            .triangle
-            .solve_upper_triangular(&SMatrix::<f64, N, N>::identity())
-            .ok_or(NotPositiveDefinite)?;
-        Ok(inverse * inverse.transpose())
+        self.system.covariance().ok_or(NotPositiveDefinite)
     }
 
     /// The information matrix: the sum of features outer products, penalty included.
     pub fn information(&self) -> SMatrix<f64, N, N> {
-        self.triangle.transpose() * self.triangle
+        self.system.factor.tr_mul(&self.system.factor)
     }
 
     /// Logarithm of the information matrix's determinant; negative infinity while singular.
     pub fn log_determinant(&self) -> f64 {
-        2.0 * (0..N).map(|i| self.triangle[(i, i)].abs().ln()).sum::<f64>()
+        2.0 * (0..N).map(|i| self.system.factor[(i, i)].abs().ln()).sum::<f64>()
     }
 
     /// Sum of squared residuals of the solution, penalty included.
@@ -135,13 +99,6 @@ impl<const N: usize> SquareRootInformation<N> {
     /// Number of rows seen, the forgotten ones in part.
     pub fn count(&self) -> f64 {
         self.count
-    }
-
-    fn is_regular(&self) -> bool {
-        (0..N).all(|i| {
-            let pivot = self.triangle[(i, i)].abs();
-            pivot.is_finite() && pivot > f64::MIN_POSITIVE
-        }) && self.side.iter().all(|value| value.is_finite())
     }
 }
 

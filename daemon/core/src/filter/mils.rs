@@ -2,9 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::rank_one::measured;
-use super::rls::scalar_update;
-use super::{NotPositiveDefinite, Step};
+use super::{Gaussian, Innovation, NotPositiveDefinite};
 
 /// How a criterion `sum of lambda/2 theta^2` enters a recursion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,12 +37,11 @@ impl<const N: usize> Penalty<N> {
 ///
 /// An update stacks the newest `length` rows, all with the innovation of the estimate before.
 /// That is the same as taking them one after the other, and the regularisation the same as rows
-/// that observe 0, so both are done with scalar Joseph updates: no inverse, lambda = 0 allowed
-/// (the printed eq. 14 divides by it), P symmetric and positive.
+/// that observe 0, so both are done one scalar at a time: no inverse, lambda = 0 allowed (the printed
+/// eq. 14 divides by it), P symmetric and positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mils<const N: usize, const L: usize> {
-    estimate: SVector<f64, N>,
-    covariance: SMatrix<f64, N, N>,
+    belief: Gaussian<N>,
     penalty: Penalty<N>,
     /// The newest rows; `next` is where the oldest will be overwritten.
     features: [SVector<f64, N>; L],
@@ -66,8 +63,7 @@ impl<const N: usize, const L: usize> Mils<N, L> {
     ) -> Self {
         const { assert!(L > 0) };
         Mils {
-            estimate,
-            covariance: SMatrix::from_diagonal(start),
+            belief: Gaussian { mean: estimate, covariance: SMatrix::from_diagonal(start) },
             penalty,
             features: [SVector::zeros(); L],
             observed: [0.0; L],
@@ -80,13 +76,7 @@ impl<const N: usize, const L: usize> Mils<N, L> {
 
     /// The estimate.
     pub fn estimate(&self) -> &SVector<f64, N> {
-        &self.estimate
-    }
-
-    /// The recursion's P: smaller than a covariance by the length p, since every row is used
-    /// p times.
-    pub fn recursion_covariance(&self) -> &SMatrix<f64, N, N> {
-        &self.covariance
+        &self.belief.mean
     }
 
     /// The estimate's covariance in units of the error's variance: p P.
@@ -95,14 +85,13 @@ impl<const N: usize, const L: usize> Mils<N, L> {
     /// posterior covariance for a prior of weight lambda/p, which is what the repetition makes
     /// of lambda.
     pub fn covariance(&self) -> SMatrix<f64, N, N> {
-        self.covariance * self.length as f64
+        self.belief.covariance * self.length as f64
     }
 
     /// Goes on from another estimate and covariance (not P), in which the criterion's
     /// regularisation is complete; the remembered rows are dropped.
     pub fn restart(&mut self, estimate: SVector<f64, N>, covariance: SMatrix<f64, N, N>) {
-        self.estimate = estimate;
-        self.covariance = covariance / self.length as f64;
+        self.belief = Gaussian { mean: estimate, covariance: covariance / self.length as f64 };
         self.updates = self.updates.max(u64::from(self.penalty.length));
         self.forget_rows();
     }
@@ -121,7 +110,7 @@ impl<const N: usize, const L: usize> Mils<N, L> {
         &mut self,
         features: &SVector<f64, N>,
         observed: f64,
-    ) -> Result<Step, NotPositiveDefinite> {
+    ) -> Result<Innovation, NotPositiveDefinite> {
         self.remember(features, observed);
         self.update_from_memory()
     }
@@ -140,11 +129,6 @@ impl<const N: usize, const L: usize> Mils<N, L> {
         (self.next, self.held) = (0, 0);
     }
 
-    /// The number of rows remembered, at most p.
-    pub fn remembered(&self) -> usize {
-        self.held
-    }
-
     fn place_after(&self, place: usize) -> usize {
         if place + 1 < self.length { place + 1 } else { 0 }
     }
@@ -153,127 +137,36 @@ impl<const N: usize, const L: usize> Mils<N, L> {
         place.checked_sub(1).unwrap_or(self.length - 1)
     }
 
-    /// Updates with the remembered rows; the step is the newest row's.
+    /// Updates with the remembered rows; gives the newest row's innovation.
     ///
     /// # Errors
     ///
     /// When P is no longer positive definite, or no row is remembered.
     #[inline]
-    pub fn update_from_memory(&mut self) -> Result<Step, NotPositiveDefinite> {
+    pub fn update_from_memory(&mut self) -> Result<Innovation, NotPositiveDefinite> {
         if self.held == 0 {
             return Err(NotPositiveDefinite);
         }
-        // Copies, which stay in registers where `self` may not.
-        let (mut estimate, mut covariance) = (self.estimate, self.covariance);
+        // A copy, which stays in registers where `self` may not.
+        let mut belief = self.belief;
         if let Some(weights) = self.penalty.weights_at(self.updates) {
-            penalise(&mut estimate, &mut covariance, &weights)?;
+            // Rows that observe the parameters as 0.
+            for i in (0..N).filter(|&i| weights[i] > 0.0) {
+                belief.measure(i, 0.0, 1.0 / weights[i])?;
+            }
         }
         let newest = self.place_before(self.next);
-        let (features, observed) = (&self.features[newest], self.observed[newest]);
-        let step = scalar_update(&mut estimate, &mut covariance, features, observed)?;
+        let innovation =
+            belief.measure_along(&self.features[newest], self.observed[newest], 1.0)?;
         let mut place = newest;
         for _ in 1..self.held {
             place = self.place_before(place);
-            let (features, observed) = (&self.features[place], self.observed[place]);
-            scalar_update(&mut estimate, &mut covariance, features, observed)?;
+            belief.measure_along(&self.features[place], self.observed[place], 1.0)?;
         }
-        (self.estimate, self.covariance) = (estimate, covariance);
+        self.belief = belief;
         self.updates += 1;
-        Ok(step)
+        Ok(innovation)
     }
-}
-
-/// Takes in the rows of a penalty.
-#[inline(always)]
-fn penalise<const N: usize>(
-    estimate: &mut SVector<f64, N>,
-    covariance: &mut SMatrix<f64, N, N>,
-    weights: &SVector<f64, N>,
-) -> Result<(), NotPositiveDefinite> {
-    if N == 3 && draw_three_to_zero(estimate, covariance, weights) {
-        return Ok(());
-    }
-    for i in (0..N).filter(|&i| weights[i] > 0.0) {
-        draw_to_zero(estimate, covariance, i, weights[i])?;
-    }
-    Ok(())
-}
-
-/// A row that observes parameter `i` as 0 with a weight.
-#[inline(always)]
-fn draw_to_zero<const N: usize>(
-    estimate: &mut SVector<f64, N>,
-    covariance: &mut SMatrix<f64, N, N>,
-    i: usize,
-    weight: f64,
-) -> Result<(), NotPositiveDefinite> {
-    let noise_variance = 1.0 / weight;
-    let spread = covariance.column(i).into_owned();
-    let variance = spread[i] + noise_variance;
-    if !(variance >= noise_variance && variance.is_finite() && estimate[i].is_finite()) {
-        return Err(NotPositiveDefinite);
-    }
-    let inverse_variance = 1.0 / variance;
-    *estimate -= spread * (inverse_variance * estimate[i]);
-    let mut row = SVector::<f64, N>::zeros();
-    row[i] = 1.0;
-    measured(covariance, &row, &spread, inverse_variance, noise_variance);
-    Ok(())
-}
-
-/// Sum of the weighted variances up to which three rows are taken at once.
-const WEIGHTED_MAX: f64 = 100.0;
-
-/// Three rows that observe the parameters as 0, in one solution: Q = P (I + W P)^-1.
-///
-/// With the matrix A of elements `P_ij W_j`, A adj(I + A) = A + (s2 + det A) I - adj A, s2 being
-/// the sum of the principal minors (Cayley and Hamilton), so that one division does. False when
-/// nothing was done: where the weighted variances are large the minors would lose digits.
-#[inline(always)]
-fn draw_three_to_zero<const N: usize>(
-    estimate: &mut SVector<f64, N>,
-    covariance: &mut SMatrix<f64, N, N>,
-    weights: &SVector<f64, N>,
-) -> bool {
-    let p = |i: usize, j: usize| covariance[(i, j)];
-    let [w0, w1, w2] = [weights[0], weights[1], weights[2]];
-    // Minors of P; those of A carry the weights of their columns.
-    let minor = [
-        p(1, 1) * p(2, 2) - p(1, 2) * p(1, 2),
-        p(0, 0) * p(2, 2) - p(0, 2) * p(0, 2),
-        p(0, 0) * p(1, 1) - p(0, 1) * p(0, 1),
-    ];
-    let crossed01 = p(0, 1) * p(2, 2) - p(0, 2) * p(1, 2);
-    let crossed02 = p(0, 2) * p(1, 1) - p(0, 1) * p(1, 2);
-    let crossed12 = p(1, 2) * p(0, 0) - p(0, 1) * p(0, 2);
-    let determinant = p(0, 0) * minor[0] - p(0, 1) * crossed01 - p(0, 2) * crossed02;
-    let trace = p(0, 0) * w0 + p(1, 1) * w1 + p(2, 2) * w2;
-    // Also refuses NaN.
-    if !(trace <= WEIGHTED_MAX) {
-        return false;
-    }
-    let (w01, w02, w12) = (w0 * w1, w0 * w2, w1 * w2);
-    let minors = w12 * minor[0] + w02 * minor[1] + w01 * minor[2];
-    let scale = 1.0 / (1.0 + trace + minors + w01 * w2 * determinant);
-    let diagonal = [
-        p(0, 0) + w2 * minor[1] + w1 * minor[2] + w12 * determinant,
-        p(1, 1) + w2 * minor[0] + w0 * minor[2] + w02 * determinant,
-        p(2, 2) + w1 * minor[0] + w0 * minor[1] + w01 * determinant,
-    ];
-    let off = [
-        (0, 1, p(0, 1) + w2 * crossed01),
-        (0, 2, p(0, 2) + w1 * crossed02),
-        (1, 2, p(1, 2) + w0 * crossed12),
-    ];
-    for (i, value) in diagonal.into_iter().enumerate() {
-        covariance[(i, i)] = value * scale;
-    }
-    for (i, j, value) in off {
-        covariance[(i, j)] = value * scale;
-        covariance[(j, i)] = value * scale;
-    }
-    *estimate -= *covariance * estimate.component_mul(weights);
-    true
 }
 
 #[cfg(test)]
@@ -331,25 +224,6 @@ mod tests {
     }
 
     #[test]
-    fn three_rows_at_once_are_the_three_one_after_the_other() {
-        let prior = Matrix3::new(4.0, 1.0, -0.5, 1.0, 3.0, 0.7, -0.5, 0.7, 2.0);
-        for weights in [Vector3::repeat(4e-4), Vector3::new(0.0, 2.0, 0.3), Vector3::repeat(20.0)] {
-            let start = Vector3::new(1.0, -2.0, 0.5);
-            let (mut estimate, mut covariance) = (start, prior);
-            for i in (0..3).filter(|&i| weights[i] > 0.0) {
-                draw_to_zero(&mut estimate, &mut covariance, i, weights[i]).unwrap();
-            }
-            let (mut at_once, mut joint) = (start, prior);
-            let is_done = draw_three_to_zero(&mut at_once, &mut joint, &weights);
-            assert_eq!(is_done, weights[0] < 20.0);
-            if is_done {
-                assert!((at_once - estimate).norm() < 1e-13);
-                assert!((joint - covariance).norm() < 1e-13);
-            }
-        }
-    }
-
-    #[test]
     fn after_n_updates_regularised_rls_is_the_ridge_solution_of_the_criterion() {
         let rows = rows(30);
         let (lambda, p0) = (3.0, 1e9);
@@ -392,7 +266,7 @@ mod tests {
                 broken.forget_rows();
             }
             broken.update(features, *observed).unwrap();
-            assert_eq!(broken.remembered(), (i % 6 + 1).min(3));
+            assert_eq!(broken.held, (i % 6 + 1).min(3));
         }
     }
 }

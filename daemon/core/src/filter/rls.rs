@@ -2,8 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::NotPositiveDefinite;
-use super::rank_one::measured;
+use super::{Gaussian, Innovation, NotPositiveDefinite};
 
 /// How old rows lose weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,15 +17,6 @@ pub enum Forgetting {
     Directional(f64),
 }
 
-/// What a row did to an estimate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
-    /// Observed minus predicted.
-    pub innovation: f64,
-    /// Variance of the innovation, in units of the error's variance.
-    pub variance: f64,
-}
-
 /// Recursive least squares (Liu 2018, eq. 9-11).
 ///
 /// Joseph's form is taken where subtraction would cost digits, as from a wide prior.
@@ -34,8 +24,7 @@ pub struct Step {
 /// The covariance is in units of the error's variance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rls<const N: usize> {
-    estimate: SVector<f64, N>,
-    covariance: SMatrix<f64, N, N>,
+    belief: Gaussian<N>,
     forgetting: Forgetting,
 }
 
@@ -47,22 +36,23 @@ impl<const N: usize> Rls<N> {
         variances: &SVector<f64, N>,
         forgetting: Forgetting,
     ) -> Self {
-        Rls { estimate, covariance: SMatrix::from_diagonal(variances), forgetting }
+        let covariance = SMatrix::from_diagonal(variances);
+        Rls { belief: Gaussian { mean: estimate, covariance }, forgetting }
     }
 
     /// The estimate.
     pub fn estimate(&self) -> &SVector<f64, N> {
-        &self.estimate
+        &self.belief.mean
     }
 
     /// The estimate's covariance, in units of the error's variance.
     pub fn covariance(&self) -> &SMatrix<f64, N, N> {
-        &self.covariance
+        &self.belief.covariance
     }
 
     /// Goes on from another estimate and covariance.
     pub fn restart(&mut self, estimate: SVector<f64, N>, covariance: SMatrix<f64, N, N>) {
-        (self.estimate, self.covariance) = (estimate, covariance);
+        self.belief = Gaussian { mean: estimate, covariance };
     }
 
     /// Takes in a row `observed = features . theta + error`.
@@ -79,13 +69,13 @@ impl<const N: usize> Rls<N> {
         &mut self,
         features: &SVector<f64, N>,
         observed: f64,
-    ) -> Result<Step, NotPositiveDefinite> {
+    ) -> Result<Innovation, NotPositiveDefinite> {
         match self.forgetting {
             Forgetting::None => {}
-            Forgetting::Exponential(factor) => self.covariance *= 1.0 / factor,
+            Forgetting::Exponential(factor) => self.belief.covariance *= 1.0 / factor,
             Forgetting::Directional(factor) => self.forget_along(features, factor)?,
         }
-        scalar_update(&mut self.estimate, &mut self.covariance, features, observed)
+        self.belief.measure_along(features, observed, 1.0)
     }
 
     /// P + (1 - f)/f phi phi' / (phi' P^-1 phi): takes the share 1 - f of the information
@@ -96,10 +86,11 @@ impl<const N: usize> Rls<N> {
         features: &SVector<f64, N>,
         factor: f64,
     ) -> Result<(), NotPositiveDefinite> {
-        let held = information_along(&self.covariance, features).ok_or(NotPositiveDefinite)?;
+        let held =
+            information_along(&self.belief.covariance, features).ok_or(NotPositiveDefinite)?;
         if held > 0.0 {
             let step = (1.0 - factor) / (factor * held);
-            self.covariance.ger(step, features, features, 1.0);
+            self.belief.covariance.ger(step, features, features, 1.0);
         }
         Ok(())
     }
@@ -131,26 +122,6 @@ fn information_along<const N: usize>(
         }
     }
     Some(held)
-}
-
-/// One row of recursive least squares: P stays symmetric and positive.
-#[inline(always)]
-pub(super) fn scalar_update<const N: usize>(
-    estimate: &mut SVector<f64, N>,
-    covariance: &mut SMatrix<f64, N, N>,
-    features: &SVector<f64, N>,
-    observed: f64,
-) -> Result<Step, NotPositiveDefinite> {
-    let spread = *covariance * features;
-    let variance = 1.0 + features.dot(&spread);
-    let innovation = observed - features.dot(estimate);
-    if !(variance >= 1.0 && variance.is_finite() && innovation.is_finite()) {
-        return Err(NotPositiveDefinite);
-    }
-    let inverse_variance = 1.0 / variance;
-    *estimate += spread * (inverse_variance * innovation);
-    measured(covariance, features, &spread, inverse_variance, 1.0);
-    Ok(Step { innovation, variance })
 }
 
 #[cfg(test)]

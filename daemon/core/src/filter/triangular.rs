@@ -119,19 +119,20 @@ impl<const N: usize> TriangularSystem<N> {
         }
     }
 
-    /// Takes in one more row by Givens rotations.
+    /// Takes in one more row by Givens rotations, and gives what is left of its residual.
     ///
     /// # Real-time
     ///
     /// Bounded work, no allocation.
-    pub fn append(&mut self, mut row: SVector<f64, N>, mut residual: f64) {
+    pub fn append(&mut self, mut row: SVector<f64, N>, mut residual: f64) -> f64 {
         for pivot in 0..N {
             let value = row[pivot];
             if value == 0.0 {
                 continue;
             }
             let head = self.factor[(pivot, pivot)];
-            let norm = head.hypot(value);
+            // Rows are scaled, so that the squares need no guard against overflow.
+            let norm = (head * head + value * value).sqrt();
             let (cosine, sine) = (head / norm, value / norm);
             self.factor[(pivot, pivot)] = norm;
             for column in pivot + 1..N {
@@ -143,6 +144,7 @@ impl<const N: usize> TriangularSystem<N> {
             self.residual[pivot] = cosine * upper + sine * lower;
             residual = cosine * lower - sine * upper;
         }
+        residual
     }
 
     /// The minimiser; `None` when the rows do not determine it.

@@ -3,6 +3,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::NotPositiveDefinite;
+use super::rank_one::{measured, moved};
 
 /// How the hidden states move to the next row.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,8 +63,7 @@ impl<const S: usize, const C: usize> Whitener<S, C> {
     /// Bounded work, no allocation.
     pub fn propagate(&mut self, step: &Propagation<S, C>) {
         self.state = step.transition * self.state + step.input;
-        let moved = step.transition * self.covariance * step.transition.transpose() + step.noise;
-        self.covariance = (moved + moved.transpose()) * 0.5;
+        self.covariance = moved(&step.transition, &self.covariance, &step.noise);
     }
 
     /// Adds variance to state `i`: it may have jumped.
@@ -92,7 +92,7 @@ impl<const S: usize, const C: usize> Whitener<S, C> {
         (sighting.observed - predicted, variance)
     }
 
-    /// Takes a sighting into the states, in Joseph form.
+    /// Takes a sighting into the states; their covariance stays symmetric and positive.
     ///
     /// # Errors
     ///
@@ -106,12 +106,10 @@ impl<const S: usize, const C: usize> Whitener<S, C> {
         if !(variance > 0.0 && variance.is_finite()) {
             return Err(NotPositiveDefinite);
         }
-        let gain = self.covariance * sighting.direction / variance;
-        self.state += gain * innovation.transpose();
-        let kept = SMatrix::<f64, S, S>::identity() - gain * sighting.direction.transpose();
-        let joseph =
-            kept * self.covariance * kept.transpose() + gain * gain.transpose() * sighting.variance;
-        self.covariance = (joseph + joseph.transpose()) * 0.5;
+        let Sighting { direction, variance: noise_variance, .. } = sighting;
+        let (spread, inverse_variance) = (self.covariance * direction, 1.0 / variance);
+        self.state += spread * innovation.transpose() * inverse_variance;
+        measured(&mut self.covariance, direction, &spread, inverse_variance, *noise_variance);
         Ok(())
     }
 }

@@ -7,6 +7,8 @@ use dynocar_shared::snapshot::{COVARIANCE_ENTRIES, PARAMETERS_MAX, packed_index}
 use dynocar_shared::{Parameter, ParameterSnapshot, Status};
 use nalgebra::{Cholesky, DMatrix, SMatrix, SVector};
 
+use super::output::contract_unit;
+
 /// Mean square of the normalised innovations above which an estimate is not kept.
 const MEAN_SQUARE_MAX: f64 = 2.0;
 /// Lag-1 covariance of the normalised innovations above which an estimate is not kept; small
@@ -129,7 +131,7 @@ impl KeptEstimate {
         self
     }
 
-    /// Mean and covariance of these parameters; `None` unless all of them were kept.
+    /// Mean and covariance of these parameters, the mass in kg; `None` unless all of them were kept.
     pub fn moments<const N: usize>(
         &self,
         wanted: [Parameter; N],
@@ -138,8 +140,11 @@ impl KeptEstimate {
         for (place, parameter) in places.iter_mut().zip(wanted) {
             *place = self.parameters().iter().position(|&it| it == parameter)?;
         }
-        let mean = SVector::from_fn(|i, _| self.values[places[i]]);
-        let entry = |i: usize, j: usize| self.covariance[packed_index(places[i], places[j])];
+        let units = wanted.map(contract_unit);
+        let mean = SVector::from_fn(|i, _| self.values[places[i]] / units[i]);
+        let entry = |i: usize, j: usize| {
+            self.covariance[packed_index(places[i], places[j])] / (units[i] * units[j])
+        };
         Some((mean, SMatrix::from_fn(entry)))
     }
 

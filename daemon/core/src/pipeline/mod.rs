@@ -6,6 +6,7 @@
 pub mod braking;
 mod echo;
 mod estimator;
+mod estimator_settings;
 mod innovation;
 mod kept;
 pub mod mass;
@@ -19,9 +20,10 @@ pub mod trajectory;
 
 pub use echo::Echo;
 pub use estimator::{Estimator, Outcome};
+pub use estimator_settings::EstimatorSettings;
 pub use innovation::InnovationMonitor;
 pub use kept::{KeptEstimate, NotKept};
-pub use settings::{EstimatorSettings, SettingError};
+pub use settings::SettingError;
 
 use std::sync::Arc;
 

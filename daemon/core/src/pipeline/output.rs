@@ -6,7 +6,13 @@ use nalgebra::{SMatrix, SVector};
 
 use super::InnovationMonitor;
 
-/// Writes parameters with values and full covariance, each in the parameter's unit.
+/// A parameter's unit in the contract over the one that estimators reckon in: a snapshot has the
+/// mass in t, everything here has it in kg.
+pub fn contract_unit(parameter: Parameter) -> f64 {
+    if parameter == Parameter::Mass { 1e-3 } else { 1.0 }
+}
+
+/// Writes parameters with values and full covariance, the mass in kg.
 ///
 /// # Panics
 ///
@@ -19,11 +25,12 @@ pub fn write_parameters<const N: usize>(
 ) {
     const { assert!(N <= PARAMETERS_MAX) };
     snapshot.parameter_count = N as u32;
+    let units = parameters.map(contract_unit);
     for i in 0..N {
         snapshot.parameters[i] = parameters[i] as u32;
-        snapshot.values[i] = values[i];
+        snapshot.values[i] = units[i] * values[i];
         for j in 0..=i {
-            snapshot.covariance[packed_index(i, j)] = covariance[(i, j)];
+            snapshot.covariance[packed_index(i, j)] = units[i] * units[j] * covariance[(i, j)];
         }
     }
 }

@@ -5,13 +5,11 @@
 //!                          - weight_kN gradient + whatever else the force model says
 //! ```
 //!
-//! Two ways to drive it share the same step ([`motion`]):
-//!
-//! - *open loop* over a recorded run ([`Recording`], [`Prediction`]): the reported forces act, the
-//!   track is looked up at the measured position, the predicted speed is compared with the
-//!   measured one. It is the judge of every model, and an optimiser calls it thousands of times.
-//! - *driving* ([`drive`]): a driver commands the forces, the track is looked up at the simulated
-//!   position.
+//! Over a recorded run ([`Recording`], [`Prediction`]) it is open loop: the reported forces act, the
+//! track is looked up at the measured position, the predicted speed is compared with the measured
+//! one. It is the judge of every model, and an optimiser calls it thousands of times. Simulators
+//! of driven trains, which look the track up at the simulated position, share its step
+//! ([`motion::advance`]).
 //!
 //! # Integration
 //!
@@ -29,7 +27,6 @@
 
 #[cfg(test)]
 mod analytic_tests;
-mod driving;
 mod force_model;
 #[cfg(test)]
 mod gap_tests;
@@ -38,7 +35,6 @@ pub mod motion;
 mod prediction;
 mod recording;
 
-pub use driving::{Controls, DrivenPoint, Driver, TrainOnLine, drive};
 pub use force_model::{ForceModel, QuadraticForces};
 pub use metric::{MOVING_SPEED_MPS, SpeedError};
 pub use prediction::{Prediction, Restart};

@@ -33,22 +33,23 @@ fn speed_after_dip(speed_mps: f64, start: f64, end: f64, step_s: f64) -> f64 {
     (lowest_mps.max(0.0) + 0.5 * end * (step_s - turn_s)).min(SPEED_MAX_MPS)
 }
 
-/// One step of Heun's method for a train whose acceleration in m/s² depends on distance and speed.
+/// One step of Heun's method for a train whose acceleration in m/s² depends on the time in s since
+/// the step's start, and on distance and speed.
 ///
 /// A stop within the step ends the way at the stopping point.
 #[inline]
 pub fn advance(
     motion: Motion,
     step_s: f64,
-    mut acceleration_mps2: impl FnMut(Motion) -> f64,
+    mut acceleration_mps2: impl FnMut(f64, Motion) -> f64,
 ) -> Motion {
-    let start = acceleration_mps2(motion);
+    let start = acceleration_mps2(0.0, motion);
     let predicted_mps = (motion.speed_mps + step_s * start).clamp(0.0, SPEED_MAX_MPS);
     let predicted = Motion {
         distance_m: motion.distance_m + 0.5 * step_s * (motion.speed_mps + predicted_mps),
         speed_mps: predicted_mps,
     };
-    let end = acceleration_mps2(predicted);
+    let end = acceleration_mps2(step_s, predicted);
     let speed_mps = speed_after(motion.speed_mps, start, end, step_s);
     let way_m = if speed_mps > 0.0 || motion.speed_mps == 0.0 {
         // Exact for an acceleration linear in time.
@@ -91,14 +92,14 @@ mod tests {
     #[test]
     fn a_train_pulled_backwards_stays_where_it_is() {
         let at_rest = Motion { distance_m: 7.0, speed_mps: 0.0 };
-        assert_eq!(advance(at_rest, 1.0, |_| -0.4), at_rest);
+        assert_eq!(advance(at_rest, 1.0, |_, _| -0.4), at_rest);
     }
 
     #[test]
     fn a_stop_ends_after_the_braking_distance() {
         let mut motion = Motion { distance_m: 0.0, speed_mps: 10.03 };
         for _ in 0..100 {
-            motion = advance(motion, 0.5, |_| -0.8);
+            motion = advance(motion, 0.5, |_, _| -0.8);
         }
         assert_eq!(motion.speed_mps, 0.0);
         assert!((motion.distance_m - 10.03 * 10.03 / 1.6).abs() < 1e-9);

@@ -109,6 +109,25 @@ pub struct TrainModel {
 }
 
 impl TrainModel {
+    /// A train of which only mass and basic resistance are declared: a point without rotating
+    /// mass that nothing else holds back. Simulations set what else they need.
+    pub fn bare(name: &str, mass_kg: f64, resistance: Davis) -> Self {
+        TrainModel {
+            name: name.into(),
+            mass_kg,
+            length_m: 0.0,
+            cars: 1,
+            rotating_mass_factor: 0.0,
+            resistance,
+            curve_constant_n_per_kn_m: 0.0,
+            tunnel_constant_n_per_kn_m: 0.0,
+            traction: None,
+            brake: None,
+            brake_gear: BrakeGear::default(),
+            corrections: Corrections::default(),
+        }
+    }
+
     /// Weight in kN of a mass in kg.
     pub fn weight_kn(mass_kg: f64) -> f64 {
         mass_kg * STANDARD_GRAVITY_MPS2 / 1000.0

@@ -8,9 +8,8 @@ use dynocar_shared::Quantity;
 use serde::Serialize;
 
 use super::Understood;
-use super::report::line;
 use crate::cli::Failure;
-use crate::cli::text::{TextTable, short};
+use crate::cli::text::{TextTable, line, short};
 use crate::config::{DaemonConfig, TrainConfig};
 
 /// Reads a configuration with the train and track files it names, and builds every estimator, so

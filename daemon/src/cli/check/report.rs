@@ -5,10 +5,7 @@ use dynocar_core::track::Track;
 use dynocar_core::train::{BrakeGear, Corrections, EffortCurve, TrainModel};
 
 use super::{Understood, daemon, runs};
-use crate::cli::text::{self, WIDTH, short, wrap};
-
-/// Width of the keys of an entry.
-const KEY_WIDTH: usize = 12;
+use crate::cli::text::{self, WIDTH, line, short, wrap};
 
 /// The whole report.
 pub(super) fn report(understood: &Understood) -> String {
@@ -34,14 +31,6 @@ pub(super) fn report(understood: &Understood) -> String {
             parts.join("\n")
         }
     }
-}
-
-/// A line of an entry.
-pub(super) fn line(key: &str, value: &str) -> String {
-    let mut lines = wrap(value, WIDTH - KEY_WIDTH).into_iter();
-    let first = lines.next().unwrap_or_default();
-    let rest = lines.map(|line| format!("  {:KEY_WIDTH$}{line}\n", ""));
-    format!("  {key:KEY_WIDTH$}{first}\n{}", rest.collect::<String>())
 }
 
 fn dataset(manifest: &Manifest) -> String {

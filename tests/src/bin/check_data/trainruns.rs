@@ -8,10 +8,10 @@
 use std::path::Path;
 
 use dynocar_core::simulate::motion::Motion;
-use dynocar_core::simulate::{Controls, TrainOnLine, drive};
 use dynocar_core::track::Track;
 use dynocar_core::train::{BrakeGear, Davis, EffortCurve, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_tests::simulator::driving::{Controls, TrainOnLine, drive};
 
 use super::report::Report;
 

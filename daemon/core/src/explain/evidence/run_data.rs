@@ -9,7 +9,7 @@ use crate::train::TrainModel;
 use crate::validation::{ValidationLimits, Validator};
 
 use super::cleaning;
-use super::model::SampleForces;
+use super::sample_forces::SampleForces;
 
 /// Width in s of a bin over which speeds are averaged.
 const BIN_S: f64 = 2.0;

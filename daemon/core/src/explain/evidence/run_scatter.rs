@@ -9,8 +9,9 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::model::integrate_bins;
-use super::noise::Whitener;
+use super::noise::RunScatter;
 use super::run_data::RunData;
+use super::whitener::Whitener;
 use crate::train::Davis;
 
 /// A run's own deviations: of the factors on the control force and on the basic resistance from
@@ -24,15 +25,6 @@ pub type Columns = [Vec<f64>; DEVIATIONS];
 /// recorder.
 const DELAY_S: f64 = 0.02;
 
-/// Standard deviations of the runs' own factors; that of the delays is fixed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RunScatter {
-    /// Of the factor on the control force.
-    pub force: f64,
-    /// Of the factor on the basic resistance.
-    pub resistance: f64,
-}
-
 /// So many runs with the usual scatter are added to those seen.
 const PRIOR_RUNS: f64 = 4.0;
 /// Beyond these a factor is an effect and no scatter.
@@ -40,9 +32,6 @@ const FORCE_MAX: f64 = 0.008;
 const RESISTANCE_MAX: f64 = 0.03;
 
 impl RunScatter {
-    /// What well-kept force sensors and ordinary weather give.
-    pub const USUAL: RunScatter = RunScatter { force: 0.003, resistance: 0.012 };
-
     fn precision(self) -> Matrix3<f64> {
         let deviations = Vector3::new(self.force, self.resistance, DELAY_S);
         Matrix3::from_diagonal(&deviations.map(|deviation| deviation.powi(-2)))

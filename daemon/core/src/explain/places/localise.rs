@@ -1,6 +1,6 @@
 //! Where along the line, and in which runs, a force of a given shape acts.
 
-use super::ends::Stretches;
+use super::found::Found;
 use super::inside::Inside;
 use super::runs::best_runs;
 use crate::explain::evidence::{Bin, RunData};
@@ -19,41 +19,9 @@ pub const MAP_ERROR_PERMILLE: f64 = 0.1;
 /// Intervals of one effect at most.
 const INTERVALS_MAX: usize = 6;
 
-/// A set of intervals and runs with what a common factor on the shape there explains.
-#[derive(Clone, Debug)]
-pub struct Found {
-    /// Disjoint intervals in m, by chainage.
-    pub intervals_m: Vec<[f64; 2]>,
-    /// The chainage in m over which the runs move.
-    pub span_m: [f64; 2],
-    /// Fit runs by number; `None` for all that pass.
-    pub runs: Option<Vec<usize>>,
-    /// Decrease of the cost.
-    pub gain: f64,
-    /// The factor.
-    pub estimate: f64,
-    /// Twice the logarithm of the number of structures this was chosen from.
-    pub choice_cost: f64,
-    /// Standard deviation of the factor by the error of the gradient map, which all passes share.
-    pub map_error: f64,
-}
-
 struct Cell {
     interval_m: [f64; 2],
     runs: Vec<Tuple>,
-}
-
-impl Found {
-    /// Its intervals, as ends that were estimated.
-    pub fn stretches(&self) -> Stretches {
-        Stretches { intervals_m: self.intervals_m.clone(), span_m: self.span_m }
-    }
-
-    /// Files of its runs; `None` for all.
-    pub fn files(&self, scan: &Scan) -> Option<Vec<String>> {
-        let file = |&index: &usize| scan.problem.runs[index].file.clone();
-        self.runs.as_ref().map(|runs| runs.iter().map(file).collect())
-    }
 }
 
 /// A shape: acceleration in m/s² per unit at a sample of a run, where the force acts in full.

@@ -7,13 +7,15 @@
 //!   run how likely it takes part
 
 mod ends;
+mod found;
 mod inside;
 mod localise;
 mod runs;
 mod settle;
 
 pub use ends::{Axis, End, Reach, Stretches};
+pub use found::Found;
 pub use inside::Inside;
-pub use localise::{Found, MAP_ERROR_PERMILLE, find, span_m};
+pub use localise::{MAP_ERROR_PERMILLE, find, span_m};
 pub use runs::best_of_runs;
 pub use settle::settle;

@@ -1,6 +1,6 @@
 //! In which runs a force acts.
 
-use super::localise::Found;
+use super::found::Found;
 use crate::explain::scan::{Scan, Tuple};
 
 /// A chosen run must show the force by itself.

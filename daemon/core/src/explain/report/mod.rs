@@ -18,6 +18,7 @@
 pub mod candidates;
 pub mod covariates;
 pub mod errors;
+mod estimate;
 pub mod panels;
 pub mod parameters;
 pub mod places;
@@ -30,6 +31,7 @@ use super::Explanation;
 use crate::dataset::Dataset;
 use candidates::CandidateRow;
 use errors::Errors;
+pub use estimate::Estimate;
 use panels::Panel;
 use parameters::ParameterRow;
 use places::PlaceTable;
@@ -67,23 +69,5 @@ impl ReportData {
             candidates: candidates::rows(explanation),
             errors,
         }
-    }
-}
-
-/// A value with its 95 % interval.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
-    /// The value.
-    pub value: f64,
-    /// The interval; `None` where nothing tells.
-    pub interval: Option<[f64; 2]>,
-}
-
-impl Estimate {
-    /// A value with 1.96 standard deviations to either side; none when that is no number.
-    pub fn normal(value: f64, deviation: f64) -> Self {
-        let half = 1.96 * deviation;
-        let is_known = half.is_finite() && half > 0.0;
-        Estimate { value, interval: is_known.then_some([value - half, value + half]) }
     }
 }

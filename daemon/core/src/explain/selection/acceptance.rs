@@ -4,11 +4,9 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::by_run::leave_one_run_out;
 use super::search::{Outcome, Search, Trial};
-use super::significance::{EVIDENCE_MIN, STRENGTH_MIN};
+use super::significance::{EVIDENCE_MIN, REDUCTION_MIN, STRENGTH_MIN};
 use crate::explain::evidence::Fit;
 
-/// The first effect must take away this share of the open-loop error of the fit runs.
-pub const REDUCTION_MIN: f64 = 0.12;
 /// What is beyond any doubt need take away only this share.
 const SMALL_REDUCTION_MIN: f64 = 0.06;
 /// Strength beyond any doubt.

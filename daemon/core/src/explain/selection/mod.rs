@@ -6,7 +6,7 @@ mod search;
 mod significance;
 
 pub use by_run::{Held, deviations, leave_one_run_out};
-pub use search::{Outcome, Search, Trial};
+pub use search::{Outcome, Progress, Search, Trial};
 pub use significance::{
     AMBIGUOUS, EVIDENCE_MIN, NULL_STRENGTH, NullStrength, STRENGTH_MIN, discounted, model_penalty,
     p_value, penalty,

@@ -4,17 +4,18 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::acceptance::REDUCTION_MIN;
 use super::significance::{
-    AMBIGUOUS, EVIDENCE_MIN, STRENGTH_MIN, discounted, model_penalty, penalty,
+    AMBIGUOUS, EVIDENCE_MIN, REDUCTION_MIN, STRENGTH_MIN, discounted, model_penalty, penalty,
 };
-use crate::explain::Progress;
 use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal};
 use crate::explain::evidence::{Fit, FitProblem, GrownModel, Noise, RunData};
 use crate::explain::scan::Scan;
 use crate::explain::score;
 use crate::track::Track;
 use crate::train::TrainModel;
+
+/// Told how far the work is: share done, and what is being done.
+pub type Progress<'p> = &'p dyn Fn(f64, &str);
 
 /// Effects at most.
 const EFFECTS_MAX: usize = 4;

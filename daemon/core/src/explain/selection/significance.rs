@@ -4,6 +4,8 @@ use crate::explain::evidence::{Fit, SharedHypothesis};
 
 /// Evidence that an effect must have: decrease of -2 log likelihood beyond the penalty.
 pub const EVIDENCE_MIN: f64 = 9.0;
+/// The first effect must take away this share of the open-loop error of the fit runs.
+pub const REDUCTION_MIN: f64 = 0.12;
 /// Strength that an effect must have: its evidence times the share of the open-loop error that it
 /// takes away. Either alone is easily had: thousands of samples make anything significant, and a
 /// flexible form takes away some of any error. Its distribution on nulls is [`NULL_STRENGTH`].

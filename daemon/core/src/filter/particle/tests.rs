@@ -1,6 +1,6 @@
 use super::*;
-use crate::filter::batch_twin::MovingState;
-use crate::filter::kalman::GaussianState;
+use crate::filter::Gaussian;
+use crate::filter::test_runs::MovingState;
 use nalgebra::{Matrix2, Vector2};
 
 const STEPS: usize = 8;
@@ -61,7 +61,7 @@ fn exact() -> (Vec<Vector2<f64>>, Vec<Matrix2<f64>>) {
     let moving = MovingState {
         jacobian: Matrix2::new(1.0, 1.0, 0.0, 1.0),
         noise: Matrix2::from_diagonal(&Vector2::from(NOISE_STD.map(|std| std * std))),
-        prior: GaussianState::independent(Vector2::new(0.0, 1.0), Vector2::new(1.0, 0.5)),
+        prior: Gaussian::independent(Vector2::new(0.0, 1.0), Vector2::new(1.0, 0.5)),
         measured: drifting().measured.to_vec(),
         variance: MEASURED_STD * MEASURED_STD,
     };

@@ -3,7 +3,7 @@
 use dynocar_shared::Uncertain;
 
 use super::motion::StepInputs;
-use crate::filter::kalman::FilterError;
+use crate::filter::NotPositiveDefinite;
 use crate::filter::particle::ParticleError;
 
 /// Why an engine failed; it has to be started anew.
@@ -11,7 +11,7 @@ use crate::filter::particle::ParticleError;
 pub enum EngineError {
     /// A Kalman filter failed.
     #[error(transparent)]
-    Filter(#[from] FilterError),
+    Filter(#[from] NotPositiveDefinite),
     /// A particle filter failed.
     #[error(transparent)]
     Particle(#[from] ParticleError),

@@ -12,7 +12,7 @@ use super::engine::{Engine, EngineError, Estimate, Observation, Step};
 use super::law::Law;
 use super::motion::{STATES, State, StepInputs};
 use super::tracker::{TrackerModel, measure};
-use crate::filter::kalman::GaussianState;
+use crate::filter::Gaussian;
 
 const SPEED: usize = State::Speed as usize;
 const SCALE: usize = State::Scale as usize;
@@ -26,10 +26,10 @@ const CLEAR: f64 = 0.9;
 #[derive(Clone, Debug)]
 struct Hypothesis {
     model: TrackerModel,
-    state: GaussianState<STATES>,
+    state: Gaussian<STATES>,
     probability: f64,
     /// Scratch of a step.
-    mixed: GaussianState<STATES>,
+    mixed: Gaussian<STATES>,
     log_likelihood: f64,
     normalised: f64,
 }
@@ -52,7 +52,7 @@ impl LawBank {
     /// When there is no hypothesis.
     pub fn new(models: Vec<TrackerModel>, change_rate_per_s: f64) -> Self {
         assert!(!models.is_empty(), "a bank holds at least one law");
-        let empty = GaussianState {
+        let empty = Gaussian {
             mean: SVector::zeros(),
             covariance: SMatrix::<f64, STATES, STATES>::zeros(),
         };
@@ -68,11 +68,6 @@ impl LawBank {
             })
             .collect();
         LawBank { hypotheses, change_rate_per_s, demand: 0.0, is_started: false }
-    }
-
-    /// Laws with their probabilities.
-    pub fn probabilities(&self) -> impl Iterator<Item = (&Law, f64)> {
-        self.hypotheses.iter().map(|hypothesis| (&hypothesis.model.law, hypothesis.probability))
     }
 
     /// Probability of a change within a step to one certain other hypothesis.
@@ -94,7 +89,7 @@ impl LawBank {
             let total: f64 =
                 self.hypotheses.iter().enumerate().map(|(from, h)| weight_of(from, h)).sum();
             let total = total.max(f64::MIN_POSITIVE);
-            let reopened = |from: usize, state: &GaussianState<STATES>| {
+            let reopened = |from: usize, state: &Gaussian<STATES>| {
                 if from == to { *state } else { reopen(state, prior) }
             };
             let mut mean = SVector::<f64, STATES>::zeros();
@@ -110,7 +105,7 @@ impl LawBank {
                 covariance += spread * (weight_of(from, hypothesis) / total);
             }
             let target = &mut self.hypotheses[to];
-            target.mixed = GaussianState { mean, covariance };
+            target.mixed = Gaussian { mean, covariance };
             // The prior weight of the hypothesis, before its likelihood.
             target.log_likelihood = total.ln();
         }
@@ -163,15 +158,10 @@ impl LawBank {
 }
 
 /// A belief whose scale is no longer known.
-fn reopen(state: &GaussianState<STATES>, scale: Uncertain) -> GaussianState<STATES> {
+fn reopen(state: &Gaussian<STATES>, scale: Uncertain) -> Gaussian<STATES> {
     let mut opened = *state;
-    for component in [SCALE, DRIFT] {
-        opened.covariance.row_mut(component).fill(0.0);
-        opened.covariance.column_mut(component).fill(0.0);
-        opened.mean[component] = 0.0;
-    }
-    opened.mean[SCALE] = scale.value;
-    opened.covariance[(SCALE, SCALE)] = scale.std * scale.std;
+    opened.replace(DRIFT, 0.0, 0.0);
+    opened.replace(SCALE, scale.value, scale.std * scale.std);
     opened
 }
 

@@ -10,7 +10,7 @@ use super::engine::{Engine, EngineError, Estimate, Observation, Step};
 use super::law::Law;
 use super::motion::{self, MotionNoise, STATES, State, StepInputs, Walk};
 use crate::filter::fixed_lag::FixedLagSmoother;
-use crate::filter::kalman::{FilterError, GaussianState};
+use crate::filter::{Gaussian, NotPositiveDefinite};
 
 const DISTANCE: usize = State::Distance as usize;
 const SPEED: usize = State::Speed as usize;
@@ -60,10 +60,10 @@ impl TrackerModel {
     }
 
     /// The belief after a first observation.
-    pub fn initial(&self, first: &Observation) -> GaussianState<STATES> {
+    pub fn initial(&self, first: &Observation) -> Gaussian<STATES> {
         let prior = &self.prior;
         let scale = self.prior_scale(first.speed_mps, first.demand);
-        GaussianState::independent(
+        Gaussian::independent(
             SVector::from([first.distance_m, first.speed_mps, scale.value, 0.0]),
             SVector::from([
                 self.noise.measured_distance_m2.sqrt(),
@@ -79,7 +79,7 @@ impl TrackerModel {
     pub fn advance(
         &self,
         inputs: &StepInputs,
-        state: &mut GaussianState<STATES>,
+        state: &mut Gaussian<STATES>,
     ) -> SMatrix<f64, STATES, STATES> {
         let (mean, jacobian) = motion::predict(inputs, &self.law, self.walk, &state.mean);
         let added = motion::process_noise(&self.noise, self.walk, inputs.step_s);
@@ -100,7 +100,7 @@ impl TrackerModel {
     }
 
     /// The estimate that a belief about the state implies.
-    pub fn estimate(&self, state: &GaussianState<STATES>, demand: f64) -> Estimate {
+    pub fn estimate(&self, state: &Gaussian<STATES>, demand: f64) -> Estimate {
         let (shape, shape_slope) = self.law.at(state.mean[SPEED], demand);
         let scale = state.mean[SCALE];
         let mut row = SVector::<f64, STATES>::zeros();
@@ -155,7 +155,7 @@ impl ChangeDetector {
 #[derive(Clone, Debug)]
 pub struct Tracker {
     model: TrackerModel,
-    state: Option<GaussianState<STATES>>,
+    state: Option<Gaussian<STATES>>,
     smoother: FixedLagSmoother<STATES, Moment>,
     /// True when sudden changes restart the tracker.
     detects_changes: bool,
@@ -184,7 +184,7 @@ impl Tracker {
     }
 
     /// The state after the last observation; `None` before the first.
-    pub fn state(&self) -> Option<&GaussianState<STATES>> {
+    pub fn state(&self) -> Option<&Gaussian<STATES>> {
         self.state.as_ref()
     }
 
@@ -234,8 +234,8 @@ impl Engine for Tracker {
         let measurements = self.model.measurements(observed).into_iter();
         for (measurement, changes) in measurements.zip(&mut self.changes) {
             let Some((component, measured, variance)) = measurement else { continue };
-            let update = state.innovation(component, measured, variance)?;
-            let normalised = update.normalised();
+            let innovation = state.innovation(component, measured, variance)?;
+            let normalised = innovation.normalised();
             let is_outlier = normalised.abs() > OUTLIER_GATE;
             if is_outlier && first_innovation.is_some() {
                 // A speed that the position contradicts is left out on its own.
@@ -249,9 +249,9 @@ impl Engine for Tracker {
                 }
                 return Ok(Step::Outlier);
             }
-            state.apply(&update);
+            let gain = state.take(component, &innovation, variance);
             if has_lag {
-                self.smoother.apply(&update);
+                self.smoother.take(component, &innovation, &gain);
             }
             is_change |= changes.push(normalised);
             first_innovation.get_or_insert(normalised);
@@ -293,18 +293,17 @@ impl Engine for Tracker {
 ///
 /// # Errors
 ///
-/// When an innovation's variance is not positive.
+/// When belief or measurement are not sound.
 pub fn measure(
     model: &TrackerModel,
-    state: &mut GaussianState<STATES>,
+    state: &mut Gaussian<STATES>,
     observed: &Observation,
-) -> Result<(f64, f64), FilterError> {
+) -> Result<(f64, f64), NotPositiveDefinite> {
     let (mut log_likelihood, mut first_normalised) = (0.0, None);
     for (component, measured, variance) in model.measurements(observed).into_iter().flatten() {
-        let update = state.innovation(component, measured, variance)?;
-        log_likelihood += update.log_likelihood();
-        first_normalised.get_or_insert(update.normalised());
-        state.apply(&update);
+        let innovation = state.measure(component, measured, variance)?;
+        log_likelihood += innovation.log_likelihood();
+        first_normalised.get_or_insert(innovation.normalised());
     }
     Ok((log_likelihood, first_normalised.unwrap_or(0.0)))
 }

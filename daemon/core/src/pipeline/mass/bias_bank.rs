@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::bias_model::BiasModel;
 use super::line_resistance::LineResistance;
 use super::motion::Motion;
-use crate::filter::JosephFilter;
+use crate::filter::{Gaussian, NotPositiveDefinite};
 use crate::train::TrainModel;
 
 /// Place of the speed in m/s in a filter's state.
@@ -85,7 +85,7 @@ pub struct Moments {
 pub struct BiasBank {
     dynamics: Dynamics,
     models: [BiasModel; MODELS],
-    filters: [JosephFilter<3>; MODELS],
+    filters: [Gaussian<3>; MODELS],
     log_weights: [f64; MODELS],
     forgetting: f64,
     /// Share of each bias that is left after a step, and the step in s that it holds for.
@@ -104,7 +104,7 @@ impl BiasBank {
         memory: f64,
     ) -> Self {
         let filters = models.map(|model| {
-            JosephFilter::new(
+            Gaussian::independent(
                 Vector3::new(0.0, inverse_mass.0, 0.0),
                 Vector3::new(1.0, inverse_mass.1, model.std_mps2),
             )
@@ -148,7 +148,7 @@ impl BiasBank {
         }
         let filters = self.filters.iter_mut().zip(&self.models).zip(self.keeps.0);
         for ((filter, model), keep) in filters {
-            let [speed, inverse_mass, bias] = filter.state.into();
+            let [speed, inverse_mass, bias] = filter.mean.into();
             let shape = model.shape(speed);
             let start = push_from * inverse_mass - dynamics.drag_mps2(from, speed) + shape * bias;
             let ahead = speed + step_s * start;
@@ -165,12 +165,12 @@ impl BiasBank {
                 Vector3::new(speed + 0.5 * step_s * (start + end), inverse_mass, keep * bias);
             let jump_variance = model.jump_variance(jump * inverse_mass, step_s);
             let noise = Vector3::new(jump_variance, 0.0, model.noise_variance(keep));
-            filter.predict(next, &transition, &noise);
+            filter.predict(next, &transition, &Matrix3::from_diagonal(&noise));
         }
     }
 
     /// The filter with the most evidence.
-    pub fn best(&self) -> &JosephFilter<3> {
+    pub fn best(&self) -> &Gaussian<3> {
         &self.filters[self.best_index()]
     }
 
@@ -182,16 +182,25 @@ impl BiasBank {
     }
 
     /// Takes a measured speed into every filter.
-    pub fn measure(&mut self, speed_mps: f64, noise_variance: f64) {
+    ///
+    /// # Errors
+    ///
+    /// When a filter or the measurement is not sound.
+    pub fn measure(
+        &mut self,
+        speed_mps: f64,
+        noise_variance: f64,
+    ) -> Result<(), NotPositiveDefinite> {
         for (filter, log_weight) in self.filters.iter_mut().zip(&mut self.log_weights) {
-            let innovation = filter.measure(SPEED, speed_mps, noise_variance);
-            let square = innovation.value * innovation.value / innovation.variance;
+            let innovation = filter.measure(SPEED, speed_mps, noise_variance)?;
+            let square = innovation.normalised_square();
             *log_weight = self.forgetting * *log_weight - 0.5 * (square + innovation.variance.ln());
         }
         let highest = self.log_weights[self.best_index()];
         for log_weight in &mut self.log_weights {
             *log_weight = (*log_weight - highest).max(LOG_WEIGHT_MIN);
         }
+        Ok(())
     }
 
     /// Share of the evidence for each behaviour.
@@ -205,15 +214,15 @@ impl BiasBank {
     pub fn moments(&self) -> Moments {
         let weights = self.weights();
         let shapes: [f64; MODELS] =
-            std::array::from_fn(|i| self.models[i].shape(self.filters[i].state[SPEED]));
+            std::array::from_fn(|i| self.models[i].shape(self.filters[i].mean[SPEED]));
         let (mut mass, mut bias) = (0.0, 0.0);
         for ((weight, shape), filter) in weights.iter().zip(shapes).zip(&self.filters) {
-            mass += weight * filter.state[INVERSE_MASS];
-            bias += weight * shape * filter.state[BIAS];
+            mass += weight * filter.mean[INVERSE_MASS];
+            bias += weight * shape * filter.mean[BIAS];
         }
         let (mut mass_variance, mut bias_variance, mut cross) = (0.0, 0.0, 0.0);
         for ((weight, shape), filter) in weights.iter().zip(shapes).zip(&self.filters) {
-            let (du, db) = (filter.state[INVERSE_MASS] - mass, shape * filter.state[BIAS] - bias);
+            let (du, db) = (filter.mean[INVERSE_MASS] - mass, shape * filter.mean[BIAS] - bias);
             let own = &filter.covariance;
             mass_variance += weight * (own[(INVERSE_MASS, INVERSE_MASS)] + du * du);
             bias_variance += weight * (shape * shape * own[(BIAS, BIAS)] + db * db);
@@ -231,7 +240,7 @@ impl BiasBank {
 
     /// True while every filter is sound.
     pub fn is_sound(&self) -> bool {
-        self.filters.iter().all(JosephFilter::is_sound)
+        self.filters.iter().all(Gaussian::is_sound)
             && self.log_weights.iter().all(|weight| weight.is_finite())
     }
 }
@@ -299,7 +308,7 @@ mod tests {
             if k == 0 {
                 bank.restart_speed(speed, NOISE_VARIANCE);
             } else {
-                bank.measure(speed, NOISE_VARIANCE);
+                bank.measure(speed, NOISE_VARIANCE).unwrap();
             }
             let row = Vector2::new(1.0, push_mps);
             normal += row * row.transpose() / NOISE_VARIANCE;
@@ -326,7 +335,7 @@ mod tests {
             for k in 1..300 {
                 bank.predict(&motion(k - 1, 0.0), &motion(k, 0.0), STEP_S);
                 speed += STEP_S * (acting_mps2 - dynamics().mps2_per_n_per_kn() * 5.0);
-                bank.measure(speed, NOISE_VARIANCE);
+                bank.measure(speed, NOISE_VARIANCE).unwrap();
             }
             let weights = bank.weights();
             assert!(weights[expected] > weights[1 - expected], "{acting_mps2}: {weights:?}");

@@ -78,7 +78,7 @@ impl JointLeastSquares {
         }
     }
 
-    /// Writes values and covariance of [a, b, c, mass in t]; gives the relative standard
+    /// Writes values and covariance of [a, b, c, mass]; gives the relative standard
     /// deviation of the mass.
     fn write_estimate(
         &self,
@@ -88,17 +88,17 @@ impl JointLeastSquares {
     ) -> f64 {
         let davis = self.davis(solution, Section::Basic);
         let inverse = solution[INVERSE_MASS];
-        let mass_t = 1e-3 * self.regressors.reference_mass_kg / inverse;
+        let mass_kg = self.regressors.reference_mass_kg / inverse;
         let first = POLYNOMIALS[Section::Basic as usize];
         let own = self.covariance(root, [first, first + 1, first + 2, INVERSE_MASS]);
         let mut to_units = Matrix4::zeros();
         let to_davis = self.regressors.basis.to_davis_matrix();
         to_units.fixed_view_mut::<3, 3>(0, 0).copy_from(&to_davis);
-        to_units[(3, 3)] = -mass_t / inverse;
+        to_units[(3, 3)] = -mass_kg / inverse;
         write_parameters(
             snapshot,
             [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC, Parameter::Mass],
-            &Vector4::new(davis.a, davis.b, davis.c, mass_t),
+            &Vector4::new(davis.a, davis.b, davis.c, mass_kg),
             &(to_units * own * to_units.transpose()),
         );
         own[(3, 3)].sqrt() / inverse.abs()

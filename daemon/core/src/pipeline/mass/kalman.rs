@@ -7,7 +7,7 @@ use dynocar_shared::{
 };
 use nalgebra::{Matrix2, Vector2};
 
-use super::bias_bank::{BiasBank, Dynamics, MODELS, Moments, SPEED};
+use super::bias_bank::{BiasBank, Dynamics, Moments, SPEED};
 use super::health::{InputHealth, innovation_complaint};
 use super::kalman_settings::MassKalmanSettings;
 use super::motion::{Motion, StopWatch};
@@ -119,12 +119,6 @@ impl MassKalman {
         self.noise.variance().sqrt()
     }
 
-    /// Share of the evidence for each behaviour of the bias, in the order of
-    /// [`MassKalmanSettings::bias_models`].
-    pub fn bias_weights(&self) -> [f64; MODELS] {
-        self.bank.weights()
-    }
-
     /// Opens the mass after a stop; a declared mass that changed moves it by as much.
     fn reopen(&mut self, declared_mass_kg: f64) {
         let ratio = declared_mass_kg / self.declared_mass_kg;
@@ -161,12 +155,12 @@ impl MassKalman {
 
     fn advance(&mut self, from: Motion, motion: Motion, step_s: f64) -> Outcome {
         self.bank.predict(&from, &motion, step_s);
-        let expected = self.bank.best().innovation(SPEED, motion.speed_mps, self.noise.variance());
-        let normalised = expected.value / expected.variance.sqrt();
-        if !normalised.is_finite() {
+        let variance = self.noise.variance();
+        let Ok(expected) = self.bank.best().innovation(SPEED, motion.speed_mps, variance) else {
             self.reset();
             return self.begin(motion);
-        }
+        };
+        let normalised = expected.normalised();
         if normalised.abs() > OUTLIER {
             self.outliers_in_a_row += 1;
             if self.outliers_in_a_row >= OUTLIERS_BEFORE_RESTART {
@@ -179,14 +173,14 @@ impl MassKalman {
         }
         self.outliers_in_a_row = 0;
         let weight = (HUBER / normalised.abs()).min(1.0);
-        self.bank.measure(motion.speed_mps, self.noise.variance() / weight);
-        if !self.bank.is_sound() {
+        let measured = self.bank.measure(motion.speed_mps, variance / weight);
+        if measured.is_err() || !self.bank.is_sound() {
             self.reset();
             return self.begin(motion);
         }
         self.monitor.push(normalised);
         let filter = self.bank.best();
-        let residual_mps = motion.speed_mps - filter.state[SPEED];
+        let residual_mps = motion.speed_mps - filter.mean[SPEED];
         self.noise.learn(residual_mps, filter.covariance[(SPEED, SPEED)], weight);
         self.last = Some(motion);
         self.widen_speed_range(motion.speed_mps);
@@ -306,15 +300,14 @@ impl Estimator for MassKalman {
 
     fn write(&self, snapshot: &mut ParameterSnapshot) {
         let (mass_kg, mass_std_kg) = self.mass_kg();
-        let mass_std_t = 1e-3 * mass_std_kg;
         let (bias_mps2, bias_std) = (self.moments.bias_mps2, self.moments.bias_variance.sqrt());
         // The mass falls as its inverse grows.
-        let cross = -self.moments.correlation * mass_std_t * bias_std;
+        let cross = -self.moments.correlation * mass_std_kg * bias_std;
         write_parameters(
             snapshot,
             [Parameter::Mass, Parameter::AccelerationBias],
-            &Vector2::new(1e-3 * mass_kg, bias_mps2),
-            &Matrix2::new(mass_std_t * mass_std_t, cross, cross, bias_std * bias_std),
+            &Vector2::new(mass_kg, bias_mps2),
+            &Matrix2::new(mass_std_kg * mass_std_kg, cross, cross, bias_std * bias_std),
         );
         let is_known = self.is_known();
         let is_bias_known = self.health.used() >= SAMPLES_MIN;
@@ -334,12 +327,12 @@ impl Estimator for MassKalman {
 
     /// Takes up the kept mass, unless the first sample declares another than the train's.
     fn warm_start(&mut self, kept: &KeptEstimate) -> bool {
-        let Some((mass_t, variance)) = kept.moments([Parameter::Mass]) else { return false };
-        let inverse = self.reference_mass_kg / (1e3 * mass_t[0]);
+        let Some((mass_kg, variance)) = kept.moments([Parameter::Mass]) else { return false };
+        let inverse = self.reference_mass_kg / mass_kg[0];
         if !(inverse.is_finite() && inverse > 0.0) {
             return false;
         }
-        let relative_variance = variance[(0, 0)] / (mass_t[0] * mass_t[0]);
+        let relative_variance = variance[(0, 0)] / (mass_kg[0] * mass_kg[0]);
         self.bank.reopen(inverse, relative_variance * inverse * inverse);
         self.moments = self.bank.moments();
         self.is_warm_started = true;

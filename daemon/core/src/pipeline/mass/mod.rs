@@ -5,7 +5,7 @@
 //! - [`motion`], [`section`], [`line_resistance`], [`speed_basis`], [`bias_model`]: what a sample
 //!   gives, and the parts of the model
 //! - [`StagedDescent`]: the paper's stages, by normalised gradient descent on sums over all
-//!   samples, or as printed ([`printed_descent`])
+//!   samples
 //! - [`JointLeastSquares`]: resistance and mass together, on [`integrals`] of motion
 //! - [`MassKalman`]: mass by Kalman filters [v, 1/m, bias], a [`bias_bank`] of them
 
@@ -23,7 +23,6 @@ mod kalman_settings;
 mod lack_of_fit;
 pub mod line_resistance;
 pub mod motion;
-pub mod printed_descent;
 pub mod section;
 pub mod speed_basis;
 mod speed_noise;
@@ -35,7 +34,7 @@ pub use joint_settings::JointLeastSquaresSettings;
 pub use kalman::MassKalman;
 pub use kalman_settings::MassKalmanSettings;
 pub use staged::StagedDescent;
-pub use staged_settings::{DescentVariant, MassRegression, StagedDescentSettings};
+pub use staged_settings::{MassRegression, StagedDescentSettings};
 
 use super::settings::{SettingError, require};
 

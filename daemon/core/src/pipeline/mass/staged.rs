@@ -12,10 +12,9 @@ use super::descent::MeanSquare;
 use super::health::InputHealth;
 use super::line_resistance::LineResistance;
 use super::motion::{Motion, StopWatch};
-use super::printed_descent::PrintedDescent;
 use super::section::Section;
 use super::speed_basis::SpeedBasis;
-use super::staged_settings::{DescentVariant, MassRegression, StagedDescentSettings};
+use super::staged_settings::{MassRegression, StagedDescentSettings};
 use crate::force::ResolvedSample;
 use crate::pipeline::output::{write_parameters, write_status};
 use crate::pipeline::settings::SettingError;
@@ -60,7 +59,6 @@ pub struct StagedDescent {
     curve: Stage<6>,
     /// z1, which is known by then, and z3.
     tunnel: Stage<6>,
-    printed: PrintedDescent,
     mass: Stage<1>,
     learned: u64,
     stops: StopWatch,
@@ -89,7 +87,6 @@ impl StagedDescent {
             basic: Stage::new(basis.of_davis(&train.resistance)),
             curve: Stage::new(SVector::zeros()),
             tunnel: Stage::new(SVector::zeros()),
-            printed: PrintedDescent::new(settings.printed_speed_unit, &train.resistance),
             mass: Stage::new(SVector::from([1.0])),
             learned: 0,
             stops: StopWatch::new(settings.stop_min_s),
@@ -131,15 +128,7 @@ impl StagedDescent {
         }
     }
 
-    /// The number of steps after which the printed variant had diverged.
-    pub fn diverged_after(&self) -> Option<u64> {
-        self.printed.diverged_after()
-    }
-
     fn davis(&self, section: Section) -> Davis {
-        if self.settings.variant == DescentVariant::Printed {
-            return self.printed.davis(section);
-        }
         let rest = |stage: &Stage<6>| stage.coefficients.fixed_rows::<3>(3).into_owned();
         self.basis.to_davis(&match section {
             Section::Basic => self.basic.coefficients,
@@ -167,10 +156,7 @@ impl StagedDescent {
         // the resistance per kN of it, and the rotating mass that (18) leaves out.
         let specific_mps2 = force_n / to.declared_kg - inertia_mps2;
         let target = 1e3 * specific_mps2 / STANDARD_GRAVITY_MPS2 - known;
-        match self.settings.variant {
-            DescentVariant::Normalised => self.descend(section, speed_mps, target, to),
-            DescentVariant::Printed => self.printed.learn(section, speed_mps, target),
-        }
+        self.descend(section, speed_mps, target, to);
         Outcome::Updated
     }
 
@@ -241,9 +227,6 @@ impl StagedDescent {
     }
 
     fn status(&self, is_mass_known: bool) -> (Status, Reason) {
-        if self.printed.diverged_after().is_some() {
-            return (Status::Invalid, Reason::NumericalFailure);
-        }
         let is_begun = self.basic.sums.count() >= SAMPLES_MIN || is_mass_known;
         let some = if is_begun { Status::Degraded } else { Status::Unestimated };
         if let Some(reason) = self.health.complaint() {
@@ -302,11 +285,11 @@ impl Estimator for StagedDescent {
             let block = to_davis * own * to_davis.transpose();
             covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&block);
         }
-        covariance[(3, 3)] = mass_std_kg.map_or(0.0, |std| 1e-6 * std * std);
+        covariance[(3, 3)] = mass_std_kg.map_or(0.0, |std| std * std);
         write_parameters(
             snapshot,
             [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC, Parameter::Mass],
-            &Vector4::new(davis.a, davis.b, davis.c, 1e-3 * self.mass_kg()),
+            &Vector4::new(davis.a, davis.b, davis.c, self.mass_kg()),
             &covariance,
         );
         let is_basic_known = basic.is_some() && self.basic.sums.count() >= SAMPLES_MIN;

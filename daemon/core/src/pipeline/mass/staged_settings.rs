@@ -3,20 +3,8 @@
 use serde::Deserialize;
 
 use super::line_resistance::DEFAULT_REFERENCE_RADIUS_M;
-use super::printed_descent::SpeedUnit;
 use super::within;
 use crate::pipeline::settings::SettingError;
-
-/// How the resistances descend.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum DescentVariant {
-    /// Normalised features, steps down the gradient over all samples: it works.
-    #[default]
-    Normalised,
-    /// Raw features, learning rate 1e-7, one step a sample: it fails.
-    Printed,
-}
 
 /// What the mass is fitted on; the paper does not say.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
@@ -34,12 +22,8 @@ pub enum MassRegression {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct StagedDescentSettings {
-    /// How the resistances descend.
-    pub variant: DescentVariant,
     /// What the mass is fitted on.
     pub mass_regression: MassRegression,
-    /// The unit of the printed variant's speed.
-    pub printed_speed_unit: SpeedUnit,
     /// Samples of the first stages, driven at the declared mass; the mass is learned after.
     pub resistance_samples: u64,
     /// Steps down the gradient with each sample.
@@ -59,9 +43,7 @@ pub struct StagedDescentSettings {
 impl Default for StagedDescentSettings {
     fn default() -> Self {
         StagedDescentSettings {
-            variant: DescentVariant::Normalised,
             mass_regression: MassRegression::ForceOnAcceleration,
-            printed_speed_unit: SpeedUnit::KilometresPerHour,
             resistance_samples: 28_000,
             steps_per_sample: 4,
             rate: 1.0,

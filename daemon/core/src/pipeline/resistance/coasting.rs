@@ -202,7 +202,7 @@ impl Half {
 mod tests {
     use super::super::regression::scaled;
     use super::super::sample::tests::driven;
-    use super::super::simulation::normal;
+    use super::super::test_runs::normal;
     use super::*;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;

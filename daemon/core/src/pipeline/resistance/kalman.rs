@@ -11,13 +11,13 @@ use nalgebra::{SMatrix, SVector};
 use super::least_squares::ResistanceLeastSquares;
 use super::noise_bank::LikeliestNoise;
 use super::regression::{
-    BRAKE_SCALE, Disturbance, FORCE_DELAY, Motion, PARAMETERS, TRACTION_SCALE, UNKNOWNS, regressors,
+    BRAKE_SCALE, Disturbance, FORCE_DELAY, Motion, PARAMETERS, Solution, TRACTION_SCALE, UNKNOWNS,
+    regressors,
 };
 use super::report::Report;
 use super::sample::UnitSample;
 use super::settings::KalmanSettings;
-use super::solver::Solution;
-use crate::filter::JointState;
+use crate::filter::Gaussian;
 use crate::force::ResolvedSample;
 use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use crate::train::TrainModel;
@@ -47,7 +47,7 @@ pub struct ResistanceKalman {
     mean_weight: f64,
     train_length_m: f64,
     beside: ResistanceLeastSquares,
-    filter: JointState<STATES>,
+    filter: Gaussian<STATES>,
     last: Option<UnitSample>,
     last_time_ns: Option<i64>,
     noise: LikeliestNoise,
@@ -109,7 +109,7 @@ impl ResistanceKalman {
         let kept = (-duration_s / time_s).exp();
         let mut gradient = State::zeros();
         gradient[DISTURBANCE] = kept;
-        let value = kept * self.filter.mean()[DISTURBANCE];
+        let value = kept * self.filter.mean[DISTURBANCE];
         let renewed = std_n_per_kn.powi(2) * (1.0 - kept * kept);
         self.filter.rewrite(DISTURBANCE, value, &gradient, renewed);
     }
@@ -118,7 +118,7 @@ impl ResistanceKalman {
     fn propagate(&mut self, before: &UnitSample, now: &UnitSample) {
         let step_s = now.seconds_since(before);
         let inertia = now.inertia;
-        let state = *self.filter.mean();
+        let state = self.filter.mean;
         let unknown = |index: usize| state[FIRST_UNKNOWN + index];
         let traction = 0.5 * step_s * (before.traction + now.traction);
         let brake = 0.5 * step_s * (before.brake + now.brake);
@@ -176,16 +176,18 @@ impl ResistanceKalman {
     fn correct(&mut self, before: &UnitSample, now: &UnitSample) -> bool {
         let white = self.beside.speed_noise().variance_of_sample(self.moved_mps.abs());
         let variance = white + self.transient_variance(before, now);
-        let step = self.filter.innovation(SPEED, now.speed_mps, variance);
+        let Ok(innovation) = self.filter.innovation(SPEED, now.speed_mps, variance) else {
+            return false;
+        };
         let freedom = self.settings.student_freedom;
-        let square = step.innovation * step.innovation / step.variance;
+        let square = innovation.normalised_square();
         let weight = student_weight(square, freedom);
         let relative = weight / self.mean_weight;
-        let corrected = self.filter.correct(SPEED, now.speed_mps, variance / relative);
+        let corrected = self.filter.measure(SPEED, now.speed_mps, variance / relative);
         if self.beside.is_warm() {
-            self.monitor.push((square * weight).sqrt().copysign(step.innovation));
+            self.monitor.push((square * weight).sqrt().copysign(innovation.value));
         }
-        let side = if step.innovation > 0.0 { 1 } else { -1 };
+        let side = if innovation.value > 0.0 { 1 } else { -1 };
         self.astray = match square > ASTRAY_BEYOND * ASTRAY_BEYOND {
             true if self.astray * side > 0 => self.astray + side,
             true => side,
@@ -199,8 +201,8 @@ impl ResistanceKalman {
     fn recover(&mut self, now: &UnitSample) {
         self.astray = 0;
         let known = self.beside.bank().likeliest_solution().filter(|_| self.beside.is_warm());
-        let disturbance = *self.filter.mean().fixed_rows::<1>(DISTURBANCE).as_scalar();
-        let variance = self.filter.covariance()[(DISTURBANCE, DISTURBANCE)];
+        let disturbance = *self.filter.mean.fixed_rows::<1>(DISTURBANCE).as_scalar();
+        let variance = self.filter.covariance[(DISTURBANCE, DISTURBANCE)];
         self.filter = filter_at(known.as_ref().unwrap_or(self.beside.declared()));
         self.filter.replace(DISTURBANCE, disturbance, variance);
         self.start(now);
@@ -215,8 +217,8 @@ impl ResistanceKalman {
         let faded = self.force_rate * (-step_s / FORCE_RATE_MEMORY_S).exp();
         self.force_rate = faded.max((change / step_s).abs());
         let place = FIRST_UNKNOWN + FORCE_DELAY;
-        let delay = self.filter.mean()[place];
-        let delay_square = delay * delay + self.filter.covariance()[(place, place)];
+        let delay = self.filter.mean[place];
+        let delay_square = delay * delay + self.filter.covariance[(place, place)];
         (0.5 * delay_square * self.force_rate / now.inertia).powi(2)
     }
 
@@ -262,12 +264,12 @@ impl ResistanceKalman {
         joint
             .fixed_view_mut::<UNKNOWNS, UNKNOWNS>(FIRST_UNKNOWN, FIRST_UNKNOWN)
             .copy_from(&solution.covariance);
-        self.filter = JointState::new(mean, joint);
+        self.filter = Gaussian { mean, covariance: joint };
     }
 
     /// Speed and disturbance for given unknowns, as this filter knows them.
     fn own_motion(&self) -> Option<Motion> {
-        let (mean, covariance) = (self.filter.mean(), self.filter.covariance());
+        let (mean, covariance) = (&self.filter.mean, &self.filter.covariance);
         let tie = covariance.fixed_view::<UNKNOWNS, FIRST_UNKNOWN>(FIRST_UNKNOWN, 0).into_owned();
         let unknowns = covariance.fixed_view::<UNKNOWNS, UNKNOWNS>(FIRST_UNKNOWN, FIRST_UNKNOWN);
         let gain = unknowns.into_owned().cholesky()?.solve(&tie).transpose();
@@ -281,16 +283,16 @@ impl ResistanceKalman {
 
     /// The disturbance now with its standard deviation, in N/kN.
     fn disturbance(&self) -> (f64, f64) {
-        let variance = self.filter.covariance()[(DISTURBANCE, DISTURBANCE)];
-        (self.filter.mean()[DISTURBANCE], variance.max(0.0).sqrt())
+        let variance = self.filter.covariance[(DISTURBANCE, DISTURBANCE)];
+        (self.filter.mean[DISTURBANCE], variance.max(0.0).sqrt())
     }
 
     fn solution(&self) -> Solution {
         Solution {
-            estimate: self.filter.mean().fixed_rows::<UNKNOWNS>(FIRST_UNKNOWN).into_owned(),
+            estimate: self.filter.mean.fixed_rows::<UNKNOWNS>(FIRST_UNKNOWN).into_owned(),
             covariance: self
                 .filter
-                .covariance()
+                .covariance
                 .fixed_view::<UNKNOWNS, UNKNOWNS>(FIRST_UNKNOWN, FIRST_UNKNOWN)
                 .into_owned(),
         }
@@ -304,14 +306,14 @@ impl ResistanceKalman {
     }
 }
 
-fn filter_at(solution: &Solution) -> JointState<STATES> {
+fn filter_at(solution: &Solution) -> Gaussian<STATES> {
     let mut mean = State::zeros();
     let mut covariance = SMatrix::<f64, STATES, STATES>::identity();
     mean.fixed_rows_mut::<UNKNOWNS>(FIRST_UNKNOWN).copy_from(&solution.estimate);
     covariance
         .fixed_view_mut::<UNKNOWNS, UNKNOWNS>(FIRST_UNKNOWN, FIRST_UNKNOWN)
         .copy_from(&solution.covariance);
-    JointState::new(mean, covariance)
+    Gaussian { mean, covariance }
 }
 
 /// Weight of an observation by the square of its normalised innovation.

@@ -5,11 +5,11 @@ use nalgebra::{Matrix3, SMatrix};
 
 use super::noise_bank::NoiseBank;
 use super::noise_model::WhiteRow;
-use super::regression::{Motion, Observation, PARAMETERS, Unknowns, scaled, unscaling};
+use super::regression::{Motion, Observation, PARAMETERS, Solution, Unknowns, scaled, unscaling};
 use super::report::{DrivenSpeeds, Evidence, Report};
 use super::sample::UnitSample;
 use super::settings::DataSettings;
-use super::solver::{Solution, Solver, bank_penalty};
+use super::solver::{Solver, bank_penalty};
 use super::source::RowSource;
 use super::speed::SpeedNoise;
 use crate::filter::RunningMedian;

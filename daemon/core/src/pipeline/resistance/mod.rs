@@ -8,7 +8,6 @@
 //! - `solver`: the recursions
 //! - `report`: bounds, excitation, status
 //! - `least_squares`: the pipeline around all of it
-//! - [`output_error`]: the fit of whole runs at once, for data at rest
 //! - `kalman`: the robust filter over every sample, with a least-squares pipeline beside it
 
 mod coasting;
@@ -17,17 +16,15 @@ mod least_squares;
 pub(super) mod momentum;
 mod noise_bank;
 mod noise_model;
-pub mod output_error;
 pub(super) mod regression;
 mod report;
 pub(super) mod sample;
 pub mod settings;
-#[cfg(test)]
-mod simulation;
 mod solver;
 mod source;
 mod speed;
-mod speed_run;
+#[cfg(test)]
+mod test_runs;
 #[cfg(test)]
 mod tests;
 

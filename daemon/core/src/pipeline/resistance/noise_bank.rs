@@ -9,9 +9,8 @@ use nalgebra::SMatrix;
 
 use super::noise_model::{NoiseModel, PRIOR_ROWS, WhiteRow};
 use super::regression::{
-    Disturbance, Motion, Observation, PARAMETERS, SinceBlock, UNKNOWNS, Unknowns,
+    Disturbance, Motion, Observation, PARAMETERS, SinceBlock, Solution, UNKNOWNS, Unknowns,
 };
-use super::solver::Solution;
 
 /// Standard deviations of the disturbance in N/kN: from nothing to as large as resistance itself.
 const STDS_N_PER_KN: [f64; 6] = [0.01, 0.03, 0.1, 0.3, 1.0, 3.0];
@@ -308,7 +307,7 @@ fn log_prior(index: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::regression::{Columns, MomentumBlock};
-    use super::super::simulation::normal;
+    use super::super::test_runs::normal;
     use super::*;
     use rand::{RngExt, SeedableRng};
 

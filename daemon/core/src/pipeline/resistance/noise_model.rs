@@ -1,10 +1,9 @@
 //! One model of the rows' noise, with the least squares that follow from it.
 
 use super::regression::{
-    Disturbance, Motion, Observation, RowWhitener, SinceBlock, UNKNOWNS, Unknowns, disturbance_of,
-    loosen_disturbance, motion_of,
+    Disturbance, Motion, Observation, RowWhitener, SinceBlock, Solution, UNKNOWNS, Unknowns,
+    disturbance_of, loosen_disturbance, motion_of,
 };
-use super::solver::Solution;
 use crate::filter::SquareRootInformation;
 
 /// Rows for which the noise model as declared counts beside the rows seen.

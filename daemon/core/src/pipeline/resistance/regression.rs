@@ -39,6 +39,15 @@ pub type Unknowns = SVector<f64, UNKNOWNS>;
 /// The filter that makes rows independent.
 pub type RowWhitener = Whitener<STATES, COLUMNS>;
 
+/// Estimate of the unknowns with its covariance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solution {
+    /// The unknowns.
+    pub estimate: Unknowns,
+    /// Covariance for intervals by the normal distribution.
+    pub covariance: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
+}
+
 /// The scaled regressors of w0 at a speed in m/s.
 pub fn regressors(speed_mps: f64) -> [f64; PARAMETERS] {
     let scaled = speed_mps / SPEED_SCALE_MPS;

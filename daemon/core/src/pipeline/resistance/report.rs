@@ -4,8 +4,7 @@ use dynocar_shared::{Manoeuvre, Reason, Status};
 use nalgebra::{Matrix3, Vector3};
 
 use super::noise_bank::Disturbed;
-use super::regression::{PARAMETERS, SPEED_SCALE_MPS, regressors, unscaling};
-use super::solver::Solution;
+use super::regression::{PARAMETERS, SPEED_SCALE_MPS, Solution, regressors, unscaling};
 use crate::filter::bounded_minimum;
 use crate::pipeline::InnovationMonitor;
 use crate::train::Davis;

@@ -1,21 +1,10 @@
 //! The recursions of Liu 2018 behind one face.
 
-use nalgebra::SMatrix;
-
 use super::noise_bank::NoiseBank;
 use super::noise_model::WhiteRow;
-use super::regression::{PARAMETERS, UNKNOWNS, Unknowns};
+use super::regression::{PARAMETERS, Solution, UNKNOWNS, Unknowns};
 use super::settings::{DataSettings, INNOVATION_LENGTH_MAX, MilsSettings, RlsSettings};
 use crate::filter::{Forgetting, Mils, NotPositiveDefinite, Penalty, Rls};
-
-/// Estimate of the unknowns with its covariance.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Solution {
-    /// The unknowns.
-    pub estimate: Unknowns,
-    /// Covariance for intervals by the normal distribution.
-    pub covariance: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
-}
 
 /// One of the paper's algorithms.
 #[derive(Clone, Debug)]

@@ -4,7 +4,7 @@ use dynocar_shared::{
     Manoeuvre, ParameterSnapshot, Reason, RejectionReason, SampleField, Status, TrainSample,
 };
 
-use super::simulation::Scenario;
+use super::test_runs::Scenario;
 use crate::pipeline::EstimatorSettings;
 use crate::train::Davis;
 
@@ -151,7 +151,7 @@ fn cruising_tells_the_resistance_there_and_says_what_is_missing() {
     let train = scenario.train();
     let estimator = settings.build(&train).unwrap();
     let mut pipeline =
-        crate::pipeline::Pipeline::new(super::simulation::TRAIN, 0, train, None, estimator);
+        crate::pipeline::Pipeline::new(super::test_runs::TRAIN, 0, train, None, estimator);
     for sample in &samples {
         pipeline.process(sample);
     }

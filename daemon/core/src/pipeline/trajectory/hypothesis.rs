@@ -177,7 +177,7 @@ impl Hypothesis {
         self.noise.learn(innovation_mps, own_variance, is_used, model);
         self.refusals = if is_used { 0 } else { self.refusals + 1 };
         if is_used {
-            let gain = self.factor.measure_last(noise_variance).gain;
+            let gain = self.factor.measure_last(noise_variance);
             self.state += gain * innovation_mps;
             self.unit.measure(&gain);
         } else if self.refusals > REFUSALS_MAX {

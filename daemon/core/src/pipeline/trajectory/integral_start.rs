@@ -13,8 +13,7 @@
 
 use nalgebra::Vector3;
 
-use super::fit::Stretch;
-use super::step::StepRule;
+use super::step::{StepRule, Stretch};
 use crate::filter::levenberg_marquardt::{
     LeastSquares, Linearisation, ParameterBox, SolverSettings, minimise,
 };

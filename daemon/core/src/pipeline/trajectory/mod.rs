@@ -11,6 +11,7 @@ pub mod bank;
 pub mod dataset;
 pub mod deviation;
 pub mod fit;
+mod fit_settings;
 pub mod hypothesis;
 pub mod index;
 pub mod integral_start;

@@ -7,7 +7,7 @@ use super::fit::{Disturbance, FitError, FitSettings, TrajectoryFit, TrajectoryFi
 use super::index::DAVIS;
 use super::long_run::LongRunVariance;
 use super::motion::{Motion, MotionTracker};
-use super::newton_settings::{CheckedSettings, FitMethod};
+use super::newton_settings::{CheckedSettings, FitMethod, TrajectoryNewtonSettings};
 use super::quality::{Estimate, SpeedRange, missing};
 use super::step::StepRule;
 use super::unexplained::UnexplainedForce;
@@ -17,8 +17,9 @@ use crate::filter::levenberg_marquardt::ParameterBox;
 use crate::force::ResolvedSample;
 use crate::pipeline::output::{write_parameters, write_status};
 use crate::pipeline::sample_gate::{Gated, SampleGate};
+use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
-use crate::train::Davis;
+use crate::train::{Davis, TrainModel};
 
 /// Windows that the learned speed noise looks back over.
 const NOISE_WINDOWS: f64 = 50.0;
@@ -61,13 +62,22 @@ pub struct TrajectoryNewton {
 }
 
 impl TrajectoryNewton {
-    pub(super) fn new(settings: CheckedSettings) -> Self {
+    /// An estimator for a train.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn new(
+        settings: &TrajectoryNewtonSettings,
+        train: &TrainModel,
+    ) -> Result<Self, SettingError> {
+        let settings = settings.checked(train)?;
         let CheckedSettings { bounds, prior, window: capacity, .. } = settings;
         let rule = match settings.method {
             FitMethod::LevenbergMarquardt => StepRule::Time,
             FitMethod::WolfeNewton => StepRule::Distance,
         };
-        TrajectoryNewton {
+        Ok(TrajectoryNewton {
             newton: NewtonSettings {
                 bounds,
                 mean_square_max: settings.mean_square_max,
@@ -98,7 +108,7 @@ impl TrajectoryNewton {
             is_consistent: true,
             fault: None,
             settings,
-        }
+        })
     }
 
     /// Fits the window, which has just gained a step.

@@ -1,12 +1,9 @@
 //! Settings of `trajectory_newton`.
 
-use std::sync::Arc;
-
 use nalgebra::Vector3;
 use serde::Deserialize;
 
 use super::fit::DavisPrior;
-use super::newton::TrajectoryNewton;
 use super::quality::prior_std;
 use super::step::resistance_gain;
 use crate::filter::levenberg_marquardt::ParameterBox;
@@ -73,12 +70,12 @@ impl Default for TrajectoryNewtonSettings {
 }
 
 impl TrajectoryNewtonSettings {
-    /// Builds the estimator for a train.
+    /// The settings for a train, in the estimator's units.
     ///
     /// # Errors
     ///
     /// When a setting lies outside its range.
-    pub fn build(&self, train: &Arc<TrainModel>) -> Result<TrajectoryNewton, SettingError> {
+    pub(super) fn checked(&self, train: &TrainModel) -> Result<CheckedSettings, SettingError> {
         let positive = "a finite number above 0";
         let is_positive = |value: f64| value > 0.0 && value.is_finite();
         let window = f64::from(self.window);
@@ -107,7 +104,7 @@ impl TrajectoryNewtonSettings {
             let is_allowed = low.is_finite() && high.is_finite() && low < high;
             require(is_allowed, "high", high, "finite numbers above those of `low`")?;
         }
-        Ok(TrajectoryNewton::new(CheckedSettings {
+        Ok(CheckedSettings {
             method: self.method,
             window: self.window as usize,
             interval_m,
@@ -123,7 +120,7 @@ impl TrajectoryNewtonSettings {
             },
             mean_square_max: square,
             seed: self.seed,
-        }))
+        })
     }
 }
 

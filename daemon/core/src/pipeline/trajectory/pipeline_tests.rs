@@ -6,10 +6,11 @@ use dynocar_shared::{Manoeuvre, ParameterSnapshot, PipelineKind, Reason, Rejecti
 
 use super::kalman::TrajectoryKalmanSettings;
 use super::motion::tests::sample;
+use super::newton::TrajectoryNewton;
 use super::newton_settings::{FitMethod, TrajectoryNewtonSettings};
 use super::test_runs::{METRO, metro, normal, random};
 use crate::force::ResolvedSample;
-use crate::pipeline::settings::EstimatorSettings;
+use crate::pipeline::EstimatorSettings;
 use crate::pipeline::{Estimator, Outcome};
 use crate::train::{BrakeGear, Davis, TrainModel};
 
@@ -192,7 +193,7 @@ fn the_papers_method_runs_in_the_window_and_is_reproducible() {
         mean_square_max: 1e-3,
         ..TrajectoryNewtonSettings::default()
     };
-    let run = || feed(&mut settings.build(&train()).unwrap(), &samples);
+    let run = || feed(&mut TrajectoryNewton::new(&settings, &train()).unwrap(), &samples);
     let snapshot = run();
     assert_eq!(snapshot, run());
     assert_finite(&snapshot);
@@ -209,7 +210,9 @@ fn a_setting_out_of_range_is_refused_by_name() {
     assert_eq!(refused(noise), "speed_noise_mps");
     let evidence = TrajectoryKalmanSettings { jump_evidence: f64::NAN, ..default };
     assert_eq!(refused(evidence), "jump_evidence");
-    let refused = |settings: TrajectoryNewtonSettings| settings.build(&train()).unwrap_err().key;
+    let refused = |settings: TrajectoryNewtonSettings| {
+        TrajectoryNewton::new(&settings, &train()).unwrap_err().key
+    };
     let default = TrajectoryNewtonSettings::default();
     assert_eq!(refused(TrajectoryNewtonSettings { window: 2, ..default }), "window");
     let crossed = TrajectoryNewtonSettings { high: Some([-1.0, 1.0, 1.0]), ..default };

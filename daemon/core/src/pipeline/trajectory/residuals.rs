@@ -11,9 +11,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::fit::Stretch;
 use super::long_run::LongRunVariance;
-use super::step::{Step, StepRule};
+use super::step::{Step, StepRule, Stretch};
 use crate::filter::levenberg_marquardt::{LeastSquares, Linearisation};
 use crate::filter::triangular::{TriangularAccumulator, TriangularSystem};
 use crate::train::Davis;
@@ -60,11 +59,6 @@ impl InitialSpeeds {
         self.current.extend(speeds_mps.map(|speed_mps| InitialSpeed { speed_mps, row: [0.0; 5] }));
         self.tried.clear();
         self.tried.extend_from_slice(&self.current);
-    }
-
-    /// The current initial speeds in m/s, stretch by stretch.
-    pub fn speeds_mps(&self) -> impl Iterator<Item = f64> + '_ {
-        self.current.iter().map(|initial| initial.speed_mps)
     }
 }
 

@@ -2,9 +2,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::fit::{FitError, FitSettings, SCALES, Stretch, TrajectoryFit, TrajectoryFitter};
+use super::fit_settings::{FitError, FitSettings, SCALES, TrajectoryFit};
 use super::ratio_posterior::{EXPONENTS, RatioPosterior, Tried};
-use super::residuals::{Pass, Residuals, Weighting};
+use super::residuals::{InitialSpeeds, Pass, Residuals, Weighting};
+use super::step::Stretch;
 use crate::filter::levenberg_marquardt::{LeastSquares, Solution, SolverSettings, minimise};
 use crate::filter::triangular::TriangularSystem;
 use crate::train::Davis;
@@ -41,27 +42,36 @@ impl Fitted {
     }
 }
 
+/// Memory that a fit keeps for the next.
+#[derive(Clone, Debug, Default)]
+pub struct Buffers {
+    /// Initial speeds, stretch by stretch.
+    pub initial: InitialSpeeds,
+    /// Residuals of a pass.
+    pub residuals: Vec<f64>,
+}
+
 /// A fit under way.
 pub struct Search<'a, 'b> {
     stretches: &'a [Stretch<'a>],
     settings: &'a FitSettings,
     prior: Option<TriangularSystem<3>>,
-    fitter: &'b mut TrajectoryFitter,
+    buffers: &'b mut Buffers,
     /// See [`FitSettings::decrease_tolerance`].
     pub decrease_tolerance: f64,
     iterations: u32,
 }
 
 impl<'a, 'b> Search<'a, 'b> {
-    /// A search that compares roughly, from the fitter's initial speeds.
+    /// A search that compares roughly, from the initial speeds in the buffers.
     pub fn new(
         stretches: &'a [Stretch<'a>],
         settings: &'a FitSettings,
         prior: Option<TriangularSystem<3>>,
-        fitter: &'b mut TrajectoryFitter,
+        buffers: &'b mut Buffers,
     ) -> Self {
         let decrease_tolerance = ROUGH_DECREASE;
-        Search { stretches, settings, prior, fitter, decrease_tolerance, iterations: 0 }
+        Search { stretches, settings, prior, buffers, decrease_tolerance, iterations: 0 }
     }
 
     /// Fits for one disturbance ratio; repeats until the noise that weighs the residuals is
@@ -105,7 +115,7 @@ impl<'a, 'b> Search<'a, 'b> {
             settings.rule,
             weighting,
             self.prior,
-            &mut self.fitter.initial,
+            &mut self.buffers.initial,
             start,
         );
         let solver = SolverSettings {
@@ -145,7 +155,7 @@ impl<'a, 'b> Search<'a, 'b> {
             outlier_threshold: f64::INFINITY,
         };
         let start = self.settings.bounds.clamp(point);
-        let TrajectoryFitter { initial, residuals: record } = &mut *self.fitter;
+        let Buffers { initial, residuals: record } = &mut *self.buffers;
         let mut residuals =
             Residuals::new(self.stretches, self.settings.rule, weighting, None, initial, start)
                 .recording(record);

@@ -42,6 +42,15 @@ pub struct Step {
     pub resistance_gain: f64,
 }
 
+/// An unbroken trajectory: steps and the speeds measured before, between and after them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stretch<'a> {
+    /// The steps.
+    pub steps: &'a [Step],
+    /// One speed in m/s more than steps.
+    pub speeds_mps: &'a [f64],
+}
+
 /// The speed after a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Advance {

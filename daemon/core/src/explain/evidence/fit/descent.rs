@@ -1,16 +1,70 @@
-//! One step of the fit.
+//! The search of the fit, and one step of it.
 
 use nalgebra::{Cholesky, DVector};
 
 use super::super::model::GrownModel;
+use super::super::noise::{Noise, RunScatter};
+use super::super::run_scatter::{ScatterFilter, remove};
+use super::super::whitener::Whitener;
 use super::linearised::Scratch;
 use super::robust::RunFilters;
-use super::{DECREASE_MIN, Fit, FitProblem};
+use super::{Fit, FitProblem};
+
+/// Gauss-Newton steps at most.
+const STEPS_MAX: usize = 8;
+/// A predicted decrease of the cost below this ends the search.
+const DECREASE_MIN: f64 = 0.02;
 
 impl FitProblem {
+    /// Fits a model from a start under a noise.
+    pub fn fit(&self, model: &GrownModel, start: Vec<f64>, noise: Noise) -> Fit {
+        let filters = self.filters(noise);
+        let mut scratch = Scratch::default();
+        let mut fit = self.linearised(model, start, noise, &filters, &mut scratch);
+        for _ in 0..STEPS_MAX {
+            let score = self.score(&fit);
+            let Some(next) = self.descend(&fit, &score, &filters, &mut scratch) else { break };
+            let gained = fit.cost - next.cost;
+            fit = next;
+            if gained < DECREASE_MIN {
+                break;
+            }
+        }
+        fit
+    }
+
+    /// Fits a model, the noise that its residuals show, and the model again.
+    ///
+    /// One turn only: under an undeclared force further turns would take ever more of it for noise.
+    pub fn fit_with_noise(&self, model: &GrownModel, start: Vec<f64>, noise: Noise) -> Fit {
+        let fit = self.fit(model, start, noise);
+        let scatter = RunScatter::updated(&fit.factors);
+        let residuals: Vec<Vec<f64>> = fit
+            .residuals
+            .iter()
+            .zip(&self.scatter_columns)
+            .zip(&fit.factors)
+            .map(|((residual, columns), (factors, _))| remove(columns, residual, factors))
+            .collect();
+        let noise = Noise::estimate(&self.runs, &residuals, Noise { scatter, ..noise });
+        self.fit(model, fit.theta, noise)
+    }
+
+    pub(super) fn filters(&self, noise: Noise) -> Vec<RunFilters> {
+        self.runs
+            .iter()
+            .zip(&self.scatter_columns)
+            .map(|(run, columns)| {
+                let whitener = Whitener::new(run, noise);
+                let scatter = ScatterFilter::new(columns, &whitener, noise.scatter);
+                RunFilters { whitener, scatter }
+            })
+            .collect()
+    }
+
     /// A step of Levenberg and Marquardt within the bounds, damped until the cost falls; `None`
     /// when no step promises or brings a decrease.
-    pub(super) fn descend(
+    fn descend(
         &self,
         fit: &Fit,
         score: &DVector<f64>,

@@ -8,21 +8,13 @@ mod robust;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 
 use super::model::GrownModel;
-use super::noise::{Noise, Whitener};
+use super::noise::Noise;
 use super::run_data::RunData;
-use super::run_scatter::{
-    Columns, RunScatter, ScatterFilter, WeightedFilter, remove, scatter_columns,
-};
+use super::run_scatter::{Columns, WeightedFilter, scatter_columns};
+use super::whitener::Whitener;
 use crate::train::Davis;
-use linearised::Scratch;
 pub use nearby::Nearby;
-use robust::RunFilters;
-pub(super) use robust::robust_loss;
 
-/// Gauss-Newton steps at most.
-const STEPS_MAX: usize = 8;
-/// A predicted decrease of the cost below this ends the search.
-const DECREASE_MIN: f64 = 0.02;
 /// Standard deviation of the declared a, b, c as share of their size: a weak prior that keeps
 /// directions apart which the runs do not excite.
 const PRIOR_SHARE: [f64; 3] = [0.4, 0.8, 0.4];
@@ -120,52 +112,6 @@ impl FitProblem {
     pub fn start(&self, effects: &[f64]) -> Vec<f64> {
         let Davis { a, b, c } = self.declared;
         [a, b, c].iter().chain(effects).copied().collect()
-    }
-
-    /// Fits a model from a start under a noise.
-    pub fn fit(&self, model: &GrownModel, start: Vec<f64>, noise: Noise) -> Fit {
-        let filters = self.filters(noise);
-        let mut scratch = Scratch::default();
-        let mut fit = self.linearised(model, start, noise, &filters, &mut scratch);
-        for _ in 0..STEPS_MAX {
-            let score = self.score(&fit);
-            let Some(next) = self.descend(&fit, &score, &filters, &mut scratch) else { break };
-            let gained = fit.cost - next.cost;
-            fit = next;
-            if gained < DECREASE_MIN {
-                break;
-            }
-        }
-        fit
-    }
-
-    /// Fits a model, the noise that its residuals show, and the model again.
-    ///
-    /// One turn only: under an undeclared force further turns would take ever more of it for noise.
-    pub fn fit_with_noise(&self, model: &GrownModel, start: Vec<f64>, noise: Noise) -> Fit {
-        let fit = self.fit(model, start, noise);
-        let scatter = RunScatter::updated(&fit.factors);
-        let residuals: Vec<Vec<f64>> = fit
-            .residuals
-            .iter()
-            .zip(&self.scatter_columns)
-            .zip(&fit.factors)
-            .map(|((residual, columns), (factors, _))| remove(columns, residual, factors))
-            .collect();
-        let noise = Noise::estimate(&self.runs, &residuals, Noise { scatter, ..noise });
-        self.fit(model, fit.theta, noise)
-    }
-
-    fn filters(&self, noise: Noise) -> Vec<RunFilters> {
-        self.runs
-            .iter()
-            .zip(&self.scatter_columns)
-            .map(|(run, columns)| {
-                let whitener = Whitener::new(run, noise);
-                let scatter = ScatterFilter::new(columns, &whitener, noise.scatter);
-                RunFilters { whitener, scatter }
-            })
-            .collect()
     }
 }
 

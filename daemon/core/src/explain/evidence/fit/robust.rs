@@ -1,26 +1,9 @@
-//! Huber's loss, and the innovations of a run under it.
+//! The innovations of a run under Huber's loss.
 
 use nalgebra::Vector3;
 
-use super::super::noise::Whitener;
 use super::super::run_scatter::{ScatterFilter, WeightedFilter};
-
-/// Innovations beyond this many standard deviations count linearly (Huber).
-const HUBER: f64 = 3.0;
-
-/// Huber's loss, twice: the square within the bound.
-#[inline]
-pub(in super::super) fn robust_loss(nu: f64) -> f64 {
-    let size = nu.abs();
-    if size <= HUBER { nu * nu } else { HUBER * (2.0 * size - HUBER) }
-}
-
-/// Weight of an innovation in a normal equation.
-#[inline]
-fn robust_weight(nu: f64) -> f64 {
-    let size = nu.abs();
-    if size <= HUBER { 1.0 } else { HUBER / size }
-}
+use super::super::whitener::{Whitener, robust_weight};
 
 /// The filters of one run under a noise.
 #[derive(Clone)]

@@ -4,9 +4,9 @@ use std::f64::consts::LOG2_E;
 
 use nalgebra::{SMatrix, SVector};
 
-use super::window::WindowModel;
+use super::window::{Statistics, WindowModel};
+use crate::filter::Gaussian;
 use crate::filter::adjoint::{ForwardStep, smooth_means};
-use crate::filter::kalman::GaussianState;
 use crate::filter::lanes;
 use crate::filter::particle::{ParticleModel, ParticleSmoother};
 use crate::filter::random::Random;
@@ -14,26 +14,6 @@ use crate::pipeline::braking::engine::EngineError;
 use crate::pipeline::braking::motion::State;
 
 const DISTANCE: usize = State::Distance as usize;
-
-/// What the M-step needs of the E-step: dQ/d share and -d²Q/d share² at the present value, the
-/// share being the coefficient over the demand. Only I_2, the moves, depends on it (Xie 2019,
-/// eq. 30-32: I_1 and I_3 vanish).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Statistics {
-    /// Gradient of Q.
-    pub gradient: f64,
-    /// Curvature of Q, never negative.
-    pub curvature: f64,
-}
-
-impl Statistics {
-    /// The step to the maximum: Q is quadratic in the share, so that the papers' gradient
-    /// search (Xie 2019, eq. 33; Jin 2020, eq. 29) ends after this one step. 0 where Q does not
-    /// depend on the coefficient.
-    pub fn newton_step(&self) -> f64 {
-        if self.curvature > 0.0 { self.gradient / self.curvature } else { 0.0 }
-    }
-}
 
 /// A way to take the expectation.
 pub trait Expectation: Send {
@@ -45,7 +25,7 @@ pub trait Expectation: Send {
     fn expect(&mut self, model: &WindowModel<'_>) -> Result<Statistics, EngineError>;
 
     /// The belief about the state of a step before its measurement, from the last E-step.
-    fn predicted(&self, step: usize) -> Option<GaussianState<2>>;
+    fn predicted(&self, step: usize) -> Option<Gaussian<2>>;
 }
 
 /// The papers' E-step: particle filter and marginal particle smoother.
@@ -72,7 +52,7 @@ impl ParticleExpectation {
 
 impl ParticleModel<2> for WindowModel<'_> {
     fn draw_initial(&self, random: &mut Random) -> [f64; 2] {
-        let GaussianState { mean, covariance } = &self.window.first;
+        let Gaussian { mean, covariance } = &self.window.first;
         let (x, y) = (random.normal(), random.normal());
         // Cholesky factor of the 2 by 2 covariance.
         let distance_std = covariance[(0, 0)].max(0.0).sqrt();
@@ -139,9 +119,9 @@ impl Expectation for ParticleExpectation {
         Ok(statistics)
     }
 
-    fn predicted(&self, step: usize) -> Option<GaussianState<2>> {
+    fn predicted(&self, step: usize) -> Option<Gaussian<2>> {
         let (mean, covariance) = self.smoother.predicted_moments(step)?;
-        Some(GaussianState {
+        Some(Gaussian {
             mean: SVector::from(mean),
             covariance: SMatrix::from_fn(|i, j| covariance[i][j]),
         })
@@ -184,13 +164,12 @@ impl KalmanExpectation {
                 state.predict(SVector::from(mean), &jacobian, &added);
             }
             let predicted = state;
-            let update = state.innovation(
-                DISTANCE,
-                entry.observed.distance_m,
-                model.noise.measured_distance_m2,
-            )?;
-            state.apply(&update);
-            self.forward.push(ForwardStep { predicted, filtered: state, update, jacobian });
+            let variance = model.noise.measured_distance_m2;
+            let innovation = state.innovation(DISTANCE, entry.observed.distance_m, variance)?;
+            let gain = state.take(DISTANCE, &innovation, variance);
+            let (component, filtered) = (DISTANCE, state);
+            let step = ForwardStep { predicted, filtered, component, innovation, gain, jacobian };
+            self.forward.push(step);
         }
         Ok(())
     }
@@ -211,7 +190,7 @@ impl Expectation for KalmanExpectation {
         Ok(statistics)
     }
 
-    fn predicted(&self, step: usize) -> Option<GaussianState<2>> {
+    fn predicted(&self, step: usize) -> Option<Gaussian<2>> {
         self.forward.get(step).map(|forward| forward.predicted)
     }
 }

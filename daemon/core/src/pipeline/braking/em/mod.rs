@@ -14,10 +14,12 @@
 //!   filter's prediction from the window before.
 
 mod expectation;
+mod sliding;
 mod window;
 
-pub use expectation::{Expectation, KalmanExpectation, ParticleExpectation, Statistics};
-pub use window::{EmModel, EmWindow, Window, WindowModel};
+pub use expectation::{Expectation, KalmanExpectation, ParticleExpectation};
+pub use sliding::{EmModel, EmWindow};
+pub use window::{Statistics, Window, WindowModel};
 
 #[cfg(test)]
 mod tests;

@@ -3,7 +3,7 @@ use nalgebra::SVector;
 
 use super::window::{Entry, MoveNoise};
 use super::*;
-use crate::filter::kalman::GaussianState;
+use crate::filter::Gaussian;
 use crate::filter::random::Random;
 use crate::pipeline::braking::engine::{Engine, Observation, Step};
 use crate::pipeline::braking::law::Law;
@@ -71,7 +71,7 @@ fn window(seed: u64) -> Window {
         .into_iter()
         .map(|observed| Entry { inputs: inputs(), observed, noise })
         .collect();
-    let first = GaussianState::independent(
+    let first = Gaussian::independent(
         SVector::from([entries[0].observed.distance_m, FIRST_MPS]),
         SVector::from([0.1, 0.1]),
     );

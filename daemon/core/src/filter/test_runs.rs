@@ -3,14 +3,14 @@
 use nalgebra::{DMatrix, DVector, Matrix2, SMatrix, SVector, Vector2};
 
 use super::adjoint::ForwardStep;
-use super::kalman::GaussianState;
+use super::gaussian::Gaussian;
 use super::random::Random;
 
 /// A moving state of two components, of which the first is measured.
 pub struct MovingState {
     pub jacobian: Matrix2<f64>,
     pub noise: Matrix2<f64>,
-    pub prior: GaussianState<2>,
+    pub prior: Gaussian<2>,
     pub measured: Vec<f64>,
     pub variance: f64,
 }
@@ -21,10 +21,7 @@ impl MovingState {
         MovingState {
             jacobian: Matrix2::new(1.0, 0.5, -0.1, 0.9),
             noise: Matrix2::new(0.05, 0.01, 0.01, 0.03),
-            prior: GaussianState::independent(
-                SVector::from([1.0, -1.0]),
-                SVector::from([0.7, 1.5]),
-            ),
+            prior: Gaussian::independent(SVector::from([1.0, -1.0]), SVector::from([0.7, 1.5])),
             measured: (0..steps).map(|_| random.normal()).collect(),
             variance: 0.2,
         }
@@ -44,9 +41,11 @@ impl MovingState {
                 state.predict(jacobian * state.mean, &jacobian, &self.noise);
             }
             let predicted = state;
-            let update = state.innovation(0, measured, self.variance).unwrap();
-            state.apply(&update);
-            let taken = ForwardStep { predicted, filtered: state, update, jacobian };
+            let innovation = state.innovation(0, measured, self.variance).unwrap();
+            let gain = state.take(0, &innovation, self.variance);
+            let filtered = state;
+            let taken =
+                ForwardStep { predicted, filtered, component: 0, innovation, gain, jacobian };
             seen(&taken, (step > 0).then_some(&jacobian));
             forward.push(taken);
         }

@@ -60,19 +60,12 @@ impl Scenario {
     /// The train as declared: with another resistance than the true one.
     pub fn train(&self) -> Arc<TrainModel> {
         let Davis { a, b, c } = self.davis;
+        let resistance = Davis { a: 1.3 * a, b: 0.5 * b, c: 1.1 * c };
         Arc::new(TrainModel {
-            name: "test".into(),
-            mass_kg: 200_000.0,
             length_m: 100.0,
-            cars: 4,
             rotating_mass_factor: self.rotating_mass_factor,
-            resistance: Davis { a: 1.3 * a, b: 0.5 * b, c: 1.1 * c },
             curve_constant_n_per_kn_m: 600.0,
-            tunnel_constant_n_per_kn_m: 0.0,
-            traction: None,
-            brake: None,
-            brake_gear: Default::default(),
-            corrections: Default::default(),
+            ..TrainModel::bare("test", 200_000.0, resistance)
         })
     }
 

@@ -1,8 +1,8 @@
 //! The declared train under a driver: the track is looked up at the simulated position.
 
-use super::motion::{Motion, advance};
-use crate::track::Track;
-use crate::train::TrainModel;
+use dynocar_core::simulate::motion::{Motion, advance};
+use dynocar_core::track::Track;
+use dynocar_core::train::TrainModel;
 
 /// Forces that a driver commands.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -100,7 +100,7 @@ pub fn drive(
         if time_s >= time_max_s {
             break;
         }
-        motion = advance(motion, step_s, |at| line.acceleration_mps2(at, controls));
+        motion = advance(motion, step_s, |_, at| line.acceleration_mps2(at, controls));
     }
     points
 }
@@ -108,23 +108,17 @@ pub fn drive(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::track::{Curve, Tunnel};
-    use crate::train::{BrakeGear, Davis};
+    use dynocar_core::track::{Curve, Tunnel};
+    use dynocar_core::train::Davis;
 
     fn train() -> TrainModel {
+        let resistance = Davis { a: 1.6, b: 0.02, c: 0.003 };
         TrainModel {
-            name: "test".into(),
-            mass_kg: 200e3,
             length_m: 150.0,
-            cars: 6,
             rotating_mass_factor: 0.08,
-            resistance: Davis { a: 1.6, b: 0.02, c: 0.003 },
             curve_constant_n_per_kn_m: 600.0,
             tunnel_constant_n_per_kn_m: 0.00013,
-            traction: None,
-            brake: None,
-            brake_gear: BrakeGear::default(),
-            corrections: Default::default(),
+            ..TrainModel::bare("test", 200e3, resistance)
         }
     }
 

@@ -1,0 +1,117 @@
+//! Errors of a method over the seeds, beside what the method and the bound say of them.
+
+use dynocar_core::train::Davis;
+use nalgebra::{Matrix3, Vector3};
+
+use super::row::Row;
+use super::statistics::{mean, root_mean_square};
+
+/// Standard deviations to either side of an estimate that hold the truth with 95 %.
+const INTERVAL: f64 = 1.96;
+
+/// Errors, coverage and consistency of one method.
+#[derive(Clone, Debug, Default)]
+pub struct Score {
+    /// Estimate minus truth.
+    pub errors: Vec<f64>,
+    covered: Vec<f64>,
+    /// Normalised estimation error squared, per degree of freedom.
+    nees: Vec<f64>,
+    freedom: f64,
+    /// Least standard deviation of each error, where it was told.
+    bounds: Vec<f64>,
+}
+
+impl Score {
+    /// Takes in a number with its claimed standard deviation.
+    pub fn take(&mut self, error: f64, std: f64) {
+        self.errors.push(error);
+        self.cover(error, std);
+        self.nees.push((error / std).powi(2));
+        self.freedom += 1.0;
+    }
+
+    /// Takes in a resistance with the claimed covariance of a, b and c: its errors at some speeds
+    /// in m/s, and that of the coefficients together.
+    pub fn take_resistance(
+        &mut self,
+        (found, covariance): (&Davis, &Matrix3<f64>),
+        truth: &Davis,
+        speeds_mps: &[f64],
+    ) {
+        let errors = w0_errors(found, truth, speeds_mps);
+        for (error, &speed_mps) in errors.iter().zip(speeds_mps) {
+            self.cover(*error, w0_std(covariance, speed_mps));
+        }
+        self.errors.extend(errors);
+        let error = Vector3::new(found.a - truth.a, found.b - truth.b, found.c - truth.c);
+        if let Some(factor) = covariance.cholesky() {
+            self.nees.push(error.dot(&factor.solve(&error)) / 3.0);
+            self.freedom += 3.0;
+        }
+    }
+
+    /// Takes in the bound of the covariance of a, b and c at some speeds in m/s.
+    pub fn take_bound(&mut self, covariance: &Matrix3<f64>, speeds_mps: &[f64]) {
+        self.bounds.extend(speeds_mps.iter().map(|&speed_mps| w0_std(covariance, speed_mps)));
+    }
+
+    fn cover(&mut self, error: f64, std: f64) {
+        self.covered.push(f64::from(u8::from(error.abs() <= INTERVAL * std)));
+    }
+
+    /// A row with our figures: those of this score.
+    pub fn row(&self, row: Row) -> Row {
+        Row {
+            ours: Some(root_mean_square(&self.errors)),
+            bound: (!self.bounds.is_empty()).then(|| root_mean_square(&self.bounds)),
+            coverage: Some(mean(&self.covered)),
+            nees: Some(mean(&self.nees)),
+            nees_freedom: Some(self.freedom),
+            ..row
+        }
+    }
+}
+
+/// Errors of w0 in N/kN at some speeds in m/s.
+pub fn w0_errors(found: &Davis, truth: &Davis, speeds_mps: &[f64]) -> Vec<f64> {
+    speeds_mps.iter().map(|&speed| found.w0_n_per_kn(speed) - truth.w0_n_per_kn(speed)).collect()
+}
+
+/// Standard deviation of w0 in N/kN at a speed in m/s.
+pub fn w0_std(covariance: &Matrix3<f64>, speed_mps: f64) -> f64 {
+    let powers = Vector3::new(1.0, speed_mps, speed_mps * speed_mps);
+    powers.dot(&(covariance * powers)).max(0.0).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::papers::seeds::Seeds;
+
+    #[test]
+    fn an_error_of_one_standard_deviation_is_covered_and_counts_one() {
+        let mut score = Score::default();
+        score.take(0.5, 0.5);
+        score.take(-3.0, 1.0);
+        let row = score.row(Row::new("a", "b", "c", "1", Seeds::from_zero(2)));
+        assert_eq!((row.coverage, row.nees, row.nees_freedom), (Some(0.5), Some(5.0), Some(2.0)));
+        assert_eq!((row.ours, row.bound), (Some(4.625_f64.sqrt()), None));
+    }
+
+    #[test]
+    fn a_resistance_is_judged_at_its_speeds_and_as_a_whole() {
+        let truth = Davis { a: 1.0, b: 0.0, c: 0.0 };
+        let found = Davis { a: 1.3, ..truth };
+        let covariance = Matrix3::from_diagonal(&Vector3::new(0.01, 1e-4, 1e-8));
+        let mut score = Score::default();
+        score.take_resistance((&found, &covariance), &truth, &[0.0, 100.0]);
+        score.take_bound(&covariance, &[0.0]);
+        let row = score.row(Row::new("a", "b", "c", "N/kN", Seeds::from_zero(1)));
+        assert!(
+            (row.ours.unwrap() - 0.3).abs() < 1e-12 && (row.bound.unwrap() - 0.1).abs() < 1e-12
+        );
+        assert!((row.nees.unwrap() - 3.0).abs() < 1e-9);
+        assert_eq!((row.coverage, row.nees_freedom), (Some(0.5), Some(3.0)));
+    }
+}

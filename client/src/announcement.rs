@@ -1,0 +1,121 @@
+//! What a side of the channel says of itself.
+
+use std::fmt;
+
+use dynocar_shared::services::TRANSPORT_VERSION;
+use dynocar_shared::{ParameterSnapshot, SCHEMA_MAJOR, TrainSample};
+
+/// A side of the channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Role {
+    /// Serves the train: reads samples, writes snapshots.
+    Daemon,
+    /// Drives the train: writes samples, reads snapshots.
+    Controller,
+}
+
+impl Role {
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Role::Daemon => "daemon",
+            Role::Controller => "controller",
+        }
+    }
+}
+
+impl fmt::Display for Role {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// What a peer says of itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Announcement {
+    /// Its side of the channel.
+    pub role: Role,
+    /// Its process.
+    pub process_id: u32,
+    /// Release of Dynocar it was built from.
+    pub version: String,
+    /// Schema major of its channels.
+    pub schema: u32,
+    /// Release of iceoryx2 it was built with.
+    pub transport: String,
+    /// Layout hash of its [`TrainSample`].
+    pub sample_layout: u64,
+    /// Layout hash of its [`ParameterSnapshot`].
+    pub snapshot_layout: u64,
+}
+
+impl Announcement {
+    /// What this process is.
+    pub fn of_this_process(role: Role) -> Self {
+        Announcement {
+            role,
+            process_id: std::process::id(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            schema: SCHEMA_MAJOR,
+            transport: TRANSPORT_VERSION.to_owned(),
+            sample_layout: TrainSample::LAYOUT_HASH,
+            snapshot_layout: ParameterSnapshot::LAYOUT_HASH,
+        }
+    }
+
+    /// True when both sides map the same bytes.
+    pub fn is_compatible_with(&self, other: &Announcement) -> bool {
+        self.schema == other.schema
+            && self.transport == other.transport
+            && self.sample_layout == other.sample_layout
+            && self.snapshot_layout == other.snapshot_layout
+    }
+
+    pub(crate) fn to_text(&self) -> String {
+        format!(
+            "role={}\nprocess_id={}\nversion={}\nschema={}\ntransport={}\nsample_layout={:016x}\n\
+             snapshot_layout={:016x}\n",
+            self.role,
+            self.process_id,
+            self.version,
+            self.schema,
+            self.transport,
+            self.sample_layout,
+            self.snapshot_layout
+        )
+    }
+
+    /// Reads what [`Announcement::to_text`] wrote; keys that a newer release adds are passed over.
+    pub(crate) fn from_text(role: Role, text: &str) -> Option<Self> {
+        let value = |key: &str| {
+            text.lines().find_map(|line| line.split_once('=').filter(|pair| pair.0 == key))
+        };
+        let value = |key| value(key).map(|pair| pair.1);
+        let hash = |key| u64::from_str_radix(value(key)?, 16).ok();
+        Some(Announcement {
+            role,
+            process_id: value("process_id")?.parse().ok()?,
+            version: value("version")?.to_owned(),
+            schema: value("schema")?.parse().ok()?,
+            transport: value("transport")?.to_owned(),
+            sample_layout: hash("sample_layout")?,
+            snapshot_layout: hash("snapshot_layout")?,
+        })
+    }
+}
+
+impl fmt::Display for Announcement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} {} (process {}, schema {}, sample layout {:016x}, snapshot layout {:016x}, \
+             iceoryx2 {})",
+            self.role,
+            self.version,
+            self.process_id,
+            self.schema,
+            self.sample_layout,
+            self.snapshot_layout,
+            self.transport
+        )
+    }
+}

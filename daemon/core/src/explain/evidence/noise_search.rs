@@ -1,0 +1,79 @@
+//! The likeliest noise of what a model leaves.
+
+use super::noise::Noise;
+use super::run_data::RunData;
+use super::whitener::Whitener;
+
+impl Noise {
+    /// The noise under which the differences of the fit runs from a model are likeliest, robust
+    /// to outliers. `residuals` holds one vector of bin differences per run.
+    pub fn estimate(runs: &[RunData], residuals: &[Vec<f64>], start: Noise) -> Noise {
+        let mut whitened = Vec::new();
+        let mut cost = |logs: [f64; 4]| -> f64 {
+            let noise = Noise::from_logs(logs, start.scatter);
+            let outside: f64 = logs
+                .iter()
+                .zip(noise.to_logs())
+                .map(|(log, kept)| (log - kept) * (log - kept))
+                .sum();
+            let mut total = 10.0 * outside;
+            for (run, residual) in runs.iter().zip(residuals) {
+                let whitener = Whitener::new(run, noise);
+                whitener.whiten(residual, &mut whitened);
+                total += whitener.minus_two_log_likelihood(&whitened);
+            }
+            total
+        };
+        Noise::from_logs(nelder_mead(start.to_logs(), &mut cost), start.scatter)
+    }
+}
+
+/// Nelder and Mead's simplex search in four dimensions, bounded work.
+fn nelder_mead(start: [f64; 4], cost: &mut impl FnMut([f64; 4]) -> f64) -> [f64; 4] {
+    const STEPS: usize = 90;
+    let mut simplex: Vec<([f64; 4], f64)> = (0..5)
+        .map(|vertex| {
+            let mut point = start;
+            if vertex > 0 {
+                point[vertex - 1] += 1.2;
+            }
+            (point, cost(point))
+        })
+        .collect();
+    let along = |centre: &[f64; 4], worst: &[f64; 4], by: f64| {
+        std::array::from_fn(|i| centre[i] + by * (worst[i] - centre[i]))
+    };
+    for _ in 0..STEPS {
+        simplex.sort_by(|a, b| a.1.total_cmp(&b.1));
+        if simplex[4].1 - simplex[0].1 < 0.05 {
+            break;
+        }
+        let centre: [f64; 4] =
+            std::array::from_fn(|i| simplex[..4].iter().map(|v| v.0[i]).sum::<f64>() / 4.0);
+        let worst = simplex[4];
+        let mut attempt = |by: f64| {
+            let point = along(&centre, &worst.0, by);
+            (point, cost(point))
+        };
+        let reflected = attempt(-1.0);
+        if reflected.1 < simplex[0].1 {
+            let expanded = attempt(-2.0);
+            simplex[4] = if expanded.1 < reflected.1 { expanded } else { reflected };
+        } else if reflected.1 < simplex[3].1 {
+            simplex[4] = reflected;
+        } else {
+            let contracted = attempt(0.5);
+            if contracted.1 < worst.1 {
+                simplex[4] = contracted;
+            } else {
+                let best = simplex[0].0;
+                for vertex in &mut simplex[1..] {
+                    let point = along(&best, &vertex.0, 0.5);
+                    *vertex = (point, cost(point));
+                }
+            }
+        }
+    }
+    simplex.sort_by(|a, b| a.1.total_cmp(&b.1));
+    simplex[0].0
+}

@@ -1,0 +1,233 @@
+//! Imports between the files of a package run one way.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// A module by its path from the crate's root.
+type Module = Vec<String>;
+
+/// Circles that are known to stand; a new one fails the test, and so does one that is gone.
+const STANDING: &[(&str, &[&str])] = &[
+    ("daemon/core/src", &["force::corrections", "force::delay", "force::resolver"]),
+    (
+        "daemon/core/src",
+        &[
+            "explain::effects",
+            "explain::evidence::fit",
+            "explain::evidence::model",
+            "explain::scan",
+        ],
+    ),
+    (
+        "daemon/core/src",
+        &["explain::effects::mass_change", "explain::effects::mass_change::search"],
+    ),
+];
+
+/// The source without tests and comments.
+fn product(text: &str) -> String {
+    let mut kept = String::new();
+    let mut lines = text.lines();
+    while let Some(line) = lines.next() {
+        if line.trim() == "#[cfg(test)]" {
+            // The item: to its semicolon, or to the brace that closes it at the same indentation.
+            let indent = line.len() - line.trim_start().len();
+            let close = format!("{}}}", " ".repeat(indent));
+            let head = lines.next().unwrap_or_default();
+            if !head.trim_end().ends_with(';') {
+                lines.by_ref().find(|line| *line == close);
+            }
+        } else if !line.trim_start().starts_with("//") {
+            kept += line;
+            kept.push('\n');
+        }
+    }
+    kept
+}
+
+/// The paths of a `use` tree: `a::{b, c::d}` is `a::b` and `a::c::d`.
+fn paths(tree: &str) -> Vec<String> {
+    let tree = tree.trim();
+    let Some((head, rest)) = tree.split_once('{') else {
+        return vec![tree.split(" as ").next().unwrap_or(tree).to_owned()];
+    };
+    let body = rest.rsplit_once('}').map_or(rest, |(body, _)| body);
+    let (mut parts, mut depth) = (vec![String::new()], 0);
+    for letter in body.chars() {
+        depth += i32::from(letter == '{') - i32::from(letter == '}');
+        match letter {
+            ',' if depth == 0 => parts.push(String::new()),
+            _ => parts.last_mut().expect("one part at least").push(letter),
+        }
+    }
+    let parts = parts.iter().filter(|part| !part.trim().is_empty());
+    parts.flat_map(|part| paths(part)).map(|path| format!("{}{path}", head.trim())).collect()
+}
+
+#[derive(Default)]
+struct Package {
+    /// Paths that each module takes names by.
+    imports: BTreeMap<Module, Vec<Vec<String>>>,
+    /// Names that a module hands on, with the path it has them by.
+    handed_on: BTreeMap<(Module, String), Vec<String>>,
+}
+
+impl Package {
+    fn read(root: &Path) -> Self {
+        let mut package = Package::default();
+        package.read_folder(root, &mut Vec::new());
+        package
+    }
+
+    fn read_folder(&mut self, folder: &Path, module: &mut Module) {
+        for entry in std::fs::read_dir(folder).expect("a source folder") {
+            let path = entry.expect("an entry").path();
+            let name = path.file_stem().expect("a name").to_string_lossy().into_owned();
+            if path.is_dir() {
+                module.push(name);
+                self.read_folder(&path, module);
+                module.pop();
+            } else if !(name.ends_with("tests") || name == "test_runs" || name == "main") {
+                let mut of_file = module.clone();
+                if name != "mod" && name != "lib" {
+                    of_file.push(name);
+                }
+                self.read_file(&path, of_file);
+            }
+        }
+    }
+
+    fn read_file(&mut self, path: &Path, module: Module) {
+        let text = product(&std::fs::read_to_string(path).expect("a source file"));
+        let segments = |path: &str| path.split("::").map(str::to_owned).collect::<Vec<_>>();
+        let mut imports = Vec::new();
+        for statement in text.split(';') {
+            let Some((before, tree)) = statement.rsplit_once("use ") else { continue };
+            let before = before.rsplit('\n').next().unwrap_or_default().trim();
+            for path in paths(tree).iter().map(|path| segments(path)) {
+                if before.starts_with("pub") {
+                    let name = path.last().cloned().unwrap_or_default();
+                    self.handed_on.insert((module.clone(), name), path);
+                } else if before.is_empty() {
+                    imports.push(path);
+                }
+            }
+        }
+        for word in text.split(|letter: char| !(letter.is_alphanumeric() || "_:".contains(letter)))
+        {
+            // What ends in :: is the head of a tree, which was read above.
+            let is_path = word.starts_with("crate::") || word.starts_with("super::");
+            if is_path && !word.ends_with("::") {
+                imports.push(segments(word));
+            }
+        }
+        self.imports.insert(module, imports);
+    }
+
+    /// The module that a path leads to from another, through the names that are handed on.
+    fn resolve(&self, from: &Module, path: &[String], depth: usize) -> Option<Module> {
+        let mut module = from.clone();
+        let mut rest = path;
+        let is_module = |module: &Module, next: &String| {
+            self.imports.contains_key(&[module.as_slice(), std::slice::from_ref(next)].concat())
+        };
+        match rest.first().map(String::as_str) {
+            Some("crate") => (module, rest) = (Vec::new(), &rest[1..]),
+            Some("self") => rest = &rest[1..],
+            Some("super") => {
+                while rest.first().is_some_and(|segment| segment == "super") {
+                    module.pop();
+                    rest = &rest[1..];
+                }
+            }
+            _ if rest.first().is_some_and(|next| is_module(&module, next)) => {}
+            _ => return None,
+        }
+        while let Some(next) = rest.first().filter(|next| is_module(&module, next)) {
+            module.push(next.clone());
+            rest = &rest[1..];
+        }
+        let name = rest.first().map(|name| (module.clone(), name.clone()));
+        match name.and_then(|name| self.handed_on.get(&name)) {
+            Some(path) if depth < 5 => self.resolve(&module, path, depth + 1).or(Some(module)),
+            _ => Some(module),
+        }
+    }
+
+    /// Modules that reach each other, by groups.
+    fn circles(&self) -> Vec<BTreeSet<String>> {
+        let edges: BTreeMap<&Module, BTreeSet<Module>> = self
+            .imports
+            .iter()
+            .map(|(from, paths)| {
+                let to = paths.iter().filter_map(|path| self.resolve(from, path, 0));
+                (from, to.filter(|to| to != from).collect())
+            })
+            .collect();
+        let reached: BTreeMap<&Module, BTreeSet<&Module>> = edges
+            .keys()
+            .map(|&from| {
+                let (mut seen, mut open) = (BTreeSet::new(), vec![from]);
+                while let Some(module) = open.pop() {
+                    for to in edges.get(module).into_iter().flatten() {
+                        if seen.insert(to) {
+                            open.push(to);
+                        }
+                    }
+                }
+                (from, seen)
+            })
+            .collect();
+        let mut circles: Vec<BTreeSet<String>> = reached
+            .iter()
+            .filter(|(from, seen)| seen.contains(*from))
+            .map(|(from, seen)| {
+                let back = seen.iter().filter(|to| reached[**to].contains(*from));
+                back.map(|module| module.join("::")).collect()
+            })
+            .collect();
+        circles.sort();
+        circles.dedup();
+        circles
+    }
+}
+
+#[test]
+fn imports_between_files_run_one_way() {
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    for root in ["shared/src", "client/src", "daemon/core/src", "daemon/src", "bench/src"] {
+        let package = Package::read(&workspace.join(root));
+        assert!(package.imports.len() > 5, "the sources of {root} were found");
+        let known: Vec<&[&str]> =
+            STANDING.iter().filter(|(of, _)| *of == root).map(|(_, circle)| *circle).collect();
+        let is_known = |circle: &BTreeSet<String>, known: &[&str]| {
+            known.iter().all(|module| circle.contains(*module))
+        };
+        let circles = package.circles();
+        for circle in &circles {
+            let is_standing = known.iter().any(|known| is_known(circle, known));
+            assert!(is_standing, "{root}: a circle of imports: {circle:?}");
+        }
+        for known in known {
+            let stands = circles.iter().any(|circle| is_known(circle, known));
+            assert!(stands, "{root}: {known:?} is no circle any more; strike it off the list");
+        }
+    }
+}
+
+#[test]
+fn a_circle_is_found_through_names_that_are_handed_on() {
+    let module = |path: &str| path.split("::").map(str::to_owned).collect::<Module>();
+    let mut package = Package::default();
+    package.imports.insert(Vec::new(), vec![]);
+    package
+        .imports
+        .insert(module("a"), paths("super::{b::Second, c}").iter().map(|p| module(p)).collect());
+    package.imports.insert(module("b"), vec![]);
+    package.imports.insert(module("b::deep"), vec![module("crate::a::First")]);
+    package.imports.insert(module("c"), vec![]);
+    assert!(package.circles().is_empty());
+    package.handed_on.insert((module("b"), "Second".into()), module("deep::Second"));
+    let circle: BTreeSet<String> = ["a".to_owned(), "b::deep".to_owned()].into();
+    assert_eq!(package.circles(), [circle]);
+}
