@@ -43,7 +43,7 @@ impl SampleForces {
 
     /// Acceleration in m/s² that 1 N/kN of resistance takes away.
     #[inline]
-    pub(super) fn per_unit_resistance_mps2(&self) -> f64 {
+    fn per_unit_resistance_mps2(&self) -> f64 {
         TrainModel::weight_kn(1.0) / (1.0 + self.rotating_mass_factor)
     }
 
