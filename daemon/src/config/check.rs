@@ -9,6 +9,7 @@ use dynocar_core::pipeline::EstimatorSettings;
 use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::{PipelineKind, TrainId};
 
+use super::checker::Checker;
 use super::raw::{
     RawConfig, RawMetrics, RawPipeline, RawQuantities, RawState, RawThread, RawTrain,
 };
@@ -20,34 +21,6 @@ use crate::dataset::{load_track, load_train};
 
 /// The most pipeline threads that one sample channel serves.
 const THREADS_MAX: usize = 10;
-
-/// Names the configuration's file in every refusal.
-pub(super) struct Checker<'a> {
-    path: &'a Path,
-}
-
-impl Checker<'_> {
-    pub(super) fn refuse<T>(
-        &self,
-        key: impl Into<String>,
-        value: impl ToString,
-        allowed: impl Into<String>,
-    ) -> Result<T, ConfigError> {
-        Err(ConfigError::OutOfRange {
-            path: self.path.into(),
-            key: key.into(),
-            value: value.to_string(),
-            allowed: allowed.into(),
-        })
-    }
-
-    fn range(&self, key: &str, value: u64, low: u64, high: u64) -> Result<u64, ConfigError> {
-        if (low..=high).contains(&value) {
-            return Ok(value);
-        }
-        self.refuse(key, value, format!("a whole number from {low} to {high}"))
-    }
-}
 
 /// Checks a configuration's text; `path` is the file it came from.
 pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {

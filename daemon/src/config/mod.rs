@@ -4,6 +4,7 @@
 //! File names inside the configuration are relative to the configuration file.
 
 mod check;
+mod checker;
 mod pace;
 mod quantities;
 mod raw;

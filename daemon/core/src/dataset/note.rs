@@ -3,13 +3,11 @@
 use serde::Serialize;
 
 use super::Dataset;
-use super::manifest::Manifest;
-use super::quantity::Quantity;
+use super::finding_unit::unit_of;
 use super::remark::Remark;
 use super::run::Run;
-use super::units::Unit;
 use crate::plausibility::declared::misdeclared;
-use crate::plausibility::{Finding, Severity, Slip};
+use crate::plausibility::{Finding, Severity};
 use crate::track::Track;
 use crate::train::TrainModel;
 
@@ -93,29 +91,4 @@ pub fn notes<'r>(
     }
     notes.sort_by_key(|note| std::cmp::Reverse(note.severity));
     notes
-}
-
-/// The unit in which the manifest reads the quantity of a finding.
-pub(super) fn read_as(manifest: &Manifest, finding: Finding) -> &'static str {
-    use Quantity::*;
-    let (quantities, otherwise): (&[Quantity], _) = match finding.slip {
-        Slip::TimeScale => (&[Time], "s"),
-        Slip::SpeedScale => (&[Speed], "m/s"),
-        Slip::PositionScale | Slip::DirectionReversed => (&[Position], "m"),
-        Slip::MassScale => (&[TrainMass], "t"),
-        Slip::BrakeScale => (&[BrakeForce, ControlForce], "kN"),
-        Slip::ForcesSwapped | Slip::ForcesScale | Slip::TractionScale => {
-            (&[TractionForce, BrakeForce, ControlForce], "kN")
-        }
-        Slip::GradientSign | Slip::GradientScale => (&[Gradient], "permille"),
-        Slip::PressureScale => (&[BrakeCylinderPressure], "Pa"),
-    };
-    let mapped = quantities.iter().find_map(|&quantity| manifest.mapping(quantity));
-    mapped.map_or(otherwise, |mapping| mapping.unit.name())
-}
-
-/// The unit of a finding's quantity with this name.
-pub(super) fn unit_of(finding: Finding, name: &str) -> Unit {
-    let dimension = finding.slip.dimension();
-    Unit::find(dimension, name).unwrap_or_else(|| Unit::base_of(dimension))
 }

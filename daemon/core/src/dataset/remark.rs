@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
+use super::finding_unit::{read_as, unit_of};
 use super::forces::{Force, ForceSource};
 use super::motion::PositionSource;
-use super::note::{read_as, unit_of};
 use super::quality::RunQuality;
 use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};

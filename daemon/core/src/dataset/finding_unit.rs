@@ -1,0 +1,31 @@
+//! The unit that a finding is told in.
+
+use super::manifest::Manifest;
+use super::quantity::Quantity;
+use super::units::Unit;
+use crate::plausibility::{Finding, Slip};
+
+/// The unit in which the manifest reads the quantity of a finding.
+pub(super) fn read_as(manifest: &Manifest, finding: Finding) -> &'static str {
+    use Quantity::*;
+    let (quantities, otherwise): (&[Quantity], _) = match finding.slip {
+        Slip::TimeScale => (&[Time], "s"),
+        Slip::SpeedScale => (&[Speed], "m/s"),
+        Slip::PositionScale | Slip::DirectionReversed => (&[Position], "m"),
+        Slip::MassScale => (&[TrainMass], "t"),
+        Slip::BrakeScale => (&[BrakeForce, ControlForce], "kN"),
+        Slip::ForcesSwapped | Slip::ForcesScale | Slip::TractionScale => {
+            (&[TractionForce, BrakeForce, ControlForce], "kN")
+        }
+        Slip::GradientSign | Slip::GradientScale => (&[Gradient], "permille"),
+        Slip::PressureScale => (&[BrakeCylinderPressure], "Pa"),
+    };
+    let mapped = quantities.iter().find_map(|&quantity| manifest.mapping(quantity));
+    mapped.map_or(otherwise, |mapping| mapping.unit.name())
+}
+
+/// The unit of a finding's quantity with this name.
+pub(super) fn unit_of(finding: Finding, name: &str) -> Unit {
+    let dimension = finding.slip.dimension();
+    Unit::find(dimension, name).unwrap_or_else(|| Unit::base_of(dimension))
+}
