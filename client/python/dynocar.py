@@ -235,6 +235,7 @@ class Effect(_Vocabulary):
     LOCAL_RESISTANCE = 13
     LOW_ADHESION = 14
     UNKNOWN = 15
+    GRADIENT_ERROR = 16
 
 
 class Has(IntFlag):

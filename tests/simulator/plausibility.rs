@@ -138,13 +138,13 @@ fn output(folder: &Path, command: &[&str]) -> String {
     String::from_utf8(run.stdout).unwrap() + &String::from_utf8(run.stderr).unwrap()
 }
 
-/// The answer of a command; null when there is none, as where no sample is usable.
+/// The answer of a command, or its error, as where no sample is usable.
 fn json(folder: &Path, command: &[&str]) -> Value {
     let file = folder.join(format!("{}.json", command[0]));
     let mut with_file = command.to_vec();
     with_file.extend(["--json", file.to_str().unwrap()]);
     output(folder, &with_file);
-    std::fs::read(file).map_or(Value::Null, |bytes| serde_json::from_slice(&bytes).unwrap())
+    serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap()
 }
 
 fn has_note(answer: &Value, code: &str) -> bool {
@@ -183,7 +183,8 @@ fn every_slip_is_named_by_check_identify_and_explain_on_the_terminal_and_in_json
             // Where no sample is usable there is no answer, and the error names the slip.
             let report = folder.join("report.html");
             let explained = json(folder, &["explain", "--report", report.to_str().unwrap()]);
-            if explained.is_null() {
+            if let Some(message) = explained["error"]["message"].as_str() {
+                assert!(message.contains(&words), "explain: {case}: {message}");
                 continue;
             }
             assert!(has_note(&explained, code), "explain: {case}");

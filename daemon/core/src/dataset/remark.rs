@@ -309,8 +309,9 @@ fn of_position(
     if rows.len() < 2 {
         return;
     }
-    // The medians of a few rows, since a row at an end may be an outlier.
-    let few = END_ROWS.min(rows.len() / 2);
+    // The medians of a few rows, since a row at an end may be an outlier; of so few that the way
+    // between them is the run's.
+    let few = END_ROWS.min(rows.len() / 100).max(1);
     let median_m = |rows: &[usize]| {
         let mut positions: Vec<f64> = rows.iter().map(|&row| run.position_m[row]).collect();
         positions.sort_by(f64::total_cmp);

@@ -241,8 +241,8 @@ tunnels = [[2200.0, 2900.0]]
             (
                 ("tunnels", "tunnel"),
                 "track.toml:12: unknown key 'tunnel' in [track]; did you mean 'tunnels'? \
-                 (choices: 'name', 'length_m', 'gradient', 'curves', 'tunnels', 'resistance', \
-                 'masses')",
+                 (choices: 'name', 'length_m', 'gradient', 'gradient_shift_m', 'gradient_error', \
+                 'curves', 'tunnels', 'resistance', 'masses')",
             ),
         ];
         for ((from, to), expected) in cases {

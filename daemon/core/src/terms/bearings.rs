@@ -84,12 +84,17 @@ mod tests {
     #[test]
     fn bearings_are_cold_first_after_a_long_gap_and_after_a_clock_set_back_and_warm_after_a_trip() {
         let mut warm_up = WarmUp::default();
-        assert_eq!(warm_up.since_cold_s(7 * S), 0.0);
-        assert_eq!(warm_up.since_cold_s(407 * S), 400.0);
-        assert_eq!(warm_up.since_cold_s(2000 * S), 1993.0, "the next trip");
-        assert_eq!(warm_up.since_cold_s(3800 * S), 0.0);
-        assert_eq!(warm_up.since_cold_s(3900 * S), 100.0);
-        assert_eq!(warm_up.since_cold_s(10 * S), 0.0);
-        assert_eq!(warm_up.since_cold_s(30 * S), 20.0);
+        let mut assert_s = |at_s: i64, expected_s: f64| {
+            let found_s = warm_up.since_cold_s(at_s * S);
+            assert!((found_s - expected_s).abs() < 1e-9, "{at_s} s: {found_s} of {expected_s}");
+        };
+        assert_s(7, 0.0);
+        assert_s(407, 400.0);
+        // The next trip.
+        assert_s(2000, 1993.0);
+        assert_s(3800, 0.0);
+        assert_s(3900, 100.0);
+        assert_s(10, 0.0);
+        assert_s(30, 20.0);
     }
 }
