@@ -11,6 +11,7 @@ mod monitor;
 mod report;
 mod resistance;
 mod simulation;
+mod stops;
 mod trainruns;
 mod truth;
 
@@ -33,6 +34,7 @@ fn main() -> ExitCode {
     trainruns::check(&mut report, &folder.join("independent/trainruns"));
     explaining::check(&mut report, &folder);
     monitor::check(&mut report, &folder);
+    stops::check(&mut report, &folder);
     report.finish()
 }
 
