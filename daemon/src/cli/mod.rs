@@ -11,6 +11,7 @@ mod health;
 mod identify;
 mod replay;
 mod run;
+mod survey;
 mod text;
 
 use std::path::Path;
@@ -39,6 +40,7 @@ enum Command {
     Check(check::CheckArguments),
     Replay(replay::ReplayArguments),
     Identify(identify::IdentifyArguments),
+    Survey(survey::SurveyArguments),
 }
 
 impl Command {
@@ -68,6 +70,7 @@ pub fn main() -> ExitCode {
         Command::Check(arguments) => check::run(arguments),
         Command::Replay(arguments) => replay::execute(arguments),
         Command::Identify(arguments) => identify::execute(arguments),
+        Command::Survey(arguments) => survey::execute(arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -166,7 +166,8 @@ fn add_friction(brake: &mut Force, pressure_pa: Option<&[f64]>, train: &TrainMod
         return;
     };
     for (force_n, &pressure_pa) in brake.force_n.iter_mut().zip(pressure_pa) {
-        let friction_n = if pressure_pa.is_nan() { f64::NAN } else { friction.force_n(pressure_pa) };
+        let friction_n =
+            if pressure_pa.is_nan() { f64::NAN } else { friction.force_n(pressure_pa) };
         *force_n = if brake.source == ForceSource::None { 0.0 } else { *force_n } + friction_n;
     }
     if brake.source == ForceSource::None {

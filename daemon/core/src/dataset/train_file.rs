@@ -102,9 +102,10 @@ fn friction_brake(section: &Section) -> Result<Option<FrictionBrake>, DatasetErr
     let gain = section.number("force_per_pressure_n_per_pa", "N/Pa from 0 to 1000", |gain| {
         (0.0..=1e3).contains(&gain)
     })?;
-    let release = section.number("release_pressure_pa", "a pressure in Pa from 0 to 1e6", |pa| {
-        (0.0..=1e6).contains(&pa)
-    })?;
+    let release =
+        section.number("release_pressure_pa", "a pressure in Pa from 0 to 1e6", |pa| {
+            (0.0..=1e6).contains(&pa)
+        })?;
     Ok(gain.map(|force_per_pressure_n_per_pa| FrictionBrake {
         force_per_pressure_n_per_pa,
         release_pressure_pa: release.unwrap_or(RELEASE_PRESSURE_DEFAULT_PA),

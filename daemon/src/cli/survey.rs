@@ -1,0 +1,126 @@
+//! `dynocar survey`: a line that nobody surveyed, from raw recordings with GNSS.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use dynocar_core::survey::survey;
+
+use super::Failure;
+use super::output::{print, write_json};
+use crate::dataset;
+use crate::report::provenance::Provenance;
+use crate::survey::answer::Answer;
+use crate::survey::write::{Material, write};
+use crate::survey::{SurveyFailure, page, read};
+
+/// Find the line that raw recordings drive, its gradient from the forces, and cut them into trips.
+#[derive(Debug, Args)]
+pub struct SurveyArguments {
+    /// The folder of the raw recordings, or its dataset.toml under any name
+    dataset: PathBuf,
+    /// Write the dataset of trips into this folder
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+    /// Only map the recordings on a line surveyed before
+    #[arg(long, value_name = "track.toml")]
+    line: Option<PathBuf>,
+    /// Write the result for machines; - for standard output
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write a report for people: one HTML page that needs nothing else
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+}
+
+/// Surveys and writes the dataset.
+///
+/// # Errors
+///
+/// A wrong dataset or line is an input failure; a file that cannot be written one of work.
+pub fn execute(arguments: &SurveyArguments) -> Result<(), Failure> {
+    let raw =
+        dataset::load(&arguments.dataset).map_err(|error| Failure::Input(error.to_string()))?;
+    let line = arguments.line.as_deref().map(read::known_line).transpose().map_err(failure)?;
+    let (recordings, vehicle) = (read::recordings(&raw), read::vehicle(&raw));
+    let known = line.as_ref().map(|(known, _)| known);
+    let mut found = survey(&recordings, &vehicle, known)
+        .map_err(|error| failure(SurveyFailure::Survey(error)))?;
+    if let Some((_, track)) = &line {
+        name_stops(&mut found.stops, &track.survey().stops);
+    }
+    let material = Material {
+        source: &arguments.dataset,
+        dataset: &raw,
+        vehicle: &vehicle,
+        survey: &found,
+        line: arguments.line.as_deref(),
+    };
+    let files = write(&material, &arguments.out).map_err(failure)?;
+    eprintln!("dataset: {} files in {}", files.len(), arguments.out.display());
+    let answer = Answer::of(&raw, &vehicle, &found);
+    if let Some(file) = &arguments.report {
+        let provenance = Provenance::of(&arguments.dataset)
+            .map_err(|error| Failure::Input(error.to_string()))?;
+        let html = page::html(&raw, &found, &answer, &provenance);
+        std::fs::write(file, html).map_err(|error| {
+            Failure::Work(format!("{}: cannot be written: {error}", file.display()))
+        })?;
+        eprintln!("report: {}", file.display());
+    }
+    match &arguments.json {
+        Some(file) => write_json(file, &answer),
+        None => print(&summary(&answer)),
+    }
+}
+
+fn failure(failure: SurveyFailure) -> Failure {
+    match failure {
+        SurveyFailure::Write { .. } => Failure::Work(failure.to_string()),
+        _ => Failure::Input(failure.to_string()),
+    }
+}
+
+/// Stops of a known line keep their names.
+fn name_stops(stops: &mut [dynocar_core::survey::stops::Stop], known: &[(f64, String)]) {
+    const NEAR_M: f64 = 25.0;
+    for stop in stops {
+        let away = |known: &&(f64, String)| (known.0 - stop.chainage_m.value).abs();
+        let nearest = known.iter().min_by(|one, other| away(one).total_cmp(&away(other)));
+        if let Some(nearest) = nearest.filter(|nearest| away(nearest) < NEAR_M) {
+            stop.name.clone_from(&nearest.1);
+        }
+    }
+}
+
+fn summary(answer: &Answer) -> String {
+    let mut text = format!(
+        "line of {:.1} m, {} stops, {} trips, {} parts not used\n",
+        answer.line.length_m,
+        answer.line.stops.len(),
+        answer.trips.len(),
+        answer.not_used.len()
+    );
+    if let Some(std) = answer.line.gradient_std_permille {
+        text += &format!("gradient from {} passes, ± {:.2} ‰\n", answer.line.passes, 1.96 * std);
+    }
+    if let Some(learned) = &answer.learned {
+        let mut row = |name: &str, it: &crate::survey::answer::Value, unit: &str| {
+            text += &format!("    {name:<22} {:>10.4} ± {:.4} {unit}\n", it.value, 1.96 * it.std);
+        };
+        row("mass", &learned.mass_t, "t");
+        row("with rotating parts", &learned.inertial_mass_t, "t");
+        if let Some(mass) = &learned.passenger_mass_kg {
+            row("passenger", mass, "kg");
+        }
+        row("recorded / true speed", &learned.speed_scale, "");
+        row("forces stamped late", &learned.force_late_s, "s");
+        row("positions late", &learned.position_late_s, "s");
+        if let Some(gain) = &learned.friction_brake_n_per_pa {
+            row("friction brake", gain, "N/Pa");
+        }
+    }
+    for open in &answer.cannot_tell {
+        text += &format!("these recordings cannot tell {open}\n");
+    }
+    text + "± is the half width of the 95 % interval\n"
+}
