@@ -2,16 +2,12 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
-use dynocar_core::survey::survey;
-
 use super::Failure;
 use super::output::{print, write_json};
-use crate::dataset;
 use crate::report::provenance::Provenance;
 use crate::survey::answer::Answer;
-use crate::survey::write::{Material, write};
-use crate::survey::{SurveyFailure, page, read};
+use crate::survey::{SurveyFailure, page, survey_folder};
+use clap::Args;
 
 /// Find the line that raw recordings drive, its gradient from the forces, and cut them into trips.
 #[derive(Debug, Args)]
@@ -38,38 +34,21 @@ pub struct SurveyArguments {
 ///
 /// A wrong dataset or line is an input failure; a file that cannot be written one of work.
 pub fn execute(arguments: &SurveyArguments) -> Result<(), Failure> {
-    let raw =
-        dataset::load(&arguments.dataset).map_err(|error| Failure::Input(error.to_string()))?;
-    let line = arguments.line.as_deref().map(read::known_line).transpose().map_err(failure)?;
-    let (recordings, vehicle) = (read::recordings(&raw), read::vehicle(&raw));
-    let known = line.as_ref().map(|(known, _)| known);
-    let mut found = survey(&recordings, &vehicle, known)
-        .map_err(|error| failure(SurveyFailure::Survey(error)))?;
-    if let Some((_, track)) = &line {
-        name_stops(&mut found.stops, &track.survey().stops);
-    }
-    let material = Material {
-        source: &arguments.dataset,
-        dataset: &raw,
-        vehicle: &vehicle,
-        survey: &found,
-        line: arguments.line.as_deref(),
-    };
-    let files = write(&material, &arguments.out).map_err(failure)?;
-    eprintln!("dataset: {} files in {}", files.len(), arguments.out.display());
-    let answer = Answer::of(&raw, &vehicle, &found);
+    let (source, line) = (&arguments.dataset, arguments.line.as_deref());
+    let made = survey_folder(source, line, &arguments.out).map_err(failure)?;
+    eprintln!("dataset: {} files in {}", made.files.len(), arguments.out.display());
     if let Some(file) = &arguments.report {
-        let provenance = Provenance::of(&arguments.dataset)
-            .map_err(|error| Failure::Input(error.to_string()))?;
-        let html = page::html(&raw, &found, &answer, &provenance);
+        let provenance =
+            Provenance::of(source).map_err(|error| Failure::Input(error.to_string()))?;
+        let html = page::html(&made.raw, &made.survey, &made.answer, &provenance);
         std::fs::write(file, html).map_err(|error| {
             Failure::Work(format!("{}: cannot be written: {error}", file.display()))
         })?;
         eprintln!("report: {}", file.display());
     }
     match &arguments.json {
-        Some(file) => write_json(file, &answer),
-        None => print(&summary(&answer)),
+        Some(file) => write_json(file, &made.answer),
+        None => print(&summary(&made.answer)),
     }
 }
 
@@ -77,18 +56,6 @@ fn failure(failure: SurveyFailure) -> Failure {
     match failure {
         SurveyFailure::Write { .. } => Failure::Work(failure.to_string()),
         _ => Failure::Input(failure.to_string()),
-    }
-}
-
-/// Stops of a known line keep their names.
-fn name_stops(stops: &mut [dynocar_core::survey::stops::Stop], known: &[(f64, String)]) {
-    const NEAR_M: f64 = 25.0;
-    for stop in stops {
-        let away = |known: &&(f64, String)| (known.0 - stop.chainage_m.value).abs();
-        let nearest = known.iter().min_by(|one, other| away(one).total_cmp(&away(other)));
-        if let Some(nearest) = nearest.filter(|nearest| away(nearest) < NEAR_M) {
-            stop.name.clone_from(&nearest.1);
-        }
     }
 }
 

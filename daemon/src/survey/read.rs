@@ -60,8 +60,13 @@ fn recording(dataset: &Dataset, run: &Run) -> RawRecording {
             _ => traction - brake,
         }
     });
-    let mass_kg =
-        rows.iter().map(|&row| run.samples[row].get(SampleField::Mass).unwrap_or(run.mass_kg));
+    let passengers = extra(&run.extras.passengers);
+    let mass_kg = rows.iter().enumerate().map(|(index, &row)| {
+        match passengers.get(index).is_some_and(|count| count.is_nan()) {
+            true => f64::NAN,
+            false => run.samples[row].get(SampleField::Mass).unwrap_or(run.mass_kg),
+        }
+    });
     RawRecording {
         source: run.file.clone(),
         is_fit: run.role == Role::Fit,
@@ -74,10 +79,7 @@ fn recording(dataset: &Dataset, run: &Run) -> RawRecording {
         altitude_m: extra(&run.extras.altitude_m),
         door_open: extra(&run.extras.door_open),
         mass_kg: mass_kg.collect(),
-        passengers: extra(&run.extras.passengers)
-            .into_iter()
-            .map(|count| if count.is_nan() { 0.0 } else { count })
-            .collect(),
+        passengers,
     }
 }
 

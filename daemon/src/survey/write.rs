@@ -18,7 +18,7 @@ const LATE_MIN: (f64, f64) = (0.01, 3.0);
 /// A force is not taken across a longer step in s.
 const STEP_MAX_S: f64 = 2.5;
 /// A profile reaches beyond its way by so many m.
-const BEYOND_M: f64 = 30.0;
+const BEYOND_M: f64 = 60.0;
 
 /// What the files are made of.
 pub struct Material<'m> {

@@ -118,6 +118,9 @@ fn observe(
     let (middle, end) = (window.start + block, window.end);
     let gained_mps = mean(middle..end) - mean(window.start..middle);
     let row = window.start + block - 1;
+    if !raw.mass_kg[row].is_finite() {
+        return None;
+    }
     Some(Observation {
         pass: 0,
         along_m: 0.0,

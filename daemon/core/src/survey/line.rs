@@ -83,22 +83,37 @@ pub fn find(stretches: &[Stretch], recordings: &[Recording]) -> Option<Ways> {
     let fit: Vec<Stretch> =
         stretches.iter().filter(|it| recordings[it.recording].raw.is_fit).copied().collect();
     let template = template(&fit, recordings)?;
-    let growing = passes_along(&template, &fit, recordings);
-    let falling = passes_along(&reversed(&template)?, &fit, recordings);
+    let back = reversed(&template)?;
+    let growing = along(&template, &fit, recordings);
+    let falling = along(&back, &fit, recordings);
     // The line's chainage grows in the direction in which it was first driven.
-    let first =
-        |passes: &[PassRows]| passes.iter().map(|pass| (pass.recording, pass.rows.start)).min();
+    let first = |along: &[(Stretch, PassRows)]| {
+        along.iter().map(|(_, pass)| (pass.recording, pass.rows.start)).min()
+    };
     let is_backward = match (first(&growing), first(&falling)) {
         (Some(one), Some(other)) => other < one,
         (one, _) => one.is_none(),
     };
-    let (template, ahead, back) = match is_backward {
-        true => (reversed(&template)?, falling, growing),
-        false => (template, growing, falling),
+    let [(template, ahead), (reversed_template, back)] = match is_backward {
+        true => [(back, falling), (template, growing)],
+        false => [(template, growing), (back, falling)],
     };
-    let way = align(template.clone(), &thinned(&ahead), recordings);
-    let falling = falling_way(&way, &reversed(&template)?, &fit, &back, recordings);
+    let way = way_of(&template, &ahead, recordings);
+    let falling = falling_way(&way, &reversed_template, &back, recordings);
     Some(Ways { growing: way, falling, chainage_per_m: 1.0 })
+}
+
+/// The way of a direction from its own stretches: where they differ from the other direction's,
+/// they know better. A single stretch cannot say what of it is the line.
+fn way_of(template: &Way, along: &[(Stretch, PassRows)], recordings: &[Recording]) -> Way {
+    let own: Vec<Stretch> = along.iter().map(|(stretch, _)| *stretch).collect();
+    let first = match own.len() {
+        0 | 1 => template.clone(),
+        _ => self::template(&own, recordings).unwrap_or_else(|| template.clone()),
+    };
+    let passes: Vec<PassRows> =
+        self::along(&first, &own, recordings).into_iter().map(|(_, pass)| pass).collect();
+    align(first, &thinned(&passes), recordings)
 }
 
 fn thinned(passes: &[PassRows]) -> Vec<PassRows> {
@@ -109,24 +124,13 @@ fn thinned(passes: &[PassRows]) -> Vec<PassRows> {
 fn falling_way(
     growing: &Way,
     reversed_template: &Way,
-    fit: &[Stretch],
-    back: &[PassRows],
+    back: &[(Stretch, PassRows)],
     recordings: &[Recording],
 ) -> Option<FallingWay> {
     if back.is_empty() {
         return None;
     }
-    // Where the ways differ, the first guess comes from a stretch of that direction itself.
-    let own = fit.iter().filter(|stretch| {
-        back.iter().any(|pass| {
-            let rows = rows_of(stretch, recordings);
-            pass.recording == stretch.recording && rows.contains(&pass.rows.start)
-        })
-    });
-    let own: Vec<Stretch> = own.copied().collect();
-    let first = template(&own, recordings).unwrap_or_else(|| reversed_template.clone());
-    let passes = passes_along(&first, &own, recordings);
-    let way = align(first, &thinned(&passes), recordings);
+    let way = way_of(reversed_template, back, recordings);
     let (mut apart, mut chainages) = (0, Vec::new());
     for (node, &at) in way.nodes_m().iter().enumerate() {
         let near = growing.nodes_near(at, SAME_WAY_M);
@@ -228,9 +232,10 @@ fn covered(way: &Way, own: usize, stretches: &[Vec<[f64; 2]>]) -> Vec<usize> {
     counts
 }
 
-/// The passes among some stretches that run along a way in its direction.
-fn passes_along(way: &Way, stretches: &[Stretch], recordings: &[Recording]) -> Vec<PassRows> {
-    stretches.iter().filter_map(|stretch| pass_along(way, stretch, recordings)).collect()
+/// The stretches that run along a way in its direction, with their rows on it.
+fn along(way: &Way, stretches: &[Stretch], recordings: &[Recording]) -> Vec<(Stretch, PassRows)> {
+    let pass = |stretch: &Stretch| Some((*stretch, pass_along(way, stretch, recordings)?));
+    stretches.iter().filter_map(pass).collect()
 }
 
 fn pass_along(way: &Way, stretch: &Stretch, recordings: &[Recording]) -> Option<PassRows> {

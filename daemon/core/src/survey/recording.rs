@@ -28,7 +28,8 @@ pub struct RawRecording {
     pub altitude_m: Vec<f64>,
     /// 1 while a door is open; empty when not recorded.
     pub door_open: Vec<f64>,
-    /// Declared gross mass in kg with what is counted or weighed.
+    /// Declared gross mass in kg with what is counted or weighed; `NaN` where the count is not known
+    /// yet.
     pub mass_kg: Vec<f64>,
     /// Number of passengers; empty when not counted.
     pub passengers: Vec<f64>,

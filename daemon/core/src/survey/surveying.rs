@@ -17,6 +17,8 @@ use super::trips::{NotUsed, Trip, not_used, trips};
 /// Lateral uncertainty in m of a way: what the wheels roll differs from it by so much times the
 /// turning.
 const LATERAL_STD_M: f64 = 1.5;
+/// Trains that start or stop at an end of the line are seen so many m beyond it.
+const ENDS_M: f64 = 60.0;
 /// Altitudes are taken every so many m.
 const ALTITUDE_STEP_M: f64 = 50.0;
 /// Lengths in s of blocks that are tried.
@@ -224,7 +226,7 @@ fn profile(
                 };
                 let k = vehicle.curve_constant_n_per_kn_m;
                 it.curve_n_per_kn = k * curvature(curves.iter(), at_m, vehicle.length_m);
-                (0.0..=limit_m).contains(&it.along_m).then_some(it)
+                (-ENDS_M..=limit_m + ENDS_M).contains(&it.along_m).then_some(it)
             }));
         }
         if evidence.observations.is_empty() {
