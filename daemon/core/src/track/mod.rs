@@ -214,6 +214,21 @@ impl Track {
         })
     }
 
+    /// Standard deviation in ‰ of the mean gradient over a stretch, as a survey states it: errors
+    /// of stretches further apart than `FREE_M` are their own. `None` when it is not stated.
+    pub fn gradient_std_permille(&self, from_m: f64, to_m: f64) -> Option<f64> {
+        const FREE_M: f64 = 200.0;
+        let length_m = to_m - from_m;
+        let profile = self.survey.gradient_std_permille.as_ref()?;
+        let std = profile.mean_around(0.5 * (from_m + to_m), length_m);
+        Some(std * (FREE_M / length_m.max(FREE_M)).sqrt())
+    }
+
+    /// True when both directions have one gradient profile.
+    pub fn is_one_profile(&self) -> bool {
+        self.survey.gradient_falling.is_none()
+    }
+
     /// Mean of 1/R in 1/m along a train; `None` when no curves are known.
     pub fn curvature_per_m(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
         Some(self.curvature_per_m.as_ref()?.mean_around(centre_m, train_length_m))
@@ -375,6 +390,16 @@ mod tests {
         assert_eq!(track.gradient_towards_permille(1.0, 500.0, 200.0), Some(4.0));
         assert_eq!(track.gradient_towards_permille(-1.0, 500.0, 200.0), Some(7.0));
         assert_eq!(line().gradient_towards_permille(-1.0, 500.0, 200.0), Some(4.0));
+    }
+
+    #[test]
+    fn the_gradients_error_averages_out_over_long_stretches_only() {
+        let gradient_std_permille = Some(StepProfile::new(&[(0.0, 0.8)]).unwrap());
+        let survey = TrackSurvey { gradient_std_permille, ..Default::default() };
+        let track = line().with_survey(survey);
+        assert_eq!(track.gradient_std_permille(100.0, 200.0), Some(0.8));
+        assert!((track.gradient_std_permille(100.0, 900.0).unwrap() - 0.4).abs() < 1e-12);
+        assert_eq!(line().gradient_std_permille(100.0, 200.0), None);
     }
 
     #[test]
