@@ -50,6 +50,7 @@ impl Command {
             Command::Demo(arguments) => arguments.json.as_deref(),
             Command::Explain(arguments) => arguments.json.as_deref(),
             Command::Identify(arguments) => arguments.json.as_deref(),
+            Command::Survey(arguments) => arguments.json.as_deref(),
             // `check` has an answer of its own for what is wrong.
             Command::Check(_) | Command::Run(_) | Command::Health(_) | Command::Replay(_) => None,
         }

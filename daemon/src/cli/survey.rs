@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::Failure;
-use super::output::{print, write_json};
+use crate::output::{give, require_file, require_folder, tell, write_file};
 use crate::report::provenance::Provenance;
 use crate::survey::answer::Answer;
 use crate::survey::{SurveyFailure, page, survey_folder};
@@ -22,7 +22,7 @@ pub struct SurveyArguments {
     line: Option<PathBuf>,
     /// Write the result for machines; - for standard output
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    pub(super) json: Option<PathBuf>,
     /// Write a report for people: one HTML page that needs nothing else
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -34,27 +34,26 @@ pub struct SurveyArguments {
 ///
 /// A wrong dataset or line is an input failure; a file that cannot be written one of work.
 pub fn execute(arguments: &SurveyArguments) -> Result<(), Failure> {
+    for (file, mark) in [(&arguments.json, "{"), (&arguments.report, "<!DOCTYPE html>")] {
+        file.as_deref().map_or(Ok(()), |file| require_file(file, mark))?;
+    }
+    require_folder(&arguments.out)?;
     let (source, line) = (&arguments.dataset, arguments.line.as_deref());
     let made = survey_folder(source, line, &arguments.out).map_err(failure)?;
-    eprintln!("dataset: {} files in {}", made.files.len(), arguments.out.display());
+    tell(&format!("dataset: {} files in {}", made.files.len(), arguments.out.display()));
     if let Some(file) = &arguments.report {
         let provenance =
             Provenance::of(source).map_err(|error| Failure::Input(error.to_string()))?;
-        let html = page::html(&made.raw, &made.survey, &made.answer, &provenance);
-        std::fs::write(file, html).map_err(|error| {
-            Failure::Work(format!("{}: cannot be written: {error}", file.display()))
-        })?;
-        eprintln!("report: {}", file.display());
+        write_file(file, &page::html(&made.raw, &made.survey, &made.answer, &provenance))?;
+        tell(&format!("report: {}", file.display()));
     }
-    match &arguments.json {
-        Some(file) => write_json(file, &made.answer),
-        None => print(&summary(&made.answer)),
-    }
+    Ok(give(arguments.json.as_deref(), &made.answer, || summary(&made.answer))?)
 }
 
 fn failure(failure: SurveyFailure) -> Failure {
     match failure {
-        SurveyFailure::Write { .. } => Failure::Work(failure.to_string()),
+        SurveyFailure::Output(error) => Failure::from(error),
+        SurveyFailure::Load(error) => Failure::from(error),
         _ => Failure::Input(failure.to_string()),
     }
 }

@@ -19,6 +19,7 @@ use dynocar_core::survey::{Survey, SurveyError, survey};
 use self::answer::Answer;
 use self::write::{Material, write};
 use crate::dataset::{LoadError, load};
+use crate::output::OutputError;
 
 /// Stops nearer than this many m to one of a known line have its name.
 const SAME_STOP_M: f64 = 25.0;
@@ -87,12 +88,7 @@ pub enum SurveyFailure {
         /// What was expected and what came.
         problem: String,
     },
-    /// A file cannot be written.
-    #[error("{}: cannot be written: {source}", path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    /// A file cannot be written, or would cost data.
+    #[error(transparent)]
+    Output(#[from] OutputError),
 }

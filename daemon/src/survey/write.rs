@@ -12,11 +12,16 @@ use toml::{Table, Value};
 use super::SurveyFailure;
 use super::read::rows_in_order;
 use crate::dataset::open;
+use crate::output::{require_file, write_in_folder};
 
 /// Forces stamped late by less than so many s, or standard deviations, stay as they are.
 const LATE_MIN: (f64, f64) = (0.01, 3.0);
 /// A force is not taken across a longer step in s.
 const STEP_MAX_S: f64 = 2.5;
+/// Length of the beginning by which a file of a survey is known.
+const MARK_LENGTH: usize = 20;
+/// What a survey's TOML files begin with.
+const MARK: &str = "# By `dynocar survey`";
 /// A profile reaches beyond its way by so many m.
 const BEYOND_M: f64 = 60.0;
 
@@ -71,15 +76,21 @@ pub fn write(material: &Material, folder: &Path) -> Result<Vec<PathBuf>, SurveyF
     for (number, trip) in material.survey.trips.iter().enumerate() {
         files.push((trip_file(number), run_csv(material, trip)));
     }
-    let mut written = Vec::new();
-    for (name, text) in files {
+    for (name, text) in &files {
+        // What is there and begins otherwise is no survey's: the raw recordings, most likely.
+        let mark = text.get(..MARK_LENGTH.min(text.len())).unwrap_or_default();
+        let path = folder.join(name);
+        if path.exists() {
+            require_file(&path, mark)?;
+        }
+    }
+    let written = files.iter().map(|(name, text)| {
         let path = folder.join(name);
         let parent = path.parent().unwrap_or(folder);
-        let done = std::fs::create_dir_all(parent).and_then(|()| std::fs::write(&path, text));
-        done.map_err(|source| SurveyFailure::Write { path: path.clone(), source })?;
-        written.push(path);
-    }
-    Ok(written)
+        let file = path.file_name().and_then(|name| name.to_str()).unwrap_or(name);
+        Ok(write_in_folder(parent, file, text)?)
+    });
+    written.collect()
 }
 
 /// A known line with its alignments, under their own names.
@@ -105,7 +116,9 @@ fn train_toml(material: &Material) -> Result<String, SurveyFailure> {
     let path = &head.manifest.train_file.path;
     let wrong = |problem: String| SurveyFailure::Line { path: path.into(), problem };
     let text = files.read(path).map_err(|problem| wrong(problem.to_string()))?;
-    let Some(profile) = &material.survey.profile else { return Ok(text) };
+    let Some(profile) = &material.survey.profile else {
+        return Ok(format!("{MARK}: {path} as declared.\n{text}"));
+    };
     let mut train: Table =
         text.parse().map_err(|error: toml::de::Error| wrong(error.message().to_string()))?;
     let common = &profile.learned.profile.common;
@@ -132,7 +145,7 @@ fn train_toml(material: &Material) -> Result<String, SurveyFailure> {
     let inertial_t =
         prior.mass_kg * (1.0 + common.mass_share()) * (1.0 + prior.rotating_mass_factor) / 1e3;
     Ok(format!(
-        "# Grown from {path} by `dynocar survey`: mass, resistance and brake as the balance of forces has them.\n\
+        "{MARK} from {path}: mass, resistance and brake as the balance of forces has them.\n\
          # Rotating parts inside, the vehicle weighs {inertial_t:.2} t; the rotating share stays as declared.\n{train}"
     ))
 }
@@ -187,7 +200,7 @@ fn has_own_brake(run: &Run) -> bool {
 fn dataset_toml(material: &Material) -> String {
     let dataset = material.dataset;
     let quoted = |text: &str| Value::String(text.into()).to_string();
-    let mut text = format!("[dataset]\nname = {}\n", quoted(&dataset.name));
+    let mut text = format!("{MARK}.\n[dataset]\nname = {}\n", quoted(&dataset.name));
     if let Some(description) = &dataset.description {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "description = {}", quoted(description));
@@ -330,7 +343,7 @@ fn track_toml(material: &Material) -> String {
     let length_m = ways.chainage_per_m * ways.growing.length_m();
     let name = Value::String(format!("{}, surveyed", material.dataset.name)).to_string();
     let mut text = format!(
-        "# Surveyed from {} passes by `dynocar survey`.\n[track]\nname = {name}\n\
+        "{MARK} from {} passes.\n[track]\nname = {name}\n\
          length_m = {length_m:.1}\nalignment = \"alignment.csv\"\n",
         profile.trips.len()
     );
