@@ -15,6 +15,7 @@
 //! - [`filter`]: recursive estimators of fixed size, without knowledge of trains
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
 //! - [`simulate`]: the speed that a force model predicts over a recorded run
+//! - [`survey`]: a line and its gradient from recordings with GNSS
 //! - [`explain`]: which undeclared effect explains what the declared model leaves
 
 pub mod dataset;
@@ -24,6 +25,7 @@ pub mod force;
 pub mod pipeline;
 pub mod plausibility;
 pub mod simulate;
+pub mod survey;
 pub mod terms;
 pub mod track;
 pub mod train;

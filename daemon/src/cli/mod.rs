@@ -11,6 +11,7 @@ mod health;
 mod identify;
 mod replay;
 mod run;
+mod survey;
 mod text;
 
 use std::path::Path;
@@ -39,6 +40,7 @@ enum Command {
     Check(check::CheckArguments),
     Replay(replay::ReplayArguments),
     Identify(identify::IdentifyArguments),
+    Survey(survey::SurveyArguments),
 }
 
 impl Command {
@@ -48,6 +50,7 @@ impl Command {
             Command::Demo(arguments) => arguments.json.as_deref(),
             Command::Explain(arguments) => arguments.json.as_deref(),
             Command::Identify(arguments) => arguments.json.as_deref(),
+            Command::Survey(arguments) => arguments.json.as_deref(),
             // `check` has an answer of its own for what is wrong.
             Command::Check(_) | Command::Run(_) | Command::Health(_) | Command::Replay(_) => None,
         }
@@ -68,6 +71,7 @@ pub fn main() -> ExitCode {
         Command::Check(arguments) => check::run(arguments),
         Command::Replay(arguments) => replay::execute(arguments),
         Command::Identify(arguments) => identify::execute(arguments),
+        Command::Survey(arguments) => survey::execute(arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
