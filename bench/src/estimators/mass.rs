@@ -20,6 +20,8 @@ const SAMPLES: usize = 1000;
 const STEP_S: f64 = 0.2;
 const SPEED_VARIANCE: f64 = 4e-4;
 const MEMORY: f64 = 3000.0;
+/// A normalised innovation beyond which a speed counts less.
+const HUBER: f64 = 3.0;
 /// Standard deviation of the inverse mass over its reference.
 const INVERSE_MASS_STD: f64 = 0.2;
 
@@ -103,15 +105,15 @@ fn textbook(drive: &Drive) -> Vec<f64> {
     };
     let mut members: Vec<_> = drive.models.iter().map(member).collect();
     let row = RowVector3::new(1.0, 0.0, 0.0);
-    let mut last_change = 0.0;
     for pair in drive.motions.windows(2) {
-        let change = drive.dynamics.push_mps2(&pair[1]) - drive.dynamics.push_mps2(&pair[0]);
-        let jump = change - last_change;
-        last_change = change;
         for Member { filter, model, log_weight } in &mut members {
-            predict(filter, model, &drive.dynamics, pair, jump);
-            let said = filter.measure(&row, pair[1].speed_mps, SPEED_VARIANCE);
-            *log_weight = (1.0 - 1.0 / MEMORY) * *log_weight + said.log_likelihood();
+            predict(filter, model, &drive.dynamics, pair);
+            let variance = filter.covariance[(SPEED, SPEED)] + SPEED_VARIANCE;
+            let size = (pair[1].speed_mps - filter.mean[SPEED]).abs() / variance.sqrt();
+            let weight = (HUBER / size).min(1.0);
+            filter.measure(&row, pair[1].speed_mps, SPEED_VARIANCE / weight);
+            let surprise = 0.5 * size.min(HUBER).powi(2) + HUBER * (size - HUBER).max(0.0);
+            *log_weight = (1.0 - 1.0 / MEMORY) * *log_weight - surprise - 0.5 * variance.ln();
         }
         let highest =
             members.iter().map(|member| member.log_weight).fold(f64::NEG_INFINITY, f64::max);
@@ -133,7 +135,6 @@ fn predict(
     model: &BiasModel,
     dynamics: &Dynamics,
     step: &[Motion],
-    jump_mps2: f64,
 ) {
     let (from, to) = (&step[0], &step[1]);
     let (push_from, push_to) = (dynamics.push_mps2(from), dynamics.push_mps2(to));
@@ -152,7 +153,8 @@ fn predict(
         0.0, 0.0, keep,
     );
     let mean = Vector3::new(speed + 0.5 * STEP_S * (start + end), inverse_mass, keep * bias);
-    let jump_variance = model.jump_variance(jump_mps2 * inverse_mass, STEP_S);
-    let noise = Vector3::new(jump_variance, 0.0, model.noise_variance(keep));
+    let bend = dynamics.mps2_per_n_per_kn() * (to.known_n_per_kn - from.known_n_per_kn);
+    let change = (push_to - push_from) * inverse_mass - bend;
+    let noise = Vector3::new(model.jump_variance(change, STEP_S), 0.0, model.noise_variance(keep));
     filter.predict(mean, &transition, &Matrix3::from_diagonal(&noise));
 }

@@ -11,6 +11,7 @@ mod innovation;
 mod kept;
 pub mod mass;
 pub mod monitor;
+pub mod motion;
 pub mod output;
 pub mod quantities;
 pub mod resistance;

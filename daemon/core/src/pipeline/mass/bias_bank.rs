@@ -27,6 +27,12 @@ pub const MODELS: usize = 8;
 
 /// Logarithm of the least weight against the best: any behaviour can come back.
 const LOG_WEIGHT_MIN: f64 = -30.0;
+/// A normalised innovation beyond which a filter does not believe the speed.
+const OUTLIER: f64 = 8.0;
+/// A normalised innovation beyond which a speed counts less (Huber 1964).
+const HUBER: f64 = 3.0;
+/// After so many outliers in a row the measured speed is believed and the filter's is not.
+const OUTLIERS_BEFORE_RESTART: u32 = 5;
 
 /// What turns forces into acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,18 +86,43 @@ pub struct Moments {
     pub correlation: f64,
 }
 
+/// What the filter with the most evidence made of a measured speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// Its innovation over the predicted standard deviation.
+    pub normalised: f64,
+    /// Weight of the measurement against a full one; 0 for an outlier, which was left out.
+    pub weight: f64,
+}
+
+impl Measured {
+    /// Judges a normalised innovation (Huber 1964).
+    fn of(normalised: f64) -> Self {
+        let size = normalised.abs();
+        let weight = if size > OUTLIER { 0.0 } else { (HUBER / size).min(1.0) };
+        Measured { normalised, weight }
+    }
+
+    /// Minus the logarithm of its likelihood, up to that of the spread: Huber's, and bounded, so
+    /// that no single speed outweighs all before it.
+    fn surprise(&self) -> f64 {
+        let size = self.normalised.abs().min(OUTLIER);
+        if size <= HUBER { 0.5 * size * size } else { HUBER * (size - 0.5 * HUBER) }
+    }
+}
+
 /// The filters with the evidence for each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BiasBank {
     dynamics: Dynamics,
     models: [BiasModel; MODELS],
     filters: [Gaussian<3>; MODELS],
+    /// Outliers in a row under each behaviour.
+    outliers: [u32; MODELS],
     log_weights: [f64; MODELS],
     forgetting: f64,
     /// Share of each bias that is left after a step, and the step in s that it holds for.
     keeps: ([f64; MODELS], f64),
-    /// Change of the force's acceleration on the reference mass in the last step, in m/s².
-    push_change: f64,
 }
 
 impl BiasBank {
@@ -114,16 +145,16 @@ impl BiasBank {
             dynamics,
             models,
             filters,
+            outliers: [0; MODELS],
             log_weights,
             forgetting: 1.0 - 1.0 / memory,
             keeps: ([1.0; MODELS], 0.0),
-            push_change: 0.0,
         }
     }
 
     /// Starts anew at a measured speed; mass and bias stay as they are.
     pub fn restart_speed(&mut self, speed_mps: f64, noise_variance: f64) {
-        self.push_change = 0.0;
+        self.outliers = [0; MODELS];
         for filter in &mut self.filters {
             filter.replace(SPEED, speed_mps, noise_variance);
         }
@@ -141,8 +172,8 @@ impl BiasBank {
     pub fn predict(&mut self, from: &Motion, to: &Motion, step_s: f64) {
         let dynamics = &self.dynamics;
         let (push_from, push_to) = (dynamics.push_mps2(from), dynamics.push_mps2(to));
-        let jump = push_to - push_from - self.push_change;
-        self.push_change = push_to - push_from;
+        let bend = to.known_n_per_kn - from.known_n_per_kn;
+        let change = (push_to - push_from, dynamics.mps2_per_n_per_kn() * bend);
         if self.keeps.1 != step_s {
             self.keeps = (self.models.map(|model| model.keep(step_s)), step_s);
         }
@@ -163,7 +194,7 @@ impl BiasBank {
             );
             let next =
                 Vector3::new(speed + 0.5 * step_s * (start + end), inverse_mass, keep * bias);
-            let jump_variance = model.jump_variance(jump * inverse_mass, step_s);
+            let jump_variance = model.jump_variance(change.0 * inverse_mass - change.1, step_s);
             let noise = Vector3::new(jump_variance, 0.0, model.noise_variance(keep));
             filter.predict(next, &transition, &Matrix3::from_diagonal(&noise));
         }
@@ -181,7 +212,11 @@ impl BiasBank {
         (1..MODELS).fold(0, better)
     }
 
-    /// Takes a measured speed into every filter.
+    /// Takes a measured speed into every filter that does not hold it for an outlier; tells what
+    /// the filter made of it that has the most evidence now.
+    ///
+    /// A speed that is an outlier under one behaviour may be as expected under another, which
+    /// knows of forces that jump: each judges for itself, and the evidence is taken of all.
     ///
     /// # Errors
     ///
@@ -190,17 +225,29 @@ impl BiasBank {
         &mut self,
         speed_mps: f64,
         noise_variance: f64,
-    ) -> Result<(), NotPositiveDefinite> {
-        for (filter, log_weight) in self.filters.iter_mut().zip(&mut self.log_weights) {
-            let innovation = filter.measure(SPEED, speed_mps, noise_variance)?;
-            let square = innovation.normalised_square();
-            *log_weight = self.forgetting * *log_weight - 0.5 * (square + innovation.variance.ln());
+    ) -> Result<Measured, NotPositiveDefinite> {
+        let mut judged = [Measured::of(0.0); MODELS];
+        for (index, filter) in self.filters.iter_mut().enumerate() {
+            let innovation = filter.innovation(SPEED, speed_mps, noise_variance)?;
+            judged[index] = Measured::of(innovation.normalised());
+            let outliers = &mut self.outliers[index];
+            *outliers = if judged[index].weight > 0.0 { 0 } else { *outliers + 1 };
+            if judged[index].weight > 0.0 {
+                filter.measure(SPEED, speed_mps, noise_variance / judged[index].weight)?;
+            } else if *outliers >= OUTLIERS_BEFORE_RESTART {
+                *outliers = 0;
+                filter.replace(SPEED, speed_mps, noise_variance);
+            }
+            let log_weight = &mut self.log_weights[index];
+            let evidence = -judged[index].surprise() - 0.5 * innovation.variance.ln();
+            *log_weight = self.forgetting * *log_weight + evidence;
         }
-        let highest = self.log_weights[self.best_index()];
+        let best = self.best_index();
+        let highest = self.log_weights[best];
         for log_weight in &mut self.log_weights {
             *log_weight = (*log_weight - highest).max(LOG_WEIGHT_MIN);
         }
-        Ok(())
+        Ok(judged[best])
     }
 
     /// Share of the evidence for each behaviour.

@@ -1,5 +1,7 @@
 //! How an acceleration that the model lacks behaves in time.
 
+use crate::pipeline::motion::jump_variance;
+
 /// Speed in m/s at which the bias of a behaviour that grows with speed is stated.
 const GROWTH_REFERENCE_MPS: f64 = 20.0;
 
@@ -21,14 +23,10 @@ impl BiasModel {
         BiasModel { std_mps2, time_s, grows_with_speed }
     }
 
-    /// Variance in (m/s)² of what a step misses because the force may jump between two
-    /// samples, from the second difference of its acceleration.
-    ///
-    /// A jump by a at some time in a step h makes the trapezoid err by up to a h / 2 either way,
-    /// with a mean square of a² h² / 12, and shows in the second differences of two steps. A
-    /// behaviour that lasts for ever also believes that force runs straight between samples.
-    pub fn jump_variance(&self, second_difference_mps2: f64, step_s: f64) -> f64 {
-        if self.time_s.is_finite() { (second_difference_mps2 * step_s).powi(2) / 24.0 } else { 0.0 }
+    /// Variance in (m/s)² of what a step misses because the acceleration changes by so much over it.
+    /// A behaviour that lasts for ever also believes that forces run straight between samples.
+    pub fn jump_variance(&self, change_mps2: f64, step_s: f64) -> f64 {
+        if self.time_s.is_finite() { jump_variance(change_mps2, step_s) } else { 0.0 }
     }
 
     /// Share of the bias that is left after a time in s.

@@ -12,8 +12,8 @@ pub struct Step {
     pub step_s: f64,
     /// Speed in m/s at its start.
     pub speed_mps: f64,
-    /// Second difference of the force's acceleration in m/s².
-    pub jump_mps2: f64,
+    /// Change of the force's acceleration over it in m/s².
+    pub push_change_mps2: f64,
     /// Variance in (m/s)² of what comes to the level under any assumption.
     pub noise_variance: f64,
 }
@@ -77,7 +77,7 @@ impl Hypothesis {
     /// Moves on by a step of time.
     pub fn propagate(&mut self, step: &Step) {
         let keep = self.model.keep(step.step_s);
-        let jump_variance = self.model.jump_variance(step.jump_mps2, step.step_s);
+        let jump_variance = self.model.jump_variance(step.push_change_mps2, step.step_s);
         self.regression.propagate(&DriftStep {
             gain: step.step_s * self.model.shape(step.speed_mps),
             keep,

@@ -24,18 +24,6 @@ use crate::train::TrainModel;
 /// Resistance in N/kN that a curve or a tunnel typically adds.
 const TYPICAL_N_PER_KN: f64 = 5.0;
 
-/// Variance in (m/s)² of what the trapezoid misses in a step of time, from the second
-/// difference of the rate.
-///
-/// A gradient acts over the length of the train, so that its rate is a polygon. Where the slope
-/// of the rate jumps by s, at a share f of a step h, the trapezoid errs by s h² f (1 - f) / 2,
-/// and the second differences of the two steps are s h (1 - f) and s h f. Over f from 0 to 1
-/// the mean square of the error is s² h⁴ / 120, and h²/80 of the sum of the squared second
-/// differences.
-pub fn missed_variance(second_difference_mps2: f64, step_s: f64) -> f64 {
-    (step_s * second_difference_mps2).powi(2) / 80.0
-}
-
 /// Number of unknowns: level, bias, inverse mass, z1, z2, z3.
 pub const UNKNOWNS: usize = 12;
 /// Place of the reference mass over the mass.
@@ -129,28 +117,5 @@ impl Integrals {
         let mut row = self.row;
         row[LEVEL] = 1.0;
         (row, speed_mps + self.known_mps)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_missed_variance_is_the_mean_square_of_the_trapezoids_error_at_a_kink() {
-        let (slope, step_s, positions) = (3.0, 0.2, 1000);
-        let (mut squares, mut variance) = (0.0, 0.0);
-        for k in 0..positions {
-            let kink_s = step_s * (k as f64 + 0.5) / positions as f64;
-            let rate = |time_s: f64| slope * (time_s - kink_s).max(0.0);
-            let rates = [0.0, 0.0, rate(step_s), rate(2.0 * step_s), rate(3.0 * step_s)];
-            let exact = 0.5 * slope * (step_s - kink_s).powi(2);
-            squares += (0.5 * step_s * rate(step_s) - exact).powi(2);
-            for at in 2..5 {
-                let (before, now) = (rates[at - 1] - rates[at - 2], rates[at] - rates[at - 1]);
-                variance += missed_variance(now - before, step_s);
-            }
-        }
-        assert!((variance / squares - 1.0).abs() < 1e-3, "{variance} and {squares}");
     }
 }

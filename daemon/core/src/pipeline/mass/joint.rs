@@ -7,9 +7,7 @@ use nalgebra::{Matrix3, SMatrix};
 
 use super::health::InputHealth;
 use super::hypothesis::{Hypothesis, Step};
-use super::integrals::{
-    INVERSE_MASS, Integrals, POLYNOMIALS, Regressors, Row, UNKNOWNS, missed_variance,
-};
+use super::integrals::{INVERSE_MASS, Integrals, POLYNOMIALS, Regressors, Row, UNKNOWNS};
 use super::joint_settings::{JOINT_MODELS, JointLeastSquaresSettings};
 use super::lack_of_fit::LackOfFit;
 use super::line_resistance::LineResistance;
@@ -18,6 +16,7 @@ use super::section::Section;
 use super::speed_noise::SpeedNoise;
 use crate::filter::drifting_level::BIAS;
 use crate::force::ResolvedSample;
+use crate::pipeline::motion::kink_variance;
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 use crate::train::{Davis, TrainModel};
@@ -46,8 +45,8 @@ pub struct JointLeastSquares {
     stops: StopWatch,
     last: Option<(Motion, Integrals)>,
     integrals: Integrals,
-    /// Changes of tied acceleration and push in the last step, in m/s².
-    changes: [f64; 2],
+    /// Change of the tied acceleration in the last step, in m/s².
+    tied_change: f64,
     /// The resistance a while ago, for its slope.
     latest: LineResistance,
     updates_since_refresh: u32,
@@ -90,7 +89,7 @@ impl JointLeastSquares {
             stops: StopWatch::new(settings.stop_min_s),
             last: None,
             integrals: Integrals::zero(),
-            changes: [0.0; 2],
+            tied_change: 0.0,
             latest: LineResistance::declared(train),
             updates_since_refresh: 0,
             noise: SpeedNoise::new(settings.speed_noise_mps),
@@ -157,7 +156,7 @@ impl JointLeastSquares {
 
     fn begin(&mut self, motion: Motion) -> Outcome {
         self.integrals = Integrals::zero();
-        self.changes = [0.0; 2];
+        self.tied_change = 0.0;
         let (row, value) = self.integrals.equation(motion.speed_mps);
         for hypothesis in &mut self.hypotheses {
             hypothesis.free_level();
@@ -177,7 +176,17 @@ impl JointLeastSquares {
             hypothesis.propagate(&step);
         }
         let variance = self.noise.variance();
-        let expected = self.hypotheses[self.best].expect(&row, value, variance);
+        let mut expected = self.hypotheses[self.best].expect(&row, value, variance);
+        if expected.normalised.abs() > OUTLIER {
+            // Impossible to one assumption, as a force that jumps to one that knows of none: it gives
+            // way to one under which the speed is possible.
+            for (index, hypothesis) in self.hypotheses.iter().enumerate() {
+                let other = hypothesis.expect(&row, value, variance);
+                if other.normalised.abs() < expected.normalised.abs().min(OUTLIER) {
+                    (expected, self.best) = (other, index);
+                }
+            }
+        }
         if !expected.normalised.is_finite() {
             self.reset();
             return self.begin(motion);
@@ -219,15 +228,15 @@ impl JointLeastSquares {
     /// the integral, by a random walk.
     fn step(&mut self, last: &(Motion, Integrals), rates: &Integrals, step_s: f64) -> Step {
         let [tied, push] = Integrals::changes(&last.1, rates);
-        let [tied_before, push_before] = std::mem::replace(&mut self.changes, [tied, push]);
+        let tied_before = std::mem::replace(&mut self.tied_change, tied);
         let slope = self.latest.slope(&last.0, last.0.speed_mps);
         let walk_mps =
             step_s * self.regressors.mps2_per_n_per_kn() * slope * self.speed_noise_mps();
         Step {
             step_s,
             speed_mps: last.0.speed_mps,
-            jump_mps2: push - push_before,
-            noise_variance: missed_variance(tied - tied_before, step_s) + walk_mps * walk_mps,
+            push_change_mps2: push,
+            noise_variance: kink_variance(tied - tied_before, step_s) + walk_mps * walk_mps,
         }
     }
 

@@ -11,6 +11,7 @@ use super::bias_bank::{BiasBank, Dynamics, Moments, SPEED};
 use super::health::{InputHealth, innovation_complaint};
 use super::kalman_settings::MassKalmanSettings;
 use super::motion::{Motion, StopWatch};
+use super::settling::Settling;
 use super::speed_noise::SpeedNoise;
 use crate::force::ResolvedSample;
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
@@ -19,12 +20,6 @@ use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use crate::train::TrainModel;
 
-/// A normalised innovation beyond which the speed is not believed.
-const OUTLIER: f64 = 8.0;
-/// A normalised innovation beyond which a speed counts less (Huber 1964).
-const HUBER: f64 = 3.0;
-/// After so many outliers in a row the measured speed is believed and the filters' is not.
-const OUTLIERS_BEFORE_RESTART: u32 = 5;
 /// Samples over which the evidence for a behaviour of the bias is remembered.
 const EVIDENCE_MEMORY: f64 = 3000.0;
 /// Used samples below which nothing is said of the mass.
@@ -58,7 +53,7 @@ pub struct MassKalman {
     declared_mass_kg: f64,
     is_warm_started: bool,
     noise: SpeedNoise,
-    outliers_in_a_row: u32,
+    settling: Settling,
     monitor: InnovationMonitor,
     health: InputHealth,
     speed_range_mps: Option<(f64, f64)>,
@@ -97,7 +92,7 @@ impl MassKalman {
             declared_mass_kg: train.mass_kg,
             is_warm_started: false,
             noise: SpeedNoise::new(settings.speed_noise_mps),
-            outliers_in_a_row: 0,
+            settling: Settling::default(),
             monitor: InnovationMonitor::new(500),
             health: InputHealth::default(),
             speed_range_mps: None,
@@ -147,51 +142,46 @@ impl MassKalman {
     }
 
     fn begin(&mut self, motion: Motion) -> Outcome {
-        self.bank.restart_speed(motion.speed_mps, self.noise.variance());
+        let noise_variance = self.noise.variance_of_sample(f64::INFINITY);
+        self.bank.restart_speed(motion.speed_mps, noise_variance);
         self.monitor.break_here();
         self.last = Some(motion);
         Outcome::Used
     }
 
     fn advance(&mut self, from: Motion, motion: Motion, step_s: f64) -> Outcome {
+        let before_mps = self.bank.best().mean[SPEED];
         self.bank.predict(&from, &motion, step_s);
-        let variance = self.noise.variance();
-        let Ok(expected) = self.bank.best().innovation(SPEED, motion.speed_mps, variance) else {
+        let moved_mps = (self.bank.best().mean[SPEED] - before_mps).abs();
+        let noise_variance = self.noise.variance_of_sample(moved_mps);
+        let measured = self.bank.measure(motion.speed_mps, noise_variance);
+        let Some(measured) = measured.ok().filter(|_| self.bank.is_sound()) else {
             self.reset();
             return self.begin(motion);
         };
-        let normalised = expected.normalised();
-        if normalised.abs() > OUTLIER {
-            self.outliers_in_a_row += 1;
-            if self.outliers_in_a_row >= OUTLIERS_BEFORE_RESTART {
-                self.outliers_in_a_row = 0;
-                return self.begin(motion);
-            }
+        let mps2 =
+            |motion: &Motion| motion.force_n / (self.reference_mass_kg * self.inertia_factor);
+        self.settling.step(mps2(&from), mps2(&motion), step_s, noise_variance);
+        if measured.weight == 0.0 {
             // The filters have moved on; only the speed is not believed.
             self.last = Some(motion);
+            self.monitor.break_here();
             return Outcome::Rejected(RejectionReason::Outlier);
         }
-        self.outliers_in_a_row = 0;
-        let weight = (HUBER / normalised.abs()).min(1.0);
-        let measured = self.bank.measure(motion.speed_mps, variance / weight);
-        if measured.is_err() || !self.bank.is_sound() {
-            self.reset();
-            return self.begin(motion);
-        }
-        self.monitor.push(normalised);
+        self.monitor.push(measured.normalised);
         let filter = self.bank.best();
         let residual_mps = motion.speed_mps - filter.mean[SPEED];
-        self.noise.learn(residual_mps, filter.covariance[(SPEED, SPEED)], weight);
+        self.noise.learn(residual_mps, filter.covariance[(SPEED, SPEED)], measured.weight);
         self.last = Some(motion);
         self.widen_speed_range(motion.speed_mps);
         self.publish(0.5 * (from.force_n + motion.force_n).abs())
     }
 
-    /// Takes the mass over under force; the bias always.
+    /// Takes the mass over under a force that has settled; the bias always.
     fn publish(&mut self, force_n: f64) -> Outcome {
         let now = self.bank.moments();
         let weight_kn = TrainModel::weight_kn(self.reference_mass_kg);
-        if force_n >= self.settings.force_min_n_per_kn * weight_kn {
+        if self.settling.is_settled() && force_n >= self.settings.force_min_n_per_kn * weight_kn {
             self.moments = now;
             let is_known = self.is_known();
             self.was_known |= is_known;
@@ -264,6 +254,7 @@ impl Gated for MassKalman {
                 return Outcome::Rejected(reason);
             }
         };
+        self.noise.rounding.see(motion.speed_mps);
         let last = self.last.filter(|_| sample.step_s > 0.0);
         let step = last.and_then(|last| Some((last, motion.step_from(&last)?)));
         let outcome = match step {

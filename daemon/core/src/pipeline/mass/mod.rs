@@ -24,6 +24,7 @@ mod lack_of_fit;
 pub mod line_resistance;
 pub mod motion;
 pub mod section;
+mod settling;
 pub mod speed_basis;
 mod speed_noise;
 mod staged;

@@ -1,5 +1,7 @@
 //! The noise of the measured speed, learned from what filters leave of it.
 
+use crate::pipeline::motion::Rounding;
+
 /// Innovations over which the noise is learned.
 const MEMORY: f64 = 3000.0;
 /// Innovations that the noise of the settings counts for.
@@ -16,18 +18,26 @@ pub struct SpeedNoise {
     initial: f64,
     variance: f64,
     count: f64,
+    /// The steps of the signal.
+    pub rounding: Rounding,
 }
 
 impl SpeedNoise {
     /// Starts at a standard deviation in m/s.
     pub fn new(std_mps: f64) -> Self {
         let initial = std_mps * std_mps;
-        SpeedNoise { initial, variance: initial, count: PRIOR_COUNT }
+        SpeedNoise { initial, variance: initial, count: PRIOR_COUNT, rounding: Rounding::default() }
     }
 
     /// The variance in (m/s)².
     pub fn variance(&self) -> f64 {
         self.variance
+    }
+
+    /// Variance in (m/s)² such that one may treat a sample as independent of its neighbours;
+    /// `per_step_mps` is how far the speed moves from one sample to the next.
+    pub fn variance_of_sample(&self, per_step_mps: f64) -> f64 {
+        self.rounding.variance_of_sample(self.variance, per_step_mps)
     }
 
     /// Takes in a residual in m/s, the variance of the filtered speed, and the weight that the

@@ -85,7 +85,7 @@ impl CoastingSegments {
         now: &UnitSample,
         known: &Davis,
     ) -> Result<Option<CoastingSegment>, RejectionReason> {
-        self.watch.noise.see(now.speed_mps);
+        self.watch.noise.rounding.see(now.speed_mps);
         if now.traction > COASTING_MAX || now.brake > COASTING_MAX {
             self.chain = None;
             return Ok(None);
@@ -152,7 +152,7 @@ impl Chain {
         let before = self.half_before.replace(closed)?;
         let row = before.slopes(&closed)?;
         let row_before = self.row_before.replace(row);
-        let speed_variance = watch.noise.variance().max(watch.noise.rounding_variance());
+        let speed_variance = watch.noise.variance().max(watch.noise.rounding.variance());
         Some(CoastingSegment {
             is_first: row_before.is_none(),
             row,

@@ -19,6 +19,7 @@ use super::sample::UnitSample;
 use super::settings::KalmanSettings;
 use crate::filter::Gaussian;
 use crate::force::ResolvedSample;
+use crate::pipeline::motion::jump_variance;
 use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use crate::train::TrainModel;
 
@@ -168,7 +169,7 @@ impl ResistanceKalman {
         let bend = now.known - before.known;
         // A change of gradient or curve passes under the train in many steps, all early or all late.
         let steps = (self.train_length_m / (speed_mps * step_s)).max(1.0);
-        self.noise.scale * ((step_s * change).powi(2) / 12.0 + steps * (place_s * bend).powi(2))
+        self.noise.scale * (jump_variance(change, step_s) + steps * (place_s * bend).powi(2))
     }
 
     /// Takes a speed into the filter, weighed by Student's t; false when it is sound for

@@ -15,6 +15,7 @@ use super::sample::{SpeedWatch, UnitSample, resistance_integral, trapezoids};
 use super::settings::DataSettings;
 use super::speed::{SpeedNoise, SpeedVerdict};
 use crate::filter::Line;
+use crate::pipeline::motion::jump_variance;
 use crate::train::Davis;
 
 /// Fewest samples in a block: the scatter about a line needs three.
@@ -98,7 +99,7 @@ impl MomentumBlocks {
         now: &UnitSample,
         known: &Davis,
     ) -> Result<Option<MomentumBlock>, RejectionReason> {
-        self.watch.noise.see(now.speed_mps);
+        self.watch.noise.rounding.see(now.speed_mps);
         let Some(chain) = self.chain.as_mut().filter(|chain| chain.last.stretch == now.stretch)
         else {
             self.chain = Some(Chain::start(now));
@@ -150,8 +151,7 @@ impl Chain {
         self.integral[1 + BRAKE_SCALE] += 0.5 * step_s * (before.brake + now.brake);
         // A force that acts later by d has given d times its change less.
         self.integral[1 + FORCE_DELAY] += change;
-        // Where within the step the force changed is not known.
-        self.block.edge_variance += (step_s * change).powi(2) / 12.0;
+        self.block.edge_variance += jump_variance(change, step_s);
         let gained = self.integral[0] - resistance_integral(known, &self.integral.as_slice()[1..]);
         self.block.add(now, &self.integral, gained / now.inertia);
         self.last = *now;

@@ -1,5 +1,7 @@
 //! What the speed signal itself says of its noise, and which of its values are spikes.
 
+use crate::pipeline::motion::Rounding;
+
 /// Verdict on one speed value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SpeedVerdict {
@@ -41,8 +43,8 @@ impl SpeedGate {
 pub struct SpeedNoise {
     square_sum: f64,
     freedom: f64,
-    quantum_mps: f64,
-    last_mps: Option<f64>,
+    /// The steps of the signal.
+    pub rounding: Rounding,
     /// Variance of one value before the first scatter, in (m/s)².
     unknown_variance: f64,
 }
@@ -54,8 +56,6 @@ const MEMORY: f64 = 2_000.0;
 const CLIP_DEVIATIONS: f64 = 4.0;
 /// No speed is known better, in (m/s)².
 const VARIANCE_MIN: f64 = 1e-10;
-/// The most samples that are taken to share one rounding error.
-const ALIKE_MAX: f64 = 20.0;
 /// Degrees of freedom before the scatter is clipped.
 const FREEDOM_BEFORE_CLIP: f64 = 20.0;
 
@@ -65,20 +65,8 @@ impl SpeedNoise {
         SpeedNoise {
             square_sum: 0.0,
             freedom: 0.0,
-            quantum_mps: f64::INFINITY,
-            last_mps: None,
+            rounding: Rounding::default(),
             unknown_variance: unknown_mps * unknown_mps,
-        }
-    }
-
-    /// Takes in a speed for the quantum: the smallest step ever seen.
-    pub fn see(&mut self, speed_mps: f64) {
-        if let Some(last) = self.last_mps.replace(speed_mps) {
-            let step = (speed_mps - last).abs();
-            // Below this it is the rounding of the numbers themselves.
-            if step > 1e-6 {
-                self.quantum_mps = self.quantum_mps.min(step);
-            }
         }
     }
 
@@ -90,7 +78,7 @@ impl SpeedNoise {
         let clipped = match self.freedom > FREEDOM_BEFORE_CLIP {
             true => {
                 let most = freedom + CLIP_DEVIATIONS * (2.0 * freedom).sqrt();
-                square_sum.min(most * self.variance().max(self.rounding_variance()))
+                square_sum.min(most * self.variance().max(self.rounding.variance()))
             }
             false => square_sum,
         };
@@ -109,22 +97,16 @@ impl SpeedNoise {
     /// A speed that hardly moves falls on the same step again and again, so that averaging does
     /// not lessen its rounding error.
     pub fn variance_of_mean(&self, count: f64, range_mps: f64) -> f64 {
-        let steps = if self.quantum_mps.is_finite() { range_mps / self.quantum_mps } else { count };
-        let rounding = self.rounding_variance() / count.min(1.0 + steps);
+        let rounding =
+            self.rounding.variance() / count.min(1.0 + range_mps / self.rounding.quantum_mps());
         (self.variance() / count).max(rounding).max(VARIANCE_MIN)
     }
 
     /// Variance of one value, such that one may treat it as independent of its neighbours;
     /// `per_step_mps` is how far the speed moves from one sample to the next.
     pub fn variance_of_sample(&self, per_step_mps: f64) -> f64 {
-        let alike = (self.quantum_mps / per_step_mps).clamp(1.0, ALIKE_MAX);
         let variance = if self.freedom > 0.0 { self.variance() } else { self.unknown_variance };
-        variance.max(self.rounding_variance() * alike).max(VARIANCE_MIN)
-    }
-
-    /// Variance of rounding to the quantum in (m/s)².
-    pub fn rounding_variance(&self) -> f64 {
-        if self.quantum_mps.is_finite() { self.quantum_mps.powi(2) / 12.0 } else { 0.0 }
+        self.rounding.variance_of_sample(variance, per_step_mps).max(VARIANCE_MIN)
     }
 }
 
@@ -147,10 +129,10 @@ mod tests {
     fn rounding_of_a_steady_speed_does_not_average_out() {
         let mut noise = SpeedNoise::new(0.05);
         for speed_mps in [5.0, 5.1, 5.1, 5.2] {
-            noise.see(speed_mps);
+            noise.rounding.see(speed_mps);
         }
         let rounding = 0.1_f64.powi(2) / 12.0;
-        assert!((noise.rounding_variance() - rounding).abs() < 1e-12);
+        assert!((noise.rounding.variance() - rounding).abs() < 1e-12);
         assert!((noise.variance_of_mean(25.0, 0.0) - rounding).abs() < 1e-9);
         assert!((noise.variance_of_mean(25.0, 10.0) - rounding / 25.0).abs() < 1e-9);
         assert!((noise.variance_of_sample(0.2) - 0.05_f64.powi(2)).abs() < 1e-9, "no scatter yet");
@@ -162,6 +144,7 @@ mod tests {
     #[test]
     fn one_wild_scatter_hardly_moves_the_variance() {
         let mut noise = SpeedNoise::new(0.05);
+        [5.0, 5.11, 5.13].into_iter().for_each(|speed_mps| noise.rounding.see(speed_mps));
         for _ in 0..50 {
             noise.take(10.0 * 4e-4, 10.0);
         }

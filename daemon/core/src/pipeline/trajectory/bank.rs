@@ -29,6 +29,15 @@ pub struct JumpModel {
     pub spacing_s: f64,
 }
 
+/// What is known of a single step's errors, whatever the hypothesis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StepDoubt {
+    /// Variance in (m/s)² of what the step misses because forces may jump within it.
+    pub impulse_variance: f64,
+    /// Variance in (m/s)² of the rounding of the speed after it.
+    pub rounding_variance: f64,
+}
+
 /// Filters with different times of the last jump.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JumpBank {
@@ -39,6 +48,7 @@ pub struct JumpBank {
     jumps: JumpModel,
     noise: NoiseModel,
     outliers: OutlierModel,
+    doubt: StepDoubt,
     since_spawn_s: f64,
 }
 
@@ -66,6 +76,7 @@ impl JumpBank {
             jumps,
             noise,
             outliers,
+            doubt: StepDoubt::default(),
             since_spawn_s: 0.0,
         }
     }
@@ -92,6 +103,11 @@ impl JumpBank {
         }
     }
 
+    /// Says how far the next step can be believed; none is doubted unless this is called.
+    pub fn doubt(&mut self, doubt: StepDoubt) {
+        self.doubt = doubt;
+    }
+
     /// Moves every hypothesis over a step and weighs it by the speed measured after it; the
     /// innovation is that of the hypothesis that was likeliest before. `None` when no
     /// hypothesis is sound any more.
@@ -111,6 +127,8 @@ impl JumpBank {
         let mut told = None;
         for (index, hypothesis) in self.hypotheses[..self.count].iter_mut().enumerate() {
             hypothesis.predict(rule, step, duration_s);
+            hypothesis.doubt(self.doubt.impulse_variance);
+            hypothesis.noise.rounding_variance = self.doubt.rounding_variance;
             let innovation = hypothesis.measure(measured_mps, &self.noise, &self.outliers);
             hypothesis.weight *= innovation.likelihood;
             if index == likeliest {

@@ -103,7 +103,7 @@ impl Hypothesis {
         for column in [A, B, C] {
             self.factor.0[(SPEED, column)] = 0.0;
         }
-        self.factor.0[(SPEED, SPEED)] = self.noise.speed_variance.sqrt();
+        self.factor.0[(SPEED, SPEED)] = self.noise.measured_variance().sqrt();
         self.noise.anchor();
         self.unit.anchor();
         self.refusals = 0;
@@ -150,6 +150,13 @@ impl Hypothesis {
         self.age_s += duration_s;
     }
 
+    /// Lets the speed be doubted by a variance in (m/s)².
+    #[inline]
+    pub fn doubt(&mut self, variance: f64) {
+        let own = &mut self.factor.0[(SPEED, SPEED)];
+        *own = (*own * *own + variance).sqrt();
+    }
+
     /// Takes in a measured speed, or leaves it out when it more likely is an outlier. The weight
     /// stays; whoever compares hypotheses multiplies it by the likelihood.
     ///
@@ -164,7 +171,7 @@ impl Hypothesis {
         outliers: &OutlierModel,
     ) -> Innovation {
         let own_variance = self.factor.0.row(SPEED).norm_squared();
-        let noise_variance = self.noise.speed_variance;
+        let noise_variance = self.noise.measured_variance();
         let variance = own_variance + noise_variance;
         let inverse = 1.0 / variance;
         let deviation_mps = variance.sqrt();

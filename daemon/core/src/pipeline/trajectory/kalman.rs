@@ -6,7 +6,7 @@ use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, S
 use nalgebra::Vector3;
 use serde::Deserialize;
 
-use super::bank::{HYPOTHESES_MAX, JumpModel};
+use super::bank::{HYPOTHESES_MAX, JumpModel, StepDoubt};
 use super::hypothesis::Innovation;
 use super::index::DAVIS;
 use super::motion::{Motion, MotionStep, MotionTracker};
@@ -16,6 +16,7 @@ use super::quality::{Estimate, SpeedRange, missing, prior_std};
 use super::step::{Step, StepRule, resistance_gain};
 use super::unexplained::UnexplainedForce;
 use crate::force::ResolvedSample;
+use crate::pipeline::motion::{Rounding, jump_variance};
 use crate::pipeline::output::{write_parameters, write_status};
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::{SettingError, require};
@@ -118,6 +119,7 @@ impl TrajectoryKalmanSettings {
 pub struct TrajectoryKalman {
     gate: SampleGate,
     tracker: MotionTracker,
+    rounding: Rounding,
     filter: OnlineFilter,
     prior_std: Vector3<f64>,
     innovations: InnovationMonitor,
@@ -142,6 +144,7 @@ impl TrajectoryKalman {
         TrajectoryKalman {
             gate: SampleGate::default(),
             tracker: MotionTracker::default(),
+            rounding: Rounding::default(),
             filter: OnlineFilter::new(settings),
             prior_std: settings.davis_std,
             innovations: InnovationMonitor::new(INNOVATION_MEMORY),
@@ -159,6 +162,12 @@ impl TrajectoryKalman {
 
     fn take_step(&mut self, motion: &MotionStep, sample: &ResolvedSample) -> Outcome {
         let step = Step::from(motion);
+        let moved_mps = motion.distance_m / motion.duration_s - sample.speed_mps;
+        let learned = self.filter.bank().likeliest().noise.speed_variance;
+        self.filter.doubt(StepDoubt {
+            impulse_variance: jump_variance(motion.drive_change_mps2, motion.duration_s),
+            rounding_variance: self.rounding.variance_of_sample(learned, 2.0 * moved_mps.abs()),
+        });
         let told = self.filter.advance(StepRule::Time, &step, motion.duration_s, sample.speed_mps);
         let Some(innovation) = told else {
             self.fault = Some((Status::Unestimated, Reason::NumericalFailure));
@@ -185,6 +194,7 @@ impl Gated for TrajectoryKalman {
     }
 
     fn take(&mut self, sample: &ResolvedSample) -> Outcome {
+        self.rounding.see(sample.speed_mps);
         match self.tracker.advance(sample) {
             Motion::Continue(motion) => self.take_step(&motion, sample),
             Motion::Begin => {

@@ -31,6 +31,8 @@ pub struct MotionStep {
     pub distance_m: f64,
     /// Mean driving acceleration in m/s².
     pub drive_mps2: f64,
+    /// Change of the driving acceleration over the step in m/s².
+    pub drive_change_mps2: f64,
     /// κ in m/s² per N/kN.
     pub resistance_gain: f64,
 }
@@ -92,6 +94,7 @@ impl MotionTracker {
                     duration_s: sample.step_s,
                     distance_m: 0.5 * (last.speed_mps + speed_mps) * sample.step_s,
                     drive_mps2: 0.5 * (last.drive_mps2 + drive_mps2),
+                    drive_change_mps2: drive_mps2 - last.drive_mps2,
                     resistance_gain,
                 })
             }

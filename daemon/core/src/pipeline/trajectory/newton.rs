@@ -124,8 +124,9 @@ impl TrajectoryNewton {
         self.fit.speed_noise_mps = Some(self.speed_noise_mps);
         let fitted = match self.settings.method {
             FitMethod::LevenbergMarquardt => {
-                let deviation = self.settings.disturbance_mps2 / self.speed_noise_mps;
-                self.fit.disturbance = Disturbance::Ratio(deviation * deviation);
+                let density = self.settings.disturbance_mps2.powi(2) + self.window.missed_density();
+                let ratio = density / self.speed_noise_mps.powi(2);
+                self.fit.disturbance = Disturbance::Ratio(ratio);
                 let start = (self.windows > 0).then_some(self.davis);
                 self.fitter.fit(&[self.window.stretch()], start.as_ref(), &self.fit)
             }

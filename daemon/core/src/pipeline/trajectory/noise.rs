@@ -55,6 +55,9 @@ pub struct LearnedNoise {
     pub speed_variance: f64,
     /// Density q of the disturbing acceleration in (m/s)²/s.
     pub disturbance_density: f64,
+    /// Variance of the speed's rounding in (m/s)², below which the measured speed's does not lie:
+    /// rounding errors of a speed that hardly moves are alike, and innovations do not show them.
+    pub rounding_variance: f64,
     /// Derivatives of the predicted speed.
     by_speed: Vector2<f64>,
     /// Derivatives of the speed's variance.
@@ -71,6 +74,7 @@ impl LearnedNoise {
         LearnedNoise {
             speed_variance: model.speed_noise_mps * model.speed_noise_mps,
             disturbance_density: model.disturbance * model.disturbance,
+            rounding_variance: 0.0,
             by_speed: Vector2::zeros(),
             by_variance: Vector2::zeros(),
             information: Matrix2::from_diagonal_element(PRIOR_INFORMATION),
@@ -93,10 +97,22 @@ impl LearnedNoise {
         self.disturbance_density / (qq - rq * rq / rr - 1.0).max(LEAST_FREE_INFORMATION)
     }
 
+    /// Variance in (m/s)² that a measured speed is taken in with.
+    #[inline]
+    pub fn measured_variance(&self) -> f64 {
+        self.speed_variance.max(self.rounding_variance)
+    }
+
+    /// The derivative of that with respect to ln R.
+    #[inline]
+    fn measured_by_speed(&self) -> f64 {
+        if self.speed_variance >= self.rounding_variance { self.speed_variance } else { 0.0 }
+    }
+
     /// The speed has been taken from a measurement alone.
     pub fn anchor(&mut self) {
         self.by_speed = Vector2::zeros();
-        self.by_variance = Vector2::new(self.speed_variance, 0.0);
+        self.by_variance = Vector2::new(self.measured_by_speed(), 0.0);
         self.exceeded = 0;
     }
 
@@ -127,11 +143,11 @@ impl LearnedNoise {
         if !(model.learns_speed_noise || model.learns_disturbance) {
             return;
         }
-        let variance = own_variance + self.speed_variance;
+        let variance = own_variance + self.measured_variance();
         let inverse = 1.0 / variance;
         let square = innovation_mps * innovation_mps * inverse;
         let mut by_total = self.by_variance;
-        by_total[SPEED] += self.speed_variance;
+        by_total[SPEED] += self.measured_by_speed();
         if self.watch_for_change(innovation_mps, square, own_variance, model) || !is_used {
             return;
         }
@@ -151,7 +167,7 @@ impl LearnedNoise {
         self.by_speed = self.by_speed * (1.0 - gain) + by_gain * innovation_mps;
         let kept = 1.0 - gain;
         self.by_variance *= kept * kept;
-        self.by_variance[SPEED] += self.speed_variance * gain * gain;
+        self.by_variance[SPEED] += self.measured_by_speed() * gain * gain;
     }
 
     /// One step of ln R and ln q along the score.
@@ -192,7 +208,8 @@ impl LearnedNoise {
             self.exceeded_square = 0.0;
         }
         let has_grown = self.exceeded >= GROWN_AFTER;
-        let has_shrunk = self.newest_square < SHRUNK_BELOW && self.speed_variance > own_variance;
+        let has_shrunk = self.newest_square < SHRUNK_BELOW
+            && self.speed_variance > own_variance.max(self.rounding_variance);
         if !(model.learns_speed_noise && (has_grown || has_shrunk)) {
             return false;
         }

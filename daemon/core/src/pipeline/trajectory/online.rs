@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::bank::{JumpBank, JumpModel};
+use super::bank::{JumpBank, JumpModel, StepDoubt};
 use super::hypothesis::{Hypothesis, Innovation, OutlierModel};
 use super::long_run::LongRunVariance;
 use super::noise::{LearnedNoise, NoiseModel};
@@ -72,6 +72,11 @@ impl OnlineFilter {
     pub fn begin(&mut self, measured_mps: f64) {
         self.bank.anchor(measured_mps);
         self.long_run.break_here();
+    }
+
+    /// Says how far the next step can be believed; none is doubted unless this is called.
+    pub fn doubt(&mut self, doubt: StepDoubt) {
+        self.bank.doubt(doubt);
     }
 
     /// Takes in a step and the speed measured after it; `None` after a reset for numerical

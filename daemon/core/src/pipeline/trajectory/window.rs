@@ -3,6 +3,7 @@
 use super::fit::Stretch;
 use super::motion::MotionStep;
 use super::step::{Step, StepRule};
+use crate::pipeline::motion::jump_variance;
 
 /// The newest steps of unbroken motion, each about as long as the sampling distance.
 ///
@@ -16,6 +17,8 @@ pub struct Window {
     interval_m: f64,
     steps: Vec<Step>,
     speeds_mps: Vec<f64>,
+    /// Time in s of each step, and variance in (m/s)² of what it misses as forces jump.
+    missed: Vec<(f64, f64)>,
     open: OpenStep,
 }
 
@@ -26,6 +29,7 @@ const DURATION_MAX_S: f64 = 10.0;
 struct OpenStep {
     distance_m: f64,
     duration_s: f64,
+    missed: f64,
     /// Integral of the driving acceleration over the step's measure.
     drive: f64,
     /// Integral of κ over the step's measure.
@@ -40,6 +44,7 @@ impl Window {
             interval_m,
             steps: Vec::with_capacity(steps),
             speeds_mps: Vec::with_capacity(steps + 1),
+            missed: Vec::with_capacity(steps),
             open: OpenStep::default(),
         }
     }
@@ -48,6 +53,7 @@ impl Window {
     pub fn clear(&mut self) {
         self.steps.clear();
         self.speeds_mps.clear();
+        self.missed.clear();
         self.open = OpenStep::default();
     }
 
@@ -69,6 +75,7 @@ impl Window {
         };
         self.open.distance_m += motion.distance_m;
         self.open.duration_s += motion.duration_s;
+        self.open.missed += jump_variance(motion.drive_change_mps2, motion.duration_s);
         self.open.drive += motion.drive_mps2 * measure;
         self.open.gain += motion.resistance_gain * measure;
         if self.open.distance_m < self.interval_m && self.open.duration_s < DURATION_MAX_S {
@@ -81,6 +88,7 @@ impl Window {
         if self.steps.len() == self.steps.capacity() {
             self.steps.remove(0);
             self.speeds_mps.remove(0);
+            self.missed.remove(0);
         }
         self.steps.push(Step {
             size,
@@ -88,8 +96,17 @@ impl Window {
             resistance_gain: self.open.gain / size,
         });
         self.speeds_mps.push(speed_mps);
+        self.missed.push((self.open.duration_s, self.open.missed));
         self.open = OpenStep::default();
         true
+    }
+
+    /// Variance in (m/s)² that the steps miss for each second because forces jump.
+    pub fn missed_density(&self) -> f64 {
+        let sum =
+            |(time, variance): (f64, f64), step: &(f64, f64)| (time + step.0, variance + step.1);
+        let (time_s, variance) = self.missed.iter().fold((0.0, 0.0), sum);
+        if time_s > 0.0 { variance / time_s } else { 0.0 }
     }
 
     /// Steps in the window.
@@ -118,7 +135,13 @@ mod tests {
     use super::*;
 
     fn motion(drive_mps2: f64) -> MotionStep {
-        MotionStep { duration_s: 1.0, distance_m: 30.0, drive_mps2, resistance_gain: 0.009 }
+        MotionStep {
+            duration_s: 1.0,
+            distance_m: 30.0,
+            drive_mps2,
+            drive_change_mps2: 0.0,
+            resistance_gain: 0.009,
+        }
     }
 
     #[test]
