@@ -2,14 +2,14 @@
 
 /// Finds the quantum of a speed signal and the noise that it makes.
 ///
-/// Speeds on a grid differ by multiples of its step, and so do their differences. The smallest of
-/// either ever seen is the step of a coarse signal, and all but nothing for a fine one, even
-/// while the train speeds up evenly. A speed that only repeats tells nothing of its step.
+/// Speeds on a grid differ by multiples of its step: the smallest difference ever seen is the step
+/// of a coarse signal, and soon all but nothing for a fine one. Without noise it is the least
+/// change from one sample to the next, which stands for what a model without any error would make
+/// of perfect speeds: no model is that good. A speed that only repeats tells nothing of its step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rounding {
     quantum_mps: f64,
     last_mps: Option<f64>,
-    last_step_mps: Option<f64>,
 }
 
 /// The coarsest step in m/s that speeds are told in: 1 km/h.
@@ -21,7 +21,7 @@ const ALIKE_MAX: f64 = 100.0;
 
 impl Default for Rounding {
     fn default() -> Self {
-        Rounding { quantum_mps: QUANTUM_MAX_MPS, last_mps: None, last_step_mps: None }
+        Rounding { quantum_mps: QUANTUM_MAX_MPS, last_mps: None }
     }
 }
 
@@ -29,12 +29,9 @@ impl Rounding {
     /// Takes in the next speed in m/s.
     pub fn see(&mut self, speed_mps: f64) {
         let Some(last_mps) = self.last_mps.replace(speed_mps) else { return };
-        let step_mps = speed_mps - last_mps;
-        let bend_mps = self.last_step_mps.replace(step_mps).map(|last| step_mps - last);
-        for difference in [Some(step_mps), bend_mps].into_iter().flatten() {
-            if difference.abs() > DIFFERENCE_MIN_MPS {
-                self.quantum_mps = self.quantum_mps.min(difference.abs());
-            }
+        let difference_mps = (speed_mps - last_mps).abs();
+        if difference_mps > DIFFERENCE_MIN_MPS {
+            self.quantum_mps = self.quantum_mps.min(difference_mps);
         }
     }
 
@@ -86,7 +83,8 @@ mod tests {
         assert!((coarse.variance_of_sample(own, 0.01) / own - 5.0).abs() < 1e-9, "alike");
         let dithered = own + 0.025 * 0.025;
         assert!(coarse.variance_of_sample(dithered, 0.01) == dithered, "no longer alike");
-        assert!(after((0..50).map(exact)).quantum_mps() < 1e-3);
+        let turning = |k: i32| 5.0 + 0.01 * f64::from(k) - 1e-4 * f64::from(k * k);
+        assert!(after((0..100).map(turning)).quantum_mps() < 2e-4);
         assert_eq!(after([3.0, 3.0, 3.0]).quantum_mps(), QUANTUM_MAX_MPS, "nothing is known");
     }
 }
