@@ -44,7 +44,9 @@ pub fn execute(arguments: &SurveyArguments) -> Result<(), Failure> {
     if let Some(file) = &arguments.report {
         let provenance =
             Provenance::of(source).map_err(|error| Failure::Input(error.to_string()))?;
-        write_file(file, &page::html(&made.raw, &made.survey, &made.answer, &provenance))?;
+        let page = page::html(&made.raw, &made.survey, &made.answer, &provenance)
+            .map_err(|error| Failure::Work(format!("{}: {error}", file.display())))?;
+        write_file(file, &page)?;
         tell(&format!("report: {}", file.display()));
     }
     Ok(give(arguments.json.as_deref(), &made.answer, || summary(&made.answer))?)

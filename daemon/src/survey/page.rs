@@ -8,24 +8,36 @@ use dynocar_core::survey::Survey;
 use super::answer::Answer;
 use super::write::gradient_entries;
 use crate::report::html::{Column, Table, escape};
+use crate::report::plots::speeds::Width;
+use crate::report::plots::{PlotError, colour_rules, gradient};
 use crate::report::provenance::Provenance;
 
 const STYLE: &str = include_str!("../report/style.css");
-/// Width and height of the plots.
-const SIZE: (f64, f64) = (960.0, 420.0);
+/// Width and height of the map.
+const SIZE: (f64, f64) = (980.0, 420.0);
 
 /// The page: map, profile with its band, stops, passes, what was not used and what stays open.
-pub fn html(dataset: &Dataset, survey: &Survey, answer: &Answer, made: &Provenance) -> String {
+///
+/// # Errors
+///
+/// When a plot cannot be drawn.
+pub fn html(
+    dataset: &Dataset,
+    survey: &Survey,
+    answer: &Answer,
+    made: &Provenance,
+) -> Result<String, PlotError> {
     let name = escape(&dataset.name);
     let mut html = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta name=\"color-scheme\" content=\"light dark\">\n\
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
-         style-src 'unsafe-inline'\">\n<title>{name} – survey</title>\n<style>\n{STYLE}</style>\n\
+         style-src 'unsafe-inline'\">\n<title>{name} – survey</title>\n<style>\n{STYLE}\n{}</style>\n\
          </head>\n<body>\n<header>\n<p class=\"kicker\">Dynocar · survey</p>\n<h1>{name}</h1>\n\
          <p class=\"facts\">{:.1} m · {} stops · {} trips · {} passes learned from · {}</p>\n\
          </header>\n<main>\n",
+        colour_rules(),
         answer.line.length_m,
         answer.line.stops.len(),
         answer.trips.len(),
@@ -38,9 +50,9 @@ pub fn html(dataset: &Dataset, survey: &Survey, answer: &Answer, made: &Provenan
     };
     section("map", "The line", map(survey, answer));
     if let Some(profile) = &survey.profile {
-        let mut body = profile_plot(&gradient_entries(survey, profile, 1), "growing chainage");
+        let mut body = profile_plots(&gradient_entries(survey, profile, 1), "growing chainage")?;
         if !survey.ways.is_one_track() {
-            body += &profile_plot(&gradient_entries(survey, profile, -1), "falling chainage");
+            body += &profile_plots(&gradient_entries(survey, profile, -1), "falling chainage")?;
         }
         section("profile", "Gradient, with its 95 % band", body);
     }
@@ -55,12 +67,7 @@ pub fn html(dataset: &Dataset, survey: &Survey, answer: &Answer, made: &Provenan
          nothing.</p></footer>\n</body>\n</html>\n",
         made.version, made.day
     );
-    html
-}
-
-/// Scales values to a range of the plot.
-fn scaled(value: f64, (low, high): (f64, f64), (from, to): (f64, f64)) -> f64 {
-    from + (to - from) * (value - low) / (high - low).max(1e-9)
+    Ok(html)
 }
 
 fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
@@ -82,80 +89,69 @@ fn map(survey: &Survey, answer: &Answer) -> String {
     let (west, east) = range(all.iter().map(|it| it[0]));
     let (south, north) = range(all.iter().map(|it| it[1]));
     // Metres are as long upwards as sideways.
-    let span = ((east - west) / SIZE.0).max((north - south) / SIZE.1).max(1e-3) * 1.1;
+    let span = ((east - west) / SIZE.0).max((north - south) / SIZE.1).max(1e-3) * 1.15;
     let place = |at: [f64; 2]| {
         let x = 0.5 * SIZE.0 + (at[0] - 0.5 * (west + east)) / span;
         (x, 0.5 * SIZE.1 - (at[1] - 0.5 * (south + north)) / span)
     };
-    let mut svg = svg_head("The line on the map, with its stops");
-    for (direction, colour) in [(-1, "#c2703d"), (1, "#2f6db3")] {
+    let mut svg = format!(
+        "<svg class=\"plot\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"The line on the map, \
+         north upwards, with its stops\">\n",
+        SIZE.0, SIZE.1
+    );
+    for (direction, colour) in [(-1, "before"), (1, "after")] {
         if let Some(way) = ways.of(direction) {
             let line = path(way.nodes_m().iter().map(|&at| place(at)));
             let _ = writeln!(
                 svg,
-                "<path d=\"{line}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>"
+                "<path d=\"{line}\" fill=\"none\" stroke=\"var(--{colour})\" stroke-width=\"2\"/>"
             );
         }
     }
     for stop in &answer.line.stops {
         let Some(way) = ways.of(stop.direction) else { continue };
-        let along = match (&ways.falling, stop.direction) {
-            (Some(falling), -1) => falling.start_chainage_m - stop.chainage_m / ways.chainage_per_m,
-            _ => stop.chainage_m / ways.chainage_per_m,
-        };
-        let (x, y) = place(way.at(along));
+        let (x, y) = place(way.at(ways.along_m(stop.direction, stop.chainage_m)));
         let _ = writeln!(
             svg,
-            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"currentColor\"><title>{:.0} m {}\
+            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"var(--ink)\"><title>{:.0} m {}\
              </title></circle>",
             stop.chainage_m,
             escape(&stop.name)
         );
     }
-    svg + "</svg>\n<p>Blue: growing chainage; brown: falling; dots: stops.</p>\n"
+    let two = ways.falling.as_ref().is_some_and(|falling| !falling.is_same);
+    svg + &scale_bar(span)
+        + "</svg>\n<p class=\"note\">North is up. "
+        + match two {
+            true => "Blue: the way of growing chainage; brown: that of falling. ",
+            false => "The line: both directions take the same way, or one was driven. ",
+        }
+        + "Dots: stops, with their chainage when pointed at.</p>\n"
 }
 
-fn svg_head(label: &str) -> String {
+/// A bar of a round length, for a map of some m for each unit of the drawing.
+fn scale_bar(span: f64) -> String {
+    let most_m = 0.25 * SIZE.0 * span;
+    let decade_m = 10f64.powf(most_m.log10().floor());
+    let bar_m = [5.0, 2.0, 1.0].map(|it| it * decade_m).into_iter().find(|it| *it <= most_m);
+    let bar_m = bar_m.unwrap_or(decade_m);
+    let (left, right, y) = (20.0, 20.0 + bar_m / span, SIZE.1 - 20.0);
+    let name =
+        if bar_m < 1000.0 { format!("{bar_m:.0} m") } else { format!("{:.0} km", bar_m / 1e3) };
     format!(
-        "<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{label}\" width=\"100%\">\n",
-        SIZE.0, SIZE.1
+        "<path d=\"M{left},{y}H{right:.1}\" stroke=\"var(--muted)\" stroke-width=\"3\"/>\n<text \
+         x=\"{left}\" y=\"{}\" fill=\"var(--muted)\" font-size=\"15\">{name}</text>\n",
+        y - 8.0
     )
 }
 
-fn profile_plot(entries: &[(f64, f64, f64)], which: &str) -> String {
-    let (left, right) = range(entries.iter().map(|it| it.0));
-    let low_high = entries.iter().flat_map(|it| [it.1 - 1.96 * it.2, it.1 + 1.96 * it.2]);
-    let (low, high) = range(low_high);
-    let x = |at: f64| scaled(at, (left, right), (50.0, SIZE.0 - 10.0));
-    let y = |value: f64| scaled(value, (low, high), (SIZE.1 - 30.0, 10.0));
-    let mut svg = svg_head(&format!("Gradient over the chainage, {which}"));
-    let upper = entries.iter().map(|it| (x(it.0), y(it.1 + 1.96 * it.2)));
-    let lower = entries.iter().rev().map(|it| (x(it.0), y(it.1 - 1.96 * it.2)));
-    let _ = writeln!(
-        svg,
-        "<path d=\"{}Z\" fill=\"#2f6db3\" fill-opacity=\"0.3\"/>",
-        path(upper.chain(lower))
-    );
-    let line = path(entries.iter().map(|it| (x(it.0), y(it.1))));
-    let _ = writeln!(svg, "<path d=\"{line}\" fill=\"none\" stroke=\"#2f6db3\"/>");
-    for (at, anchor) in [(left, "start"), (right, "end")] {
-        let _ = writeln!(
-            svg,
-            "<text x=\"{:.1}\" y=\"{}\" text-anchor=\"{anchor}\" fill=\"currentColor\" \
-             font-size=\"14\">{at:.0} m</text>",
-            x(at),
-            SIZE.1 - 8.0
-        );
-    }
-    for value in [low, 0.0, high] {
-        let _ = writeln!(
-            svg,
-            "<text x=\"46\" y=\"{:.1}\" text-anchor=\"end\" fill=\"currentColor\" \
-             font-size=\"14\">{value:.0} ‰</text>",
-            y(value) + 5.0
-        );
-    }
-    svg + &format!("</svg>\n<p>For {which}.</p>\n")
+fn profile_plots(entries: &[(f64, f64, f64)], direction: &str) -> Result<String, PlotError> {
+    let [wide, narrow] =
+        [Width::Wide, Width::Narrow].map(|width| gradient::draw(entries, direction, width));
+    Ok(format!(
+        "<figure>\n<figcaption>For {direction}</figcaption>\n{}{}</figure>\n",
+        wide?, narrow?
+    ))
 }
 
 fn learned(answer: &Answer) -> String {

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use dynocar_core::dataset::{Dataset, DatasetFiles, ForceSource, Quantity, Run};
-use dynocar_core::survey::profile::HEIGHT_STEP_M;
+use dynocar_core::survey::layout::HEIGHT_STEP_M;
 use dynocar_core::survey::{Survey, SurveyedProfile, Trip, Vehicle};
 use dynocar_shared::{SampleField, TrainSample};
 use toml::{Table, Value};

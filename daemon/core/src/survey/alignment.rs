@@ -28,14 +28,25 @@ pub struct PassRows {
     pub rows: std::ops::Range<usize>,
 }
 
-/// Moves a first way into the middle of the passes.
-pub fn align(first: Way, passes: &[PassRows], recordings: &[Recording]) -> Way {
+/// Moves a first way into the middle of the passes, each with its direction along it: 1 or -1.
+pub fn align(first: Way, passes: &[(PassRows, i8)], recordings: &[Recording]) -> Way {
     let mut way = first;
     for _ in 0..ROUNDS {
-        let placed: Vec<Vec<Placed>> = passes
-            .iter()
-            .map(|pass| follow(&recordings[pass.recording], pass.rows.clone(), &way))
-            .collect();
+        let Some(back) = way.reversed() else { return way };
+        let place = |(pass, direction): &(PassRows, i8)| {
+            let recording = &recordings[pass.recording];
+            if *direction > 0 {
+                return follow(recording, pass.rows.clone(), &way);
+            }
+            let mut placed = follow(recording, pass.rows.clone(), &back);
+            placed.reverse();
+            for fix in &mut placed {
+                fix.chainage_m = way.length_m() - fix.chainage_m;
+                fix.left_m = -fix.left_m;
+            }
+            placed
+        };
+        let placed: Vec<Vec<Placed>> = passes.iter().map(place).collect();
         let speed_mps = mean_speed(passes, recordings);
         let Some(moved) = moved(&way, &placed, speed_mps) else { return way };
         way = moved;
@@ -44,9 +55,9 @@ pub fn align(first: Way, passes: &[PassRows], recordings: &[Recording]) -> Way {
 }
 
 /// Mean speed in m/s while moving.
-fn mean_speed(passes: &[PassRows], recordings: &[Recording]) -> f64 {
+fn mean_speed(passes: &[(PassRows, i8)], recordings: &[Recording]) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
-    for pass in passes {
+    for (pass, _) in passes {
         let speeds = &recordings[pass.recording].raw.speed_mps[pass.rows.clone()];
         for &speed in speeds.iter().filter(|speed| **speed > 1.0) {
             sum += speed;

@@ -8,6 +8,8 @@ const REACH_M: f64 = 40.0;
 const RADIUS_MAX_M: f64 = 2500.0;
 /// A shorter curve in m is none.
 const LENGTH_MIN_M: f64 = 30.0;
+/// A curve that reaches an end of a way goes on beyond it for so many m: under half a train.
+const BEYOND_M: f64 = 110.0;
 
 /// A curve of a way.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,13 +26,16 @@ pub struct FoundCurve {
 pub fn curves(way: &Way) -> Vec<FoundCurve> {
     let step_m = way.step_m();
     let count = way.nodes_m().len();
+    let reach = (REACH_M / step_m).round().max(1.0) as usize;
+    let direction = |segment: usize| way.direction((segment as f64 + 0.5) * step_m);
     let curvature: Vec<f64> = (0..count)
         .map(|node| {
-            let at_m = node as f64 * step_m;
-            let (from, to) = (way.direction(at_m - REACH_M), way.direction(at_m + REACH_M));
+            // Near an end the turning is that of the part that is there.
+            let (first, last) = (node.saturating_sub(reach), (node + reach - 1).min(count - 2));
+            let (from, to) = (direction(first), direction(last));
             let cross = from[0] * to[1] - from[1] * to[0];
             let dot = from[0] * to[0] + from[1] * to[1];
-            cross.atan2(dot) / (2.0 * REACH_M)
+            cross.atan2(dot) / ((last - first).max(1) as f64 * step_m)
         })
         .collect();
     let mut found = Vec::new();
@@ -46,8 +51,15 @@ pub fn curves(way: &Way) -> Vec<FoundCurve> {
         if side != 0 && length_m >= LENGTH_MIN_M {
             let turned: f64 = curvature[first..end].iter().sum::<f64>() * step_m;
             let radius_m = length_m / turned.abs();
-            let from_m = (first as f64 - 0.5).max(0.0) * step_m;
-            found.push(FoundCurve { from_m, to_m: from_m + length_m, radius_m });
+            let (mut from_m, mut to_m) =
+                ((first as f64 - 0.5) * step_m, (end as f64 - 0.5) * step_m);
+            if first == 0 {
+                from_m = -BEYOND_M;
+            }
+            if end == count {
+                to_m = way.length_m() + BEYOND_M;
+            }
+            found.push(FoundCurve { from_m, to_m, radius_m });
         }
         first = end;
     }
@@ -87,5 +99,17 @@ mod tests {
         assert_eq!(found.len(), 1, "{found:?}");
         assert!((found[0].radius_m - 800.0).abs() < 60.0, "{found:?}");
         assert!((found[0].to_m - found[0].from_m - 800.0).abs() < 80.0);
+    }
+    #[test]
+    fn a_curve_at_the_start_of_a_way_is_seen_from_there_on_and_goes_on_before_it() {
+        let arc = |k: i32| {
+            let angle = 10.0 * f64::from(k) / 400.0;
+            [400.0 * angle.sin(), 400.0 * (1.0 - angle.cos())]
+        };
+        let points: Vec<[f64; 2]> = (0..30).map(arc).collect();
+        let found = curves(&Way::through(&points).unwrap());
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!((found[0].radius_m - 400.0).abs() < 20.0, "{found:?}");
+        assert!(found[0].from_m < -100.0 && found[0].to_m > 390.0, "{found:?}");
     }
 }

@@ -1,6 +1,7 @@
 //! The line that is driven repeatedly, and which stretches are passes of it.
 
 use super::alignment::{PassRows, align};
+use super::both_directions::{Compared, compare};
 use super::recording::Recording;
 use super::stretches::{SAME_WAY_M, Stretch, distance_squared};
 use super::tracking::follow;
@@ -16,12 +17,6 @@ const POINT_STEP_M: f64 = 20.0;
 const PASS_SHARE_MIN: f64 = 0.25;
 /// A pass of this many m is worth having however long the line is.
 const PASS_MIN_M: f64 = 1000.0;
-/// Both directions take the same way when so much of it lies within `SAME_TRACK_M`.
-const SAME_TRACK_SHARE: f64 = 0.97;
-/// Distance in m of two tracks of the same way.
-const SAME_TRACK_M: f64 = 25.0;
-/// Difference in m between the chainages of two ways at the same places, up to which they are one.
-const SAME_CHAINAGE_M: f64 = 15.0;
 
 /// The ways of a line, each in its direction of travel.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,6 +58,15 @@ impl Ways {
         self.chainage_per_m * on_plane_m
     }
 
+    /// Place in m along the way of a direction of a chainage in m: [`Ways::chainage_m`] turned round.
+    pub fn along_m(&self, direction: i8, chainage_m: f64) -> f64 {
+        let on_plane_m = chainage_m / self.chainage_per_m;
+        match (&self.falling, direction) {
+            (Some(falling), -1) => falling.start_chainage_m - on_plane_m,
+            _ => on_plane_m,
+        }
+    }
+
     /// True when both directions share one profile.
     pub fn is_one_track(&self) -> bool {
         self.falling.as_ref().is_none_or(|falling| falling.is_same)
@@ -83,7 +87,7 @@ pub fn find(stretches: &[Stretch], recordings: &[Recording]) -> Option<Ways> {
     let fit: Vec<Stretch> =
         stretches.iter().filter(|it| recordings[it.recording].raw.is_fit).copied().collect();
     let template = template(&fit, recordings)?;
-    let back = reversed(&template)?;
+    let back = template.reversed()?;
     let growing = along(&template, &fit, recordings);
     let falling = along(&back, &fit, recordings);
     // The line's chainage grows in the direction in which it was first driven.
@@ -98,9 +102,31 @@ pub fn find(stretches: &[Stretch], recordings: &[Recording]) -> Option<Ways> {
         true => [(back, falling), (template, growing)],
         false => [(template, growing), (back, falling)],
     };
-    let way = way_of(&template, &ahead, recordings);
-    let falling = falling_way(&way, &reversed_template, &back, recordings);
-    Some(Ways { growing: way, falling, chainage_per_m: 1.0 })
+    let growing = way_of(&template, &ahead, recordings);
+    let chainage_per_m = 1.0;
+    if back.is_empty() {
+        return Some(Ways { growing, falling: None, chainage_per_m });
+    }
+    let way = way_of(&reversed_template, &back, recordings);
+    let Some(Compared { start_chainage_m, joined }) = compare(&growing, &way) else {
+        return Some(Ways { growing, falling: None, chainage_per_m });
+    };
+    let Some(joined) = joined else {
+        let falling = Some(FallingWay { way, start_chainage_m, is_same: false });
+        return Some(Ways { growing, falling, chainage_per_m });
+    };
+    // One track has one way and one chainage, and the passes of both directions show it.
+    let passes =
+        [(joined.clone(), 1), (joined.reversed()?, -1)].into_iter().flat_map(|(way, direction)| {
+            let along = self::along(&way, &fit, recordings);
+            let passes: Vec<PassRows> = along.into_iter().map(|(_, pass)| pass).collect();
+            thinned(&passes).into_iter().map(move |pass| (pass, direction))
+        });
+    let growing = align(joined, &passes.collect::<Vec<_>>(), recordings);
+    let way = growing.reversed()?;
+    let start_chainage_m = way.length_m();
+    let falling = Some(FallingWay { way, start_chainage_m, is_same: true });
+    Some(Ways { growing, falling, chainage_per_m })
 }
 
 /// The way of a direction from its own stretches: where they differ from the other direction's,
@@ -113,56 +139,13 @@ fn way_of(template: &Way, along: &[(Stretch, PassRows)], recordings: &[Recording
     };
     let passes: Vec<PassRows> =
         self::along(&first, &own, recordings).into_iter().map(|(_, pass)| pass).collect();
-    align(first, &thinned(&passes), recordings)
+    let passes: Vec<_> = thinned(&passes).into_iter().map(|pass| (pass, 1)).collect();
+    align(first, &passes, recordings)
 }
 
 fn thinned(passes: &[PassRows]) -> Vec<PassRows> {
     let step = passes.len().div_ceil(ALIGNED_MAX).max(1);
     passes.iter().step_by(step).cloned().collect()
-}
-
-fn falling_way(
-    growing: &Way,
-    reversed_template: &Way,
-    back: &[(Stretch, PassRows)],
-    recordings: &[Recording],
-) -> Option<FallingWay> {
-    if back.is_empty() {
-        return None;
-    }
-    let way = way_of(reversed_template, back, recordings);
-    let (mut apart, mut chainages) = (0, Vec::new());
-    for (node, &at) in way.nodes_m().iter().enumerate() {
-        let near = growing.nodes_near(at, SAME_WAY_M);
-        let Some((twin, distance)) = near.min_by(|one, other| one.1.total_cmp(&other.1)) else {
-            apart += 1;
-            continue;
-        };
-        apart += usize::from(distance > SAME_TRACK_M);
-        chainages.push(twin as f64 * growing.step_m() + node as f64 * way.step_m());
-    }
-    if chainages.is_empty() {
-        return None;
-    }
-    chainages.sort_unstable_by(f64::total_cmp);
-    let share = |share: f64| chainages[(share * (chainages.len() - 1) as f64) as usize];
-    let start_chainage_m = share(0.5);
-    let nodes = way.nodes_m().len() as f64;
-    let is_same = (apart as f64) < (1.0 - SAME_TRACK_SHARE) * nodes
-        && share(0.97) - share(0.03) < SAME_CHAINAGE_M;
-    if is_same {
-        // One track has one chainage: the way back is the way there.
-        let way = reversed(growing)?;
-        let start_chainage_m = way.length_m();
-        return Some(FallingWay { way, start_chainage_m, is_same });
-    }
-    Some(FallingWay { way, start_chainage_m, is_same })
-}
-
-fn reversed(way: &Way) -> Option<Way> {
-    let mut nodes = way.nodes_m().to_vec();
-    nodes.reverse();
-    Way::through(&nodes)
 }
 
 fn rows_of(stretch: &Stretch, recordings: &[Recording]) -> std::ops::Range<usize> {

@@ -8,20 +8,24 @@
 //! # Layout, in the order of reading
 //!
 //! - [`recording`], [`geodesy`]: what was recorded, on a plane in metres
-//! - `stretches`, [`way`], `tracking`, `alignment`, [`line`]: the line that is driven repeatedly
+//! - `stretches`, [`way`], `tracking`, `alignment`, `both_directions`, [`line`]: the line that is driven repeatedly
 //! - [`chainage`]: a chainage for every row; [`stops`], [`curves`]: what it shows
 //! - [`balance`], [`common`], [`profile`], [`friction`], [`learn`]: gradient, resistance, mass,
-//!   time offset and friction brake from the balance of forces; [`banded`]: its solver
+//!   time offset and friction brake from the balance of forces; [`layout`]: its unknown heights;
+//!   [`banded`], `bordered`: its solver
 //! - [`survey()`]: all of it in turn
 
 mod alignment;
 pub mod balance;
 pub mod banded;
+mod bordered;
+mod both_directions;
 pub mod chainage;
 pub mod common;
 pub mod curves;
 pub mod friction;
 pub mod geodesy;
+pub mod layout;
 pub mod learn;
 pub mod line;
 pub mod profile;

@@ -6,13 +6,11 @@
 //! its border; the mass of each pass is fitted in turns, so that work grows linearly with passes.
 
 use super::balance::Observation;
-use super::banded::{Banded, Factor};
+use super::banded::{Banded, NotPositive};
+use super::bordered::Bordered;
 use super::common::{Common, Prior};
+use super::layout::{Course, HEIGHT_STEP_M, Layout};
 
-/// Distance in m between heights.
-pub const HEIGHT_STEP_M: f64 = 10.0;
-/// Heights reach beyond a way by half a vehicle and so many m.
-const MARGIN_M: f64 = 60.0;
 /// Standard deviation in m of a row of GNSS altitude: far more than it errs, since its errors
 /// last for minutes.
 const ALTITUDE_STD_M: f64 = 15.0;
@@ -25,86 +23,6 @@ const ROUNDS: usize = 8;
 /// Degrees of freedom of the residuals' distribution.
 const TAIL: f64 = 4.0;
 const GRAVITY_MPS2: f64 = 9.81;
-
-/// Where heights lie in the system.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Layout {
-    /// For the two ways: number of the first height, and number of heights.
-    blocks: Vec<(usize, usize)>,
-    /// Chainage in m of a block's first height along its way.
-    start_m: f64,
-    vehicle_m: f64,
-}
-
-/// A pass's way in the system: which block, and +1 along it, -1 against it from an end.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Course {
-    /// Number of the block of heights.
-    pub block: usize,
-    /// For a pass against the block's sense: length of the way in m.
-    pub against_from_m: Option<f64>,
-}
-
-impl Course {
-    fn in_block(&self, along_m: f64) -> f64 {
-        self.against_from_m.map_or(along_m, |length_m| length_m - along_m)
-    }
-}
-
-impl Layout {
-    /// Heights for ways of some lengths in m.
-    pub fn new(lengths_m: &[f64], vehicle_m: f64) -> Self {
-        let start_m = -(MARGIN_M + 0.5 * vehicle_m);
-        let mut next = 0;
-        let block = |length_m: &f64| {
-            let count = ((length_m - 2.0 * start_m) / HEIGHT_STEP_M).ceil() as usize + 1;
-            next += count;
-            (next - count, count)
-        };
-        let blocks = lengths_m.iter().map(block).collect();
-        Layout { blocks, start_m, vehicle_m }
-    }
-
-    fn size(&self) -> usize {
-        self.blocks.iter().map(|block| block.1).sum()
-    }
-
-    /// Diagonals beside the main one: a vehicle, and the reach of a block of time.
-    fn width(&self, reach_max_m: f64) -> usize {
-        ((self.vehicle_m.max(HEIGHT_STEP_M) + 2.0 * reach_max_m) / HEIGHT_STEP_M).ceil() as usize
-            + 3
-    }
-
-    /// Adds a height with a weight to a sparse row.
-    fn push(&self, block: usize, at_m: f64, weight: f64, row: &mut Vec<(usize, f64)>) {
-        let (first, count) = self.blocks[block];
-        let place = ((at_m - self.start_m) / HEIGHT_STEP_M).clamp(0.0, (count - 1) as f64 - 1e-9);
-        let (node, share) = (place as usize, place.fract());
-        for (node, part) in [(node, 1.0 - share), (node + 1, share)] {
-            match row.iter_mut().find(|entry| entry.0 == first + node) {
-                Some(entry) => entry.1 += weight * part,
-                None => row.push((first + node, weight * part)),
-            }
-        }
-    }
-
-    /// The gradient under a vehicle as a combination of heights.
-    fn gradient(&self, course: Course, along_m: f64, reach_m: f64, row: &mut Vec<(usize, f64)>) {
-        row.clear();
-        let length_m = self.vehicle_m.max(HEIGHT_STEP_M);
-        let parts: &[(f64, f64)] = match reach_m > 0.0 {
-            true => &[(-1.0, 0.25), (0.0, 0.5), (1.0, 0.25)],
-            false => &[(0.0, 1.0)],
-        };
-        for (offset, weight) in parts {
-            let centre_m = along_m + offset * reach_m;
-            let front = course.in_block(centre_m + 0.5 * length_m);
-            let rear = course.in_block(centre_m - 0.5 * length_m);
-            self.push(course.block, front, weight / length_m, row);
-            self.push(course.block, rear, -weight / length_m, row);
-        }
-    }
-}
 
 /// An altitude that GNSS gave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -166,7 +84,7 @@ impl Evidence {
         walk_per_m: f64,
         counts: Fold,
         wants_std: bool,
-    ) -> Result<Profile, super::banded::NotPositive> {
+    ) -> Result<Profile, NotPositive> {
         let size = self.layout.size();
         let mut state = Profile {
             layout: self.layout.clone(),
@@ -199,7 +117,7 @@ impl Evidence {
         walk_per_m: f64,
         counts: Fold,
         wants_std: bool,
-    ) -> Result<(), super::banded::NotPositive> {
+    ) -> Result<(), NotPositive> {
         let size = self.layout.size();
         let reach_max_m = self.observations.iter().map(|it| it.reach_m).fold(0.0, f64::max);
         let mut matrix = Banded::zeros(size, self.layout.width(reach_max_m));
@@ -235,15 +153,15 @@ impl Evidence {
             }
         }
         let factor = matrix.factor()?;
-        let step = Bordered { factor: &factor, border: &border, corner, corner_right };
-        let (heights, common, std, columns) = step.solve(right);
-        for (height, change) in state.heights_m.iter_mut().zip(heights) {
+        let step = Bordered { factor: &factor, border: &border, corner, corner_right }.solve(right);
+        for (height, change) in state.heights_m.iter_mut().zip(&step.heights_m) {
             *height += change;
         }
-        state.common.add(&common);
-        state.common_std = std.0;
+        state.common.add(&step.common);
+        state.common_std = step.common_std();
         if wants_std {
-            state.gradient_var = self.layout.gradient_variances(&factor, &columns, &std.1);
+            state.gradient_var =
+                self.layout.gradient_variances(&factor, &step.columns, &step.covariance);
         }
         if !sizes.is_empty() {
             let middle = sizes.len() / 2;
@@ -392,81 +310,5 @@ impl Profile {
         let mut row = Vec::with_capacity(2);
         self.layout.push(block, at_m, 1.0, &mut row);
         row.iter().map(|&(node, value)| value * self.heights_m[node]).sum()
-    }
-}
-
-impl Layout {
-    /// Variance of the gradient between neighbouring heights.
-    fn gradient_variances(
-        &self,
-        factor: &Factor,
-        columns: &[[f64; Common::COUNT]],
-        common: &nalgebra::SMatrix<f64, { Common::COUNT }, { Common::COUNT }>,
-    ) -> Vec<Vec<f64>> {
-        let inverse = factor.inverse_band();
-        let per_m = 1.0 / HEIGHT_STEP_M;
-        let of_node = |node: usize| {
-            let row = [(node, -per_m), (node + 1, per_m)];
-            let slopes = nalgebra::SVector::<f64, { Common::COUNT }>::from_fn(|index, _| {
-                per_m * (columns[node + 1][index] - columns[node][index])
-            });
-            inverse.variance_of(&row).max(0.0) + slopes.dot(&(common * slopes)).max(0.0)
-        };
-        let block =
-            |&(first, count): &(usize, usize)| (first..first + count - 1).map(of_node).collect();
-        self.blocks.iter().map(block).collect()
-    }
-}
-
-/// A banded system with a border of common unknowns.
-struct Bordered<'b> {
-    factor: &'b Factor,
-    border: &'b [[f64; Common::COUNT]],
-    corner: nalgebra::SMatrix<f64, { Common::COUNT }, { Common::COUNT }>,
-    corner_right: nalgebra::SVector<f64, { Common::COUNT }>,
-}
-
-type CommonCovariance = nalgebra::SMatrix<f64, { Common::COUNT }, { Common::COUNT }>;
-
-impl Bordered<'_> {
-    /// Heights, common unknowns, their standard deviations and covariance, and the columns of
-    /// the band's inverse times the border.
-    #[allow(clippy::type_complexity)]
-    fn solve(
-        &self,
-        mut right: Vec<f64>,
-    ) -> (Vec<f64>, Common, (Common, CommonCovariance), Vec<[f64; Common::COUNT]>) {
-        let size = right.len();
-        self.factor.solve(&mut right);
-        let mut columns = vec![[0.0; Common::COUNT]; size];
-        let mut column = vec![0.0; size];
-        for index in 0..Common::COUNT {
-            for (entry, border) in column.iter_mut().zip(self.border) {
-                *entry = border[index];
-            }
-            self.factor.solve(&mut column);
-            for (entries, value) in columns.iter_mut().zip(&column) {
-                entries[index] = *value;
-            }
-        }
-        let (mut corner, mut corner_right) = (self.corner, self.corner_right);
-        for node in 0..size {
-            for one in 0..Common::COUNT {
-                corner_right[one] -= self.border[node][one] * right[node];
-                for other in 0..Common::COUNT {
-                    corner[(one, other)] -= self.border[node][one] * columns[node][other];
-                }
-            }
-        }
-        // The prior keeps the corner positive definite.
-        let covariance = corner.try_inverse().unwrap_or_else(CommonCovariance::zeros);
-        let common = covariance * corner_right;
-        for (height, column) in right.iter_mut().zip(&columns) {
-            for index in 0..Common::COUNT {
-                *height -= column[index] * common[index];
-            }
-        }
-        let std = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
-        (right, Common(common), (Common(std), covariance), columns)
     }
 }

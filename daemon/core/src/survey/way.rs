@@ -57,6 +57,11 @@ impl Way {
         Some(Way { nodes_m, step_m, cells })
     }
 
+    /// The same way driven the other way round.
+    pub fn reversed(&self) -> Option<Way> {
+        Way::through(&self.nodes_m.iter().rev().copied().collect::<Vec<_>>())
+    }
+
     /// Its nodes, east and north in m.
     pub fn nodes_m(&self) -> &[[f64; 2]] {
         &self.nodes_m
