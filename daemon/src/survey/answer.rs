@@ -4,7 +4,8 @@ use dynocar_core::dataset::Dataset;
 use dynocar_core::survey::{Survey, Vehicle};
 use serde::Serialize;
 
-use super::write::{gradient_entries, late_s, trip_file};
+use super::trip_rows::late_s;
+use super::write::{gradient_entries, trip_file};
 
 /// All that a survey found.
 #[derive(Debug, Serialize)]

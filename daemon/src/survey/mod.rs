@@ -1,13 +1,15 @@
 //! Raw recordings to a dataset on a surveyed line: reading, writing and telling.
 //!
 //! - [`read`]: a dataset's runs as recordings; a line that was surveyed before
-//! - [`write`](mod@write): the dataset folder with its trips
+//! - [`write`](mod@write), [`trip_rows`]: the dataset folder with its trips
 //! - [`answer`]: the result for machines
 //! - [`page`]: the result as a page
 
 pub mod answer;
+pub mod material;
 pub mod page;
 pub mod read;
+pub mod trip_rows;
 pub mod write;
 
 use std::path::{Path, PathBuf};
@@ -17,7 +19,8 @@ use dynocar_core::survey::stops::Stop;
 use dynocar_core::survey::{Survey, SurveyError, survey};
 
 use self::answer::Answer;
-use self::write::{Material, write};
+use self::material::Material;
+use self::write::write;
 use crate::dataset::{LoadError, load};
 use crate::output::OutputError;
 
