@@ -52,6 +52,33 @@ fn every_test_that_the_promises_name_exists() {
     }
 }
 
+/// What stands between backticks and names a Rust file by its path, with the name in it, if any.
+fn named_places(document: &str) -> impl Iterator<Item = (&str, Option<&str>)> {
+    let codes = document.split('`').skip(1).step_by(2).filter(|code| code.contains('/'));
+    codes.filter_map(|code| match code.split_once(".rs::") {
+        Some((file, name)) => Some((&code[..file.len() + 3], Some(name))),
+        None => code.ends_with(".rs").then_some((code, None)),
+    })
+}
+
+#[test]
+fn every_place_that_the_walks_through_the_source_name_is_there() {
+    let defines = |line: &str, name: &str| {
+        let mut words = line.split(|it: char| !it.is_alphanumeric() && it != '_');
+        let is_kind = |word| matches!(word, "fn" | "const" | "struct" | "trait" | "enum");
+        words.by_ref().any(is_kind) && words.next() == Some(name)
+    };
+    for page in ["docs/walkthrough.md", "ARCHITECTURE.md"] {
+        let text = read(page);
+        assert!(named_places(&text).count() >= 4, "{page}: the places are found");
+        for (file, name) in named_places(&text) {
+            let source = read(file);
+            let is_there = |name| source.lines().any(|line| defines(line, name));
+            assert!(name.is_none_or(is_there), "{page}: {file} has no {name:?}");
+        }
+    }
+}
+
 #[test]
 fn the_reading_guide_has_a_line_for_every_member_of_the_vocabularies() {
     use dynocar_shared::{PipelineKind, Quantity, Reason, RejectionReason, Status};
