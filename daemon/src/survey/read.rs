@@ -12,7 +12,7 @@ use dynocar_core::survey::{KnownLine, Vehicle};
 use dynocar_core::track::Track;
 use dynocar_shared::SampleField;
 
-use super::SurveyFailure;
+use super::failure::SurveyFailure;
 use crate::dataset::{load_track, read_text};
 
 /// A run's rows in order of time, as numbers of its samples.

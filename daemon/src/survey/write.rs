@@ -8,7 +8,7 @@ use dynocar_core::survey::layout::HEIGHT_STEP_M;
 use dynocar_core::survey::{Survey, SurveyedProfile};
 use toml::{Table, Value};
 
-use super::SurveyFailure;
+use super::failure::SurveyFailure;
 use super::material::Material;
 use super::trip_rows::{Column, columns, run_csv};
 use crate::dataset::open;
