@@ -16,6 +16,7 @@ use crate::latency::{self, LatencyArguments, plot};
 use crate::load::{self, LoadArguments};
 use crate::output::give;
 use crate::papers::{self, Row, Seeds, Verdict, table};
+use crate::survey::{self, SurveyArguments};
 
 /// Measures Dynocar: accuracy against the statistical bound, speed against peers.
 #[derive(Debug, Parser)]
@@ -32,6 +33,7 @@ enum Command {
     Latency(LatencyArguments),
     Load(LoadArguments),
     Papers(PapersArguments),
+    Survey(SurveyArguments),
     #[command(hide = true)]
     Peer(PeerArguments),
 }
@@ -104,6 +106,7 @@ pub fn main() -> ExitCode {
         Command::Latency(arguments) => latency(arguments),
         Command::Load(arguments) => load(arguments),
         Command::Papers(arguments) => papers(arguments),
+        Command::Survey(arguments) => survey::run(arguments),
         Command::Peer(arguments) => serve(arguments).map_err(|error| (error.to_string(), 1)),
     };
     match result {

@@ -8,6 +8,7 @@
 //! - [`rig`]: what the two share
 //! - [`output`]: results for people and for machines
 //! - [`papers`]: accuracy of every estimator over seeded runs, beside the statistical bound
+//! - [`survey`](mod@survey): how the work of a survey grows with passes
 
 pub mod cli;
 pub mod estimators;
@@ -17,3 +18,4 @@ pub mod load;
 pub mod output;
 pub mod papers;
 pub mod rig;
+pub mod survey;

@@ -14,6 +14,7 @@
 //! - [`runtime`]: its threads
 //! - [`state`]: estimates that outlive the daemon
 //! - [`supervision`]: what a supervisor and an operator see of the daemon
+//! - [`survey`]: raw recordings to a dataset on a surveyed line
 //! - [`replay`]: recorded runs into the sample channel
 
 pub mod cli;
@@ -29,3 +30,4 @@ pub mod run;
 pub mod runtime;
 pub mod state;
 pub mod supervision;
+pub mod survey;

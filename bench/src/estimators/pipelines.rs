@@ -44,6 +44,7 @@ impl DemoRun {
             ratio: Some(2.55),
             friction: Some(0.35),
             pads: Some(48.0),
+            friction_brake: None,
         };
         Ok(Arc::new(DemoRun { train: Arc::new(train), track: head.track, samples: run.samples }))
     }

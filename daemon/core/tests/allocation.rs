@@ -41,6 +41,7 @@ fn train() -> Arc<TrainModel> {
         mass_kg: 200_000.0,
         length_m: 100.0,
         cars: 4,
+        passenger_mass_kg: 70.0,
         rotating_mass_factor: 0.06,
         resistance: Davis { a: 1.8, b: 0.03, c: 0.0035 },
         curve_constant_n_per_kn_m: 600.0,
@@ -55,6 +56,7 @@ fn train() -> Arc<TrainModel> {
             ratio: Some(2.55),
             friction: Some(0.35),
             pads: Some(48.0),
+            friction_brake: None,
         },
         corrections: Default::default(),
     })

@@ -108,6 +108,11 @@ pub struct Column {
 }
 
 impl Column {
+    /// A train without an odometer has no position of its own.
+    pub fn is_written(&self, has_odometer: bool) -> bool {
+        has_odometer || self.quantity != Quantity::Position
+    }
+
     /// The file's text for an SI value.
     pub fn text(&self, si: f64) -> String {
         let value = (si * self.per_si + self.addend) / self.scale;
@@ -175,9 +180,11 @@ pub fn row_text(
     plan: &RunPlan,
     train_length_m: f64,
     number: usize,
+    has_odometer: bool,
 ) -> String {
     let head_m = if style.is_head_position { 0.5 * train_length_m * plan.direction } else { 0.0 };
-    let cells = style.columns.iter().map(|column| {
+    let written = style.columns.iter().filter(|it| it.is_written(has_odometer));
+    let cells = written.map(|column| {
         let value = match column.quantity {
             Quantity::Time => Some(sample.time_ns as f64 * 1e-9),
             Quantity::Position => sample.get(SampleField::Position).map(|centre| centre + head_m),

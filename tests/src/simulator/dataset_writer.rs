@@ -8,10 +8,15 @@ use dynocar_core::train::TrainModel;
 
 use super::columns::{FileStyle, make_style, row_text};
 use super::random::{Random, Stream};
-use super::{SimulatedDataset, SimulatedRun};
+use super::{SimulatedDataset, SimulatedRun, gnss};
 
 /// A file of a dataset: its path within the folder, and its text.
 pub type FileText = (String, String);
+
+/// What `[columns]` says of a GNSS receiver's columns.
+const GNSS_COLUMNS: &str = "latitude = { column = \"lat\", unit = \"deg\" }\n\
+    longitude = { column = \"lon\", unit = \"deg\" }\n\
+    altitude = { column = \"alt\", unit = \"m\" }";
 
 /// The files of a dataset; nothing in them tells of the truth.
 pub fn dataset_files(dataset: &SimulatedDataset) -> Vec<FileText> {
@@ -21,8 +26,10 @@ pub fn dataset_files(dataset: &SimulatedDataset) -> Vec<FileText> {
     let mut files = vec![
         ("dataset.toml".to_string(), dataset_toml(dataset, &style)),
         ("train.toml".to_string(), train_toml(dataset.declared_train())),
-        ("track.toml".to_string(), track_toml(dataset)),
     ];
+    if settings.gnss.is_none() {
+        files.push(("track.toml".to_string(), track_toml(dataset)));
+    }
     files.extend(
         dataset
             .runs
@@ -72,8 +79,16 @@ fn dataset_toml(dataset: &SimulatedDataset, style: &FileStyle) -> String {
     if style.delimiter != ',' {
         line(format!("delimiter = \"{}\"", style.delimiter));
     }
-    line("\n[train]\nfile = \"train.toml\"\n\n[track]\nfile = \"track.toml\"\n\n[columns]".into());
-    for column in &style.columns {
+    line("\n[train]\nfile = \"train.toml\"\n".into());
+    if dataset.settings.gnss.is_none() {
+        line("[track]\nfile = \"track.toml\"\n".into());
+    }
+    line("[columns]".into());
+    if dataset.settings.gnss.is_some() {
+        line(GNSS_COLUMNS.into());
+    }
+    let has_odometer = dataset.settings.gnss.is_none();
+    for column in style.columns.iter().filter(|it| it.is_written(has_odometer)) {
         let scale = match column.scale {
             1.0 => String::new(),
             scale => format!(", scale = {scale}"),
@@ -147,13 +162,20 @@ fn track_toml(dataset: &SimulatedDataset) -> String {
 
 fn run_csv(run: &SimulatedRun, style: &FileStyle, train_length_m: f64) -> String {
     let number = style.has_row_numbers.then_some("row");
-    let names = style.columns.iter().map(|column| column.name.as_str());
+    let has_odometer = run.positions.is_empty();
+    let written = style.columns.iter().filter(|it| it.is_written(has_odometer));
+    let names = written.map(|column| column.name.as_str());
     let mut text = String::with_capacity(64 * run.samples.len());
     let delimiter = style.delimiter.to_string();
-    text.push_str(&number.into_iter().chain(names).collect::<Vec<_>>().join(&delimiter));
+    let gnss = if has_odometer { &[][..] } else { &["lat", "lon", "alt"][..] };
+    let names = number.into_iter().chain(names).chain(gnss.iter().copied());
+    text.push_str(&names.collect::<Vec<_>>().join(&delimiter));
     text.push('\n');
     for (k, sample) in run.samples.iter().enumerate() {
-        text.push_str(&row_text(sample, style, &run.plan, train_length_m, k + 1));
+        text.push_str(&row_text(sample, style, &run.plan, train_length_m, k + 1, has_odometer));
+        if let Some(position) = run.positions.get(k) {
+            text.push_str(&gnss::row_text(position.as_ref(), &delimiter));
+        }
         text.push('\n');
     }
     text

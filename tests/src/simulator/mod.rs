@@ -12,7 +12,7 @@
 //! - [`train_maker`], [`line_maker`], [`run_maker`]: what there is
 //! - [`effects`], [`effect_maker`], [`disturbances`]: what is undeclared, and what it changes
 //! - [`driving`], [`permitted_speed`], [`driver`], [`actuators`], [`dynamics`], [`true_run`]: what happens
-//! - [`sensors`], [`defects`]: what is recorded of it
+//! - [`sensors`], [`defects`], [`gnss`]: what is recorded of it
 //! - [`truth`], [`oracle`]: what a perfect explainer would find, and how well it would predict
 //! - [`columns`], [`dataset_writer`]: the recording as a dataset folder
 
@@ -26,6 +26,7 @@ pub mod driving;
 pub mod dynamics;
 pub mod effect_maker;
 pub mod effects;
+pub mod gnss;
 pub mod line_maker;
 pub mod oracle;
 pub mod permitted_speed;
@@ -42,7 +43,7 @@ use dynocar_core::train::TrainModel;
 use dynocar_shared::TrainSample;
 
 pub use effects::Effect;
-pub use settings::{Defects, EffectRequest, SimulatorSettings, TrainType};
+pub use settings::{Defects, EffectRequest, GnssReceiver, SimulatorSettings, TrainType};
 
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -67,6 +68,8 @@ pub struct SimulatedRun {
     pub states: Vec<TrueState>,
     /// What was recorded.
     pub samples: Vec<TrainSample>,
+    /// Positions by GNSS, one for each sample; empty without a receiver.
+    pub positions: Vec<Option<gnss::Position>>,
 }
 
 /// A simulated dataset with its truth.
@@ -178,5 +181,9 @@ fn simulate_run(
     );
     let samples =
         defects::spoil(clean, &settings.defects, &mut stream(Stream::Defects(plan.number)));
-    SimulatedRun { plan, disturbances, states, samples }
+    let positions = settings.gnss.map_or(Vec::new(), |receiver| {
+        let mut random = stream(Stream::Gnss(plan.number));
+        gnss::positions(&samples, &states, line, (receiver, settings), &mut random)
+    });
+    SimulatedRun { plan, disturbances, states, samples, positions }
 }

@@ -37,6 +37,8 @@ pub enum Stream {
     Sensors(usize),
     /// Missing rows and outliers of a run.
     Defects(usize),
+    /// The GNSS receiver in a run.
+    Gnss(usize),
 }
 
 impl Stream {
@@ -56,6 +58,7 @@ impl Stream {
             Stream::Slip(run) => of_run(8, run),
             Stream::Sensors(run) => of_run(9, run),
             Stream::Defects(run) => of_run(10, run),
+            Stream::Gnss(run) => of_run(14, run),
         }
     }
 }

@@ -78,7 +78,8 @@ pub fn make_plans(
     let season_degc = random.uniform(2.0, 20.0);
     (0..settings.runs)
         .map(|number| {
-            let direction = if number % 2 == 0 { first_sign } else { -first_sign };
+            let is_first = number % 2 == 0 || settings.is_one_direction;
+            let direction = if is_first { first_sign } else { -first_sign };
             let style = make_style(train.train_type, random);
             let (start_m, stops_m) =
                 make_route(settings.duration_s, train, line, direction, &style, random);

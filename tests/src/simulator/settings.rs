@@ -134,6 +134,29 @@ pub struct SimulatorSettings {
     pub wheel_slips_per_run: f64,
     /// What goes wrong between sensors and file.
     pub defects: Defects,
+    /// A GNSS receiver instead of an odometer, and no line file.
+    pub gnss: Option<GnssReceiver>,
+    /// True when all runs go the same way.
+    pub is_one_direction: bool,
+}
+
+/// A GNSS receiver on the train.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GnssReceiver {
+    /// Standard deviation in m of a position, east and north each.
+    pub std_m: f64,
+    /// Time constant in s with which its error fades.
+    pub fading_s: f64,
+    /// Age in s of a position at its stamp.
+    pub late_s: f64,
+    /// Gaps of 10 to 60 s per hour.
+    pub gaps_per_hour: f64,
+}
+
+impl GnssReceiver {
+    /// Errors of 3.5 m that fade over 12 s, 1.3 s late, with gaps.
+    pub const USUAL: GnssReceiver =
+        GnssReceiver { std_m: 3.5, fading_s: 12.0, late_s: 1.3, gaps_per_hour: 6.0 };
 }
 
 impl SimulatorSettings {
@@ -155,6 +178,8 @@ impl SimulatorSettings {
             hidden_variation: 1.0,
             wheel_slips_per_run: 0.25,
             defects: Defects::NONE,
+            gnss: None,
+            is_one_direction: false,
         }
     }
 

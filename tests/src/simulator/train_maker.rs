@@ -194,6 +194,7 @@ pub fn make_train(train_type: TrainType, resistance_spread: f64, random: &mut Ra
         mass_kg,
         length_m,
         cars: cars.2.len() as u32,
+        passenger_mass_kg: 70.0,
         rotating_mass_factor: ranges.rotating_mass_factor,
         resistance: declared_resistance,
         curve_constant_n_per_kn_m: 600.0,

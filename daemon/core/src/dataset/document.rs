@@ -226,6 +226,31 @@ impl<'d> Section<'d> {
         Ok(Some(entries))
     }
 
+    /// The list of [chainage_m, "name"] under a key, empty when absent.
+    pub fn named_chainages(&self, key: &str) -> Result<Vec<(f64, String)>, DatasetError> {
+        const FORM: &str = "[chainage_m, \"name\"]";
+        let Some(value) = self.table.get(key) else { return Ok(Vec::new()) };
+        let DeValue::Array(items) = value.get_ref() else {
+            return Err(self.wrong_type(key, &format!("a list of {FORM}"), value));
+        };
+        let entry = |(index, item): (usize, &Spanned<DeValue>)| {
+            let pair = match item.get_ref() {
+                DeValue::Array(pair) if pair.len() == 2 => {
+                    let at_m = number(pair[0].get_ref()).filter(|at_m| at_m.is_finite());
+                    at_m.zip(pair[1].get_ref().as_str()).map(|(at_m, name)| (at_m, name.into()))
+                }
+                _ => None,
+            };
+            pair.ok_or_else(|| {
+                let place = self.document.place(item.span().start);
+                let key = format!("{} entry {}", self.full(key), index + 1);
+                let (expected, found) = (FORM.into(), shown(item.get_ref()));
+                place.problem(Problem::WrongType { key, expected, found })
+            })
+        };
+        items.iter().enumerate().map(entry).collect()
+    }
+
     /// The error of a key that is not there.
     pub fn missing(&self, key: &str, expected: &str) -> DatasetError {
         let (key, expected) = (self.full(key), expected.into());

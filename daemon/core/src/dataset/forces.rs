@@ -29,6 +29,8 @@ pub enum ForceSource {
     ControlForce,
     /// The share of the effort curve in the handle's column.
     Handle,
+    /// The declared friction brake at the recorded pressure.
+    Pressure,
     /// It is not recorded.
     None,
 }
@@ -86,6 +88,7 @@ impl Forces {
                 ),
             ),
         };
+        add_friction(&mut brake, table.column(Quantity::BrakeCylinderPressure), train);
         let greatest_n = [(&traction, &train.traction), (&brake, &train.brake)]
             .map(|(force, curve)| force.greatest_n(curve.as_ref()))
             .into_iter()
@@ -156,6 +159,22 @@ fn split(control: &[f64]) -> (Force, Force) {
     (part(1.0), part(-1.0))
 }
 
+/// Adds what the friction brake makes of its pressure to the recorded brake force; where no brake
+/// force is recorded, it is all there is. A missing pressure leaves the brake force unknown.
+fn add_friction(brake: &mut Force, pressure_pa: Option<&[f64]>, train: &TrainModel) {
+    let (Some(pressure_pa), Some(friction)) = (pressure_pa, train.brake_gear.friction_brake) else {
+        return;
+    };
+    for (force_n, &pressure_pa) in brake.force_n.iter_mut().zip(pressure_pa) {
+        let friction_n =
+            if pressure_pa.is_nan() { f64::NAN } else { friction.force_n(pressure_pa) };
+        *force_n = if brake.source == ForceSource::None { 0.0 } else { *force_n } + friction_n;
+    }
+    if brake.source == ForceSource::None {
+        brake.source = ForceSource::Pressure;
+    }
+}
+
 /// Counts the noise below zero of either force as the other.
 fn exchange_noise(traction: &mut Force, brake: &mut Force, noise_n: f64) {
     for row in 0..traction.force_n.len() {
@@ -186,6 +205,10 @@ mod tests {
         [brake]\nmax_force_kn=200\n";
 
     fn forces(columns: &str, csv: &str) -> Forces {
+        forces_of(TRAIN, columns, csv)
+    }
+
+    fn forces_of(train: &str, columns: &str, csv: &str) -> Forces {
         let text = format!(
             "[dataset]\nname='x'\n[train]\nfile='t'\n[columns]\ntime={{column='t',unit='s'}}\n\
              speed={{column='v',unit='m/s'}}\n{columns}\n[[runs]]\nfile='a.csv'\n"
@@ -194,7 +217,7 @@ mod tests {
         let table = Table::parse("a.csv", csv, &manifest).unwrap();
         let times = table.column(Quantity::Time).unwrap();
         let order = TimeOrder::of(times, &vec![0; times.len()]);
-        let train = parse_train("train.toml", TRAIN).unwrap();
+        let train = parse_train("train.toml", train).unwrap();
         Forces::of(&table, table.column(Quantity::Speed).unwrap(), &train, &order)
     }
 
@@ -228,6 +251,23 @@ mod tests {
         assert_eq!(forces.brake.force_n[..3], [0.0, 7.0, 0.0]);
         assert!(forces.traction.force_n[3].is_nan() && forces.brake.force_n[3].is_nan());
         assert_eq!(forces.brake.source, ForceSource::ControlForce);
+    }
+
+    #[test]
+    fn the_friction_brake_acts_by_its_pressure_beside_the_signed_force() {
+        let columns = "control_force={column='C',unit='N'}\n\
+                       brake_cylinder_pressure={column='p',unit='kPa'}";
+        let brake = "force_per_pressure_n_per_pa=0.5\nrelease_pressure_pa=20000\n";
+        let train = format!("{TRAIN}{brake}");
+        let forces = forces_of(&train, columns, "t,v,C,p\n0,1,500,10\n1,1,-700,40\n2,1,0,\n");
+        assert_eq!(forces.traction.force_n[..2], [500.0, 0.0]);
+        assert_eq!(forces.brake.force_n[..2], [0.0, 700.0 + 0.5 * 20e3]);
+        assert!(forces.brake.force_n[2].is_nan(), "no pressure, no brake force");
+        let alone = "traction_force={column='C',unit='N'}\n\
+                     brake_cylinder_pressure={column='p',unit='kPa'}";
+        let forces = forces_of(&train, alone, "t,v,C,p\n0,1,500,10\n1,1,0,40\n");
+        assert_eq!(forces.brake.force_n, [0.0, 10e3]);
+        assert_eq!(forces.brake.source, ForceSource::Pressure);
     }
 
     #[test]

@@ -48,11 +48,25 @@ pub enum Quantity {
     WindSpeed,
     /// 1 while the wheel-slide protection is active, else 0.
     WheelSlide,
+    /// Geographical latitude by GNSS (WGS 84).
+    Latitude,
+    /// Geographical longitude by GNSS (WGS 84).
+    Longitude,
+    /// Course over ground by GNSS, clockwise from north.
+    Course,
+    /// Curvature of the way as measured by a yaw gyro or the steering; turning left is positive.
+    Curvature,
+    /// 1 while a door is open, else 0.
+    DoorOpen,
+    /// Power of the traction drive, regeneration negative.
+    TractionPower,
+    /// Power taken from the line, regeneration negative.
+    LinePower,
 }
 
 impl Quantity {
     /// Every quantity, in the order of the documentation.
-    pub const ALL: [Quantity; 20] = {
+    pub const ALL: [Quantity; 27] = {
         use Quantity::*;
         [
             Time,
@@ -75,6 +89,13 @@ impl Quantity {
             CurveRadius,
             WindSpeed,
             WheelSlide,
+            Latitude,
+            Longitude,
+            Course,
+            Curvature,
+            DoorOpen,
+            TractionPower,
+            LinePower,
         ]
     };
 
@@ -101,6 +122,13 @@ impl Quantity {
             Quantity::CurveRadius => "curve_radius",
             Quantity::WindSpeed => "wind_speed",
             Quantity::WheelSlide => "wheel_slide",
+            Quantity::Latitude => "latitude",
+            Quantity::Longitude => "longitude",
+            Quantity::Course => "course",
+            Quantity::Curvature => "curvature",
+            Quantity::DoorOpen => "door_open",
+            Quantity::TractionPower => "traction_power",
+            Quantity::LinePower => "line_power",
         }
     }
 
@@ -126,7 +154,10 @@ impl Quantity {
             Quantity::BrakeCylinderPressure => Dimension::Pressure,
             Quantity::TrainMass => Dimension::Mass,
             Quantity::AmbientTemperature => Dimension::Temperature,
-            Quantity::Passengers | Quantity::WheelSlide => Dimension::Count,
+            Quantity::Passengers | Quantity::WheelSlide | Quantity::DoorOpen => Dimension::Count,
+            Quantity::Latitude | Quantity::Longitude | Quantity::Course => Dimension::Angle,
+            Quantity::Curvature => Dimension::Curvature,
+            Quantity::TractionPower | Quantity::LinePower => Dimension::Power,
         }
     }
 

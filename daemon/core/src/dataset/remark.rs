@@ -374,12 +374,14 @@ fn of_force(
 }
 
 /// The bounds beyond which [`crate::validation::Validator`] refuses a sample.
-const PLAUSIBLE: [(Quantity, f64, f64); 5] = [
+const PLAUSIBLE: [(Quantity, f64, f64); 7] = [
     (Quantity::Acceleration, -20.0, 20.0),
     (Quantity::SpecificForce, -20.0, 20.0),
     (Quantity::BrakeCylinderPressure, -5e4, 2e6),
     (Quantity::AmbientTemperature, -80.0, 80.0),
     (Quantity::Gradient, -150.0, 150.0),
+    (Quantity::Latitude, -90.0, 90.0),
+    (Quantity::Longitude, -180.0, 180.0),
 ];
 
 fn of_plausibility(run: &Resolved, remarks: &mut Vec<Remark>) {

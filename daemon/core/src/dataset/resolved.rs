@@ -62,6 +62,7 @@ pub(super) struct Resolved<'d> {
 impl<'d> Resolved<'d> {
     pub fn of(context: Context<'d>, entry: &'d RunEntry, mut table: Table) -> Self {
         let (timeless_before, rows_without_time) = drop_timeless(&mut table);
+        table.hold_last(Quantity::Passengers);
         let column = |quantity| table.column(quantity).unwrap_or_default();
         let times_s = column(Quantity::Time).to_vec();
         let order = TimeOrder::of(&times_s, &timeless_before);
@@ -98,7 +99,10 @@ impl<'d> Resolved<'d> {
     }
 
     /// The samples, one for each row.
-    pub fn samples(&self, number: u32) -> Vec<TrainSample> {
+    ///
+    /// The mass is the row's, else the run's declared one, else that of the empty train and its
+    /// counted passengers.
+    pub fn samples(&self, number: u32, train: &TrainModel) -> Vec<TrainSample> {
         let column = |quantity| self.table.column(quantity).unwrap_or_default();
         let fields: [(SampleField, &[f64]); 10] = [
             (SampleField::Position, &self.position_m),
@@ -113,6 +117,7 @@ impl<'d> Resolved<'d> {
             (SampleField::Gradient, self.gradient_permille.as_deref().unwrap_or_default()),
         ];
         let radius_m = column(Quantity::CurveRadius);
+        let passengers = column(Quantity::Passengers);
         let wheel_slide = column(Quantity::WheelSlide);
         let is_there =
             |values: &[f64], row: usize| values.get(row).copied().filter(|v| v.is_finite());
@@ -125,7 +130,9 @@ impl<'d> Resolved<'d> {
                 sample.sequence = sequence;
                 sample.run = number;
                 sample.direction = self.entry.direction;
-                if let Some(mass_kg) = self.entry.mass_kg {
+                let counted = is_there(passengers, row)
+                    .map(|count| train.mass_kg + count * train.passenger_mass_kg);
+                if let Some(mass_kg) = self.entry.mass_kg.or(counted) {
                     sample.set(SampleField::Mass, mass_kg);
                 }
                 for (field, values) in fields {

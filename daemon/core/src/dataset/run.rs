@@ -24,6 +24,20 @@ pub struct Extras {
     pub passengers: Option<Vec<Option<f64>>>,
     /// Altitude in m.
     pub altitude_m: Option<Vec<Option<f64>>>,
+    /// Latitude in degrees.
+    pub latitude_deg: Option<Vec<Option<f64>>>,
+    /// Longitude in degrees.
+    pub longitude_deg: Option<Vec<Option<f64>>>,
+    /// Course in degrees, clockwise from north.
+    pub course_deg: Option<Vec<Option<f64>>>,
+    /// Measured curvature in 1/m, turning left positive.
+    pub curvature_per_m: Option<Vec<Option<f64>>>,
+    /// 1 while a door is open.
+    pub door_open: Option<Vec<Option<f64>>>,
+    /// Power of the drive in W.
+    pub traction_power_w: Option<Vec<Option<f64>>>,
+    /// Power from the line in W.
+    pub line_power_w: Option<Vec<Option<f64>>>,
 }
 
 /// A recorded run.
@@ -87,7 +101,7 @@ pub(super) fn read(
     if rows > 1 && resolved.times_s.iter().all(|&other| other == time_s) {
         return refuse(Problem::OneTime { column: column(Quantity::Time), time_s, rows });
     }
-    let samples = resolved.samples(number);
+    let samples = resolved.samples(number, context.train);
     let quality = quality::assess(context, &resolved, &samples);
     let is_position_recorded = resolved.position_source == PositionSource::Column;
     let findings =
@@ -120,5 +134,12 @@ fn extras(table: &Table) -> Extras {
         wind_speed_mps: column(Quantity::WindSpeed),
         passengers: column(Quantity::Passengers),
         altitude_m: column(Quantity::Altitude),
+        latitude_deg: column(Quantity::Latitude),
+        longitude_deg: column(Quantity::Longitude),
+        course_deg: column(Quantity::Course),
+        curvature_per_m: column(Quantity::Curvature),
+        door_open: column(Quantity::DoorOpen),
+        traction_power_w: column(Quantity::TractionPower),
+        line_power_w: column(Quantity::LinePower),
     }
 }

@@ -42,6 +42,18 @@ impl Table {
         self.columns.iter().map(|(quantity, values)| (*quantity, &values[..]))
     }
 
+    /// Lets an empty cell of a quantity keep the last value before it.
+    pub fn hold_last(&mut self, quantity: Quantity) {
+        let columns = self.columns.iter_mut().filter(|(other, _)| *other == quantity);
+        for (_, values) in columns {
+            let mut last = f64::NAN;
+            for value in values {
+                last = if value.is_nan() { last } else { *value };
+                *value = last;
+            }
+        }
+    }
+
     /// Drops the rows whose mark is false.
     pub fn retain(&mut self, keep: &[bool]) {
         for (_, values) in &mut self.columns {

@@ -125,7 +125,8 @@ fn what_a_sample_does_not_carry_is_kept_beside_it() {
     let run = Example::new(&columns, "t,v,rh,w,n,h\n0,1,93,36,250,512\n,,,,,\n2,1,,,,\n").run();
     assert_eq!(run.extras.relative_humidity, Some(vec![Some(0.93), None]));
     assert_eq!(run.extras.wind_speed_mps, Some(vec![Some(10.0), None]));
-    assert_eq!(run.extras.passengers, Some(vec![Some(250.0), None]));
+    // Who was counted stays on board until the next count.
+    assert_eq!(run.extras.passengers, Some(vec![Some(250.0), Some(250.0)]));
     assert_eq!(run.extras.altitude_m, Some(vec![Some(512.0), None]));
     assert_eq!(Example::new(&[], "t,v\n0,1\n").run().extras, Extras::default());
 }

@@ -3,7 +3,10 @@
 use super::document::{Document, Section};
 use super::error::{DatasetError, Place, Problem};
 use crate::terms::{gradient, masses, place};
-use crate::track::{Curve, LinearProfile, MassSection, ProfileError, Track, TrackError, Tunnel};
+use crate::track::{
+    Curve, LinearProfile, MassSection, ProfileError, StepProfile, Track, TrackError, TrackSurvey,
+    Tunnel,
+};
 
 /// A steeper gradient in ‰ than any adhesion railway has is a mistake of unit.
 const GRADIENT_MAX_PERMILLE: f64 = 150.0;
@@ -28,9 +31,15 @@ pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
         "tunnels",
         place::LIST,
         masses::LIST,
+        "gradient_falling",
+        "gradient_std",
+        "stops",
+        "alignment",
+        "alignment_falling",
     ])?;
     let length_m = section.number("length_m", "a length in m above 0", |length| length > 0.0)?;
-    let (gradient, gradient_places) = gradient_profile(&section)?.unzip();
+    let gradient = profile(&section, "gradient", -GRADIENT_MAX_PERMILLE)?;
+    let (gradient, gradient_places) = gradient.unzip();
     let curves = section.entries::<3>("curves", "[start_m, end_m, radius_m]")?.map(split);
     let (curves, curve_places) = curves.unzip();
     let tunnels = section.entries::<2>("tunnels", "[start_m, end_m]")?.map(split);
@@ -55,7 +64,31 @@ pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
         Ok(track) => track,
         Err(error) => return refused(error),
     };
-    with_corrections(track, &section)
+    with_survey(with_corrections(track, &section)?, &section)
+}
+
+/// Adds what a survey knows beside the profile.
+fn with_survey(track: Track, section: &Section) -> Result<Track, DatasetError> {
+    let profile = |key: &str, low: f64| -> Result<Option<StepProfile>, DatasetError> {
+        let Some((list, places)) = profile(section, key, low)? else { return Ok(None) };
+        let made = StepProfile::new(&list).map_err(|error| {
+            let index = match error {
+                ProfileError::Empty => None,
+                ProfileError::NotFinite { index, .. }
+                | ProfileError::NotIncreasing { index, .. } => places.get(index - 1).cloned(),
+            };
+            let place = index.unwrap_or_else(|| section.place_of(key));
+            place.problem(Problem::Track(TrackError::Gradient(error)))
+        })?;
+        Ok(Some(made))
+    };
+    Ok(track.with_survey(TrackSurvey {
+        gradient_falling: profile("gradient_falling", -GRADIENT_MAX_PERMILLE)?,
+        gradient_std_permille: profile("gradient_std", 0.0)?,
+        stops: section.named_chainages("stops")?,
+        alignment: section.text("alignment")?.map(Into::into),
+        alignment_falling: section.text("alignment_falling")?.map(Into::into),
+    }))
 }
 
 /// Adds what measured runs have shown of the line: resistance at places, other masses in sections.
@@ -147,15 +180,16 @@ fn split<const N: usize>(entries: Vec<([f64; N], Place)>) -> (Vec<[f64; N]>, Vec
 
 type Gradient = (Vec<(f64, f64)>, Vec<Place>);
 
-fn gradient_profile(section: &Section) -> Result<Option<Gradient>, DatasetError> {
-    const KEY: &str = "gradient";
-    let Some(entries) = section.entries::<2>(KEY, "[chainage_m, permille]")? else {
+/// A list of [chainage_m, permille] with values from `low` to the steepest gradient.
+fn profile(section: &Section, key: &str, low: f64) -> Result<Option<Gradient>, DatasetError> {
+    let Some(entries) = section.entries::<2>(key, "[chainage_m, permille]")? else {
         return Ok(None);
     };
     for (index, ([_, permille], place)) in entries.iter().enumerate() {
-        if permille.abs() > GRADIENT_MAX_PERMILLE {
-            let key = format!("{} entry {}", section.full(KEY), index + 1);
-            let (value, allowed) = (permille.to_string(), "from -150 to 150 permille".into());
+        if !(low..=GRADIENT_MAX_PERMILLE).contains(permille) {
+            let key = format!("{} entry {}", section.full(key), index + 1);
+            let allowed = format!("from {low} to {GRADIENT_MAX_PERMILLE} permille");
+            let value = permille.to_string();
             return Err(place.clone().problem(Problem::OutOfRange { key, value, allowed }));
         }
     }
@@ -205,6 +239,26 @@ tunnels = [[2200.0, 2900.0]]
     }
 
     #[test]
+    fn what_a_survey_adds_is_read() {
+        let text = FULL.to_string()
+            + "gradient_falling = [[0.0, 1.5]]\ngradient_std = [[0.0, 0.4]]\n\
+               stops = [[120.0, \"Depot\"], [2900, \"\"]]\nalignment = \"alignment.csv\"\n";
+        let track = parse_track("track.toml", &text).unwrap();
+        assert_eq!(track.gradient_towards_permille(-1.0, 1300.0, 0.0), Some(1.5));
+        let survey = track.survey();
+        assert_eq!(survey.stops, [(120.0, "Depot".into()), (2900.0, String::new())]);
+        assert_eq!(survey.alignment.as_deref(), Some("alignment.csv"));
+        assert_eq!(
+            refusal(&text.replace("[[0.0, 0.4]]", "[[0.0, -0.4]]")),
+            "track.toml:14: track.gradient_std entry 1 = -0.4: expected from 0 to 150 permille"
+        );
+        assert_eq!(
+            refusal(&text.replace("[2900, \"\"]", "[2900]")),
+            "track.toml:15: track.stops entry 2: expected [chainage_m, \"name\"], got [2900]"
+        );
+    }
+
+    #[test]
     fn the_line_of_a_bad_entry_is_named() {
         let cases = [
             (
@@ -242,7 +296,8 @@ tunnels = [[2200.0, 2900.0]]
                 ("tunnels", "tunnel"),
                 "track.toml:12: unknown key 'tunnel' in [track]; did you mean 'tunnels'? \
                  (choices: 'name', 'length_m', 'gradient', 'gradient_shift_m', 'gradient_error', \
-                 'curves', 'tunnels', 'resistance', 'masses')",
+                 'curves', 'tunnels', 'resistance', 'masses', 'gradient_falling', 'gradient_std', \
+                 'stops', 'alignment', 'alignment_falling')",
             ),
         ];
         for ((from, to), expected) in cases {

@@ -4,10 +4,14 @@ use super::corrections::read_corrections;
 use super::document::{Document, Section};
 use super::error::{DatasetError, Problem};
 use crate::terms::{Key, curve, rotating, tunnel};
-use crate::train::{BrakeGear, Corrections, Davis, EffortCurve, TrainModel};
+use crate::train::{BrakeGear, Corrections, Davis, EffortCurve, FrictionBrake, TrainModel};
 
 /// k in the declared curve resistance k/R in N/kN, R in m, unless a train says otherwise.
 pub const CURVE_CONSTANT_DEFAULT_N_PER_KN_M: f64 = 600.0;
+/// Mass of a passenger in kg unless a train says otherwise.
+pub const PASSENGER_MASS_DEFAULT_KG: f64 = 70.0;
+/// A friction brake is released up to this pressure in Pa unless a train says otherwise.
+pub const RELEASE_PRESSURE_DEFAULT_PA: f64 = 20e3;
 
 /// Reads the text of a `train.toml`; `label` names the file in messages.
 ///
@@ -19,7 +23,14 @@ pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> 
     let root = document.root();
     root.allow(&["train", "resistance", "traction", "brake", "corrections"])?;
     let train = root.required_table("train")?;
-    train.allow(&["name", "mass_t", "length_m", "cars", "rotating_mass_factor"])?;
+    train.allow(&[
+        "name",
+        "mass_t",
+        "length_m",
+        "cars",
+        "rotating_mass_factor",
+        "passenger_mass_kg",
+    ])?;
     let resistance = root.required_table("resistance")?;
     let traction = match root.table("traction")? {
         Some(section) => {
@@ -43,6 +54,9 @@ pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> 
     let cars = train.number("cars", "a whole number from 1 to 1000", |cars| {
         (1.0..=1000.0).contains(&cars) && cars.fract() == 0.0
     })?;
+    let passenger_kg = train.number("passenger_mass_kg", "a mass in kg from 0 to 200", |mass| {
+        (0.0..=200.0).contains(&mass)
+    })?;
     let gamma = &rotating::FACTOR;
     let rotating_mass_factor =
         train.required_number(gamma.name, gamma.allowed, |value| gamma.allows(value))?;
@@ -50,6 +64,7 @@ pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> 
     let mut model = TrainModel {
         name: train.text("name")?.unwrap_or("unnamed train").into(),
         mass_kg: mass_t * 1000.0,
+        passenger_mass_kg: passenger_kg.unwrap_or(PASSENGER_MASS_DEFAULT_KG),
         length_m,
         cars: cars.unwrap_or(1.0) as u32,
         rotating_mass_factor,
@@ -82,6 +97,21 @@ fn declared(section: &Section) -> Result<(Davis, f64, f64), DatasetError> {
     Ok((davis, curve.unwrap_or(CURVE_CONSTANT_DEFAULT_N_PER_KN_M), tunnel.unwrap_or(0.0)))
 }
 
+/// The friction brake that is known by its pressure.
+fn friction_brake(section: &Section) -> Result<Option<FrictionBrake>, DatasetError> {
+    let gain = section.number("force_per_pressure_n_per_pa", "N/Pa from 0 to 1000", |gain| {
+        (0.0..=1e3).contains(&gain)
+    })?;
+    let release =
+        section.number("release_pressure_pa", "a pressure in Pa from 0 to 1e6", |pa| {
+            (0.0..=1e6).contains(&pa)
+        })?;
+    Ok(gain.map(|force_per_pressure_n_per_pa| FrictionBrake {
+        force_per_pressure_n_per_pa,
+        release_pressure_pa: release.unwrap_or(RELEASE_PRESSURE_DEFAULT_PA),
+    }))
+}
+
 fn brake(section: &Section) -> Result<(Option<EffortCurve>, BrakeGear), DatasetError> {
     section.allow(&[
         "max_force_kn",
@@ -93,6 +123,8 @@ fn brake(section: &Section) -> Result<(Option<EffortCurve>, BrakeGear), DatasetE
         "ratio",
         "friction",
         "pads",
+        "force_per_pressure_n_per_pa",
+        "release_pressure_pa",
     ])?;
     let max_force_kn = section.number("max_force_kn", FORCE_KN, is_force_kn)?;
     let curve = effort(section)?;
@@ -113,6 +145,7 @@ fn brake(section: &Section) -> Result<(Option<EffortCurve>, BrakeGear), DatasetE
         ratio: section.number("ratio", "above 0, at most 100", |x| x > 0.0 && x <= 100.0)?,
         friction: share("friction")?,
         pads: section.number("pads", "from 1 to 100000", |pads| (1.0..=1e5).contains(&pads))?,
+        friction_brake: friction_brake(section)?,
     };
     Ok((curve.or(constant), gear))
 }
@@ -185,6 +218,8 @@ efficiency = 0.9
 ratio = 2.55
 friction = 0.28
 pads = 95
+force_per_pressure_n_per_pa = 0.25
+release_pressure_pa = 21000.0
 "#;
 
     fn refusal(text: &str) -> String {
@@ -211,6 +246,10 @@ pads = 95
             ratio: Some(2.55),
             friction: Some(0.28),
             pads: Some(95.0),
+            friction_brake: Some(FrictionBrake {
+                force_per_pressure_n_per_pa: 0.25,
+                release_pressure_pa: 21e3,
+            }),
         };
         assert_eq!(train.brake_gear, gear);
     }
@@ -231,7 +270,7 @@ pads = 95
         assert_eq!(
             message,
             "train.toml:5: unknown key 'lenght_m' in [train]; did you mean 'length_m'? (choices: \
-             'name', 'mass_t', 'length_m', 'cars', 'rotating_mass_factor')"
+             'name', 'mass_t', 'length_m', 'cars', 'rotating_mass_factor', 'passenger_mass_kg')"
         );
         let message = refusal(&FULL.replace("[traction]", "[tractive]"));
         assert!(message.starts_with("train.toml:14: unknown key 'tractive'; did you mean"));

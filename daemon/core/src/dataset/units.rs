@@ -24,6 +24,12 @@ pub enum Dimension {
     Temperature,
     /// Base unit 1.
     Ratio,
+    /// Base unit deg.
+    Angle,
+    /// Base unit 1/m.
+    Curvature,
+    /// Base unit W.
+    Power,
     /// Things counted, and yes or no; base unit 1.
     Count,
 }
@@ -46,7 +52,7 @@ const POUND_FORCE_N: f64 = 4.4482216152605;
 /// Metres per second in a mile per hour: 1609.344 m in 3600 s.
 const MILE_PER_HOUR_MPS: f64 = 0.44704;
 
-const UNITS: [Unit; 29] = {
+const UNITS: [Unit; 34] = {
     use Dimension::*;
     [
         unit("s", Time, 1.0, 1.0),
@@ -77,6 +83,11 @@ const UNITS: [Unit; 29] = {
         unit("permille", Ratio, 1.0, 1e3),
         unit("%", Ratio, 1.0, 1e2),
         unit("1", Ratio, 1.0, 1.0),
+        unit("deg", Angle, 1.0, 1.0),
+        unit("rad", Angle, 180.0, std::f64::consts::PI),
+        unit("1/m", Curvature, 1.0, 1.0),
+        unit("W", Power, 1.0, 1.0),
+        unit("kW", Power, 1e3, 1.0),
         unit("1", Count, 1.0, 1.0),
     ]
 };
@@ -178,6 +189,11 @@ mod tests {
             (Ratio, "permille", 3.0, 0.003),
             (Ratio, "%", 93.0, 0.93),
             (Ratio, "1", 0.4, 0.4),
+            (Angle, "deg", 47.4, 47.4),
+            (Angle, "rad", std::f64::consts::PI, 180.0),
+            (Curvature, "1/m", -0.01, -0.01),
+            (Power, "W", 5.0, 5.0),
+            (Power, "kW", 1.5, 1500.0),
             (Count, "1", 250.0, 250.0),
         ];
         assert_eq!(cases.len(), UNITS.len(), "one case for every unit");

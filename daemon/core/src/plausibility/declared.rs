@@ -95,6 +95,7 @@ mod tests {
             mass_kg: 200e3,
             length_m: 100.0,
             cars: 4,
+            passenger_mass_kg: 70.0,
             rotating_mass_factor: 0.06,
             resistance: Davis { a: 1.8, b: 0.03, c: 0.0035 },
             curve_constant_n_per_kn_m: 600.0,

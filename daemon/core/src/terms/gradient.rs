@@ -40,5 +40,6 @@ pub fn along_travel_permille(
     length_m: f64,
     shift_m: f64,
 ) -> Option<f64> {
-    Some(direction * track.gradient_permille(position_m - shift_m, length_m)?)
+    let at_m = position_m - shift_m;
+    Some(direction * track.gradient_towards_permille(direction, at_m, length_m)?)
 }

@@ -10,6 +10,22 @@ mod profile;
 pub use entries::{Curve, MassSection, Tunnel};
 pub use profile::{LinearProfile, ProfileError, StepProfile};
 
+/// What a survey adds to a line.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TrackSurvey {
+    /// Gradient for falling chainage as (chainage in m, ‰ climbing positive as the chainage
+    /// grows), where trains in that direction take another way.
+    pub gradient_falling: Option<StepProfile>,
+    /// Standard deviation of the gradient in ‰.
+    pub gradient_std_permille: Option<StepProfile>,
+    /// Stops: chainage in m and name.
+    pub stops: Vec<(f64, String)>,
+    /// Path of the file that holds the way on the map.
+    pub alignment: Option<String>,
+    /// The same for falling chainage, where it is another way.
+    pub alignment_falling: Option<String>,
+}
+
 /// Why a list of track entries is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TrackError {
@@ -69,6 +85,7 @@ pub struct Track {
     gradient_error_permille: Option<LinearProfile>,
     resistance_n_per_kn: Option<StepProfile>,
     masses: Vec<MassSection>,
+    survey: TrackSurvey,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -112,6 +129,7 @@ impl Track {
             gradient_error_permille: None,
             resistance_n_per_kn: None,
             masses: Vec::new(),
+            survey: TrackSurvey::default(),
         })
     }
 
@@ -146,6 +164,18 @@ impl Track {
         self
     }
 
+    /// The same line with what a survey adds.
+    #[must_use]
+    pub fn with_survey(mut self, survey: TrackSurvey) -> Self {
+        self.survey = survey;
+        self
+    }
+
+    /// What a survey added.
+    pub fn survey(&self) -> &TrackSurvey {
+        &self.survey
+    }
+
     /// Further resistance in N/kN, the mean along a train; `None` when none is known.
     pub fn resistance_n_per_kn(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
         Some(self.resistance_n_per_kn.as_ref()?.mean_around(centre_m, train_length_m))
@@ -161,12 +191,42 @@ impl Track {
     ///
     /// `centre_m` is the chainage of the train's centre. `None` when no gradient is known.
     pub fn gradient_permille(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
+        self.gradient_towards_permille(1.0, centre_m, train_length_m)
+    }
+
+    /// The same for a direction of travel, +1 or -1: trains may climb by another way than they
+    /// descend.
+    pub fn gradient_towards_permille(
+        &self,
+        direction: f64,
+        centre_m: f64,
+        train_length_m: f64,
+    ) -> Option<f64> {
+        let profile = match &self.survey.gradient_falling {
+            Some(falling) if direction < 0.0 => falling,
+            _ => self.gradient_permille.as_ref()?,
+        };
         let true_m = centre_m - self.gradient_shift_m;
-        let mapped = self.gradient_permille.as_ref()?.mean_around(true_m, train_length_m);
+        let mapped = profile.mean_around(true_m, train_length_m);
         Some(match &self.gradient_error_permille {
             Some(error) => mapped + error.at(centre_m),
             None => mapped,
         })
+    }
+
+    /// Standard deviation in ‰ of the mean gradient over a stretch, as a survey states it: errors
+    /// of stretches further apart than `FREE_M` are their own. `None` when it is not stated.
+    pub fn gradient_std_permille(&self, from_m: f64, to_m: f64) -> Option<f64> {
+        const FREE_M: f64 = 200.0;
+        let length_m = to_m - from_m;
+        let profile = self.survey.gradient_std_permille.as_ref()?;
+        let std = profile.mean_around(0.5 * (from_m + to_m), length_m);
+        Some(std * (FREE_M / length_m.max(FREE_M)).sqrt())
+    }
+
+    /// True when both directions have one gradient profile.
+    pub fn is_one_profile(&self) -> bool {
+        self.survey.gradient_falling.is_none()
     }
 
     /// Mean of 1/R in 1/m along a train; `None` when no curves are known.
@@ -320,6 +380,26 @@ mod tests {
         assert_eq!(track.gradient_permille(1050.0, 200.0), Some(-0.5));
         assert_eq!(track.gradient_permille(9999.0, 200.0), Some(-2.0));
         assert_eq!(track.gradient_permille(-50.0, 200.0), Some(4.0));
+    }
+
+    #[test]
+    fn trains_the_other_way_round_may_have_a_gradient_of_their_own() {
+        let falling = StepProfile::new(&[(0.0, 7.0)]).unwrap();
+        let gradient_falling = Some(falling);
+        let track = line().with_survey(TrackSurvey { gradient_falling, ..Default::default() });
+        assert_eq!(track.gradient_towards_permille(1.0, 500.0, 200.0), Some(4.0));
+        assert_eq!(track.gradient_towards_permille(-1.0, 500.0, 200.0), Some(7.0));
+        assert_eq!(line().gradient_towards_permille(-1.0, 500.0, 200.0), Some(4.0));
+    }
+
+    #[test]
+    fn the_gradients_error_averages_out_over_long_stretches_only() {
+        let gradient_std_permille = Some(StepProfile::new(&[(0.0, 0.8)]).unwrap());
+        let survey = TrackSurvey { gradient_std_permille, ..Default::default() };
+        let track = line().with_survey(survey);
+        assert_eq!(track.gradient_std_permille(100.0, 200.0), Some(0.8));
+        assert!((track.gradient_std_permille(100.0, 900.0).unwrap() - 0.4).abs() < 1e-12);
+        assert_eq!(line().gradient_std_permille(100.0, 200.0), None);
     }
 
     #[test]

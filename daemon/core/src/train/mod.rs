@@ -77,6 +77,24 @@ pub struct BrakeGear {
     pub friction: Option<f64>,
     /// Number of brake pads on the train.
     pub pads: Option<f64>,
+    /// What the friction brake makes of its pressure, where its force is not recorded.
+    pub friction_brake: Option<FrictionBrake>,
+}
+
+/// A friction brake that is known by its pressure: force = gain * (pressure - release pressure).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrictionBrake {
+    /// Force of the whole train in N for each Pa above the release pressure.
+    pub force_per_pressure_n_per_pa: f64,
+    /// Pressure in Pa up to which the brake is released.
+    pub release_pressure_pa: f64,
+}
+
+impl FrictionBrake {
+    /// Retarding force in N at a pressure in Pa.
+    pub fn force_n(&self, pressure_pa: f64) -> f64 {
+        self.force_per_pressure_n_per_pa * (pressure_pa - self.release_pressure_pa).max(0.0)
+    }
 }
 
 /// A train as declared: the content of a `train.toml`, in SI units.
@@ -86,6 +104,8 @@ pub struct TrainModel {
     pub name: String,
     /// Nominal gross mass in kg, without the rotating part.
     pub mass_kg: f64,
+    /// Mass of a passenger in kg, where passengers are counted; the nominal mass is empty then.
+    pub passenger_mass_kg: f64,
     /// Length in m.
     pub length_m: f64,
     /// Number of cars.
@@ -115,6 +135,7 @@ impl TrainModel {
         TrainModel {
             name: name.into(),
             mass_kg,
+            passenger_mass_kg: 70.0,
             length_m: 0.0,
             cars: 1,
             rotating_mass_factor: 0.0,

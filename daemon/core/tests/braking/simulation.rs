@@ -19,6 +19,7 @@ pub fn train() -> TrainModel {
         mass_kg: 536_000.0,
         length_m: 200.0,
         cars: 8,
+        passenger_mass_kg: 70.0,
         rotating_mass_factor: 0.06,
         resistance: Davis { a: 0.79, b: 0.023, c: 0.0015 },
         curve_constant_n_per_kn_m: 600.0,
@@ -33,6 +34,7 @@ pub fn train() -> TrainModel {
             ratio: Some(2.55),
             friction: Some(0.28),
             pads: Some(95.0),
+            friction_brake: None,
         },
         corrections: Default::default(),
     }

@@ -24,6 +24,7 @@ pub fn train() -> Arc<TrainModel> {
         mass_kg: DECLARED_KG,
         length_m: 100.0,
         cars: 4,
+        passenger_mass_kg: 70.0,
         rotating_mass_factor: 0.06,
         resistance: Davis { a: 2.0, b: 0.02, c: 0.005 },
         curve_constant_n_per_kn_m: 0.0,

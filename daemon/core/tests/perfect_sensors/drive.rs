@@ -86,12 +86,14 @@ pub fn train() -> Arc<TrainModel> {
         ratio: Some(2.55),
         friction: Some(FRICTION),
         pads: Some(1.0 / (PA_PER_N * force_n_per_pa_and_pad())),
+        friction_brake: None,
     };
     Arc::new(TrainModel {
         name: "metro".into(),
         mass_kg: MASS_KG,
         length_m: 1.0,
         cars: 6,
+        passenger_mass_kg: 70.0,
         rotating_mass_factor: ROTATING,
         resistance: DAVIS,
         curve_constant_n_per_kn_m: 0.0,

@@ -131,6 +131,7 @@ fn sources(runs: &[Read]) -> String {
         ForceSource::Column => "as recorded",
         ForceSource::ControlForce => "from the signed control_force",
         ForceSource::Handle => "from the handle's share of the effort curve",
+        ForceSource::Pressure => "from the friction brake's pressure",
         ForceSource::None => "not recorded",
     };
     let mut text = String::from("sources\n");

@@ -21,14 +21,14 @@ pub enum Width {
 
 impl Width {
     /// Nominal size in px: width, height of the speeds, height of the errors.
-    fn size(self) -> (u32, u32, u32) {
+    pub(super) fn size(self) -> (u32, u32, u32) {
         match self {
             Width::Wide => (980, 250, 190),
             Width::Narrow => (470, 240, 190),
         }
     }
 
-    fn class(self) -> &'static str {
+    pub(super) fn class(self) -> &'static str {
         match self {
             Width::Wide => "wide",
             Width::Narrow => "narrow",

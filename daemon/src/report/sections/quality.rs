@@ -140,6 +140,7 @@ fn sources(subject: &Subject) -> String {
         ForceSource::Column => "as recorded",
         ForceSource::ControlForce => "from the signed control force",
         ForceSource::Handle => "from the handle's share of the effort curve",
+        ForceSource::Pressure => "from the friction brake's pressure",
         ForceSource::None => "not recorded",
     };
     let position = |run: &Run| match run.position_source {

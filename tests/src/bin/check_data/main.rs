@@ -1,11 +1,12 @@
 //! Checks Dynocar against a folder of recorded and simulated data: every dataset loads, the
 //! resistance that `dynocar identify` finds is the true one where the truth is known, and the
 //! forward simulation comes out where other simulators do; what is undeclared in them is found,
-//! offline and live.
+//! offline and live; a bus's line is surveyed and predicts trips that took no part in it.
 //!
 //! `dynocar-check-data FOLDER`, with the folders `practice`, `practice-truth`, `independent` and
 //! `measured` in it. Exit status 1 when a check fails.
 
+mod bus;
 mod explaining;
 mod monitor;
 mod report;
@@ -35,6 +36,7 @@ fn main() -> ExitCode {
     explaining::check(&mut report, &folder);
     monitor::check(&mut report, &folder);
     stops::check(&mut report, &folder);
+    bus::check(&mut report, &folder.join("measured/ztbus"));
     report.finish()
 }
 

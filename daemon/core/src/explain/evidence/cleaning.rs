@@ -7,6 +7,11 @@ const HALF_WINDOW: usize = 3;
 /// So many times the usual deviation from the median around is an outlier.
 const OUTLIER_SPREADS: f64 = 8.0;
 
+/// Samples further apart than this many s do not show what is an outlier.
+const SPARSE_S: f64 = 0.5;
+/// The sharpest bend of a speed curve in m/s².
+const SPEED_BEND_MPS2: f64 = 1.5;
+
 /// The median of a window; reorders it.
 fn median(window: &mut [f64]) -> f64 {
     window.sort_unstable_by(f64::total_cmp);
@@ -46,12 +51,19 @@ pub(super) fn replace_outliers(values: &mut [f64], least: f64) -> usize {
 /// Cleans forces, speeds and pressures of a run; returns the number of replaced values.
 ///
 /// A force counts as an outlier when it leaves its neighbours by a tenth of the run's greatest
-/// force, a speed by 0.25 m/s: less than that averages out.
-pub(super) fn clean(samples: &mut [ResolvedSample]) -> usize {
+/// force, a speed by 0.25 m/s: less than that averages out. Samples more than `SPARSE_S` apart
+/// cannot tell an outlier from a short application of the brake, or from the bend of a speed where
+/// it ends: their forces stay, and their speeds may bend as sharply as a train's do.
+pub(super) fn clean(samples: &mut [ResolvedSample], period_s: f64) -> usize {
     let mut speeds: Vec<f64> = samples.iter().map(|sample| sample.speed_mps).collect();
-    let mut replaced = replace_outliers(&mut speeds, 0.25);
+    let is_sparse = period_s > SPARSE_S;
+    let bend_mps = if is_sparse { SPEED_BEND_MPS2 * HALF_WINDOW as f64 * period_s } else { 0.0 };
+    let mut replaced = replace_outliers(&mut speeds, 0.25 + bend_mps);
     for (sample, speed_mps) in samples.iter_mut().zip(speeds) {
         sample.speed_mps = speed_mps;
+    }
+    if is_sparse {
+        return replaced;
     }
     let fields: [fn(&mut ResolvedSample) -> &mut Option<f64>; 3] = [
         |sample| &mut sample.traction_force_n,
@@ -86,6 +98,20 @@ mod tests {
         assert_eq!(replace_outliers(&mut values, 0.25), 2);
         assert!(values[..30].iter().all(|&value| value == 1.0));
         assert!(values[30..].iter().all(|&value| value == 9.0));
+    }
+
+    #[test]
+    fn a_short_application_of_the_brake_is_no_outlier_where_samples_are_sparse() {
+        let brake_n = |row: usize| if row % 20 == 7 { 30e3 } else { 0.0 };
+        let sample = |row: usize| ResolvedSample {
+            brake_force_n: Some(brake_n(row)),
+            ..ResolvedSample::coasting()
+        };
+        let mut dense: Vec<ResolvedSample> = (0..200).map(sample).collect();
+        let mut sparse = dense.clone();
+        assert_eq!(clean(&mut dense, 0.2), 10);
+        assert_eq!(clean(&mut sparse, 1.0), 0);
+        assert!((0..200).all(|row| sparse[row].brake_force_n == Some(brake_n(row))));
     }
 
     #[test]

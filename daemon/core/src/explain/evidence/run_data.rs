@@ -127,8 +127,10 @@ fn prepare_run(
     let numbered = run.samples.iter().map(|it| TrainSample { run: run.number, ..*it });
     let mut samples: Vec<ResolvedSample> = numbered.filter_map(|sample| resolve(&sample)).collect();
     let rejected = run.samples.len() - samples.len();
-    let replaced = cleaning::clean(&mut samples);
     let first_ns = samples.first().map_or(0, |sample| sample.time_ns);
+    let time_s: Vec<f64> =
+        samples.iter().map(|sample| (sample.time_ns - first_ns) as f64 * 1e-9).collect();
+    let replaced = cleaning::clean(&mut samples, sampling_period_s(&time_s));
     let recording = Recording::new(samples, BridgeLimits::default())
         .map_err(|source| RunDataError::Simulate { file: run.file.clone(), source })?;
     let declared = recording

@@ -5,6 +5,7 @@ use super::inside::Inside;
 use super::runs::best_runs;
 use crate::explain::evidence::{Bin, RunData};
 use crate::explain::scan::{Scan, Tuple};
+use crate::track::Track;
 
 /// Shortest interval in m that is looked for.
 const SHORTEST_M: f64 = 150.0;
@@ -132,6 +133,19 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside, positive: bool) -> Option
     Some(found)
 }
 
+/// Standard deviation in ‰ of the mean gradient over some intervals: what the line states of each,
+/// and no less than a surveyor's.
+fn gradient_std_permille(track: Option<&Track>, intervals_m: &[[f64; 2]]) -> f64 {
+    let squares: f64 = intervals_m
+        .iter()
+        .map(|[from_m, to_m]| {
+            let stated = track.and_then(|track| track.gradient_std_permille(*from_m, *to_m));
+            stated.unwrap_or(0.0).max(MAP_ERROR_PERMILLE).powi(2)
+        })
+        .sum();
+    squares.sqrt() / intervals_m.len().max(1) as f64
+}
+
 /// True when an interval overlaps none of some others.
 fn apart(one: [f64; 2], others: &[[f64; 2]]) -> bool {
     others.iter().all(|other| one[1] <= other[0] || one[0] >= other[1])
@@ -160,8 +174,13 @@ impl Places<'_, '_> {
         if square <= 0.0 || full <= 0.0 {
             return 0.0;
         }
-        let places = found.intervals_m.len().max(1) as f64;
-        MAP_ERROR_PERMILLE * (leaning / square).abs() / places.sqrt() * resistance / full
+        // With a profile of its own for each direction, nothing cancels.
+        let track = self.scan.track;
+        let is_one = track.is_none_or(|track| track.is_one_profile());
+        let leaning = if is_one { (leaning / square).abs() } else { 1.0 };
+        gradient_std_permille(track.map(|track| &**track), &found.intervals_m)
+            * leaning
+            * (resistance / full)
     }
 
     /// The sum over the chosen runs.

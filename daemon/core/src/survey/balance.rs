@@ -1,0 +1,169 @@
+//! What a pass says of the forces, second by second.
+//!
+//! ```text
+//! control force = mass ((1 + gamma) dv/dt + g (w0(v) + k/R) / 1000 + g gradient)
+//! ```
+//!
+//! Speeds are averaged over blocks of a second or more; the difference of two blocks is the
+//! acceleration weighted by a triangle over both, and so are the forces.
+
+use super::chainage::Chained;
+use super::recording::RawRecording;
+
+/// Below this speed in m/s holding brakes and stiction act.
+const MOVING_MPS: f64 = 0.8;
+/// Rows further apart than this many s are not joined.
+const STEP_MAX_S: f64 = 2.5;
+
+/// One difference of two blocks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observation {
+    /// Number of the pass.
+    pub pass: u32,
+    /// Place in m along the way, and how far the window reaches to either side.
+    pub along_m: f64,
+    /// Half the way in m between the centres of the blocks, 0 for single rows.
+    pub reach_m: f64,
+    /// Mean speed in m/s.
+    pub speed_mps: f64,
+    /// Acceleration in m/s².
+    pub acceleration_mps2: f64,
+    /// Mean control force in N.
+    pub force_n: f64,
+    /// Change of the mean force in N for each second that forces are stamped too early.
+    pub force_change_n: f64,
+    /// Lowest, mean and greatest friction-brake pressure in Pa; 0 where none is recorded.
+    pub friction_pa: [f64; 3],
+    /// Declared curve resistance in N/kN.
+    pub curve_n_per_kn: f64,
+    /// Declared mass in kg with what is counted.
+    pub mass_kg: f64,
+    /// Number of passengers, 0 where not counted.
+    pub passengers: f64,
+}
+
+/// The observations of a pass with blocks of `block_s`; `speed_factor` is true over recorded speed.
+pub fn observations(
+    raw: &RawRecording,
+    chained: &Chained,
+    pass: u32,
+    block_s: f64,
+    speed_factor: f64,
+) -> Vec<Observation> {
+    let rows = chained.first_row..chained.first_row + chained.chainage_m.len();
+    let period_s = period(&raw.time_s[rows.clone()]);
+    let block = ((block_s / period_s).round() as usize).max(1);
+    let mut found = Vec::new();
+    let mut from = rows.start;
+    while from + 2 * block <= rows.end {
+        let window = from..from + 2 * block;
+        if let Some(mut observation) = observe(raw, window, block, speed_factor) {
+            let along = |row: usize| chained.chainage_m[row - chained.first_row];
+            let (first, last) = (along(from), along(from + 2 * block - 1));
+            observation.pass = pass;
+            observation.along_m = 0.5 * (first + last);
+            observation.reach_m = if block == 1 { 0.0 } else { 0.25 * (last - first) };
+            found.push(observation);
+        }
+        from += block;
+    }
+    found
+}
+
+fn period(time_s: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let middle = steps.len() / 2;
+    if steps.is_empty() {
+        return 1.0;
+    }
+    steps.select_nth_unstable_by(middle, f64::total_cmp).1.max(1e-3)
+}
+
+/// The difference of the two blocks of a window; `None` where the vehicle stands or values are
+/// missing.
+fn observe(
+    raw: &RawRecording,
+    window: std::ops::Range<usize>,
+    block: usize,
+    speed_factor: f64,
+) -> Option<Observation> {
+    let friction = |row: usize| raw.friction_pa.get(row).copied().unwrap_or(0.0);
+    let mut friction_pa = [f64::INFINITY, 0.0, 0.0];
+    for row in window.clone() {
+        // Comparisons with NaN fail, so that missing values end here too.
+        if !(raw.speed_mps[row] > MOVING_MPS && raw.control_n[row].is_finite()) {
+            return None;
+        }
+        friction_pa[0] = friction_pa[0].min(friction(row));
+        friction_pa[1] += friction(row) / window.len() as f64;
+        friction_pa[2] = friction_pa[2].max(friction(row));
+    }
+    let (mut force, mut change, mut speed, mut total_s) = (0.0, 0.0, 0.0, 0.0);
+    for row in window.start..window.end - 1 {
+        let step_s = raw.time_s[row + 1] - raw.time_s[row];
+        if !(step_s > 0.0 && step_s <= STEP_MAX_S) {
+            return None;
+        }
+        // The triangle: 1, 2 … block … 2, 1.
+        let index = row - window.start;
+        let weight = (index + 1).min(2 * block - 1 - index) as f64;
+        let (one_n, other_n) = (raw.control_n[row], raw.control_n[row + 1]);
+        force += weight * 0.5 * step_s * (one_n + other_n);
+        change += weight * (other_n - one_n);
+        speed += weight * 0.5 * step_s * (raw.speed_mps[row] + raw.speed_mps[row + 1]);
+        total_s += weight * step_s;
+    }
+    let mean =
+        |range: std::ops::Range<usize>| raw.speed_mps[range].iter().sum::<f64>() / block as f64;
+    let (middle, end) = (window.start + block, window.end);
+    let gained_mps = mean(middle..end) - mean(window.start..middle);
+    let row = window.start + block - 1;
+    if !raw.mass_kg[row].is_finite() {
+        return None;
+    }
+    Some(Observation {
+        pass: 0,
+        along_m: 0.0,
+        reach_m: 0.0,
+        speed_mps: speed_factor * speed / total_s,
+        acceleration_mps2: speed_factor * gained_mps * block as f64 / total_s,
+        force_n: force / total_s,
+        force_change_n: change / total_s,
+        friction_pa,
+        curve_n_per_kn: 0.0,
+        mass_kg: raw.mass_kg[row],
+        passengers: raw.passengers.get(row).copied().unwrap_or(0.0),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::survey::chainage::WheelsAndLag;
+
+    #[test]
+    fn a_constant_acceleration_is_seen_whatever_the_block() {
+        let count = 60;
+        let time_s: Vec<f64> = (0..count).map(|row| 0.2 * f64::from(row)).collect();
+        let raw = RawRecording {
+            speed_mps: time_s.iter().map(|time| 5.0 + 0.3 * time).collect(),
+            control_n: time_s.iter().map(|time| 1000.0 + 10.0 * time).collect(),
+            mass_kg: vec![100e3; count as usize],
+            time_s: time_s.clone(),
+            ..RawRecording::default()
+        };
+        let chainage_m = time_s.iter().map(|time| 5.0 * time + 0.15 * time * time).collect();
+        let chained = Chained { first_row: 0, chainage_m, learned: WheelsAndLag::UNKNOWN };
+        for block_s in [0.2, 1.0, 2.0] {
+            let seen = observations(&raw, &chained, 3, block_s, 1.0);
+            assert!(!seen.is_empty());
+            for observation in seen {
+                assert!((observation.acceleration_mps2 - 0.3).abs() < 1e-9, "{block_s}");
+                assert!((observation.force_change_n - 10.0).abs() < 1e-9, "{block_s}");
+                // Where the mean speed is, there the mean force is: both are linear in time.
+                let time_s = (observation.speed_mps - 5.0) / 0.3;
+                assert!((observation.force_n - 1000.0 - 10.0 * time_s).abs() < 1e-6);
+            }
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Whether both directions take one track, and which.
+
+use super::stretches::SAME_WAY_M;
+use super::way::Way;
+
+/// Both directions take the same way when so much of what both drive lies within `SAME_TRACK_M`.
+const SAME_TRACK_SHARE: f64 = 0.97;
+/// Distance in m of two tracks of the same way.
+const SAME_TRACK_M: f64 = 25.0;
+/// Difference in m between the chainages of two ways at the same places, up to which they are one.
+const SAME_CHAINAGE_M: f64 = 15.0;
+/// Lengths of one track as two directions measure them differ by less than this share.
+const DRIFT_SHARE: f64 = 0.005;
+/// Where each goes on alone for so many m at the same end, they fork there.
+const FORK_M: f64 = 100.0;
+
+/// Two ways, each in its direction of travel, beside one another.
+pub struct Compared {
+    /// Chainage in m along the growing way where the falling one starts.
+    pub start_chainage_m: f64,
+    /// The track of both, for growing chainage, as far as either drives it; `None` where they are
+    /// two.
+    pub joined: Option<Way>,
+}
+
+/// Compares the ways of growing and of falling chainage; `None` when they never meet.
+pub fn compare(growing: &Way, falling: &Way) -> Option<Compared> {
+    let twin = |at: &[f64; 2]| {
+        growing.nodes_near(*at, SAME_WAY_M).min_by(|one, other| one.1.total_cmp(&other.1))
+    };
+    let twins: Vec<Option<(usize, f64)>> = falling.nodes_m().iter().map(twin).collect();
+    let first = twins.iter().position(Option::is_some)?;
+    let last = twins.iter().rposition(Option::is_some)?;
+    let both = &twins[first..=last];
+    let apart = both.iter().filter(|twin| twin.is_none_or(|twin| twin.1 > SAME_TRACK_M)).count();
+    // Chainage along the one and back along the other: the same everywhere on one track, but for
+    // a drift, since two measures of a length differ by a share of it.
+    let mut sums_m: Vec<f64> = twins
+        .iter()
+        .enumerate()
+        .filter_map(|(node, twin)| {
+            Some(twin.as_ref()?.0 as f64 * growing.step_m() + node as f64 * falling.step_m())
+        })
+        .collect();
+    let start_chainage_m = share_of(&sums_m, 0.5);
+    let (one, other) = sums_m.split_at(sums_m.len() / 2);
+    let drift_m = 2.0 * (share_of(other, 0.5) - share_of(one, 0.5));
+    let count = sums_m.len() as f64;
+    for (node, sum_m) in sums_m.iter_mut().enumerate() {
+        *sum_m -= drift_m * node as f64 / count;
+    }
+    // The growing way starts where the falling one ends.
+    let (start, end) = (twins[last]?.0, twins[first]?.0);
+    let forks = |one: usize, other: usize| {
+        one.min(other) as f64 * growing.step_m().min(falling.step_m()) > FORK_M
+    };
+    let (ahead, back) = (growing.nodes_m(), falling.nodes_m());
+    let is_same = start < end
+        && (apart as f64) < (1.0 - SAME_TRACK_SHARE) * both.len() as f64
+        && drift_m.abs() < DRIFT_SHARE * growing.length_m()
+        && share_of(&sums_m, 0.97) - share_of(&sums_m, 0.03) < SAME_CHAINAGE_M
+        && !forks(start, back.len() - 1 - last)
+        && !forks(ahead.len() - 1 - end, first);
+    let joined = || {
+        let from = if last + 1 < back.len() { start } else { 0 };
+        let to = if first > 0 { end } else { ahead.len() - 1 };
+        let mut nodes: Vec<[f64; 2]> = back[last + 1..].iter().rev().copied().collect();
+        nodes.extend_from_slice(&ahead[from..=to]);
+        nodes.extend(back[..first].iter().rev());
+        Way::through(&nodes)
+    };
+    let joined = is_same.then(joined).flatten();
+    Some(Compared { start_chainage_m, joined })
+}
+
+/// The value below which a share of some values lies; 0 of none.
+fn share_of(values: &[f64], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let index = (share * sorted.len().saturating_sub(1) as f64) as usize;
+    sorted.get(index).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn way(from_m: i32, to_m: i32, left_m: f64) -> Way {
+        let step = if to_m > from_m { 10 } else { -10 };
+        let count = (to_m - from_m) / step;
+        let point = |k: i32| [f64::from(from_m + k * step), left_m];
+        Way::through(&(0..=count).map(point).collect::<Vec<_>>()).unwrap()
+    }
+
+    #[test]
+    fn directions_that_begin_and_end_elsewhere_on_one_track_are_joined() {
+        let compared = compare(&way(0, 3000, 0.0), &way(3600, -500, 4.0)).unwrap();
+        let joined = compared.joined.unwrap();
+        assert!((joined.length_m() - 4100.0).abs() < 1.0, "{}", joined.length_m());
+        assert!((joined.nodes_m()[0][0] + 500.0).abs() < 1.0);
+        assert!((compared.start_chainage_m - 3600.0).abs() < 41.0);
+    }
+
+    #[test]
+    fn lengths_that_drift_apart_are_one_track_and_a_detour_makes_two() {
+        let growing = way(0, 20_000, 0.0);
+        let wavy = |k: i32| [20_000.0 - 10.0 * f64::from(k), 0.6 * f64::from(k % 2)];
+        let drifting: Vec<[f64; 2]> = (0..=2000).map(wavy).collect();
+        let falling = Way::through(&drifting).unwrap();
+        assert!(falling.length_m() > 20_030.0, "{}", falling.length_m());
+        assert!(compare(&growing, &falling).unwrap().joined.is_some());
+        let mut detour = drifting[..1000].to_vec();
+        detour.extend((0..=12).map(|k| [10_010.0, 5.0 * f64::from(k)]));
+        detour.extend((0..=12).map(|k| [10_000.0, 60.0 - 5.0 * f64::from(k)]));
+        detour.extend_from_slice(&drifting[1000..]);
+        assert!(compare(&growing, &Way::through(&detour).unwrap()).unwrap().joined.is_none());
+    }
+
+    #[test]
+    fn ways_that_fork_or_lie_apart_stay_two() {
+        let mut points: Vec<[f64; 2]> = (0..60).map(|k| [10.0 * f64::from(k), 200.0]).collect();
+        points.reverse();
+        points.extend((0..200).map(|k| [-10.0 - 10.0 * f64::from(k), 0.0]));
+        let growing = way(-2000, 600, 0.0);
+        assert!(compare(&growing, &Way::through(&points).unwrap()).unwrap().joined.is_none());
+        assert!(compare(&growing, &way(600, -2000, 30.0)).unwrap().joined.is_none());
+        assert!(compare(&growing, &way(600, -2000, 300.0)).is_none());
+    }
+}

@@ -1,0 +1,120 @@
+//! Where the unknown heights of a line's ways lie, and what a gradient under a vehicle is of them.
+
+use super::banded::Factor;
+use super::bordered::{Columns, CommonCovariance};
+use super::common::Common;
+
+/// Distance in m between heights.
+pub const HEIGHT_STEP_M: f64 = 10.0;
+/// Heights reach beyond a way by half a vehicle and so many m.
+const MARGIN_M: f64 = 60.0;
+
+/// Where heights lie in the system.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layout {
+    /// For the two ways: number of the first height, and number of heights.
+    pub blocks: Vec<(usize, usize)>,
+    /// Chainage in m of a block's first height along its way.
+    pub start_m: f64,
+    /// Length in m of the vehicle.
+    vehicle_m: f64,
+}
+
+/// A pass's way in the system: which block, and +1 along it, -1 against it from an end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Course {
+    /// Number of the block of heights.
+    pub block: usize,
+    /// For a pass against the block's sense: length of the way in m.
+    pub against_from_m: Option<f64>,
+}
+
+impl Course {
+    /// Place in m along the block.
+    pub fn in_block(&self, along_m: f64) -> f64 {
+        self.against_from_m.map_or(along_m, |length_m| length_m - along_m)
+    }
+}
+
+impl Layout {
+    /// Heights for ways of some lengths in m.
+    pub fn new(lengths_m: &[f64], vehicle_m: f64) -> Self {
+        let start_m = -(MARGIN_M + 0.5 * vehicle_m);
+        let mut next = 0;
+        let block = |length_m: &f64| {
+            let count = ((length_m - 2.0 * start_m) / HEIGHT_STEP_M).ceil() as usize + 1;
+            next += count;
+            (next - count, count)
+        };
+        let blocks = lengths_m.iter().map(block).collect();
+        Layout { blocks, start_m, vehicle_m }
+    }
+
+    /// Number of heights.
+    pub fn size(&self) -> usize {
+        self.blocks.iter().map(|block| block.1).sum()
+    }
+
+    /// Diagonals beside the main one: a vehicle, and the reach of a block of time.
+    pub fn width(&self, reach_max_m: f64) -> usize {
+        ((self.vehicle_m.max(HEIGHT_STEP_M) + 2.0 * reach_max_m) / HEIGHT_STEP_M).ceil() as usize
+            + 3
+    }
+
+    /// Adds a height with a weight to a sparse row.
+    pub fn push(&self, block: usize, at_m: f64, weight: f64, row: &mut Vec<(usize, f64)>) {
+        let (first, count) = self.blocks[block];
+        let place = ((at_m - self.start_m) / HEIGHT_STEP_M).clamp(0.0, (count - 1) as f64 - 1e-9);
+        let (node, share) = (place as usize, place.fract());
+        for (node, part) in [(node, 1.0 - share), (node + 1, share)] {
+            match row.iter_mut().find(|entry| entry.0 == first + node) {
+                Some(entry) => entry.1 += weight * part,
+                None => row.push((first + node, weight * part)),
+            }
+        }
+    }
+
+    /// The gradient under a vehicle as a combination of heights.
+    pub fn gradient(
+        &self,
+        course: Course,
+        along_m: f64,
+        reach_m: f64,
+        row: &mut Vec<(usize, f64)>,
+    ) {
+        row.clear();
+        let length_m = self.vehicle_m.max(HEIGHT_STEP_M);
+        let parts: &[(f64, f64)] = match reach_m > 0.0 {
+            true => &[(-1.0, 0.25), (0.0, 0.5), (1.0, 0.25)],
+            false => &[(0.0, 1.0)],
+        };
+        for (offset, weight) in parts {
+            let centre_m = along_m + offset * reach_m;
+            let front = course.in_block(centre_m + 0.5 * length_m);
+            let rear = course.in_block(centre_m - 0.5 * length_m);
+            self.push(course.block, front, weight / length_m, row);
+            self.push(course.block, rear, -weight / length_m, row);
+        }
+    }
+
+    /// Variance of the gradient between neighbouring heights.
+    pub fn gradient_variances(
+        &self,
+        factor: &Factor,
+        columns: &Columns,
+        common: &CommonCovariance,
+    ) -> Vec<Vec<f64>> {
+        let inverse = factor.inverse_band();
+        let per_m = 1.0 / HEIGHT_STEP_M;
+        let of_node = |node: usize| {
+            let row = [(node, -per_m), (node + 1, per_m)];
+            let slopes = nalgebra::SVector::<f64, { Common::COUNT }>::from_fn(|index, _| {
+                per_m * (columns[node + 1][index] - columns[node][index])
+            });
+            inverse.variance_of(&row).max(0.0) + slopes.dot(&(common * slopes)).max(0.0)
+        };
+        let block =
+            |&(first, count): &(usize, usize)| (first..first + count - 1).map(of_node).collect();
+        self.blocks.iter().map(block).collect()
+    }
+}

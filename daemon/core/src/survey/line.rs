@@ -1,0 +1,242 @@
+//! The line that is driven repeatedly, and which stretches are passes of it.
+
+use super::alignment::{PassRows, align};
+use super::both_directions::{Compared, compare};
+use super::recording::Recording;
+use super::stretches::{SAME_WAY_M, Stretch, distance_squared};
+use super::tracking::follow;
+use super::way::Way;
+
+/// Stretches that are tried as the line, and stretches that each is compared with, at most.
+const TRIED_MAX: usize = 12;
+/// Passes that the way is laid through, at most: more make it no better than GNSS itself.
+const ALIGNED_MAX: usize = 60;
+/// Distance in m between the points of a stretch.
+const POINT_STEP_M: f64 = 20.0;
+/// A pass covers at least this share of the line, or `PASS_MIN_M`.
+const PASS_SHARE_MIN: f64 = 0.25;
+/// A pass of this many m is worth having however long the line is.
+const PASS_MIN_M: f64 = 1000.0;
+
+/// The ways of a line, each in its direction of travel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ways {
+    /// For growing chainage; chainage and way in m are the same.
+    pub growing: Way,
+    /// For falling chainage, where it is driven.
+    pub falling: Option<FallingWay>,
+    /// Metres of chainage for each metre on the plane: 1, unless the wheels are the better measure.
+    pub chainage_per_m: f64,
+}
+
+/// The way for falling chainage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FallingWay {
+    /// The way from its own start.
+    pub way: Way,
+    /// Chainage in m on the plane at its start.
+    pub start_chainage_m: f64,
+    /// True when it is the growing way the other way round: the same track.
+    pub is_same: bool,
+}
+
+impl Ways {
+    /// The way of a direction.
+    pub fn of(&self, direction: i8) -> Option<&Way> {
+        match direction {
+            1 => Some(&self.growing),
+            _ => self.falling.as_ref().map(|falling| &falling.way),
+        }
+    }
+
+    /// Chainage in m of a place along the way of a direction.
+    pub fn chainage_m(&self, direction: i8, along_m: f64) -> f64 {
+        let on_plane_m = match (&self.falling, direction) {
+            (Some(falling), -1) => falling.start_chainage_m - along_m,
+            _ => along_m,
+        };
+        self.chainage_per_m * on_plane_m
+    }
+
+    /// Place in m along the way of a direction of a chainage in m: [`Ways::chainage_m`] turned round.
+    pub fn along_m(&self, direction: i8, chainage_m: f64) -> f64 {
+        let on_plane_m = chainage_m / self.chainage_per_m;
+        match (&self.falling, direction) {
+            (Some(falling), -1) => falling.start_chainage_m - on_plane_m,
+            _ => on_plane_m,
+        }
+    }
+
+    /// True when both directions share one profile.
+    pub fn is_one_track(&self) -> bool {
+        self.falling.as_ref().is_none_or(|falling| falling.is_same)
+    }
+}
+
+/// A stretch that runs along the line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pass {
+    /// Its rows, as far as they are on the line.
+    pub rows: PassRows,
+    /// 1 while the chainage grows, -1 while it falls.
+    pub direction: i8,
+}
+
+/// Finds the line among the stretches of the fit runs; `None` when there is none.
+pub fn find(stretches: &[Stretch], recordings: &[Recording]) -> Option<Ways> {
+    let fit: Vec<Stretch> =
+        stretches.iter().filter(|it| recordings[it.recording].raw.is_fit).copied().collect();
+    let template = template(&fit, recordings)?;
+    let back = template.reversed()?;
+    let growing = along(&template, &fit, recordings);
+    let falling = along(&back, &fit, recordings);
+    // The line's chainage grows in the direction in which it was first driven.
+    let first = |along: &[(Stretch, PassRows)]| {
+        along.iter().map(|(_, pass)| (pass.recording, pass.rows.start)).min()
+    };
+    let is_backward = match (first(&growing), first(&falling)) {
+        (Some(one), Some(other)) => other < one,
+        (one, _) => one.is_none(),
+    };
+    let [(template, ahead), (reversed_template, back)] = match is_backward {
+        true => [(back, falling), (template, growing)],
+        false => [(template, growing), (back, falling)],
+    };
+    let growing = way_of(&template, &ahead, recordings);
+    let chainage_per_m = 1.0;
+    if back.is_empty() {
+        return Some(Ways { growing, falling: None, chainage_per_m });
+    }
+    let way = way_of(&reversed_template, &back, recordings);
+    let Some(Compared { start_chainage_m, joined }) = compare(&growing, &way) else {
+        return Some(Ways { growing, falling: None, chainage_per_m });
+    };
+    let Some(joined) = joined else {
+        let falling = Some(FallingWay { way, start_chainage_m, is_same: false });
+        return Some(Ways { growing, falling, chainage_per_m });
+    };
+    // One track has one way and one chainage, and the passes of both directions show it.
+    let passes =
+        [(joined.clone(), 1), (joined.reversed()?, -1)].into_iter().flat_map(|(way, direction)| {
+            let along = self::along(&way, &fit, recordings);
+            let passes: Vec<PassRows> = along.into_iter().map(|(_, pass)| pass).collect();
+            thinned(&passes).into_iter().map(move |pass| (pass, direction))
+        });
+    let growing = align(joined, &passes.collect::<Vec<_>>(), recordings);
+    let way = growing.reversed()?;
+    let start_chainage_m = way.length_m();
+    let falling = Some(FallingWay { way, start_chainage_m, is_same: true });
+    Some(Ways { growing, falling, chainage_per_m })
+}
+
+/// The way of a direction from its own stretches: where they differ from the other direction's,
+/// they know better. A single stretch cannot say what of it is the line.
+fn way_of(template: &Way, along: &[(Stretch, PassRows)], recordings: &[Recording]) -> Way {
+    let own: Vec<Stretch> = along.iter().map(|(stretch, _)| *stretch).collect();
+    let first = match own.len() {
+        0 | 1 => template.clone(),
+        _ => self::template(&own, recordings).unwrap_or_else(|| template.clone()),
+    };
+    let passes: Vec<PassRows> =
+        self::along(&first, &own, recordings).into_iter().map(|(_, pass)| pass).collect();
+    let passes: Vec<_> = thinned(&passes).into_iter().map(|pass| (pass, 1)).collect();
+    align(first, &passes, recordings)
+}
+
+fn thinned(passes: &[PassRows]) -> Vec<PassRows> {
+    let step = passes.len().div_ceil(ALIGNED_MAX).max(1);
+    passes.iter().step_by(step).cloned().collect()
+}
+
+fn rows_of(stretch: &Stretch, recordings: &[Recording]) -> std::ops::Range<usize> {
+    let recording = &recordings[stretch.recording];
+    let first = recording.way_m.partition_point(|&way| way < stretch.from_m);
+    let end = recording.way_m.partition_point(|&way| way <= stretch.to_m);
+    first..end
+}
+
+/// The stretch that the others follow furthest, cut to what at least one other drives too.
+fn template(stretches: &[Stretch], recordings: &[Recording]) -> Option<Way> {
+    let thinned: Vec<&Stretch> = {
+        let mut long: Vec<&Stretch> = stretches.iter().collect();
+        long.retain(|stretch| stretch.to_m - stretch.from_m > 100.0);
+        let step = long.len().div_ceil(TRIED_MAX).max(1);
+        long.into_iter().step_by(step).collect()
+    };
+    let points: Vec<Vec<[f64; 2]>> = thinned
+        .iter()
+        .map(|stretch| {
+            let points = recordings[stretch.recording].points(POINT_STEP_M);
+            let within =
+                |point: &&(f64, [f64; 2])| (stretch.from_m..=stretch.to_m).contains(&point.0);
+            points.iter().filter(within).map(|point| point.1).collect()
+        })
+        .collect();
+    let tried = points.iter().enumerate().filter_map(|(one, nodes)| {
+        let way = Way::through(nodes)?;
+        let counts = covered(&way, one, &points);
+        let score: usize = counts.iter().sum();
+        // Of two that the others follow as far, the shorter one holds less that is not the line.
+        Some((score, std::cmp::Reverse(nodes.len()), way, counts))
+    });
+    let (_, _, way, counts) = tried.max_by_key(|it| (it.0, it.1))?;
+    if thinned.len() < 2 {
+        return Some(way);
+    }
+    let first = counts.iter().position(|&count| count > 0)?;
+    let last = counts.iter().rposition(|&count| count > 0)?;
+    Way::through(&way.nodes_m()[first..=last])
+}
+
+/// For each node of a way how many other stretches drive it, each counted in the direction in
+/// which it drives most of it.
+fn covered(way: &Way, own: usize, stretches: &[Vec<[f64; 2]>]) -> Vec<usize> {
+    let count = way.nodes_m().len();
+    let mut counts = vec![0; count];
+    for (_, points) in stretches.iter().enumerate().filter(|(other, _)| *other != own) {
+        let mut marks = [vec![false; count], vec![false; count]];
+        for pair in points.windows(2) {
+            let step = [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]];
+            let length = distance_squared(pair[0], pair[1]).sqrt().max(1e-9);
+            for (node, _) in way.nodes_near(pair[0], SAME_WAY_M) {
+                let [x, y] = way.direction(node as f64 * way.step_m());
+                let cosine = (x * step[0] + y * step[1]) / length;
+                if cosine.abs() > 0.6 {
+                    marks[usize::from(cosine < 0.0)][node] = true;
+                }
+            }
+        }
+        let covers = |marks: &Vec<bool>| marks.iter().filter(|mark| **mark).count();
+        let best = if covers(&marks[0]) >= covers(&marks[1]) { &marks[0] } else { &marks[1] };
+        for (count, mark) in counts.iter_mut().zip(best) {
+            *count += usize::from(*mark);
+        }
+    }
+    counts
+}
+
+/// The stretches that run along a way in its direction, with their rows on it.
+fn along(way: &Way, stretches: &[Stretch], recordings: &[Recording]) -> Vec<(Stretch, PassRows)> {
+    let pass = |stretch: &Stretch| Some((*stretch, pass_along(way, stretch, recordings)?));
+    stretches.iter().filter_map(pass).collect()
+}
+
+fn pass_along(way: &Way, stretch: &Stretch, recordings: &[Recording]) -> Option<PassRows> {
+    let rows = rows_of(stretch, recordings);
+    let placed = follow(&recordings[stretch.recording], rows.clone(), way);
+    let (first, last) = (placed.first()?, placed.last()?);
+    let covered_m = last.chainage_m - first.chainage_m;
+    let least_m = (PASS_SHARE_MIN * way.length_m()).min(PASS_MIN_M);
+    let on_line = PassRows { recording: stretch.recording, rows: first.row..last.row + 1 };
+    (covered_m >= least_m).then_some(on_line)
+}
+
+/// The pass that a stretch of any role is, if it is one.
+pub fn pass_of(ways: &Ways, stretch: &Stretch, recordings: &[Recording]) -> Option<Pass> {
+    let along = |direction: i8| {
+        let rows = pass_along(ways.of(direction)?, stretch, recordings)?;
+        Some(Pass { rows, direction })
+    };
+    let length = |pass: &Pass| pass.rows.rows.len();
+    [along(1), along(-1)].into_iter().flatten().max_by_key(length)
+}

@@ -1,0 +1,42 @@
+//! A line that nobody surveyed, from recordings of trains that drove it with GNSS.
+//!
+//! A gradient from GNSS altitude is worse than none: noise in a regressor attenuates its
+//! coefficient, and the mass, the rotating mass or the gain of the forces pay for it. The forces
+//! themselves say what the gradient is: over many passes the balance of forces leaves nothing else
+//! that depends on the place and turns its sign with the direction.
+//!
+//! # Layout, in the order of reading
+//!
+//! - [`recording`], [`geodesy`]: what was recorded, on a plane in metres
+//! - `stretches`, [`way`], `tracking`, `alignment`, `both_directions`, [`line`]: the line that is driven repeatedly
+//! - [`chainage`]: a chainage for every row; [`stops`], [`curves`]: what it shows
+//! - [`balance`], [`common`], [`profile`], [`friction`], [`learn`]: gradient, resistance, mass,
+//!   time offset and friction brake from the balance of forces; [`layout`]: its unknown heights;
+//!   [`banded`], `bordered`: its solver
+//! - [`survey()`]: all of it in turn
+
+mod alignment;
+pub mod balance;
+pub mod banded;
+mod bordered;
+mod both_directions;
+pub mod chainage;
+pub mod common;
+pub mod curves;
+pub mod friction;
+pub mod geodesy;
+pub mod layout;
+pub mod learn;
+pub mod line;
+pub mod profile;
+pub mod recording;
+pub mod stops;
+mod stretches;
+mod surveying;
+mod tracking;
+pub mod trips;
+pub mod way;
+
+pub use alignment::PassRows;
+pub use surveying::{KnownLine, Survey, SurveyError, SurveyedProfile, Vehicle, survey};
+pub use trips::{NotUsed, Trip};

@@ -1,0 +1,314 @@
+//! The height profile from the balance of forces over all passes.
+//!
+//! Heights at nodes 10 m apart are unknown, with a random walk of the gradient between them
+//! (Wahba 1978: a smoothing spline is such a prior); resistance, mass and the time offset of the
+//! forces are estimated beside them. The heights make a banded system, the few common unknowns
+//! its border; the mass of each pass is fitted in turns, so that work grows linearly with passes.
+
+use super::balance::Observation;
+use super::banded::{Banded, NotPositive};
+use super::bordered::Bordered;
+use super::common::{Common, Prior};
+use super::layout::{Course, HEIGHT_STEP_M, Layout};
+
+/// Standard deviation in m of a row of GNSS altitude: far more than it errs, since its errors
+/// last for minutes.
+const ALTITUDE_STD_M: f64 = 15.0;
+/// Standard deviation of a gradient of which nothing is known.
+const GRADIENT_STD: f64 = 0.05;
+/// Standard deviation of a pass's mass around the declared one, as a share.
+const PASS_MASS_STD: f64 = 0.03;
+/// Rounds of linearising, weighing and fitting the passes' masses.
+const ROUNDS: usize = 8;
+/// Degrees of freedom of the residuals' distribution.
+const TAIL: f64 = 4.0;
+const GRAVITY_MPS2: f64 = 9.81;
+
+/// An altitude that GNSS gave.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Altitude {
+    /// The way.
+    pub course: Course,
+    /// Place in m along it.
+    pub along_m: f64,
+    /// Altitude in m.
+    pub altitude_m: f64,
+}
+
+/// Everything that a profile is fitted to.
+#[derive(Clone, Debug)]
+pub struct Evidence {
+    /// Where heights lie.
+    pub layout: Layout,
+    /// The way of each pass.
+    pub courses: Vec<Course>,
+    /// What the forces say.
+    pub observations: Vec<Observation>,
+    /// What GNSS says.
+    pub altitudes: Vec<Altitude>,
+    /// What is declared of the vehicle.
+    pub prior: Prior,
+}
+
+/// A fitted profile.
+#[derive(Clone, Debug)]
+pub struct Profile {
+    layout: Layout,
+    /// Heights in m, all blocks.
+    heights_m: Vec<f64>,
+    /// What is common to all passes.
+    pub common: Common,
+    /// Standard deviations of the common unknowns, with the heights' noise let in.
+    pub common_std: Common,
+    /// Mass of each pass over its declared one, less 1, beside the common factor.
+    pub pass_mass: Vec<f64>,
+    /// Scale in N of the residuals.
+    pub residual_n: f64,
+    /// Correlation of each residual with the one before it.
+    pub autocorrelation: f64,
+    /// Variance of gradients, block by block, per node.
+    gradient_var: Vec<Vec<f64>>,
+}
+
+/// Which observations count.
+pub type Fold<'f> = &'f dyn Fn(&Observation) -> bool;
+
+impl Evidence {
+    /// Fits the profile for a variance per m of the gradient's random walk.
+    ///
+    /// # Errors
+    ///
+    /// When the system has no solution, as without any observation.
+    pub fn fit(
+        &self,
+        walk_per_m: f64,
+        counts: Fold,
+        wants_std: bool,
+    ) -> Result<Profile, NotPositive> {
+        let size = self.layout.size();
+        let mut state = Profile {
+            layout: self.layout.clone(),
+            heights_m: vec![0.0; size],
+            common: self.prior.start(),
+            common_std: self.prior.start(),
+            pass_mass: vec![0.0; self.courses.len()],
+            residual_n: self.first_scale(),
+            autocorrelation: 0.0,
+            gradient_var: Vec::new(),
+        };
+        for round in 0..ROUNDS {
+            let is_last = round + 1 == ROUNDS;
+            self.improve(&mut state, walk_per_m, counts, wants_std && is_last)?;
+            self.fit_masses(&mut state, counts);
+        }
+        state.autocorrelation = self.autocorrelation(&state, counts);
+        Ok(state)
+    }
+
+    /// Before anything is known, a gradient of 2 % is noise.
+    fn first_scale(&self) -> f64 {
+        0.02 * GRAVITY_MPS2 * self.prior.mass_kg
+    }
+
+    /// One step of Gauss and Newton over heights and common unknowns.
+    fn improve(
+        &self,
+        state: &mut Profile,
+        walk_per_m: f64,
+        counts: Fold,
+        wants_std: bool,
+    ) -> Result<(), NotPositive> {
+        let size = self.layout.size();
+        let reach_max_m = self.observations.iter().map(|it| it.reach_m).fold(0.0, f64::max);
+        let mut matrix = Banded::zeros(size, self.layout.width(reach_max_m));
+        let mut right = vec![0.0; size];
+        self.add_priors(state, walk_per_m, &mut matrix, &mut right);
+        let mut border = vec![[0.0; Common::COUNT]; size];
+        let (mut corner, mut corner_right) = self.prior.rows(&state.common);
+        let mut row = Vec::with_capacity(16);
+        let mut sizes = Vec::new();
+        for observation in self.observations.iter().filter(|it| counts(it)) {
+            let course = self.courses[observation.pass as usize];
+            self.layout.gradient(course, observation.along_m, observation.reach_m, &mut row);
+            let (residual_n, mass_kg, unit) = state.residual(observation, &row, &self.prior);
+            let ratio = residual_n / state.residual_n;
+            let weight = (TAIL + 1.0) / (TAIL + ratio * ratio) / state.residual_n.powi(2);
+            sizes.push(residual_n.abs());
+            for entry in &mut row {
+                entry.1 *= mass_kg * GRAVITY_MPS2;
+            }
+            let slopes = self.prior.slopes(observation, mass_kg, unit);
+            matrix.add_row(&row, weight);
+            for &(node, value) in &row {
+                right[node] += weight * value * residual_n;
+                for (entry, slope) in border[node].iter_mut().zip(&slopes) {
+                    *entry += weight * value * slope;
+                }
+            }
+            for (one, slope) in slopes.iter().enumerate() {
+                corner_right[one] += weight * slope * residual_n;
+                for (other, second) in slopes.iter().enumerate() {
+                    corner[(one, other)] += weight * slope * second;
+                }
+            }
+        }
+        let factor = matrix.factor()?;
+        let step = Bordered { factor: &factor, border: &border, corner, corner_right }.solve(right);
+        for (height, change) in state.heights_m.iter_mut().zip(&step.heights_m) {
+            *height += change;
+        }
+        state.common.add(&step.common);
+        state.common_std = step.common_std();
+        if wants_std {
+            state.gradient_var =
+                self.layout.gradient_variances(&factor, &step.columns, &step.covariance);
+        }
+        if !sizes.is_empty() {
+            let middle = sizes.len() / 2;
+            let scale = 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+            // The first residuals hold the whole profile and say little of the noise.
+            state.residual_n = scale.max(0.3 * state.residual_n);
+        }
+        Ok(())
+    }
+
+    /// Smoothness of the gradient, a gradient of nothing, and GNSS altitudes.
+    fn add_priors(&self, state: &Profile, walk_per_m: f64, matrix: &mut Banded, right: &mut [f64]) {
+        let heights = &state.heights_m;
+        let mut add = |row: &[(usize, f64)], target: f64, weight: f64| {
+            let now: f64 = row.iter().map(|&(node, value)| value * heights[node]).sum();
+            matrix.add_row(row, weight);
+            for &(node, value) in row {
+                right[node] += weight * value * (target - now);
+            }
+        };
+        for &(first, count) in &self.layout.blocks {
+            let walk = 1.0 / (walk_per_m * HEIGHT_STEP_M);
+            let level = 10.0 / (GRADIENT_STD * GRADIENT_STD * count as f64);
+            let per_m = 1.0 / HEIGHT_STEP_M;
+            for node in first..first + count - 1 {
+                add(&[(node, -per_m), (node + 1, per_m)], 0.0, level);
+                if node + 2 < first + count {
+                    let bend = [(node, per_m), (node + 1, -2.0 * per_m), (node + 2, per_m)];
+                    add(&bend, 0.0, walk);
+                }
+            }
+            add(&[(first, 1.0)], 0.0, 1e-6);
+        }
+        let mut row = Vec::with_capacity(2);
+        for altitude in &self.altitudes {
+            row.clear();
+            let at_m = altitude.course.in_block(altitude.along_m);
+            self.layout.push(altitude.course.block, at_m, 1.0, &mut row);
+            let now: f64 = row.iter().map(|&(node, value)| value * heights[node]).sum();
+            let ratio = (altitude.altitude_m - now) / ALTITUDE_STD_M;
+            let weight = 1.0 / (1.0 + ratio * ratio) / (ALTITUDE_STD_M * ALTITUDE_STD_M);
+            add(&row, altitude.altitude_m, weight);
+        }
+    }
+
+    /// The mass of each pass, given all else.
+    fn fit_masses(&self, state: &mut Profile, counts: Fold) {
+        let mut sums = vec![(0.0, 1.0 / (PASS_MASS_STD * PASS_MASS_STD)); self.courses.len()];
+        let mut row = Vec::with_capacity(16);
+        for observation in self.observations.iter().filter(|it| counts(it)) {
+            let pass = observation.pass as usize;
+            self.layout.gradient(
+                self.courses[pass],
+                observation.along_m,
+                observation.reach_m,
+                &mut row,
+            );
+            let (residual_n, _, unit) = state.residual(observation, &row, &self.prior);
+            let slope = observation.mass_kg * unit;
+            let ratio = residual_n / state.residual_n;
+            let weight = (TAIL + 1.0) / (TAIL + ratio * ratio) / state.residual_n.powi(2);
+            sums[pass].0 += weight * slope * (residual_n + slope * state.pass_mass[pass]);
+            sums[pass].1 += weight * slope * slope;
+        }
+        for (mass, (top, bottom)) in state.pass_mass.iter_mut().zip(sums) {
+            *mass = top / bottom;
+        }
+        // What all passes share is the vehicle's, and moves there at once.
+        let driven: Vec<usize> = state.driven(&self.observations, counts);
+        let mean = driven.iter().map(|&pass| state.pass_mass[pass]).sum::<f64>()
+            / driven.len().max(1) as f64;
+        state.pass_mass.iter_mut().for_each(|mass| *mass -= mean);
+        state.common.0[3] += mean;
+    }
+
+    /// Residuals in N with their observations.
+    pub fn residuals<'e>(
+        &'e self,
+        profile: &'e Profile,
+    ) -> impl Iterator<Item = (&'e Observation, f64)> + 'e {
+        let mut row = Vec::with_capacity(16);
+        self.observations.iter().map(move |observation| {
+            let course = self.courses[observation.pass as usize];
+            self.layout.gradient(course, observation.along_m, observation.reach_m, &mut row);
+            (observation, profile.residual(observation, &row, &self.prior).0)
+        })
+    }
+
+    fn autocorrelation(&self, profile: &Profile, counts: Fold) -> f64 {
+        let (mut product, mut square, mut last) = (0.0, 0.0, None);
+        let bound = 4.0 * profile.residual_n;
+        for (observation, residual_n) in self.residuals(profile).filter(|it| counts(it.0)) {
+            let residual_n = residual_n.clamp(-bound, bound);
+            if let Some((pass, before_n)) = last
+                && pass == observation.pass
+            {
+                product += residual_n * before_n;
+                square += residual_n * residual_n;
+            }
+            last = Some((observation.pass, residual_n));
+        }
+        if square > 0.0 { product / square } else { 0.0 }
+    }
+}
+
+impl Profile {
+    /// Passes with observations that count.
+    fn driven(&self, observations: &[Observation], counts: Fold) -> Vec<usize> {
+        let mut has = vec![false; self.pass_mass.len()];
+        for observation in observations.iter().filter(|it| counts(it)) {
+            has[observation.pass as usize] = true;
+        }
+        (0..has.len()).filter(|&pass| has[pass]).collect()
+    }
+
+    /// Recorded less modelled force in N, the mass in kg, and the force in N for each kg.
+    fn residual(
+        &self,
+        observation: &Observation,
+        gradient: &[(usize, f64)],
+        prior: &Prior,
+    ) -> (f64, f64, f64) {
+        let climb: f64 = gradient.iter().map(|&(node, value)| value * self.heights_m[node]).sum();
+        let unit = prior.unit_force(observation, &self.common) + GRAVITY_MPS2 * climb;
+        let pass = self.pass_mass[observation.pass as usize];
+        let mass_kg = prior.mass_kg(observation, &self.common) + observation.mass_kg * pass;
+        let force_n = observation.force_n + self.common.delay_s() * observation.force_change_n;
+        (force_n - mass_kg * unit, mass_kg, unit)
+    }
+
+    /// Gradient in ‰ along a block with its standard deviation: (from in m, gradient, std).
+    pub fn gradient_permille(&self, block: usize) -> Vec<(f64, f64, f64)> {
+        let (first, count) = self.layout.blocks[block];
+        (0..count - 1)
+            .map(|node| {
+                let rise = self.heights_m[first + node + 1] - self.heights_m[first + node];
+                let variance = self.gradient_var.get(block).map_or(f64::NAN, |list| list[node]);
+                let at_m = self.layout.start_m + node as f64 * HEIGHT_STEP_M;
+                (at_m, 1000.0 * rise / HEIGHT_STEP_M, 1000.0 * variance.sqrt())
+            })
+            .collect()
+    }
+
+    /// Height in m at a place along a block.
+    pub fn height_m(&self, block: usize, at_m: f64) -> f64 {
+        let mut row = Vec::with_capacity(2);
+        self.layout.push(block, at_m, 1.0, &mut row);
+        row.iter().map(|&(node, value)| value * self.heights_m[node]).sum()
+    }
+}

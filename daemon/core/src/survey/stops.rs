@@ -1,0 +1,99 @@
+//! Where the passes stand.
+
+use super::chainage::Estimate;
+use super::recording::RawRecording;
+
+/// Below this speed in m/s a vehicle stands.
+const STANDING_MPS: f64 = 0.1;
+/// A shorter stand in s without open doors is no stop.
+const STAND_MIN_S: f64 = 8.0;
+/// Stands nearer than this many m are at the same stop.
+const SAME_STOP_M: f64 = 25.0;
+/// Share of the passes that stand at a stop.
+const SHARE_MIN: f64 = 0.5;
+
+/// A stop of the line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stop {
+    /// Mean chainage in m, and how the passes scatter around it.
+    pub chainage_m: Estimate,
+    /// Direction of travel.
+    pub direction: i8,
+    /// Number of stands.
+    pub stands: usize,
+    /// Name, where known.
+    pub name: String,
+}
+
+/// Chainages in m at which a trip stands: for some seconds, or with a door open where doors are
+/// recorded.
+pub fn stands(raw: &RawRecording, first_row: usize, chainage_m: &[f64]) -> Vec<f64> {
+    let has_doors = raw.door_open.iter().any(|door| *door > 0.5);
+    let mut found = Vec::new();
+    let mut from: Option<usize> = None;
+    for index in 0..=chainage_m.len() {
+        let row = first_row + index;
+        let stands = index < chainage_m.len() && raw.speed_mps[row] < STANDING_MPS;
+        match (stands, from) {
+            (true, None) => from = Some(index),
+            (false, Some(start)) => {
+                let rows = first_row + start..row;
+                let stood_s = raw.time_s[row - 1] - raw.time_s[first_row + start];
+                let is_stop = match has_doors {
+                    true => raw.door_open[rows].iter().any(|door| *door > 0.5),
+                    false => stood_s >= STAND_MIN_S,
+                };
+                if is_stop {
+                    found.push(chainage_m[(start + index - 1) / 2]);
+                }
+                from = None;
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
+/// The stops of a direction from the stands of its passes.
+pub fn stops(direction: i8, passes: &[Vec<f64>]) -> Vec<Stop> {
+    let mut all: Vec<(f64, usize)> = passes
+        .iter()
+        .enumerate()
+        .flat_map(|(pass, stands)| stands.iter().map(move |stand| (*stand, pass)))
+        .collect();
+    all.sort_by(|one, other| one.0.total_cmp(&other.0));
+    let mut stops = Vec::new();
+    for cluster in all.chunk_by(|one, other| other.0 - one.0 < SAME_STOP_M) {
+        let mut standing: Vec<usize> = cluster.iter().map(|stand| stand.1).collect();
+        standing.sort_unstable();
+        standing.dedup();
+        if (standing.len() as f64) < SHARE_MIN * passes.len() as f64 {
+            continue;
+        }
+        let count = cluster.len() as f64;
+        let mean = cluster.iter().map(|stand| stand.0).sum::<f64>() / count;
+        let squares: f64 = cluster.iter().map(|stand| (stand.0 - mean).powi(2)).sum();
+        let std = if count > 1.0 { (squares / (count - 1.0)).sqrt() } else { f64::NAN };
+        stops.push(Stop {
+            chainage_m: Estimate { value: mean, std },
+            direction,
+            stands: cluster.len(),
+            name: String::new(),
+        });
+    }
+    stops
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stop_is_where_most_passes_stand() {
+        let passes = [vec![100.0, 500.0], vec![101.0, 340.0], vec![99.0, 503.0]];
+        let stops = stops(1, &passes);
+        let at: Vec<f64> = stops.iter().map(|stop| stop.chainage_m.value).collect();
+        assert_eq!(at, [100.0, 501.5]);
+        assert!((stops[0].chainage_m.std - 1.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,275 @@
+//! The survey as a whole.
+
+use super::balance::{Observation, observations};
+use super::banded::NotPositive;
+use super::chainage::WheelsAndLag;
+use super::common::Prior;
+use super::curves::{FoundCurve, curves, turning_rad};
+use super::geodesy::LocalPlane;
+use super::layout::{Course, Layout};
+use super::learn::{Learned, acting_from_pa, learn};
+use super::line::{Ways, find, pass_of};
+use super::profile::{Altitude, Evidence};
+use super::recording::{RawRecording, Recording, plane_of};
+use super::stops::{Stop, stands, stops};
+use super::stretches::{Stretch, stretches};
+use super::trips::{NotUsed, Trip, not_used, trips};
+
+/// Lateral uncertainty in m of a way: what the wheels roll differs from it by so much times the
+/// turning.
+const LATERAL_STD_M: f64 = 1.5;
+/// Trains that start or stop at an end of the line are seen so many m beyond it.
+const ENDS_M: f64 = 60.0;
+/// Altitudes are taken every so many m.
+const ALTITUDE_STEP_M: f64 = 50.0;
+/// Lengths in s of blocks that are tried.
+const BLOCKS_S: [f64; 3] = [1.0, 2.0, 4.0];
+/// Residuals that alternate more than this are the speed's noise: blocks are lengthened.
+const ALTERNATING: f64 = -0.3;
+
+/// What is declared of the vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vehicle {
+    /// Mass and resistance.
+    pub prior: Prior,
+    /// Length in m.
+    pub length_m: f64,
+    /// k in the declared curve resistance k/R in N/kN.
+    pub curve_constant_n_per_kn_m: f64,
+}
+
+/// A line that was surveyed before.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KnownLine {
+    /// The plane of its ways.
+    pub plane: LocalPlane,
+    /// Its ways.
+    pub ways: Ways,
+}
+
+/// Why nothing can be surveyed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SurveyError {
+    /// No recording has positions.
+    #[error("expected recordings with latitude and longitude, got no position by GNSS")]
+    NoPositions,
+    /// No fit run follows a line.
+    #[error("expected fit runs along a line, got none: {what}")]
+    NoLine {
+        /// What was found instead.
+        what: &'static str,
+    },
+    /// The forces tell nothing.
+    #[error("expected speeds and forces while moving, got none on the line")]
+    NoForces,
+    /// The balance has no solution.
+    #[error("the balance of forces has no solution: {0}")]
+    Balance(#[from] NotPositive),
+}
+
+/// What the balance of forces gave.
+#[derive(Clone, Debug)]
+pub struct SurveyedProfile {
+    /// The profile and what belongs to it.
+    pub learned: Learned,
+    /// Curves of the growing way.
+    pub curves: Vec<FoundCurve>,
+    /// Numbers of the trips that took part, in the order of the passes.
+    pub trips: Vec<usize>,
+    /// Length in s of the blocks.
+    pub block_s: f64,
+    /// Seconds of motion that took part.
+    pub observed: usize,
+}
+
+/// A surveyed line.
+#[derive(Clone, Debug)]
+pub struct Survey {
+    /// The plane of the ways.
+    pub plane: LocalPlane,
+    /// The ways.
+    pub ways: Ways,
+    /// The trips, by recording and time.
+    pub trips: Vec<Trip>,
+    /// What is no trip.
+    pub not_used: Vec<NotUsed>,
+    /// The stops.
+    pub stops: Vec<Stop>,
+    /// What GNSS tells of the wheels' scale and its own lag.
+    pub wheels: WheelsAndLag,
+    /// Standard deviation of the wheels' scale with the uncertainty of the way's length.
+    pub scale_std: f64,
+    /// The profile; `None` on a line that was known.
+    pub profile: Option<SurveyedProfile>,
+}
+
+/// Surveys a line, or maps recordings on a known one.
+///
+/// # Errors
+///
+/// When there are no positions, no line, or nothing to learn from.
+pub fn survey(
+    raws: &[RawRecording],
+    vehicle: &Vehicle,
+    known: Option<&KnownLine>,
+) -> Result<Survey, SurveyError> {
+    let plane = match known {
+        Some(known) => known.plane,
+        None => plane_of(raws).ok_or(SurveyError::NoPositions)?,
+    };
+    let recordings: Vec<Recording> = raws.iter().map(|raw| Recording::of(raw, &plane)).collect();
+    let cut: Vec<Stretch> = recordings
+        .iter()
+        .enumerate()
+        .flat_map(|(number, recording)| stretches(number, recording))
+        .collect();
+    let mut ways = match known {
+        Some(known) => known.ways.clone(),
+        None => find(&cut, &recordings)
+            .ok_or(SurveyError::NoLine { what: "no two passes follow the same way" })?,
+    };
+    let passes: Vec<_> =
+        cut.iter().filter_map(|stretch| pass_of(&ways, stretch, &recordings)).collect();
+    let (trips, wheels) = trips(&passes, &ways, &recordings);
+    if trips.is_empty() {
+        return Err(SurveyError::NoLine { what: "no recording runs along it" });
+    }
+    let scale_std = wheels.scale.std.hypot(way_std(&ways));
+    if known.is_none() && wheels.scale.value.abs() < 2.0 * scale_std {
+        // As far as anybody can tell the wheels are as declared, and a better measure of length.
+        ways.chainage_per_m = 1.0 / (1.0 + wheels.scale.value);
+    }
+    let profile = match known {
+        Some(_) => None,
+        None => Some(profile(raws, &recordings, vehicle, &ways, &trips, &wheels)?),
+    };
+    let not_used = not_used(&trips, &recordings);
+    let stops = found_stops(raws, &ways, &trips, known.is_some());
+    Ok(Survey { plane, ways, trips, not_used, stops, wheels, scale_std, profile })
+}
+
+/// Standard deviation of a way's length as a share of it.
+fn way_std(ways: &Ways) -> f64 {
+    LATERAL_STD_M * turning_rad(&ways.growing) / ways.growing.length_m()
+}
+
+fn found_stops(raws: &[RawRecording], ways: &Ways, trips: &[Trip], of_all: bool) -> Vec<Stop> {
+    let mut found = Vec::new();
+    for direction in [1, -1] {
+        let own = trips.iter().filter(|it| it.direction == direction && (of_all || it.is_fit));
+        let passes: Vec<Vec<f64>> = own
+            .map(|trip| {
+                let chainage_m: Vec<f64> = trip
+                    .along
+                    .chainage_m
+                    .iter()
+                    .map(|&along_m| ways.chainage_m(direction, along_m))
+                    .collect();
+                stands(&raws[trip.recording], trip.along.first_row, &chainage_m)
+            })
+            .collect();
+        found.extend(stops(direction, &passes));
+    }
+    found
+}
+
+/// The profile from the fit trips.
+fn profile(
+    raws: &[RawRecording],
+    recordings: &[Recording],
+    vehicle: &Vehicle,
+    ways: &Ways,
+    trips: &[Trip],
+    wheels: &WheelsAndLag,
+) -> Result<SurveyedProfile, SurveyError> {
+    let fit: Vec<usize> = (0..trips.len()).filter(|&number| trips[number].is_fit).collect();
+    if fit.is_empty() {
+        return Err(SurveyError::NoLine { what: "the fit runs do not follow it" });
+    }
+    let mut lengths_m = vec![ways.growing.length_m()];
+    if let Some(falling) = ways.falling.as_ref().filter(|it| !it.is_same) {
+        lengths_m.push(falling.way.length_m());
+    }
+    let layout = Layout::new(&lengths_m, vehicle.length_m);
+    let against_m = ways.growing.length_m();
+    let course = |direction: i8| match (direction, ways.is_one_track()) {
+        (1, _) => Course { block: 0, against_from_m: None },
+        (_, true) => Course { block: 0, against_from_m: Some(against_m) },
+        (_, false) => Course { block: 1, against_from_m: None },
+    };
+    let courses: Vec<Course> = fit.iter().map(|&number| course(trips[number].direction)).collect();
+    // Where each direction has a way of its own, its profile holds the curves' resistance too.
+    let curves = if ways.is_one_track() { curves(&ways.growing) } else { Vec::new() };
+    // True over recorded speed, when the chainage is GNSS's; else the wheels are believed.
+    let speed_factor = if ways.chainage_per_m == 1.0 { 1.0 + wheels.scale.value } else { 1.0 };
+    let altitudes = fit.iter().zip(&courses).flat_map(|(&number, &course)| {
+        altitudes(&trips[number], &recordings[trips[number].recording], course)
+    });
+    let mut evidence = Evidence {
+        layout,
+        courses: courses.clone(),
+        observations: Vec::new(),
+        altitudes: altitudes.collect(),
+        prior: vehicle.prior,
+    };
+    let released_pa = acting_from_pa(raws.iter().filter(|raw| raw.is_fit));
+    for block_s in BLOCKS_S {
+        evidence.observations.clear();
+        for (pass, &number) in fit.iter().enumerate() {
+            let trip = &trips[number];
+            let raw = &raws[trip.recording];
+            let seen = observations(raw, &trip.along, pass as u32, block_s, speed_factor);
+            let limit_m = ways.of(trip.direction).map_or(0.0, |way| way.length_m());
+            evidence.observations.extend(seen.into_iter().filter_map(|mut it| {
+                let at_m = match courses[pass].against_from_m {
+                    Some(length_m) => length_m - it.along_m,
+                    None => it.along_m,
+                };
+                let k = vehicle.curve_constant_n_per_kn_m;
+                it.curve_n_per_kn = k * curvature(curves.iter(), at_m, vehicle.length_m);
+                (-ENDS_M..=limit_m + ENDS_M).contains(&it.along_m).then_some(it)
+            }));
+        }
+        if evidence.observations.is_empty() {
+            return Err(SurveyError::NoForces);
+        }
+        let is_longest = block_s == BLOCKS_S[BLOCKS_S.len() - 1];
+        let rough = evidence.fit(1e-6, &|_| true, false)?;
+        if rough.autocorrelation > ALTERNATING || is_longest {
+            evidence.prior.speed_mps = typical_speed(&evidence.observations);
+            let learned = learn(&mut evidence, released_pa)?;
+            let observed = evidence.observations.len();
+            return Ok(SurveyedProfile { learned, curves, trips: fit, block_s, observed });
+        }
+    }
+    unreachable!("the longest block is always taken")
+}
+
+fn typical_speed(observations: &[Observation]) -> f64 {
+    let squares: f64 = observations.iter().map(|it| it.speed_mps * it.speed_mps).sum();
+    (squares / observations.len() as f64).sqrt()
+}
+
+/// Mean curvature in 1/m along a vehicle.
+fn curvature<'c>(curves: impl Iterator<Item = &'c FoundCurve>, at_m: f64, vehicle_m: f64) -> f64 {
+    let (rear, front) = (at_m - 0.5 * vehicle_m, at_m + 0.5 * vehicle_m);
+    let inside = |curve: &FoundCurve| {
+        (front.min(curve.to_m) - rear.max(curve.from_m)).max(0.0) / (vehicle_m * curve.radius_m)
+    };
+    curves.map(inside).sum()
+}
+
+fn altitudes(trip: &Trip, recording: &Recording, course: Course) -> Vec<Altitude> {
+    let raw = recording.raw;
+    let mut found: Vec<Altitude> = Vec::new();
+    let rows = trip.rows();
+    for fix in recording.fixes.iter().filter(|fix| rows.contains(&fix.row)) {
+        let along_m = trip.along.chainage_m[fix.row - rows.start];
+        let altitude_m = raw.altitude_m.get(fix.row).copied().unwrap_or(f64::NAN);
+        let is_new = found.last().is_none_or(|last| along_m - last.along_m >= ALTITUDE_STEP_M);
+        if altitude_m.is_finite() && is_new {
+            found.push(Altitude { course, along_m, altitude_m });
+        }
+    }
+    found
+}

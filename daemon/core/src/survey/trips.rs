@@ -1,0 +1,152 @@
+//! One-way trips along the line, and what of the recordings is none.
+
+use super::chainage::{Chained, Estimate, WheelsAndLag, chain};
+use super::line::{Pass, Ways};
+use super::recording::Recording;
+use super::tracking::follow;
+
+/// A trip reaches beyond its first and last fix by so many m and s: it stands there.
+const REACH: (f64, f64) = (30.0, 60.0);
+/// What is not used is told from so many s on.
+const NOT_USED_MIN_S: f64 = 5.0;
+/// Wheels of one vehicle differ so little from pass to pass.
+const SCALE_SPREAD: f64 = 0.001;
+
+/// A one-way trip along the line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trip {
+    /// Number of the recording.
+    pub recording: usize,
+    /// True when models may be fitted to it.
+    pub is_fit: bool,
+    /// 1 while the chainage grows, -1 while it falls.
+    pub direction: i8,
+    /// Place in m along the way of its direction, from its first row on.
+    pub along: Chained,
+}
+
+impl Trip {
+    /// Its rows in the recording.
+    pub fn rows(&self) -> std::ops::Range<usize> {
+        self.along.first_row..self.along.first_row + self.along.chainage_m.len()
+    }
+
+    /// Length in m.
+    pub fn length_m(&self) -> f64 {
+        let along = &self.along.chainage_m;
+        along.last().copied().unwrap_or(0.0) - along.first().copied().unwrap_or(0.0)
+    }
+}
+
+/// A part of a recording that is no trip.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NotUsed {
+    /// Number of the recording.
+    pub recording: usize,
+    /// Time in s where it starts.
+    pub from_s: f64,
+    /// Time in s where it ends.
+    pub to_s: f64,
+    /// Why it is not used.
+    pub reason: &'static str,
+}
+
+/// Gives every pass its chainage; what the fit runs tell of wheels and lag comes beside it.
+pub fn trips(passes: &[Pass], ways: &Ways, recordings: &[Recording]) -> (Vec<Trip>, WheelsAndLag) {
+    let placed: Vec<_> = passes
+        .iter()
+        .map(|pass| {
+            let recording = &recordings[pass.rows.recording];
+            let way = ways.of(pass.direction)?;
+            let placed = follow(recording, pass.rows.rows.clone(), way);
+            let rows = with_stands(recording, pass.rows.rows.clone());
+            let alone = chain(recording, rows.clone(), &placed, WheelsAndLag::UNKNOWN)?;
+            Some((rows, placed, alone.learned))
+        })
+        .collect();
+    let is_fit = |pass: &Pass| recordings[pass.rows.recording].raw.is_fit;
+    let has_fit = passes.iter().any(is_fit);
+    let learned: Vec<WheelsAndLag> = passes
+        .iter()
+        .zip(&placed)
+        .filter(|(pass, _)| is_fit(pass) || !has_fit)
+        .filter_map(|(_, placed)| placed.as_ref().map(|it| it.2))
+        .collect();
+    let together = WheelsAndLag::together(&learned, SCALE_SPREAD).unwrap_or(WheelsAndLag::UNKNOWN);
+    let mut trips = Vec::new();
+    for (pass, placed) in passes.iter().zip(placed) {
+        let Some((rows, placed, _)) = placed else { continue };
+        let recording = &recordings[pass.rows.recording];
+        let is_fit = recording.raw.is_fit;
+        // Another day's wheels may be worn or new.
+        let scale = match is_fit || !has_fit {
+            true => Estimate { value: together.scale.value, std: 2.0 * SCALE_SPREAD },
+            false => WheelsAndLag::UNKNOWN.scale,
+        };
+        let lag_s = Estimate { std: together.lag_s.std.max(0.05), ..together.lag_s };
+        if let Some(along) = chain(recording, rows, &placed, WheelsAndLag { scale, lag_s }) {
+            let (recording, direction) = (pass.rows.recording, pass.direction);
+            trips.push(Trip { recording, is_fit, direction, along });
+        }
+    }
+    trips.sort_by_key(|trip| (trip.recording, trip.along.first_row));
+    for index in 1..trips.len() {
+        let end = trips[index - 1].rows().end;
+        let (before, trip) = (trips[index - 1].recording, &mut trips[index]);
+        if before == trip.recording && trip.along.first_row < end {
+            let over = end - trip.along.first_row;
+            trip.along.chainage_m.drain(..over.min(trip.along.chainage_m.len()));
+            trip.along.first_row = end;
+        }
+    }
+    trips.retain(|trip| !trip.along.chainage_m.is_empty());
+    (trips, together)
+}
+
+/// The rows with the stands before and after them.
+fn with_stands(recording: &Recording, rows: std::ops::Range<usize>) -> std::ops::Range<usize> {
+    let near = |row: usize, from: usize| {
+        let (way_m, time_s) = (&recording.way_m, &recording.raw.time_s);
+        (way_m[row] - way_m[from]).abs() < REACH.0 && (time_s[row] - time_s[from]).abs() < REACH.1
+    };
+    let (mut first, mut last) = (rows.start, rows.end - 1);
+    while first > 0 && near(first - 1, rows.start) {
+        first -= 1;
+    }
+    while last + 1 < recording.way_m.len() && near(last + 1, rows.end - 1) {
+        last += 1;
+    }
+    first..last + 1
+}
+
+/// What of the recordings lies outside the trips, and why.
+pub fn not_used(trips: &[Trip], recordings: &[Recording]) -> Vec<NotUsed> {
+    let mut found = Vec::new();
+    for (number, recording) in recordings.iter().enumerate() {
+        let rows = recording.raw.time_s.len();
+        let mut from = 0;
+        let own = trips.iter().filter(|trip| trip.recording == number).map(Trip::rows);
+        for trip in own.chain(std::iter::once(rows..rows)) {
+            if trip.start > from {
+                let (from_s, to_s) =
+                    (recording.raw.time_s[from], recording.raw.time_s[trip.start - 1]);
+                if to_s - from_s >= NOT_USED_MIN_S {
+                    let reason = reason(recording, from..trip.start);
+                    found.push(NotUsed { recording: number, from_s, to_s, reason });
+                }
+            }
+            from = trip.end;
+        }
+    }
+    found
+}
+
+fn reason(recording: &Recording, rows: std::ops::Range<usize>) -> &'static str {
+    let moved_m = recording.way_m[rows.end - 1] - recording.way_m[rows.start];
+    let fixes = recording.fixes.iter().filter(|fix| rows.contains(&fix.row)).count();
+    match (moved_m < 50.0, fixes < 10) {
+        (true, _) => "stands at an end of the line",
+        (false, true) => "no position by GNSS",
+        (false, false) => "not along the line that is driven repeatedly",
+    }
+}

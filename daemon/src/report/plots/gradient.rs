@@ -1,0 +1,54 @@
+//! A surveyed gradient over the chainage, with its 95 % band.
+
+use plotters::backend::SVGBackend;
+use plotters::drawing::IntoDrawingArea;
+use plotters::element::{PathElement, Polygon};
+use plotters::style::Color;
+
+use super::axes::{Axis, chart, padded, range_with_zero, stroke, zero_line};
+use super::speeds::Width;
+use super::{AFTER, BAND, PlotError, SCALE, for_page};
+
+/// Half width of the 95 % interval in standard deviations.
+const HALF_95: f64 = 1.96;
+
+/// A profile of (chainage in m, gradient in ‰, its standard deviation in ‰) as SVG.
+///
+/// # Errors
+///
+/// When the drawing fails.
+pub fn draw(
+    entries: &[(f64, f64, f64)],
+    direction: &str,
+    width: Width,
+) -> Result<String, PlotError> {
+    let (nominal, height, _) = width.size();
+    let size = (nominal * SCALE, (height + 60) * SCALE);
+    let mut drawing = String::new();
+    {
+        let area = SVGBackend::with_string(&mut drawing, size).into_drawing_area();
+        let x = padded(entries.iter().map(|entry| entry.0 / 1e3), 0.005);
+        // Where nothing is driven the band is wide: it is cut so that the rest stays readable.
+        let y = range_with_zero(entries.iter().map(|entry| entry.1));
+        let labels = if width == Width::Wide { 10 } else { 5 };
+        let x_axis = Axis { range: x, title: "Chainage, km", labels, is_whole: false };
+        let y_axis = Axis { range: y, title: "Gradient, ‰", labels: 6, is_whole: false };
+        let mut chart = chart(&area, &x_axis, &y_axis)?;
+        let edge = |&(at_m, gradient, std): &(f64, f64, f64), side: f64| {
+            (at_m / 1e3, (gradient + side * HALF_95 * std).clamp(y[0], y[1]))
+        };
+        let upper = entries.iter().map(|entry| edge(entry, 1.0));
+        let lower = entries.iter().rev().map(|entry| edge(entry, -1.0));
+        let outline: Vec<(f64, f64)> = upper.chain(lower).collect();
+        chart.draw_series([Polygon::new(outline, BAND.filled())])?;
+        zero_line(&mut chart, x)?;
+        let line: Vec<(f64, f64)> = entries.iter().map(|entry| edge(entry, 0.0)).collect();
+        chart.draw_series([PathElement::new(line, stroke(AFTER, 1.2))])?;
+        area.present()?;
+    }
+    let (low, high) = entries.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |range, entry| {
+        (range.0.min(entry.1), range.1.max(entry.1))
+    });
+    let label = format!("Gradient over the chainage for {direction}: from {low:.1} to {high:.1} ‰");
+    Ok(for_page(&drawing, &label, width.class(), size))
+}

@@ -1,0 +1,254 @@
+//! The result of a survey for machines.
+
+use dynocar_core::dataset::Dataset;
+use dynocar_core::survey::{Survey, Vehicle};
+use serde::Serialize;
+
+use super::trip_rows::late_s;
+use super::write::{gradient_entries, trip_file};
+
+/// All that a survey found.
+#[derive(Debug, Serialize)]
+pub struct Answer {
+    /// The line.
+    pub line: Line,
+    /// The trips, in the order of the written dataset.
+    pub trips: Vec<TripAnswer>,
+    /// What is no trip.
+    pub not_used: Vec<NotUsedAnswer>,
+    /// What was learned beside the line; absent on a known line.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub learned: Option<LearnedAnswer>,
+    /// What these recordings cannot tell.
+    pub cannot_tell: Vec<String>,
+}
+
+/// A line.
+#[derive(Debug, Serialize)]
+pub struct Line {
+    /// Length in m.
+    pub length_m: f64,
+    /// Its stops.
+    pub stops: Vec<StopAnswer>,
+    /// Median standard deviation of the gradient in ‰; absent on a known line.
+    pub gradient_std_permille: Option<f64>,
+    /// Passes that it was learned from.
+    pub passes: usize,
+    /// True when both directions take the same way.
+    pub is_one_way_for_both: bool,
+}
+
+/// A stop.
+#[derive(Debug, Serialize)]
+pub struct StopAnswer {
+    /// Chainage in m.
+    pub chainage_m: f64,
+    /// Name, empty where not known.
+    pub name: String,
+    /// How stands scatter in m; absent for one.
+    pub std_m: Option<f64>,
+    /// Direction of travel.
+    pub direction: i8,
+    /// Number of stands.
+    pub stands: usize,
+}
+
+/// A trip.
+#[derive(Debug, Serialize)]
+pub struct TripAnswer {
+    /// Its file in the written dataset.
+    pub file: String,
+    /// The recording.
+    pub source: String,
+    /// `fit` or `holdout`.
+    pub role: &'static str,
+    /// 1 while the chainage grows, -1 while it falls.
+    pub direction: i8,
+    /// Time in s of its first row in the recording's own count.
+    pub from_s: f64,
+    /// Time in s of its last row.
+    pub to_s: f64,
+    /// Length in m.
+    pub length_m: f64,
+    /// Residual in N when the profile is learned without it; absent where that cannot be.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_out_residual_n: Option<f64>,
+}
+
+/// A part that is no trip.
+#[derive(Debug, Serialize)]
+pub struct NotUsedAnswer {
+    /// The recording.
+    pub source: String,
+    /// Time in s where it starts.
+    pub from_s: f64,
+    /// Time in s where it ends.
+    pub to_s: f64,
+    /// Why it is not used.
+    pub reason: &'static str,
+}
+
+/// A value and its standard deviation.
+#[derive(Debug, Serialize)]
+pub struct Value {
+    /// The value.
+    pub value: f64,
+    /// Its standard deviation.
+    pub std: f64,
+}
+
+/// What was learned of the vehicle and its recorder.
+#[derive(Debug, Serialize)]
+pub struct LearnedAnswer {
+    /// Nominal or empty mass in t, without rotating parts.
+    pub mass_t: Value,
+    /// The same with rotating parts, which is what the balance of forces shows.
+    pub inertial_mass_t: Value,
+    /// Mass of a passenger in kg, where they are counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub passenger_mass_kg: Option<Value>,
+    /// a, b, c in N/kN.
+    pub resistance: [Value; 3],
+    /// Recorded over true speed.
+    pub speed_scale: Value,
+    /// Seconds by which forces are stamped late; negative where they act late.
+    pub force_late_s: Value,
+    /// Seconds by which the written forces were moved.
+    pub force_moved_s: f64,
+    /// Age of a position at its stamp in s.
+    pub position_late_s: Value,
+    /// Friction brake in N/Pa, where it shows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub friction_brake_n_per_pa: Option<Value>,
+    /// Pressure in Pa from which on it acts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub release_pressure_pa: Option<f64>,
+    /// Variance per m of the gradient's random walk, chosen by leaving passes out.
+    pub gradient_walk_per_m: f64,
+    /// Scale of the residuals in N.
+    pub residual_n: f64,
+}
+
+impl Answer {
+    /// The answer to a survey.
+    pub fn of(dataset: &Dataset, vehicle: &Vehicle, survey: &Survey) -> Self {
+        let raw = |recording: usize| &dataset.runs[recording];
+        let time_s = |recording: usize, row: usize| {
+            let run = raw(recording);
+            run.samples[super::read::rows_in_order(run)[row]].time_ns as f64 * 1e-9
+        };
+        let left_out = |number: usize| {
+            let profile = survey.profile.as_ref()?;
+            let pass = profile.trips.iter().position(|trip| *trip == number)?;
+            Some(profile.learned.left_out_n[pass]).filter(|value| value.is_finite())
+        };
+        let trips = survey.trips.iter().enumerate().map(|(number, trip)| TripAnswer {
+            file: trip_file(number),
+            source: raw(trip.recording).file.clone(),
+            role: raw(trip.recording).role.name(),
+            direction: trip.direction,
+            from_s: time_s(trip.recording, trip.rows().start),
+            to_s: time_s(trip.recording, trip.rows().end - 1),
+            length_m: survey.ways.chainage_per_m * trip.length_m(),
+            left_out_residual_n: left_out(number),
+        });
+        let not_used = survey.not_used.iter().map(|it| NotUsedAnswer {
+            source: raw(it.recording).file.clone(),
+            from_s: it.from_s,
+            to_s: it.to_s,
+            reason: it.reason,
+        });
+        Answer {
+            line: Line::of(survey),
+            trips: trips.collect(),
+            not_used: not_used.collect(),
+            learned: LearnedAnswer::of(vehicle, survey),
+            cannot_tell: cannot_tell(survey),
+        }
+    }
+}
+
+impl Line {
+    fn of(survey: &Survey) -> Self {
+        let stops = survey.stops.iter().map(|stop| StopAnswer {
+            chainage_m: stop.chainage_m.value,
+            name: stop.name.clone(),
+            std_m: Some(stop.chainage_m.std).filter(|std| std.is_finite()),
+            direction: stop.direction,
+            stands: stop.stands,
+        });
+        let median = survey.profile.as_ref().map(|profile| {
+            let entries = gradient_entries(survey, profile, 1);
+            let mut stds: Vec<f64> = entries.iter().map(|entry| entry.2).collect();
+            let middle = stds.len() / 2;
+            *stds.select_nth_unstable_by(middle, f64::total_cmp).1
+        });
+        Line {
+            length_m: survey.ways.chainage_per_m * survey.ways.growing.length_m(),
+            stops: stops.collect(),
+            gradient_std_permille: median,
+            passes: survey.profile.as_ref().map_or(0, |profile| profile.trips.len()),
+            is_one_way_for_both: survey.ways.is_one_track(),
+        }
+    }
+}
+
+impl LearnedAnswer {
+    fn of(vehicle: &Vehicle, survey: &Survey) -> Option<Self> {
+        let profile = survey.profile.as_ref()?;
+        let fitted = &profile.learned.profile;
+        let (common, std, prior) = (&fitted.common, &fitted.common_std, &vehicle.prior);
+        let value = |value: f64, std: f64| Value { value, std };
+        let declared_t = prior.mass_kg / 1e3;
+        let (mass_t, std_t) =
+            (declared_t * (1.0 + common.mass_share()), declared_t * std.mass_share());
+        let inertia = 1.0 + prior.rotating_mass_factor;
+        let wheels = &survey.wheels;
+        let brake = profile.learned.brake.as_ref();
+        let ([a, b, c], [a_std, b_std, c_std]) = (common.davis(), std.davis());
+        Some(LearnedAnswer {
+            mass_t: value(mass_t, std_t),
+            inertial_mass_t: value(inertia * mass_t, inertia * std_t),
+            passenger_mass_kg: prior
+                .has_passengers
+                .then(|| value(common.passenger_kg(), std.passenger_kg())),
+            resistance: [value(a, a_std), value(b, b_std), value(c, c_std)],
+            speed_scale: value(1.0 / (1.0 + wheels.scale.value), survey.scale_std),
+            force_late_s: value(common.delay_s(), std.delay_s()),
+            force_moved_s: late_s(survey),
+            position_late_s: value(wheels.lag_s.value, wheels.lag_s.std),
+            friction_brake_n_per_pa: brake
+                .map(|brake| value(brake.gain_n_per_pa.value, brake.gain_n_per_pa.std)),
+            release_pressure_pa: brake.map(|brake| brake.release_pa),
+            gradient_walk_per_m: profile.learned.walk_per_m,
+            residual_n: fitted.residual_n,
+        })
+    }
+}
+
+/// What recordings of this kind leave open.
+fn cannot_tell(survey: &Survey) -> Vec<String> {
+    let Some(profile) = &survey.profile else { return Vec::new() };
+    let mut open = vec![
+        "the scale of the forces against the mass: both scale alike, gravity too".to_string(),
+        "the rotating mass: it stays as declared until a line is surveyed from outside".to_string(),
+    ];
+    let trips = |direction: i8| {
+        profile.trips.iter().filter(|trip| survey.trips[**trip].direction == direction).count()
+    };
+    if trips(1) == 0 || trips(-1) == 0 || !survey.ways.is_one_track() {
+        open.push(
+            "a mean gradient against a constant resistance: no place is driven in both \
+             directions, so that only GNSS altitude and what is declared part them; curves and \
+             tunnels are held by the gradient"
+                .to_string(),
+        );
+    }
+    if profile.trips.len() < 2 {
+        open.push(
+            "how well the profile repeats: one pass cannot be left out and predicted by others"
+                .to_string(),
+        );
+    }
+    open
+}

@@ -1,0 +1,19 @@
+//! Raw recordings to a dataset on a surveyed line: reading, writing and telling.
+//!
+//! - [`read`]: a dataset's runs as recordings; a line that was surveyed before
+//! - [`write`](mod@write), [`trip_rows`]: the dataset folder with its trips
+//! - `folder`: all of it in turn; `failure`: why nothing comes of it
+//! - [`answer`]: the result for machines
+//! - [`page`]: the result as a page
+
+pub mod answer;
+mod failure;
+mod folder;
+pub mod material;
+pub mod page;
+pub mod read;
+pub mod trip_rows;
+pub mod write;
+
+pub use failure::SurveyFailure;
+pub use folder::{Surveyed, survey_folder};

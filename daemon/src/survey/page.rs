@@ -1,0 +1,260 @@
+//! A survey as one page of HTML.
+
+use std::fmt::Write as _;
+
+use dynocar_core::dataset::Dataset;
+use dynocar_core::survey::Survey;
+
+use super::answer::Answer;
+use super::write::gradient_entries;
+use crate::report::html::{Column, Table, escape};
+use crate::report::plots::speeds::Width;
+use crate::report::plots::{PlotError, colour_rules, gradient};
+use crate::report::provenance::Provenance;
+
+const STYLE: &str = include_str!("../report/style.css");
+/// Width and height of the map.
+const SIZE: (f64, f64) = (980.0, 420.0);
+
+/// The page: map, profile with its band, stops, passes, what was not used and what stays open.
+///
+/// # Errors
+///
+/// When a plot cannot be drawn.
+pub fn html(
+    dataset: &Dataset,
+    survey: &Survey,
+    answer: &Answer,
+    made: &Provenance,
+) -> Result<String, PlotError> {
+    let name = escape(&dataset.name);
+    let mut html = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
+         style-src 'unsafe-inline'\">\n<title>{name} – survey</title>\n<style>\n{STYLE}\n{}</style>\n\
+         </head>\n<body>\n<header>\n<p class=\"kicker\">Dynocar · survey</p>\n<h1>{name}</h1>\n\
+         <p class=\"facts\">{:.1} m · {} stops · {} trips · {} passes learned from · {}</p>\n\
+         </header>\n<main>\n",
+        colour_rules(),
+        answer.line.length_m,
+        answer.line.stops.len(),
+        answer.trips.len(),
+        answer.line.passes,
+        made.day
+    );
+    let mut section = |id: &str, title: &str, body: String| {
+        // Writing to a string cannot fail.
+        let _ = write!(html, "<section id=\"{id}\">\n<h2>{title}</h2>\n{body}</section>\n");
+    };
+    section("map", "The line", map(survey, answer));
+    if let Some(profile) = &survey.profile {
+        let mut body = profile_plots(&gradient_entries(survey, profile, 1), "growing chainage")?;
+        if !survey.ways.is_one_track() {
+            body += &profile_plots(&gradient_entries(survey, profile, -1), "falling chainage")?;
+        }
+        section("profile", "Gradient, with its 95 % band", body);
+    }
+    section("learned", "What was learned beside it", learned(answer));
+    section("stops", "Stops, and how they repeat", stops(answer));
+    section("trips", "Trips", trips(answer));
+    section("not-used", "Not used", not_used(answer));
+    section("open", "What these recordings cannot tell", open(answer));
+    let _ = write!(
+        html,
+        "</main>\n<footer><p>Made by Dynocar {} on {}. The page is complete in itself: it loads \
+         nothing.</p></footer>\n</body>\n</html>\n",
+        made.version, made.day
+    );
+    Ok(html)
+}
+
+fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), it| (low.min(it), high.max(it)))
+}
+
+fn path(points: impl Iterator<Item = (f64, f64)>) -> String {
+    let mut path = String::new();
+    for (k, (x, y)) in points.enumerate() {
+        let _ = write!(path, "{}{x:.1},{y:.1}", if k == 0 { "M" } else { "L" });
+    }
+    path
+}
+
+fn map(survey: &Survey, answer: &Answer) -> String {
+    let ways = &survey.ways;
+    let nodes = [1, -1].into_iter().filter_map(|it| ways.of(it)).flat_map(|way| way.nodes_m());
+    let all: Vec<[f64; 2]> = nodes.copied().collect();
+    let (west, east) = range(all.iter().map(|it| it[0]));
+    let (south, north) = range(all.iter().map(|it| it[1]));
+    // Metres are as long upwards as sideways.
+    let span = ((east - west) / SIZE.0).max((north - south) / SIZE.1).max(1e-3) * 1.15;
+    let place = |at: [f64; 2]| {
+        let x = 0.5 * SIZE.0 + (at[0] - 0.5 * (west + east)) / span;
+        (x, 0.5 * SIZE.1 - (at[1] - 0.5 * (south + north)) / span)
+    };
+    let mut svg = format!(
+        "<svg class=\"plot\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"The line on the map, \
+         north upwards, with its stops\">\n",
+        SIZE.0, SIZE.1
+    );
+    for (direction, colour) in [(-1, "before"), (1, "after")] {
+        if let Some(way) = ways.of(direction) {
+            let line = path(way.nodes_m().iter().map(|&at| place(at)));
+            let _ = writeln!(
+                svg,
+                "<path d=\"{line}\" fill=\"none\" stroke=\"var(--{colour})\" stroke-width=\"2\"/>"
+            );
+        }
+    }
+    for stop in &answer.line.stops {
+        let Some(way) = ways.of(stop.direction) else { continue };
+        let (x, y) = place(way.at(ways.along_m(stop.direction, stop.chainage_m)));
+        let _ = writeln!(
+            svg,
+            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"var(--ink)\"><title>{:.0} m {}\
+             </title></circle>",
+            stop.chainage_m,
+            escape(&stop.name)
+        );
+    }
+    let two = ways.falling.as_ref().is_some_and(|falling| !falling.is_same);
+    svg + &scale_bar(span)
+        + "</svg>\n<p class=\"note\">North is up. "
+        + match two {
+            true => "Blue: the way of growing chainage; brown: that of falling. ",
+            false => "The line: both directions take the same way, or one was driven. ",
+        }
+        + "Dots: stops, with their chainage when pointed at.</p>\n"
+}
+
+/// A bar of a round length, for a map of some m for each unit of the drawing.
+fn scale_bar(span: f64) -> String {
+    let most_m = 0.25 * SIZE.0 * span;
+    let decade_m = 10f64.powf(most_m.log10().floor());
+    let bar_m = [5.0, 2.0, 1.0].map(|it| it * decade_m).into_iter().find(|it| *it <= most_m);
+    let bar_m = bar_m.unwrap_or(decade_m);
+    let (left, right, y) = (20.0, 20.0 + bar_m / span, SIZE.1 - 20.0);
+    let name =
+        if bar_m < 1000.0 { format!("{bar_m:.0} m") } else { format!("{:.0} km", bar_m / 1e3) };
+    format!(
+        "<path d=\"M{left},{y}H{right:.1}\" stroke=\"var(--muted)\" stroke-width=\"3\"/>\n<text \
+         x=\"{left}\" y=\"{}\" fill=\"var(--muted)\" font-size=\"15\">{name}</text>\n",
+        y - 8.0
+    )
+}
+
+fn profile_plots(entries: &[(f64, f64, f64)], direction: &str) -> Result<String, PlotError> {
+    let [wide, narrow] =
+        [Width::Wide, Width::Narrow].map(|width| gradient::draw(entries, direction, width));
+    Ok(format!(
+        "<figure>\n<figcaption>For {direction}</figcaption>\n{}{}</figure>\n",
+        wide?, narrow?
+    ))
+}
+
+fn learned(answer: &Answer) -> String {
+    let Some(learned) = &answer.learned else {
+        return "<p>The line was known: nothing was learned.</p>\n".into();
+    };
+    let head = [("quantity", Column::Words), ("value", Column::Numbers), ("±", Column::Numbers)];
+    let mut table = Table::new("Learned, with 95 % intervals", &head);
+    let mut row = |name: &str, it: &super::answer::Value| {
+        let half = format!("{:.4}", 1.96 * it.std);
+        table.push(vec![name.into(), format!("{:.4}", it.value), half]);
+    };
+    row("mass, t", &learned.mass_t);
+    row("mass with rotating parts, t", &learned.inertial_mass_t);
+    if let Some(mass) = &learned.passenger_mass_kg {
+        row("mass of a passenger, kg", mass);
+    }
+    for (name, value) in
+        ["a, N/kN", "b, N/kN per m/s", "c, N/kN per (m/s)²"].into_iter().zip(&learned.resistance)
+    {
+        row(name, value);
+    }
+    row("recorded over true speed", &learned.speed_scale);
+    row("forces stamped late, s", &learned.force_late_s);
+    row("positions late, s", &learned.position_late_s);
+    if let Some(gain) = &learned.friction_brake_n_per_pa {
+        row("friction brake, N/Pa", gain);
+    }
+    table.html()
+}
+
+fn stops(answer: &Answer) -> String {
+    let head = [
+        ("chainage, m", Column::Numbers),
+        ("name", Column::Names),
+        ("direction", Column::Numbers),
+        ("stands", Column::Numbers),
+        ("scatter, m", Column::Numbers),
+    ];
+    let mut table = Table::new("Stops", &head);
+    for stop in &answer.line.stops {
+        let scatter = stop.std_m.map_or("–".into(), |std| format!("{std:.1}"));
+        table.push(vec![
+            format!("{:.1}", stop.chainage_m),
+            escape(&stop.name),
+            stop.direction.to_string(),
+            stop.stands.to_string(),
+            scatter,
+        ]);
+    }
+    table.html()
+}
+
+fn trips(answer: &Answer) -> String {
+    let head = [
+        ("file", Column::Names),
+        ("recording", Column::Names),
+        ("role", Column::Words),
+        ("direction", Column::Numbers),
+        ("from, s", Column::Numbers),
+        ("to, s", Column::Numbers),
+        ("length, m", Column::Numbers),
+        ("residual left out, N", Column::Numbers),
+    ];
+    let mut table = Table::new("Trips, and how far the others predict the forces of each", &head);
+    for trip in &answer.trips {
+        table.push(vec![
+            escape(&trip.file),
+            escape(&trip.source),
+            trip.role.into(),
+            trip.direction.to_string(),
+            format!("{:.0}", trip.from_s),
+            format!("{:.0}", trip.to_s),
+            format!("{:.0}", trip.length_m),
+            trip.left_out_residual_n.map_or("–".into(), |value| format!("{value:.0}")),
+        ]);
+    }
+    table.html()
+}
+
+fn not_used(answer: &Answer) -> String {
+    let head = [
+        ("recording", Column::Names),
+        ("from, s", Column::Numbers),
+        ("to, s", Column::Numbers),
+        ("why", Column::Words),
+    ];
+    let mut table = Table::new("Parts of the recordings that are no trip", &head);
+    for part in &answer.not_used {
+        table.push(vec![
+            escape(&part.source),
+            format!("{:.0}", part.from_s),
+            format!("{:.0}", part.to_s),
+            part.reason.into(),
+        ]);
+    }
+    table.html()
+}
+
+fn open(answer: &Answer) -> String {
+    let mut html = String::from("<ul>\n");
+    for open in &answer.cannot_tell {
+        let _ = writeln!(html, "<li>{}</li>", escape(open));
+    }
+    html + "</ul>\n"
+}

@@ -1,0 +1,109 @@
+//! The trolley bus whose line nobody surveyed: what `dynocar survey` learns of it, and how far a line
+//! learned without two of its trips predicts their speed.
+
+use std::path::Path;
+
+use dynocar::dataset;
+use dynocar::survey::answer::Answer;
+use dynocar::survey::survey_folder;
+use dynocar_core::explain::explain;
+
+use super::report::Report;
+
+/// Largest error in m/s over 60 s in open loop on trips left out, over all of them.
+const ERROR_MAX_MPS: f64 = 0.30;
+/// What independent analyses of the day leave open, for each quantity.
+const INERTIAL_MASS_T: [f64; 2] = [19.4, 20.1];
+const PASSENGER_KG: [f64; 2] = [60.0, 82.0];
+const BRAKE_N_PER_PA: [f64; 2] = [0.23, 0.28];
+const RELEASE_PA: [f64; 2] = [17e3, 25e3];
+
+/// Surveys the bus's day, then leaves its trips out two by two.
+pub fn check(report: &mut Report, folder: &Path) {
+    let whole = surveyed(&folder.join("dataset-raw.toml"));
+    report.note(
+        "bus: what is learned beside the line",
+        whole.as_ref().map_err(Clone::clone).and_then(learned),
+    );
+    let outcome = whole.and_then(|answer| left_out(folder, &answer));
+    report.note("bus: 60 s in open loop, trips left out two by two", outcome);
+}
+
+fn surveyed(source: &Path) -> Result<Answer, String> {
+    let out = tempfile::tempdir().map_err(|error| error.to_string())?;
+    Ok(survey_folder(source, None, out.path()).map_err(|error| error.to_string())?.answer)
+}
+
+fn learned(answer: &Answer) -> Result<String, String> {
+    let learned = answer.learned.as_ref().ok_or("nothing is learned")?;
+    let missing = f64::NAN;
+    let passenger_kg = learned.passenger_mass_kg.as_ref().map_or(missing, |it| it.value);
+    let brake = learned.friction_brake_n_per_pa.as_ref().map_or(missing, |it| it.value);
+    let release_pa = learned.release_pressure_pa.unwrap_or(missing);
+    let found = [
+        ("t with rotating parts", learned.inertial_mass_t.value, INERTIAL_MASS_T),
+        ("kg a passenger", passenger_kg, PASSENGER_KG),
+        ("N/Pa", brake, BRAKE_N_PER_PA),
+        ("Pa of release", release_pa, RELEASE_PA),
+    ];
+    let words: Vec<String> =
+        found.iter().map(|(unit, value, _)| format!("{value:.3} {unit}")).collect();
+    let is_inside = found.iter().all(|(_, value, [low, high])| (low..=high).contains(&value));
+    if is_inside { Ok(words.join(", ")) } else { Err(words.join(", ")) }
+}
+
+/// Root mean square of the errors on trips that took no part in their line.
+fn left_out(folder: &Path, whole: &Answer) -> Result<String, String> {
+    let trips = &whole.trips;
+    // A trip's recording reaches to the middle of the stands beside it.
+    let middles: Vec<f64> =
+        trips.windows(2).map(|pair| 0.5 * (pair[0].to_s + pair[1].from_s)).collect();
+    let mut errors_mps = Vec::new();
+    for first in (0..trips.len()).step_by(2) {
+        let raw = tempfile::tempdir().map_err(|error| error.to_string())?;
+        let out = tempfile::tempdir().map_err(|error| error.to_string())?;
+        let is_out = |trip: usize| trip == first || trip == first + 1;
+        cut(folder, raw.path(), &middles, &is_out).map_err(|error| error.to_string())?;
+        survey_folder(raw.path(), None, out.path()).map_err(|error| error.to_string())?;
+        let mapped = dataset::load(out.path()).map_err(|error| error.to_string())?;
+        let explained = explain(&mapped, &|_, _| {}).map_err(|error| error.to_string())?;
+        let score = &explained.score.holdout_window60[0];
+        errors_mps.push(score.rmse_mps().ok_or("no trip is held out")?);
+    }
+    let squares: f64 = errors_mps.iter().map(|error| error * error).sum();
+    let all_mps = (squares / errors_mps.len() as f64).sqrt();
+    let words = format!("{all_mps:.3} m/s, by pair {errors_mps:.3?}");
+    if all_mps <= ERROR_MAX_MPS { Ok(words) } else { Err(words) }
+}
+
+/// Cuts the day into one recording for each trip, some of them held out.
+fn cut(
+    folder: &Path,
+    out: &Path,
+    middles: &[f64],
+    is_out: &dyn Fn(usize) -> bool,
+) -> std::io::Result<()> {
+    std::fs::create_dir(out.join("runs"))?;
+    std::fs::copy(folder.join("train.toml"), out.join("train.toml"))?;
+    let described = std::fs::read_to_string(folder.join("dataset-raw.toml"))?;
+    let (mut manifest, runs) = match described.split_once("[[runs]]") {
+        Some((head, runs)) => (head.to_string(), runs),
+        None => (described.clone(), ""),
+    };
+    let file = runs.split('"').nth(1).unwrap_or_default();
+    let text = std::fs::read_to_string(folder.join(file))?;
+    let (head, rows) = text.split_once('\n').unwrap_or((&text, ""));
+    let column = head.split(',').position(|name| name == "time_unix").unwrap_or(0);
+    let mut parts = vec![format!("{head}\n"); middles.len() + 1];
+    for row in rows.lines() {
+        let time_s = row.split(',').nth(column).and_then(|cell| cell.parse::<f64>().ok());
+        let trip = middles.partition_point(|middle| time_s.is_some_and(|it| it > *middle));
+        parts[trip] += &format!("{row}\n");
+    }
+    for (trip, part) in parts.iter().enumerate() {
+        std::fs::write(out.join(format!("runs/{trip}.csv")), part)?;
+        let role = if is_out(trip) { "holdout" } else { "fit" };
+        manifest += &format!("[[runs]]\nfile = \"runs/{trip}.csv\"\nrole = \"{role}\"\n");
+    }
+    std::fs::write(out.join("dataset.toml"), manifest)
+}
