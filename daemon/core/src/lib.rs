@@ -16,6 +16,7 @@
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
 //! - [`simulate`]: the speed that a force model predicts over a recorded run
 //! - [`survey`]: a line and its gradient from recordings with GNSS
+//! - [`stops`]: what recorded stops say of a brake of unknown force
 //! - [`explain`]: which undeclared effect explains what the declared model leaves
 
 pub mod dataset;
@@ -25,6 +26,7 @@ pub mod force;
 pub mod pipeline;
 pub mod plausibility;
 pub mod simulate;
+pub mod stops;
 pub mod survey;
 pub mod terms;
 pub mod track;

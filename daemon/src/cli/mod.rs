@@ -11,6 +11,7 @@ mod health;
 mod identify;
 mod replay;
 mod run;
+mod stops;
 mod survey;
 mod text;
 
@@ -41,6 +42,7 @@ enum Command {
     Replay(replay::ReplayArguments),
     Identify(identify::IdentifyArguments),
     Survey(survey::SurveyArguments),
+    Stops(stops::StopsArguments),
 }
 
 impl Command {
@@ -51,6 +53,7 @@ impl Command {
             Command::Explain(arguments) => arguments.json.as_deref(),
             Command::Identify(arguments) => arguments.json.as_deref(),
             Command::Survey(arguments) => arguments.json.as_deref(),
+            Command::Stops(arguments) => arguments.json.as_deref(),
             // `check` has an answer of its own for what is wrong.
             Command::Check(_) | Command::Run(_) | Command::Health(_) | Command::Replay(_) => None,
         }
@@ -72,6 +75,7 @@ pub fn main() -> ExitCode {
         Command::Replay(arguments) => replay::execute(arguments),
         Command::Identify(arguments) => identify::execute(arguments),
         Command::Survey(arguments) => survey::execute(arguments),
+        Command::Stops(arguments) => stops::execute(arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -98,12 +98,17 @@ pub enum Remark {
         count: usize,
     },
     /// Handles outside 0 to 1.
-    #[error("{quantity} lies outside 0 to 1 in {count} rows, up to {highest}: is the unit '%'?")]
+    #[error(
+        "{quantity} lies outside 0 to 1 in {count} rows, from {lowest} to {highest}; there it \
+         counts as missing{}", if *highest > 2.0 { ": is the unit '%'?" } else { "" }
+    )]
     HandleOutOfRange {
         /// The quantity.
         quantity: Quantity,
         /// In how many rows.
         count: usize,
+        /// The lowest.
+        lowest: f64,
         /// The highest.
         highest: f64,
     },
@@ -355,9 +360,10 @@ fn of_force(
     }
     if force.handle_out_of_range > 0 {
         let column = run.table.column(handle).unwrap_or_default();
+        let lowest = column.iter().copied().fold(f64::INFINITY, f64::min);
         let highest = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let count = force.handle_out_of_range;
-        remarks.push(Remark::HandleOutOfRange { quantity: handle, count, highest });
+        remarks.push(Remark::HandleOutOfRange { quantity: handle, count, lowest, highest });
     }
     if force.source == ForceSource::Column && run.table.column(handle).is_some() {
         remarks.push(Remark::UnusedHandle { quantity: handle });

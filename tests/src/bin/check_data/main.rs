@@ -12,6 +12,7 @@ mod monitor;
 mod report;
 mod resistance;
 mod simulation;
+mod stops;
 mod trainruns;
 mod truth;
 
@@ -35,6 +36,7 @@ fn main() -> ExitCode {
     explaining::check(&mut report, &folder);
     monitor::check(&mut report, &folder);
     bus::check(&mut report, &folder.join("measured/ztbus"));
+    stops::check(&mut report, &folder);
     report.finish()
 }
 

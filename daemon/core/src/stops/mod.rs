@@ -1,0 +1,21 @@
+//! What recorded stops say of a brake whose force nobody measured: deceleration over speed, the
+//! friction behind it, and how long the next stop will be.
+//!
+//! - [`find`]: where in a run the brake was applied until the train stood
+//! - [`Curve`]: speed and deceleration along one stop, from its speeds alone
+//! - [`Law`]: deceleration over speed of all stops, and how much stops differ
+//! - [`StoppingDistance`]: how long the next stop is, with a bound
+//! - [`friction`]: the pipelines of Jin 2020 and Xie 2019 over a stop, fed with a brake of unknown force
+//! - [`Study`]: all of it over a dataset
+
+mod curve;
+mod find;
+mod friction;
+mod law;
+mod study;
+
+pub use curve::{Curve, Point};
+pub use find::{FindSettings, FoundBy, Stop, find};
+pub use friction::{FrictionPoint, friction};
+pub use law::{Law, LawPoint, StoppingDistance};
+pub use study::{RecordedStop, Study, StudySettings};
