@@ -225,7 +225,7 @@ impl Hypothesis {
 
 #[cfg(test)]
 mod tests {
-    use super::super::fit::{DavisPrior, Disturbance, FitSettings, Stretch, TrajectoryFitter};
+    use super::super::fit::{DavisPrior, FitSettings, Stretch, TrajectoryFitter};
     use super::super::test_runs::{FAST, normal, random, speeds, steps};
     use super::*;
     use crate::filter::levenberg_marquardt::ParameterBox;
@@ -281,7 +281,7 @@ mod tests {
                 prior: Some(DavisPrior { davis: FAST, std: prior_std() }),
                 bounds: ParameterBox { low: Vector3::repeat(-9.0), high: Vector3::repeat(9.0) },
                 speed_noise_mps: Some(NOISE_MPS),
-                disturbance: Disturbance::Ratio(ratio),
+                disturbance_ratio: ratio,
                 outlier_threshold: f64::INFINITY,
                 ..FitSettings::new(rule)
             };

@@ -8,7 +8,6 @@
 //! - [`quality`]: what an estimate is worth
 
 pub mod bank;
-pub mod dataset;
 pub mod deviation;
 pub mod fit;
 mod fit_settings;
@@ -25,7 +24,6 @@ pub mod online;
 #[cfg(test)]
 mod pipeline_tests;
 pub mod quality;
-mod ratio_posterior;
 pub mod residuals;
 mod search;
 pub mod step;

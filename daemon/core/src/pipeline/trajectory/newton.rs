@@ -3,7 +3,7 @@
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 use nalgebra::{Matrix3, Vector3};
 
-use super::fit::{Disturbance, FitError, FitSettings, TrajectoryFit, TrajectoryFitter};
+use super::fit::{FitError, FitSettings, TrajectoryFit, TrajectoryFitter};
 use super::index::DAVIS;
 use super::long_run::LongRunVariance;
 use super::motion::{Motion, MotionTracker};
@@ -125,8 +125,7 @@ impl TrajectoryNewton {
         let fitted = match self.settings.method {
             FitMethod::LevenbergMarquardt => {
                 let density = self.settings.disturbance_mps2.powi(2) + self.window.missed_density();
-                let ratio = density / self.speed_noise_mps.powi(2);
-                self.fit.disturbance = Disturbance::Ratio(ratio);
+                self.fit.disturbance_ratio = density / self.speed_noise_mps.powi(2);
                 let start = (self.windows > 0).then_some(self.davis);
                 self.fitter.fit(&[self.window.stretch()], start.as_ref(), &self.fit)
             }

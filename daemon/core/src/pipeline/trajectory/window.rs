@@ -114,16 +114,6 @@ impl Window {
         self.steps.len()
     }
 
-    /// True before the first step.
-    pub fn is_empty(&self) -> bool {
-        self.steps.is_empty()
-    }
-
-    /// The newest step.
-    pub fn newest(&self) -> Option<&Step> {
-        self.steps.last()
-    }
-
     /// The window as a stretch.
     pub fn stretch(&self) -> Stretch<'_> {
         Stretch { steps: &self.steps, speeds_mps: &self.speeds_mps }
