@@ -71,7 +71,7 @@ impl JointLeastSquares {
         settings: JointLeastSquaresSettings,
         train: &Arc<TrainModel>,
     ) -> Result<Self, SettingError> {
-        settings.check()?;
+        settings.check_ranges()?;
         let regressors = Regressors::new(train, settings.reference_radius_m);
         let mut mean = Row::zeros();
         mean[INVERSE_MASS] = 1.0;

@@ -36,15 +36,3 @@ pub use kalman::MassKalman;
 pub use kalman_settings::MassKalmanSettings;
 pub use staged::StagedDescent;
 pub use staged_settings::{MassRegression, StagedDescentSettings};
-
-use super::settings::{SettingError, require};
-
-/// Refuses a setting that is not finite or lies outside its range.
-fn within(
-    key: &'static str,
-    value: f64,
-    (low, high): (f64, f64),
-    allowed: &'static str,
-) -> Result<(), SettingError> {
-    require((low..=high).contains(&value), key, value, allowed)
-}

@@ -77,7 +77,7 @@ impl StagedDescent {
         settings: StagedDescentSettings,
         train: &Arc<TrainModel>,
     ) -> Result<Self, SettingError> {
-        settings.check()?;
+        settings.check_ranges()?;
         let basis = SpeedBasis::new(train.speed_max_mps().filter(|&v| v > 5.0).unwrap_or(40.0));
         Ok(StagedDescent {
             settings,

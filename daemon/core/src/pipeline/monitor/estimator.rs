@@ -78,7 +78,7 @@ impl ResidualMonitor {
     ///
     /// When a setting lies outside its range.
     pub fn new(settings: MonitorSettings, train: &TrainModel) -> Result<Self, SettingError> {
-        settings.check()?;
+        settings.check_ranges()?;
         let declared = train.resistance;
         let coefficients = scaled(&declared);
         let mut declared_base = BaseVector::zeros();

@@ -47,7 +47,7 @@ pub fn ls(
     train: &TrainModel,
     settings: &LsSettings,
 ) -> Result<ResistanceLeastSquares, SettingError> {
-    settings.check()?;
+    settings.check_ranges()?;
     let kind = PipelineKind::Ls;
     let (data, lambda) = (settings.data, settings.lambda);
     Ok(ResistanceLeastSquares::new(kind, train, data, Solver::Batch, lambda, 1.0))
@@ -62,7 +62,7 @@ pub fn rls(
     train: &TrainModel,
     settings: &RlsSettings,
 ) -> Result<ResistanceLeastSquares, SettingError> {
-    settings.check()?;
+    settings.check_ranges()?;
     let solver = Solver::rls(settings);
     // The bank needs some regularisation of its own while rows are few.
     let lambda = 2.0 / settings.start_variance;
@@ -116,7 +116,7 @@ pub fn kalman(
     train: &TrainModel,
     settings: &KalmanSettings,
 ) -> Result<ResistanceKalman, SettingError> {
-    settings.check()?;
+    settings.check_ranges()?;
     let beside = ls(train, &LsSettings { data: settings.data, ..LsSettings::default() })?;
     Ok(ResistanceKalman::new(train, *settings, beside))
 }
@@ -127,6 +127,6 @@ fn regularised(
     settings: &MilsSettings,
     solver: Solver,
 ) -> Result<ResistanceLeastSquares, SettingError> {
-    settings.check()?;
+    settings.check_ranges()?;
     Ok(ResistanceLeastSquares::new(kind, train, settings.data, solver, settings.lambda, 1.0))
 }

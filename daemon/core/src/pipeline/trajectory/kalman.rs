@@ -4,9 +4,8 @@ use std::sync::Arc;
 
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 use nalgebra::Vector3;
-use serde::Deserialize;
 
-use super::bank::{HYPOTHESES_MAX, JumpModel, StepDoubt};
+use super::bank::{JumpModel, StepDoubt};
 use super::hypothesis::Innovation;
 use super::index::DAVIS;
 use super::motion::{Motion, MotionStep, MotionTracker};
@@ -19,40 +18,28 @@ use crate::force::ResolvedSample;
 use crate::pipeline::motion::{Rounding, jump_variance};
 use crate::pipeline::output::{write_parameters, write_status};
 use crate::pipeline::sample_gate::{Gated, SampleGate};
-use crate::pipeline::settings::{SettingError, require};
+use crate::pipeline::settings::{SettingError, settings};
 use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use crate::train::{Davis, TrainModel};
 
-/// Settings of `trajectory_kalman`.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct TrajectoryKalmanSettings {
-    /// Standard deviations of the declared coefficients, as a share of each.
-    pub prior_relative_std: f64,
-    /// Evidence in nats that it takes to believe in a jump of the coefficients (rain, wind, a
-    /// change of the train) within a given second. Disturbances that last, as no noise model
-    /// here has them, look like jumps: less evidence is quicker and more often wrong.
-    pub jump_evidence: f64,
-    /// The most hypotheses about the last jump; 1 looks for no jumps.
-    pub hypotheses: u32,
-    /// Standard deviation of the measured speed in m/s; learned when absent.
-    pub speed_noise_mps: Option<f64>,
-    /// Root of the density of disturbing forces in N/kN √s; learned when absent.
-    pub disturbance_n_per_kn_sqrt_s: Option<f64>,
-    /// Samples that the learned noise looks back over.
-    pub noise_memory: u32,
-}
-
-impl Default for TrajectoryKalmanSettings {
-    fn default() -> Self {
-        TrajectoryKalmanSettings {
-            prior_relative_std: 0.5,
-            jump_evidence: 16.0,
-            hypotheses: 8,
-            speed_noise_mps: None,
-            disturbance_n_per_kn_sqrt_s: None,
-            noise_memory: 2000,
-        }
+settings! {
+    /// Settings of `trajectory_kalman`.
+    #[derive(Copy)]
+    TrajectoryKalmanSettings {
+        /// Standard deviations of the declared coefficients, as a share of each.
+        prior_relative_std: f64 = 0.5 => (above 0);
+        /// Evidence in nats that it takes to believe in a jump of the coefficients (rain, wind, a
+        /// change of the train) within a given second. Disturbances that last, as no noise model
+        /// here has them, look like jumps: less evidence is quicker and more often wrong.
+        jump_evidence: f64 = 16.0 => (1 to 1000 "nats");
+        /// The most hypotheses about the last jump; 1 looks for no jumps.
+        hypotheses: u32 = 8 => (1 to 16);
+        /// Standard deviation of the measured speed in m/s; learned when absent.
+        speed_noise_mps: Option<f64> = None => (above 0);
+        /// Root of the density of disturbing forces in N/kN √s; learned when absent.
+        disturbance_n_per_kn_sqrt_s: Option<f64> = None => (0 or more);
+        /// Samples that the learned noise looks back over.
+        noise_memory: u32 = 2000 => (50 or more);
     }
 }
 
@@ -74,36 +61,22 @@ impl TrajectoryKalmanSettings {
     ///
     /// When a setting lies outside its range.
     pub fn build(&self, train: &Arc<TrainModel>) -> Result<TrajectoryKalman, SettingError> {
-        let positive = "a finite number above 0";
-        let is_positive = |value: f64| value > 0.0 && value.is_finite();
-        let relative = self.prior_relative_std;
-        require(is_positive(relative), "prior_relative_std", relative, positive)?;
-        let evidence = self.jump_evidence;
-        require((1.0..=1e3).contains(&evidence), "jump_evidence", evidence, "1 to 1000 nats")?;
-        let hypotheses = f64::from(self.hypotheses);
-        let is_allowed = (1..=HYPOTHESES_MAX as u32).contains(&self.hypotheses);
-        require(is_allowed, "hypotheses", hypotheses, "1 to 16")?;
+        self.check_ranges()?;
         let speed_noise_mps = self.speed_noise_mps.unwrap_or(SPEED_NOISE_FIRST_MPS);
-        require(is_positive(speed_noise_mps), "speed_noise_mps", speed_noise_mps, positive)?;
         let disturbance = self.disturbance_n_per_kn_sqrt_s.unwrap_or(DISTURBANCE_FIRST);
-        let is_allowed = disturbance >= 0.0 && disturbance.is_finite();
-        let key = "disturbance_n_per_kn_sqrt_s";
-        require(is_allowed, key, disturbance, "a finite number, 0 or above")?;
-        let memory = f64::from(self.noise_memory);
-        require(memory >= 50.0, "noise_memory", memory, "at least 50 samples")?;
         let gain = resistance_gain(train.rotating_mass_factor);
-        let davis_std = prior_std(train, relative);
+        let davis_std = prior_std(train, self.prior_relative_std);
         Ok(TrajectoryKalman::new(OnlineSettings {
             davis: train.resistance,
             davis_std,
-            jumps: JumpModel { evidence, std: davis_std, spacing_s: SPACING_S },
+            jumps: JumpModel { evidence: self.jump_evidence, std: davis_std, spacing_s: SPACING_S },
             hypotheses: self.hypotheses as usize,
             noise: NoiseModel {
                 speed_noise_mps,
                 speed_noise_range_mps: SPEED_NOISE_RANGE_MPS,
                 disturbance: gain * disturbance,
                 disturbance_range: (gain * DISTURBANCE_RANGE.0, gain * DISTURBANCE_RANGE.1),
-                memory,
+                memory: f64::from(self.noise_memory),
                 learns_speed_noise: self.speed_noise_mps.is_none(),
                 learns_disturbance: self.disturbance_n_per_kn_sqrt_s.is_none(),
             },
