@@ -7,7 +7,7 @@ pub mod braking;
 mod echo;
 mod estimator;
 mod estimator_settings;
-mod innovation;
+pub mod judge;
 mod kept;
 pub mod mass;
 pub mod monitor;
@@ -22,7 +22,7 @@ pub mod trajectory;
 pub use echo::Echo;
 pub use estimator::{Estimator, Outcome};
 pub use estimator_settings::EstimatorSettings;
-pub use innovation::InnovationMonitor;
+pub use judge::InnovationMonitor;
 pub use kept::{KeptEstimate, NotKept};
 pub use settings::SettingError;
 
@@ -148,7 +148,7 @@ impl Pipeline {
                 snapshot.status = Status::Degraded as u32;
             }
         } else if is_estimated && self.refused_share > REFUSED_SHARE_MAX {
-            output::write_status(&mut self.snapshot, Status::Degraded, Reason::BadInput);
+            output::write_status(&mut self.snapshot, (Status::Degraded, Reason::BadInput));
         }
         &self.snapshot
     }

@@ -13,9 +13,8 @@ mod gated;
 
 pub use gated::Gated;
 
-use dynocar_shared::{ParameterSnapshot, Reason, RejectionReason, Status};
+use dynocar_shared::{Reason, RejectionReason};
 
-use super::output::write_status;
 use crate::force::ResolvedSample;
 
 /// So many samples away from the old level make a new one.
@@ -164,11 +163,9 @@ impl SampleGate {
         self.withdrawn_share > WITHDRAWN_SHARE_MAX
     }
 
-    /// Marks an estimate as degraded while the forces are in doubt.
-    pub fn qualify(&self, snapshot: &mut ParameterSnapshot) {
-        if self.is_in_doubt() && snapshot.status() == Status::Estimated {
-            write_status(snapshot, Status::Degraded, Reason::BadInput);
-        }
+    /// What is wrong with the forces, if anything.
+    pub fn complaint(&self) -> Option<Reason> {
+        self.is_in_doubt().then_some(Reason::BadInput)
     }
 
     fn forget(&mut self) {

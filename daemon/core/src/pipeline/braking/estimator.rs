@@ -151,7 +151,7 @@ impl<E: Engine> Estimator for BrakingEstimator<E> {
         let circumstances = Circumstances {
             reason: self.reason,
             is_stale: self.is_stale(),
-            innovations: (self.innovations.mean_square(), self.innovations.effective_count()),
+            are_innovations_too_large: self.innovations.are_too_large(),
         };
         report::write(snapshot, self.quantity, &self.report, self.held.as_ref(), &circumstances);
         write_innovations(snapshot, &self.innovations);

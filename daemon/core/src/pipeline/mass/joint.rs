@@ -5,17 +5,16 @@ use std::sync::Arc;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason};
 use nalgebra::{Matrix3, SMatrix};
 
-use super::health::InputHealth;
 use super::hypothesis::{Hypothesis, Step};
 use super::integrals::{INVERSE_MASS, Integrals, POLYNOMIALS, Regressors, Row, UNKNOWNS};
 use super::joint_settings::{JOINT_MODELS, JointLeastSquaresSettings};
-use super::lack_of_fit::LackOfFit;
 use super::line_resistance::LineResistance;
 use super::motion::{Motion, StopWatch};
 use super::section::Section;
 use super::speed_noise::SpeedNoise;
 use crate::filter::drifting_level::BIAS;
 use crate::force::ResolvedSample;
+use crate::pipeline::judge::{InputHealth, LackOfFit};
 use crate::pipeline::motion::kink_variance;
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
@@ -294,19 +293,9 @@ impl Estimator for JointLeastSquares {
             }
             self.last = None;
         }
-        if sample.speed_mps < self.settings.speed_min_mps {
-            self.last = None;
-            return Outcome::Used;
-        }
-        let motion = match Motion::of(sample) {
+        let motion = match Motion::seen(sample, self.settings.speed_min_mps, &mut self.last) {
             Ok(motion) => motion,
-            Err(reason) => {
-                if reason == RejectionReason::WheelSlide {
-                    self.last = None;
-                }
-                self.health.refuse(reason, sample);
-                return Outcome::Rejected(reason);
-            }
+            Err(outcome) => return self.health.passed(outcome, sample),
         };
         self.speed_mps = motion.speed_mps;
         let step = self.last.and_then(|last| Some((last, motion.step_from(&last.0)?)));
@@ -314,11 +303,7 @@ impl Estimator for JointLeastSquares {
             Some((last, step_s)) => self.advance(last, motion, step_s),
             None => self.begin(motion),
         };
-        match outcome {
-            Outcome::Rejected(reason) => self.health.refuse(reason, sample),
-            Outcome::Used | Outcome::Updated => self.health.accept(),
-        }
-        outcome
+        self.health.note(outcome, sample)
     }
 
     fn write(&self, snapshot: &mut ParameterSnapshot) {

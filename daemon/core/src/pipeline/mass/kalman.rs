@@ -8,12 +8,12 @@ use dynocar_shared::{
 use nalgebra::{Matrix2, Vector2};
 
 use super::bias_bank::{BiasBank, Dynamics, Moments, SPEED};
-use super::health::{InputHealth, innovation_complaint};
 use super::kalman_settings::MassKalmanSettings;
 use super::motion::{Motion, StopWatch};
 use super::settling::Settling;
 use super::speed_noise::SpeedNoise;
 use crate::force::ResolvedSample;
+use crate::pipeline::judge::{Case, InputHealth};
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::SettingError;
@@ -212,24 +212,16 @@ impl MassKalman {
         std_kg <= 0.01 * self.settings.usable_std_percent * mass_kg
     }
 
-    fn status(&self) -> (Status, Reason) {
-        let without = if self.was_known { Status::Degraded } else { Status::Unestimated };
-        if self.is_fresh_reset {
-            return (Status::Invalid, Reason::NumericalFailure);
-        }
-        let is_known = self.is_known();
-        if let Some(reason) = self.health.complaint() {
-            return (if is_known { Status::Degraded } else { without }, reason);
-        }
-        if self.health.used() < SAMPLES_MIN {
-            return (without, Reason::TooFewSamples);
-        }
-        if !is_known {
-            return (without, Reason::WeakExcitation);
-        }
-        match innovation_complaint(&self.monitor) {
-            Some(reason) => (Status::Degraded, reason),
-            None => (Status::Estimated, Reason::None),
+    fn case(&self) -> Case {
+        let failure = (Status::Invalid, Reason::NumericalFailure);
+        Case {
+            fault: self.is_fresh_reset.then_some(failure),
+            input: self.health.complaint().or(self.gate.complaint()),
+            is_ready: self.health.used() >= SAMPLES_MIN,
+            is_known: self.is_known(),
+            lacking: if self.was_known { Status::Degraded } else { Status::Unestimated },
+            contradiction: self.monitor.contradiction(),
+            remark: Reason::None,
         }
     }
 }
@@ -240,19 +232,9 @@ impl Gated for MassKalman {
     }
 
     fn take(&mut self, sample: &ResolvedSample) -> Outcome {
-        if sample.speed_mps < self.settings.speed_min_mps {
-            self.last = None;
-            return Outcome::Used;
-        }
-        let motion = match Motion::of(sample) {
+        let motion = match Motion::seen(sample, self.settings.speed_min_mps, &mut self.last) {
             Ok(motion) => motion,
-            Err(reason) => {
-                if reason == RejectionReason::WheelSlide {
-                    self.last = None;
-                }
-                self.health.refuse(reason, sample);
-                return Outcome::Rejected(reason);
-            }
+            Err(outcome) => return self.health.passed(outcome, sample),
         };
         self.noise.rounding.see(motion.speed_mps);
         let last = self.last.filter(|_| sample.step_s > 0.0);
@@ -261,11 +243,7 @@ impl Gated for MassKalman {
             Some((last, step_s)) => self.advance(last, motion, step_s),
             None => self.begin(motion),
         };
-        match outcome {
-            Outcome::Rejected(reason) => self.health.refuse(reason, sample),
-            Outcome::Used | Outcome::Updated => self.health.accept(),
-        }
-        outcome
+        self.health.note(outcome, sample)
     }
 
     fn leave_out(&mut self, sample: &ResolvedSample, reason: RejectionReason) {
@@ -304,9 +282,7 @@ impl Estimator for MassKalman {
         let is_bias_known = self.health.used() >= SAMPLES_MIN;
         snapshot.excited = u32::from(is_known) | (u32::from(is_bias_known) << 1);
         snapshot.missing_manoeuvres = if is_known { 0 } else { Manoeuvre::Accelerate.bit() };
-        let (status, reason) = self.status();
-        write_status(snapshot, status, reason);
-        self.gate.qualify(snapshot);
+        write_status(snapshot, self.case().verdict());
         write_innovations(snapshot, &self.monitor);
         let inertia_kg = mass_kg * self.inertia_factor;
         snapshot.unexplained_force_n = -bias_mps2 * inertia_kg;

@@ -12,7 +12,6 @@
 pub mod bias_bank;
 pub mod bias_model;
 mod descent;
-mod health;
 mod hypothesis;
 pub mod integrals;
 mod joint;
@@ -20,7 +19,6 @@ mod joint_settings;
 mod joint_snapshot;
 mod kalman;
 mod kalman_settings;
-mod lack_of_fit;
 pub mod line_resistance;
 pub mod motion;
 pub mod section;

@@ -3,6 +3,7 @@
 use dynocar_shared::RejectionReason;
 
 use crate::force::ResolvedSample;
+use crate::pipeline::Outcome;
 
 /// Speed in m/s up to which a train counts as standing; below it a wheel sensor sees nothing.
 pub const STANDING_MPS: f64 = 0.3;
@@ -69,6 +70,30 @@ impl Motion {
         }
         let is_possible = bounds.iter().all(|&(number, low, high)| number >= low && number <= high);
         if is_possible { Ok(motion) } else { Err(RejectionReason::OutOfRange) }
+    }
+
+    /// The motion at a sample that an estimator from a least speed in m/s on takes; where there is none,
+    /// what became of the sample. A step leads neither over a standstill nor over a slide: `last` is
+    /// forgotten there.
+    ///
+    /// # Errors
+    ///
+    /// `Used` for a train that stands, else the refusal with the reason of [`Motion::of`].
+    pub fn seen<T>(
+        sample: &ResolvedSample,
+        speed_min_mps: f64,
+        last: &mut Option<T>,
+    ) -> Result<Self, Outcome> {
+        if sample.speed_mps < speed_min_mps {
+            *last = None;
+            return Err(Outcome::Used);
+        }
+        Motion::of(sample).map_err(|reason| {
+            if reason == RejectionReason::WheelSlide {
+                *last = None;
+            }
+            Outcome::Rejected(reason)
+        })
     }
 
     /// Time in s since an earlier sample of the same stretch; `None` when forces and speed

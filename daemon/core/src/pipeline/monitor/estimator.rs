@@ -14,6 +14,7 @@ use super::settings::MonitorSettings;
 use super::suspects::{BASE, FIRST_ONSET, ONSETS, SUSPECTS, suspect_of};
 use super::verdict::{Evidence, Verdict};
 use crate::force::ResolvedSample;
+use crate::pipeline::judge::Case;
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::resistance::momentum::MomentumBlocks;
 use crate::pipeline::resistance::regression::{
@@ -316,11 +317,16 @@ impl Estimator for ResidualMonitor {
         );
         let named = self.verdict.named();
         let has_rows = self.information.count() >= ROWS_MIN;
-        match named {
-            _ if !has_rows => write_status(snapshot, Status::Unestimated, Reason::TooFewSamples),
-            Some(_) => write_status(snapshot, Status::Degraded, Reason::InnovationsNotWhite),
-            None => write_status(snapshot, Status::Estimated, Reason::None),
-        }
+        let case = Case {
+            fault: None,
+            input: None,
+            is_ready: has_rows,
+            is_known: true,
+            lacking: Status::Unestimated,
+            contradiction: named.map(|_| Reason::InnovationsNotWhite),
+            remark: Reason::None,
+        };
+        write_status(snapshot, case.verdict());
         write_innovations(snapshot, &self.innovations);
         snapshot.generation = self.resets;
         snapshot.excited = u32::from(has_rows);

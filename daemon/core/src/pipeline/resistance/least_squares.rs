@@ -14,6 +14,7 @@ use super::source::RowSource;
 use super::speed::SpeedNoise;
 use crate::filter::RunningMedian;
 use crate::force::ResolvedSample;
+use crate::pipeline::judge::missing;
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use crate::train::{Davis, TrainModel};
@@ -279,7 +280,7 @@ impl ResistanceLeastSquares {
             Some(obstacle) if self.bank.count() == 0.0 => obstacle,
             _ => report.reason,
         };
-        write_status(snapshot, report.status, reason);
+        write_status(snapshot, (report.status, reason));
         let factors = unscaling();
         let covariance =
             Matrix3::from_diagonal(&factors) * report.covariance * Matrix3::from_diagonal(&factors);
@@ -318,10 +319,7 @@ impl Estimator for ResistanceLeastSquares {
                     self.source.break_chain();
                 }
                 if reason == RejectionReason::Missing {
-                    self.obstacle = Some(match sample.gradient_permille {
-                        None => Reason::GradientUnknown,
-                        Some(_) => Reason::MissingQuantity,
-                    });
+                    self.obstacle = Some(missing(sample));
                 }
                 Outcome::Rejected(reason)
             }

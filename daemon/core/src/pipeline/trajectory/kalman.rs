@@ -11,12 +11,13 @@ use super::index::DAVIS;
 use super::motion::{Motion, MotionStep, MotionTracker};
 use super::noise::NoiseModel;
 use super::online::{OnlineFilter, OnlineSettings};
-use super::quality::{Estimate, SpeedRange, missing, prior_std};
+use super::quality::{Estimate, SpeedRange, prior_std};
 use super::step::{Step, StepRule, resistance_gain};
 use super::unexplained::UnexplainedForce;
 use crate::force::ResolvedSample;
+use crate::pipeline::judge::InputHealth;
 use crate::pipeline::motion::{Rounding, jump_variance};
-use crate::pipeline::output::{write_parameters, write_status};
+use crate::pipeline::output::write_parameters;
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::{SettingError, settings};
 use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
@@ -99,7 +100,8 @@ pub struct TrajectoryKalman {
     unexplained: UnexplainedForce,
     speeds: SpeedRange,
     updates: u64,
-    /// Why there is no estimate, when something else than the lack of samples is to blame.
+    health: InputHealth,
+    /// Why there is no estimate, when something else than the samples is to blame.
     fault: Option<(Status, Reason)>,
 }
 
@@ -124,6 +126,7 @@ impl TrajectoryKalman {
             unexplained: UnexplainedForce::default(),
             speeds: SpeedRange::default(),
             updates: 0,
+            health: InputHealth::default(),
             fault: None,
         }
     }
@@ -168,7 +171,7 @@ impl Gated for TrajectoryKalman {
 
     fn take(&mut self, sample: &ResolvedSample) -> Outcome {
         self.rounding.see(sample.speed_mps);
-        match self.tracker.advance(sample) {
+        let outcome = match self.tracker.advance(sample) {
             Motion::Continue(motion) => self.take_step(&motion, sample),
             Motion::Begin => {
                 self.filter.begin(sample.speed_mps);
@@ -177,16 +180,13 @@ impl Gated for TrajectoryKalman {
                 Outcome::Used
             }
             Motion::Standstill => Outcome::Used,
-            Motion::Unusable(reason) => {
-                if reason == RejectionReason::Missing && self.updates < UPDATES_MIN {
-                    self.fault = Some(missing(sample));
-                }
-                Outcome::Rejected(reason)
-            }
-        }
+            Motion::Unusable(reason) => Outcome::Rejected(reason),
+        };
+        self.health.note(outcome, sample)
     }
 
-    fn leave_out(&mut self, _: &ResolvedSample, _: RejectionReason) {
+    fn leave_out(&mut self, sample: &ResolvedSample, reason: RejectionReason) {
+        self.health.refuse(reason, sample);
         self.tracker = MotionTracker::default();
     }
 }
@@ -203,6 +203,7 @@ impl Estimator for TrajectoryKalman {
     fn write(&self, snapshot: &mut ParameterSnapshot) {
         let (davis, covariance) = self.filter.davis();
         write_parameters(snapshot, DAVIS, &Vector3::new(davis.a, davis.b, davis.c), &covariance);
+        let is_fresh = self.filter.bank().likeliest().age_s < FRESH_S;
         let estimate = Estimate {
             davis,
             covariance,
@@ -212,13 +213,11 @@ impl Estimator for TrajectoryKalman {
             inflation: self.filter.inflation(),
             is_ready: self.updates >= UPDATES_MIN,
             is_at_bound: false,
+            fault: self.fault,
+            input: self.health.complaint().or(self.gate.complaint()),
+            doubt: is_fresh.then_some(Reason::InnovationsTooLarge),
         };
-        estimate.write(snapshot, self.fault);
-        let is_fresh = self.filter.bank().likeliest().age_s < FRESH_S;
-        if is_fresh && snapshot.status() == Status::Estimated {
-            write_status(snapshot, Status::Degraded, Reason::InnovationsTooLarge);
-        }
-        self.gate.qualify(snapshot);
+        estimate.write(snapshot);
         let speed_variance = self.filter.bank().likeliest().noise.speed_variance;
         self.unexplained.write(snapshot, speed_variance);
         snapshot.generation = self.filter.resets();

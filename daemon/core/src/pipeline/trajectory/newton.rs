@@ -8,14 +8,15 @@ use super::index::DAVIS;
 use super::long_run::LongRunVariance;
 use super::motion::{Motion, MotionTracker};
 use super::newton_settings::{CheckedSettings, FitMethod, TrajectoryNewtonSettings};
-use super::quality::{Estimate, SpeedRange, missing};
+use super::quality::{Estimate, SpeedRange};
 use super::step::StepRule;
 use super::unexplained::UnexplainedForce;
 use super::window::Window;
 use super::wolfe_newton::{NewtonSettings, RestartSource, Restarts, wolfe_newton};
 use crate::filter::levenberg_marquardt::ParameterBox;
 use crate::force::ResolvedSample;
-use crate::pipeline::output::{write_parameters, write_status};
+use crate::pipeline::judge::InputHealth;
+use crate::pipeline::output::write_parameters;
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
@@ -58,6 +59,7 @@ pub struct TrajectoryNewton {
     speeds: SpeedRange,
     /// False when the newest window's residuals are larger than the noise accounts for.
     is_consistent: bool,
+    health: InputHealth,
     fault: Option<(Status, Reason)>,
 }
 
@@ -106,6 +108,7 @@ impl TrajectoryNewton {
             unexplained: UnexplainedForce::default(),
             speeds: SpeedRange::default(),
             is_consistent: true,
+            health: InputHealth::default(),
             fault: None,
             settings,
         })
@@ -229,7 +232,7 @@ impl Gated for TrajectoryNewton {
     }
 
     fn take(&mut self, sample: &ResolvedSample) -> Outcome {
-        match self.tracker.advance(sample) {
+        let outcome = match self.tracker.advance(sample) {
             Motion::Continue(motion) => {
                 self.unexplained.push(&motion, sample, &self.davis);
                 self.speeds.push(sample.speed_mps);
@@ -251,15 +254,14 @@ impl Gated for TrajectoryNewton {
             }
             Motion::Unusable(reason) => {
                 self.end_window();
-                if reason == RejectionReason::Missing && self.windows == 0 {
-                    self.fault = Some(missing(sample));
-                }
                 Outcome::Rejected(reason)
             }
-        }
+        };
+        self.health.note(outcome, sample)
     }
 
-    fn leave_out(&mut self, _: &ResolvedSample, _: RejectionReason) {
+    fn leave_out(&mut self, sample: &ResolvedSample, reason: RejectionReason) {
+        self.health.refuse(reason, sample);
         self.tracker = MotionTracker::default();
         self.end_window();
     }
@@ -288,12 +290,11 @@ impl Estimator for TrajectoryNewton {
             inflation,
             is_ready: self.windows > 0,
             is_at_bound: self.at_bound,
+            fault: self.fault,
+            input: self.health.complaint().or(self.gate.complaint()),
+            doubt: (!self.is_consistent).then_some(Reason::InnovationsTooLarge),
         };
-        estimate.write(snapshot, self.fault);
-        if !self.is_consistent && snapshot.status() == Status::Estimated {
-            write_status(snapshot, Status::Degraded, Reason::InnovationsTooLarge);
-        }
-        self.gate.qualify(snapshot);
+        estimate.write(snapshot);
         self.unexplained.write(snapshot, self.speed_noise_mps.powi(2));
     }
 }
