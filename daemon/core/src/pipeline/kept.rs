@@ -86,7 +86,7 @@ impl KeptEstimate {
         }
         let mean_square = snapshot.innovation_mean_square;
         let correlation = snapshot.innovation_correlation;
-        if !mean_square.is_finite()
+        if !(mean_square + correlation).is_finite()
             || are_too_large(mean_square)
             || are_alike(mean_square, correlation)
         {

@@ -2,6 +2,7 @@
 
 use super::bias_model::BiasModel;
 use super::line_resistance::DEFAULT_REFERENCE_RADIUS_M;
+use crate::pipeline::motion::MOVING_MPS;
 use crate::pipeline::settings::settings;
 
 /// Number of behaviours of the unexplained acceleration.
@@ -24,7 +25,7 @@ settings! {
         /// Standard deviation in m/s² of an acceleration that no parameter explains.
         bias_std_mps2: f64 = 0.01 => (0.0001 to 0.5);
         /// Lowest speed in m/s that is used.
-        speed_min_mps: f64 = 1.0 => (0.3 to 20);
+        speed_min_mps: f64 = MOVING_MPS => (0.3 to 20);
         /// Radius in m that the curve resistance refers to.
         reference_radius_m: f64 = DEFAULT_REFERENCE_RADIUS_M => (50 to 10000);
         /// Standard deviation of the mass in % up to which it may be used.

@@ -49,8 +49,7 @@ impl JointLeastSquares {
         let shape = best.shape(self.speed_mps);
         snapshot.unexplained_force_n = -shape * solution[BIAS] * inertia_kg;
         snapshot.unexplained_force_std_n = shape * root.row(BIAS).norm() * inertia_kg;
-        (snapshot.speed_min_mps, snapshot.speed_max_mps) =
-            self.speed_range_mps.unwrap_or((0.0, 0.0));
+        self.speeds.write(snapshot);
     }
 
     fn case(&self, is_mass_known: bool, is_resistance_known: bool) -> Case {

@@ -14,6 +14,7 @@ use super::settling::Settling;
 use super::speed_noise::SpeedNoise;
 use crate::force::ResolvedSample;
 use crate::pipeline::judge::{Case, InputHealth};
+use crate::pipeline::motion::SpeedRange;
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::SettingError;
@@ -56,7 +57,7 @@ pub struct MassKalman {
     settling: Settling,
     monitor: InnovationMonitor,
     health: InputHealth,
-    speed_range_mps: Option<(f64, f64)>,
+    speeds: SpeedRange,
     was_known: bool,
     is_fresh_reset: bool,
     generation: u64,
@@ -95,7 +96,7 @@ impl MassKalman {
             settling: Settling::default(),
             monitor: InnovationMonitor::new(500),
             health: InputHealth::default(),
-            speed_range_mps: None,
+            speeds: SpeedRange::default(),
             was_known: false,
             is_fresh_reset: false,
             generation: 0,
@@ -162,7 +163,7 @@ impl MassKalman {
         let mps2 =
             |motion: &Motion| motion.force_n / (self.reference_mass_kg * self.inertia_factor);
         self.settling.step(mps2(&from), mps2(&motion), step_s, noise_variance);
-        if measured.weight == 0.0 {
+        if measured.is_outlier() {
             // The filters have moved on; only the speed is not believed.
             self.last = Some(motion);
             self.monitor.break_here();
@@ -173,7 +174,7 @@ impl MassKalman {
         let residual_mps = motion.speed_mps - filter.mean[SPEED];
         self.noise.learn(residual_mps, filter.covariance[(SPEED, SPEED)], measured.weight);
         self.last = Some(motion);
-        self.widen_speed_range(motion.speed_mps);
+        self.speeds.push(motion.speed_mps);
         self.publish(0.5 * (from.force_n + motion.force_n).abs())
     }
 
@@ -191,11 +192,6 @@ impl MassKalman {
         self.moments.bias_mps2 = now.bias_mps2;
         self.moments.bias_variance = now.bias_variance;
         Outcome::Used
-    }
-
-    fn widen_speed_range(&mut self, speed_mps: f64) {
-        let (low, high) = self.speed_range_mps.unwrap_or((speed_mps, speed_mps));
-        self.speed_range_mps = Some((low.min(speed_mps), high.max(speed_mps)));
     }
 
     fn reset(&mut self) {
@@ -287,8 +283,7 @@ impl Estimator for MassKalman {
         let inertia_kg = mass_kg * self.inertia_factor;
         snapshot.unexplained_force_n = -bias_mps2 * inertia_kg;
         snapshot.unexplained_force_std_n = bias_std * inertia_kg;
-        (snapshot.speed_min_mps, snapshot.speed_max_mps) =
-            self.speed_range_mps.unwrap_or((0.0, 0.0));
+        self.speeds.write(snapshot);
         snapshot.generation = self.generation;
     }
 

@@ -3,6 +3,7 @@
 use super::bias_bank::MODELS;
 use super::bias_model::BiasModel;
 use super::line_resistance::{DEFAULT_REFERENCE_RADIUS_M, LineResistance};
+use crate::pipeline::motion::MOVING_MPS;
 use crate::pipeline::settings::{SettingError, settings, within};
 use crate::train::{Davis, TrainModel};
 
@@ -23,7 +24,7 @@ settings! {
         /// Least force in N/kN that counts as traction or braking.
         force_min_n_per_kn: f64 = 5.0 => (0 to 100);
         /// Lowest speed in m/s that is used.
-        speed_min_mps: f64 = 1.0 => (0.3 to 20);
+        speed_min_mps: f64 = MOVING_MPS => (0.3 to 20);
         /// Basic resistance [a, b, c] in place of the declared one, speeds in m/s.
         basic_resistance: Option<[f64; 3]> = None;
         /// Curve resistance [a, b, c] at the reference radius beyond the declared one.

@@ -4,13 +4,7 @@ use dynocar_shared::RejectionReason;
 
 use crate::force::ResolvedSample;
 use crate::pipeline::Outcome;
-
-/// Speed in m/s up to which a train counts as standing; below it a wheel sensor sees nothing.
-pub const STANDING_MPS: f64 = 0.3;
-
-/// Longest step in s that is integrated: missing forces are bridged by the mean of the forces
-/// around them, and records at 1 Hz are used.
-pub const STEP_MAX_S: f64 = 2.5;
+use crate::pipeline::motion::{BRIDGED_MAX_S, STANDING_MPS};
 
 /// The known quantities of a moving train at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,7 +94,8 @@ impl Motion {
     /// between the two are not known well enough to integrate.
     pub fn step_from(&self, earlier: &Motion) -> Option<f64> {
         let step_s = self.time_ns.saturating_sub(earlier.time_ns) as f64 * 1e-9;
-        (self.stretch == earlier.stretch && step_s > 0.0 && step_s <= STEP_MAX_S).then_some(step_s)
+        (self.stretch == earlier.stretch && step_s > 0.0 && step_s <= BRIDGED_MAX_S)
+            .then_some(step_s)
     }
 }
 

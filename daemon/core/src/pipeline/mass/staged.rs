@@ -14,6 +14,7 @@ use super::speed_basis::SpeedBasis;
 use super::staged_settings::{MassRegression, StagedDescentSettings};
 use crate::force::ResolvedSample;
 use crate::pipeline::judge::{Case, InputHealth};
+use crate::pipeline::motion::SpeedRange;
 use crate::pipeline::output::{write_parameters, write_status};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, Outcome};
@@ -62,7 +63,7 @@ pub struct StagedDescent {
     stops: StopWatch,
     last: Option<Motion>,
     health: InputHealth,
-    speed_range_mps: Option<(f64, f64)>,
+    speeds: SpeedRange,
 }
 
 impl StagedDescent {
@@ -90,7 +91,7 @@ impl StagedDescent {
             stops: StopWatch::new(settings.stop_min_s),
             last: None,
             health: InputHealth::default(),
-            speed_range_mps: None,
+            speeds: SpeedRange::default(),
         })
     }
 
@@ -141,8 +142,7 @@ impl StagedDescent {
         let known = 0.5 * (from.known_n_per_kn + to.known_n_per_kn);
         let acceleration_mps2 = (to.speed_mps - from.speed_mps) / step_s;
         let inertia_mps2 = self.inertia_factor * acceleration_mps2;
-        let (low, high) = self.speed_range_mps.unwrap_or((speed_mps, speed_mps));
-        self.speed_range_mps = Some((low.min(speed_mps), high.max(speed_mps)));
+        self.speeds.push(speed_mps);
         if self.learned >= self.settings.resistance_samples {
             let at = Motion { speed_mps, known_n_per_kn: known, ..*to };
             let w = self.resistance().w_n_per_kn(&at, speed_mps);
@@ -284,7 +284,6 @@ impl Estimator for StagedDescent {
         snapshot.missing_manoeuvres =
             if mass_std_kg.is_some() { 0 } else { Manoeuvre::Accelerate.bit() };
         write_status(snapshot, self.case(mass_std_kg.is_some()).verdict());
-        (snapshot.speed_min_mps, snapshot.speed_max_mps) =
-            self.speed_range_mps.unwrap_or((0.0, 0.0));
+        self.speeds.write(snapshot);
     }
 }

@@ -3,6 +3,7 @@
 use serde::Deserialize;
 
 use super::line_resistance::DEFAULT_REFERENCE_RADIUS_M;
+use crate::pipeline::motion::MOVING_MPS;
 use crate::pipeline::settings::settings;
 
 /// What the mass is fitted on; the paper does not say.
@@ -32,7 +33,7 @@ settings! {
         /// Shortest stop in s at which the mass may change.
         stop_min_s: f64 = 5.0 => (0 to 3600);
         /// Lowest speed in m/s that is used.
-        speed_min_mps: f64 = 1.0 => (0.3 to 20);
+        speed_min_mps: f64 = MOVING_MPS => (0.3 to 20);
         /// Least force in N/kN on which mass is learned.
         force_min_n_per_kn: f64 = 5.0 => (0 to 100);
         /// Radius in m that the curve resistance refers to.

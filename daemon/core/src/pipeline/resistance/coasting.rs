@@ -12,7 +12,7 @@ use dynocar_shared::RejectionReason;
 use super::regression::{CoastingSegment, Columns, PARAMETERS, SPEED_SCALE_MPS};
 use super::sample::{SpeedWatch, UnitSample, resistance_integral, trapezoids};
 use super::settings::DataSettings;
-use super::speed::{SpeedNoise, SpeedVerdict};
+use super::speed::SpeedNoise;
 use crate::filter::Line;
 use crate::train::Davis;
 
@@ -98,13 +98,11 @@ impl CoastingSegments {
             self.chain = Some(Chain::start(now, settle_s));
             return Ok(None);
         };
-        match self.watch.judge(&chain.last, now, known) {
-            SpeedVerdict::Continues => {}
-            SpeedVerdict::Spike => return Err(RejectionReason::Outlier),
-            SpeedVerdict::Restart => {
+        if let Some(is_believed) = self.watch.judge(&chain.last, now, known) {
+            if is_believed {
                 self.chain = Some(Chain::start(now, settle_s));
-                return Err(RejectionReason::Outlier);
             }
+            return Err(RejectionReason::Outlier);
         }
         chain.advance(now);
         if chain.settling_s > 0.0 {

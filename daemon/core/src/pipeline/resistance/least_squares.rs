@@ -292,8 +292,7 @@ impl ResistanceLeastSquares {
         // The disturbance acts against the motion as resistance does.
         snapshot.unexplained_force_n = self.disturbance.0 * self.weight_kn;
         snapshot.unexplained_force_std_n = self.disturbance.1 * self.weight_kn;
-        snapshot.speed_min_mps = self.speeds.min_mps;
-        snapshot.speed_max_mps = self.speeds.max_mps;
+        self.speeds.range.write(snapshot);
     }
 }
 

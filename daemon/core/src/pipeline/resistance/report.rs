@@ -8,6 +8,7 @@ use super::regression::{PARAMETERS, SPEED_SCALE_MPS, Solution, regressors, unsca
 use crate::filter::bounded_minimum;
 use crate::pipeline::InnovationMonitor;
 use crate::pipeline::judge::Case;
+use crate::pipeline::motion::SpeedRange;
 use crate::train::Davis;
 
 /// Rows before anything is called estimated.
@@ -25,24 +26,26 @@ const DISTURBANCE_STDS_MAX: f64 = 4.0;
 /// Share of refused rows beyond which the input is bad.
 const REFUSED_SHARE_MAX: f64 = 0.3;
 
-/// Mean and range of the speeds behind the rows, in m/s.
+/// Mean and range of the speeds behind the rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DrivenSpeeds {
-    /// Lowest.
-    pub min_mps: f64,
-    /// Highest.
-    pub max_mps: f64,
+    /// Lowest and highest.
+    pub range: SpeedRange,
     sum_mps: f64,
     count: f64,
 }
 
 impl DrivenSpeeds {
-    /// Takes in the mean speed of a row.
+    /// Takes in the mean speed of a row in m/s.
     pub fn push(&mut self, speed_mps: f64) {
-        self.min_mps = if self.count == 0.0 { speed_mps } else { self.min_mps.min(speed_mps) };
-        self.max_mps = self.max_mps.max(speed_mps);
+        self.range.push(speed_mps);
         self.sum_mps += speed_mps;
         self.count += 1.0;
+    }
+
+    /// Highest in m/s; 0 before the first.
+    pub fn max_mps(&self) -> f64 {
+        self.range.get().map_or(0.0, |(_, max_mps)| max_mps)
     }
 
     /// Mean; 0 before the first.
@@ -124,7 +127,7 @@ impl Report {
             (powers.dot(&estimate), powers.dot(&(covariance * powers)).max(0.0).sqrt())
         };
         let speeds = evidence.speeds;
-        let excited = excited(&covariance, at(speeds.max_mps).0, speeds.max_mps);
+        let excited = excited(&covariance, at(speeds.max_mps()).0, speeds.max_mps());
         let case = case(evidence, at(speeds.mean_mps()), excited, bounded.at_bound != 0);
         let (status, reason) = case.verdict();
         let missing_manoeuvres = missing_manoeuvres(excited);

@@ -2,6 +2,7 @@
 
 use serde::Deserialize;
 
+use crate::pipeline::motion::MOVING_MPS;
 use crate::pipeline::settings::settings;
 
 /// Where the regression data come from.
@@ -28,7 +29,7 @@ settings! {
         /// Time in s after the forces ended before coasting is believed.
         coasting_settle_s: f64 = 3.0 => (0 to 60 "s");
         /// Below this speed in m/s nothing is learned: static friction, holding brakes.
-        speed_min_mps: f64 = 1.0 => (0.1 to 10 "m/s");
+        speed_min_mps: f64 = MOVING_MPS => (0.1 to 10 "m/s");
         /// Deviation in m/s from the expected speed that is never called a spike.
         spike_mps: f64 = 0.15 => (0.01 to 10 "m/s");
         /// Standard deviation of the scales of traction and brake force, found beside the

@@ -11,12 +11,12 @@ use super::index::DAVIS;
 use super::motion::{Motion, MotionStep, MotionTracker};
 use super::noise::NoiseModel;
 use super::online::{OnlineFilter, OnlineSettings};
-use super::quality::{Estimate, SpeedRange, prior_std};
+use super::quality::{Estimate, prior_std};
 use super::step::{Step, StepRule, resistance_gain};
 use super::unexplained::UnexplainedForce;
 use crate::force::ResolvedSample;
 use crate::pipeline::judge::InputHealth;
-use crate::pipeline::motion::{Rounding, jump_variance};
+use crate::pipeline::motion::{Rounding, SpeedRange, jump_variance};
 use crate::pipeline::output::write_parameters;
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::{SettingError, settings};
@@ -208,7 +208,7 @@ impl Estimator for TrajectoryKalman {
             davis,
             covariance,
             prior_std: self.prior_std,
-            speeds_mps: self.speeds.get(),
+            speeds: self.speeds,
             innovations: &self.innovations,
             inflation: self.filter.inflation(),
             is_ready: self.updates >= UPDATES_MIN,

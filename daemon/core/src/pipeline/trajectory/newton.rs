@@ -8,7 +8,7 @@ use super::index::DAVIS;
 use super::long_run::LongRunVariance;
 use super::motion::{Motion, MotionTracker};
 use super::newton_settings::{CheckedSettings, FitMethod, TrajectoryNewtonSettings};
-use super::quality::{Estimate, SpeedRange};
+use super::quality::Estimate;
 use super::step::StepRule;
 use super::unexplained::UnexplainedForce;
 use super::window::Window;
@@ -16,6 +16,7 @@ use super::wolfe_newton::{NewtonSettings, RestartSource, Restarts, wolfe_newton}
 use crate::filter::levenberg_marquardt::ParameterBox;
 use crate::force::ResolvedSample;
 use crate::pipeline::judge::InputHealth;
+use crate::pipeline::motion::SpeedRange;
 use crate::pipeline::output::write_parameters;
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::SettingError;
@@ -285,7 +286,7 @@ impl Estimator for TrajectoryNewton {
             davis: self.davis,
             covariance,
             prior_std: self.settings.prior.std,
-            speeds_mps: self.speeds.get(),
+            speeds: self.speeds,
             innovations: &self.innovations,
             inflation,
             is_ready: self.windows > 0,

@@ -10,6 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::index::{A, B, C};
 use crate::pipeline::InnovationMonitor;
 use crate::pipeline::judge::{Case, LONG_RUN_MAX};
+use crate::pipeline::motion::SpeedRange;
 use crate::pipeline::output::{write_innovations, write_status};
 use crate::train::{Davis, TrainModel};
 
@@ -39,8 +40,8 @@ pub struct Estimate<'a> {
     pub covariance: Matrix3<f64>,
     /// Their standard deviations before any data.
     pub prior_std: Vector3<f64>,
-    /// Lowest and highest speed in m/s behind them; `None` before the first.
-    pub speeds_mps: Option<(f64, f64)>,
+    /// Speeds behind them.
+    pub speeds: SpeedRange,
     /// Innovations so far.
     pub innovations: &'a InnovationMonitor,
     /// Factor by which disturbances that last have widened the covariance.
@@ -61,7 +62,7 @@ impl Estimate<'_> {
     /// All that the judge asks for.
     pub fn case(&self) -> Case {
         let is_finite = self.covariance.iter().all(|entry| entry.is_finite());
-        let speeds_mps = self.speeds_mps.filter(|_| self.is_ready);
+        let speeds_mps = self.speeds.get().filter(|_| self.is_ready);
         let is_known = speeds_mps.is_none_or(|(low_mps, high_mps)| {
             [low_mps, 0.5 * (low_mps + high_mps), high_mps].into_iter().all(|speed| {
                 let powers = Vector3::new(1.0, speed, speed * speed);
@@ -122,31 +123,12 @@ impl Estimate<'_> {
                 missing |= manoeuvre.bit();
             }
         }
-        if self.speeds_mps.is_none() {
+        if self.speeds.get().is_none() {
             missing |= Manoeuvre::Move.bit();
         }
         snapshot.excited = (0..3).map(|i| u32::from(excited[i]) << i).sum();
         snapshot.missing_manoeuvres = missing;
-        let (low_mps, high_mps) = self.speeds_mps.unwrap_or((0.0, 0.0));
-        snapshot.speed_min_mps = low_mps;
-        snapshot.speed_max_mps = high_mps;
-    }
-}
-
-/// Lowest and highest speed so far.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SpeedRange(Option<(f64, f64)>);
-
-impl SpeedRange {
-    /// Takes in a speed in m/s.
-    pub fn push(&mut self, speed_mps: f64) {
-        let (low, high) = self.0.unwrap_or((speed_mps, speed_mps));
-        self.0 = Some((low.min(speed_mps), high.max(speed_mps)));
-    }
-
-    /// Lowest and highest, in m/s.
-    pub fn get(&self) -> Option<(f64, f64)> {
-        self.0
+        self.speeds.write(snapshot);
     }
 }
 
@@ -155,11 +137,13 @@ mod tests {
     use super::*;
 
     fn estimate(monitor: &InnovationMonitor, covariance: Matrix3<f64>) -> Estimate<'_> {
+        let mut speeds = SpeedRange::default();
+        [75.0, 84.0].into_iter().for_each(|speed_mps| speeds.push(speed_mps));
         Estimate {
             davis: Davis { a: 1.0, b: 0.02, c: 0.001 },
             covariance,
             prior_std: Vector3::new(0.5, 0.01, 0.0005),
-            speeds_mps: Some((75.0, 84.0)),
+            speeds,
             innovations: monitor,
             inflation: 1.0,
             is_ready: true,

@@ -20,6 +20,7 @@ use super::intake::{BrakingIntake, IntakeSettings, Quantity};
 use super::motion::MotionNoise;
 use super::report::ReportSettings;
 use crate::pipeline::Estimator;
+use crate::pipeline::motion::MOVING_MPS;
 use crate::pipeline::settings::{SettingError, require, settings};
 use crate::train::TrainModel;
 
@@ -49,7 +50,7 @@ settings! {
         /// Least brake force per weight that counts as braking.
         braking_min_per_weight: f64 = 0.01 => (above 0);
         /// Slowest speed in m/s at which the model is trusted.
-        speed_min_mps: f64 = 1.0 => (0 or more);
+        speed_min_mps: f64 = MOVING_MPS => (0 or more);
         /// True when the position does not come from the braked wheels, so that it holds while they
         /// slide.
         position_is_wheel_independent: bool = false;
