@@ -13,6 +13,7 @@ pub mod mass;
 pub mod monitor;
 pub mod motion;
 pub mod output;
+pub mod papers;
 pub mod quantities;
 pub mod resistance;
 pub mod sample_gate;

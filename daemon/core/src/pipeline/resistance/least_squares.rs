@@ -9,13 +9,13 @@ use super::regression::{Motion, Observation, PARAMETERS, Solution, Unknowns, sca
 use super::report::{DrivenSpeeds, Evidence, Report};
 use super::sample::UnitSample;
 use super::settings::DataSettings;
-use super::solver::{Solver, bank_penalty};
 use super::source::RowSource;
 use super::speed::SpeedNoise;
 use crate::filter::RunningMedian;
 use crate::force::ResolvedSample;
 use crate::pipeline::judge::missing;
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
+use crate::pipeline::papers::liu::solver::{Solver, bank_penalty};
 use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use crate::train::{Davis, TrainModel};
 

@@ -3,28 +3,26 @@
 //! # Layout, in the order a sample takes
 //!
 //! - `sample`, `speed`: forces per weight; spikes refused, noise of the speed learned
-//! - `momentum`, `coasting`: samples to observations of the regression in `regression`
+//! - `momentum`: samples to observations of the regression in `regression`, as coasting segments are
 //! - `noise_model`, `noise_bank`: observations to independent rows, and how noisy they are
-//! - `solver`: the recursions
+//! - `solver` and `coasting` of [`super::papers::liu`]: the paper's recursions and data
 //! - `report`: bounds, excitation, status
 //! - `least_squares`: the pipeline around all of it
 //! - `kalman`: the robust filter over every sample, with a least-squares pipeline beside it
 
-mod coasting;
 mod kalman;
 mod least_squares;
 pub(super) mod momentum;
-mod noise_bank;
-mod noise_model;
+pub(super) mod noise_bank;
+pub(super) mod noise_model;
 pub(super) mod regression;
 mod report;
 pub(super) mod sample;
 pub mod settings;
-mod solver;
 mod source;
-mod speed;
+pub(super) mod speed;
 #[cfg(test)]
-mod test_runs;
+pub(super) mod test_runs;
 #[cfg(test)]
 mod tests;
 
@@ -34,7 +32,7 @@ pub use least_squares::ResistanceLeastSquares;
 use dynocar_shared::PipelineKind;
 
 use self::settings::{KalmanSettings, LsSettings, MilsSettings, RlsSettings};
-use self::solver::Solver;
+use super::papers::liu::solver::Solver;
 use super::settings::SettingError;
 use crate::train::TrainModel;
 

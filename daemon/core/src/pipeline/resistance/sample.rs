@@ -116,7 +116,7 @@ pub fn resistance_integral(known: &Davis, regressor_integrals: &[f64]) -> f64 {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(in crate::pipeline) mod tests {
     use super::*;
 
     /// A sample of a train with s = 100 N/kN per m/s².

@@ -39,7 +39,12 @@ impl EkfSettings {
         })
     }
 
-    fn build(
+    /// Builds an estimator of a kind.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn build(
         &self,
         kind: PipelineKind,
         quantity: Quantity,
@@ -61,23 +66,5 @@ impl EkfSettings {
             },
         };
         Ok(self.braking.estimator(kind, quantity, train, Tracker::new(model, 0.0, 0, false)))
-    }
-
-    /// Builds `adhesion_ekf`.
-    ///
-    /// # Errors
-    ///
-    /// When a setting lies outside its range.
-    pub fn build_adhesion(&self, train: &TrainModel) -> Result<Box<dyn Estimator>, SettingError> {
-        self.build(PipelineKind::AdhesionEkf, Quantity::Adhesion, train)
-    }
-
-    /// Builds `brake_ekf`.
-    ///
-    /// # Errors
-    ///
-    /// When a setting lies outside its range.
-    pub fn build_brake(&self, train: &TrainModel) -> Result<Box<dyn Estimator>, SettingError> {
-        self.build(PipelineKind::BrakeEkf, self.reports.quantity(), train)
     }
 }

@@ -5,9 +5,9 @@ use serde::Deserialize;
 
 use super::{BrakeFactor, BrakingSettings};
 use crate::pipeline::Estimator;
-use crate::pipeline::braking::em::{EmModel, EmWindow, KalmanExpectation, ParticleExpectation};
 use crate::pipeline::braking::intake::Quantity;
 use crate::pipeline::braking::motion::MotionNoise;
+use crate::pipeline::papers::xie::{EmModel, EmWindow, KalmanExpectation, ParticleExpectation};
 use crate::pipeline::settings::{SettingError, require, settings};
 use crate::train::TrainModel;
 
@@ -60,7 +60,12 @@ impl EmSettings {
         require(slides, "slide", self.slide as f64, "at least 1 and below window")
     }
 
-    fn build(
+    /// Builds an estimator of a kind.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn build(
         &self,
         kind: PipelineKind,
         quantity: Quantity,
@@ -87,23 +92,5 @@ impl EmSettings {
                 self.braking.estimator(kind, quantity, train, EmWindow::new(model, kalman))
             }
         })
-    }
-
-    /// Builds `adhesion_em`.
-    ///
-    /// # Errors
-    ///
-    /// When a setting lies outside its range.
-    pub fn build_adhesion(&self, train: &TrainModel) -> Result<Box<dyn Estimator>, SettingError> {
-        self.build(PipelineKind::AdhesionEm, Quantity::Adhesion, train)
-    }
-
-    /// Builds `brake_em`.
-    ///
-    /// # Errors
-    ///
-    /// When a setting lies outside its range.
-    pub fn build_brake(&self, train: &TrainModel) -> Result<Box<dyn Estimator>, SettingError> {
-        self.build(PipelineKind::BrakeEm, self.reports.quantity(), train)
     }
 }

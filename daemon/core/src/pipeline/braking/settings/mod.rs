@@ -127,7 +127,7 @@ pub enum BrakeFactor {
 }
 
 impl BrakeFactor {
-    fn quantity(self) -> Quantity {
+    pub(in crate::pipeline) fn quantity(self) -> Quantity {
         match self {
             BrakeFactor::Friction => Quantity::Friction,
             BrakeFactor::Ratio => Quantity::Ratio,

@@ -100,7 +100,12 @@ impl SmootherSettings {
         }
     }
 
-    fn build(
+    /// Builds an estimator of a kind.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn build(
         &self,
         kind: PipelineKind,
         quantity: Quantity,
@@ -120,23 +125,5 @@ impl SmootherSettings {
         let most_moments = (self.lag_s / (0.9 * self.braking.interval_s)).ceil() as usize;
         let tracker = Tracker::new(model, self.lag_s, most_moments, true);
         Ok(self.braking.estimator(kind, quantity, train, tracker))
-    }
-
-    /// Builds `adhesion_smoother`.
-    ///
-    /// # Errors
-    ///
-    /// When a setting lies outside its range.
-    pub fn build_adhesion(&self, train: &TrainModel) -> Result<Box<dyn Estimator>, SettingError> {
-        self.build(PipelineKind::AdhesionSmoother, Quantity::Adhesion, train)
-    }
-
-    /// Builds `brake_smoother`.
-    ///
-    /// # Errors
-    ///
-    /// When a setting lies outside its range.
-    pub fn build_brake(&self, train: &TrainModel) -> Result<Box<dyn Estimator>, SettingError> {
-        self.build(PipelineKind::BrakeSmoother, self.reports.quantity(), train)
     }
 }

@@ -7,13 +7,13 @@ use dynocar_shared::{Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Reas
 use nalgebra::{Matrix4, SVector, Vector4};
 
 use super::descent::MeanSquare;
-use super::line_resistance::LineResistance;
-use super::motion::{Motion, StopWatch};
-use super::section::Section;
-use super::speed_basis::SpeedBasis;
 use super::staged_settings::{MassRegression, StagedDescentSettings};
 use crate::force::ResolvedSample;
 use crate::pipeline::judge::{Case, InputHealth};
+use crate::pipeline::mass::line_resistance::LineResistance;
+use crate::pipeline::mass::motion::{Motion, StopWatch};
+use crate::pipeline::mass::section::Section;
+use crate::pipeline::mass::speed_basis::SpeedBasis;
 use crate::pipeline::motion::SpeedRange;
 use crate::pipeline::output::{write_parameters, write_status};
 use crate::pipeline::settings::SettingError;

@@ -3,14 +3,7 @@
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 use nalgebra::{Matrix3, Vector3};
 
-use super::fit::{FitError, FitSettings, TrajectoryFit, TrajectoryFitter};
-use super::index::DAVIS;
-use super::long_run::LongRunVariance;
-use super::motion::{Motion, MotionTracker};
 use super::newton_settings::{CheckedSettings, FitMethod, TrajectoryNewtonSettings};
-use super::quality::Estimate;
-use super::step::StepRule;
-use super::unexplained::UnexplainedForce;
 use super::window::Window;
 use super::wolfe_newton::{NewtonSettings, RestartSource, Restarts, wolfe_newton};
 use crate::filter::levenberg_marquardt::ParameterBox;
@@ -20,6 +13,13 @@ use crate::pipeline::motion::SpeedRange;
 use crate::pipeline::output::write_parameters;
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::SettingError;
+use crate::pipeline::trajectory::fit::{FitError, FitSettings, TrajectoryFit, TrajectoryFitter};
+use crate::pipeline::trajectory::index::DAVIS;
+use crate::pipeline::trajectory::long_run::LongRunVariance;
+use crate::pipeline::trajectory::motion::{Motion, MotionTracker};
+use crate::pipeline::trajectory::quality::Estimate;
+use crate::pipeline::trajectory::step::StepRule;
+use crate::pipeline::trajectory::unexplained::UnexplainedForce;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 use crate::train::{Davis, TrainModel};
 
@@ -122,7 +122,7 @@ impl TrajectoryNewton {
             FitMethod::LevenbergMarquardt => self.settings.window / 2,
             FitMethod::WolfeNewton => self.settings.window,
         };
-        if self.window.len() < needed {
+        if self.window.count() < needed {
             return Outcome::Used;
         }
         self.fit.speed_noise_mps = Some(self.speed_noise_mps);

@@ -1,6 +1,6 @@
 //! Newton's method with Wolfe steps at the bounds and random restarts: Algorithm 1 of Xia 2023.
 //!
-//! Kept faithful, weaknesses included, as the yardstick for [`super::fit`]: the Hessian is
+//! Kept faithful, weaknesses included, as the yardstick for [`crate::pipeline::trajectory::fit`]: the Hessian is
 //! positive definite at none (cruise) to a fifth (full speed profile) of random parameters, so
 //! that eq. 10 often climbs; v_0 is the first measured speed with its noise; restarts are a
 //! lottery. Where the paper leaves things open:
@@ -15,8 +15,8 @@
 use nalgebra::Vector3;
 
 use super::deviation::{Deviation, deviation};
-use super::step::Step;
 use crate::filter::levenberg_marquardt::ParameterBox;
+use crate::pipeline::trajectory::step::Step;
 use crate::train::Davis;
 
 /// When Algorithm 1 draws new parameters at random.
@@ -212,8 +212,8 @@ fn newton_step(
 
 #[cfg(test)]
 mod tests {
-    use super::super::step::{StepRule, resistance_gain};
     use super::*;
+    use crate::pipeline::trajectory::step::{StepRule, resistance_gain};
 
     const TRUTH: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
 

@@ -3,11 +3,11 @@
 use nalgebra::Vector3;
 use serde::Deserialize;
 
-use super::fit::DavisPrior;
-use super::quality::prior_std;
-use super::step::resistance_gain;
 use crate::filter::levenberg_marquardt::ParameterBox;
 use crate::pipeline::settings::{SettingError, require, settings};
+use crate::pipeline::trajectory::fit::DavisPrior;
+use crate::pipeline::trajectory::quality::prior_std;
+use crate::pipeline::trajectory::step::resistance_gain;
 use crate::train::TrainModel;
 
 /// Speed noise before the first window, in m/s.
@@ -59,7 +59,7 @@ impl TrajectoryNewtonSettings {
     /// # Errors
     ///
     /// When a setting lies outside its range.
-    pub(super) fn checked(&self, train: &TrainModel) -> Result<CheckedSettings, SettingError> {
+    pub(crate) fn checked(&self, train: &TrainModel) -> Result<CheckedSettings, SettingError> {
         self.check_ranges()?;
         let davis = train.resistance;
         let std = prior_std(train, self.prior_relative_std);
@@ -95,7 +95,7 @@ impl TrajectoryNewtonSettings {
 
 /// Settings within their ranges, in the estimator's units.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct CheckedSettings {
+pub(crate) struct CheckedSettings {
     pub method: FitMethod,
     pub window: usize,
     pub interval_m: f64,
