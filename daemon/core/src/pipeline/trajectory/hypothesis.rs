@@ -336,7 +336,7 @@ mod tests {
         }
         assert!((filter.state[SPEED] - 40.0).abs() < 0.05);
         let davis = filter.davis();
-        for _ in 0..20 {
+        for _ in 0..14 {
             filter.predict(StepRule::Time, &hold, 0.2);
             filter.measure(45.0, &model, &outliers());
         }
