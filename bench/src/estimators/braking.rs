@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use dynocar_core::filter::Gaussian;
 use dynocar_core::filter::random::Random;
-use dynocar_core::pipeline::braking::em::{
-    EmModel, EmWindow, Expectation, KalmanExpectation, ParticleExpectation,
-};
 use dynocar_core::pipeline::braking::engine::{Engine, Observation};
 use dynocar_core::pipeline::braking::law::Law;
 use dynocar_core::pipeline::braking::motion::{self, STATES, State, Walk};
 use dynocar_core::pipeline::braking::tracker::{Prior, PriorScale, Tracker, TrackerModel};
+use dynocar_core::pipeline::papers::xie::{
+    EmModel, EmWindow, Expectation, KalmanExpectation, ParticleExpectation,
+};
 use dynocar_shared::Uncertain;
 use nalgebra::RowVector4;
 

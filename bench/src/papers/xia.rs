@@ -2,12 +2,14 @@
 //!
 //! - [`scenario`]: line, driver and truth, seeded
 //! - [`bound`]: the Cramér-Rao bound from the scenario's own numerical Jacobian
-//! - [`offline`]: Table 3 (without noise) and Figure 4 (with noise)
+//! - [`offline`]: Table 3 (without noise) and Figure 4 (with noise); `ratio_posterior` is the fit with
+//!   an unknown disturbance
 //! - [`online`]: Table 4 (coefficients that switch on the way)
 
 pub mod bound;
 pub mod offline;
 pub mod online;
+mod ratio_posterior;
 pub mod scenario;
 
 use super::row::Row;

@@ -2,9 +2,8 @@
 //! learn them.
 
 use dynocar_core::pipeline::mass::line_resistance::LineResistance;
-use dynocar_core::pipeline::mass::{
-    MassKalman, MassKalmanSettings, MassRegression, StagedDescent, StagedDescentSettings,
-};
+use dynocar_core::pipeline::mass::{MassKalman, MassKalmanSettings};
+use dynocar_core::pipeline::papers::wang::{MassRegression, StagedDescent, StagedDescentSettings};
 
 use super::driver::{Driver, LimitDriver};
 use super::line::{CURVE_RADIUS_M, STATIONS_M};

@@ -3,9 +3,8 @@
 use dynocar_core::pipeline::Estimator;
 use dynocar_core::pipeline::mass::line_resistance::LineResistance;
 use dynocar_core::pipeline::mass::section::Section;
-use dynocar_core::pipeline::mass::{
-    JointLeastSquares, JointLeastSquaresSettings, StagedDescent, StagedDescentSettings,
-};
+use dynocar_core::pipeline::mass::{JointLeastSquares, JointLeastSquaresSettings};
+use dynocar_core::pipeline::papers::wang::{StagedDescent, StagedDescentSettings};
 use dynocar_core::train::Davis;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

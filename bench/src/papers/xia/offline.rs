@@ -4,19 +4,20 @@ use dynocar_core::filter::levenberg_marquardt::{
     LeastSquares, Linearisation, ParameterBox, SolverSettings, minimise,
 };
 use dynocar_core::filter::triangular::{TriangularAccumulator, TriangularSystem};
-use dynocar_core::pipeline::trajectory::fit::{
-    Disturbance, FitSettings, Stretch, TrajectoryFit, TrajectoryFitter,
-};
-use dynocar_core::pipeline::trajectory::step::StepRule;
-use dynocar_core::pipeline::trajectory::wolfe_newton::{
+use dynocar_core::pipeline::papers::xia::wolfe_newton::{
     NewtonResult, NewtonSettings, RestartSource, Restarts, wolfe_newton,
 };
+use dynocar_core::pipeline::trajectory::fit::{
+    FitSettings, Stretch, TrajectoryFit, TrajectoryFitter,
+};
+use dynocar_core::pipeline::trajectory::step::StepRule;
 use dynocar_core::train::Davis;
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::bound::{davis_covariance, disturbed_davis_covariance};
+use super::ratio_posterior::likeliest_fit;
 use super::row;
 use super::scenario::{CASES, Profile, Run, all_speeds_mps, drive, fast_speeds_mps};
 use crate::papers::row::Row;
@@ -267,15 +268,11 @@ fn disturbed_row(seeds: Seeds) -> Row {
         let run = cruise.disturbed(&truth, &mut random);
         let speeds = run.measured_mps(0, &mut random);
         let stretches = [Stretch { steps: &run.steps, speeds_mps: &speeds }];
-        for (disturbance, score) in
-            [(Disturbance::None, &mut output_error), (Disturbance::Estimated, &mut ours)]
-        {
-            let settings = FitSettings {
-                bounds: anywhere(),
-                disturbance,
-                ..FitSettings::new(StepRule::Distance)
-            };
-            if let Ok(found) = TrajectoryFitter::default().fit(&stretches, None, &settings) {
+        let settings = FitSettings { bounds: anywhere(), ..FitSettings::new(StepRule::Distance) };
+        let exact = TrajectoryFitter::default().fit(&stretches, None, &settings);
+        let estimated = likeliest_fit(&stretches, &settings);
+        for (found, score) in [(exact, &mut output_error), (estimated, &mut ours)] {
+            if let Ok(found) = found {
                 score.take_resistance((&found.davis, &found.covariance), &truth, &fast);
                 score.take_bound(&bound, &fast);
             }

@@ -5,14 +5,14 @@
 //! most. The error with noise is taken from km 64 on, but for the 8 km after the switch at km 82.
 
 use dynocar_core::filter::levenberg_marquardt::ParameterBox;
+use dynocar_core::pipeline::papers::xia::wolfe_newton::{
+    NewtonSettings, RestartSource, wolfe_newton,
+};
 use dynocar_core::pipeline::trajectory::bank::JumpModel;
 use dynocar_core::pipeline::trajectory::hypothesis::{Hypothesis, OutlierModel};
 use dynocar_core::pipeline::trajectory::noise::{LearnedNoise, NoiseModel};
 use dynocar_core::pipeline::trajectory::online::{OnlineFilter, OnlineSettings};
 use dynocar_core::pipeline::trajectory::step::{StepRule, resistance_gain};
-use dynocar_core::pipeline::trajectory::wolfe_newton::{
-    NewtonSettings, RestartSource, wolfe_newton,
-};
 use dynocar_core::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 use rand::SeedableRng;

@@ -82,6 +82,7 @@ impl<const N: usize> SquareRootInformation<N> {
     }
 
     /// The information matrix: the sum of features outer products, penalty included.
+    #[cfg(test)]
     pub fn information(&self) -> SMatrix<f64, N, N> {
         self.system.factor.tr_mul(&self.system.factor)
     }

@@ -14,6 +14,7 @@
 //! - [`fixed_lag`]: what later measurements say of an earlier state, without a backward pass
 //! - [`adjoint`]: fixed-interval smoothing without an inverse (Bryson and Frazier)
 //! - [`particle`], [`random`]: particle filter, marginal particle smoother and their seeded generator
+//! - [`mixture`]: hypotheses side by side
 //! - [`lanes`]: sums and powers over slices
 
 pub mod adjoint;
@@ -27,6 +28,7 @@ pub mod levenberg_marquardt;
 mod line;
 mod median;
 mod mils;
+pub mod mixture;
 pub mod particle;
 pub mod random;
 mod rank_one;

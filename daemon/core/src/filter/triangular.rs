@@ -27,11 +27,6 @@ impl<const C: usize> Default for TriangularAccumulator<C> {
 }
 
 impl<const C: usize> TriangularAccumulator<C> {
-    /// Forgets all rows.
-    pub fn clear(&mut self) {
-        *self = TriangularAccumulator::default();
-    }
-
     /// Takes in a row.
     ///
     /// # Real-time
@@ -98,11 +93,6 @@ pub struct TriangularSystem<const N: usize> {
 }
 
 impl<const N: usize> TriangularSystem<N> {
-    /// A system without rows.
-    pub fn empty() -> Self {
-        TriangularSystem { factor: SMatrix::zeros(), residual: SVector::zeros() }
-    }
-
     /// The last `N` columns before the residual of gathered rows of `C` columns, with the
     /// columns before them eliminated.
     ///
@@ -226,7 +216,8 @@ mod tests {
     fn rows_appended_one_by_one_give_the_same_minimiser() {
         let rows = random_rows(20);
         let mut gathered = TriangularAccumulator::<4>::default();
-        let mut appended = TriangularSystem::<3>::empty();
+        let mut appended =
+            TriangularSystem::<3> { factor: SMatrix::zeros(), residual: SVector::zeros() };
         for row in &rows {
             gathered.push(row);
             appended.append(SVector::<f64, 3>::new(row[0], row[1], row[2]), row[3]);

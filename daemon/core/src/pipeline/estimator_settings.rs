@@ -8,19 +8,18 @@ use dynocar_shared::PipelineKind;
 use serde::Deserialize;
 
 use super::Estimator;
+use super::braking::intake::Quantity;
 use super::braking::settings::{EkfSettings, EmSettings, LawSettings, SmootherSettings};
 use super::echo::Echo;
-use super::mass::{
-    JointLeastSquares, JointLeastSquaresSettings, MassKalman, MassKalmanSettings, StagedDescent,
-    StagedDescentSettings,
-};
+use super::mass::{JointLeastSquares, JointLeastSquaresSettings, MassKalman, MassKalmanSettings};
 use super::monitor::{MonitorSettings, ResidualMonitor};
+use super::papers::wang::{StagedDescent, StagedDescentSettings};
+use super::papers::xia::newton::TrajectoryNewton;
+use super::papers::xia::newton_settings::TrajectoryNewtonSettings;
 use super::resistance;
 use super::resistance::settings::{KalmanSettings, LsSettings, MilsSettings, RlsSettings};
 use super::settings::SettingError;
 use super::trajectory::kalman::TrajectoryKalmanSettings;
-use super::trajectory::newton::TrajectoryNewton;
-use super::trajectory::newton_settings::TrajectoryNewtonSettings;
 use crate::train::TrainModel;
 
 /// The settings of a kind without settings.
@@ -119,17 +118,23 @@ estimator_kinds! {
     ResidualMonitor(MonitorSettings) = ResidualMonitor,
         |s, t| boxed(ResidualMonitor::new(*s, t));
     /// Adhesion by sliding-window EM.
-    AdhesionEm(EmSettings) = AdhesionEm, |s, t| s.build_adhesion(t);
+    AdhesionEm(EmSettings) = AdhesionEm,
+        |s, t| s.build(PipelineKind::AdhesionEm, Quantity::Adhesion, t);
     /// Adhesion by extended Kalman filter.
-    AdhesionEkf(EkfSettings) = AdhesionEkf, |s, t| s.build_adhesion(t);
+    AdhesionEkf(EkfSettings) = AdhesionEkf,
+        |s, t| s.build(PipelineKind::AdhesionEkf, Quantity::Adhesion, t);
     /// Adhesion by fixed-lag smoothing.
-    AdhesionSmoother(SmootherSettings) = AdhesionSmoother, |s, t| s.build_adhesion(t);
+    AdhesionSmoother(SmootherSettings) = AdhesionSmoother,
+        |s, t| s.build(PipelineKind::AdhesionSmoother, Quantity::Adhesion, t);
     /// Adhesion as the scale of a known law.
     AdhesionLaw(LawSettings) = AdhesionLaw, |s, t| s.build_adhesion(t);
     /// Disc friction or braking ratio by sliding-window EM.
-    BrakeEm(EmSettings) = BrakeEm, |s, t| s.build_brake(t);
+    BrakeEm(EmSettings) = BrakeEm,
+        |s, t| s.build(PipelineKind::BrakeEm, s.reports.quantity(), t);
     /// Disc friction or braking ratio by extended Kalman filter.
-    BrakeEkf(EkfSettings) = BrakeEkf, |s, t| s.build_brake(t);
+    BrakeEkf(EkfSettings) = BrakeEkf,
+        |s, t| s.build(PipelineKind::BrakeEkf, s.reports.quantity(), t);
     /// Disc friction or braking ratio by fixed-lag smoothing.
-    BrakeSmoother(SmootherSettings) = BrakeSmoother, |s, t| s.build_brake(t);
+    BrakeSmoother(SmootherSettings) = BrakeSmoother,
+        |s, t| s.build(PipelineKind::BrakeSmoother, s.reports.quantity(), t);
 }

@@ -7,13 +7,8 @@ use dynocar_shared::snapshot::{COVARIANCE_ENTRIES, PARAMETERS_MAX, packed_index}
 use dynocar_shared::{Parameter, ParameterSnapshot, Status};
 use nalgebra::{Cholesky, DMatrix, SMatrix, SVector};
 
+use super::judge::{are_alike, are_too_large};
 use super::output::contract_unit;
-
-/// Mean square of the normalised innovations above which an estimate is not kept.
-const MEAN_SQUARE_MAX: f64 = 2.0;
-/// Lag-1 covariance of the normalised innovations above which an estimate is not kept; small
-/// innovations may be alike, as with a perfect sensor.
-const COVARIANCE_MAX: f64 = 0.4;
 
 /// A validated estimate with its covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,7 +86,10 @@ impl KeptEstimate {
         }
         let mean_square = snapshot.innovation_mean_square;
         let correlation = snapshot.innovation_correlation;
-        if !(mean_square <= MEAN_SQUARE_MAX && correlation * mean_square <= COVARIANCE_MAX) {
+        if !(mean_square + correlation).is_finite()
+            || are_too_large(mean_square)
+            || are_alike(mean_square, correlation)
+        {
             return Err(NotKept::NotWhite { mean_square, correlation });
         }
         let count = (snapshot.parameter_count as usize).min(PARAMETERS_MAX);

@@ -7,12 +7,13 @@ pub mod braking;
 mod echo;
 mod estimator;
 mod estimator_settings;
-mod innovation;
+pub mod judge;
 mod kept;
 pub mod mass;
 pub mod monitor;
 pub mod motion;
 pub mod output;
+pub mod papers;
 pub mod quantities;
 pub mod resistance;
 pub mod sample_gate;
@@ -22,7 +23,7 @@ pub mod trajectory;
 pub use echo::Echo;
 pub use estimator::{Estimator, Outcome};
 pub use estimator_settings::EstimatorSettings;
-pub use innovation::InnovationMonitor;
+pub use judge::InnovationMonitor;
 pub use kept::{KeptEstimate, NotKept};
 pub use settings::SettingError;
 
@@ -148,7 +149,7 @@ impl Pipeline {
                 snapshot.status = Status::Degraded as u32;
             }
         } else if is_estimated && self.refused_share > REFUSED_SHARE_MAX {
-            output::write_status(&mut self.snapshot, Status::Degraded, Reason::BadInput);
+            output::write_status(&mut self.snapshot, (Status::Degraded, Reason::BadInput));
         }
         &self.snapshot
     }

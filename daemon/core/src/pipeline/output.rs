@@ -36,7 +36,7 @@ pub fn write_parameters<const N: usize>(
 }
 
 /// Writes status and reason.
-pub fn write_status(snapshot: &mut ParameterSnapshot, status: Status, reason: Reason) {
+pub fn write_status(snapshot: &mut ParameterSnapshot, (status, reason): (Status, Reason)) {
     snapshot.status = status as u32;
     snapshot.reason = reason as u32;
 }

@@ -13,17 +13,13 @@ mod gated;
 
 pub use gated::Gated;
 
-use dynocar_shared::{ParameterSnapshot, Reason, RejectionReason, Status};
+use dynocar_shared::{Reason, RejectionReason};
 
-use super::output::write_status;
+use super::motion::{BRIDGED_MAX_S, MOVING_MPS};
 use crate::force::ResolvedSample;
 
 /// So many samples away from the old level make a new one.
 const AGREEING: usize = 3;
-/// The longest time in s between two samples that steps are integrated over, as in validation.
-const BRIDGED_MAX_S: f64 = 2.5;
-/// A speed in m/s at and below which forces hold the train and do not move it.
-const STANDSTILL_MPS: f64 = 1.0;
 /// A change in N/kN that is none: gradients change by as much within a sample.
 const TOLERANCE_N_PER_KN: f64 = 1.0;
 /// A change that counts as none, as a share of the force: sensors of force are good to a few %.
@@ -70,7 +66,7 @@ struct Reading {
 impl Reading {
     /// `None` for a sample that no estimator steps to.
     fn of(sample: &ResolvedSample) -> Option<Self> {
-        let is_moving = sample.speed_mps > STANDSTILL_MPS && !sample.is_sliding;
+        let is_moving = sample.speed_mps > MOVING_MPS && !sample.is_sliding;
         let driving_n_per_kn = sample.driving_force_n()? / sample.weight_kn;
         (is_moving && driving_n_per_kn.is_finite()).then_some(Reading {
             stretch: sample.stretch,
@@ -164,11 +160,9 @@ impl SampleGate {
         self.withdrawn_share > WITHDRAWN_SHARE_MAX
     }
 
-    /// Marks an estimate as degraded while the forces are in doubt.
-    pub fn qualify(&self, snapshot: &mut ParameterSnapshot) {
-        if self.is_in_doubt() && snapshot.status() == Status::Estimated {
-            write_status(snapshot, Status::Degraded, Reason::BadInput);
-        }
+    /// What is wrong with the forces, if anything.
+    pub fn complaint(&self) -> Option<Reason> {
+        self.is_in_doubt().then_some(Reason::BadInput)
     }
 
     fn forget(&mut self) {

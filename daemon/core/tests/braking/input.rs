@@ -202,7 +202,7 @@ fn a_corrected_position_restarts_the_estimate_and_is_counted() {
     }
     let snapshot = after(&mut pipeline(&smoother()), &moments);
     assert_eq!(snapshot.generation, 1);
-    assert_eq!(snapshot.rejected(RejectionReason::Outlier), 2, "the third one is believed");
+    assert_eq!(snapshot.rejected(RejectionReason::Outlier), 4, "the fifth one is believed");
     assert_eq!(snapshot.status(), Status::Estimated);
 }
 

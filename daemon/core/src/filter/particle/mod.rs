@@ -226,11 +226,6 @@ impl<const D: usize> ParticleSmoother<D> {
         Ok(())
     }
 
-    /// Number of particles.
-    pub fn particles(&self) -> usize {
-        self.particles
-    }
-
     /// Mean and covariance of the particles of a step before its measurement was weighed in;
     /// `None` unless the last run reached the step.
     pub fn predicted_moments(&self, step: usize) -> Option<([f64; D], [[f64; D]; D])> {
@@ -239,6 +234,7 @@ impl<const D: usize> ParticleSmoother<D> {
 
     /// Mean and covariance of the particles of a step given every measurement; valid after
     /// [`ParticleSmoother::smooth`], `None` unless the last run reached the step.
+    #[cfg(test)]
     pub fn smoothed_moments(&self, step: usize) -> Option<([f64; D], [[f64; D]; D])> {
         (step < self.steps).then(|| self.moments(step, |place| self.smoothed[place]))
     }

@@ -7,6 +7,7 @@ use super::intake::{BrakingIntake, Intake, Quantity};
 use super::motion::StepInputs;
 use super::report::{self, Circumstances, ReportSettings};
 use crate::force::ResolvedSample;
+use crate::pipeline::motion::SpeedRange;
 use crate::pipeline::output::write_innovations;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 
@@ -32,7 +33,7 @@ pub struct BrakingEstimator<E> {
     updated_ns: i64,
     now_ns: i64,
     resets: u64,
-    speed_mps: Option<(f64, f64)>,
+    speeds: SpeedRange,
 }
 
 impl<E: Engine> BrakingEstimator<E> {
@@ -59,7 +60,7 @@ impl<E: Engine> BrakingEstimator<E> {
             updated_ns: 0,
             now_ns: 0,
             resets: 0,
-            speed_mps: None,
+            speeds: SpeedRange::default(),
         }
     }
 
@@ -101,15 +102,14 @@ impl<E: Engine> BrakingEstimator<E> {
         let held_counts = self.held.is_some_and(|held| self.report.counts(&held));
         if counts || self.is_current || !held_counts {
             if !self.is_current {
-                self.speed_mps = None;
+                self.speeds = SpeedRange::default();
             }
             self.held = Some(estimate);
             self.is_current = counts;
             self.updated_ns = self.now_ns;
             self.reason = Reason::None;
         }
-        let (low, high) = self.speed_mps.unwrap_or((f64::INFINITY, 0.0));
-        self.speed_mps = Some((low.min(speed_mps), high.max(speed_mps)));
+        self.speeds.push(speed_mps);
     }
 
     fn is_stale(&self) -> bool {
@@ -151,7 +151,7 @@ impl<E: Engine> Estimator for BrakingEstimator<E> {
         let circumstances = Circumstances {
             reason: self.reason,
             is_stale: self.is_stale(),
-            innovations: (self.innovations.mean_square(), self.innovations.effective_count()),
+            are_innovations_too_large: self.innovations.are_too_large(),
         };
         report::write(snapshot, self.quantity, &self.report, self.held.as_ref(), &circumstances);
         write_innovations(snapshot, &self.innovations);
@@ -159,7 +159,6 @@ impl<E: Engine> Estimator for BrakingEstimator<E> {
         snapshot.excited = (1u32 << snapshot.parameter_count) - 1;
         let is_missing = self.held.is_none() || circumstances.is_stale;
         snapshot.missing_manoeuvres = if is_missing { Manoeuvre::Brake.bit() } else { 0 };
-        let (low, high) = self.speed_mps.unwrap_or((0.0, 0.0));
-        (snapshot.speed_min_mps, snapshot.speed_max_mps) = (low, high);
+        self.speeds.write(snapshot);
     }
 }

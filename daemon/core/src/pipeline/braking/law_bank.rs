@@ -6,13 +6,14 @@
 //! since the rail behind the tunnel portal says nothing of the rail inside.
 
 use dynocar_shared::Uncertain;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::Vector1;
 
 use super::engine::{Engine, EngineError, Estimate, Observation, Step};
 use super::law::Law;
 use super::motion::{STATES, State, StepInputs};
 use super::tracker::{TrackerModel, measure};
 use crate::filter::Gaussian;
+use crate::filter::mixture::{Mixture, likeliest, to_shares};
 
 const SPEED: usize = State::Speed as usize;
 const SCALE: usize = State::Scale as usize;
@@ -38,6 +39,8 @@ struct Hypothesis {
 #[derive(Clone, Debug)]
 pub struct LawBank {
     hypotheses: Vec<Hypothesis>,
+    /// Their probabilities.
+    shares: Vec<f64>,
     /// Rate in 1/s at which one hypothesis gives way to another.
     change_rate_per_s: f64,
     demand: f64,
@@ -52,10 +55,8 @@ impl LawBank {
     /// When there is no hypothesis.
     pub fn new(models: Vec<TrackerModel>, change_rate_per_s: f64) -> Self {
         assert!(!models.is_empty(), "a bank holds at least one law");
-        let empty = Gaussian {
-            mean: SVector::zeros(),
-            covariance: SMatrix::<f64, STATES, STATES>::zeros(),
-        };
+        let empty = Mixture::<STATES>::default().belief;
+        let shares = vec![0.0; models.len()];
         let hypotheses = models
             .into_iter()
             .map(|model| Hypothesis {
@@ -67,7 +68,7 @@ impl LawBank {
                 normalised: 0.0,
             })
             .collect();
-        LawBank { hypotheses, change_rate_per_s, demand: 0.0, is_started: false }
+        LawBank { hypotheses, shares, change_rate_per_s, demand: 0.0, is_started: false }
     }
 
     /// Probability of a change within a step to one certain other hypothesis.
@@ -86,74 +87,45 @@ impl LawBank {
             let weight_of = |from: usize, hypothesis: &Hypothesis| {
                 hypothesis.probability * if from == to { stay } else { switch }
             };
-            let total: f64 =
-                self.hypotheses.iter().enumerate().map(|(from, h)| weight_of(from, h)).sum();
-            let total = total.max(f64::MIN_POSITIVE);
-            let reopened = |from: usize, state: &Gaussian<STATES>| {
-                if from == to { *state } else { reopen(state, prior) }
-            };
-            let mut mean = SVector::<f64, STATES>::zeros();
+            let mut mixture = Mixture::default();
             for (from, hypothesis) in self.hypotheses.iter().enumerate() {
-                mean +=
-                    reopened(from, &hypothesis.state).mean * (weight_of(from, hypothesis) / total);
-            }
-            let mut covariance = SMatrix::<f64, STATES, STATES>::zeros();
-            for (from, hypothesis) in self.hypotheses.iter().enumerate() {
-                let state = reopened(from, &hypothesis.state);
-                let off = state.mean - mean;
-                let spread = state.covariance + off * off.transpose();
-                covariance += spread * (weight_of(from, hypothesis) / total);
+                let own = &hypothesis.state;
+                let state = if from == to { *own } else { reopen(own, prior) };
+                mixture.add(weight_of(from, hypothesis), &state.mean, &state.covariance);
             }
             let target = &mut self.hypotheses[to];
-            target.mixed = Gaussian { mean, covariance };
+            target.mixed = mixture.belief;
             // The prior weight of the hypothesis, before its likelihood.
-            target.log_likelihood = total.ln();
+            target.log_likelihood = mixture.weight.max(f64::MIN_POSITIVE).ln();
         }
     }
 
     /// Probabilities from the log-likelihoods; false when they cannot be normalised.
     fn weigh(&mut self) -> bool {
-        let greatest = self
-            .hypotheses
-            .iter()
-            .map(|hypothesis| hypothesis.log_likelihood)
-            .fold(f64::NEG_INFINITY, f64::max);
-        let mut sum = 0.0;
-        for hypothesis in &mut self.hypotheses {
-            hypothesis.probability = (hypothesis.log_likelihood - greatest).exp();
-            sum += hypothesis.probability;
+        for (share, hypothesis) in self.shares.iter_mut().zip(&self.hypotheses) {
+            *share = hypothesis.log_likelihood;
         }
-        for hypothesis in &mut self.hypotheses {
-            hypothesis.probability /= sum;
+        let is_sound = to_shares(&mut self.shares);
+        for (share, hypothesis) in self.shares.iter().zip(&mut self.hypotheses) {
+            hypothesis.probability = *share;
         }
-        sum.is_finite() && sum > 0.0
+        is_sound
     }
 
     fn most_probable(&self) -> &Hypothesis {
-        let mut best = &self.hypotheses[0];
-        for hypothesis in &self.hypotheses[1..] {
-            if hypothesis.probability > best.probability {
-                best = hypothesis;
-            }
-        }
-        best
+        &self.hypotheses[likeliest(0, self.shares.iter().copied())]
     }
 
     /// Mean and spread of the coefficient over the hypotheses that `counts` admits.
     fn mixture(&self, counts: impl Fn(&Law) -> bool) -> Option<(Uncertain, f64)> {
-        let (mut weight, mut first, mut second) = (0.0, 0.0, 0.0);
+        let mut mixture = Mixture::<1>::default();
         for hypothesis in self.hypotheses.iter().filter(|h| counts(&h.model.law)) {
             let own = hypothesis.model.estimate(&hypothesis.state, self.demand).coefficient;
-            weight += hypothesis.probability;
-            first += hypothesis.probability * own.value;
-            second += hypothesis.probability * (own.std * own.std + own.value * own.value);
+            let (mean, variance) = (Vector1::new(own.value), Vector1::new(own.std * own.std));
+            mixture.add(hypothesis.probability, &mean, &variance);
         }
-        if weight <= 0.0 {
-            return None;
-        }
-        let value = first / weight;
-        let variance = (second / weight - value * value).max(0.0);
-        Some((Uncertain::new(value, variance.sqrt()), weight))
+        let coefficient = Uncertain::new(mixture.belief.mean[0], mixture.belief.std(0));
+        (mixture.weight > 0.0).then_some((coefficient, mixture.weight))
     }
 }
 

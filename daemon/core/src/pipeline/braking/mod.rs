@@ -6,13 +6,12 @@
 //! - [`gear`], [`law`], [`motion`]: the braking train
 //! - [`intake`]: from the train's samples to observations and steps of a braking
 //! - [`engine`]: what the estimators have in common
-//! - [`em`]: the papers' sliding-window expectation maximisation
+//! - [`super::papers::xie`]: the papers' sliding-window expectation maximisation
 //! - [`tracker`]: the papers' extended Kalman filter, and our fixed-lag smoother
 //! - [`law_bank`]: known laws, scaled and weighed by evidence
 //! - [`report`], [`estimator`]: from an engine to a snapshot
 //! - [`settings`]: the pipelines by name
 
-pub mod em;
 pub mod engine;
 pub mod estimator;
 pub mod gear;

@@ -5,6 +5,7 @@ use nalgebra::{Matrix1, Matrix2, SVector};
 
 use super::engine::Estimate;
 use super::intake::Quantity;
+use crate::pipeline::judge::Case;
 use crate::pipeline::output::{write_parameters, write_status};
 
 /// When an estimate counts.
@@ -29,11 +30,6 @@ impl ReportSettings {
 /// Standard deviations by which the achieved brake force must lie below the demanded one before
 /// the rail counts as the smaller one.
 const RAIL_LIMIT_SIGMAS: f64 = 2.0;
-/// Mean square of the normalised innovations beyond which the model does not hold.
-const INNOVATIONS_MAX: f64 = 4.0;
-/// Innovations before their mean square is judged.
-const INNOVATIONS_JUDGED: f64 = 20.0;
-
 /// What is known beside the estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Circumstances {
@@ -41,8 +37,8 @@ pub struct Circumstances {
     pub reason: Reason,
     /// True when the last braking lies too far back.
     pub is_stale: bool,
-    /// Mean square of the normalised innovations and the number behind it.
-    pub innovations: (f64, f64),
+    /// True when the innovations are larger than the filter says.
+    pub are_innovations_too_large: bool,
 }
 
 /// True when the rail carries less than the brake would need, so that the coefficient is that
@@ -70,7 +66,7 @@ pub fn write(
 ) {
     let Some(estimate) = estimate else {
         snapshot.parameter_count = 0;
-        write_status(snapshot, Status::Unestimated, circumstances.reason);
+        write_status(snapshot, (Status::Unestimated, circumstances.reason));
         return;
     };
     let is_number =
@@ -82,8 +78,8 @@ pub fn write(
         Quantity::Ratio => Parameter::BrakingRatio,
     };
     write_values(snapshot, parameter, settings.has_law_scale && is_number, estimate);
-    let (status, reason) = judge(quantity, settings, is_number, estimate, circumstances);
-    write_status(snapshot, status, reason);
+    let case = case(quantity, settings, is_number, estimate, circumstances);
+    write_status(snapshot, case.verdict());
 }
 
 fn write_values(
@@ -112,30 +108,32 @@ fn write_values(
     }
 }
 
-fn judge(
+fn case(
     quantity: Quantity,
     settings: &ReportSettings,
     is_number: bool,
     estimate: &Estimate,
     circumstances: &Circumstances,
-) -> (Status, Reason) {
-    let coefficient = estimate.coefficient;
-    let (mean_square, count) = circumstances.innovations;
-    if !settings.counts(estimate) {
-        (Status::Unestimated, Reason::TooFewSamples)
-    } else if coefficient.value <= 0.0 {
-        (Status::Invalid, Reason::AtBound)
-    } else if count >= INNOVATIONS_JUDGED && mean_square > INNOVATIONS_MAX {
-        (Status::Degraded, Reason::InnovationsTooLarge)
-    } else if circumstances.is_stale {
-        (Status::Degraded, Reason::EstimateStale)
-    } else if !is_number {
-        (Status::Degraded, Reason::OnlyLowerBound)
-    } else if quantity != Quantity::Adhesion {
+) -> Case {
+    let counts = settings.counts(estimate);
+    let is_impossible = counts && estimate.coefficient.value <= 0.0;
+    let contradictions = [
+        (circumstances.are_innovations_too_large, Reason::InnovationsTooLarge),
+        (circumstances.is_stale, Reason::EstimateStale),
+        (!is_number, Reason::OnlyLowerBound),
+    ];
+    Case {
+        fault: is_impossible.then_some((Status::Invalid, Reason::AtBound)),
+        input: None,
+        is_ready: counts,
+        is_known: true,
+        lacking: Status::Unestimated,
+        contradiction: contradictions.into_iter().find(|(is_so, _)| *is_so).map(|(_, it)| it),
         // Only friction times ratio acts on the train, and the other factor is held as declared:
         // who reckons with both has the force that acts.
-        (Status::Estimated, Reason::NotIdentifiable)
-    } else {
-        (Status::Estimated, Reason::None)
+        remark: match quantity {
+            Quantity::Adhesion => Reason::None,
+            Quantity::Friction | Quantity::Ratio => Reason::NotIdentifiable,
+        },
     }
 }

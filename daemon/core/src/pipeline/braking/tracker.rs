@@ -11,6 +11,7 @@ use super::law::Law;
 use super::motion::{self, MotionNoise, STATES, State, StepInputs, Walk};
 use crate::filter::fixed_lag::FixedLagSmoother;
 use crate::filter::{Gaussian, NotPositiveDefinite};
+use crate::pipeline::motion::OutlierRow;
 
 const DISTANCE: usize = State::Distance as usize;
 const SPEED: usize = State::Speed as usize;
@@ -127,8 +128,6 @@ struct Moment {
 
 /// An innovation beyond so many standard deviations is refused.
 const OUTLIER_GATE: f64 = 5.0;
-/// After so many refusals in a row the motion has changed.
-const OUTLIERS_BEFORE_RESTART: u32 = 3;
 /// Forgetting factors of the mean innovations that tell of a change: one for a sudden one, one
 /// for a small one.
 const CHANGE_FORGETTING: [f64; 2] = [0.8, 0.95];
@@ -162,7 +161,7 @@ pub struct Tracker {
     lag_s: f64,
     /// Time in s since the start.
     time_s: f64,
-    outliers_in_a_row: u32,
+    outliers: OutlierRow,
     /// One for each measured quantity.
     changes: [ChangeDetector; 2],
 }
@@ -178,7 +177,7 @@ impl Tracker {
             detects_changes,
             lag_s,
             time_s: 0.0,
-            outliers_in_a_row: 0,
+            outliers: OutlierRow::default(),
             changes: Default::default(),
         }
     }
@@ -203,7 +202,7 @@ impl Tracker {
         };
         self.smoother.freeze();
         self.state = Some(self.model.initial(&Observation { speed_mps, ..*observed }));
-        self.outliers_in_a_row = 0;
+        self.outliers = OutlierRow::default();
         self.changes = Default::default();
         self.remember(observed.demand);
     }
@@ -242,8 +241,7 @@ impl Engine for Tracker {
                 continue;
             }
             if is_outlier {
-                self.outliers_in_a_row += 1;
-                if self.outliers_in_a_row >= OUTLIERS_BEFORE_RESTART {
+                if self.outliers.push(true) {
                     self.restart(observed);
                     return Ok(Step::Restarted);
                 }
@@ -256,7 +254,7 @@ impl Engine for Tracker {
             is_change |= changes.push(normalised);
             first_innovation.get_or_insert(normalised);
         }
-        self.outliers_in_a_row = 0;
+        self.outliers.push(false);
         let value = state.mean[SCALE];
         if !value.is_finite() {
             return Err(EngineError::NotFinite { value });

@@ -7,12 +7,14 @@
 //! Kirubarajan 2001, section 11.6.2).
 
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 use super::bias_model::BiasModel;
 use super::line_resistance::LineResistance;
 use super::motion::Motion;
+use crate::filter::mixture::{Mixture, likeliest, to_shares};
 use crate::filter::{Gaussian, NotPositiveDefinite};
+use crate::pipeline::motion::{OutlierRow, Trust};
 use crate::train::TrainModel;
 
 /// Place of the speed in m/s in a filter's state.
@@ -27,13 +29,6 @@ pub const MODELS: usize = 8;
 
 /// Logarithm of the least weight against the best: any behaviour can come back.
 const LOG_WEIGHT_MIN: f64 = -30.0;
-/// A normalised innovation beyond which a filter does not believe the speed.
-const OUTLIER: f64 = 8.0;
-/// A normalised innovation beyond which a speed counts less (Huber 1964).
-const HUBER: f64 = 3.0;
-/// After so many outliers in a row the measured speed is believed and the filter's is not.
-const OUTLIERS_BEFORE_RESTART: u32 = 5;
-
 /// What turns forces into acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dynamics {
@@ -86,31 +81,6 @@ pub struct Moments {
     pub correlation: f64,
 }
 
-/// What the filter with the most evidence made of a measured speed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Measured {
-    /// Its innovation over the predicted standard deviation.
-    pub normalised: f64,
-    /// Weight of the measurement against a full one; 0 for an outlier, which was left out.
-    pub weight: f64,
-}
-
-impl Measured {
-    /// Judges a normalised innovation (Huber 1964).
-    fn of(normalised: f64) -> Self {
-        let size = normalised.abs();
-        let weight = if size > OUTLIER { 0.0 } else { (HUBER / size).min(1.0) };
-        Measured { normalised, weight }
-    }
-
-    /// Minus the logarithm of its likelihood, up to that of the spread: Huber's, and bounded, so
-    /// that no single speed outweighs all before it.
-    fn surprise(&self) -> f64 {
-        let size = self.normalised.abs().min(OUTLIER);
-        if size <= HUBER { 0.5 * size * size } else { HUBER * (size - 0.5 * HUBER) }
-    }
-}
-
 /// The filters with the evidence for each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BiasBank {
@@ -118,7 +88,7 @@ pub struct BiasBank {
     models: [BiasModel; MODELS],
     filters: [Gaussian<3>; MODELS],
     /// Outliers in a row under each behaviour.
-    outliers: [u32; MODELS],
+    outliers: [OutlierRow; MODELS],
     log_weights: [f64; MODELS],
     forgetting: f64,
     /// Share of each bias that is left after a step, and the step in s that it holds for.
@@ -145,7 +115,7 @@ impl BiasBank {
             dynamics,
             models,
             filters,
-            outliers: [0; MODELS],
+            outliers: Default::default(),
             log_weights,
             forgetting: 1.0 - 1.0 / memory,
             keeps: ([1.0; MODELS], 0.0),
@@ -154,7 +124,7 @@ impl BiasBank {
 
     /// Starts anew at a measured speed; mass and bias stay as they are.
     pub fn restart_speed(&mut self, speed_mps: f64, noise_variance: f64) {
-        self.outliers = [0; MODELS];
+        self.outliers = Default::default();
         for filter in &mut self.filters {
             filter.replace(SPEED, speed_mps, noise_variance);
         }
@@ -206,10 +176,7 @@ impl BiasBank {
     }
 
     fn best_index(&self) -> usize {
-        let better = |best: usize, other: usize| {
-            if self.log_weights[other] > self.log_weights[best] { other } else { best }
-        };
-        (1..MODELS).fold(0, better)
+        likeliest(0, self.log_weights)
     }
 
     /// Takes a measured speed into every filter that does not hold it for an outlier; tells what
@@ -225,17 +192,15 @@ impl BiasBank {
         &mut self,
         speed_mps: f64,
         noise_variance: f64,
-    ) -> Result<Measured, NotPositiveDefinite> {
-        let mut judged = [Measured::of(0.0); MODELS];
+    ) -> Result<Trust, NotPositiveDefinite> {
+        let mut judged = [Trust::of(0.0); MODELS];
         for (index, filter) in self.filters.iter_mut().enumerate() {
             let innovation = filter.innovation(SPEED, speed_mps, noise_variance)?;
-            judged[index] = Measured::of(innovation.normalised());
-            let outliers = &mut self.outliers[index];
-            *outliers = if judged[index].weight > 0.0 { 0 } else { *outliers + 1 };
-            if judged[index].weight > 0.0 {
+            judged[index] = Trust::of(innovation.normalised());
+            let is_believed = self.outliers[index].push(judged[index].is_outlier());
+            if !judged[index].is_outlier() {
                 filter.measure(SPEED, speed_mps, noise_variance / judged[index].weight)?;
-            } else if *outliers >= OUTLIERS_BEFORE_RESTART {
-                *outliers = 0;
+            } else if is_believed {
                 filter.replace(SPEED, speed_mps, noise_variance);
             }
             let log_weight = &mut self.log_weights[index];
@@ -252,36 +217,37 @@ impl BiasBank {
 
     /// Share of the evidence for each behaviour.
     pub fn weights(&self) -> [f64; MODELS] {
-        let raw = self.log_weights.map(f64::exp);
-        let sum: f64 = raw.iter().sum();
-        raw.map(|weight| weight / sum)
+        let mut weights = self.log_weights;
+        to_shares(&mut weights);
+        weights
     }
 
     /// Inverse mass and bias, averaged over the behaviours by their evidence.
     pub fn moments(&self) -> Moments {
-        let weights = self.weights();
-        let shapes: [f64; MODELS] =
-            std::array::from_fn(|i| self.models[i].shape(self.filters[i].mean[SPEED]));
-        let (mut mass, mut bias) = (0.0, 0.0);
-        for ((weight, shape), filter) in weights.iter().zip(shapes).zip(&self.filters) {
-            mass += weight * filter.mean[INVERSE_MASS];
-            bias += weight * shape * filter.mean[BIAS];
-        }
-        let (mut mass_variance, mut bias_variance, mut cross) = (0.0, 0.0, 0.0);
-        for ((weight, shape), filter) in weights.iter().zip(shapes).zip(&self.filters) {
-            let (du, db) = (filter.mean[INVERSE_MASS] - mass, shape * filter.mean[BIAS] - bias);
+        let mut mixture = Mixture::<2>::default();
+        for ((weight, model), filter) in self.weights().iter().zip(&self.models).zip(&self.filters)
+        {
+            let shape = model.shape(filter.mean[SPEED]);
+            let [_, inverse_mass, bias] = filter.mean.into();
             let own = &filter.covariance;
-            mass_variance += weight * (own[(INVERSE_MASS, INVERSE_MASS)] + du * du);
-            bias_variance += weight * (shape * shape * own[(BIAS, BIAS)] + db * db);
-            cross += weight * (shape * own[(INVERSE_MASS, BIAS)] + du * db);
+            let cross = shape * own[(INVERSE_MASS, BIAS)];
+            let covariance = Matrix2::new(
+                own[(INVERSE_MASS, INVERSE_MASS)],
+                cross,
+                cross,
+                shape * shape * own[(BIAS, BIAS)],
+            );
+            mixture.add(*weight, &Vector2::new(inverse_mass, shape * bias), &covariance);
         }
-        let product = (mass_variance * bias_variance).sqrt();
+        let Gaussian { mean, covariance } = mixture.belief;
+        let product = (covariance[(0, 0)] * covariance[(1, 1)]).sqrt();
+        let correlation = covariance[(0, 1)] / product;
         Moments {
-            inverse_mass: mass,
-            inverse_mass_variance: mass_variance,
-            bias_mps2: bias,
-            bias_variance,
-            correlation: if product > 0.0 { (cross / product).clamp(-1.0, 1.0) } else { 0.0 },
+            inverse_mass: mean[0],
+            inverse_mass_variance: covariance[(0, 0)],
+            bias_mps2: mean[1],
+            bias_variance: covariance[(1, 1)],
+            correlation: if product > 0.0 { correlation.clamp(-1.0, 1.0) } else { 0.0 },
         }
     }
 
@@ -294,7 +260,6 @@ impl BiasBank {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Matrix2, Vector2};
     use rand::{RngExt, SeedableRng};
 
     use super::*;

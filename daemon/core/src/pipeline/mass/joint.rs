@@ -5,28 +5,22 @@ use std::sync::Arc;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason};
 use nalgebra::{Matrix3, SMatrix};
 
-use super::health::InputHealth;
 use super::hypothesis::{Hypothesis, Step};
 use super::integrals::{INVERSE_MASS, Integrals, POLYNOMIALS, Regressors, Row, UNKNOWNS};
 use super::joint_settings::{JOINT_MODELS, JointLeastSquaresSettings};
-use super::lack_of_fit::LackOfFit;
 use super::line_resistance::LineResistance;
 use super::motion::{Motion, StopWatch};
 use super::section::Section;
 use super::speed_noise::SpeedNoise;
 use crate::filter::drifting_level::BIAS;
+use crate::filter::mixture::likeliest;
 use crate::force::ResolvedSample;
-use crate::pipeline::motion::kink_variance;
+use crate::pipeline::judge::{InputHealth, LackOfFit};
+use crate::pipeline::motion::{OutlierRow, SpeedRange, Trust, kink_variance};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 use crate::train::{Davis, TrainModel};
 
-/// A normalised innovation beyond which the speed is not believed.
-const OUTLIER: f64 = 8.0;
-/// A normalised innovation beyond which a speed counts less (Huber 1964).
-const HUBER: f64 = 3.0;
-/// After so many outliers in a row the measured speed is believed and the model's is not.
-const OUTLIERS_BEFORE_RESTART: u32 = 5;
 /// Updates between two looks at the slope of the resistance.
 const REFRESH_EVERY: u32 = 50;
 
@@ -51,12 +45,12 @@ pub struct JointLeastSquares {
     latest: LineResistance,
     updates_since_refresh: u32,
     noise: SpeedNoise,
-    outliers_in_a_row: u32,
+    outliers: OutlierRow,
     pub(super) monitor: InnovationMonitor,
     pub(super) health: InputHealth,
     pub(super) fit: LackOfFit,
     pub(super) speed_mps: f64,
-    pub(super) speed_range_mps: Option<(f64, f64)>,
+    pub(super) speeds: SpeedRange,
     pub(super) is_fresh_reset: bool,
     pub(super) generation: u64,
 }
@@ -71,7 +65,7 @@ impl JointLeastSquares {
         settings: JointLeastSquaresSettings,
         train: &Arc<TrainModel>,
     ) -> Result<Self, SettingError> {
-        settings.check()?;
+        settings.check_ranges()?;
         let regressors = Regressors::new(train, settings.reference_radius_m);
         let mut mean = Row::zeros();
         mean[INVERSE_MASS] = 1.0;
@@ -93,12 +87,12 @@ impl JointLeastSquares {
             latest: LineResistance::declared(train),
             updates_since_refresh: 0,
             noise: SpeedNoise::new(settings.speed_noise_mps),
-            outliers_in_a_row: 0,
+            outliers: OutlierRow::default(),
             monitor: InnovationMonitor::new(500),
             health: InputHealth::default(),
             fit: LackOfFit::default(),
             speed_mps: 0.0,
-            speed_range_mps: None,
+            speeds: SpeedRange::default(),
             is_fresh_reset: false,
             generation: 0,
         })
@@ -177,12 +171,13 @@ impl JointLeastSquares {
         }
         let variance = self.noise.variance();
         let mut expected = self.hypotheses[self.best].expect(&row, value, variance);
-        if expected.normalised.abs() > OUTLIER {
+        if Trust::of(expected.normalised).is_outlier() {
             // Impossible to one assumption, as a force that jumps to one that knows of none: it gives
             // way to one under which the speed is possible.
             for (index, hypothesis) in self.hypotheses.iter().enumerate() {
                 let other = hypothesis.expect(&row, value, variance);
-                if other.normalised.abs() < expected.normalised.abs().min(OUTLIER) {
+                let is_possible = !Trust::of(other.normalised).is_outlier();
+                if is_possible && other.normalised.abs() < expected.normalised.abs() {
                     (expected, self.best) = (other, index);
                 }
             }
@@ -191,26 +186,23 @@ impl JointLeastSquares {
             self.reset();
             return self.begin(motion);
         }
-        if expected.normalised.abs() > OUTLIER {
-            self.outliers_in_a_row += 1;
-            if self.outliers_in_a_row >= OUTLIERS_BEFORE_RESTART {
-                self.outliers_in_a_row = 0;
+        let trust = Trust::of(expected.normalised);
+        let is_believed = self.outliers.push(trust.is_outlier());
+        if trust.is_outlier() {
+            if is_believed {
                 return self.begin(motion);
             }
             self.bridge(motion, &rates, expected.error_mps, step_s);
             return Outcome::Rejected(RejectionReason::Outlier);
         }
-        self.outliers_in_a_row = 0;
         self.monitor.push(expected.normalised);
-        let trust = (HUBER / expected.normalised.abs()).min(1.0);
         for hypothesis in &mut self.hypotheses {
-            hypothesis.absorb(&row, value, trust / variance);
+            hypothesis.absorb(&row, value, trust.weight / variance);
         }
-        self.noise.learn(expected.residual_mps, expected.filtered_variance, trust);
+        self.noise.learn(expected.residual_mps, expected.filtered_variance, trust.weight);
         self.choose();
         self.refresh();
-        let (low, high) = self.speed_range_mps.unwrap_or((motion.speed_mps, motion.speed_mps));
-        self.speed_range_mps = Some((low.min(motion.speed_mps), high.max(motion.speed_mps)));
+        self.speeds.push(motion.speed_mps);
         self.last = Some((motion, rates));
         Outcome::Updated
     }
@@ -241,11 +233,7 @@ impl JointLeastSquares {
     }
 
     fn choose(&mut self) {
-        for (i, hypothesis) in self.hypotheses.iter().enumerate() {
-            if hypothesis.evidence() > self.hypotheses[self.best].evidence() {
-                self.best = i;
-            }
-        }
+        self.best = likeliest(self.best, self.hypotheses.iter().map(Hypothesis::evidence));
     }
 
     /// Takes the latest resistance over once in a while; it changes slowly.
@@ -294,19 +282,9 @@ impl Estimator for JointLeastSquares {
             }
             self.last = None;
         }
-        if sample.speed_mps < self.settings.speed_min_mps {
-            self.last = None;
-            return Outcome::Used;
-        }
-        let motion = match Motion::of(sample) {
+        let motion = match Motion::seen(sample, self.settings.speed_min_mps, &mut self.last) {
             Ok(motion) => motion,
-            Err(reason) => {
-                if reason == RejectionReason::WheelSlide {
-                    self.last = None;
-                }
-                self.health.refuse(reason, sample);
-                return Outcome::Rejected(reason);
-            }
+            Err(outcome) => return self.health.passed(outcome, sample),
         };
         self.speed_mps = motion.speed_mps;
         let step = self.last.and_then(|last| Some((last, motion.step_from(&last.0)?)));
@@ -314,11 +292,7 @@ impl Estimator for JointLeastSquares {
             Some((last, step_s)) => self.advance(last, motion, step_s),
             None => self.begin(motion),
         };
-        match outcome {
-            Outcome::Rejected(reason) => self.health.refuse(reason, sample),
-            Outcome::Used | Outcome::Updated => self.health.accept(),
-        }
-        outcome
+        self.health.note(outcome, sample)
     }
 
     fn write(&self, snapshot: &mut ParameterSnapshot) {

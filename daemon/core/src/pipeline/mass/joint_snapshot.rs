@@ -3,11 +3,11 @@
 use dynocar_shared::{Manoeuvre, Parameter, ParameterSnapshot, Reason, Status};
 use nalgebra::{Matrix4, SMatrix, Vector3, Vector4};
 
-use super::health::innovation_complaint;
 use super::integrals::{INVERSE_MASS, POLYNOMIALS, Row, UNKNOWNS};
 use super::joint::JointLeastSquares;
 use super::section::Section;
 use crate::filter::drifting_level::BIAS;
+use crate::pipeline::judge::Case;
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 
 /// Used samples below which nothing is said.
@@ -24,7 +24,7 @@ impl JointLeastSquares {
         let (Some(solution), Some(root)) = (best.regression().solve(), self.covariance_root())
         else {
             snapshot.parameter_count = 0;
-            write_status(snapshot, Status::Invalid, Reason::NumericalFailure);
+            write_status(snapshot, (Status::Invalid, Reason::NumericalFailure));
             return;
         };
         let mass_std = self.write_estimate(&solution, &root, snapshot);
@@ -43,38 +43,27 @@ impl JointLeastSquares {
             snapshot.excited |= u32::from(is_known) << i;
             snapshot.missing_manoeuvres |= if is_known { 0 } else { manoeuvre.bit() };
         }
-        let (status, reason) = self.status(is_mass_known, known[1]);
-        write_status(snapshot, status, reason);
+        write_status(snapshot, self.case(is_mass_known, known[1]).verdict());
         let inertia_kg = self.regressors.reference_mass_kg / solution[INVERSE_MASS]
             * self.regressors.inertia_factor;
         let shape = best.shape(self.speed_mps);
         snapshot.unexplained_force_n = -shape * solution[BIAS] * inertia_kg;
         snapshot.unexplained_force_std_n = shape * root.row(BIAS).norm() * inertia_kg;
-        (snapshot.speed_min_mps, snapshot.speed_max_mps) =
-            self.speed_range_mps.unwrap_or((0.0, 0.0));
+        self.speeds.write(snapshot);
     }
 
-    fn status(&self, is_mass_known: bool, is_resistance_known: bool) -> (Status, Reason) {
-        if self.is_fresh_reset && !is_mass_known {
-            return (Status::Invalid, Reason::NumericalFailure);
-        }
+    fn case(&self, is_mass_known: bool, is_resistance_known: bool) -> Case {
         let some = is_mass_known || is_resistance_known;
-        let lacking = if some { Status::Degraded } else { Status::Unestimated };
-        if let Some(reason) = self.health.complaint() {
-            return (lacking, reason);
-        }
-        if self.health.used() < SAMPLES_MIN {
-            return (Status::Unestimated, Reason::TooFewSamples);
-        }
-        if !(is_mass_known && is_resistance_known) {
-            return (lacking, Reason::WeakExcitation);
-        }
-        if self.fit.is_lasting() {
-            return (Status::Degraded, Reason::InnovationsNotWhite);
-        }
-        match innovation_complaint(&self.monitor) {
-            Some(reason) => (Status::Degraded, reason),
-            None => (Status::Estimated, Reason::None),
+        let failure = (Status::Invalid, Reason::NumericalFailure);
+        let lasting = self.fit.is_lasting().then_some(Reason::InnovationsNotWhite);
+        Case {
+            fault: (self.is_fresh_reset && !is_mass_known).then_some(failure),
+            input: self.health.complaint(),
+            is_ready: self.health.used() >= SAMPLES_MIN,
+            is_known: is_mass_known && is_resistance_known,
+            lacking: if some { Status::Degraded } else { Status::Unestimated },
+            contradiction: lasting.or_else(|| self.monitor.contradiction()),
+            remark: Reason::None,
         }
     }
 

@@ -8,12 +8,13 @@ use dynocar_shared::{
 use nalgebra::{Matrix2, Vector2};
 
 use super::bias_bank::{BiasBank, Dynamics, Moments, SPEED};
-use super::health::{InputHealth, innovation_complaint};
 use super::kalman_settings::MassKalmanSettings;
 use super::motion::{Motion, StopWatch};
 use super::settling::Settling;
 use super::speed_noise::SpeedNoise;
 use crate::force::ResolvedSample;
+use crate::pipeline::judge::{Case, InputHealth};
+use crate::pipeline::motion::SpeedRange;
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::SettingError;
@@ -56,7 +57,7 @@ pub struct MassKalman {
     settling: Settling,
     monitor: InnovationMonitor,
     health: InputHealth,
-    speed_range_mps: Option<(f64, f64)>,
+    speeds: SpeedRange,
     was_known: bool,
     is_fresh_reset: bool,
     generation: u64,
@@ -95,7 +96,7 @@ impl MassKalman {
             settling: Settling::default(),
             monitor: InnovationMonitor::new(500),
             health: InputHealth::default(),
-            speed_range_mps: None,
+            speeds: SpeedRange::default(),
             was_known: false,
             is_fresh_reset: false,
             generation: 0,
@@ -162,7 +163,7 @@ impl MassKalman {
         let mps2 =
             |motion: &Motion| motion.force_n / (self.reference_mass_kg * self.inertia_factor);
         self.settling.step(mps2(&from), mps2(&motion), step_s, noise_variance);
-        if measured.weight == 0.0 {
+        if measured.is_outlier() {
             // The filters have moved on; only the speed is not believed.
             self.last = Some(motion);
             self.monitor.break_here();
@@ -173,7 +174,7 @@ impl MassKalman {
         let residual_mps = motion.speed_mps - filter.mean[SPEED];
         self.noise.learn(residual_mps, filter.covariance[(SPEED, SPEED)], measured.weight);
         self.last = Some(motion);
-        self.widen_speed_range(motion.speed_mps);
+        self.speeds.push(motion.speed_mps);
         self.publish(0.5 * (from.force_n + motion.force_n).abs())
     }
 
@@ -193,11 +194,6 @@ impl MassKalman {
         Outcome::Used
     }
 
-    fn widen_speed_range(&mut self, speed_mps: f64) {
-        let (low, high) = self.speed_range_mps.unwrap_or((speed_mps, speed_mps));
-        self.speed_range_mps = Some((low.min(speed_mps), high.max(speed_mps)));
-    }
-
     fn reset(&mut self) {
         self.bank = self.initial_bank;
         self.moments = self.bank.moments();
@@ -212,24 +208,16 @@ impl MassKalman {
         std_kg <= 0.01 * self.settings.usable_std_percent * mass_kg
     }
 
-    fn status(&self) -> (Status, Reason) {
-        let without = if self.was_known { Status::Degraded } else { Status::Unestimated };
-        if self.is_fresh_reset {
-            return (Status::Invalid, Reason::NumericalFailure);
-        }
-        let is_known = self.is_known();
-        if let Some(reason) = self.health.complaint() {
-            return (if is_known { Status::Degraded } else { without }, reason);
-        }
-        if self.health.used() < SAMPLES_MIN {
-            return (without, Reason::TooFewSamples);
-        }
-        if !is_known {
-            return (without, Reason::WeakExcitation);
-        }
-        match innovation_complaint(&self.monitor) {
-            Some(reason) => (Status::Degraded, reason),
-            None => (Status::Estimated, Reason::None),
+    fn case(&self) -> Case {
+        let failure = (Status::Invalid, Reason::NumericalFailure);
+        Case {
+            fault: self.is_fresh_reset.then_some(failure),
+            input: self.health.complaint().or(self.gate.complaint()),
+            is_ready: self.health.used() >= SAMPLES_MIN,
+            is_known: self.is_known(),
+            lacking: if self.was_known { Status::Degraded } else { Status::Unestimated },
+            contradiction: self.monitor.contradiction(),
+            remark: Reason::None,
         }
     }
 }
@@ -240,19 +228,9 @@ impl Gated for MassKalman {
     }
 
     fn take(&mut self, sample: &ResolvedSample) -> Outcome {
-        if sample.speed_mps < self.settings.speed_min_mps {
-            self.last = None;
-            return Outcome::Used;
-        }
-        let motion = match Motion::of(sample) {
+        let motion = match Motion::seen(sample, self.settings.speed_min_mps, &mut self.last) {
             Ok(motion) => motion,
-            Err(reason) => {
-                if reason == RejectionReason::WheelSlide {
-                    self.last = None;
-                }
-                self.health.refuse(reason, sample);
-                return Outcome::Rejected(reason);
-            }
+            Err(outcome) => return self.health.passed(outcome, sample),
         };
         self.noise.rounding.see(motion.speed_mps);
         let last = self.last.filter(|_| sample.step_s > 0.0);
@@ -261,11 +239,7 @@ impl Gated for MassKalman {
             Some((last, step_s)) => self.advance(last, motion, step_s),
             None => self.begin(motion),
         };
-        match outcome {
-            Outcome::Rejected(reason) => self.health.refuse(reason, sample),
-            Outcome::Used | Outcome::Updated => self.health.accept(),
-        }
-        outcome
+        self.health.note(outcome, sample)
     }
 
     fn leave_out(&mut self, sample: &ResolvedSample, reason: RejectionReason) {
@@ -304,15 +278,12 @@ impl Estimator for MassKalman {
         let is_bias_known = self.health.used() >= SAMPLES_MIN;
         snapshot.excited = u32::from(is_known) | (u32::from(is_bias_known) << 1);
         snapshot.missing_manoeuvres = if is_known { 0 } else { Manoeuvre::Accelerate.bit() };
-        let (status, reason) = self.status();
-        write_status(snapshot, status, reason);
-        self.gate.qualify(snapshot);
+        write_status(snapshot, self.case().verdict());
         write_innovations(snapshot, &self.monitor);
         let inertia_kg = mass_kg * self.inertia_factor;
         snapshot.unexplained_force_n = -bias_mps2 * inertia_kg;
         snapshot.unexplained_force_std_n = bias_std * inertia_kg;
-        (snapshot.speed_min_mps, snapshot.speed_max_mps) =
-            self.speed_range_mps.unwrap_or((0.0, 0.0));
+        self.speeds.write(snapshot);
         snapshot.generation = self.generation;
     }
 

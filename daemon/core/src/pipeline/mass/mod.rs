@@ -1,18 +1,15 @@
-//! Mass, and the resistances that have to be known for it (Wang 2022).
+//! Mass, and the resistances that have to be known for it; the paper's method is in
+//! [`super::papers::wang`].
 //!
 //! # Layout
 //!
 //! - [`motion`], [`section`], [`line_resistance`], [`speed_basis`], [`bias_model`]: what a sample
 //!   gives, and the parts of the model
-//! - [`StagedDescent`]: the paper's stages, by normalised gradient descent on sums over all
-//!   samples
 //! - [`JointLeastSquares`]: resistance and mass together, on [`integrals`] of motion
 //! - [`MassKalman`]: mass by Kalman filters [v, 1/m, bias], a [`bias_bank`] of them
 
 pub mod bias_bank;
 pub mod bias_model;
-mod descent;
-mod health;
 mod hypothesis;
 pub mod integrals;
 mod joint;
@@ -20,31 +17,14 @@ mod joint_settings;
 mod joint_snapshot;
 mod kalman;
 mod kalman_settings;
-mod lack_of_fit;
 pub mod line_resistance;
 pub mod motion;
 pub mod section;
 mod settling;
 pub mod speed_basis;
 mod speed_noise;
-mod staged;
-mod staged_settings;
 
 pub use joint::JointLeastSquares;
 pub use joint_settings::JointLeastSquaresSettings;
 pub use kalman::MassKalman;
 pub use kalman_settings::MassKalmanSettings;
-pub use staged::StagedDescent;
-pub use staged_settings::{MassRegression, StagedDescentSettings};
-
-use super::settings::{SettingError, require};
-
-/// Refuses a setting that is not finite or lies outside its range.
-fn within(
-    key: &'static str,
-    value: f64,
-    (low, high): (f64, f64),
-    allowed: &'static str,
-) -> Result<(), SettingError> {
-    require((low..=high).contains(&value), key, value, allowed)
-}

@@ -3,13 +3,8 @@
 use dynocar_shared::RejectionReason;
 
 use crate::force::ResolvedSample;
-
-/// Speed in m/s up to which a train counts as standing; below it a wheel sensor sees nothing.
-pub const STANDING_MPS: f64 = 0.3;
-
-/// Longest step in s that is integrated: missing forces are bridged by the mean of the forces
-/// around them, and records at 1 Hz are used.
-pub const STEP_MAX_S: f64 = 2.5;
+use crate::pipeline::Outcome;
+use crate::pipeline::motion::{BRIDGED_MAX_S, STANDING_MPS};
 
 /// The known quantities of a moving train at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,11 +66,36 @@ impl Motion {
         if is_possible { Ok(motion) } else { Err(RejectionReason::OutOfRange) }
     }
 
+    /// The motion at a sample that an estimator from a least speed in m/s on takes; where there is none,
+    /// what became of the sample. A step leads neither over a standstill nor over a slide: `last` is
+    /// forgotten there.
+    ///
+    /// # Errors
+    ///
+    /// `Used` for a train that stands, else the refusal with the reason of [`Motion::of`].
+    pub fn seen<T>(
+        sample: &ResolvedSample,
+        speed_min_mps: f64,
+        last: &mut Option<T>,
+    ) -> Result<Self, Outcome> {
+        if sample.speed_mps < speed_min_mps {
+            *last = None;
+            return Err(Outcome::Used);
+        }
+        Motion::of(sample).map_err(|reason| {
+            if reason == RejectionReason::WheelSlide {
+                *last = None;
+            }
+            Outcome::Rejected(reason)
+        })
+    }
+
     /// Time in s since an earlier sample of the same stretch; `None` when forces and speed
     /// between the two are not known well enough to integrate.
     pub fn step_from(&self, earlier: &Motion) -> Option<f64> {
         let step_s = self.time_ns.saturating_sub(earlier.time_ns) as f64 * 1e-9;
-        (self.stretch == earlier.stretch && step_s > 0.0 && step_s <= STEP_MAX_S).then_some(step_s)
+        (self.stretch == earlier.stretch && step_s > 0.0 && step_s <= BRIDGED_MAX_S)
+            .then_some(step_s)
     }
 }
 

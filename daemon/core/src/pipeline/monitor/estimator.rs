@@ -14,6 +14,8 @@ use super::settings::MonitorSettings;
 use super::suspects::{BASE, FIRST_ONSET, ONSETS, SUSPECTS, suspect_of};
 use super::verdict::{Evidence, Verdict};
 use crate::force::ResolvedSample;
+use crate::pipeline::judge::Case;
+use crate::pipeline::motion::{STANDING_MPS, SpeedRange};
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::resistance::momentum::MomentumBlocks;
 use crate::pipeline::resistance::regression::{
@@ -29,9 +31,6 @@ use crate::train::{Davis, TrainModel};
 const ROWS_MIN: f64 = 12.0;
 /// Innovations that their statistics look back over.
 const MONITOR_ROWS: u32 = 150;
-/// Below this speed in m/s a train stands.
-const STANDSTILL_MPS: f64 = 0.3;
-
 /// The force that the model does not explain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Unexplained {
@@ -66,8 +65,7 @@ pub struct ResidualMonitor {
     last_block: Option<(Option<f64>, f64)>,
     unexplained: Unexplained,
     weight_kn: f64,
-    speed_min_mps: f64,
-    speed_max_mps: f64,
+    speeds: SpeedRange,
     resets: u64,
 }
 
@@ -78,7 +76,7 @@ impl ResidualMonitor {
     ///
     /// When a setting lies outside its range.
     pub fn new(settings: MonitorSettings, train: &TrainModel) -> Result<Self, SettingError> {
-        settings.check()?;
+        settings.check_ranges()?;
         let declared = train.resistance;
         let coefficients = scaled(&declared);
         let mut declared_base = BaseVector::zeros();
@@ -117,8 +115,7 @@ impl ResidualMonitor {
                 std_n_per_kn: settings.davis_std_share * declared.w0_n_per_kn(20.0),
             },
             weight_kn: TrainModel::weight_kn(train.mass_kg),
-            speed_min_mps: f64::INFINITY,
-            speed_max_mps: 0.0,
+            speeds: SpeedRange::default(),
             resets: 0,
         })
     }
@@ -174,8 +171,7 @@ impl ResidualMonitor {
             self.innovations.push(row.observed - row.features.dot(model));
         }
         self.information.push(&row, self.kept_per_row);
-        self.speed_min_mps = self.speed_min_mps.min(block.speed_mps);
-        self.speed_max_mps = self.speed_max_mps.max(block.speed_mps);
+        self.speeds.push(block.speed_mps);
         let resistance = self.declared.w0_n_per_kn(block.speed_mps) * block.impulse[1];
         self.verdict.note_forces(&self.units(&impulse, block.impulse[1]), resistance);
         self.judge(&(impulse / block.impulse[1]), block.speed_mps);
@@ -274,7 +270,7 @@ impl Estimator for ResidualMonitor {
             self.start_run();
         }
         self.pressure.push(sample);
-        self.has_stopped |= sample.speed_mps < STANDSTILL_MPS;
+        self.has_stopped |= sample.speed_mps <= STANDING_MPS;
         let unit = match UnitSample::of(sample) {
             Ok(unit) => unit,
             Err(reason) => {
@@ -316,11 +312,16 @@ impl Estimator for ResidualMonitor {
         );
         let named = self.verdict.named();
         let has_rows = self.information.count() >= ROWS_MIN;
-        match named {
-            _ if !has_rows => write_status(snapshot, Status::Unestimated, Reason::TooFewSamples),
-            Some(_) => write_status(snapshot, Status::Degraded, Reason::InnovationsNotWhite),
-            None => write_status(snapshot, Status::Estimated, Reason::None),
-        }
+        let case = Case {
+            fault: None,
+            input: None,
+            is_ready: has_rows,
+            is_known: true,
+            lacking: Status::Unestimated,
+            contradiction: named.map(|_| Reason::InnovationsNotWhite),
+            remark: Reason::None,
+        };
+        write_status(snapshot, case.verdict());
         write_innovations(snapshot, &self.innovations);
         snapshot.generation = self.resets;
         snapshot.excited = u32::from(has_rows);
@@ -328,9 +329,6 @@ impl Estimator for ResidualMonitor {
         snapshot.unexplained_force_std_n = std_n;
         snapshot.suspected_effect = named.map_or(EffectKind::None, |named| named.effect) as u32;
         snapshot.suspicion_evidence = named.map_or(0.0, |named| named.evidence);
-        if self.speed_max_mps > 0.0 {
-            snapshot.speed_min_mps = self.speed_min_mps;
-            snapshot.speed_max_mps = self.speed_max_mps;
-        }
+        self.speeds.write(snapshot);
     }
 }

@@ -1,10 +1,26 @@
 //! What every estimator takes from the samples of a moving train.
 //!
+//! - [`STANDING_MPS`], [`MOVING_MPS`], [`BRIDGED_MAX_S`]: when a train stands, moves, and is lost sight of
+//! - [`Trust`], [`OutlierRow`]: how far a measured speed is believed
 //! - [`jump_variance`], [`kink_variance`]: what a trapezoid over a step misses
 //! - [`Rounding`]: the steps that a speed is told in
+//! - [`SpeedRange`]: the speeds driven
 
 mod missed;
+mod outlier;
 mod rounding;
+mod speed_range;
 
 pub use missed::{jump_variance, kink_variance};
+pub use outlier::{OutlierRow, Trust};
 pub use rounding::Rounding;
+pub use speed_range::SpeedRange;
+
+/// Speed in m/s up to which a train counts as standing; below it a wheel sensor sees nothing.
+pub const STANDING_MPS: f64 = 0.3;
+/// Speed in m/s up to which nothing is learned of a train's motion: holding brakes, slack and starting
+/// resistance are no part of the model.
+pub const MOVING_MPS: f64 = 1.0;
+/// The longest time in s between two samples that is integrated over, as in validation: missing forces
+/// are bridged by the mean of those around them, and records at 1 Hz are used.
+pub const BRIDGED_MAX_S: f64 = 2.5;

@@ -74,7 +74,7 @@ mod tests {
 
     #[test]
     fn the_grid_of_coarse_speeds_is_found_and_fine_ones_have_none() {
-        let exact = |k: i32| 5.0 + 0.19 * f64::from(k) - 1e-4 * f64::from(k * k);
+        let exact = |k: i32| 5.0 + 0.06 * f64::from(k) - 1e-4 * f64::from(k * k);
         let coarse = after((0..50).map(|k| (exact(k) / 0.05).round() * 0.05));
         assert!((coarse.quantum_mps() - 0.05).abs() < 1e-9);
         let own = coarse.variance();

@@ -9,12 +9,13 @@ use super::regression::{Motion, Observation, PARAMETERS, Solution, Unknowns, sca
 use super::report::{DrivenSpeeds, Evidence, Report};
 use super::sample::UnitSample;
 use super::settings::DataSettings;
-use super::solver::{Solver, bank_penalty};
 use super::source::RowSource;
 use super::speed::SpeedNoise;
 use crate::filter::RunningMedian;
 use crate::force::ResolvedSample;
+use crate::pipeline::judge::missing;
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
+use crate::pipeline::papers::liu::solver::{Solver, bank_penalty};
 use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use crate::train::{Davis, TrainModel};
 
@@ -279,7 +280,7 @@ impl ResistanceLeastSquares {
             Some(obstacle) if self.bank.count() == 0.0 => obstacle,
             _ => report.reason,
         };
-        write_status(snapshot, report.status, reason);
+        write_status(snapshot, (report.status, reason));
         let factors = unscaling();
         let covariance =
             Matrix3::from_diagonal(&factors) * report.covariance * Matrix3::from_diagonal(&factors);
@@ -291,8 +292,7 @@ impl ResistanceLeastSquares {
         // The disturbance acts against the motion as resistance does.
         snapshot.unexplained_force_n = self.disturbance.0 * self.weight_kn;
         snapshot.unexplained_force_std_n = self.disturbance.1 * self.weight_kn;
-        snapshot.speed_min_mps = self.speeds.min_mps;
-        snapshot.speed_max_mps = self.speeds.max_mps;
+        self.speeds.range.write(snapshot);
     }
 }
 
@@ -318,10 +318,7 @@ impl Estimator for ResistanceLeastSquares {
                     self.source.break_chain();
                 }
                 if reason == RejectionReason::Missing {
-                    self.obstacle = Some(match sample.gradient_permille {
-                        None => Reason::GradientUnknown,
-                        Some(_) => Reason::MissingQuantity,
-                    });
+                    self.obstacle = Some(missing(sample));
                 }
                 Outcome::Rejected(reason)
             }

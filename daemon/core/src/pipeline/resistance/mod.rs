@@ -3,28 +3,26 @@
 //! # Layout, in the order a sample takes
 //!
 //! - `sample`, `speed`: forces per weight; spikes refused, noise of the speed learned
-//! - `momentum`, `coasting`: samples to observations of the regression in `regression`
+//! - `momentum`: samples to observations of the regression in `regression`, as coasting segments are
 //! - `noise_model`, `noise_bank`: observations to independent rows, and how noisy they are
-//! - `solver`: the recursions
+//! - `solver` and `coasting` of [`super::papers::liu`]: the paper's recursions and data
 //! - `report`: bounds, excitation, status
 //! - `least_squares`: the pipeline around all of it
 //! - `kalman`: the robust filter over every sample, with a least-squares pipeline beside it
 
-mod coasting;
 mod kalman;
 mod least_squares;
 pub(super) mod momentum;
-mod noise_bank;
-mod noise_model;
+pub(super) mod noise_bank;
+pub(super) mod noise_model;
 pub(super) mod regression;
 mod report;
 pub(super) mod sample;
 pub mod settings;
-mod solver;
 mod source;
-mod speed;
+pub(super) mod speed;
 #[cfg(test)]
-mod test_runs;
+pub(super) mod test_runs;
 #[cfg(test)]
 mod tests;
 
@@ -34,7 +32,7 @@ pub use least_squares::ResistanceLeastSquares;
 use dynocar_shared::PipelineKind;
 
 use self::settings::{KalmanSettings, LsSettings, MilsSettings, RlsSettings};
-use self::solver::Solver;
+use super::papers::liu::solver::Solver;
 use super::settings::SettingError;
 use crate::train::TrainModel;
 
@@ -47,7 +45,7 @@ pub fn ls(
     train: &TrainModel,
     settings: &LsSettings,
 ) -> Result<ResistanceLeastSquares, SettingError> {
-    settings.check()?;
+    settings.check_ranges()?;
     let kind = PipelineKind::Ls;
     let (data, lambda) = (settings.data, settings.lambda);
     Ok(ResistanceLeastSquares::new(kind, train, data, Solver::Batch, lambda, 1.0))
@@ -62,7 +60,7 @@ pub fn rls(
     train: &TrainModel,
     settings: &RlsSettings,
 ) -> Result<ResistanceLeastSquares, SettingError> {
-    settings.check()?;
+    settings.check_ranges()?;
     let solver = Solver::rls(settings);
     // The bank needs some regularisation of its own while rows are few.
     let lambda = 2.0 / settings.start_variance;
@@ -116,7 +114,7 @@ pub fn kalman(
     train: &TrainModel,
     settings: &KalmanSettings,
 ) -> Result<ResistanceKalman, SettingError> {
-    settings.check()?;
+    settings.check_ranges()?;
     let beside = ls(train, &LsSettings { data: settings.data, ..LsSettings::default() })?;
     Ok(ResistanceKalman::new(train, *settings, beside))
 }
@@ -127,6 +125,6 @@ fn regularised(
     settings: &MilsSettings,
     solver: Solver,
 ) -> Result<ResistanceLeastSquares, SettingError> {
-    settings.check()?;
+    settings.check_ranges()?;
     Ok(ResistanceLeastSquares::new(kind, train, settings.data, solver, settings.lambda, 1.0))
 }

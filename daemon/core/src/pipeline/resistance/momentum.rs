@@ -13,7 +13,7 @@ use super::regression::{
 };
 use super::sample::{SpeedWatch, UnitSample, resistance_integral, trapezoids};
 use super::settings::DataSettings;
-use super::speed::{SpeedNoise, SpeedVerdict};
+use super::speed::SpeedNoise;
 use crate::filter::Line;
 use crate::pipeline::motion::jump_variance;
 use crate::train::Davis;
@@ -105,13 +105,11 @@ impl MomentumBlocks {
             self.chain = Some(Chain::start(now));
             return Ok(None);
         };
-        match self.watch.judge(&chain.last, now, known) {
-            SpeedVerdict::Continues => {}
-            SpeedVerdict::Spike => return Err(RejectionReason::Outlier),
-            SpeedVerdict::Restart => {
+        if let Some(is_believed) = self.watch.judge(&chain.last, now, known) {
+            if is_believed {
                 self.chain = Some(Chain::start(now));
-                return Err(RejectionReason::Outlier);
             }
+            return Err(RejectionReason::Outlier);
         }
         chain.advance(now, known);
         if chain.integral[1] - chain.block.start_s < self.settings.block_s

@@ -5,12 +5,12 @@
 //! the estimate is worth. A small bank of noise models runs side by side, and their solutions
 //! are mixed by their likelihood.
 
-use nalgebra::SMatrix;
-
 use super::noise_model::{NoiseModel, PRIOR_ROWS, WhiteRow};
 use super::regression::{
-    Disturbance, Motion, Observation, PARAMETERS, SinceBlock, Solution, UNKNOWNS, Unknowns,
+    Disturbance, Motion, Observation, PARAMETERS, SinceBlock, Solution, Unknowns,
 };
+use crate::filter::Gaussian;
+use crate::filter::mixture::{Mixture, likeliest, to_shares};
 
 /// Standard deviations of the disturbance in N/kN: from nothing to as large as resistance itself.
 const STDS_N_PER_KN: [f64; 6] = [0.01, 0.03, 0.1, 0.3, 1.0, 3.0];
@@ -235,24 +235,17 @@ impl NoiseBank {
     fn mix(&self, probability: f64, factor: f64) -> Option<Solution> {
         let mut order: [usize; MODELS] = std::array::from_fn(|index| index);
         order.sort_unstable_by(|&i, &j| self.weights[j].total_cmp(&self.weights[i]));
-        let mut estimate = Unknowns::zeros();
-        let mut second = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
-        let mut total = 0.0;
+        let mut mixture = Mixture::default();
         for index in order {
             let weight = self.weights[index];
-            if total >= probability || weight <= WEIGHT_MIN {
+            if mixture.weight >= probability || weight <= WEIGHT_MIN {
                 break;
             }
             let own = self.models[index].solution()?;
-            estimate += own.estimate * weight;
-            second += (own.covariance * factor + own.estimate * own.estimate.transpose()) * weight;
-            total += weight;
+            mixture.add(weight, &own.estimate, &(own.covariance * factor));
         }
-        if total <= 0.0 {
-            return None;
-        }
-        estimate /= total;
-        Some(Solution { estimate, covariance: second / total - estimate * estimate.transpose() })
+        let Gaussian { mean: estimate, covariance } = mixture.belief;
+        (mixture.weight > 0.0).then_some(Solution { estimate, covariance })
     }
 
     fn weighty(&self) -> impl Iterator<Item = (&NoiseModel, f64)> {
@@ -263,17 +256,10 @@ impl NoiseBank {
         if self.models[0].freedom() < 1.0 {
             return;
         }
-        let likelihoods: [f64; MODELS] =
+        self.weights =
             std::array::from_fn(|index| self.models[index].log_likelihood() + log_prior(index));
-        for (index, likelihood) in likelihoods.iter().enumerate() {
-            if *likelihood > likelihoods[self.likeliest] {
-                self.likeliest = index;
-            }
-        }
-        let best = likelihoods[self.likeliest];
-        self.weights = likelihoods.map(|likelihood| (likelihood - best).exp());
-        let sum: f64 = self.weights.iter().sum();
-        self.weights = self.weights.map(|weight| weight / sum);
+        self.likeliest = likeliest(self.likeliest, self.weights);
+        to_shares(&mut self.weights);
     }
 
     /// Every so many rows, gives back what forgetting took off the priors.

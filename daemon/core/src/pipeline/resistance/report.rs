@@ -7,6 +7,8 @@ use super::noise_bank::Disturbed;
 use super::regression::{PARAMETERS, SPEED_SCALE_MPS, Solution, regressors, unscaling};
 use crate::filter::bounded_minimum;
 use crate::pipeline::InnovationMonitor;
+use crate::pipeline::judge::Case;
+use crate::pipeline::motion::SpeedRange;
 use crate::train::Davis;
 
 /// Rows before anything is called estimated.
@@ -21,31 +23,29 @@ const DISTURBANCE_SHARE_MAX: f64 = 0.1;
 const DISTURBANCE_EVIDENCE_MIN: f64 = 10.0;
 /// Standard deviations beyond which the force now is no chance.
 const DISTURBANCE_STDS_MAX: f64 = 4.0;
-/// Mean square of normalised innovations beyond which they are too large.
-const MEAN_SQUARE_MAX: f64 = 4.0;
-/// Innovations before their mean square counts.
-const INNOVATIONS_MIN: f64 = 15.0;
 /// Share of refused rows beyond which the input is bad.
 const REFUSED_SHARE_MAX: f64 = 0.3;
 
-/// Mean and range of the speeds behind the rows, in m/s.
+/// Mean and range of the speeds behind the rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DrivenSpeeds {
-    /// Lowest.
-    pub min_mps: f64,
-    /// Highest.
-    pub max_mps: f64,
+    /// Lowest and highest.
+    pub range: SpeedRange,
     sum_mps: f64,
     count: f64,
 }
 
 impl DrivenSpeeds {
-    /// Takes in the mean speed of a row.
+    /// Takes in the mean speed of a row in m/s.
     pub fn push(&mut self, speed_mps: f64) {
-        self.min_mps = if self.count == 0.0 { speed_mps } else { self.min_mps.min(speed_mps) };
-        self.max_mps = self.max_mps.max(speed_mps);
+        self.range.push(speed_mps);
         self.sum_mps += speed_mps;
         self.count += 1.0;
+    }
+
+    /// Highest in m/s; 0 before the first.
+    pub fn max_mps(&self) -> f64 {
+        self.range.get().map_or(0.0, |(_, max_mps)| max_mps)
     }
 
     /// Mean; 0 before the first.
@@ -127,9 +127,9 @@ impl Report {
             (powers.dot(&estimate), powers.dot(&(covariance * powers)).max(0.0).sqrt())
         };
         let speeds = evidence.speeds;
-        let excited = excited(&covariance, at(speeds.max_mps).0, speeds.max_mps);
-        let (status, reason) =
-            verdict(evidence, at(speeds.mean_mps()), excited, bounded.at_bound != 0);
+        let excited = excited(&covariance, at(speeds.max_mps()).0, speeds.max_mps());
+        let case = case(evidence, at(speeds.mean_mps()), excited, bounded.at_bound != 0);
+        let (status, reason) = case.verdict();
         let missing_manoeuvres = missing_manoeuvres(excited);
         Some(Report { status, reason, estimate, covariance, excited, missing_manoeuvres })
     }
@@ -141,38 +141,32 @@ impl Report {
     }
 }
 
-/// Status and reason, by w0 at the mean speed with its standard deviation.
-fn verdict(
-    evidence: &Evidence,
-    (w0, w0_std): (f64, f64),
-    excited: u32,
-    is_at_bound: bool,
-) -> (Status, Reason) {
+/// All that the judge asks for, by w0 at the mean speed with its standard deviation.
+fn case(evidence: &Evidence, (w0, w0_std): (f64, f64), excited: u32, is_at_bound: bool) -> Case {
     let Evidence { disturbed, innovations, .. } = evidence;
     let now = evidence.disturbance_n_per_kn.abs();
-    if evidence.rows < ROWS_MIN {
-        (Status::Unestimated, Reason::TooFewSamples)
-    } else if disturbed.std_n_per_kn > DISTURBANCE_SHARE_MAX * w0
-        && disturbed.evidence > DISTURBANCE_EVIDENCE_MIN
-    {
-        // Before weak excitation: structure makes the intervals wide, and says why.
-        (Status::Degraded, Reason::InnovationsNotWhite)
-    } else if w0_std > SHARE_STD_MAX * w0 {
-        (Status::Unestimated, Reason::WeakExcitation)
-    } else if (innovations.mean_square() > MEAN_SQUARE_MAX
-        && innovations.effective_count() > INNOVATIONS_MIN)
-        || (now > DISTURBANCE_SHARE_MAX * w0
-            && now > DISTURBANCE_STDS_MAX * evidence.disturbance_std_n_per_kn)
-    {
-        (Status::Degraded, Reason::InnovationsTooLarge)
-    } else if evidence.refused_share > REFUSED_SHARE_MAX {
-        (Status::Degraded, Reason::BadInput)
-    } else if excited != (1 << PARAMETERS) - 1 {
-        (Status::Estimated, Reason::WeakExcitation)
-    } else if is_at_bound {
-        (Status::Estimated, Reason::AtBound)
-    } else {
-        (Status::Estimated, Reason::None)
+    let has_structure = disturbed.std_n_per_kn > DISTURBANCE_SHARE_MAX * w0
+        && disturbed.evidence > DISTURBANCE_EVIDENCE_MIN;
+    let is_disturbed = now > DISTURBANCE_SHARE_MAX * w0
+        && now > DISTURBANCE_STDS_MAX * evidence.disturbance_std_n_per_kn;
+    let is_too_large = innovations.are_too_large() || is_disturbed;
+    Case {
+        fault: None,
+        input: (evidence.refused_share > REFUSED_SHARE_MAX).then_some(Reason::BadInput),
+        is_ready: evidence.rows >= ROWS_MIN,
+        // Structure makes the intervals wide, and says why.
+        is_known: has_structure || w0_std <= SHARE_STD_MAX * w0,
+        lacking: Status::Unestimated,
+        contradiction: has_structure
+            .then_some(Reason::InnovationsNotWhite)
+            .or(is_too_large.then_some(Reason::InnovationsTooLarge)),
+        remark: if excited != (1 << PARAMETERS) - 1 {
+            Reason::WeakExcitation
+        } else if is_at_bound {
+            Reason::AtBound
+        } else {
+            Reason::None
+        },
     }
 }
 

@@ -4,8 +4,9 @@ use dynocar_shared::RejectionReason;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
 use super::regression::{PARAMETERS, regressors, scaled};
-use super::speed::{SpeedGate, SpeedNoise, SpeedVerdict};
+use super::speed::SpeedNoise;
 use crate::force::ResolvedSample;
+use crate::pipeline::motion::OutlierRow;
 use crate::train::Davis;
 
 /// A sample with its forces per weight.
@@ -78,7 +79,7 @@ pub fn trapezoids(from: &UnitSample, to: &UnitSample) -> [f64; 1 + PARAMETERS] {
 pub struct SpeedWatch {
     /// Noise of the speed so far.
     pub noise: SpeedNoise,
-    gate: SpeedGate,
+    outliers: OutlierRow,
     spike_mps: f64,
 }
 
@@ -87,13 +88,14 @@ impl SpeedWatch {
     pub fn new(spike_mps: f64) -> Self {
         // What is never called a spike is taken to be three standard deviations at the start.
         let noise = SpeedNoise::new(spike_mps / 3.0);
-        SpeedWatch { noise, gate: SpeedGate::default(), spike_mps }
+        SpeedWatch { noise, outliers: OutlierRow::default(), spike_mps }
     }
 
-    /// Judges a sample by the one before it and the resistance as far as it is known.
+    /// Judges a sample by the one before it and the resistance as far as it is known; `Some` for a
+    /// spike, true in it when so many came in a row that the samples before must have been wrong.
     ///
     /// The force may have changed anywhere in the step, and a tenth of every force is doubted.
-    pub fn judge(&mut self, before: &UnitSample, now: &UnitSample, known: &Davis) -> SpeedVerdict {
+    pub fn judge(&mut self, before: &UnitSample, now: &UnitSample, known: &Davis) -> Option<bool> {
         let step_s = now.seconds_since(before);
         let driving = 0.5 * (before.driving + now.driving);
         let resistance = known.w0_n_per_kn(before.speed_mps);
@@ -102,7 +104,9 @@ impl SpeedWatch {
         let doubt = 0.5 * (now.driving - before.driving).abs() + 0.1 * (control + resistance.abs());
         let allowed_mps =
             self.spike_mps + 8.0 * self.noise.variance().sqrt() + step_s * doubt / now.inertia;
-        self.gate.judge(now.speed_mps - expected_mps, allowed_mps)
+        let is_spike = !((now.speed_mps - expected_mps).abs() <= allowed_mps);
+        let is_believed = self.outliers.push(is_spike);
+        is_spike.then_some(is_believed)
     }
 }
 
@@ -112,7 +116,7 @@ pub fn resistance_integral(known: &Davis, regressor_integrals: &[f64]) -> f64 {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(in crate::pipeline) mod tests {
     use super::*;
 
     /// A sample of a train with s = 100 N/kN per m/s².
@@ -152,9 +156,9 @@ pub(super) mod tests {
         let before = unit_sample(0.0, 10.0, 0.0);
         // Full traction from just after the first sample on.
         let now = unit_sample(1.0, 10.98, 100.0);
-        assert_eq!(watch.judge(&before, &now, &known), SpeedVerdict::Continues);
+        assert_eq!(watch.judge(&before, &now, &known), None);
         let coasting = unit_sample(1.0, 10.98, 0.0);
-        assert_eq!(watch.judge(&before, &coasting, &known), SpeedVerdict::Spike);
+        assert_eq!(watch.judge(&before, &coasting, &known), Some(false));
     }
 
     #[test]

@@ -2,12 +2,12 @@
 
 use dynocar_shared::RejectionReason;
 
-use super::coasting::CoastingSegments;
 use super::momentum::MomentumBlocks;
 use super::regression::{Observation, SinceBlock};
 use super::sample::UnitSample;
 use super::settings::{DataSettings, DataSource};
 use super::speed::SpeedNoise;
+use crate::pipeline::papers::liu::coasting::CoastingSegments;
 use crate::train::Davis;
 
 #[derive(Clone, Debug)]

@@ -1,42 +1,6 @@
-//! What the speed signal itself says of its noise, and which of its values are spikes.
+//! What the speed signal itself says of its noise.
 
 use crate::pipeline::motion::Rounding;
-
-/// Verdict on one speed value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SpeedVerdict {
-    /// It continues the ones before.
-    Continues,
-    /// It does not; the next may.
-    Spike,
-    /// So many in a row do not that the ones before must have been wrong.
-    Restart,
-}
-
-/// Refuses speeds that neither force nor inertia can explain.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SpeedGate {
-    refusals: u32,
-}
-
-/// After so many refusals in a row the new level is believed.
-const REFUSALS_BEFORE_RESTART: u32 = 3;
-
-impl SpeedGate {
-    /// Judges a deviation from the predicted speed against what may be.
-    pub fn judge(&mut self, deviation_mps: f64, allowed_mps: f64) -> SpeedVerdict {
-        if deviation_mps.abs() <= allowed_mps {
-            self.refusals = 0;
-            return SpeedVerdict::Continues;
-        }
-        self.refusals += 1;
-        if self.refusals < REFUSALS_BEFORE_RESTART {
-            return SpeedVerdict::Spike;
-        }
-        self.refusals = 0;
-        SpeedVerdict::Restart
-    }
-}
 
 /// Variance of the speed's white noise and its quantum, from the signal itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -113,17 +77,6 @@ impl SpeedNoise {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_single_spike_is_refused_and_a_new_level_is_believed() {
-        let mut gate = SpeedGate::default();
-        assert_eq!(gate.judge(0.05, 0.15), SpeedVerdict::Continues);
-        assert_eq!(gate.judge(-0.9, 0.15), SpeedVerdict::Spike);
-        assert_eq!(gate.judge(0.01, 0.15), SpeedVerdict::Continues);
-        let verdicts = [(); 4].map(|()| gate.judge(0.9, 0.15));
-        use SpeedVerdict::{Restart, Spike};
-        assert_eq!(verdicts, [Spike, Spike, Restart, Spike]);
-    }
 
     #[test]
     fn rounding_of_a_steady_speed_does_not_average_out() {

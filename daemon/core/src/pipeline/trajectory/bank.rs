@@ -12,6 +12,8 @@ use nalgebra::{Matrix3, Vector3};
 use super::hypothesis::{Hypothesis, Innovation, OutlierModel};
 use super::noise::NoiseModel;
 use super::step::{Step, StepRule};
+use crate::filter::Gaussian;
+use crate::filter::mixture::{Mixture, likeliest};
 use crate::train::Davis;
 
 /// The most hypotheses of a bank.
@@ -92,8 +94,7 @@ impl JumpBank {
     }
 
     fn likeliest_index(&self) -> usize {
-        let weight = |i: &usize| self.hypotheses[*i].weight;
-        (0..self.count).max_by(|i, j| weight(i).total_cmp(&weight(j))).unwrap_or(0)
+        likeliest(0, self.hypotheses().iter().map(|hypothesis| hypothesis.weight))
     }
 
     /// Takes the speed of every hypothesis from a measurement alone.
@@ -202,19 +203,12 @@ impl JumpBank {
         let total: f64 = live.iter().map(|hypothesis| hypothesis.weight).sum();
         let published =
             |hypothesis: &&Hypothesis| hypothesis.weight >= WEIGHT_PUBLISHED_MIN * total;
-        let (mut mean, mut weight) = (Vector3::zeros(), 0.0);
+        let mut mixture = Mixture::<3>::default();
         for hypothesis in live.iter().filter(published) {
-            mean += hypothesis.state.fixed_rows::<3>(0) * hypothesis.weight;
-            weight += hypothesis.weight;
-        }
-        mean /= weight;
-        let mut covariance = Matrix3::zeros();
-        for hypothesis in live.iter().filter(published) {
-            let share = hypothesis.weight / weight;
-            let apart = hypothesis.state.fixed_rows::<3>(0) - mean;
             let own = hypothesis.davis_covariance_over_noise(&self.noise);
-            covariance += (own + apart * apart.transpose()) * share;
+            mixture.add(hypothesis.weight, &hypothesis.state.fixed_rows::<3>(0).into(), &own);
         }
+        let Gaussian { mean, covariance } = mixture.belief;
         (Davis { a: mean[0], b: mean[1], c: mean[2] }, covariance)
     }
 }

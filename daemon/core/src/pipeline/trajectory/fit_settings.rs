@@ -26,17 +26,6 @@ impl DavisPrior {
     }
 }
 
-/// A disturbing acceleration, white over the steps: wind, gradient errors, force errors.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Disturbance {
-    /// The forces are exact: output error, as in Xia 2023.
-    None,
-    /// Density over the variance of the measured speed, q / R in 1/s.
-    Ratio(f64),
-    /// The ratio of greatest likelihood.
-    Estimated,
-}
-
 /// How to fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitSettings {
@@ -48,8 +37,10 @@ pub struct FitSettings {
     pub prior: Option<DavisPrior>,
     /// Standard deviation of the measured speed in m/s; `None` estimates it.
     pub speed_noise_mps: Option<f64>,
-    /// Disturbing acceleration.
-    pub disturbance: Disturbance,
+    /// Density of a disturbing acceleration, white over the steps (wind, gradient errors, force
+    /// errors), over the variance of the measured speed, q / R in 1/s; 0 for exact forces: output
+    /// error, as in Xia 2023.
+    pub disturbance_ratio: f64,
     /// Residuals beyond so many standard deviations count linearly; infinity for never.
     pub outlier_threshold: f64,
     /// Decrease of the cost, half the sum of squared standard deviations, that is worth another
@@ -66,7 +57,7 @@ impl FitSettings {
             bounds: ParameterBox { low: Vector3::zeros(), high: Vector3::new(50.0, 1.0, 0.1) },
             prior: None,
             speed_noise_mps: None,
-            disturbance: Disturbance::None,
+            disturbance_ratio: 0.0,
             outlier_threshold: 4.0,
             decrease_tolerance: 1e-8,
         }
@@ -80,12 +71,9 @@ impl FitSettings {
         let noise_mps = self.speed_noise_mps.unwrap_or(1.0);
         let is_allowed = noise_mps > 0.0 && noise_mps.is_finite();
         require(is_allowed, "speed_noise_mps", noise_mps, "a finite number above 0")?;
-        let ratio = match self.disturbance {
-            Disturbance::Ratio(ratio) => ratio,
-            Disturbance::None | Disturbance::Estimated => 0.0,
-        };
+        let ratio = self.disturbance_ratio;
         let is_allowed = ratio >= 0.0 && ratio.is_finite();
-        require(is_allowed, "disturbance ratio", ratio, "a finite number, 0 or above")?;
+        require(is_allowed, "disturbance_ratio", ratio, "a finite number, 0 or above")?;
         let threshold = self.outlier_threshold;
         require(threshold > 0.0, "outlier_threshold", threshold, "above 0")
     }
@@ -138,22 +126,20 @@ pub enum FitError {
 pub struct TrajectoryFit {
     /// The coefficients.
     pub davis: Davis,
-    /// Their covariance, averaged over the disturbance ratios where that is estimated, and
-    /// widened where the residuals are correlated over tens of seconds.
+    /// Their covariance, widened where the residuals are correlated over tens of seconds.
     pub covariance: Matrix3<f64>,
     /// Factor by which it was widened, see [`super::long_run`].
     pub inflation: f64,
-    /// Their covariance by the scatter between stretches, which also holds when residuals are
-    /// correlated within a stretch (Liang, Zeger 1986); from 4 stretches on, good from 20 on.
-    pub cluster_covariance: Option<Matrix3<f64>>,
     /// Standard deviation of the measured speed in m/s, as given or estimated.
     pub speed_noise_mps: f64,
     /// Standard deviation in m/s that the residuals show, outliers clipped.
     pub residual_std_mps: f64,
-    /// Density of the disturbing acceleration over the variance of the measured speed, in 1/s.
-    pub disturbance_ratio: f64,
     /// Logarithm of the likelihood, up to a constant of the data; to compare models by.
     pub log_likelihood: f64,
+    /// The likelihood of what the fitted parameters leave over (Patterson, Thompson 1971): the
+    /// greatest likelihood itself takes the slow disturbances that coefficients and initial speeds
+    /// have absorbed for their absence.
+    pub restricted_log_likelihood: f64,
     /// Root of the mean squared residual in m/s; with exact forces that of the trajectory.
     pub rmse_mps: f64,
     /// Fitted speed in m/s at the end of the last stretch.

@@ -6,7 +6,9 @@ use super::index::{A, B, C, SPEED};
 use super::noise::{LearnedNoise, NoiseModel};
 use super::step::{Step, StepRule};
 use super::unit_disturbance::UnitDisturbance;
+use crate::filter::mixture::Mixture;
 use crate::filter::square_root::CovarianceFactor;
+use crate::pipeline::motion::OutlierRow;
 use crate::train::Davis;
 
 /// How often measured speeds are wrong, and how.
@@ -37,11 +39,8 @@ pub struct Hypothesis {
     /// Time in s since its jump.
     pub age_s: f64,
     /// Measurements left out in a row.
-    refusals: u32,
+    outliers: OutlierRow,
 }
-
-/// After so many measurements left out in a row the speed is taken from the next.
-const REFUSALS_MAX: u32 = 10;
 
 /// The normal density of unit variance at its mean, 1 / √(2π).
 const NORMAL_DENSITY: f64 = 0.398_942_280_401_432_7;
@@ -71,7 +70,7 @@ impl Hypothesis {
             unit: UnitDisturbance::default(),
             weight: 1.0,
             age_s: 0.0,
-            refusals: 0,
+            outliers: OutlierRow::default(),
         }
     }
 
@@ -106,7 +105,7 @@ impl Hypothesis {
         self.factor.0[(SPEED, SPEED)] = self.noise.measured_variance().sqrt();
         self.noise.anchor();
         self.unit.anchor();
-        self.refusals = 0;
+        self.outliers = OutlierRow::default();
     }
 
     /// Lets the coefficients jump by an unknown amount of given covariance diagonal; `false`
@@ -182,12 +181,12 @@ impl Hypothesis {
         let outlier = outliers.share * outliers.density;
         let is_used = inlier >= outlier;
         self.noise.learn(innovation_mps, own_variance, is_used, model);
-        self.refusals = if is_used { 0 } else { self.refusals + 1 };
+        let is_believed = self.outliers.push(!is_used);
         if is_used {
             let gain = self.factor.measure_last(noise_variance);
             self.state += gain * innovation_mps;
             self.unit.measure(&gain);
-        } else if self.refusals > REFUSALS_MAX {
+        } else if is_believed {
             self.anchor(measured_mps);
         }
         Innovation { innovation_mps, deviation_mps, likelihood: inlier + outlier, is_used }
@@ -201,17 +200,15 @@ impl Hypothesis {
     pub fn united(&self, other: &Hypothesis) -> Hypothesis {
         let (more, less) = if self.weight >= other.weight { (self, other) } else { (other, self) };
         let weight = more.weight + less.weight;
-        let share = less.weight / weight;
-        let apart = less.state - more.state;
-        let covariance = more.factor.covariance() * (1.0 - share)
-            + less.factor.covariance() * share
-            + apart * apart.transpose() * (share * (1.0 - share));
+        let mut both = Mixture::default();
+        both.add(more.weight, &more.state, &more.factor.covariance());
+        both.add(less.weight, &less.state, &less.factor.covariance());
         let mut united = *more;
         united.weight = weight;
-        if let Some(factor) = CovarianceFactor::of(&covariance) {
-            united.state += apart * share;
+        if let Some(factor) = CovarianceFactor::of(&both.belief.covariance) {
+            united.state = both.belief.mean;
             united.factor = factor;
-            united.unit = more.unit.mixed(&less.unit, share);
+            united.unit = more.unit.mixed(&less.unit, less.weight / weight);
         }
         united
     }
@@ -225,7 +222,7 @@ impl Hypothesis {
 
 #[cfg(test)]
 mod tests {
-    use super::super::fit::{DavisPrior, Disturbance, FitSettings, Stretch, TrajectoryFitter};
+    use super::super::fit::{DavisPrior, FitSettings, Stretch, TrajectoryFitter};
     use super::super::test_runs::{FAST, normal, random, speeds, steps};
     use super::*;
     use crate::filter::levenberg_marquardt::ParameterBox;
@@ -281,7 +278,7 @@ mod tests {
                 prior: Some(DavisPrior { davis: FAST, std: prior_std() }),
                 bounds: ParameterBox { low: Vector3::repeat(-9.0), high: Vector3::repeat(9.0) },
                 speed_noise_mps: Some(NOISE_MPS),
-                disturbance: Disturbance::Ratio(ratio),
+                disturbance_ratio: ratio,
                 outlier_threshold: f64::INFINITY,
                 ..FitSettings::new(rule)
             };
@@ -339,7 +336,7 @@ mod tests {
         }
         assert!((filter.state[SPEED] - 40.0).abs() < 0.05);
         let davis = filter.davis();
-        for _ in 0..20 {
+        for _ in 0..14 {
             filter.predict(StepRule::Time, &hold, 0.2);
             filter.measure(45.0, &model, &outliers());
         }

@@ -4,55 +4,43 @@ use std::sync::Arc;
 
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 use nalgebra::Vector3;
-use serde::Deserialize;
 
-use super::bank::{HYPOTHESES_MAX, JumpModel, StepDoubt};
+use super::bank::{JumpModel, StepDoubt};
 use super::hypothesis::Innovation;
 use super::index::DAVIS;
 use super::motion::{Motion, MotionStep, MotionTracker};
 use super::noise::NoiseModel;
 use super::online::{OnlineFilter, OnlineSettings};
-use super::quality::{Estimate, SpeedRange, missing, prior_std};
+use super::quality::{Estimate, prior_std};
 use super::step::{Step, StepRule, resistance_gain};
 use super::unexplained::UnexplainedForce;
 use crate::force::ResolvedSample;
-use crate::pipeline::motion::{Rounding, jump_variance};
-use crate::pipeline::output::{write_parameters, write_status};
+use crate::pipeline::judge::InputHealth;
+use crate::pipeline::motion::{Rounding, SpeedRange, jump_variance};
+use crate::pipeline::output::write_parameters;
 use crate::pipeline::sample_gate::{Gated, SampleGate};
-use crate::pipeline::settings::{SettingError, require};
+use crate::pipeline::settings::{SettingError, settings};
 use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use crate::train::{Davis, TrainModel};
 
-/// Settings of `trajectory_kalman`.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct TrajectoryKalmanSettings {
-    /// Standard deviations of the declared coefficients, as a share of each.
-    pub prior_relative_std: f64,
-    /// Evidence in nats that it takes to believe in a jump of the coefficients (rain, wind, a
-    /// change of the train) within a given second. Disturbances that last, as no noise model
-    /// here has them, look like jumps: less evidence is quicker and more often wrong.
-    pub jump_evidence: f64,
-    /// The most hypotheses about the last jump; 1 looks for no jumps.
-    pub hypotheses: u32,
-    /// Standard deviation of the measured speed in m/s; learned when absent.
-    pub speed_noise_mps: Option<f64>,
-    /// Root of the density of disturbing forces in N/kN √s; learned when absent.
-    pub disturbance_n_per_kn_sqrt_s: Option<f64>,
-    /// Samples that the learned noise looks back over.
-    pub noise_memory: u32,
-}
-
-impl Default for TrajectoryKalmanSettings {
-    fn default() -> Self {
-        TrajectoryKalmanSettings {
-            prior_relative_std: 0.5,
-            jump_evidence: 16.0,
-            hypotheses: 8,
-            speed_noise_mps: None,
-            disturbance_n_per_kn_sqrt_s: None,
-            noise_memory: 2000,
-        }
+settings! {
+    /// Settings of `trajectory_kalman`.
+    #[derive(Copy)]
+    TrajectoryKalmanSettings {
+        /// Standard deviations of the declared coefficients, as a share of each.
+        prior_relative_std: f64 = 0.5 => (above 0);
+        /// Evidence in nats that it takes to believe in a jump of the coefficients (rain, wind, a
+        /// change of the train) within a given second. Disturbances that last, as no noise model
+        /// here has them, look like jumps: less evidence is quicker and more often wrong.
+        jump_evidence: f64 = 16.0 => (1 to 1000 "nats");
+        /// The most hypotheses about the last jump; 1 looks for no jumps.
+        hypotheses: u32 = 8 => (1 to 16);
+        /// Standard deviation of the measured speed in m/s; learned when absent.
+        speed_noise_mps: Option<f64> = None => (above 0);
+        /// Root of the density of disturbing forces in N/kN √s; learned when absent.
+        disturbance_n_per_kn_sqrt_s: Option<f64> = None => (0 or more);
+        /// Samples that the learned noise looks back over.
+        noise_memory: u32 = 2000 => (50 or more);
     }
 }
 
@@ -74,36 +62,22 @@ impl TrajectoryKalmanSettings {
     ///
     /// When a setting lies outside its range.
     pub fn build(&self, train: &Arc<TrainModel>) -> Result<TrajectoryKalman, SettingError> {
-        let positive = "a finite number above 0";
-        let is_positive = |value: f64| value > 0.0 && value.is_finite();
-        let relative = self.prior_relative_std;
-        require(is_positive(relative), "prior_relative_std", relative, positive)?;
-        let evidence = self.jump_evidence;
-        require((1.0..=1e3).contains(&evidence), "jump_evidence", evidence, "1 to 1000 nats")?;
-        let hypotheses = f64::from(self.hypotheses);
-        let is_allowed = (1..=HYPOTHESES_MAX as u32).contains(&self.hypotheses);
-        require(is_allowed, "hypotheses", hypotheses, "1 to 16")?;
+        self.check_ranges()?;
         let speed_noise_mps = self.speed_noise_mps.unwrap_or(SPEED_NOISE_FIRST_MPS);
-        require(is_positive(speed_noise_mps), "speed_noise_mps", speed_noise_mps, positive)?;
         let disturbance = self.disturbance_n_per_kn_sqrt_s.unwrap_or(DISTURBANCE_FIRST);
-        let is_allowed = disturbance >= 0.0 && disturbance.is_finite();
-        let key = "disturbance_n_per_kn_sqrt_s";
-        require(is_allowed, key, disturbance, "a finite number, 0 or above")?;
-        let memory = f64::from(self.noise_memory);
-        require(memory >= 50.0, "noise_memory", memory, "at least 50 samples")?;
         let gain = resistance_gain(train.rotating_mass_factor);
-        let davis_std = prior_std(train, relative);
+        let davis_std = prior_std(train, self.prior_relative_std);
         Ok(TrajectoryKalman::new(OnlineSettings {
             davis: train.resistance,
             davis_std,
-            jumps: JumpModel { evidence, std: davis_std, spacing_s: SPACING_S },
+            jumps: JumpModel { evidence: self.jump_evidence, std: davis_std, spacing_s: SPACING_S },
             hypotheses: self.hypotheses as usize,
             noise: NoiseModel {
                 speed_noise_mps,
                 speed_noise_range_mps: SPEED_NOISE_RANGE_MPS,
                 disturbance: gain * disturbance,
                 disturbance_range: (gain * DISTURBANCE_RANGE.0, gain * DISTURBANCE_RANGE.1),
-                memory,
+                memory: f64::from(self.noise_memory),
                 learns_speed_noise: self.speed_noise_mps.is_none(),
                 learns_disturbance: self.disturbance_n_per_kn_sqrt_s.is_none(),
             },
@@ -126,7 +100,8 @@ pub struct TrajectoryKalman {
     unexplained: UnexplainedForce,
     speeds: SpeedRange,
     updates: u64,
-    /// Why there is no estimate, when something else than the lack of samples is to blame.
+    health: InputHealth,
+    /// Why there is no estimate, when something else than the samples is to blame.
     fault: Option<(Status, Reason)>,
 }
 
@@ -151,6 +126,7 @@ impl TrajectoryKalman {
             unexplained: UnexplainedForce::default(),
             speeds: SpeedRange::default(),
             updates: 0,
+            health: InputHealth::default(),
             fault: None,
         }
     }
@@ -195,7 +171,7 @@ impl Gated for TrajectoryKalman {
 
     fn take(&mut self, sample: &ResolvedSample) -> Outcome {
         self.rounding.see(sample.speed_mps);
-        match self.tracker.advance(sample) {
+        let outcome = match self.tracker.advance(sample) {
             Motion::Continue(motion) => self.take_step(&motion, sample),
             Motion::Begin => {
                 self.filter.begin(sample.speed_mps);
@@ -204,16 +180,13 @@ impl Gated for TrajectoryKalman {
                 Outcome::Used
             }
             Motion::Standstill => Outcome::Used,
-            Motion::Unusable(reason) => {
-                if reason == RejectionReason::Missing && self.updates < UPDATES_MIN {
-                    self.fault = Some(missing(sample));
-                }
-                Outcome::Rejected(reason)
-            }
-        }
+            Motion::Unusable(reason) => Outcome::Rejected(reason),
+        };
+        self.health.note(outcome, sample)
     }
 
-    fn leave_out(&mut self, _: &ResolvedSample, _: RejectionReason) {
+    fn leave_out(&mut self, sample: &ResolvedSample, reason: RejectionReason) {
+        self.health.refuse(reason, sample);
         self.tracker = MotionTracker::default();
     }
 }
@@ -230,22 +203,21 @@ impl Estimator for TrajectoryKalman {
     fn write(&self, snapshot: &mut ParameterSnapshot) {
         let (davis, covariance) = self.filter.davis();
         write_parameters(snapshot, DAVIS, &Vector3::new(davis.a, davis.b, davis.c), &covariance);
+        let is_fresh = self.filter.bank().likeliest().age_s < FRESH_S;
         let estimate = Estimate {
             davis,
             covariance,
             prior_std: self.prior_std,
-            speeds_mps: self.speeds.get(),
+            speeds: self.speeds,
             innovations: &self.innovations,
             inflation: self.filter.inflation(),
             is_ready: self.updates >= UPDATES_MIN,
             is_at_bound: false,
+            fault: self.fault,
+            input: self.health.complaint().or(self.gate.complaint()),
+            doubt: is_fresh.then_some(Reason::InnovationsTooLarge),
         };
-        estimate.write(snapshot, self.fault);
-        let is_fresh = self.filter.bank().likeliest().age_s < FRESH_S;
-        if is_fresh && snapshot.status() == Status::Estimated {
-            write_status(snapshot, Status::Degraded, Reason::InnovationsTooLarge);
-        }
-        self.gate.qualify(snapshot);
+        estimate.write(snapshot);
         let speed_variance = self.filter.bank().likeliest().noise.speed_variance;
         self.unexplained.write(snapshot, speed_variance);
         snapshot.generation = self.filter.resets();

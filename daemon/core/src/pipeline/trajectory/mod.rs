@@ -1,15 +1,13 @@
-//! Davis coefficients by fitting a computed speed trajectory to the measured one (Xia 2023).
+//! Davis coefficients by fitting a computed speed trajectory to the measured one; the paper's method is in
+//! [`super::papers::xia`].
 //!
 //! - [`step`]: how a train moves over one step, with derivatives
 //! - [`motion`]: from resolved samples to steps
-//! - [`deviation`], [`wolfe_newton`]: the paper's method, with its formulas corrected
 //! - [`integral_start`], [`residuals`], [`fit`]: ours, offline and over windows
 //! - [`hypothesis`], [`bank`], [`noise`], [`online`]: ours, sample by sample
 //! - [`quality`]: what an estimate is worth
 
 pub mod bank;
-pub mod dataset;
-pub mod deviation;
 pub mod fit;
 mod fit_settings;
 pub mod hypothesis;
@@ -18,14 +16,11 @@ pub mod integral_start;
 pub mod kalman;
 pub mod long_run;
 pub mod motion;
-pub mod newton;
-pub mod newton_settings;
 pub mod noise;
 pub mod online;
 #[cfg(test)]
 mod pipeline_tests;
 pub mod quality;
-mod ratio_posterior;
 pub mod residuals;
 mod search;
 pub mod step;
@@ -33,5 +28,3 @@ pub mod step;
 mod test_runs;
 pub mod unexplained;
 mod unit_disturbance;
-pub mod window;
-pub mod wolfe_newton;

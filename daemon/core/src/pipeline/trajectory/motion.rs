@@ -4,10 +4,7 @@ use dynocar_shared::RejectionReason;
 
 use super::step::Step;
 use crate::force::ResolvedSample;
-
-/// A speed in m/s at and below which a train counts as standing: holding brakes, slack and
-/// starting resistance are no part of the Davis model.
-pub const STANDSTILL_SPEED_MPS: f64 = 1.0;
+use crate::pipeline::motion::MOVING_MPS;
 
 /// What a sample adds to a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,7 +72,7 @@ impl MotionTracker {
         if sample.is_sliding {
             return Motion::Unusable(RejectionReason::WheelSlide);
         }
-        if sample.speed_mps <= STANDSTILL_SPEED_MPS {
+        if sample.speed_mps <= MOVING_MPS {
             return Motion::Standstill;
         }
         let Some(driving_force_n) = sample.driving_force_n() else {

@@ -6,11 +6,11 @@ use dynocar_shared::{Manoeuvre, ParameterSnapshot, PipelineKind, Reason, Rejecti
 
 use super::kalman::TrajectoryKalmanSettings;
 use super::motion::tests::sample;
-use super::newton::TrajectoryNewton;
-use super::newton_settings::{FitMethod, TrajectoryNewtonSettings};
 use super::test_runs::{METRO, metro, normal, random};
 use crate::force::ResolvedSample;
 use crate::pipeline::EstimatorSettings;
+use crate::pipeline::papers::xia::newton::TrajectoryNewton;
+use crate::pipeline::papers::xia::newton_settings::{FitMethod, TrajectoryNewtonSettings};
 use crate::pipeline::{Estimator, Outcome};
 use crate::train::{BrakeGear, Davis, TrainModel};
 

@@ -8,8 +8,9 @@ use dynocar_shared::{Manoeuvre, ParameterSnapshot, Reason, Status};
 use nalgebra::{Matrix3, Vector3};
 
 use super::index::{A, B, C};
-use crate::force::ResolvedSample;
 use crate::pipeline::InnovationMonitor;
+use crate::pipeline::judge::{Case, LONG_RUN_MAX};
+use crate::pipeline::motion::SpeedRange;
 use crate::pipeline::output::{write_innovations, write_status};
 use crate::train::{Davis, TrainModel};
 
@@ -17,15 +18,6 @@ use crate::train::{Davis, TrainModel};
 const W0_DEVIATION_MAX: f64 = 0.1;
 /// A coefficient is excited when the data have cut its prior standard deviation to this share.
 const EXCITED_SHARE: f64 = 0.5;
-/// Mean square of the innovations above which the model does not hold.
-const INNOVATION_SQUARE_MAX: f64 = 4.0;
-/// Lag-1 correlation of the innovations beyond which the model lacks something.
-const INNOVATION_CORRELATION_MAX: f64 = 0.6;
-/// Long-run variance of the innovations beyond which the model lacks something.
-const INFLATION_MAX: f64 = 4.0;
-/// Innovations before their statistics count.
-const INNOVATIONS_MIN: f64 = 50.0;
-
 /// Standard deviations of declared coefficients, as a share of each, or of a fifth of the
 /// resistance at the train's highest speed where one is declared small or zero.
 pub fn prior_std(train: &TrainModel, relative: f64) -> Vector3<f64> {
@@ -39,13 +31,6 @@ pub fn prior_std(train: &TrainModel, relative: f64) -> Vector3<f64> {
     )
 }
 
-/// Status and reason while samples lack a force.
-pub fn missing(sample: &ResolvedSample) -> (Status, Reason) {
-    let is_gradient = sample.gradient_permille.is_none();
-    let reason = if is_gradient { Reason::GradientUnknown } else { Reason::MissingQuantity };
-    (Status::Unestimated, reason)
-}
-
 /// An estimate with what is needed to judge it.
 #[derive(Clone, Copy, Debug)]
 pub struct Estimate<'a> {
@@ -55,8 +40,8 @@ pub struct Estimate<'a> {
     pub covariance: Matrix3<f64>,
     /// Their standard deviations before any data.
     pub prior_std: Vector3<f64>,
-    /// Lowest and highest speed in m/s behind them; `None` before the first.
-    pub speeds_mps: Option<(f64, f64)>,
+    /// Speeds behind them.
+    pub speeds: SpeedRange,
     /// Innovations so far.
     pub innovations: &'a InnovationMonitor,
     /// Factor by which disturbances that last have widened the covariance.
@@ -65,41 +50,42 @@ pub struct Estimate<'a> {
     pub is_ready: bool,
     /// True when a coefficient lies at a bound.
     pub is_at_bound: bool,
+    /// Why there is no estimate, when something else than the samples is to blame.
+    pub fault: Option<(Status, Reason)>,
+    /// What is wrong with the samples.
+    pub input: Option<Reason>,
+    /// What else contradicts the estimate.
+    pub doubt: Option<Reason>,
 }
 
 impl Estimate<'_> {
-    /// Status and reason, without regard to the input.
-    pub fn status(&self) -> (Status, Reason) {
-        let Some((low_mps, high_mps)) = self.speeds_mps.filter(|_| self.is_ready) else {
-            return (Status::Unestimated, Reason::TooFewSamples);
-        };
-        if !self.covariance.iter().all(|entry| entry.is_finite()) {
-            return (Status::Invalid, Reason::NumericalFailure);
-        }
-        let is_loose = [low_mps, 0.5 * (low_mps + high_mps), high_mps].into_iter().any(|speed| {
-            let powers = Vector3::new(1.0, speed, speed * speed);
-            let variance = (powers.transpose() * self.covariance * powers)[0];
-            let w0 = self.davis.w0_n_per_kn(speed).abs().max(0.1);
-            variance.max(0.0).sqrt() > W0_DEVIATION_MAX * w0
+    /// All that the judge asks for.
+    pub fn case(&self) -> Case {
+        let is_finite = self.covariance.iter().all(|entry| entry.is_finite());
+        let speeds_mps = self.speeds.get().filter(|_| self.is_ready);
+        let is_known = speeds_mps.is_none_or(|(low_mps, high_mps)| {
+            [low_mps, 0.5 * (low_mps + high_mps), high_mps].into_iter().all(|speed| {
+                let powers = Vector3::new(1.0, speed, speed * speed);
+                let variance = (powers.transpose() * self.covariance * powers)[0];
+                let w0 = self.davis.w0_n_per_kn(speed).abs().max(0.1);
+                variance.max(0.0).sqrt() <= W0_DEVIATION_MAX * w0
+            })
         });
-        let monitor = self.innovations;
-        if is_loose {
-            (Status::Degraded, Reason::WeakExcitation)
-        } else if monitor.effective_count() < INNOVATIONS_MIN {
-            (Status::Estimated, self.remark())
-        } else if monitor.mean_square() > INNOVATION_SQUARE_MAX {
-            (Status::Degraded, Reason::InnovationsTooLarge)
-        } else if self.inflation > INFLATION_MAX || self.is_correlated() {
-            (Status::Degraded, Reason::InnovationsNotWhite)
-        } else {
-            (Status::Estimated, self.remark())
+        let is_ready = speeds_mps.is_some();
+        let failure = (Status::Invalid, Reason::NumericalFailure);
+        Case {
+            fault: self.fault.or((is_ready && !is_finite).then_some(failure)),
+            input: self.input,
+            is_ready,
+            is_known,
+            lacking: if is_ready { Status::Degraded } else { Status::Unestimated },
+            contradiction: self
+                .innovations
+                .contradiction()
+                .or((self.inflation > LONG_RUN_MAX).then_some(Reason::InnovationsNotWhite))
+                .or(self.doubt),
+            remark: self.remark(),
         }
-    }
-
-    /// True for innovations that follow each other; smaller than predicted, they do no harm.
-    fn is_correlated(&self) -> bool {
-        let monitor = self.innovations;
-        monitor.correlation().abs() > INNOVATION_CORRELATION_MAX && monitor.mean_square() > 0.5
     }
 
     fn remark(&self) -> Reason {
@@ -125,9 +111,8 @@ impl Estimate<'_> {
     /// # Real-time
     ///
     /// Allocates nothing.
-    pub fn write(&self, snapshot: &mut ParameterSnapshot, fault: Option<(Status, Reason)>) {
-        let (status, reason) = fault.unwrap_or_else(|| self.status());
-        write_status(snapshot, status, reason);
+    pub fn write(&self, snapshot: &mut ParameterSnapshot) {
+        write_status(snapshot, self.case().verdict());
         write_innovations(snapshot, self.innovations);
         let excited = self.excited();
         let mut missing = 0;
@@ -138,31 +123,12 @@ impl Estimate<'_> {
                 missing |= manoeuvre.bit();
             }
         }
-        if self.speeds_mps.is_none() {
+        if self.speeds.get().is_none() {
             missing |= Manoeuvre::Move.bit();
         }
         snapshot.excited = (0..3).map(|i| u32::from(excited[i]) << i).sum();
         snapshot.missing_manoeuvres = missing;
-        let (low_mps, high_mps) = self.speeds_mps.unwrap_or((0.0, 0.0));
-        snapshot.speed_min_mps = low_mps;
-        snapshot.speed_max_mps = high_mps;
-    }
-}
-
-/// Lowest and highest speed so far.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SpeedRange(Option<(f64, f64)>);
-
-impl SpeedRange {
-    /// Takes in a speed in m/s.
-    pub fn push(&mut self, speed_mps: f64) {
-        let (low, high) = self.0.unwrap_or((speed_mps, speed_mps));
-        self.0 = Some((low.min(speed_mps), high.max(speed_mps)));
-    }
-
-    /// Lowest and highest, in m/s.
-    pub fn get(&self) -> Option<(f64, f64)> {
-        self.0
+        self.speeds.write(snapshot);
     }
 }
 
@@ -171,15 +137,20 @@ mod tests {
     use super::*;
 
     fn estimate(monitor: &InnovationMonitor, covariance: Matrix3<f64>) -> Estimate<'_> {
+        let mut speeds = SpeedRange::default();
+        [75.0, 84.0].into_iter().for_each(|speed_mps| speeds.push(speed_mps));
         Estimate {
             davis: Davis { a: 1.0, b: 0.02, c: 0.001 },
             covariance,
             prior_std: Vector3::new(0.5, 0.01, 0.0005),
-            speeds_mps: Some((75.0, 84.0)),
+            speeds,
             innovations: monitor,
             inflation: 1.0,
             is_ready: true,
             is_at_bound: false,
+            fault: None,
+            input: None,
+            doubt: None,
         }
     }
 
@@ -193,10 +164,10 @@ mod tests {
     fn cruise_gives_an_estimate_that_says_what_it_lacks() {
         let monitor = InnovationMonitor::new(100);
         let estimate = estimate(&monitor, cruise_covariance());
-        assert_eq!(estimate.status(), (Status::Estimated, Reason::WeakExcitation));
+        assert_eq!(estimate.case().verdict(), (Status::Estimated, Reason::WeakExcitation));
         assert_eq!(estimate.excited(), [false, false, true]);
         let mut snapshot = ParameterSnapshot::empty();
-        estimate.write(&mut snapshot, None);
+        estimate.write(&mut snapshot);
         assert_eq!(snapshot.excited, 0b100);
         let expected = Manoeuvre::CoastSlow.bit() | Manoeuvre::VarySpeed.bit();
         assert_eq!(snapshot.missing_manoeuvres, expected);
@@ -207,7 +178,7 @@ mod tests {
         let monitor = InnovationMonitor::new(100);
         let covariance = Matrix3::from_diagonal(&Vector3::new(9.0, 0.0, 0.0));
         let estimate = estimate(&monitor, covariance);
-        assert_eq!(estimate.status(), (Status::Degraded, Reason::WeakExcitation));
+        assert_eq!(estimate.case().verdict(), (Status::Degraded, Reason::WeakExcitation));
     }
 
     #[test]
@@ -215,6 +186,6 @@ mod tests {
         let mut monitor = InnovationMonitor::new(100);
         (0..200).for_each(|_| monitor.push(1.0));
         let estimate = estimate(&monitor, cruise_covariance());
-        assert_eq!(estimate.status(), (Status::Degraded, Reason::InnovationsNotWhite));
+        assert_eq!(estimate.case().verdict(), (Status::Degraded, Reason::InnovationsNotWhite));
     }
 }

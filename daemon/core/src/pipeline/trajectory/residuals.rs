@@ -9,7 +9,7 @@
 //! The initial speed of each stretch is a parameter. Its column is eliminated stretch by
 //! stretch by orthogonal reflections, so that the work grows with the samples alone.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use super::long_run::LongRunVariance;
 use super::step::{Step, StepRule, Stretch};
@@ -79,8 +79,6 @@ pub struct Pass {
     pub log_variance: f64,
     /// Sum of the logarithms of the eliminated pivots: of the information on initial speeds.
     pub log_pivots: f64,
-    /// Sum over stretches of the outer product of their scores.
-    pub score_square: Matrix3<f64>,
     /// Long-run variance of the residuals in standard deviations.
     pub long_run: LongRunVariance,
     /// Speed in m/s at the end of the last stretch, led back to its measurement.
@@ -99,7 +97,6 @@ impl Pass {
             square_mps2: 0.0,
             log_variance: 0.0,
             log_pivots: 0.0,
-            score_square: Matrix3::zeros(),
             long_run: LongRunVariance::new(f64::INFINITY),
             end_speed_mps: 0.0,
             end_variance: 0.0,
@@ -191,9 +188,7 @@ impl LeastSquares<3> for Residuals<'_, '_> {
             for row in &factor[1..] {
                 joint.push(&[row[1], row[2], row[3], row[4]]);
             }
-            let score = TriangularSystem::<3>::from_rows(&mut rows.rows).gradient();
             self.tried_pass.log_pivots += factor[0][0].abs().ln();
-            self.tried_pass.score_square += score * score.transpose();
         }
         let mut system = TriangularSystem::from_rows(&mut joint);
         if let Some(prior) = &self.prior {

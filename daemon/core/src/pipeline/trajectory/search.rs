@@ -1,9 +1,8 @@
-//! The search behind a trajectory fit: coefficients, noise and disturbance in turn.
+//! The search behind a trajectory fit: coefficients and noise in turn.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::fit_settings::{FitError, FitSettings, SCALES, TrajectoryFit};
-use super::ratio_posterior::{EXPONENTS, RatioPosterior, Tried};
 use super::residuals::{InitialSpeeds, Pass, Residuals, Weighting};
 use super::step::Stretch;
 use crate::filter::levenberg_marquardt::{LeastSquares, Solution, SolverSettings, minimise};
@@ -14,8 +13,6 @@ use crate::train::Davis;
 /// trajectory would count as a residual.
 const SPEED_NOISE_MIN_MPS: f64 = 1e-8;
 const NOISE_ROUNDS_MAX: u32 = 8;
-/// Decrease of the cost worth an iteration when disturbance ratios are compared.
-const ROUGH_DECREASE: f64 = 2e-4;
 
 /// The least-squares solution for one disturbance ratio.
 pub struct Fitted {
@@ -28,9 +25,6 @@ pub struct Fitted {
     /// Noise that the residuals show.
     shown_mps: f64,
     log_likelihood: f64,
-    /// The likelihood of what the fitted parameters leave over (Patterson, Thompson 1971):
-    /// the greatest likelihood itself takes the slow disturbances that coefficients and initial
-    /// speeds have absorbed for their absence.
     restricted_log_likelihood: f64,
 }
 
@@ -57,36 +51,32 @@ pub struct Search<'a, 'b> {
     settings: &'a FitSettings,
     prior: Option<TriangularSystem<3>>,
     buffers: &'b mut Buffers,
-    /// See [`FitSettings::decrease_tolerance`].
-    pub decrease_tolerance: f64,
     iterations: u32,
 }
 
 impl<'a, 'b> Search<'a, 'b> {
-    /// A search that compares roughly, from the initial speeds in the buffers.
+    /// A search from the initial speeds in the buffers.
     pub fn new(
         stretches: &'a [Stretch<'a>],
         settings: &'a FitSettings,
         prior: Option<TriangularSystem<3>>,
         buffers: &'b mut Buffers,
     ) -> Self {
-        let decrease_tolerance = ROUGH_DECREASE;
-        Search { stretches, settings, prior, buffers, decrease_tolerance, iterations: 0 }
+        Search { stretches, settings, prior, buffers, iterations: 0 }
     }
 
-    /// Fits for one disturbance ratio; repeats until the noise that weighs the residuals is
-    /// the noise that they show.
-    pub fn at_ratio(&mut self, start: &Vector3<f64>, ratio: f64) -> Result<Fitted, FitError> {
+    /// Repeats the fit until the noise that weighs the residuals is the noise that they show.
+    pub fn run(&mut self, start: &Vector3<f64>) -> Result<Fitted, FitError> {
         let mut point = *start;
         let mut noise_mps = match self.settings.speed_noise_mps {
             Some(known_mps) => known_mps,
-            None => self.median_noise_mps(&point, ratio)?,
+            None => self.median_noise_mps(&point)?,
         };
         let mut rounds = 0;
         loop {
             noise_mps = noise_mps.max(SPEED_NOISE_MIN_MPS);
             rounds += 1;
-            let fitted = self.minimise(&point, ratio, noise_mps)?;
+            let fitted = self.minimise(&point, noise_mps)?;
             let is_settled = (fitted.noise_mps / noise_mps - 1.0).abs() < 0.01
                 || (fitted.noise_mps < SPEED_NOISE_MIN_MPS && noise_mps <= SPEED_NOISE_MIN_MPS);
             let is_known = self.settings.speed_noise_mps.is_some();
@@ -97,16 +87,11 @@ impl<'a, 'b> Search<'a, 'b> {
         }
     }
 
-    fn minimise(
-        &mut self,
-        point: &Vector3<f64>,
-        ratio: f64,
-        noise_mps: f64,
-    ) -> Result<Fitted, FitError> {
+    fn minimise(&mut self, point: &Vector3<f64>, noise_mps: f64) -> Result<Fitted, FitError> {
         let settings = self.settings;
         let weighting = Weighting {
             speed_noise_mps: noise_mps,
-            disturbance_ratio: ratio,
+            disturbance_ratio: settings.disturbance_ratio,
             outlier_threshold: settings.outlier_threshold,
         };
         let start = settings.bounds.clamp(point);
@@ -121,7 +106,7 @@ impl<'a, 'b> Search<'a, 'b> {
         let solver = SolverSettings {
             scales: Vector3::from(SCALES),
             iterations_max: 60,
-            decrease_tolerance: self.decrease_tolerance,
+            decrease_tolerance: settings.decrease_tolerance,
             relative_tolerance: 1e-14,
         };
         let solution = minimise(&mut residuals, &start, &settings.bounds, &solver)
@@ -148,10 +133,10 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 
     /// Noise by the median absolute residual, which half the residuals cannot spoil.
-    fn median_noise_mps(&mut self, point: &Vector3<f64>, ratio: f64) -> Result<f64, FitError> {
+    fn median_noise_mps(&mut self, point: &Vector3<f64>) -> Result<f64, FitError> {
         let weighting = Weighting {
             speed_noise_mps: 1.0,
-            disturbance_ratio: ratio,
+            disturbance_ratio: self.settings.disturbance_ratio,
             outlier_threshold: f64::INFINITY,
         };
         let start = self.settings.bounds.clamp(point);
@@ -167,68 +152,20 @@ impl<'a, 'b> Search<'a, 'b> {
         Ok(*median / 0.6745)
     }
 
-    /// The disturbance ratio of greatest restricted likelihood, by decades and then by quarters
-    /// of a decade, and what the other ratios are worth.
-    pub fn likeliest_ratio(
-        &mut self,
-        point: &mut Vector3<f64>,
-    ) -> Result<(f64, RatioPosterior), FitError> {
-        let mut posterior = RatioPosterior::new();
-        // Downwards, since much disturbance binds the trajectory to the measured speeds.
-        for exponent in EXPONENTS.rev().map(f64::from) {
-            posterior.add(self.tried(point, exponent)?);
-        }
-        *point = posterior.likeliest().point;
-        for exponent in posterior.between_neighbours() {
-            posterior.add(self.tried(point, exponent)?);
-        }
-        *point = posterior.likeliest().point;
-        let without = self.at_ratio(point, 0.0)?;
-        // Half a unit of likelihood is what the free ratio gains by chance (Akaike 1974: 1).
-        let gain = posterior.likeliest().log_likelihood - without.restricted_log_likelihood;
-        let ratio = if gain > 0.5 { 10f64.powf(posterior.peak_exponent()) } else { 0.0 };
-        Ok((ratio, posterior))
-    }
-
-    /// The fit at 10 to the power of an exponent; `point` moves on to it.
-    fn tried(&mut self, point: &mut Vector3<f64>, exponent: f64) -> Result<Tried, FitError> {
-        let fitted = self.at_ratio(point, 10f64.powf(exponent))?;
-        *point = fitted.solution.point;
-        Ok(Tried {
-            exponent,
-            log_likelihood: fitted.restricted_log_likelihood,
-            point: *point,
-            covariance: fitted.covariance()?,
-        })
-    }
-
     /// The fit with covariance and counts.
-    pub fn describe(
-        &self,
-        fitted: &Fitted,
-        ratio: f64,
-        others: Option<&RatioPosterior>,
-    ) -> Result<TrajectoryFit, FitError> {
+    pub fn describe(&self, fitted: &Fitted) -> Result<TrajectoryFit, FitError> {
         let Fitted { solution, pass, .. } = fitted;
         let inflation = pass.long_run.inflation();
-        let own = fitted.covariance()?;
-        let covariance =
-            others.and_then(|others| others.covariance_about(&solution.point)).unwrap_or(own);
-        let raw = solution.linearisation.system.covariance().ok_or(FitError::NotDetermined)?;
-        let stretches = self.stretches.len() as f64;
-        let cluster_covariance = (self.stretches.len() >= 4)
-            .then(|| raw * pass.score_square * raw * (stretches / (stretches - 1.0)));
         let point = solution.point;
         let bounds = &self.settings.bounds;
         Ok(TrajectoryFit {
             davis: Davis { a: point[0], b: point[1], c: point[2] },
-            covariance: covariance * inflation,
+            covariance: fitted.covariance()? * inflation,
             inflation,
-            cluster_covariance,
             speed_noise_mps: fitted.noise_mps,
             residual_std_mps: fitted.shown_mps,
-            disturbance_ratio: ratio,
             log_likelihood: fitted.log_likelihood,
+            restricted_log_likelihood: fitted.restricted_log_likelihood,
             rmse_mps: (pass.square_mps2 / pass.count as f64).sqrt(),
             end_speed_mps: pass.end_speed_mps,
             end_variance: pass.end_variance,

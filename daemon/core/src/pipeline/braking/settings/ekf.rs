@@ -1,44 +1,32 @@
 //! Settings of the extended Kalman filter.
 
 use dynocar_shared::{PipelineKind, Uncertain};
-use serde::Deserialize;
 
-use super::{ADHESION_REFERENCE, BrakeFactor, BrakingSettings, declared, require_positive};
+use super::{ADHESION_REFERENCE, BrakeFactor, BrakingSettings, declared};
 use crate::pipeline::Estimator;
 use crate::pipeline::braking::intake::Quantity;
 use crate::pipeline::braking::law::Law;
 use crate::pipeline::braking::motion::Walk;
 use crate::pipeline::braking::tracker::{Prior, PriorScale, Tracker, TrackerModel};
-use crate::pipeline::settings::{SettingError, require};
+use crate::pipeline::settings::{SettingError, settings};
 use crate::train::TrainModel;
 
-/// Settings of the extended Kalman filter with a random walk of the coefficient.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct EkfSettings {
-    /// Motion, measurement and braking.
-    pub braking: BrakingSettings,
-    /// The coefficient before the first observation; the declared one, or an adhesion of 0.1, when
-    /// absent.
-    pub initial: Option<f64>,
-    /// Its standard deviation over the declared value (over 0.1 for adhesion).
-    pub initial_relative_std: f64,
-    /// Standard deviation that it gains in 1 s, over the demand; when absent, what serves best in
-    /// the papers' scenarios.
-    pub relative_walk: Option<f64>,
-    /// What a brake pipeline reports; no meaning for adhesion.
-    pub reports: BrakeFactor,
-}
-
-impl Default for EkfSettings {
-    fn default() -> Self {
-        EkfSettings {
-            braking: BrakingSettings::default(),
-            initial: None,
-            initial_relative_std: 1.0,
-            relative_walk: None,
-            reports: BrakeFactor::Friction,
-        }
+settings! {
+    /// Settings of the extended Kalman filter with a random walk of the coefficient.
+    #[derive(Copy)]
+    EkfSettings {
+        /// Motion, measurement and braking.
+        braking: BrakingSettings = BrakingSettings::default();
+        /// The coefficient before the first observation; the declared one, or an adhesion of 0.1, when
+        /// absent.
+        initial: Option<f64> = None => (0 or more);
+        /// Its standard deviation over the declared value (over 0.1 for adhesion).
+        initial_relative_std: f64 = 1.0 => (above 0);
+        /// Standard deviation that it gains in 1 s, over the demand; when absent, what serves best in
+        /// the papers' scenarios.
+        relative_walk: Option<f64> = None => (above 0);
+        /// What a brake pipeline reports; no meaning for adhesion.
+        reports: BrakeFactor = BrakeFactor::Friction;
     }
 }
 
@@ -51,20 +39,23 @@ impl EkfSettings {
         })
     }
 
-    fn build(
+    /// Builds an estimator of a kind.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn build(
         &self,
         kind: PipelineKind,
         quantity: Quantity,
         train: &TrainModel,
     ) -> Result<Box<dyn Estimator>, SettingError> {
         self.braking.check()?;
-        require_positive("initial_relative_std", self.initial_relative_std)?;
+        self.check_ranges()?;
         let relative_walk = self.relative_walk(quantity);
-        require_positive("relative_walk", relative_walk)?;
         let reference = declared(quantity, train).unwrap_or(ADHESION_REFERENCE);
         let initial_std = self.initial_relative_std * reference;
         let initial = self.initial.unwrap_or(reference);
-        require(initial >= 0.0 && initial.is_finite(), "initial", initial, "0 or more")?;
         let model = TrackerModel {
             law: Law::Demand,
             noise: self.braking.noise(),
@@ -75,23 +66,5 @@ impl EkfSettings {
             },
         };
         Ok(self.braking.estimator(kind, quantity, train, Tracker::new(model, 0.0, 0, false)))
-    }
-
-    /// Builds `adhesion_ekf`.
-    ///
-    /// # Errors
-    ///
-    /// When a setting lies outside its range.
-    pub fn build_adhesion(&self, train: &TrainModel) -> Result<Box<dyn Estimator>, SettingError> {
-        self.build(PipelineKind::AdhesionEkf, Quantity::Adhesion, train)
-    }
-
-    /// Builds `brake_ekf`.
-    ///
-    /// # Errors
-    ///
-    /// When a setting lies outside its range.
-    pub fn build_brake(&self, train: &TrainModel) -> Result<Box<dyn Estimator>, SettingError> {
-        self.build(PipelineKind::BrakeEkf, self.reports.quantity(), train)
     }
 }

@@ -5,10 +5,10 @@ use serde::Deserialize;
 
 use super::{BrakeFactor, BrakingSettings};
 use crate::pipeline::Estimator;
-use crate::pipeline::braking::em::{EmModel, EmWindow, KalmanExpectation, ParticleExpectation};
 use crate::pipeline::braking::intake::Quantity;
 use crate::pipeline::braking::motion::MotionNoise;
-use crate::pipeline::settings::{SettingError, require};
+use crate::pipeline::papers::xie::{EmModel, EmWindow, KalmanExpectation, ParticleExpectation};
+use crate::pipeline::settings::{SettingError, require, settings};
 use crate::train::TrainModel;
 
 /// How the expectation of the EM is taken.
@@ -22,70 +22,50 @@ pub enum EStep {
     Kalman,
 }
 
-/// Settings of sliding-window EM.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct EmSettings {
-    /// Motion, measurement and braking; speeds are used only to start with.
-    pub braking: BrakingSettings,
-    /// Particles, of the particle E-step.
-    pub particles: usize,
-    /// Most iterations in a window.
-    pub iterations: usize,
-    /// Observations in a window (S).
-    pub window: usize,
-    /// Observations by which the window slides (L).
-    pub slide: usize,
-    /// Iterations end when the coefficient changes by less, as a share of the demand.
-    pub tolerance: f64,
-    /// The coefficient before the first window; when absent the declared one, and for adhesion
-    /// what the brake would need.
-    pub initial: Option<f64>,
-    /// Seed of the particles.
-    pub seed: u64,
-    /// How the expectation is taken.
-    pub e_step: EStep,
-    /// True for the papers' cap on the coefficient, under which values above the demand stick.
-    pub has_printed_cap: bool,
-    /// What a brake pipeline reports; no meaning for adhesion.
-    pub reports: BrakeFactor,
-}
-
-impl Default for EmSettings {
-    fn default() -> Self {
-        EmSettings {
-            braking: BrakingSettings::default(),
-            particles: 20,
-            iterations: 50,
-            window: 40,
-            slide: 5,
-            tolerance: 1e-7,
-            initial: None,
-            seed: 1,
-            e_step: EStep::Particle,
-            has_printed_cap: false,
-            reports: BrakeFactor::Friction,
-        }
+settings! {
+    /// Settings of sliding-window EM.
+    #[derive(Copy)]
+    EmSettings {
+        /// Motion, measurement and braking; speeds are used only to start with.
+        braking: BrakingSettings = BrakingSettings::default();
+        /// Particles, of the particle E-step.
+        particles: usize = 20 => (2 or more);
+        /// Most iterations in a window.
+        iterations: usize = 50 => (1 or more);
+        /// Observations in a window (S).
+        window: usize = 40 => (3 or more);
+        /// Observations by which the window slides (L).
+        slide: usize = 5;
+        /// Iterations end when the coefficient changes by less, as a share of the demand.
+        tolerance: f64 = 1e-7 => (0 or more);
+        /// The coefficient before the first window; when absent the declared one, and for adhesion
+        /// what the brake would need.
+        initial: Option<f64> = None => (0 or more);
+        /// Seed of the particles.
+        seed: u64 = 1;
+        /// How the expectation is taken.
+        e_step: EStep = EStep::Particle;
+        /// True for the papers' cap on the coefficient, under which values above the demand stick.
+        has_printed_cap: bool = false;
+        /// What a brake pipeline reports; no meaning for adhesion.
+        reports: BrakeFactor = BrakeFactor::Friction;
     }
 }
 
 impl EmSettings {
     fn check(&self) -> Result<(), SettingError> {
         self.braking.check()?;
-        let at_least = |key, value: usize, least: usize, allowed| {
-            require(value >= least, key, value as f64, allowed)
-        };
-        at_least("particles", self.particles, 2, "2 or more")?;
-        at_least("iterations", self.iterations, 1, "1 or more")?;
-        at_least("window", self.window, 3, "3 or more")?;
+        self.check_ranges()?;
         let slides = self.slide >= 1 && self.slide < self.window;
-        require(slides, "slide", self.slide as f64, "at least 1 and below window")?;
-        let initial = self.initial.unwrap_or(0.0);
-        require(initial >= 0.0 && initial.is_finite(), "initial", initial, "0 or more")?;
-        require(self.tolerance >= 0.0, "tolerance", self.tolerance, "0 or more")
+        require(slides, "slide", self.slide as f64, "at least 1 and below window")
     }
 
-    fn build(
+    /// Builds an estimator of a kind.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn build(
         &self,
         kind: PipelineKind,
         quantity: Quantity,
@@ -112,23 +92,5 @@ impl EmSettings {
                 self.braking.estimator(kind, quantity, train, EmWindow::new(model, kalman))
             }
         })
-    }
-
-    /// Builds `adhesion_em`.
-    ///
-    /// # Errors
-    ///
-    /// When a setting lies outside its range.
-    pub fn build_adhesion(&self, train: &TrainModel) -> Result<Box<dyn Estimator>, SettingError> {
-        self.build(PipelineKind::AdhesionEm, Quantity::Adhesion, train)
-    }
-
-    /// Builds `brake_em`.
-    ///
-    /// # Errors
-    ///
-    /// When a setting lies outside its range.
-    pub fn build_brake(&self, train: &TrainModel) -> Result<Box<dyn Estimator>, SettingError> {
-        self.build(PipelineKind::BrakeEm, self.reports.quantity(), train)
     }
 }

@@ -1,40 +1,29 @@
 //! Settings of the scale of a known adhesion law.
 
 use dynocar_shared::{PipelineKind, RailCondition, Uncertain};
-use serde::Deserialize;
 
-use super::{BrakingSettings, require_positive};
+use super::BrakingSettings;
 use crate::pipeline::Estimator;
 use crate::pipeline::braking::intake::Quantity;
 use crate::pipeline::braking::law::Law;
 use crate::pipeline::braking::law_bank::LawBank;
 use crate::pipeline::braking::motion::Walk;
 use crate::pipeline::braking::tracker::{Prior, PriorScale, TrackerModel};
-use crate::pipeline::settings::SettingError;
+use crate::pipeline::settings::{SettingError, settings};
 use crate::train::TrainModel;
 
-/// Settings of the scale of a known adhesion law.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LawSettings {
-    /// Motion, measurement and braking.
-    pub braking: BrakingSettings,
-    /// Standard deviation of the scale of a rail's law beforehand.
-    pub scale_std: f64,
-    /// Standard deviation that the scale gains in 1 s.
-    pub scale_walk: f64,
-    /// Rate in 1/s at which the rail's condition changes.
-    pub change_rate_per_s: f64,
-}
-
-impl Default for LawSettings {
-    fn default() -> Self {
-        LawSettings {
-            braking: BrakingSettings::default(),
-            scale_std: 0.25,
-            scale_walk: 0.0005,
-            change_rate_per_s: 0.0005,
-        }
+settings! {
+    /// Settings of the scale of a known adhesion law.
+    #[derive(Copy)]
+    LawSettings {
+        /// Motion, measurement and braking.
+        braking: BrakingSettings = BrakingSettings::default();
+        /// Standard deviation of the scale of a rail's law beforehand.
+        scale_std: f64 = 0.25 => (above 0);
+        /// Standard deviation that the scale gains in 1 s.
+        scale_walk: f64 = 0.0005 => (above 0);
+        /// Rate in 1/s at which the rail's condition changes.
+        change_rate_per_s: f64 = 0.0005 => (above 0);
     }
 }
 
@@ -46,9 +35,7 @@ impl LawSettings {
     /// When a setting lies outside its range.
     pub fn build_adhesion(&self, train: &TrainModel) -> Result<Box<dyn Estimator>, SettingError> {
         self.braking.check()?;
-        require_positive("scale_std", self.scale_std)?;
-        require_positive("scale_walk", self.scale_walk)?;
-        require_positive("change_rate_per_s", self.change_rate_per_s)?;
+        self.check_ranges()?;
         let hypothesis = |law, std| TrackerModel {
             law,
             noise: self.braking.noise(),

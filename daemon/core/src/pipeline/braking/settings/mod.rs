@@ -20,86 +20,60 @@ use super::intake::{BrakingIntake, IntakeSettings, Quantity};
 use super::motion::MotionNoise;
 use super::report::ReportSettings;
 use crate::pipeline::Estimator;
-use crate::pipeline::settings::{SettingError, require};
+use crate::pipeline::motion::MOVING_MPS;
+use crate::pipeline::settings::{SettingError, require, settings};
 use crate::train::TrainModel;
 
-/// What every braking pipeline is told of motion, measurement and braking.
-///
-/// The defaults of the noise are those of the papers' simulation: a position measured within
-/// 0.1 m, and process noise uniform within 0.1 m and 0.1 km/h over steps of 0.2 s.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct BrakingSettings {
-    /// Shortest time in s between two observations.
-    pub interval_s: f64,
-    /// A longer time in s between two observations ends the braking.
-    pub gap_max_s: f64,
-    /// Standard deviation of a measured position in m.
-    pub position_std_m: f64,
-    /// Standard deviation of a measured speed in m/s.
-    pub speed_std_mps: f64,
-    /// False when only the first speed of a braking is used, as in the papers.
-    pub uses_speed: bool,
-    /// Standard deviation in m that the position gains in 1 s about the model.
-    pub position_walk_m: f64,
-    /// Standard deviation in m/s that the speed gains in 1 s about the model.
-    pub speed_walk_mps: f64,
-    /// Standard deviation in m/s of the first speed of a braking.
-    pub first_speed_std_mps: f64,
-    /// Least brake force per weight that counts as braking.
-    pub braking_min_per_weight: f64,
-    /// Slowest speed in m/s at which the model is trusted.
-    pub speed_min_mps: f64,
-    /// True when the position does not come from the braked wheels, so that it holds while they
-    /// slide.
-    pub position_is_wheel_independent: bool,
-    /// Standard deviation over value of the declared brake force.
-    pub demand_relative_std: f64,
-    /// Greatest standard deviation over value of an estimate that counts.
-    pub relative_std_max: f64,
-    /// Age in s at which an estimate is stale.
-    pub stale_after_s: f64,
+settings! {
+    /// What every braking pipeline is told of motion, measurement and braking.
+    ///
+    /// The defaults of the noise are those of the papers' simulation: a position measured within
+    /// 0.1 m, and process noise uniform within 0.1 m and 0.1 km/h over steps of 0.2 s.
+    #[derive(Copy)]
+    BrakingSettings {
+        /// Shortest time in s between two observations.
+        interval_s: f64 = 0.2 => (above 0);
+        /// A longer time in s between two observations ends the braking.
+        gap_max_s: f64 = 2.0;
+        /// Standard deviation of a measured position in m.
+        position_std_m: f64 = 0.1 => (above 0);
+        /// Standard deviation of a measured speed in m/s.
+        speed_std_mps: f64 = 0.1 => (above 0);
+        /// False when only the first speed of a braking is used, as in the papers.
+        uses_speed: bool = true;
+        /// Standard deviation in m that the position gains in 1 s about the model.
+        position_walk_m: f64 = walk_per_sqrt_s(0.1) => (above 0);
+        /// Standard deviation in m/s that the speed gains in 1 s about the model.
+        speed_walk_mps: f64 = walk_per_sqrt_s(0.1 / 3.6) => (above 0);
+        /// Standard deviation in m/s of the first speed of a braking.
+        first_speed_std_mps: f64 = 0.2 => (above 0);
+        /// Least brake force per weight that counts as braking.
+        braking_min_per_weight: f64 = 0.01 => (above 0);
+        /// Slowest speed in m/s at which the model is trusted.
+        speed_min_mps: f64 = MOVING_MPS => (0 or more);
+        /// True when the position does not come from the braked wheels, so that it holds while they
+        /// slide.
+        position_is_wheel_independent: bool = false;
+        /// Standard deviation over value of the declared brake force.
+        demand_relative_std: f64 = 0.03 => (above 0);
+        /// Greatest standard deviation over value of an estimate that counts.
+        relative_std_max: f64 = 0.15 => (above 0);
+        /// Age in s at which an estimate is stale.
+        stale_after_s: f64 = 300.0 => (above 0);
+    }
 }
 
-impl Default for BrakingSettings {
-    fn default() -> Self {
-        // A uniform step of half width w has variance w²/3; 0.2 s make it a rate.
-        let walk = |half_width: f64| (half_width * half_width / 3.0 / 0.2).sqrt();
-        BrakingSettings {
-            interval_s: 0.2,
-            gap_max_s: 2.0,
-            position_std_m: 0.1,
-            speed_std_mps: 0.1,
-            uses_speed: true,
-            position_walk_m: walk(0.1),
-            speed_walk_mps: walk(0.1 / 3.6),
-            first_speed_std_mps: 0.2,
-            braking_min_per_weight: 0.01,
-            speed_min_mps: 1.0,
-            position_is_wheel_independent: false,
-            demand_relative_std: 0.03,
-            relative_std_max: 0.15,
-            stale_after_s: 300.0,
-        }
-    }
+/// Standard deviation that comes in 1 s from steps of 0.2 s, uniform within a half width, each of
+/// variance w²/3.
+fn walk_per_sqrt_s(half_width: f64) -> f64 {
+    (half_width * half_width / 3.0 / 0.2).sqrt()
 }
 
 impl BrakingSettings {
     fn check(&self) -> Result<(), SettingError> {
-        require_positive("interval_s", self.interval_s)?;
-        require_positive("position_std_m", self.position_std_m)?;
-        require_positive("speed_std_mps", self.speed_std_mps)?;
-        require_positive("position_walk_m", self.position_walk_m)?;
-        require_positive("speed_walk_mps", self.speed_walk_mps)?;
-        require_positive("first_speed_std_mps", self.first_speed_std_mps)?;
-        require_positive("braking_min_per_weight", self.braking_min_per_weight)?;
-        require_positive("demand_relative_std", self.demand_relative_std)?;
-        require_positive("relative_std_max", self.relative_std_max)?;
-        require_positive("stale_after_s", self.stale_after_s)?;
+        self.check_ranges()?;
         let is_longer = self.gap_max_s >= self.interval_s && self.gap_max_s.is_finite();
-        require(is_longer, "gap_max_s", self.gap_max_s, "at least interval_s")?;
-        let is_moving = self.speed_min_mps >= 0.0 && self.speed_min_mps.is_finite();
-        require(is_moving, "speed_min_mps", self.speed_min_mps, "at least 0")
+        require(is_longer, "gap_max_s", self.gap_max_s, "at least interval_s")
     }
 
     fn noise(&self) -> MotionNoise {
@@ -153,7 +127,7 @@ pub enum BrakeFactor {
 }
 
 impl BrakeFactor {
-    fn quantity(self) -> Quantity {
+    pub(in crate::pipeline) fn quantity(self) -> Quantity {
         match self {
             BrakeFactor::Friction => Quantity::Friction,
             BrakeFactor::Ratio => Quantity::Ratio,
@@ -172,8 +146,4 @@ fn declared(quantity: Quantity, train: &TrainModel) -> Option<f64> {
         Quantity::Friction => gear.map(|gear| gear.friction),
         Quantity::Ratio => gear.map(|gear| gear.ratio),
     }
-}
-
-fn require_positive(key: &'static str, value: f64) -> Result<(), SettingError> {
-    require(value > 0.0 && value.is_finite(), key, value, "a finite number above 0")
 }

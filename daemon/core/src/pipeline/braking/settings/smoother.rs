@@ -3,13 +3,13 @@
 use dynocar_shared::{PipelineKind, Uncertain};
 use serde::Deserialize;
 
-use super::{BrakeFactor, BrakingSettings, require_positive};
+use super::{BrakeFactor, BrakingSettings};
 use crate::pipeline::Estimator;
 use crate::pipeline::braking::intake::Quantity;
 use crate::pipeline::braking::law::{Law, SpeedTable};
 use crate::pipeline::braking::motion::Walk;
 use crate::pipeline::braking::tracker::{Prior, PriorScale, Tracker, TrackerModel};
-use crate::pipeline::settings::{SettingError, require};
+use crate::pipeline::settings::{SettingError, check_setting, settings};
 use crate::train::TrainModel;
 
 /// How the achieved share of the declared brake force wanders.
@@ -30,32 +30,20 @@ pub enum WalkSettings {
     },
 }
 
-/// Settings of the fixed-lag smoother.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SmootherSettings {
-    /// Motion, measurement and braking.
-    pub braking: BrakingSettings,
-    /// The estimate lies this many seconds back; 0 for the present.
-    pub lag_s: f64,
-    /// How the achieved share of the declared brake force wanders; see [`WalkSettings`] and
-    /// `SmootherSettings::walk` for what holds when absent.
-    pub walk: Option<WalkSettings>,
-    /// What a brake pipeline reports; no meaning for adhesion.
-    pub reports: BrakeFactor,
-    /// A known curve of disc friction, [speed in m/s, friction]; only its scale is estimated.
-    pub friction_law: Option<Vec<(f64, f64)>>,
-}
-
-impl Default for SmootherSettings {
-    fn default() -> Self {
-        SmootherSettings {
-            braking: BrakingSettings::default(),
-            lag_s: 5.0,
-            walk: None,
-            reports: BrakeFactor::Friction,
-            friction_law: None,
-        }
+settings! {
+    /// Settings of the fixed-lag smoother.
+    SmootherSettings {
+        /// Motion, measurement and braking.
+        braking: BrakingSettings = BrakingSettings::default();
+        /// The estimate lies this many seconds back; 0 for the present.
+        lag_s: f64 = 5.0 => (0 to 60);
+        /// How the achieved share of the declared brake force wanders; see [`WalkSettings`] and
+        /// `SmootherSettings::walk` for what holds when absent.
+        walk: Option<WalkSettings> = None;
+        /// What a brake pipeline reports; no meaning for adhesion.
+        reports: BrakeFactor = BrakeFactor::Friction;
+        /// A known curve of disc friction, [speed in m/s, friction]; only its scale is estimated.
+        friction_law: Option<Vec<(f64, f64)>> = None;
     }
 }
 
@@ -83,12 +71,12 @@ impl SmootherSettings {
     fn checked_walk(&self, quantity: Quantity) -> Result<Walk, SettingError> {
         match self.walk(quantity) {
             WalkSettings::Drift { std_per_s, time_s } => {
-                require_positive("walk.std_per_s", std_per_s)?;
-                require_positive("walk.time_s", time_s)?;
+                check_setting!(std_per_s, "walk.std_per_s", (above 0));
+                check_setting!(time_s, "walk.time_s", (above 0));
                 Ok(Walk::Drift { std_per_s, time_s })
             }
             WalkSettings::Scale { std_after_1_s } => {
-                require_positive("walk.std_after_1_s", std_after_1_s)?;
+                check_setting!(std_after_1_s, "walk.std_after_1_s", (above 0));
                 Ok(Walk::Scale(std_after_1_s.powi(2)))
             }
         }
@@ -112,14 +100,19 @@ impl SmootherSettings {
         }
     }
 
-    fn build(
+    /// Builds an estimator of a kind.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn build(
         &self,
         kind: PipelineKind,
         quantity: Quantity,
         train: &TrainModel,
     ) -> Result<Box<dyn Estimator>, SettingError> {
         self.braking.check()?;
-        require((0.0..=60.0).contains(&self.lag_s), "lag_s", self.lag_s, "0 to 60")?;
+        self.check_ranges()?;
         let model = TrackerModel {
             law: self.law(quantity)?,
             noise: self.braking.noise(),
@@ -132,23 +125,5 @@ impl SmootherSettings {
         let most_moments = (self.lag_s / (0.9 * self.braking.interval_s)).ceil() as usize;
         let tracker = Tracker::new(model, self.lag_s, most_moments, true);
         Ok(self.braking.estimator(kind, quantity, train, tracker))
-    }
-
-    /// Builds `adhesion_smoother`.
-    ///
-    /// # Errors
-    ///
-    /// When a setting lies outside its range.
-    pub fn build_adhesion(&self, train: &TrainModel) -> Result<Box<dyn Estimator>, SettingError> {
-        self.build(PipelineKind::AdhesionSmoother, Quantity::Adhesion, train)
-    }
-
-    /// Builds `brake_smoother`.
-    ///
-    /// # Errors
-    ///
-    /// When a setting lies outside its range.
-    pub fn build_brake(&self, train: &TrainModel) -> Result<Box<dyn Estimator>, SettingError> {
-        self.build(PipelineKind::BrakeSmoother, self.reports.quantity(), train)
     }
 }

@@ -3,19 +3,18 @@
 use std::sync::Arc;
 
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
-use dynocar_shared::{
-    Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status,
-};
+use dynocar_shared::{Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Reason, Status};
 use nalgebra::{Matrix4, SVector, Vector4};
 
 use super::descent::MeanSquare;
-use super::health::InputHealth;
-use super::line_resistance::LineResistance;
-use super::motion::{Motion, StopWatch};
-use super::section::Section;
-use super::speed_basis::SpeedBasis;
 use super::staged_settings::{MassRegression, StagedDescentSettings};
 use crate::force::ResolvedSample;
+use crate::pipeline::judge::{Case, InputHealth};
+use crate::pipeline::mass::line_resistance::LineResistance;
+use crate::pipeline::mass::motion::{Motion, StopWatch};
+use crate::pipeline::mass::section::Section;
+use crate::pipeline::mass::speed_basis::SpeedBasis;
+use crate::pipeline::motion::SpeedRange;
 use crate::pipeline::output::{write_parameters, write_status};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, Outcome};
@@ -64,7 +63,7 @@ pub struct StagedDescent {
     stops: StopWatch,
     last: Option<Motion>,
     health: InputHealth,
-    speed_range_mps: Option<(f64, f64)>,
+    speeds: SpeedRange,
 }
 
 impl StagedDescent {
@@ -77,7 +76,7 @@ impl StagedDescent {
         settings: StagedDescentSettings,
         train: &Arc<TrainModel>,
     ) -> Result<Self, SettingError> {
-        settings.check()?;
+        settings.check_ranges()?;
         let basis = SpeedBasis::new(train.speed_max_mps().filter(|&v| v > 5.0).unwrap_or(40.0));
         Ok(StagedDescent {
             settings,
@@ -92,7 +91,7 @@ impl StagedDescent {
             stops: StopWatch::new(settings.stop_min_s),
             last: None,
             health: InputHealth::default(),
-            speed_range_mps: None,
+            speeds: SpeedRange::default(),
         })
     }
 
@@ -143,8 +142,7 @@ impl StagedDescent {
         let known = 0.5 * (from.known_n_per_kn + to.known_n_per_kn);
         let acceleration_mps2 = (to.speed_mps - from.speed_mps) / step_s;
         let inertia_mps2 = self.inertia_factor * acceleration_mps2;
-        let (low, high) = self.speed_range_mps.unwrap_or((speed_mps, speed_mps));
-        self.speed_range_mps = Some((low.min(speed_mps), high.max(speed_mps)));
+        self.speeds.push(speed_mps);
         if self.learned >= self.settings.resistance_samples {
             let at = Motion { speed_mps, known_n_per_kn: known, ..*to };
             let w = self.resistance().w_n_per_kn(&at, speed_mps);
@@ -226,19 +224,17 @@ impl StagedDescent {
         1.0 / self.mass.sums.explained_share() - 1.0
     }
 
-    fn status(&self, is_mass_known: bool) -> (Status, Reason) {
+    fn case(&self, is_mass_known: bool) -> Case {
         let is_begun = self.basic.sums.count() >= SAMPLES_MIN || is_mass_known;
-        let some = if is_begun { Status::Degraded } else { Status::Unestimated };
-        if let Some(reason) = self.health.complaint() {
-            (some, reason)
-        } else if self.learned < self.settings.resistance_samples {
-            (some, Reason::TooFewSamples)
-        } else if is_mass_known && self.mass_bracket() > BRACKET_MAX {
-            (Status::Degraded, Reason::NotIdentifiable)
-        } else if is_mass_known {
-            (Status::Estimated, Reason::None)
-        } else {
-            (some, Reason::WeakExcitation)
+        let is_bracketed = self.mass_bracket() <= BRACKET_MAX;
+        Case {
+            fault: None,
+            input: self.health.complaint(),
+            is_ready: self.learned >= self.settings.resistance_samples,
+            is_known: is_mass_known,
+            lacking: if is_begun { Status::Degraded } else { Status::Unestimated },
+            contradiction: (!is_bracketed).then_some(Reason::NotIdentifiable),
+            remark: Reason::None,
         }
     }
 }
@@ -252,19 +248,9 @@ impl Estimator for StagedDescent {
         if self.stops.departs(sample.time_ns, sample.stretch, sample.speed_mps) {
             self.mass.sums = MeanSquare::default();
         }
-        if sample.speed_mps < self.settings.speed_min_mps {
-            self.last = None;
-            return Outcome::Used;
-        }
-        let motion = match Motion::of(sample) {
+        let motion = match Motion::seen(sample, self.settings.speed_min_mps, &mut self.last) {
             Ok(motion) => motion,
-            Err(reason) => {
-                if reason == RejectionReason::WheelSlide {
-                    self.last = None;
-                }
-                self.health.refuse(reason, sample);
-                return Outcome::Rejected(reason);
-            }
+            Err(outcome) => return self.health.passed(outcome, sample),
         };
         self.health.accept();
         let step = self.last.and_then(|last| Some((last, motion.step_from(&last)?)));
@@ -297,9 +283,7 @@ impl Estimator for StagedDescent {
         snapshot.excited |= u32::from(mass_std_kg.is_some()) << 3;
         snapshot.missing_manoeuvres =
             if mass_std_kg.is_some() { 0 } else { Manoeuvre::Accelerate.bit() };
-        let (status, reason) = self.status(mass_std_kg.is_some());
-        write_status(snapshot, status, reason);
-        (snapshot.speed_min_mps, snapshot.speed_max_mps) =
-            self.speed_range_mps.unwrap_or((0.0, 0.0));
+        write_status(snapshot, self.case(mass_std_kg.is_some()).verdict());
+        self.speeds.write(snapshot);
     }
 }

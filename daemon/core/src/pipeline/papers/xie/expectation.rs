@@ -45,6 +45,7 @@ impl ParticleExpectation {
     }
 
     /// Mean of distance and speed at a step given the whole window, from the last E-step.
+    #[cfg(test)]
     pub fn smoothed_mean(&self, step: usize) -> Option<[f64; 2]> {
         self.smoother.smoothed_moments(step).map(|(mean, _)| mean)
     }
@@ -146,6 +147,7 @@ impl KalmanExpectation {
     }
 
     /// Mean of distance and speed at a step given the whole window, from the last E-step.
+    #[cfg(test)]
     pub fn smoothed_mean(&self, step: usize) -> Option<[f64; 2]> {
         (step < self.forward.len()).then(|| self.smoothed[step].into())
     }

@@ -3,21 +3,23 @@
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 use nalgebra::{Matrix3, Vector3};
 
-use super::fit::{Disturbance, FitError, FitSettings, TrajectoryFit, TrajectoryFitter};
-use super::index::DAVIS;
-use super::long_run::LongRunVariance;
-use super::motion::{Motion, MotionTracker};
 use super::newton_settings::{CheckedSettings, FitMethod, TrajectoryNewtonSettings};
-use super::quality::{Estimate, SpeedRange, missing};
-use super::step::StepRule;
-use super::unexplained::UnexplainedForce;
 use super::window::Window;
 use super::wolfe_newton::{NewtonSettings, RestartSource, Restarts, wolfe_newton};
 use crate::filter::levenberg_marquardt::ParameterBox;
 use crate::force::ResolvedSample;
-use crate::pipeline::output::{write_parameters, write_status};
+use crate::pipeline::judge::InputHealth;
+use crate::pipeline::motion::SpeedRange;
+use crate::pipeline::output::write_parameters;
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::SettingError;
+use crate::pipeline::trajectory::fit::{FitError, FitSettings, TrajectoryFit, TrajectoryFitter};
+use crate::pipeline::trajectory::index::DAVIS;
+use crate::pipeline::trajectory::long_run::LongRunVariance;
+use crate::pipeline::trajectory::motion::{Motion, MotionTracker};
+use crate::pipeline::trajectory::quality::Estimate;
+use crate::pipeline::trajectory::step::StepRule;
+use crate::pipeline::trajectory::unexplained::UnexplainedForce;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 use crate::train::{Davis, TrainModel};
 
@@ -58,6 +60,7 @@ pub struct TrajectoryNewton {
     speeds: SpeedRange,
     /// False when the newest window's residuals are larger than the noise accounts for.
     is_consistent: bool,
+    health: InputHealth,
     fault: Option<(Status, Reason)>,
 }
 
@@ -106,6 +109,7 @@ impl TrajectoryNewton {
             unexplained: UnexplainedForce::default(),
             speeds: SpeedRange::default(),
             is_consistent: true,
+            health: InputHealth::default(),
             fault: None,
             settings,
         })
@@ -118,15 +122,14 @@ impl TrajectoryNewton {
             FitMethod::LevenbergMarquardt => self.settings.window / 2,
             FitMethod::WolfeNewton => self.settings.window,
         };
-        if self.window.len() < needed {
+        if self.window.count() < needed {
             return Outcome::Used;
         }
         self.fit.speed_noise_mps = Some(self.speed_noise_mps);
         let fitted = match self.settings.method {
             FitMethod::LevenbergMarquardt => {
                 let density = self.settings.disturbance_mps2.powi(2) + self.window.missed_density();
-                let ratio = density / self.speed_noise_mps.powi(2);
-                self.fit.disturbance = Disturbance::Ratio(ratio);
+                self.fit.disturbance_ratio = density / self.speed_noise_mps.powi(2);
                 let start = (self.windows > 0).then_some(self.davis);
                 self.fitter.fit(&[self.window.stretch()], start.as_ref(), &self.fit)
             }
@@ -230,7 +233,7 @@ impl Gated for TrajectoryNewton {
     }
 
     fn take(&mut self, sample: &ResolvedSample) -> Outcome {
-        match self.tracker.advance(sample) {
+        let outcome = match self.tracker.advance(sample) {
             Motion::Continue(motion) => {
                 self.unexplained.push(&motion, sample, &self.davis);
                 self.speeds.push(sample.speed_mps);
@@ -252,15 +255,14 @@ impl Gated for TrajectoryNewton {
             }
             Motion::Unusable(reason) => {
                 self.end_window();
-                if reason == RejectionReason::Missing && self.windows == 0 {
-                    self.fault = Some(missing(sample));
-                }
                 Outcome::Rejected(reason)
             }
-        }
+        };
+        self.health.note(outcome, sample)
     }
 
-    fn leave_out(&mut self, _: &ResolvedSample, _: RejectionReason) {
+    fn leave_out(&mut self, sample: &ResolvedSample, reason: RejectionReason) {
+        self.health.refuse(reason, sample);
         self.tracker = MotionTracker::default();
         self.end_window();
     }
@@ -284,17 +286,16 @@ impl Estimator for TrajectoryNewton {
             davis: self.davis,
             covariance,
             prior_std: self.settings.prior.std,
-            speeds_mps: self.speeds.get(),
+            speeds: self.speeds,
             innovations: &self.innovations,
             inflation,
             is_ready: self.windows > 0,
             is_at_bound: self.at_bound,
+            fault: self.fault,
+            input: self.health.complaint().or(self.gate.complaint()),
+            doubt: (!self.is_consistent).then_some(Reason::InnovationsTooLarge),
         };
-        estimate.write(snapshot, self.fault);
-        if !self.is_consistent && snapshot.status() == Status::Estimated {
-            write_status(snapshot, Status::Degraded, Reason::InnovationsTooLarge);
-        }
-        self.gate.qualify(snapshot);
+        estimate.write(snapshot);
         self.unexplained.write(snapshot, self.speed_noise_mps.powi(2));
     }
 }

@@ -1,9 +1,9 @@
 //! The sliding window of Xia 2023: points at even distances, steps between them.
 
-use super::fit::Stretch;
-use super::motion::MotionStep;
-use super::step::{Step, StepRule};
 use crate::pipeline::motion::jump_variance;
+use crate::pipeline::trajectory::fit::Stretch;
+use crate::pipeline::trajectory::motion::MotionStep;
+use crate::pipeline::trajectory::step::{Step, StepRule};
 
 /// The newest steps of unbroken motion, each about as long as the sampling distance.
 ///
@@ -110,18 +110,8 @@ impl Window {
     }
 
     /// Steps in the window.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.steps.len()
-    }
-
-    /// True before the first step.
-    pub fn is_empty(&self) -> bool {
-        self.steps.is_empty()
-    }
-
-    /// The newest step.
-    pub fn newest(&self) -> Option<&Step> {
-        self.steps.last()
     }
 
     /// The window as a stretch.
@@ -167,6 +157,6 @@ mod tests {
         let stretch = window.stretch();
         assert_eq!(stretch.speeds_mps, [2.0, 3.0, 4.0]);
         assert_eq!((stretch.steps[0].size, stretch.steps[0].drive_mps2), (1.0, 3.0));
-        assert_eq!(window.len(), 2);
+        assert_eq!(window.count(), 2);
     }
 }

@@ -9,11 +9,15 @@
 
 use dynocar_shared::RejectionReason;
 
-use super::regression::{CoastingSegment, Columns, PARAMETERS, SPEED_SCALE_MPS};
-use super::sample::{SpeedWatch, UnitSample, resistance_integral, trapezoids};
-use super::settings::DataSettings;
-use super::speed::{SpeedNoise, SpeedVerdict};
 use crate::filter::Line;
+use crate::pipeline::resistance::regression::{
+    CoastingSegment, Columns, PARAMETERS, SPEED_SCALE_MPS,
+};
+use crate::pipeline::resistance::sample::{
+    SpeedWatch, UnitSample, resistance_integral, trapezoids,
+};
+use crate::pipeline::resistance::settings::DataSettings;
+use crate::pipeline::resistance::speed::SpeedNoise;
 use crate::train::Davis;
 
 /// Up to this force in N per kN of weight the train counts as coasting.
@@ -98,13 +102,11 @@ impl CoastingSegments {
             self.chain = Some(Chain::start(now, settle_s));
             return Ok(None);
         };
-        match self.watch.judge(&chain.last, now, known) {
-            SpeedVerdict::Continues => {}
-            SpeedVerdict::Spike => return Err(RejectionReason::Outlier),
-            SpeedVerdict::Restart => {
+        if let Some(is_believed) = self.watch.judge(&chain.last, now, known) {
+            if is_believed {
                 self.chain = Some(Chain::start(now, settle_s));
-                return Err(RejectionReason::Outlier);
             }
+            return Err(RejectionReason::Outlier);
         }
         chain.advance(now);
         if chain.settling_s > 0.0 {
@@ -200,10 +202,10 @@ impl Half {
 
 #[cfg(test)]
 mod tests {
-    use super::super::regression::scaled;
-    use super::super::sample::tests::driven;
-    use super::super::test_runs::normal;
     use super::*;
+    use crate::pipeline::resistance::regression::scaled;
+    use crate::pipeline::resistance::sample::tests::driven;
+    use crate::pipeline::resistance::test_runs::normal;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 

@@ -1,12 +1,12 @@
 //! Newton's method with Wolfe steps at the bounds and random restarts: Algorithm 1 of Xia 2023.
 //!
-//! Kept faithful, weaknesses included, as the yardstick for [`super::fit`]: the Hessian is
+//! Kept faithful, weaknesses included, as the yardstick for [`crate::pipeline::trajectory::fit`]: the Hessian is
 //! positive definite at none (cruise) to a fifth (full speed profile) of random parameters, so
 //! that eq. 10 often climbs; v_0 is the first measured speed with its noise; restarts are a
 //! lottery. Where the paper leaves things open:
 //!
-//! - step 11 as printed restarts after every iteration that has not converged; the text
-//!   restarts when the parameters no longer move. Both are here, see [`Restarts`].
+//! - step 11 as printed restarts after every iteration that has not converged, which no search
+//!   survives; as in the text, this one restarts when the parameters no longer move;
 //! - the stall test |θ_{n+1} - θ_n| < Δθ_T is taken per component, in absolute values;
 //! - α in eq. 24 is halved from 1; if 30 halvings find none, the iteration counts as stalled;
 //! - a train that stops (v² < 0 in eq. 7) counts as a stall;
@@ -15,8 +15,8 @@
 use nalgebra::Vector3;
 
 use super::deviation::{Deviation, deviation};
-use super::step::Step;
 use crate::filter::levenberg_marquardt::ParameterBox;
+use crate::pipeline::trajectory::step::Step;
 use crate::train::Davis;
 
 /// When Algorithm 1 draws new parameters at random.
@@ -26,8 +26,6 @@ pub enum Restarts {
     Never,
     /// When the parameters no longer move: the text below eq. 25.
     WhenStalled,
-    /// After every iteration that has not converged: step 11 as printed.
-    AfterEveryIteration,
 }
 
 /// Table 2 of Xia 2023.
@@ -166,11 +164,6 @@ pub fn wolfe_newton(
             (Restarts::Never, Some(next)) if !is_stalled => theta = next,
             (Restarts::Never, _) => return result,
             (Restarts::WhenStalled, Some(next)) if !is_stalled => theta = next,
-            (Restarts::AfterEveryIteration, Some(next))
-                if evaluate(&next).is_some_and(|d| d.mean_square < settings.mean_square_max) =>
-            {
-                theta = next;
-            }
             _ => {
                 theta = source.draw(&settings.bounds, &theta, &settings.restart_distance);
                 result.restarts += 1;
@@ -219,8 +212,8 @@ fn newton_step(
 
 #[cfg(test)]
 mod tests {
-    use super::super::step::{StepRule, resistance_gain};
     use super::*;
+    use crate::pipeline::trajectory::step::{StepRule, resistance_gain};
 
     const TRUTH: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
 

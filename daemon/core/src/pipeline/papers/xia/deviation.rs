@@ -10,7 +10,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::step::{Step, StepRule};
+use crate::pipeline::trajectory::step::{Step, StepRule};
 use crate::train::Davis;
 
 /// f(θ) of eq. 8 with derivatives with respect to (a, b, c).
@@ -67,8 +67,8 @@ pub fn deviation(steps: &[Step], speeds_mps: &[f64], davis: &Davis) -> Option<De
 
 #[cfg(test)]
 mod tests {
-    use super::super::step::resistance_gain;
     use super::*;
+    use crate::pipeline::trajectory::step::resistance_gain;
 
     const TRUTH: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
     const SCALES: [f64; 3] = [1.0, 0.02, 0.001];

@@ -6,7 +6,7 @@
 //!   uniform noise. With the uniform density itself, Q is constant where it is finite, and that
 //!   is an interval of about 1e-5 around the old value: the M-step never moves. The Gaussian
 //!   makes the M-step, eq. (29)-(33), a weighted least-squares problem with a closed form.
-//! - The motion is that of [`super::motion`], without the cap min(F(mu), B), unless
+//! - The motion is that of [`crate::pipeline::braking::motion`], without the cap min(F(mu), B), unless
 //!   [`EmModel::has_printed_cap`] asks for it.
 //! - An estimate belongs to the middle of its window; attributed to the end, as printed, it
 //!   lags behind a changing coefficient by half a window.

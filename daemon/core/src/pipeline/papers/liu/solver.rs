@@ -1,10 +1,12 @@
 //! The recursions of Liu 2018 behind one face.
 
-use super::noise_bank::NoiseBank;
-use super::noise_model::WhiteRow;
-use super::regression::{PARAMETERS, Solution, UNKNOWNS, Unknowns};
-use super::settings::{DataSettings, INNOVATION_LENGTH_MAX, MilsSettings, RlsSettings};
 use crate::filter::{Forgetting, Mils, NotPositiveDefinite, Penalty, Rls};
+use crate::pipeline::resistance::noise_bank::NoiseBank;
+use crate::pipeline::resistance::noise_model::WhiteRow;
+use crate::pipeline::resistance::regression::{PARAMETERS, Solution, UNKNOWNS, Unknowns};
+use crate::pipeline::resistance::settings::{
+    DataSettings, INNOVATION_LENGTH_MAX, MilsSettings, RlsSettings,
+};
 
 /// One of the paper's algorithms.
 #[derive(Clone, Debug)]

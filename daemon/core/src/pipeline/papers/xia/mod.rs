@@ -1,0 +1,11 @@
+//! Xia 2023: the trajectory of a window of even distances, fitted step by step.
+//!
+//! - [`deviation`], [`wolfe_newton`]: the paper's method, with its formulas corrected
+//! - [`window`]: even distances from samples in time
+//! - [`newton`]: the pipeline, with the paper's search or with ours
+
+pub mod deviation;
+pub mod newton;
+pub mod newton_settings;
+pub mod window;
+pub mod wolfe_newton;
