@@ -33,6 +33,7 @@ pub fn sentence(answer: &Answer, errors: &Errors) -> String {
                 gained(errors)
             )
         }
+        Verdict::Unknown if answer.effects.is_empty() => answer.statement.clone(),
         Verdict::Unknown => format!(
             "Something undeclared acts that no effect of the library explains: {found}. {}",
             gained(errors)
