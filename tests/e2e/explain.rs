@@ -159,20 +159,22 @@ fn a_slow_trains_force_is_unknown_and_swallowed_by_no_impossible_resistance() {
 #[test]
 fn nothing_at_a_bound_of_what_is_looked_for_is_found() {
     let folder = tempfile::tempdir().unwrap();
-    // No train is so, and no map: what asks for it is something else.
-    let beyond = Effect::RotatingMass { rotating_mass_factor: 0.8 };
-    let effects = EffectRequest::Exactly(vec![beyond]);
-    let ordinary = SimulatorSettings::new(SEED, effects);
-    let settings = SimulatorSettings { train_type: Some(TrainType::Metro), ..ordinary };
+    // No train is so: what asks for it is something else.
+    let beyond = Effect::RotatingMass { rotating_mass_factor: 0.6 };
+    let settings = SimulatorSettings {
+        runs: 4,
+        holdout_runs: 1,
+        train_type: Some(TrainType::Regional),
+        ..SimulatorSettings::new(SEED, EffectRequest::Exactly(vec![beyond]))
+    };
     let explanation = explained(&simulate(&settings), folder.path());
     let answer = &explanation.answer;
     for (index, effect) in explanation.grown.model.effects.iter().enumerate() {
         let parameters = explanation.grown.effect_parameters(index);
         assert_eq!(effect.at_bound(parameters), None, "{}", answer.statement);
     }
-    let remark = &answer.considered.iter().find(|it| it.kind == "rotating_mass").unwrap().remark;
-    assert!(remark.contains("not identifiable"), "{remark}: {}", answer.statement);
-    assert!(answer.statement.contains("rotating_mass"), "{}", answer.statement);
+    let is_found = answer.effects.iter().any(|effect| effect.kind == "rotating_mass");
+    assert!(!is_found, "{}: {:?}", answer.statement, answer.considered);
 }
 
 #[test]
@@ -191,20 +193,22 @@ fn a_tunnel_that_the_map_lacks_is_named_alone_or_beside_a_resistance_there() {
 #[test]
 fn a_place_in_one_run_is_found_with_its_time_and_may_be_a_brake() {
     let folder = tempfile::tempdir().unwrap();
-    let place = Effect::LocalResistance {
-        extra_n_per_kn: 3.0,
-        intervals_m: vec![(5000.0, 7000.0)],
-        runs: Vec::new(),
-    };
-    let effects = EffectRequest::Exactly(vec![place]);
-    let settings = SimulatorSettings {
+    let two_runs = |effects: Vec<Effect>| SimulatorSettings {
         runs: 2,
         holdout_runs: 1,
         train_type: Some(TrainType::Freight),
-        ..SimulatorSettings::new(SEED, effects)
+        ..SimulatorSettings::ideal(SEED, EffectRequest::Exactly(effects))
     };
-    let answer = explained(&simulate(&settings), folder.path()).answer;
-    assert_eq!(answer.verdict, Verdict::Ambiguous, "{}", answer.statement);
+    let declared = simulate(&two_runs(Vec::new()));
+    let fitted = declared.runs.iter().find(|run| !run.plan.is_holdout).expect("a run to fit");
+    let middle_m = fitted.states[fitted.states.len() / 2].position_m.round();
+    let place = Effect::LocalResistance {
+        extra_n_per_kn: 3.0,
+        intervals_m: vec![(middle_m - 1000.0, middle_m + 1000.0)],
+        runs: Vec::new(),
+    };
+    let answer = explained(&simulate(&two_runs(vec![place])), folder.path()).answer;
+    assert_eq!(answer.verdict, Verdict::Ambiguous, "{}: {:?}", answer.statement, answer.considered);
     assert_eq!(answer.effects[0].kind, "local_resistance");
     assert!(answer.ambiguous_with.contains(&"dragging_brake"), "{}", answer.statement);
     assert_eq!(answer.effects[0].place.windows.as_ref().map(Vec::len), Some(1));

@@ -95,11 +95,6 @@ impl Fit {
         self.runs.iter().fold(self.prior_information.clone(), |sum, run| sum + &run.information)
     }
 
-    /// Whether the data push one of a, b, c (0, 1, 2) against its bound.
-    pub fn is_held(&self, coefficient: usize) -> bool {
-        self.held_information[coefficient] > 0.0
-    }
-
     /// Cholesky factor of the information matrix; `None` when it is not positive definite.
     pub fn factor(&self) -> Option<Cholesky<f64, Dyn>> {
         Cholesky::new(self.information())
