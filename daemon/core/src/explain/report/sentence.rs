@@ -255,6 +255,7 @@ mod tests {
             error_reduction_interval: None,
             window60: None,
             fit_runs: None,
+            unexplained_n_per_kn: None,
             considered: Vec::new(),
             predictions: std::collections::BTreeMap::new(),
         };
