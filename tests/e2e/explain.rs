@@ -145,6 +145,96 @@ fn an_effect_outside_the_library_is_called_unknown_and_placed() {
 }
 
 #[test]
+fn a_slow_trains_force_is_unknown_and_swallowed_by_no_impossible_resistance() {
+    let folder = tempfile::tempdir().unwrap();
+    let slow = Effect::SlowForce { below_mps: 15.0, least_mps: 3.0, extra_n_per_kn: 1.0 };
+    let simulated = simulate(&SimulatorSettings::new(SEED, EffectRequest::Exactly(vec![slow])));
+    let answer = explained(&simulated, folder.path()).answer;
+    assert_eq!(answer.verdict, Verdict::Unknown, "{}", answer.statement);
+    let declared = simulated.declared_train().resistance;
+    assert!(answer.base.b >= 0.0, "b = {}", answer.base.b);
+    assert!(answer.base.a <= 1.8 * declared.a, "a = {}, {}", answer.base.a, declared.a);
+}
+
+#[test]
+fn nothing_at_a_bound_of_what_is_looked_for_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    // No train is so: what asks for it is something else.
+    let beyond = Effect::RotatingMass { rotating_mass_factor: 0.6 };
+    let settings = SimulatorSettings {
+        runs: 4,
+        holdout_runs: 1,
+        train_type: Some(TrainType::Regional),
+        ..SimulatorSettings::new(SEED, EffectRequest::Exactly(vec![beyond]))
+    };
+    let explanation = explained(&simulate(&settings), folder.path());
+    let answer = &explanation.answer;
+    for (index, effect) in explanation.grown.model.effects.iter().enumerate() {
+        let parameters = explanation.grown.effect_parameters(index);
+        assert_eq!(effect.at_bound(parameters), None, "{}", answer.statement);
+    }
+    let is_found = answer.effects.iter().any(|effect| effect.kind == "rotating_mass");
+    assert!(!is_found, "{}: {:?}", answer.statement, answer.considered);
+}
+
+#[test]
+fn a_tunnel_that_the_map_lacks_is_named_alone_or_beside_a_resistance_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let kinds = EffectRequest::Kinds(vec![EffectKind::TunnelDrag]);
+    let ordinary = SimulatorSettings::new(SEED, kinds);
+    let answer =
+        explained(&simulate(&SimulatorSettings { maps_tunnels: false, ..ordinary }), folder.path())
+            .answer;
+    let mut named = answer.ambiguous_with.clone();
+    named.extend(answer.effects.iter().map(|effect| effect.kind));
+    assert!(named.contains(&"tunnel_drag"), "{}", answer.statement);
+}
+
+#[test]
+fn a_place_in_one_run_is_found_with_its_time_and_may_be_a_brake() {
+    let folder = tempfile::tempdir().unwrap();
+    let two_runs = |effects: Vec<Effect>| SimulatorSettings {
+        runs: 2,
+        holdout_runs: 1,
+        train_type: Some(TrainType::Freight),
+        ..SimulatorSettings::ideal(SEED, EffectRequest::Exactly(effects))
+    };
+    let declared = simulate(&two_runs(Vec::new()));
+    let fitted = declared.runs.iter().find(|run| !run.plan.is_holdout).expect("a run to fit");
+    let middle_m = fitted.states[fitted.states.len() / 2].position_m.round();
+    let place = Effect::LocalResistance {
+        extra_n_per_kn: 3.0,
+        intervals_m: vec![(middle_m - 1000.0, middle_m + 1000.0)],
+        runs: Vec::new(),
+    };
+    let answer = explained(&simulate(&two_runs(vec![place])), folder.path()).answer;
+    assert_eq!(answer.verdict, Verdict::Ambiguous, "{}: {:?}", answer.statement, answer.considered);
+    assert_eq!(answer.effects[0].kind, "local_resistance");
+    assert!(answer.ambiguous_with.contains(&"dragging_brake"), "{}", answer.statement);
+    assert_eq!(answer.effects[0].place.windows.as_ref().map(Vec::len), Some(1));
+    assert!(answer.rmse_after.unwrap() < 0.5 * answer.rmse_before.unwrap());
+}
+
+#[test]
+fn what_predicts_the_runs_held_out_worse_is_not_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let declared = simulate(&SimulatorSettings::new(SEED, EffectRequest::none()));
+    let fitted = declared.runs.iter().filter(|run| !run.plan.is_holdout);
+    // A brush that hangs into the line on the days of the fit runs, and on no other.
+    let place = Effect::LocalResistance {
+        extra_n_per_kn: 2.0,
+        intervals_m: vec![(4000.0, 8000.0)],
+        runs: fitted.map(|run| run.plan.number).collect(),
+    };
+    let effects = EffectRequest::Exactly(vec![place]);
+    let explanation = explained(&simulate(&SimulatorSettings::new(SEED, effects)), folder.path());
+    let answer = &explanation.answer;
+    assert!(answer.rmse_after <= answer.rmse_before, "{}", answer.statement);
+    let remark = &answer.considered.iter().find(|it| it.kind == "local_resistance").unwrap().remark;
+    assert!(remark.contains("held out are predicted worse"), "{remark}: {}", answer.statement);
+}
+
+#[test]
 fn on_a_level_straight_line_two_kinds_of_mass_cannot_be_told_apart() {
     let folder = tempfile::tempdir().unwrap();
     let effects = EffectRequest::Kinds(vec![EffectKind::RotatingMass]);

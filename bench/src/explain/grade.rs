@@ -3,12 +3,12 @@
 use dynocar_core::explain::Explanation;
 use dynocar_core::explain::answer::Verdict;
 use dynocar_core::track::LinearProfile;
-use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};
 use serde_json::Value;
 
 use super::place::{ends_within, place_iou};
+use super::scenario::Rival;
 
 /// How good an answer is.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,10 +44,10 @@ pub struct ParameterGrade {
     pub z: f64,
 }
 
-/// Grades an explanation; `rival` is a kind that the data cannot tell from the one that acts.
+/// Grades an explanation; `rival` is a kind that is hardly told from the one that acts.
 pub fn grade(
     simulated: &SimulatedDataset,
-    rival: Option<EffectKind>,
+    rival: Option<Rival>,
     explanation: &Explanation,
 ) -> Grade {
     let answer = &explanation.answer;
@@ -62,15 +62,15 @@ pub fn grade(
         Verdict::Unknown => "unknown",
         Verdict::InsufficientData => "insufficient_data",
     };
+    if let Some(rival) = rival.filter(|rival| rival.is_never_told || verdict == "ambiguous") {
+        expected.push(rival.kind.name());
+    }
     found.extend(&answer.ambiguous_with);
-    expected.extend(rival.map(EffectKind::name));
     expected.sort_unstable();
     found.sort_unstable();
-    let is_right = match simulated.verdict() {
-        "unknown" => verdict == "unknown",
-        _ if rival.is_some() => verdict == "ambiguous" && expected == found,
-        right => verdict == right && expected == found,
-    };
+    let right =
+        if expected.len() > simulated.effects.len() { "ambiguous" } else { simulated.verdict() };
+    let is_right = verdict == right && (right == "unknown" || expected == found);
     let json = serde_json::to_value(answer).unwrap_or(Value::Null);
     let (mut iou, mut ends_held, mut parameters) = (None, Vec::new(), Vec::new());
     for effect in &simulated.effects {
@@ -93,6 +93,10 @@ pub fn grade(
             )
         })
         .collect();
+    details.push(format!(
+        "holdout {:.3?} to {:.3?} m/s, unexplained {:.3?} N/kN",
+        answer.rmse_before, answer.rmse_after, answer.unexplained_n_per_kn
+    ));
     if !answer.ambiguous_with.is_empty() {
         details.push(format!("or {}", answer.ambiguous_with.join(", ")));
     }
@@ -159,9 +163,10 @@ fn graded(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Vec<Par
             vec![one("extra_n_per_kn", *extra_n_per_kn, 0.0)]
         }
         Effect::LowAdhesion { adhesion, .. } => vec![one("adhesion", *adhesion, 0.0)],
-        Effect::MassChangeSections(_) | Effect::MassChangeWindows(_) | Effect::SpeedBand { .. } => {
-            mass_factors(effect, own)
-        }
+        Effect::MassChangeSections(_)
+        | Effect::MassChangeWindows(_)
+        | Effect::SlowForce { .. }
+        | Effect::SpeedBand { .. } => mass_factors(effect, own),
     };
     list.into_iter().flatten().collect()
 }

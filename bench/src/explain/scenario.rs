@@ -1,7 +1,16 @@
 //! What is simulated: one kind, two at once, or a poor recording.
 
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_tests::simulator::{Defects, EffectRequest, SimulatorSettings};
+use dynocar_tests::simulator::{Defects, Effect, EffectRequest, SimulatorSettings};
+
+/// A kind that is hardly told from the one that acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rival {
+    /// The kind.
+    pub kind: EffectKind,
+    /// True when no data of the family tell the two apart.
+    pub is_never_told: bool,
+}
 
 /// A family of datasets; a seed makes one of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,6 +21,10 @@ pub enum Scenario {
     Two,
     /// A rotating mass on a level, straight line, where another mass does the same.
     Alike,
+    /// A tunnel that the map lacks: where its trains drive alike, a resistance does the same.
+    UnmappedTunnel,
+    /// A force that only slow trains feel, which no library holds.
+    SlowForce,
     /// A null recorded with gaps, repeats and heavy outliers.
     PoorNull,
     /// One effect of a kind drawn from the seed, recorded so.
@@ -55,7 +68,15 @@ impl Scenario {
     /// All of them, in the order of the table.
     pub fn all() -> Vec<Scenario> {
         let kinds = EffectKind::ALL.iter().copied().map(Scenario::Kind);
-        kinds.chain([Scenario::Two, Scenario::Alike, Scenario::PoorNull, Scenario::Poor]).collect()
+        let others = [
+            Scenario::Two,
+            Scenario::Alike,
+            Scenario::UnmappedTunnel,
+            Scenario::SlowForce,
+            Scenario::PoorNull,
+            Scenario::Poor,
+        ];
+        kinds.chain(others).collect()
     }
 
     /// The scenario of this name.
@@ -69,6 +90,8 @@ impl Scenario {
             Scenario::Kind(kind) => kind.name(),
             Scenario::Two => "two_effects",
             Scenario::Alike => "level_straight_line",
+            Scenario::UnmappedTunnel => "unmapped_tunnel",
+            Scenario::SlowForce => "slow_force",
             Scenario::PoorNull => "none_poor_recording",
             Scenario::Poor => "poor_recording",
         }
@@ -86,6 +109,8 @@ impl Scenario {
             Scenario::Kind(EffectKind::None) | Scenario::PoorNull => Vec::new(),
             Scenario::Kind(kind) => vec![kind],
             Scenario::Alike => vec![EffectKind::RotatingMass],
+            Scenario::UnmappedTunnel => vec![EffectKind::TunnelDrag],
+            Scenario::SlowForce => vec![EffectKind::Unknown],
             Scenario::Two => PAIRS[drawn(PAIRS.len())].to_vec(),
             Scenario::Poor => vec![POOR[drawn(POOR.len())]],
         }
@@ -93,14 +118,34 @@ impl Scenario {
 
     /// What the simulator is asked for.
     pub fn settings(self, seed: u64) -> SimulatorSettings {
-        let ordinary = SimulatorSettings::new(seed, EffectRequest::Kinds(self.kinds(seed)));
+        let effects = match self {
+            // 0.5 to 1.1 N/kN at half the speed below which it acts.
+            Scenario::SlowForce => EffectRequest::Exactly(vec![Effect::SlowForce {
+                below_mps: 15.0,
+                least_mps: 3.0,
+                extra_n_per_kn: 0.5 + 0.1 * (seed % 7) as f64,
+            }]),
+            _ => EffectRequest::Kinds(self.kinds(seed)),
+        };
+        let ordinary = SimulatorSettings::new(seed, effects);
         let is_poor = matches!(self, Scenario::PoorNull | Scenario::Poor);
         let defects = if is_poor { HEAVY } else { Defects::NONE };
-        SimulatorSettings { defects, is_level_and_straight: self == Scenario::Alike, ..ordinary }
+        SimulatorSettings {
+            defects,
+            is_level_and_straight: self == Scenario::Alike,
+            maps_tunnels: self != Scenario::UnmappedTunnel,
+            ..ordinary
+        }
     }
 
-    /// The kind that no data of this family can tell from the one that acts.
-    pub fn rival(self) -> Option<EffectKind> {
-        (self == Scenario::Alike).then_some(EffectKind::MassChange)
+    /// The kind that is hardly told from the one that acts.
+    pub fn rival(self) -> Option<Rival> {
+        match self {
+            Scenario::Alike => Some(Rival { kind: EffectKind::MassChange, is_never_told: true }),
+            Scenario::UnmappedTunnel => {
+                Some(Rival { kind: EffectKind::LocalResistance, is_never_told: false })
+            }
+            _ => None,
+        }
     }
 }

@@ -153,7 +153,8 @@ fn track_toml(dataset: &SimulatedDataset) -> String {
             writeln!(text, "  [{:.1}, {:.1}, {:.1}],", curve.start_m, curve.end_m, curve.radius_m);
     }
     text.push_str("]\ntunnels = [\n");
-    for tunnel in track.tunnels() {
+    let mapped = track.tunnels().iter().filter(|_| dataset.settings.maps_tunnels);
+    for tunnel in mapped {
         let _ = writeln!(text, "  [{:.1}, {:.1}],", tunnel.start_m, tunnel.end_m);
     }
     text.push_str("]\n");

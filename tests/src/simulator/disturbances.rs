@@ -21,15 +21,27 @@ pub struct AdhesionCap {
     pub intervals_m: Vec<(f64, f64)>,
 }
 
-/// A bell-shaped resistance over speed.
+/// A resistance in N/kN over speed in m/s that no library holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SpeedBand {
-    /// Middle of the band in m/s.
-    pub centre_mps: f64,
-    /// Standard deviation in m/s.
-    pub width_mps: f64,
-    /// Resistance in N/kN in the middle.
-    pub extra_n_per_kn: f64,
+pub enum SpeedForce {
+    /// Bell-shaped over speed.
+    Band {
+        /// Middle of the band.
+        centre_mps: f64,
+        /// Standard deviation.
+        width_mps: f64,
+        /// Resistance in the middle.
+        extra_n_per_kn: f64,
+    },
+    /// As one over the speed, for slow trains.
+    Slow {
+        /// From here on there is none.
+        below_mps: f64,
+        /// Below this it grows no more.
+        least_mps: f64,
+        /// Resistance at half of `below_mps`.
+        extra_n_per_kn: f64,
+    },
 }
 
 /// Everything undeclared in one run; [`Disturbances::none`] leaves the declared model true.
@@ -82,7 +94,7 @@ pub struct Disturbances {
     /// A cap on the achieved brake force.
     pub adhesion: Option<AdhesionCap>,
     /// A resistance outside every library.
-    pub speed_band: Option<SpeedBand>,
+    pub speed_force: Option<SpeedForce>,
 }
 
 /// What the disturbances act on at an instant.
@@ -102,11 +114,18 @@ pub struct Seen {
     pub local_n_per_kn: f64,
 }
 
-impl SpeedBand {
+impl SpeedForce {
     /// The resistance in N/kN at a speed in m/s.
     pub fn extra_n_per_kn(&self, speed_mps: f64) -> f64 {
-        let away = (speed_mps - self.centre_mps) / self.width_mps;
-        self.extra_n_per_kn * (-0.5 * away * away).exp()
+        match *self {
+            SpeedForce::Band { centre_mps, width_mps, extra_n_per_kn } => {
+                let away = (speed_mps - centre_mps) / width_mps;
+                extra_n_per_kn * (-0.5 * away * away).exp()
+            }
+            SpeedForce::Slow { below_mps, least_mps, extra_n_per_kn } => {
+                extra_n_per_kn * (below_mps / speed_mps.max(least_mps) - 1.0).max(0.0)
+            }
+        }
     }
 }
 
@@ -141,7 +160,7 @@ impl Disturbances {
             ambient: None,
             local: None,
             adhesion: None,
-            speed_band: None,
+            speed_force: None,
         }
     }
 
@@ -235,12 +254,11 @@ impl Disturbances {
                 let cap = AdhesionCap { adhesion: *adhesion, intervals_m: intervals_m.clone() };
                 self.adhesion = in_runs(runs).then_some(cap);
             }
-            Effect::SpeedBand { centre_mps, width_mps, extra_n_per_kn } => {
-                self.speed_band = Some(SpeedBand {
-                    centre_mps: *centre_mps,
-                    width_mps: *width_mps,
-                    extra_n_per_kn: *extra_n_per_kn,
-                });
+            &Effect::SlowForce { below_mps, least_mps, extra_n_per_kn } => {
+                self.speed_force = Some(SpeedForce::Slow { below_mps, least_mps, extra_n_per_kn });
+            }
+            &Effect::SpeedBand { centre_mps, width_mps, extra_n_per_kn } => {
+                self.speed_force = Some(SpeedForce::Band { centre_mps, width_mps, extra_n_per_kn });
             }
         }
     }

@@ -128,6 +128,15 @@ pub enum Effect {
         /// Numbers of the runs that feel it; all when empty.
         runs: Vec<usize>,
     },
+    /// A force that a slow train feels and that falls as one over its speed: in no library.
+    SlowForce {
+        /// Speed in m/s from which on there is none.
+        below_mps: f64,
+        /// Speed in m/s below which it grows no more.
+        least_mps: f64,
+        /// Extra resistance in N/kN at half of `below_mps`.
+        extra_n_per_kn: f64,
+    },
     /// A resonance that takes energy in a band of speeds: in no library.
     SpeedBand {
         /// Middle of the band in m/s.
@@ -158,7 +167,7 @@ impl Effect {
             Effect::AmbientTemperature { .. } => EffectKind::AmbientTemperature,
             Effect::LocalResistance { .. } => EffectKind::LocalResistance,
             Effect::LowAdhesion { .. } => EffectKind::LowAdhesion,
-            Effect::SpeedBand { .. } => EffectKind::Unknown,
+            Effect::SlowForce { .. } | Effect::SpeedBand { .. } => EffectKind::Unknown,
         }
     }
 
@@ -219,7 +228,7 @@ impl Effect {
                 json!({ "extra_n_per_kn": extra_n_per_kn })
             }
             Effect::LowAdhesion { adhesion, .. } => json!({ "adhesion": adhesion }),
-            Effect::SpeedBand { extra_n_per_kn, .. } => {
+            Effect::SlowForce { extra_n_per_kn, .. } | Effect::SpeedBand { extra_n_per_kn, .. } => {
                 json!({ "extra_n_per_kn": extra_n_per_kn })
             }
         }
@@ -246,6 +255,7 @@ impl Effect {
                 }
                 Value::Object(place)
             }
+            Effect::SlowForce { below_mps, .. } => json!({ "speed_range_mps": [0.0, below_mps] }),
             Effect::SpeedBand { centre_mps, width_mps, .. } => json!({
                 "speed_range_mps": [centre_mps - 2.0 * width_mps, centre_mps + 2.0 * width_mps]
             }),

@@ -13,7 +13,7 @@ use dynocar_core::terms::delay::DelayLine;
 use dynocar_core::terms::{gradient, traction};
 use dynocar_core::validation::{ValidationLimits, Validator};
 
-use super::disturbances::{Disturbances, Seen, SpeedBand};
+use super::disturbances::{Disturbances, Seen, SpeedForce};
 use super::sensors::SIMULATED_TRAIN;
 use super::{SimulatedDataset, SimulatedRun};
 
@@ -92,15 +92,15 @@ pub fn record(dataset: &SimulatedDataset, run: &SimulatedRun) -> Recording {
 #[derive(Clone, Debug, PartialEq)]
 pub struct OracleForces {
     quadratic: QuadraticForces,
-    speed_band: Option<SpeedBand>,
+    speed_force: Option<SpeedForce>,
     /// Weight in kN over inertial mass in kg.
     weight_per_kg: f64,
 }
 
 impl ForceModel for OracleForces {
     fn acceleration_mps2(&self, index: usize, speed_mps: f64) -> f64 {
-        let band_n_per_kn = self.speed_band.map_or(0.0, |band| band.extra_n_per_kn(speed_mps));
-        self.quadratic.acceleration_mps2(index, speed_mps) - self.weight_per_kg * band_n_per_kn
+        let force_n_per_kn = self.speed_force.map_or(0.0, |force| force.extra_n_per_kn(speed_mps));
+        self.quadratic.acceleration_mps2(index, speed_mps) - self.weight_per_kg * force_n_per_kn
     }
 
     fn speed_scale(&self) -> f64 {
@@ -142,7 +142,7 @@ pub fn oracle_forces(
     let first = &recording.samples()[0];
     OracleForces {
         quadratic,
-        speed_band: disturbances.speed_band,
+        speed_force: disturbances.speed_force,
         weight_per_kg: inertia_ratio * first.weight_kn / first.inertial_mass_kg,
     }
 }

@@ -126,6 +126,8 @@ pub struct SimulatorSettings {
     pub resistance_spread: f64,
     /// A line without gradients and curves.
     pub is_level_and_straight: bool,
+    /// Whether the map holds the line's tunnels; else its list of them is empty.
+    pub maps_tunnels: bool,
     /// Factor on the small things that nobody declares and no library holds: the survey's error of
     /// each gradient (standard deviation 0.05 ‰), and from run to run the calibration of the
     /// forces (0.2 %) and the basic resistance (1 %).
@@ -175,6 +177,7 @@ impl SimulatorSettings {
             sensor_noise: 1.0,
             resistance_spread: 1.0,
             is_level_and_straight: false,
+            maps_tunnels: true,
             hidden_variation: 1.0,
             wheel_slips_per_run: 0.25,
             defects: Defects::NONE,

@@ -243,6 +243,10 @@ pub struct Answer {
     pub window60: Option<[f64; 2]>,
     /// The same errors on the fit runs: before and after.
     pub fit_runs: Option<[f64; 2]>,
+    /// What stays unexplained and is taken for noise: a force of this standard deviation in N/kN
+    /// on average over a minute; absent without motion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unexplained_n_per_kn: Option<f64>,
     /// What else was considered.
     pub considered: Vec<Considered>,
     /// Prediction files by run.

@@ -9,7 +9,7 @@
 //!   time, would explain
 //! - [`selection`]: the search for effects, its significance, evidence by run
 //! - [`score`]: open-loop prediction of fit and holdout runs
-//! - [`rivals`], [`verdict`], [`answer`]: the statement
+//! - [`unexplained`], [`rivals`], [`verdict`], [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
 //!
 //! [`explain`] runs it all.
@@ -24,6 +24,7 @@ pub mod rivals;
 pub mod scan;
 pub mod score;
 pub mod selection;
+pub mod unexplained;
 pub mod verdict;
 
 use crate::dataset::{Dataset, Role};
@@ -57,7 +58,7 @@ pub struct Explanation {
 
 /// Explains what the declared model of a dataset leaves.
 ///
-/// Holdout runs are read once, to score the finished model.
+/// Speeds of holdout runs score the finished model, and refuse effects that predict them worse.
 ///
 /// # Errors
 ///

@@ -33,20 +33,30 @@ pub fn run_error(fit: &Fit, run: &RunData, restart: Restart) -> SpeedError {
     SpeedError::of(&run.recording, &prediction)
 }
 
-/// Root mean square open-loop error in m/s of the fit runs: over whole runs, and with restarts every
-/// 60 s.
-pub fn errors_on_fit_runs(problem: &FitProblem, fit: &Fit) -> [f64; 2] {
-    [Restart::FullRun, Restart::WINDOW_60].map(|restart| {
-        let error: SpeedError = problem.runs.iter().map(|run| run_error(fit, run, restart)).sum();
+/// Open-loop errors of some runs: root mean square in m/s over whole runs and with restarts every
+/// 60 s, and the share by which the integrated speed misses the measured way, with what that is
+/// known to.
+pub fn open_loop_errors(runs: &[RunData], way_ratio: Option<(f64, f64)>, fit: &Fit) -> [f64; 3] {
+    let [whole, restarted] = [Restart::FullRun, Restart::WINDOW_60].map(|restart| {
+        let error: SpeedError = runs.iter().map(|run| run_error(fit, run, restart)).sum();
         error.rmse_mps().unwrap_or(0.0)
-    })
+    });
+    let missed =
+        |(ratio, deviation): (f64, f64)| (ratio - 1.0 / fit.speed_scale()).hypot(deviation);
+    [whole, restarted, way_ratio.map_or(0.0, missed)]
 }
 
-/// Share of the error that a model takes away: over whole runs or with restarts, whichever is more.
-pub fn reduction(before_mps: [f64; 2], after_mps: [f64; 2]) -> f64 {
-    before_mps
+/// The same of the fit runs.
+pub fn errors_on_fit_runs(problem: &FitProblem, fit: &Fit) -> [f64; 3] {
+    open_loop_errors(&problem.runs, problem.way_ratio, fit)
+}
+
+/// Share of the error that a model takes away: over whole runs, with restarts or of the way,
+/// whichever is most.
+pub fn reduction(before: [f64; 3], after: [f64; 3]) -> f64 {
+    before
         .into_iter()
-        .zip(after_mps)
+        .zip(after)
         .map(|(before, after)| if before > 0.0 { 1.0 - after / before } else { 0.0 })
         .fold(f64::NEG_INFINITY, f64::max)
 }

@@ -13,6 +13,7 @@ use super::effects::ReportContext;
 use super::rivals::{is_in, rivals, separating_run};
 use super::score::{self, Score};
 use super::selection::{Outcome, Search, deviations, discounted, p_value, penalty};
+use super::unexplained::Unexplained;
 use crate::dataset::Note;
 use crate::plausibility::Severity;
 use crate::simulate::SpeedError;
@@ -34,7 +35,8 @@ pub fn answer(
     let (deviation, covariance) = deviations(fit);
     let effects = effect_answers(search, outcome, known, (&deviation, &covariance));
     let rivals = rivals(outcome);
-    let verdict = verdict(search, outcome, &rivals);
+    let left = Unexplained::of(search, outcome);
+    let verdict = verdict(search, outcome, &rivals, left.as_ref());
     let [rmse_before, rmse_after] = score.holdout_rmse_mps();
     let pair = |errors: [SpeedError; 2]| Some([errors[0].rmse_mps()?, errors[1].rmse_mps()?]);
     let impossible: Vec<String> = notes
@@ -43,7 +45,7 @@ pub fn answer(
         .map(ToString::to_string)
         .collect();
     let (statement, experiment) = if impossible.is_empty() {
-        statement(search, outcome, verdict, &effects, &rivals)
+        statement(search, outcome, verdict, &effects, &rivals, left.as_ref())
     } else {
         let text = format!("The data cannot be true as described: {}", impossible.join("; "));
         (text, Some("Set right what is named and run this again.".into()))
@@ -69,6 +71,7 @@ pub fn answer(
         error_reduction_interval: score.reduction_interval(),
         window60: pair(score.holdout_window60),
         fit_runs: pair(score.fit_runs),
+        unexplained_n_per_kn: left.map(|left| left.n_per_kn),
         considered: considered(search, outcome, &rivals),
         predictions: BTreeMap::new(),
     }
@@ -133,7 +136,7 @@ fn effect_answers(
                 place: Place { uncertainty_95: known[index].clone(), ..effect.place() },
                 parameters: reported.values,
                 std: reported.deviations,
-                p_value: p_value((decrease - penalty(effect, fit.observations())) * reduction),
+                p_value: p_value((decrease - penalty(fit, index)) * reduction),
                 error_reduction: reduction,
             };
             (decrease, answer)
@@ -143,11 +146,19 @@ fn effect_answers(
     answers.into_iter().map(|(_, answer)| answer).collect()
 }
 
-fn verdict(search: &Search, outcome: &Outcome, rivals: &[EffectKind]) -> Verdict {
+fn verdict(
+    search: &Search,
+    outcome: &Outcome,
+    rivals: &[EffectKind],
+    left: Option<&Unexplained>,
+) -> Verdict {
     if outcome.rounds.is_empty() || moving_s(search) < MOVING_MIN_S {
         return Verdict::InsufficientData;
     }
     let effects = &outcome.fit.model.effects;
+    if left.is_some_and(|left| !left.is_noise(effects.len())) {
+        return Verdict::Unknown;
+    }
     if effects.is_empty() {
         return Verdict::None;
     }
@@ -196,9 +207,11 @@ fn statement(
     verdict: Verdict,
     effects: &[EffectAnswer],
     rivals: &[EffectKind],
+    left: Option<&Unexplained>,
 ) -> (String, Option<String>) {
     let described: Vec<String> = effects.iter().map(describe).collect();
     let described = described.join("; ");
+    let not_told = left.map(Unexplained::not_told).unwrap_or_default();
     match verdict {
         Verdict::InsufficientData if search.problem.runs.is_empty() => {
             let held_out = search.holdout.len();
@@ -214,15 +227,23 @@ fn statement(
             (text, Some("Record several runs of some minutes, in both directions.".into()))
         }
         Verdict::None => {
-            ("Nothing undeclared is found: the declared model with a, b, c refitted explains the runs.".into(), None)
+            let text = "Nothing undeclared is found: the declared model with a, b, c refitted \
+                        explains the runs.";
+            (format!("{text}{not_told}"), None)
         }
-        Verdict::Effect => (format!("Found: {described}."), None),
-        Verdict::Unknown => (
-            format!(
-                "The residual is real, but no effect of the library explains it; it lives here: {described}."
-            ),
-            Some("Drive this range again with other speeds, loads and directions.".into()),
-        ),
+        Verdict::Effect => (format!("Found: {described}.{not_told}"), None),
+        Verdict::Unknown => {
+            let text = if is_in(&outcome.fit, EffectKind::Unknown) {
+                format!(
+                    "The residual is real, but no effect of the library explains it; it lives \
+                     here: {described}.{not_told}"
+                )
+            } else {
+                unnamed(left, &described) + &not_told
+            };
+            let experiment = "Drive this range again with other speeds, loads and directions.";
+            (text, Some(experiment.into()))
+        }
         Verdict::Ambiguous => {
             let names: Vec<&str> = rivals.iter().map(|kind| kind.name()).collect();
             let first = effects.first().map_or("", |effect| effect.kind);
@@ -235,6 +256,21 @@ fn statement(
             (text, experiment)
         }
     }
+}
+
+/// A residual that nothing in the model stands for, with what is found beside it.
+fn unnamed(left: Option<&Unexplained>, found: &str) -> String {
+    let mut text = String::from("The residual is real, but no effect of the library explains it.");
+    if let Some(left) = left {
+        text += &left.describe();
+        if let Some(place) = &left.place {
+            text += &format!(" It lives most here: {}.", describe_place(place).join(", "));
+        }
+    }
+    if !found.is_empty() {
+        text += &format!(" Beside it is found: {found}.");
+    }
+    text
 }
 
 fn describe(effect: &EffectAnswer) -> String {
@@ -251,25 +287,32 @@ fn describe(effect: &EffectAnswer) -> String {
         }
     }
     parts.extend(effect.parameters.values().find_map(mass_factors));
-    if let Some(intervals) = &effect.place.intervals_m {
+    parts.extend(describe_place(&effect.place));
+    parts.extend(effect.place.uncertainty_95.as_ref().and_then(precision));
+    format!("{} ({})", effect.kind, parts.join(", "))
+}
+
+/// Where something acts.
+fn describe_place(place: &Place) -> Vec<String> {
+    let mut parts = Vec::new();
+    if let Some(intervals) = &place.intervals_m {
         let shown = intervals.iter().take(4).map(|[from, to]| format!("{from:.0}–{to:.0} m"));
         let more = if intervals.len() > 4 { " …" } else { "" };
         parts.push(format!("at {}{more}", shown.collect::<Vec<_>>().join(", ")));
     }
-    if let Some(windows) = &effect.place.windows {
+    if let Some(windows) = &place.windows {
         let shown =
             windows.iter().map(|w| format!("{} {:.0}–{:.0} s", w.run, w.t_start_s, w.t_end_s));
         parts.push(format!("in {}", shown.collect::<Vec<_>>().join(", ")));
     }
-    if let Some(runs) = &effect.place.runs {
+    if let Some(runs) = &place.runs {
         parts.push(format!("in {}", runs.join(", ")));
     }
-    if let Some(covariate) = &effect.place.covariate {
+    if let Some(covariate) = &place.covariate {
         let [low, high] = covariate.range;
         parts.push(format!("{} from {low:.1} to {high:.1}", covariate.name));
     }
-    parts.extend(effect.place.uncertainty_95.as_ref().and_then(precision));
-    format!("{} ({})", effect.kind, parts.join(", "))
+    parts
 }
 
 /// How well the ends of a place are known: half of the widest 95 % interval.

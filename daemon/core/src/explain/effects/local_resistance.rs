@@ -5,7 +5,7 @@ use std::sync::Arc;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal};
-use crate::explain::answer::Place;
+use crate::explain::answer::{Place, RunWindow};
 use crate::explain::evidence::{RunData, SampleForces, SharedHypothesis};
 use crate::explain::places::{End, Inside, Stretches, find};
 use crate::explain::scan::Scan;
@@ -22,6 +22,36 @@ struct Local {
     runs: Option<Vec<String>>,
     choice_cost: f64,
     map_error: f64,
+    /// The only fit run, whose passage could as well be a stretch of time.
+    only: Option<Arc<Passage>>,
+}
+
+/// When a run is where.
+#[derive(Debug)]
+struct Passage {
+    file: String,
+    /// Time in s, in the recording's own count, and chainage in m.
+    samples: Vec<(f64, f64)>,
+}
+
+impl Passage {
+    fn of(run: &RunData) -> Self {
+        let times_s = run.recording.time_s().iter().map(|time_s| run.offset_s + time_s);
+        let samples = times_s.zip(run.samples());
+        let samples = samples.filter_map(|(time_s, at)| Some((time_s, at.position_m?))).collect();
+        Passage { file: run.file.clone(), samples }
+    }
+
+    /// The stretches of time in which the train's centre is inside intervals in m.
+    fn windows(&self, intervals_m: &[[f64; 2]]) -> Vec<RunWindow> {
+        let window = |&[from_m, to_m]: &[f64; 2]| {
+            let mut inside = self.samples.iter().filter(|(_, at_m)| (from_m..=to_m).contains(at_m));
+            let (t_start_s, _) = *inside.next()?;
+            let (t_end_s, _) = *inside.next_back()?;
+            Some(RunWindow { run: self.file.clone(), t_start_s, t_end_s })
+        };
+        intervals_m.iter().filter_map(window).collect()
+    }
 }
 
 impl Effect for LocalResistance {
@@ -38,6 +68,10 @@ impl Effect for LocalResistance {
         let Some(found) = find(scan, &shape, inside, true) else {
             return Proposal::Candidates(Vec::new());
         };
+        let only = match &scan.problem.runs[..] {
+            [run] => Some(Arc::new(Passage::of(run))),
+            _ => None,
+        };
         let candidate = |runs: Option<Vec<String>>| {
             let hypothesis = Local {
                 stretches: found.stretches(),
@@ -45,6 +79,7 @@ impl Effect for LocalResistance {
                 runs,
                 choice_cost: found.choice_cost,
                 map_error: found.map_error,
+                only: only.clone(),
             };
             Candidate::new(hypothesis, vec![found.estimate])
         };
@@ -110,7 +145,17 @@ impl Hypothesis for Local {
         Some(Arc::new(Local { runs: Some(runs), ..self.clone() }))
     }
 
+    fn twins(&self) -> &[EffectKind] {
+        if self.only.is_some() { &[EffectKind::DraggingBrake] } else { &[] }
+    }
+
+    fn is_event(&self) -> bool {
+        self.runs.is_some()
+    }
+
     fn place(&self) -> Place {
-        Place { runs: self.runs.clone(), ..Place::of_intervals(self.stretches.intervals_m.clone()) }
+        let intervals_m = &self.stretches.intervals_m;
+        let windows = self.only.as_ref().map(|only| only.windows(intervals_m));
+        Place { runs: self.runs.clone(), windows, ..Place::of_intervals(intervals_m.clone()) }
     }
 }

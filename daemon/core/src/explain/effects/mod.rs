@@ -73,6 +73,15 @@ impl Reported {
     }
 }
 
+/// A parameter at a bound of what is looked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AtBound {
+    /// Its name in the answer.
+    pub name: &'static str,
+    /// The bound.
+    pub bound: f64,
+}
+
 /// What a report may need beside the parameters of the effect itself.
 pub struct ReportContext<'a> {
     /// Parameters of the effect.
@@ -130,6 +139,12 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         None
     }
 
+    /// True when it acts in certain runs only: an event, and no property of train or line.
+    fn is_event(&self) -> bool {
+        let place = self.place();
+        place.windows.is_some() || place.runs.is_some()
+    }
+
     /// Files of the fit runs in which it acts, where these were chosen.
     fn chosen_runs(&self) -> Option<&[String]> {
         None
@@ -159,6 +174,17 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
     /// The value of each parameter at which there is no effect.
     fn none(&self) -> f64 {
         0.0
+    }
+
+    /// The first parameter that lies at a bound of what is looked for, other than at no effect: the
+    /// data ask for something else, or hold it not at all.
+    fn at_bound(&self, parameters: &[f64]) -> Option<AtBound> {
+        let mut specs = self.parameters().iter().zip(parameters);
+        specs.find_map(|(spec, &value)| {
+            let near = |bound: &f64| (value - bound).abs() < spec.step && *bound != self.none();
+            let bound = [spec.lower, spec.upper].into_iter().find(near)?;
+            Some(AtBound { name: spec.name, bound })
+        })
     }
 
     /// How far it is from no effect, in the unit of its first parameter.

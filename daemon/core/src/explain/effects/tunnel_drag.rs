@@ -1,4 +1,8 @@
 //! Air resistance in tunnels: c v² is larger for the part of the train inside.
+//!
+//! A map without a tunnel is no proof that there is none: beside the mapped tunnels, places are
+//! looked for where c v² is larger. Trains that pass a place at different speeds tell that from a
+//! constant resistance there.
 
 use std::sync::Arc;
 
@@ -10,6 +14,11 @@ use crate::explain::evidence::{RunData, SampleForces, SharedHypothesis};
 use crate::explain::places::{End, Inside, Stretches, find};
 use crate::explain::scan::Scan;
 use crate::terms::{place, tunnel};
+
+/// Motion in s inside mapped tunnels that tells of them.
+const MAPPED_MIN_S: f64 = 10.0;
+/// A tunnel that nobody mapped is less likely than some resistance at a place.
+const UNMAPPED_COST: f64 = 4.0;
 
 /// The kind.
 pub struct TunnelDrag;
@@ -32,20 +41,17 @@ impl Effect for TunnelDrag {
     fn propose(&self, scan: &Scan) -> Proposal {
         let length_m = scan.train.length_m;
         let inside_s = scan.seconds_where(|_, sample| sample.tunnel_share.is_some_and(|s| s > 0.0));
-        let is_mapped = scan.track.is_some_and(|track| track.knows_tunnels());
-        if is_mapped && inside_s < 10.0 {
-            return Proposal::NotTestable("no mapped tunnel on the way".into());
-        }
-        if is_mapped {
-            let mapped_m = scan.track.map_or_else(Vec::new, |track| {
-                track.tunnels().iter().map(|tunnel| [tunnel.start_m, tunnel.end_m]).collect()
-            });
+        let Some(track) = scan.track else {
+            return Proposal::NotTestable("the line is not known".into());
+        };
+        let mapped_m: Vec<[f64; 2]> =
+            track.tunnels().iter().map(|tunnel| [tunnel.start_m, tunnel.end_m]).collect();
+        let mut candidates = Vec::new();
+        if inside_s > MAPPED_MIN_S {
+            let mapped_m = mapped_m.clone();
             let mapped =
                 Tunnels { found: None, length_m, mapped_m, choice_cost: 0.0, map_error: 0.0 };
-            return Proposal::Candidates(vec![Candidate::new(mapped, vec![0.0])]);
-        }
-        if scan.track.is_none() {
-            return Proposal::NotTestable("the line is not known".into());
+            candidates.push(Candidate::new(mapped, vec![0.0]));
         }
         let inside = Inside::Share { length_m };
         let shape = |run: &RunData, i: usize| {
@@ -54,17 +60,17 @@ impl Effect for TunnelDrag {
         };
         let Some(found) = find(scan, &shape, inside, true).filter(|found| found.runs.is_none())
         else {
-            return Proposal::Candidates(Vec::new());
+            return Proposal::Candidates(candidates);
         };
         let hypothesis = Tunnels {
             found: Some(found.stretches()),
             length_m,
-            mapped_m: Vec::new(),
-            // A tunnel that nobody mapped is less likely than some resistance at a place.
-            choice_cost: found.choice_cost + 4.0,
+            mapped_m,
+            choice_cost: found.choice_cost + UNMAPPED_COST,
             map_error: found.map_error,
         };
-        Proposal::Candidates(vec![Candidate::new(hypothesis, vec![found.estimate])])
+        candidates.push(Candidate::new(hypothesis, vec![found.estimate]));
+        Proposal::Candidates(candidates)
     }
 }
 
@@ -101,13 +107,18 @@ impl Hypothesis for Tunnels {
                     .map(|(profile, position_m)| profile.mean_around(position_m, self.length_m)),
             };
             tunnel::act(parameters[0], share, &mut force.resistance);
-            tunnel::enter(share, &mut force.resistance);
+            let sheltered = share.unwrap_or(0.0).max(sample.tunnel_share.unwrap_or(0.0));
+            tunnel::enter(Some(sheltered), &mut force.resistance);
         }
     }
 
     fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
         let mut entries = vec![Entry::Number(&tunnel::DC, parameters[0])];
         if let Some(found) = &self.found {
+            // The files know one greater c for all tunnels.
+            if !self.mapped_m.is_empty() {
+                return None;
+            }
             let rows = found.intervals_m.iter().map(|interval_m| interval_m.to_vec()).collect();
             entries.push(Entry::Rows("tunnels", rows));
         }

@@ -32,6 +32,13 @@ impl Noise {
         Noise { fading_var: (share * self.fading_var).max(1e-10), ..self }
     }
 
+    /// Standard deviation in m/s² of what the force does on average over some seconds.
+    pub fn mean_acceleration_mps2(&self, over_s: f64) -> f64 {
+        let Noise { white_density, fading_var, fading_s, .. } = *self;
+        let lasting_s = over_s - fading_s * (1.0 - (-over_s / fading_s).exp());
+        (white_density * over_s + 2.0 * fading_var * fading_s * lasting_s).sqrt() / over_s
+    }
+
     pub(super) fn to_logs(self) -> [f64; 4] {
         [self.measurement_var, self.white_density, self.fading_var, self.fading_s].map(f64::ln)
     }

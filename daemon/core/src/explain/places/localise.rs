@@ -11,7 +11,7 @@ use crate::track::Track;
 const SHORTEST_M: f64 = 150.0;
 /// Ends are refined to so many m.
 const FINEST_M: f64 = 10.0;
-/// What is tied to a place shows in so many runs; less is an event.
+/// What is tied to a place shows in so many runs, where there are so many; less is an event.
 const PLACE_RUNS_MIN: usize = 2;
 /// A further interval must add this share of what the others explain.
 const FURTHER_SHARE: f64 = 0.05;
@@ -103,9 +103,10 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside, positive: bool) -> Option
     let places = Places::new(scan, shape, inside, positive);
     let cells = cells(&places, span);
     let interval_cost = 2.0 * (cells.len().max(2) as f64).ln();
+    let runs_min = PLACE_RUNS_MIN.min(scan.problem.runs.len());
     let best = cells
         .iter()
-        .map(|cell| (cell, best_runs(scan, &cell.runs, positive, PLACE_RUNS_MIN)))
+        .map(|cell| (cell, best_runs(scan, &cell.runs, positive, runs_min)))
         .max_by(|one, other| (one.1.1 - one.1.3).total_cmp(&(other.1.1 - other.1.3)))?;
     let (cell, (runs, gain, _, subset)) = best;
     if gain <= 0.0 {

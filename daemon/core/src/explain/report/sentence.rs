@@ -33,6 +33,7 @@ pub fn sentence(answer: &Answer, errors: &Errors) -> String {
                 gained(errors)
             )
         }
+        Verdict::Unknown if answer.effects.is_empty() => answer.statement.clone(),
         Verdict::Unknown => format!(
             "Something undeclared acts that no effect of the library explains: {found}. {}",
             gained(errors)
@@ -254,6 +255,7 @@ mod tests {
             error_reduction_interval: None,
             window60: None,
             fit_runs: None,
+            unexplained_n_per_kn: None,
             considered: Vec::new(),
             predictions: std::collections::BTreeMap::new(),
         };

@@ -5,7 +5,9 @@ use dynocar_shared::vocabulary::EffectKind;
 use super::by_run::leave_one_run_out;
 use super::search::{Outcome, Search, Trial};
 use super::significance::{EVIDENCE_MIN, REDUCTION_MIN, STRENGTH_MIN};
-use crate::explain::evidence::Fit;
+use crate::explain::effects::AtBound;
+use crate::explain::evidence::{Fit, pooled_way_ratio};
+use crate::explain::score::open_loop_errors;
 
 /// What is beyond any doubt need take away only this share.
 const SMALL_REDUCTION_MIN: f64 = 0.06;
@@ -23,12 +25,23 @@ pub enum Refusal {
     Insignificant,
     /// It is smaller than what declared figures are good for.
     Immaterial,
+    /// A parameter lies at the bound of what is looked for: these data do not hold it.
+    AtBound(AtBound),
     /// It takes away this share of the open-loop error, which is too little.
     LittleOfTheError(f64),
     /// Evidence and share of the error are too small together.
     Weak,
     /// Runs left out of the fit do not gain from it.
     NotInEveryRun,
+    /// The runs held out are predicted worse with it.
+    WorseHeldOut,
+}
+
+impl Refusal {
+    /// Whether all but its name speaks for the effect: something is left to explain.
+    pub fn leaves_a_residual(&self) -> bool {
+        matches!(self, Refusal::AtBound(_) | Refusal::WorseHeldOut)
+    }
 }
 
 impl std::fmt::Display for Refusal {
@@ -37,6 +50,13 @@ impl std::fmt::Display for Refusal {
             Refusal::Chance => "explains no more than chance",
             Refusal::Insignificant => "not significant for a search over the whole library",
             Refusal::Immaterial => "smaller than what declared figures are good for",
+            Refusal::AtBound(AtBound { name, bound }) => {
+                return write!(
+                    f,
+                    "not identifiable from these data: {name} runs to the bound {bound} of what is \
+                     looked for"
+                );
+            }
             Refusal::LittleOfTheError(share) if *share < 0.005 => {
                 return f.write_str("takes nothing from the error");
             }
@@ -45,6 +65,7 @@ impl std::fmt::Display for Refusal {
             }
             Refusal::Weak => "takes too little from the error for its evidence",
             Refusal::NotInEveryRun => "runs left out of the fit do not gain from it",
+            Refusal::WorseHeldOut => "the runs held out are predicted worse with it",
         })
     }
 }
@@ -64,6 +85,10 @@ impl Search<'_> {
             Some(Refusal::Weak)
         } else if !self.holds_by_run(base, trial) {
             Some(Refusal::NotInEveryRun)
+        } else if let Some(at) = at_bound(&trial.fit, trial.last()) {
+            Some(Refusal::AtBound(at))
+        } else if self.predicts_worse(base, &trial.fit, trial.last()) {
+            Some(Refusal::WorseHeldOut)
         } else {
             None
         }
@@ -77,6 +102,7 @@ impl Search<'_> {
             .filter(|trial| {
                 trial.evidence > EVIDENCE_MIN
                     && is_material(trial)
+                    && at_bound(&trial.fit, trial.last()).is_none()
                     && self.holds_by_run(&outcome.base, trial)
             })
             .map(Trial::strength)
@@ -87,17 +113,34 @@ impl Search<'_> {
     fn holds_by_run(&self, base: &Fit, trial: &Trial) -> bool {
         let sharper = self.problem.fit(&base.model, base.theta.clone(), trial.fit.noise);
         let held = leave_one_run_out(&sharper, &trial.fit);
-        let own = trial.fit.model.effects[trial.fit.model.effects.len() - 1].place();
-        if own.windows.is_some() || own.runs.is_some() || held.runs < 3 {
+        if trial.fit.model.effects[trial.last()].is_event() || held.runs < 3 {
             return true;
         }
         held.gain > 0.5 * EVIDENCE_MIN && 2 * held.better > held.runs
     }
+
+    /// Whether the runs held out are predicted worse with effect number `index` of a fit than by
+    /// the model without it: their speed, and their way too where it changes the scale of speeds.
+    /// An event of single fit runs predicts nothing of others.
+    pub fn predicts_worse(&self, without: &Fit, with: &Fit, index: usize) -> bool {
+        let way_ratio = pooled_way_ratio(self.holdout);
+        let errors = |fit: &Fit| open_loop_errors(self.holdout, way_ratio, fit);
+        let ([before_mps, _, way_before], [after_mps, _, way_after]) =
+            (errors(without), errors(with));
+        let effect = &with.model.effects[index];
+        let finds_the_way = effect.changes_speed_scale() && way_after < way_before;
+        after_mps > before_mps && !finds_the_way && !effect.is_event()
+    }
+}
+
+/// The parameter of effect number `index` that lies at a bound of what is looked for.
+pub fn at_bound(fit: &Fit, index: usize) -> Option<AtBound> {
+    fit.model.effects[index].at_bound(fit.effect_parameters(index))
 }
 
 /// Whether the last effect of a trial is larger than what declared figures are good for.
 fn is_material(trial: &Trial) -> bool {
-    let last = trial.fit.model.effects.len() - 1;
+    let last = trial.last();
     let parameters = trial.fit.effect_parameters(last);
     trial.fit.model.effects[last].is_material(parameters, trial.fit.theta[2])
 }

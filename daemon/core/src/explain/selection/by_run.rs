@@ -70,7 +70,7 @@ fn few_runs_factor(runs: usize) -> f64 {
 /// uncertain: where that of all parameters together is greater, half of the enlargement is theirs.
 pub fn deviations(fit: &Fit) -> (Vec<f64>, DMatrix<f64>) {
     let count = fit.theta.len();
-    let Some(factor) = fit.factor() else {
+    let Some(factor) = Cholesky::new(fit.free_information()) else {
         return (vec![f64::NAN; count], DMatrix::zeros(count, count));
     };
     let covariance = factor.inverse();

@@ -5,6 +5,7 @@ mod by_run;
 mod search;
 mod significance;
 
+pub use acceptance::Refusal;
 pub use by_run::{Held, deviations, leave_one_run_out};
 pub use search::{Outcome, Progress, Search, Trial};
 pub use significance::{

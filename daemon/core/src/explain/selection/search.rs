@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
+use super::acceptance::at_bound;
 use super::significance::{
     AMBIGUOUS, EVIDENCE_MIN, REDUCTION_MIN, STRENGTH_MIN, discounted, model_penalty, penalty,
 };
@@ -48,6 +49,11 @@ pub struct Trial {
 }
 
 impl Trial {
+    /// The number of the candidate among the effects of its model.
+    pub fn last(&self) -> usize {
+        self.fit.model.effects.len() - 1
+    }
+
     /// Evidence times the share of the open-loop error that it takes away.
     pub fn strength(&self) -> f64 {
         self.evidence.max(0.0) * self.reduction.max(0.0)
@@ -191,7 +197,6 @@ impl Search<'_> {
     /// Fits a candidate on top of a fit; its evidence counts against `base`.
     fn attempt(&self, base: &Fit, onto: &Fit, candidate: Candidate, own_noise: bool) -> Trial {
         let kind = candidate.hypothesis.kind();
-        let price = penalty(&candidate.hypothesis, base.observations());
         let model = onto.model.with(candidate.hypothesis);
         let start = onto.theta.iter().chain(&candidate.start).copied().collect();
         let fit = if own_noise {
@@ -199,12 +204,14 @@ impl Search<'_> {
         } else {
             self.problem.fit(&model, start, onto.noise)
         };
-        Self::trial(base, fit, kind, price)
+        Self::trial(base, fit, kind)
     }
 
-    fn trial(base: &Fit, fit: Fit, kind: EffectKind, price: f64) -> Trial {
+    fn trial(base: &Fit, fit: Fit, kind: EffectKind) -> Trial {
         let decrease = base.cost - fit.cost;
-        let evidence = discounted(&fit, fit.model.effects.len() - 1, decrease) - price;
+        let last = fit.model.effects.len() - 1;
+        let price = penalty(&fit, last);
+        let evidence = discounted(&fit, last, decrease) - price;
         Trial { kind, fit, advantage: decrease - price, evidence, reduction: 0.0 }
     }
 
@@ -217,7 +224,7 @@ impl Search<'_> {
                 trial.fit.theta.clone(),
                 trial.fit.noise,
             );
-            Self::trial(base, fit, trial.kind, base.cost - trial.fit.cost - trial.advantage)
+            Self::trial(base, fit, trial.kind)
         };
         let mut best = refit(&trial);
         for attempt in 0..3 {
@@ -283,7 +290,9 @@ impl Search<'_> {
             let reduction = self.reduction(&rest, fit);
             let needless = evidence < EVIDENCE_MIN
                 || reduction < REDUCTION_MIN
-                || evidence * reduction < STRENGTH_MIN;
+                || evidence * reduction < STRENGTH_MIN
+                || at_bound(fit, index).is_some()
+                || self.predicts_worse(&rest, fit, index);
             if needless {
                 *fit = rest;
             } else {

@@ -1,6 +1,8 @@
 //! When an effect is more than chance.
 
-use crate::explain::evidence::{Fit, SharedHypothesis};
+use nalgebra::{Cholesky, DMatrix};
+
+use crate::explain::evidence::Fit;
 
 /// Evidence that an effect must have: decrease of -2 log likelihood beyond the penalty.
 pub const EVIDENCE_MIN: f64 = 9.0;
@@ -17,12 +19,32 @@ pub const NULL_STRENGTH: NullStrength = NullStrength { share: 0.05, at: 2.0, per
 /// Two kinds whose evidence differs by less than this explain the data equally well.
 pub const AMBIGUOUS: f64 = 6.0;
 
-/// Price of an effect in -2 log likelihood: each parameter costs the logarithm of the number of
-/// observations (Schwarz 1978), each choice of a structure twice the logarithm of the number of
-/// structures.
-pub fn penalty(hypothesis: &SharedHypothesis, observations: usize) -> f64 {
-    let parameters = hypothesis.parameters().len() as f64;
-    parameters * (observations.max(2) as f64).ln() + hypothesis.choice_cost()
+/// Price of an effect of a fitted model in -2 log likelihood: each parameter costs the logarithm of
+/// the number of observations (Schwarz 1978), each choice of a structure twice the logarithm of the
+/// number of structures. Parameters with a prior of their own cost what the data narrow it by
+/// (Laplace's approximation of the evidence; Rasmussen and Williams 2006, equation 3.32).
+pub fn penalty(fit: &Fit, index: usize) -> f64 {
+    let effect = &fit.model.effects[index];
+    let narrowed = effect.prior_information().and_then(|prior| narrowed(fit, index, prior));
+    let by_count = || {
+        let parameters = effect.parameters().len() as f64;
+        parameters * (fit.observations().max(2) as f64).ln()
+    };
+    narrowed.unwrap_or_else(by_count) + effect.choice_cost()
+}
+
+/// Logarithm of the determinant of the information about an effect's parameters, all others fitted,
+/// over that before the data; `None` when one of them is singular.
+fn narrowed(fit: &Fit, index: usize, prior: &DMatrix<f64>) -> Option<f64> {
+    let own = fit.model.ranges()[index].clone();
+    let information = fit.information();
+    let others: Vec<usize> = (0..fit.theta.len()).filter(|i| !own.contains(i)).collect();
+    let rest =
+        DMatrix::from_fn(others.len(), others.len(), |i, j| information[(others[i], others[j])]);
+    let log_determinant =
+        |matrix: DMatrix<f64>| Some(2.0 * Cholesky::new(matrix)?.l().diagonal().map(f64::ln).sum());
+    let all = log_determinant(information)?;
+    Some(all - log_determinant(rest)? - log_determinant(prior.clone())?)
 }
 
 /// Decrease of -2 log likelihood by an effect of a fitted model, less what errors that all runs
@@ -40,8 +62,7 @@ pub fn discounted(fit: &Fit, index: usize, decrease: f64) -> f64 {
 
 /// The price of all effects of a model.
 pub fn model_penalty(fit: &Fit) -> f64 {
-    let observations = fit.observations();
-    fit.model.effects.iter().map(|effect| penalty(effect, observations)).sum()
+    (0..fit.model.effects.len()).map(|index| penalty(fit, index)).sum()
 }
 
 /// The tail of a distribution of strengths.

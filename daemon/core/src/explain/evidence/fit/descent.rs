@@ -131,11 +131,11 @@ impl FitProblem {
 
     /// Bounds of all parameters.
     fn bounds(&self, model: &GrownModel) -> Vec<(f64, f64)> {
-        let free = [(f64::NEG_INFINITY, f64::INFINITY); 3];
+        let declared = [0, 1, 2].map(|coefficient| self.declared_bounds(coefficient));
         let of_effects = model
             .effects
             .iter()
             .flat_map(|effect| effect.parameters().iter().map(|spec| (spec.lower, spec.upper)));
-        free.into_iter().chain(of_effects).collect()
+        declared.into_iter().chain(of_effects).collect()
     }
 }

@@ -98,6 +98,7 @@ impl FitProblem {
             cost: 0.0,
             runs: Vec::new(),
             prior_information,
+            held_information: [0.0; 3],
             innovations: Vec::new(),
             columns: Vec::new(),
             residuals: Vec::new(),
@@ -118,6 +119,7 @@ impl FitProblem {
             fit.filters.push(filter);
         }
         fit.cost = cost;
+        fit.held_information = self.held_information(&fit.theta, &self.score(&fit));
         fit
     }
 

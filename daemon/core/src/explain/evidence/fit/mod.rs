@@ -18,6 +18,11 @@ pub use nearby::Nearby;
 /// Standard deviation of the declared a, b, c as share of their size: a weak prior that keeps
 /// directions apart which the runs do not excite.
 const PRIOR_SHARE: [f64; 3] = [0.4, 0.8, 0.4];
+/// A declared coefficient is wrong by at most so many of these; what asks for more, or for less
+/// resistance than none, is a force that the basic resistance does not have.
+const DECLARED_DEVIATIONS_MAX: f64 = 4.0;
+/// A coefficient that is held at its bound is known to this share of its prior deviation.
+const HELD_SHARE: f64 = 1e-3;
 
 /// The runs that are fitted and what is known beforehand.
 #[derive(Clone, Debug)]
@@ -58,6 +63,8 @@ pub struct Fit {
     pub runs: Vec<RunNormal>,
     /// Information of prior and way ratio.
     pub prior_information: DMatrix<f64>,
+    /// Information by which those of a, b, c are held that the data push against their bounds.
+    held_information: [f64; 3],
     /// White innovations by run, less the runs' own factors.
     pub innovations: Vec<Vec<f64>>,
     /// Whitened regressors by run and parameter, less what the runs' own factors would explain;
@@ -74,8 +81,17 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// Information matrix of all runs and the prior.
+    /// Information matrix of all runs and the prior, with what is held at its bounds.
     pub fn information(&self) -> DMatrix<f64> {
+        let mut information = self.free_information();
+        for (i, held) in self.held_information.iter().enumerate() {
+            information[(i, i)] += held;
+        }
+        information
+    }
+
+    /// The same with nothing held: what the data say of a coefficient at its bound.
+    pub fn free_information(&self) -> DMatrix<f64> {
         self.runs.iter().fold(self.prior_information.clone(), |sum, run| sum + &run.information)
     }
 
@@ -87,6 +103,12 @@ impl Fit {
     /// Number of innovations.
     pub fn observations(&self) -> usize {
         self.whiteners.iter().map(Whitener::count).sum()
+    }
+
+    /// Measured over true speed.
+    pub fn speed_scale(&self) -> f64 {
+        let effects = self.model.effects.iter().zip(self.model.ranges());
+        effects.map(|(effect, range)| effect.speed_scale(&self.theta[range])).product()
     }
 
     /// The parameters of effect number `index`.
@@ -108,6 +130,26 @@ impl FitProblem {
         FitProblem { runs, declared, prior_deviation, scatter_columns, way_ratio }
     }
 
+    /// Least and greatest a (0), b (1) or c (2): physical, and within the tolerance of what is
+    /// declared; what is declared as none has no greatest.
+    fn declared_bounds(&self, coefficient: usize) -> (f64, f64) {
+        let Davis { a, b, c } = self.declared;
+        let declared = [a, b, c][coefficient];
+        let most = DECLARED_DEVIATIONS_MAX * self.prior_deviation[coefficient];
+        let greatest = if declared == 0.0 { f64::INFINITY } else { declared + most };
+        ((declared - most).max(declared.min(0.0)), greatest)
+    }
+
+    /// Information that holds a, b, c where a score pushes them against their bounds.
+    fn held_information(&self, theta: &[f64], score: &DVector<f64>) -> [f64; 3] {
+        std::array::from_fn(|i| {
+            let (lower, upper) = self.declared_bounds(i);
+            let is_held =
+                (theta[i] <= lower && score[i] < 0.0) || (theta[i] >= upper && score[i] > 0.0);
+            if is_held { (HELD_SHARE * self.prior_deviation[i]).powi(-2) } else { 0.0 }
+        })
+    }
+
     /// The model with a, b, c as declared and the effects at given parameters.
     pub fn start(&self, effects: &[f64]) -> Vec<f64> {
         let Davis { a, b, c } = self.declared;
@@ -117,7 +159,7 @@ impl FitProblem {
 
 /// The ratios of all runs together. Wheel creep, rounding and the places where a run starts are
 /// common to the runs: below `COMMON` nothing is told.
-fn pooled_way_ratio(runs: &[RunData]) -> Option<(f64, f64)> {
+pub fn pooled_way_ratio(runs: &[RunData]) -> Option<(f64, f64)> {
     const COMMON: f64 = 0.001;
     let mut ratios: Vec<f64> = runs.iter().filter_map(|run| Some(run.way_ratio?.0)).collect();
     if ratios.is_empty() {

@@ -37,6 +37,9 @@ impl<'a> Nearby<'a> {
             score += &normal.score;
             cost += normal.cost;
         }
+        for (i, held) in self.fit.held_information.iter().enumerate() {
+            information[(i, i)] += held;
+        }
         let step = Cholesky::new(information)?.solve(&score);
         Some(cost - score.dot(&step)).filter(|reached| reached.is_finite())
     }

@@ -1,0 +1,79 @@
+//! What is left when the search is done: whether noise explains it, and where it lives.
+
+use super::answer::Place;
+use super::selection::{Outcome, Refusal, Search, Trial};
+use dynocar_shared::vocabulary::EffectKind;
+
+/// Time in s over which the force that is left is averaged: gusts and joints of rails are gone.
+const OVER_S: f64 = 60.0;
+/// Noise averages to less than this share of the basic resistance: gusts, the map's error and the
+/// force sensors leave up to 0.11 of it in simulated datasets and 0.18 in recorded ones
+/// (`unexplained_n_per_kn` of `dynocar-bench explain --verbose`).
+const NOISE_SHARE_MAX: f64 = 0.3;
+
+/// What the finished model leaves.
+pub struct Unexplained<'o> {
+    /// Standard deviation in N/kN of the force that is left, on average over a minute.
+    pub n_per_kn: f64,
+    /// The same over the declared basic resistance.
+    pub share: f64,
+    /// Trials of the last round that all but prediction and bounds speak for, with what speaks
+    /// against them; the strongest first.
+    pub refused: Vec<(&'o Trial, Refusal)>,
+    /// Where a force outside the library explains most.
+    pub place: Option<Place>,
+}
+
+impl<'o> Unexplained<'o> {
+    /// What a finished search leaves; `None` without motion.
+    pub fn of(search: &Search, outcome: &'o Outcome) -> Option<Self> {
+        let declared = search.train.resistance;
+        let (mut count, mut per_unit, mut basic) = (0.0, 0.0, 0.0);
+        for run in &search.problem.runs {
+            for bin in &run.bins {
+                let sample = &run.samples()[bin.middle()];
+                count += 1.0;
+                per_unit += sample.weight_kn / sample.inertial_mass_kg;
+                basic += declared.w0_n_per_kn(bin.speed_mps);
+            }
+        }
+        if count == 0.0 {
+            return None;
+        }
+        let n_per_kn = outcome.fit.noise.mean_acceleration_mps2(OVER_S) * count / per_unit;
+        let last = outcome.rounds.last().into_iter().flatten();
+        let refused = last
+            .clone()
+            .filter_map(|trial| Some((trial, search.refusal(&outcome.fit, trial)?)))
+            .filter(|(_, refusal)| refusal.leaves_a_residual())
+            .collect();
+        let outside = last.clone().find(|trial| trial.kind == EffectKind::Unknown);
+        let place = outside.map(|trial| trial.fit.model.effects[trial.last()].place());
+        Some(Unexplained { n_per_kn, share: n_per_kn * count / basic, refused, place })
+    }
+
+    /// Whether noise explains it, with `found` effects in the model. A force outside the library
+    /// that only the runs held out speak against is there, in the runs that were fitted.
+    pub fn is_noise(&self, found: usize) -> bool {
+        let is_outside = self.refused.iter().any(|(trial, _)| trial.kind == EffectKind::Unknown);
+        self.share < NOISE_SHARE_MAX && (found > 0 || !is_outside)
+    }
+
+    /// It in words.
+    pub fn describe(&self) -> String {
+        let Unexplained { n_per_kn, share, .. } = self;
+        format!(
+            " A force of {n_per_kn:.2} N/kN on average over a minute stays unexplained, {:.0} % of \
+             the basic resistance.",
+            100.0 * share
+        )
+    }
+
+    /// What explains the residual but is not told, in words; empty for nothing.
+    pub fn not_told(&self) -> String {
+        let one = |(trial, refusal): &(&Trial, Refusal)| {
+            format!(" Not told is {}: {refusal}.", trial.kind.name())
+        };
+        self.refused.iter().map(one).collect()
+    }
+}
