@@ -58,7 +58,7 @@ pub struct Explanation {
 
 /// Explains what the declared model of a dataset leaves.
 ///
-/// Speeds of holdout runs score the finished model, and refuse effects that predict them worse.
+/// Holdout runs are read once, to score the finished model.
 ///
 /// # Errors
 ///

@@ -33,37 +33,47 @@ pub fn run_error(fit: &Fit, run: &RunData, restart: Restart) -> SpeedError {
     SpeedError::of(&run.recording, &prediction)
 }
 
-/// Open-loop errors of some runs: root mean square in m/s over whole runs and with restarts every
-/// 60 s, and the share by which the integrated speed misses the measured way, with what that is
-/// known to.
-pub fn open_loop_errors(runs: &[RunData], way_ratio: Option<(f64, f64)>, fit: &Fit) -> [f64; 3] {
-    let [whole, restarted] = [Restart::FullRun, Restart::WINDOW_60].map(|restart| {
-        let error: SpeedError = runs.iter().map(|run| run_error(fit, run, restart)).sum();
-        error.rmse_mps().unwrap_or(0.0)
-    });
-    let missed =
-        |(ratio, deviation): (f64, f64)| (ratio - 1.0 / fit.speed_scale()).hypot(deviation);
-    [whole, restarted, way_ratio.map_or(0.0, missed)]
+/// Open-loop errors of the fit runs.
+#[derive(Clone, Copy, Debug)]
+pub struct FitErrors {
+    /// Root mean square in m/s over whole runs, and with restarts every 60 s.
+    speed_mps: [f64; 2],
+    /// Share by which the integrated speed misses the measured way, with what that is known to.
+    way: f64,
+    /// Whether the model looks for the scale of the speeds: nothing else is judged by the way.
+    has_speed_scale: bool,
 }
 
-/// The same of the fit runs.
-pub fn errors_on_fit_runs(problem: &FitProblem, fit: &Fit) -> [f64; 3] {
-    open_loop_errors(&problem.runs, problem.way_ratio, fit)
-}
+impl FitErrors {
+    /// Those of a fitted model.
+    pub fn of(problem: &FitProblem, fit: &Fit) -> Self {
+        let speed_mps = [Restart::FullRun, Restart::WINDOW_60].map(|restart| {
+            let each = problem.runs.iter().map(|run| run_error(fit, run, restart));
+            each.sum::<SpeedError>().rmse_mps().unwrap_or(0.0)
+        });
+        let missed =
+            |(ratio, deviation): (f64, f64)| (ratio - 1.0 / fit.speed_scale()).hypot(deviation);
+        let has_speed_scale = fit.model.effects.iter().any(|it| it.changes_speed_scale());
+        FitErrors { speed_mps, way: problem.way_ratio.map_or(0.0, missed), has_speed_scale }
+    }
 
-/// Share of the error that a model takes away: over whole runs, with restarts or of the way,
-/// whichever is most.
-pub fn reduction(before: [f64; 3], after: [f64; 3]) -> f64 {
-    before
-        .into_iter()
-        .zip(after)
-        .map(|(before, after)| if before > 0.0 { 1.0 - after / before } else { 0.0 })
-        .fold(f64::NEG_INFINITY, f64::max)
+    /// Share of the error that a model with these errors takes away from another: over whole runs,
+    /// with restarts or, for the scale of the speeds, of the way, whichever is most.
+    pub fn reduction_from(&self, before: &Self) -> f64 {
+        let share = |before: f64, after: f64| if before > 0.0 { 1.0 - after / before } else { 0.0 };
+        let of_speed = [0, 1].map(|k| share(before.speed_mps[k], self.speed_mps[k]));
+        let of_way = if self.has_speed_scale == before.has_speed_scale {
+            f64::NEG_INFINITY
+        } else {
+            share(before.way, self.way)
+        };
+        of_speed.into_iter().fold(of_way, f64::max)
+    }
 }
 
 /// Share of the error of the fit runs that the larger model takes away.
 pub fn reduction_on_fit_runs(problem: &FitProblem, smaller: &Fit, larger: &Fit) -> f64 {
-    reduction(errors_on_fit_runs(problem, smaller), errors_on_fit_runs(problem, larger))
+    FitErrors::of(problem, larger).reduction_from(&FitErrors::of(problem, smaller))
 }
 
 /// Predictions of all runs, fit and holdout.

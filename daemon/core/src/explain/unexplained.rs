@@ -17,8 +17,7 @@ pub struct Unexplained<'o> {
     pub n_per_kn: f64,
     /// The same over the declared basic resistance.
     pub share: f64,
-    /// Trials of the last round that all but prediction and bounds speak for, with what speaks
-    /// against them; the strongest first.
+    /// Trials of the last round that all but a bound speaks for, with that; the strongest first.
     pub refused: Vec<(&'o Trial, Refusal)>,
     /// Where a force outside the library explains most.
     pub place: Option<Place>,
@@ -52,11 +51,9 @@ impl<'o> Unexplained<'o> {
         Some(Unexplained { n_per_kn, share: n_per_kn * count / basic, refused, place })
     }
 
-    /// Whether noise explains it, with `found` effects in the model. A force outside the library
-    /// that only the runs held out speak against is there, in the runs that were fitted.
-    pub fn is_noise(&self, found: usize) -> bool {
-        let is_outside = self.refused.iter().any(|(trial, _)| trial.kind == EffectKind::Unknown);
-        self.share < NOISE_SHARE_MAX && (found > 0 || !is_outside)
+    /// Whether noise explains it.
+    pub fn is_noise(&self) -> bool {
+        self.share < NOISE_SHARE_MAX
     }
 
     /// It in words.

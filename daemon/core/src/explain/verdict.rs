@@ -45,7 +45,9 @@ pub fn answer(
         .map(ToString::to_string)
         .collect();
     let (statement, experiment) = if impossible.is_empty() {
-        statement(search, outcome, verdict, &effects, &rivals, left.as_ref())
+        let (text, experiment) =
+            statement(search, outcome, verdict, &effects, &rivals, left.as_ref());
+        (text + &worse_held_out(&effects, score), experiment)
     } else {
         let text = format!("The data cannot be true as described: {}", impossible.join("; "));
         (text, Some("Set right what is named and run this again.".into()))
@@ -74,6 +76,17 @@ pub fn answer(
         unexplained_n_per_kn: left.map(|left| left.n_per_kn),
         considered: considered(search, outcome, &rivals),
         predictions: BTreeMap::new(),
+    }
+}
+
+/// That the runs held out are predicted worse with what was found; empty when they are not.
+fn worse_held_out(effects: &[EffectAnswer], score: &Score) -> String {
+    match score.holdout_rmse_mps() {
+        [Some(before), Some(after)] if after > before && !effects.is_empty() => format!(
+            " The runs held out are predicted worse with it, {before:.3} m/s before and {after:.3} \
+             after: it holds for the runs that were fitted, not for those."
+        ),
+        _ => String::new(),
     }
 }
 
@@ -156,7 +169,7 @@ fn verdict(
         return Verdict::InsufficientData;
     }
     let effects = &outcome.fit.model.effects;
-    if left.is_some_and(|left| !left.is_noise(effects.len())) {
+    if left.is_some_and(|left| !left.is_noise()) {
         return Verdict::Unknown;
     }
     if effects.is_empty() {

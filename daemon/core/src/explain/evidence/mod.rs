@@ -19,7 +19,7 @@ mod sample_forces;
 mod whitener;
 
 pub use fade::Fade;
-pub use fit::{Fit, FitProblem, Nearby, RunNormal, pooled_way_ratio};
+pub use fit::{Fit, FitProblem, Nearby, RunNormal};
 pub use model::{GrownForces, GrownModel, SharedHypothesis};
 pub use noise::{Noise, RunScatter};
 pub use run_data::{Bin, RunData, RunDataError, prepare};

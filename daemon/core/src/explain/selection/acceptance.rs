@@ -4,10 +4,9 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::by_run::leave_one_run_out;
 use super::search::{Outcome, Search, Trial};
-use super::significance::{EVIDENCE_MIN, REDUCTION_MIN, STRENGTH_MIN};
+use super::significance::{EVIDENCE_MIN, REDUCTION_MIN, STRENGTH_MIN, at_bound};
 use crate::explain::effects::AtBound;
-use crate::explain::evidence::{Fit, pooled_way_ratio};
-use crate::explain::score::open_loop_errors;
+use crate::explain::evidence::Fit;
 
 /// What is beyond any doubt need take away only this share.
 const SMALL_REDUCTION_MIN: f64 = 0.06;
@@ -33,14 +32,12 @@ pub enum Refusal {
     Weak,
     /// Runs left out of the fit do not gain from it.
     NotInEveryRun,
-    /// The runs held out are predicted worse with it.
-    WorseHeldOut,
 }
 
 impl Refusal {
     /// Whether all but its name speaks for the effect: something is left to explain.
     pub fn leaves_a_residual(&self) -> bool {
-        matches!(self, Refusal::AtBound(_) | Refusal::WorseHeldOut)
+        matches!(self, Refusal::AtBound(_))
     }
 }
 
@@ -65,7 +62,6 @@ impl std::fmt::Display for Refusal {
             }
             Refusal::Weak => "takes too little from the error for its evidence",
             Refusal::NotInEveryRun => "runs left out of the fit do not gain from it",
-            Refusal::WorseHeldOut => "the runs held out are predicted worse with it",
         })
     }
 }
@@ -85,12 +81,8 @@ impl Search<'_> {
             Some(Refusal::Weak)
         } else if !self.holds_by_run(base, trial) {
             Some(Refusal::NotInEveryRun)
-        } else if let Some(at) = at_bound(&trial.fit, trial.last()) {
-            Some(Refusal::AtBound(at))
-        } else if self.predicts_worse(base, &trial.fit, trial.last()) {
-            Some(Refusal::WorseHeldOut)
         } else {
-            None
+            at_bound(&trial.fit, trial.last()).map(Refusal::AtBound)
         }
     }
 
@@ -118,24 +110,6 @@ impl Search<'_> {
         }
         held.gain > 0.5 * EVIDENCE_MIN && 2 * held.better > held.runs
     }
-
-    /// Whether the runs held out are predicted worse with effect number `index` of a fit than by
-    /// the model without it: their speed, and their way too where it changes the scale of speeds.
-    /// An event of single fit runs predicts nothing of others.
-    pub fn predicts_worse(&self, without: &Fit, with: &Fit, index: usize) -> bool {
-        let way_ratio = pooled_way_ratio(self.holdout);
-        let errors = |fit: &Fit| open_loop_errors(self.holdout, way_ratio, fit);
-        let ([before_mps, _, way_before], [after_mps, _, way_after]) =
-            (errors(without), errors(with));
-        let effect = &with.model.effects[index];
-        let finds_the_way = effect.changes_speed_scale() && way_after < way_before;
-        after_mps > before_mps && !finds_the_way && !effect.is_event()
-    }
-}
-
-/// The parameter of effect number `index` that lies at a bound of what is looked for.
-pub fn at_bound(fit: &Fit, index: usize) -> Option<AtBound> {
-    fit.model.effects[index].at_bound(fit.effect_parameters(index))
 }
 
 /// Whether the last effect of a trial is larger than what declared figures are good for.

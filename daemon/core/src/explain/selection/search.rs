@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::acceptance::at_bound;
 use super::significance::{
-    AMBIGUOUS, EVIDENCE_MIN, REDUCTION_MIN, STRENGTH_MIN, discounted, model_penalty, penalty,
+    AMBIGUOUS, EVIDENCE_MIN, REDUCTION_MIN, STRENGTH_MIN, at_bound, discounted, model_penalty,
+    penalty,
 };
 use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal};
 use crate::explain::evidence::{Fit, FitProblem, GrownModel, Noise, RunData};
 use crate::explain::scan::Scan;
-use crate::explain::score;
+use crate::explain::score::{self, FitErrors};
 use crate::track::Track;
 use crate::train::TrainModel;
 
@@ -166,9 +166,8 @@ impl Search<'_> {
         trials.sort_by(|one, other| by_advantage(&one.0, &other.0));
         let greatest = trials.first().map_or(0.0, |(trial, _)| trial.advantage);
         let least = FINALIST_MIN.max(FINALIST_SHARE * greatest);
-        let before_mps = score::errors_on_fit_runs(self.problem, base);
-        let reduction =
-            |fit: &Fit| score::reduction(before_mps, score::errors_on_fit_runs(self.problem, fit));
+        let before = FitErrors::of(self.problem, base);
+        let reduction = |fit: &Fit| FitErrors::of(self.problem, fit).reduction_from(&before);
         let has_many = base.observations() > MANY_OBSERVATIONS;
         let mut finished: Vec<Trial> = trials
             .into_iter()
@@ -291,8 +290,7 @@ impl Search<'_> {
             let needless = evidence < EVIDENCE_MIN
                 || reduction < REDUCTION_MIN
                 || evidence * reduction < STRENGTH_MIN
-                || at_bound(fit, index).is_some()
-                || self.predicts_worse(&rest, fit, index);
+                || at_bound(fit, index).is_some();
             if needless {
                 *fit = rest;
             } else {

@@ -2,6 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix};
 
+use crate::explain::effects::AtBound;
 use crate::explain::evidence::Fit;
 
 /// Evidence that an effect must have: decrease of -2 log likelihood beyond the penalty.
@@ -58,6 +59,11 @@ pub fn discounted(fit: &Fit, index: usize, decrease: f64) -> f64 {
     let parameters = fit.effect_parameters(index);
     let each = decrease / parameters.len() as f64;
     decrease / (1.0 + each * (shared / effect.size(parameters)).powi(2))
+}
+
+/// The parameter of effect number `index` that lies at a bound of what is looked for.
+pub fn at_bound(fit: &Fit, index: usize) -> Option<AtBound> {
+    fit.model.effects[index].at_bound(fit.effect_parameters(index))
 }
 
 /// The price of all effects of a model.

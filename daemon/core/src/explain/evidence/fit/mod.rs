@@ -159,7 +159,7 @@ impl FitProblem {
 
 /// The ratios of all runs together. Wheel creep, rounding and the places where a run starts are
 /// common to the runs: below `COMMON` nothing is told.
-pub fn pooled_way_ratio(runs: &[RunData]) -> Option<(f64, f64)> {
+fn pooled_way_ratio(runs: &[RunData]) -> Option<(f64, f64)> {
     const COMMON: f64 = 0.001;
     let mut ratios: Vec<f64> = runs.iter().filter_map(|run| Some(run.way_ratio?.0)).collect();
     if ratios.is_empty() {
