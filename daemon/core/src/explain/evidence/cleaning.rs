@@ -53,7 +53,8 @@ pub(super) fn replace_outliers(values: &mut [f64], least: f64) -> usize {
 /// A force counts as an outlier when it leaves its neighbours by a tenth of the run's greatest
 /// force, a speed by 0.25 m/s: less than that averages out. Samples more than `SPARSE_S` apart
 /// cannot tell an outlier from a short application of the brake, or from the bend of a speed where
-/// it ends: their forces stay, and their speeds may bend as sharply as a train's do.
+/// it ends: forces stay, but for those beside a missing one, of which nobody knows how long they
+/// last, and speeds may bend as sharply as a train's do.
 pub(super) fn clean(samples: &mut [ResolvedSample], period_s: f64) -> usize {
     let mut speeds: Vec<f64> = samples.iter().map(|sample| sample.speed_mps).collect();
     let is_sparse = period_s > SPARSE_S;
@@ -61,9 +62,6 @@ pub(super) fn clean(samples: &mut [ResolvedSample], period_s: f64) -> usize {
     let mut replaced = replace_outliers(&mut speeds, 0.25 + bend_mps);
     for (sample, speed_mps) in samples.iter_mut().zip(speeds) {
         sample.speed_mps = speed_mps;
-    }
-    if is_sparse {
-        return replaced;
     }
     let fields: [fn(&mut ResolvedSample) -> &mut Option<f64>; 3] = [
         |sample| &mut sample.traction_force_n,
@@ -78,9 +76,19 @@ pub(super) fn clean(samples: &mut [ResolvedSample], period_s: f64) -> usize {
         let mut sorted = values.clone();
         sorted.sort_unstable_by(f64::total_cmp);
         let high = sorted.get(sorted.len() * 99 / 100).copied().unwrap_or(0.0);
-        replaced += replace_outliers(&mut values, 0.1 * high.max(1.0));
-        for (&row, &value) in rows.iter().zip(&values) {
-            *field(&mut samples[row]) = Some(value);
+        replace_outliers(&mut values, 0.1 * high.max(1.0));
+        let mut is_missing =
+            |row: usize| samples.get_mut(row).is_some_and(|sample| field(sample).is_none());
+        let is_open: Vec<bool> = rows
+            .iter()
+            .map(|&row| is_missing(row + 1) || is_missing(row.wrapping_sub(1)))
+            .collect();
+        for ((&row, &value), is_open) in rows.iter().zip(&values).zip(is_open) {
+            let own = field(&mut samples[row]);
+            if *own != Some(value) && (is_open || !is_sparse) {
+                *own = Some(value);
+                replaced += 1;
+            }
         }
     }
     replaced
@@ -112,6 +120,9 @@ mod tests {
         assert_eq!(clean(&mut dense, 0.2), 10);
         assert_eq!(clean(&mut sparse, 1.0), 0);
         assert!((0..200).all(|row| sparse[row].brake_force_n == Some(brake_n(row))));
+        sparse[28].brake_force_n = None;
+        assert_eq!(clean(&mut sparse, 1.0), 1, "nobody knows how long it lasted");
+        assert_eq!(sparse[27].brake_force_n, Some(0.0));
     }
 
     #[test]

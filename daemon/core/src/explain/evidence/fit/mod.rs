@@ -21,6 +21,8 @@ const PRIOR_SHARE: [f64; 3] = [0.4, 0.8, 0.4];
 /// A declared coefficient is wrong by at most so many of these; what asks for more, or for less
 /// resistance than none, is a force that the basic resistance does not have.
 const DECLARED_DEVIATIONS_MAX: f64 = 4.0;
+/// A coefficient below none by no more than this share of one is an error of estimation.
+const BELOW_NONE_MAX: f64 = 0.25;
 /// A coefficient that is held at its bound is known to this share of its prior deviation.
 const HELD_SHARE: f64 = 1e-3;
 
@@ -137,7 +139,8 @@ impl FitProblem {
         let declared = [a, b, c][coefficient];
         let most = DECLARED_DEVIATIONS_MAX * self.prior_deviation[coefficient];
         let greatest = if declared == 0.0 { f64::INFINITY } else { declared + most };
-        ((declared - most).max(declared.min(0.0)), greatest)
+        let least = declared.min(0.0) - BELOW_NONE_MAX * self.prior_deviation[coefficient];
+        ((declared - most).max(least), greatest)
     }
 
     /// Information that holds a, b, c where a score pushes them against their bounds.
