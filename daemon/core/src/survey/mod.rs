@@ -8,7 +8,7 @@
 //! # Layout, in the order of reading
 //!
 //! - [`recording`], [`geodesy`]: what was recorded, on a plane in metres
-//! - `stretches`, [`way`], `tracking`, `alignment`, `both_directions`, [`line`]: the line that is driven repeatedly
+//! - `stretches`, [`way`], `tracking`, `alignment`, `both_directions`, [`mod@line`]: the line that is driven repeatedly
 //! - [`chainage`]: a chainage for every row; [`stops`], [`curves`]: what it shows
 //! - [`balance`], [`common`], [`profile`], [`friction`], [`learn`]: gradient, resistance, mass,
 //!   time offset and friction brake from the balance of forces; [`layout`]: its unknown heights;
