@@ -22,10 +22,12 @@ pub enum LoadError {
         path: PathBuf,
     },
     /// The folder holds no `dataset.toml`.
-    #[error("{}: not a dataset: the folder holds no {MANIFEST_FILE}", path.display())]
+    #[error("{}: not a dataset: the folder holds no {MANIFEST_FILE}{hint}", path.display())]
     NotADataset {
         /// The folder.
         path: PathBuf,
+        /// Which file in it to give instead; empty without one.
+        hint: String,
     },
     /// The file is no manifest.
     #[error("{}: {found}; expected a dataset's folder or its {MANIFEST_FILE}", path.display())]
@@ -58,7 +60,7 @@ impl DatasetFolder {
         if path.is_dir() {
             let manifest = path.join(MANIFEST_FILE);
             if !manifest.exists() {
-                return Err(LoadError::NotADataset { path: path.into() });
+                return Err(LoadError::NotADataset { path: path.into(), hint: described(path) });
             }
             return Ok(DatasetFolder { folder: path.into(), manifest });
         }
@@ -85,6 +87,22 @@ impl DatasetFiles for DatasetFolder {
     fn label(&self, path: &str) -> String {
         self.path_of(path).display().to_string()
     }
+}
+
+/// Which files of a folder describe a dataset under another name, in words; empty for none.
+fn described(folder: &Path) -> String {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names: Vec<String> = entries
+        .map(|entry| entry.path())
+        .filter(|path| path.extension().is_some_and(|it| it == "toml"))
+        .filter(|path| {
+            let keys = read_text(path).map(|text| top_keys(&path.display().to_string(), &text));
+            matches!(keys, Ok(Ok(keys)) if kind_of(&keys) == Some(FileKind::Dataset))
+        })
+        .map(|path| path.display().to_string())
+        .collect();
+    names.sort();
+    if names.is_empty() { String::new() } else { format!("; give {} itself", names.join(" or ")) }
 }
 
 /// Reads what a dataset declares, but no run.
@@ -306,6 +324,15 @@ mod tests {
         assert_eq!(
             refusal(&path.join("runs")),
             format!("{shown}/runs: not a dataset: the folder holds no dataset.toml")
+        );
+        std::fs::create_dir(path.join("raw")).unwrap();
+        std::fs::write(path.join("raw/day.toml"), MANIFEST).unwrap();
+        assert_eq!(
+            refusal(&path.join("raw")),
+            format!(
+                "{shown}/raw: not a dataset: the folder holds no dataset.toml; give \
+                 {shown}/raw/day.toml itself"
+            )
         );
         assert_eq!(
             refusal(path),

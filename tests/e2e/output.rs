@@ -14,7 +14,7 @@ const SOAK: &str = env!("CARGO_BIN_EXE_dynocar-soak");
 const DEMO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo");
 
 /// Commands with a result on standard output, that end by themselves.
-const COMMANDS: [(&str, &[&str]); 11] = [
+const COMMANDS: [(&str, &[&str]); 13] = [
     (DYNOCAR, &["--help"]),
     (DYNOCAR, &["explain", "--help"]),
     (DYNOCAR, &["--version"]),
@@ -24,6 +24,8 @@ const COMMANDS: [(&str, &[&str]); 11] = [
     (DYNOCAR, &["identify", DEMO, "--estimator", "rls", "--json", "-"]),
     (DYNOCAR, &["explain", DEMO]),
     (DYNOCAR, &["explain", DEMO, "--json", "-"]),
+    (DYNOCAR, &["stops", DEMO, "--applied", "0.3"]),
+    (DYNOCAR, &["stops", DEMO, "--applied", "0.3", "--json", "-"]),
     (SOAK, &["--help"]),
     (SOAK, &["fuzz", "--rounds", "1"]),
 ];

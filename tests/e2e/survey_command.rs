@@ -2,7 +2,7 @@
 
 use std::fs::{create_dir_all, read_to_string, write};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
 
 use dynocar_tests::browser::Browser;
@@ -80,6 +80,23 @@ fn changed(change: &dyn Fn(&str, String) -> String) -> tempfile::TempDir {
         }
     }
     folder
+}
+
+#[test]
+fn a_closed_pipe_ends_it_quietly_and_a_full_disk_is_told() {
+    let (raw, out) = (surveyed().path("raw"), tempfile::tempdir().unwrap());
+    let told = |standard_output: Stdio| {
+        let mut command = Command::new(DYNOCAR);
+        command.arg("survey").arg(&raw).arg("--out").arg(out.path().join("line"));
+        let output = command.stdout(standard_output).stderr(Stdio::piped()).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    let (_, writer) = std::io::pipe().unwrap();
+    let (status, words) = told(writer.into());
+    assert!(status == Some(0) && !words.contains("panicked"), "{status:?}: {words}");
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let (status, words) = told(full.into());
+    assert!(status == Some(1) && words.contains("cannot be written"), "{status:?}: {words}");
 }
 
 #[test]

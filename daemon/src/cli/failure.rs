@@ -111,7 +111,7 @@ impl From<LoadError> for Failure {
         match error {
             LoadError::Dataset(error) => error.into(),
             LoadError::NoSuchPath { path }
-            | LoadError::NotADataset { path }
+            | LoadError::NotADataset { path, .. }
             | LoadError::NoManifest { path, .. } => {
                 Failure::At(Place::whole(&path.display().to_string()), message)
             }
