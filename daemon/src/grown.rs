@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use dynocar_core::dataset::{DatasetFiles, FileProblem, MANIFEST_FILE};
 use dynocar_core::explain::{Explanation, evidence::Fit};
+use dynocar_core::terms::extra::{self, Extra, Factor};
 use dynocar_core::terms::{Entry, Key};
 use toml::{Table, Value};
 
@@ -111,6 +112,7 @@ pub fn grow(fit: &Fit, train: &mut Table, mut track: Option<&mut Table>) -> Vec<
 fn can_hold(entry: &Entry, train: &Table, track: Option<&Table>) -> bool {
     match entry {
         Entry::Number(key, found) => key.allows(joined(key, train, *found)),
+        Entry::Extra(_) => true,
         Entry::TrackNumber(..) | Entry::Rows(..) | Entry::List(..) => {
             let section = track.and_then(|track| track.get("track")?.as_table());
             let stands_alone = |name: &str| !section.is_some_and(|own| own.contains_key(name));
@@ -125,6 +127,12 @@ fn write_entry(entry: Entry, train: &mut Table, track: Option<&mut Table>) {
             let value = joined(key, train, found);
             set(train, key.table, key.name, value);
         }
+        (Entry::Extra(found), _) => {
+            let tables = train.entry(extra::TABLES).or_insert_with(|| Value::Array(Vec::new()));
+            if let Some(tables) = tables.as_array_mut() {
+                tables.push(Value::Table(extra_table(&found)));
+            }
+        }
         (Entry::TrackNumber(name, found), Some(track)) => {
             let declared = number(track, "track", name).unwrap_or(0.0);
             set(track, "track", name, declared + found);
@@ -136,6 +144,24 @@ fn write_entry(entry: Entry, train: &mut Table, track: Option<&mut Table>) {
         }
         (_, None) => {}
     }
+}
+
+/// A table of `[[extra]]`.
+fn extra_table(found: &Extra) -> Table {
+    let factor = |factor: &Factor| {
+        let mut table = Table::new();
+        table.insert("of".into(), factor.of.name().into());
+        table.insert("form".into(), factor.form.name().into());
+        for (name, number) in factor.form.numbers().iter().zip(factor.numbers) {
+            table.insert((*name).into(), Value::Float(number));
+        }
+        Value::Table(table)
+    };
+    let mut table = Table::new();
+    table.insert(extra::FORCE.into(), Value::Float(found.n_per_kn));
+    let factors: Vec<Value> = found.factors.iter().map(factor).collect();
+    table.insert(extra::FACTORS.into(), Value::Array(factors));
+    table
 }
 
 /// A number that was found with the one that stands in the file.

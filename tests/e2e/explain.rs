@@ -4,14 +4,16 @@ use std::path::Path;
 
 use dynocar::dataset;
 use dynocar::grown::write_grown;
+use dynocar_core::dataset::parse_train;
 use dynocar_core::explain::answer::{ParameterValue, Verdict};
 use dynocar_core::explain::effects::LIBRARY;
 use dynocar_core::explain::scan::Scan;
 use dynocar_core::explain::{Explanation, explain};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::write_dataset;
+use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{
-    Effect, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate,
+    Effect, EffectRequest, Law, SimulatedDataset, SimulatorSettings, TrainType, Unlisted, simulate,
 };
 
 const SEED: u64 = 23;
@@ -136,7 +138,9 @@ fn an_effect_outside_the_library_is_called_unknown_and_placed() {
     let explanation = explained(&simulated, folder.path());
     let answer = &explanation.answer;
     assert_eq!(answer.verdict, Verdict::Unknown, "{}", answer.statement);
-    let [Effect::SpeedBand { centre_mps, .. }] = simulated.effects[..] else {
+    let [Effect::Unlisted(Unlisted { law: Law::Band { centre_mps, .. }, .. })] =
+        simulated.effects[..]
+    else {
         panic!("the simulator was asked for something unknown");
     };
     let unknown = answer.effects.iter().find(|effect| effect.kind == "unknown").unwrap();
@@ -147,7 +151,8 @@ fn an_effect_outside_the_library_is_called_unknown_and_placed() {
 #[test]
 fn a_slow_trains_force_is_unknown_and_swallowed_by_no_impossible_resistance() {
     let folder = tempfile::tempdir().unwrap();
-    let slow = Effect::SlowForce { below_mps: 15.0, least_mps: 3.0, extra_n_per_kn: 1.0 };
+    let law = Law::Slow { below_mps: 15.0, least_mps: 3.0 };
+    let slow = Effect::Unlisted(Unlisted { law, n_per_kn: 1.0 });
     let simulated = simulate(&SimulatorSettings::new(SEED, EffectRequest::Exactly(vec![slow])));
     let answer = explained(&simulated, folder.path()).answer;
     assert_eq!(answer.verdict, Verdict::Unknown, "{}", answer.statement);
@@ -155,6 +160,45 @@ fn a_slow_trains_force_is_unknown_and_swallowed_by_no_impossible_resistance() {
     // A quarter of its tolerance below none is an error of estimation.
     assert!(answer.base.b >= -0.2 * declared.b, "b = {}", answer.base.b);
     assert!(answer.base.a <= 1.8 * declared.a, "a = {}, {}", answer.base.a, declared.a);
+}
+
+#[test]
+fn a_force_outside_the_library_gets_its_form_and_goes_into_the_grown_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let law = Law::Slow { below_mps: 15.0, least_mps: 3.0 };
+    let slow = Effect::Unlisted(Unlisted { law, n_per_kn: 1.2 });
+    let settings = SimulatorSettings {
+        train_type: Some(TrainType::Regional),
+        ..SimulatorSettings::new(SEED, EffectRequest::Exactly(vec![slow]))
+    };
+    let simulated = simulate(&settings);
+    let explanation = explained(&simulated, folder.path());
+    let answer = &explanation.answer;
+    assert_eq!(answer.verdict, Verdict::Unknown, "{}", answer.statement);
+    let [effect] = &answer.effects[..] else { panic!("{}", answer.statement) };
+    let number =
+        |values: &std::collections::BTreeMap<String, ParameterValue>, name: &str| match values
+            .get(name)
+        {
+            Some(ParameterValue::Number(value)) => *value,
+            other => panic!("{name} is {other:?}"),
+        };
+    for (name, truth) in [("extra_n_per_kn", 1.2), ("below", 15.0), ("least", 3.0)] {
+        let (value, deviation) = (number(&effect.parameters, name), number(&effect.std, name));
+        assert!((value - truth).abs() < 3.0 * deviation, "{name} = {value} ± {deviation}");
+        assert!(deviation < 0.2 * truth, "{name} = {value} ± {deviation}");
+    }
+    assert!(!effect.runners_up.is_empty(), "other forms were tried");
+    let oracle_mps = score(&simulated).full_run.true_mps;
+    let after_mps = answer.rmse_after.expect("runs are held out");
+    assert!(after_mps < 1.2 * oracle_mps, "{after_mps} m/s of {oracle_mps}");
+    let grown = tempfile::tempdir().unwrap();
+    let written = write_grown(folder.path(), &explanation, grown.path()).unwrap();
+    assert_eq!(written.not_expressed, Vec::<String>::new());
+    let text = std::fs::read_to_string(grown.path().join("train.toml")).unwrap();
+    let train = parse_train("train.toml", &text).unwrap();
+    assert_eq!(train.extra.len(), 1, "{text}");
+    assert_eq!(train.extra[0].n_per_kn, number(&effect.parameters, "extra_n_per_kn"));
 }
 
 #[test]

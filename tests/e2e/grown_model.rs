@@ -104,8 +104,7 @@ fn every_kind_written_as_a_grown_model_is_applied_to_the_bit() {
     applied.sort_unstable();
     applied.dedup();
     // Events of certain runs are no property of a train or a line.
-    let events =
-        [EffectKind::None, EffectKind::DraggingBrake, EffectKind::LowAdhesion, EffectKind::Unknown];
+    let events = [EffectKind::None, EffectKind::DraggingBrake, EffectKind::LowAdhesion];
     let expected: Vec<EffectKind> =
         EffectKind::ALL.iter().copied().filter(|kind| !events.contains(kind)).collect();
     assert_eq!(applied, expected);

@@ -67,7 +67,7 @@ fn undo(kind: EffectKind, disturbances: &mut Disturbances, neutral: &Disturbance
         EffectKind::AmbientTemperature => d.ambient = neutral.ambient,
         EffectKind::LocalResistance => d.local = neutral.local,
         EffectKind::LowAdhesion => d.adhesion = neutral.adhesion,
-        EffectKind::Unknown => d.speed_force = neutral.speed_force,
+        EffectKind::Unknown => d.unlisted = neutral.unlisted,
     }
 }
 

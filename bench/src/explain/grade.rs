@@ -29,6 +29,8 @@ pub struct Grade {
     pub details: Vec<String>,
     /// Share of the attainable reduction of the error on the holdout runs.
     pub share: Option<f64>,
+    /// Error on the holdout runs over that of the true model.
+    pub left_ratio: Option<f64>,
     /// Greatest strength of a candidate in the first round of the search.
     pub strength: f64,
 }
@@ -71,6 +73,7 @@ pub fn grade(
     let right =
         if expected.len() > simulated.effects.len() { "ambiguous" } else { simulated.verdict() };
     let is_right = verdict == right && (right == "unknown" || expected == found);
+    let attained = attained(simulated, explanation);
     let json = serde_json::to_value(answer).unwrap_or(Value::Null);
     let (mut iou, mut ends_held, mut parameters) = (None, Vec::new(), Vec::new());
     for effect in &simulated.effects {
@@ -87,16 +90,31 @@ pub fn grade(
         .iter()
         .map(|effect| {
             let parameters = serde_json::to_string(&effect.parameters).unwrap_or_default();
+            let others = effect.runners_up.iter();
+            let others: Vec<String> = others
+                .map(|other| format!("[{} -{:.0}]", other.formula, other.evidence_less))
+                .collect();
             format!(
-                "{} -{:.3} p {:.1e} {parameters}",
-                effect.kind, effect.error_reduction, effect.p_value
+                "{} -{:.3} p {:.1e} {parameters} {}",
+                effect.kind,
+                effect.error_reduction,
+                effect.p_value,
+                others.join(" ")
             )
         })
         .collect();
     details.push(format!(
-        "holdout {:.3?} to {:.3?} m/s, unexplained {:.3?} N/kN",
-        answer.rmse_before, answer.rmse_after, answer.unexplained_n_per_kn
+        "holdout {:.3?} to {:.3?} m/s, {:.2?} of the true model's, unexplained {:.3?} N/kN",
+        answer.rmse_before,
+        answer.rmse_after,
+        attained.map(|attained| attained.left_ratio),
+        answer.unexplained_n_per_kn
     ));
+    let unlisted = simulated.effects.iter().filter(|it| matches!(it, Effect::Unlisted(_)));
+    details.extend(unlisted.map(|effect| format!("truth {effect:?}")));
+    let considered = answer.considered.iter().enumerate();
+    let considered = considered.filter(|(k, it)| *k < 4 || it.kind == "unknown").map(|it| it.1);
+    details.extend(considered.map(|it| format!("{} {:.0?}: {}", it.kind, it.evidence, it.remark)));
     if !answer.ambiguous_with.is_empty() {
         details.push(format!("or {}", answer.ambiguous_with.join(", ")));
     }
@@ -108,12 +126,22 @@ pub fn grade(
         iou,
         ends_held,
         parameters,
-        share: share(simulated, explanation),
+        share: attained.map(|attained| attained.share),
+        left_ratio: attained.map(|attained| attained.left_ratio),
         strength: explanation.strength,
     }
 }
 
-fn share(simulated: &SimulatedDataset, explanation: &Explanation) -> Option<f64> {
+/// An answer against the true model, on the holdout runs.
+#[derive(Clone, Copy)]
+struct Attained {
+    /// Share of the attainable reduction of the error.
+    share: f64,
+    /// Error over that of the true model.
+    left_ratio: f64,
+}
+
+fn attained(simulated: &SimulatedDataset, explanation: &Explanation) -> Option<Attained> {
     if simulated.effects.is_empty() {
         return None;
     }
@@ -125,7 +153,8 @@ fn share(simulated: &SimulatedDataset, explanation: &Explanation) -> Option<f64>
     }
     let oracle = score(simulated).full_run.true_mps;
     let (before, after) = (explanation.answer.rmse_before?, explanation.answer.rmse_after?);
-    (before > 1.2 * oracle).then(|| (before - after) / (before - oracle))
+    let share = (before - after) / (before - oracle);
+    (before > 1.2 * oracle).then(|| Attained { share, left_ratio: after / oracle })
 }
 
 /// Parameters that have a single true number; the size of an effect is its distance from none.
@@ -163,10 +192,9 @@ fn graded(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Vec<Par
             vec![one("extra_n_per_kn", *extra_n_per_kn, 0.0)]
         }
         Effect::LowAdhesion { adhesion, .. } => vec![one("adhesion", *adhesion, 0.0)],
-        Effect::MassChangeSections(_)
-        | Effect::MassChangeWindows(_)
-        | Effect::SlowForce { .. }
-        | Effect::SpeedBand { .. } => mass_factors(effect, own),
+        Effect::MassChangeSections(_) | Effect::MassChangeWindows(_) | Effect::Unlisted(_) => {
+            mass_factors(effect, own)
+        }
     };
     list.into_iter().flatten().collect()
 }

@@ -31,6 +31,8 @@ pub struct KindRow {
     pub coverage: Option<f64>,
     /// Median share of the attainable reduction of the error on the holdout runs.
     pub error_reduction_share: Option<f64>,
+    /// Share of all answers that leave at most a tenth more error than the true model.
+    pub within_a_tenth: Option<f64>,
 }
 
 /// False alarms on nulls.
@@ -149,6 +151,9 @@ fn row(kind: &str, grades: &[Grade]) -> KindRow {
         place_coverage: share_of(right.iter().flat_map(|grade| grade.ends_held.iter().copied())),
         parameter_error: median(parameters.iter().map(|p| p.error.abs()).collect()),
         coverage: share_of(parameters.iter().map(|parameter| parameter.z.abs() < 1.96)),
+        within_a_tenth: share_of(
+            grades.iter().filter_map(|grade| grade.left_ratio).map(|ratio| ratio <= 1.1),
+        ),
         error_reduction_share: median(right.iter().filter_map(|grade| grade.share).collect()),
     }
 }
@@ -156,14 +161,14 @@ fn row(kind: &str, grades: &[Grade]) -> KindRow {
 /// The matrix as a table for people.
 pub fn table(matrix: &Matrix) -> String {
     let mut text = String::from(
-        "kind                  right      IoU   ends  error  cover  share  named instead\n",
+        "kind                  right      IoU   ends  error  cover  share  tenth  named instead\n",
     );
     let shown = |value: Option<f64>| value.map_or("     -".into(), |value| format!("{value:6.3}"));
     for row in &matrix.kinds {
         let confused: Vec<String> =
             row.confused_with.iter().map(|(named, count)| format!("{named} {count}")).collect();
         text += &format!(
-            "{:20} {:3}/{:<3} {} {} {} {} {}  {}\n",
+            "{:20} {:3}/{:<3} {} {} {} {} {} {}  {}\n",
             row.kind,
             row.right,
             row.runs,
@@ -172,6 +177,7 @@ pub fn table(matrix: &Matrix) -> String {
             shown(row.parameter_error),
             shown(row.coverage),
             shown(row.error_reduction_share),
+            shown(row.within_a_tenth),
             confused.join(", ")
         );
     }

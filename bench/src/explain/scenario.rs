@@ -1,7 +1,7 @@
 //! What is simulated: one kind, two at once, or a poor recording.
 
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_tests::simulator::{Defects, Effect, EffectRequest, SimulatorSettings};
+use dynocar_tests::simulator::{Defects, Effect, EffectRequest, Law, SimulatorSettings, Unlisted};
 
 /// A kind that is hardly told from the one that acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,6 +25,8 @@ pub enum Scenario {
     UnmappedTunnel,
     /// A force that only slow trains feel, which no library holds.
     SlowForce,
+    /// A force by a law drawn from the seed, which no library holds.
+    AnyLaw,
     /// A null recorded with gaps, repeats and heavy outliers.
     PoorNull,
     /// One effect of a kind drawn from the seed, recorded so.
@@ -73,6 +75,7 @@ impl Scenario {
             Scenario::Alike,
             Scenario::UnmappedTunnel,
             Scenario::SlowForce,
+            Scenario::AnyLaw,
             Scenario::PoorNull,
             Scenario::Poor,
         ];
@@ -92,6 +95,7 @@ impl Scenario {
             Scenario::Alike => "level_straight_line",
             Scenario::UnmappedTunnel => "unmapped_tunnel",
             Scenario::SlowForce => "slow_force",
+            Scenario::AnyLaw => "any_law",
             Scenario::PoorNull => "none_poor_recording",
             Scenario::Poor => "poor_recording",
         }
@@ -110,7 +114,7 @@ impl Scenario {
             Scenario::Kind(kind) => vec![kind],
             Scenario::Alike => vec![EffectKind::RotatingMass],
             Scenario::UnmappedTunnel => vec![EffectKind::TunnelDrag],
-            Scenario::SlowForce => vec![EffectKind::Unknown],
+            Scenario::SlowForce | Scenario::AnyLaw => vec![EffectKind::Unknown],
             Scenario::Two => PAIRS[drawn(PAIRS.len())].to_vec(),
             Scenario::Poor => vec![POOR[drawn(POOR.len())]],
         }
@@ -120,11 +124,11 @@ impl Scenario {
     pub fn settings(self, seed: u64) -> SimulatorSettings {
         let effects = match self {
             // 0.5 to 1.1 N/kN at half the speed below which it acts.
-            Scenario::SlowForce => EffectRequest::Exactly(vec![Effect::SlowForce {
-                below_mps: 15.0,
-                least_mps: 3.0,
-                extra_n_per_kn: 0.5 + 0.1 * (seed % 7) as f64,
-            }]),
+            Scenario::SlowForce => EffectRequest::Exactly(vec![Effect::Unlisted(Unlisted {
+                law: Law::Slow { below_mps: 15.0, least_mps: 3.0 },
+                n_per_kn: 0.5 + 0.1 * (seed % 7) as f64,
+            })]),
+            Scenario::AnyLaw => EffectRequest::AnyLaw,
             _ => EffectRequest::Kinds(self.kinds(seed)),
         };
         let ordinary = SimulatorSettings::new(seed, effects);

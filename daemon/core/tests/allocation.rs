@@ -59,6 +59,7 @@ fn train() -> Arc<TrainModel> {
             friction_brake: None,
         },
         corrections: Default::default(),
+        extra: Vec::new(),
     })
 }
 

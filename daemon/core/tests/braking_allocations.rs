@@ -56,6 +56,7 @@ fn train() -> TrainModel {
             friction_brake: None,
         },
         corrections: Default::default(),
+        extra: Vec::new(),
     }
 }
 

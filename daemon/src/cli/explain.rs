@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use clap::Args;
 use dynocar_core::dataset::{Dataset, DatasetFiles, Place, Role};
+use dynocar_core::explain::answer::RunnerUp;
 use dynocar_core::explain::evidence::RunDataError;
 use dynocar_core::explain::{Explanation, explain};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -230,6 +231,10 @@ fn text(explanation: &Explanation) -> String {
     }
     if let Some(unscored) = &answer.unscored {
         text += &format!("{unscored}\n");
+    }
+    for other in answer.effects.iter().flat_map(|effect| &effect.runners_up) {
+        let RunnerUp { formula, evidence_less } = other;
+        text += &format!("another form, evidence less by {evidence_less:.0}: {formula}\n");
     }
     for considered in &answer.considered {
         let evidence =

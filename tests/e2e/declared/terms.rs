@@ -129,10 +129,21 @@ const fn correction(line: &'static str) -> (&'static str, &'static str) {
 /// is no property of a train or a line.
 pub fn declarations(kind: EffectKind) -> Vec<Declaration> {
     match kind {
-        EffectKind::None
-        | EffectKind::DraggingBrake
-        | EffectKind::LowAdhesion
-        | EffectKind::Unknown => Vec::new(),
+        EffectKind::None | EffectKind::DraggingBrake | EffectKind::LowAdhesion => Vec::new(),
+        EffectKind::Unknown => vec![Declaration {
+            name: "extra",
+            train: correction(
+                "[[extra]]\nn_per_kn = 1.2\n[[extra.factor]]\nof = \"speed_mps\"\n\
+                 form = \"hyperbola\"\nbelow = 18\nleast = 4\n[[extra.factor]]\n\
+                 of = \"ambient_temperature_degc\"\nform = \"above\"\nfrom = -30\nspan = 40\n\
+                 [corrections]\n",
+            ),
+            extra_n_per_kn: |_, at| {
+                let slow = (18.0 / at.speed_mps.max(4.0) - 1.0).max(0.0);
+                1.2 * slow * (at.degc + 30.0) / 40.0
+            },
+            ..NOTHING
+        }],
         EffectKind::TunnelDrag => vec![
             Declaration {
                 name: "tunnel_c_factor",

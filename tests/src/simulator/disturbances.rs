@@ -11,6 +11,7 @@ use super::random::{Random, Stream};
 use super::run_maker::RunPlan;
 use super::settings::SimulatorSettings;
 use super::train_maker::TrueTrain;
+use super::unlisted::{Around, Unlisted};
 
 /// A cap on the achieved brake force.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,29 +20,6 @@ pub struct AdhesionCap {
     pub adhesion: f64,
     /// (from, to) in m of the train's centre; everywhere when empty.
     pub intervals_m: Vec<(f64, f64)>,
-}
-
-/// A resistance in N/kN over speed in m/s that no library holds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum SpeedForce {
-    /// Bell-shaped over speed.
-    Band {
-        /// Middle of the band.
-        centre_mps: f64,
-        /// Standard deviation.
-        width_mps: f64,
-        /// Resistance in the middle.
-        extra_n_per_kn: f64,
-    },
-    /// As one over the speed, for slow trains.
-    Slow {
-        /// From here on there is none.
-        below_mps: f64,
-        /// Below this it grows no more.
-        least_mps: f64,
-        /// Resistance at half of `below_mps`.
-        extra_n_per_kn: f64,
-    },
 }
 
 /// Everything undeclared in one run; [`Disturbances::none`] leaves the declared model true.
@@ -94,7 +72,7 @@ pub struct Disturbances {
     /// A cap on the achieved brake force.
     pub adhesion: Option<AdhesionCap>,
     /// A resistance outside every library.
-    pub speed_force: Option<SpeedForce>,
+    pub unlisted: Option<Unlisted>,
 }
 
 /// What the disturbances act on at an instant.
@@ -112,21 +90,6 @@ pub struct Seen {
     pub degc: Option<f64>,
     /// Resistance in N/kN of places.
     pub local_n_per_kn: f64,
-}
-
-impl SpeedForce {
-    /// The resistance in N/kN at a speed in m/s.
-    pub fn extra_n_per_kn(&self, speed_mps: f64) -> f64 {
-        match *self {
-            SpeedForce::Band { centre_mps, width_mps, extra_n_per_kn } => {
-                let away = (speed_mps - centre_mps) / width_mps;
-                extra_n_per_kn * (-0.5 * away * away).exp()
-            }
-            SpeedForce::Slow { below_mps, least_mps, extra_n_per_kn } => {
-                extra_n_per_kn * (below_mps / speed_mps.max(least_mps) - 1.0).max(0.0)
-            }
-        }
-    }
 }
 
 impl Disturbances {
@@ -160,7 +123,7 @@ impl Disturbances {
             ambient: None,
             local: None,
             adhesion: None,
-            speed_force: None,
+            unlisted: None,
         }
     }
 
@@ -254,13 +217,14 @@ impl Disturbances {
                 let cap = AdhesionCap { adhesion: *adhesion, intervals_m: intervals_m.clone() };
                 self.adhesion = in_runs(runs).then_some(cap);
             }
-            &Effect::SlowForce { below_mps, least_mps, extra_n_per_kn } => {
-                self.speed_force = Some(SpeedForce::Slow { below_mps, least_mps, extra_n_per_kn });
-            }
-            &Effect::SpeedBand { centre_mps, width_mps, extra_n_per_kn } => {
-                self.speed_force = Some(SpeedForce::Band { centre_mps, width_mps, extra_n_per_kn });
-            }
+            Effect::Unlisted(unlisted) => self.unlisted = Some(*unlisted),
         }
+    }
+
+    /// What no library holds, in N/kN.
+    pub fn unlisted_n_per_kn(&self, speed_mps: f64, time_s: f64, degc: Option<f64>) -> f64 {
+        let around = Around { speed_mps, time_s, degc: degc.unwrap_or(0.0) };
+        self.unlisted.map_or(0.0, |unlisted| unlisted.resistance_n_per_kn(around))
     }
 
     /// What resists at an instant by the laws of the terms; basic and curve resistance among it.

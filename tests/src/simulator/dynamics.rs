@@ -102,7 +102,7 @@ impl TruePhysics<'_> {
         });
         all.factor *= disturbances.resistance_factor;
         all.other_n_per_kn =
-            disturbances.speed_force.map_or(0.0, |force| force.extra_n_per_kn(speed_mps));
+            disturbances.unlisted_n_per_kn(speed_mps, now.time_s, Some(now.temperature_degc));
         let all_n_per_kn = davis.w0_n_per_kn(speed_mps) + all.extra_n_per_kn(davis, speed_mps);
         let drag_n = disturbances.drag_n(now.time_s);
         let weight_kn = TrainModel::weight_kn(now.mass_kg);

@@ -8,6 +8,7 @@ use super::random::Random;
 use super::run_maker::RunPlan;
 use super::settings::TrainType;
 use super::train_maker::{TrueTrain, rounded};
+use super::unlisted::{Law, Unlisted};
 
 /// Types of train on which an effect of this kind shows.
 pub fn suitable_types(kind: EffectKind) -> &'static [TrainType] {
@@ -38,6 +39,14 @@ impl EffectScene<'_> {
     /// Unit basic resistance in N/kN at an ordinary speed.
     fn ordinary_w0_n_per_kn(&self) -> f64 {
         self.train.resistance.w0_n_per_kn(0.65 * self.train.handling.speed_max_mps)
+    }
+
+    /// A resistance by any law outside the library.
+    pub fn any_law(&self, duration_s: f64, random: &mut Random) -> Effect {
+        let sizes = (self.train.handling.speed_max_mps, self.ordinary_w0_n_per_kn());
+        let degc = self.plans.iter().map(|plan| plan.temperature_degc);
+        let warmest_degc = degc.fold(f64::NEG_INFINITY, f64::max);
+        Effect::Unlisted(Unlisted::draw(sizes, warmest_degc, duration_s, random))
     }
 
     /// About half of the fit runs and half of the holdout runs.
@@ -153,11 +162,13 @@ pub fn make_effect(
             runs: if random.chance(0.3) { scene.some_runs(random) } else { Vec::new() },
         },
         EffectKind::LowAdhesion => low_adhesion(scene, random),
-        EffectKind::Unknown => Effect::SpeedBand {
-            centre_mps: random.uniform(0.5, 0.75) * train.handling.speed_max_mps,
-            width_mps: random.uniform(0.03, 0.05) * train.handling.speed_max_mps,
-            extra_n_per_kn: random.uniform(0.6, 1.2) * w0_n_per_kn,
-        },
+        EffectKind::Unknown => Effect::Unlisted(Unlisted {
+            law: Law::Band {
+                centre_mps: random.uniform(0.5, 0.75) * train.handling.speed_max_mps,
+                width_mps: random.uniform(0.03, 0.05) * train.handling.speed_max_mps,
+            },
+            n_per_kn: random.uniform(0.6, 1.2) * w0_n_per_kn,
+        }),
     })
 }
 

@@ -4,6 +4,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use serde_json::{Map, Value, json};
 
 use super::run_maker::run_file;
+use super::unlisted::Unlisted;
 
 /// A stretch of time in one run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,24 +129,8 @@ pub enum Effect {
         /// Numbers of the runs that feel it; all when empty.
         runs: Vec<usize>,
     },
-    /// A force that a slow train feels and that falls as one over its speed: in no library.
-    SlowForce {
-        /// Speed in m/s from which on there is none.
-        below_mps: f64,
-        /// Speed in m/s below which it grows no more.
-        least_mps: f64,
-        /// Extra resistance in N/kN at half of `below_mps`.
-        extra_n_per_kn: f64,
-    },
-    /// A resonance that takes energy in a band of speeds: in no library.
-    SpeedBand {
-        /// Middle of the band in m/s.
-        centre_mps: f64,
-        /// Standard deviation in m/s of the bell curve.
-        width_mps: f64,
-        /// Extra resistance in N/kN in the middle.
-        extra_n_per_kn: f64,
-    },
+    /// A resistance by a law that no library holds.
+    Unlisted(Unlisted),
 }
 
 impl Effect {
@@ -167,7 +152,7 @@ impl Effect {
             Effect::AmbientTemperature { .. } => EffectKind::AmbientTemperature,
             Effect::LocalResistance { .. } => EffectKind::LocalResistance,
             Effect::LowAdhesion { .. } => EffectKind::LowAdhesion,
-            Effect::SlowForce { .. } | Effect::SpeedBand { .. } => EffectKind::Unknown,
+            Effect::Unlisted(_) => EffectKind::Unknown,
         }
     }
 
@@ -228,9 +213,7 @@ impl Effect {
                 json!({ "extra_n_per_kn": extra_n_per_kn })
             }
             Effect::LowAdhesion { adhesion, .. } => json!({ "adhesion": adhesion }),
-            Effect::SlowForce { extra_n_per_kn, .. } | Effect::SpeedBand { extra_n_per_kn, .. } => {
-                json!({ "extra_n_per_kn": extra_n_per_kn })
-            }
+            Effect::Unlisted(unlisted) => json!({ "extra_n_per_kn": unlisted.n_per_kn }),
         }
     }
 
@@ -255,10 +238,10 @@ impl Effect {
                 }
                 Value::Object(place)
             }
-            Effect::SlowForce { below_mps, .. } => json!({ "speed_range_mps": [0.0, below_mps] }),
-            Effect::SpeedBand { centre_mps, width_mps, .. } => json!({
-                "speed_range_mps": [centre_mps - 2.0 * width_mps, centre_mps + 2.0 * width_mps]
-            }),
+            Effect::Unlisted(unlisted) => match unlisted.speed_range_mps() {
+                Some(range) => json!({ "speed_range_mps": range }),
+                None => json!({}),
+            },
             _ => json!({}),
         }
     }

@@ -10,7 +10,8 @@
 //!
 //! - [`settings`]: what is asked of a dataset; [`random`]: a stream of numbers per subject
 //! - [`train_maker`], [`line_maker`], [`run_maker`]: what there is
-//! - [`effects`], [`effect_maker`], [`disturbances`]: what is undeclared, and what it changes
+//! - [`effects`], [`unlisted`], [`effect_maker`], [`disturbances`]: what is undeclared, and what it
+//!   changes
 //! - [`driving`], [`permitted_speed`], [`driver`], [`actuators`], [`dynamics`], [`true_run`]: what happens
 //! - [`sensors`], [`defects`], [`gnss`]: what is recorded of it
 //! - [`truth`], [`oracle`]: what a perfect explainer would find, and how well it would predict
@@ -37,6 +38,7 @@ pub mod settings;
 pub mod train_maker;
 pub mod true_run;
 pub mod truth;
+pub mod unlisted;
 
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
@@ -44,6 +46,7 @@ use dynocar_shared::TrainSample;
 
 pub use effects::Effect;
 pub use settings::{Defects, EffectRequest, GnssReceiver, SimulatorSettings, TrainType};
+pub use unlisted::{Law, Unlisted};
 
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -149,6 +152,10 @@ fn fitting_types(request: &EffectRequest) -> Vec<TrainType> {
 fn draw_effects(settings: &SimulatorSettings, scene: &EffectScene<'_>) -> Vec<Effect> {
     match &settings.effects {
         EffectRequest::Exactly(effects) => effects.clone(),
+        EffectRequest::AnyLaw => {
+            let mut random = Random::new(settings.seed, Stream::Effects);
+            vec![scene.any_law(settings.duration_s, &mut random)]
+        }
         EffectRequest::Kinds(kinds) => {
             let mut random = Random::new(settings.seed, Stream::Effects);
             kinds

@@ -13,7 +13,7 @@ use dynocar_core::terms::delay::DelayLine;
 use dynocar_core::terms::{gradient, traction};
 use dynocar_core::validation::{ValidationLimits, Validator};
 
-use super::disturbances::{Disturbances, Seen, SpeedForce};
+use super::disturbances::{Disturbances, Seen};
 use super::sensors::SIMULATED_TRAIN;
 use super::{SimulatedDataset, SimulatedRun};
 
@@ -92,14 +92,17 @@ pub fn record(dataset: &SimulatedDataset, run: &SimulatedRun) -> Recording {
 #[derive(Clone, Debug, PartialEq)]
 pub struct OracleForces {
     quadratic: QuadraticForces,
-    speed_force: Option<SpeedForce>,
+    disturbances: Disturbances,
+    /// Time in s from the run's first sample and outside temperature in °C, by sample.
+    around: Vec<(f64, Option<f64>)>,
     /// Weight in kN over inertial mass in kg.
     weight_per_kg: f64,
 }
 
 impl ForceModel for OracleForces {
     fn acceleration_mps2(&self, index: usize, speed_mps: f64) -> f64 {
-        let force_n_per_kn = self.speed_force.map_or(0.0, |force| force.extra_n_per_kn(speed_mps));
+        let (time_s, degc) = self.around[index];
+        let force_n_per_kn = self.disturbances.unlisted_n_per_kn(speed_mps, time_s, degc);
         self.quadratic.acceleration_mps2(index, speed_mps) - self.weight_per_kg * force_n_per_kn
     }
 
@@ -142,7 +145,13 @@ pub fn oracle_forces(
     let first = &recording.samples()[0];
     OracleForces {
         quadratic,
-        speed_force: disturbances.speed_force,
+        disturbances: disturbances.clone(),
+        around: recording
+            .time_s()
+            .iter()
+            .zip(recording.samples())
+            .map(|(&time_s, sample)| (time_s, sample.ambient_temperature_degc))
+            .collect(),
         weight_per_kg: inertia_ratio * first.weight_kn / first.inertial_mass_kg,
     }
 }

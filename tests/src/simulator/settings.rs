@@ -41,6 +41,8 @@ pub enum EffectRequest {
     Kinds(Vec<EffectKind>),
     /// Exactly these.
     Exactly(Vec<Effect>),
+    /// One resistance by a law outside the library, drawn from the seed.
+    AnyLaw,
 }
 
 impl EffectRequest {
@@ -53,6 +55,7 @@ impl EffectRequest {
     pub fn kinds(&self) -> Vec<EffectKind> {
         match self {
             EffectRequest::Kinds(kinds) => kinds.clone(),
+            EffectRequest::AnyLaw => vec![EffectKind::Unknown],
             EffectRequest::Exactly(effects) => effects.iter().map(Effect::kind).collect(),
         }
     }

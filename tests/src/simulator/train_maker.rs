@@ -203,6 +203,7 @@ pub fn make_train(train_type: TrainType, resistance_spread: f64, random: &mut Ra
         brake: EffortCurve::new(vec![(0.0, brake_max_n)]),
         brake_gear: BrakeGear::default(),
         corrections: Default::default(),
+        extra: Vec::new(),
     };
     let handling = Handling {
         speed_max_mps,

@@ -22,6 +22,7 @@ mod altitude;
 mod corrections;
 mod document;
 pub mod error;
+mod extra;
 mod finding_unit;
 mod forces;
 pub mod manifest;

@@ -3,7 +3,8 @@
 use super::corrections::read_corrections;
 use super::document::{Document, Section};
 use super::error::{DatasetError, Problem};
-use crate::terms::{Key, curve, rotating, tunnel};
+use super::extra::read_extra;
+use crate::terms::{Key, curve, extra, rotating, tunnel};
 use crate::train::{BrakeGear, Corrections, Davis, EffortCurve, FrictionBrake, TrainModel};
 
 /// k in the declared curve resistance k/R in N/kN, R in m, unless a train says otherwise.
@@ -21,7 +22,7 @@ pub const RELEASE_PRESSURE_DEFAULT_PA: f64 = 20e3;
 pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> {
     let document = Document::parse(label, text)?;
     let root = document.root();
-    root.allow(&["train", "resistance", "traction", "brake", "corrections"])?;
+    root.allow(&["train", "resistance", "traction", "brake", "corrections", extra::TABLES])?;
     let train = root.required_table("train")?;
     train.allow(&[
         "name",
@@ -75,6 +76,7 @@ pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> 
         brake,
         brake_gear,
         corrections: Corrections::NONE,
+        extra: read_extra(&root)?,
     };
     if let Some(section) = root.table("corrections")? {
         read_corrections(&section, &mut model)?;

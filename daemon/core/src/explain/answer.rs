@@ -151,6 +151,8 @@ pub enum ParameterValue {
     Sections(Vec<MassSection>),
     /// Masses by time.
     Windows(Vec<MassWindow>),
+    /// A formula.
+    Formula(String),
 }
 
 /// An effect that was found.
@@ -169,6 +171,18 @@ pub struct EffectAnswer {
     pub p_value: f64,
     /// Share of the open-loop error on the fit runs that goes when the effect is added last.
     pub error_reduction: f64,
+    /// For an effect outside the library, forms that explain less of the data, the best first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub runners_up: Vec<RunnerUp>,
+}
+
+/// Another form of an effect outside the library.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RunnerUp {
+    /// Its formula.
+    pub formula: String,
+    /// By how much its evidence is less, in units of -2 log likelihood.
+    pub evidence_less: f64,
 }
 
 /// An effect that was considered.

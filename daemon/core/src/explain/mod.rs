@@ -9,7 +9,7 @@
 //!   time, would explain
 //! - [`selection`]: the search for effects, its significance, evidence by run
 //! - [`score`]: open-loop prediction of fit and holdout runs
-//! - [`unexplained`], [`rivals`], [`verdict`], [`answer`]: the statement
+//! - [`unexplained`], [`rivals`], [`runners_up`], [`verdict`], [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
 //!
 //! [`explain`] runs it all.
@@ -21,6 +21,7 @@ pub mod places;
 pub mod report;
 pub mod residual_pressure;
 pub mod rivals;
+pub mod runners_up;
 pub mod scan;
 pub mod score;
 pub mod selection;
@@ -33,6 +34,7 @@ use answer::Answer;
 use evidence::{Fit, FitProblem, RunData, RunDataError};
 use score::{PredictedRun, Score};
 use selection::{Outcome, Progress, Search};
+use unexplained::Unexplained;
 
 /// Fit and holdout runs with the models that were fitted.
 pub struct Explanation {
@@ -79,6 +81,9 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
     // An effect that explains wrong units is none.
     let is_possible = notes.iter().all(|note| note.severity < Severity::Fundamental);
     let mut outcome = if is_possible { search.run() } else { search.base() };
+    if is_possible && Unexplained::of(&search, &outcome).is_some_and(|left| !left.is_noise()) {
+        search.look_under_noise(&mut outcome);
+    }
     let known = places::settle(&problem, &mut outcome.fit);
     progress(0.95, "scoring the holdout runs");
     let score = Score::of(&problem, &holdout, &outcome.base, &outcome.fit);

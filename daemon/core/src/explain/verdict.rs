@@ -11,6 +11,7 @@ use super::answer::{
 };
 use super::effects::ReportContext;
 use super::rivals::{is_in, rivals, separating_run};
+use super::runners_up::runners_up;
 use super::score::{self, Score};
 use super::selection::{Outcome, Search, deviations, discounted, p_value, penalty};
 use super::unexplained::Unexplained;
@@ -34,7 +35,9 @@ pub fn answer(
     let fit = &outcome.fit;
     let (deviation, covariance) = deviations(fit);
     let effects = effect_answers(search, outcome, known, (&deviation, &covariance));
-    let rivals = rivals(outcome);
+    // What has no name has no rivals either.
+    let is_unknown = is_in(&outcome.fit, EffectKind::Unknown);
+    let rivals = if is_unknown { Vec::new() } else { rivals(outcome) };
     let left = Unexplained::of(search, outcome);
     let verdict = verdict(search, outcome, &rivals, left.as_ref());
     let [rmse_before, rmse_after] = score.holdout_rmse_mps();
@@ -151,6 +154,11 @@ fn effect_answers(
                 std: reported.deviations,
                 p_value: p_value((decrease - penalty(fit, index)) * reduction),
                 error_reduction: reduction,
+                runners_up: if effect.kind() == EffectKind::Unknown {
+                    runners_up(search, outcome)
+                } else {
+                    Vec::new()
+                },
             };
             (decrease, answer)
         })
@@ -289,6 +297,9 @@ fn unnamed(left: Option<&Unexplained>, found: &str) -> String {
 fn describe(effect: &EffectAnswer) -> String {
     let mut parts = Vec::new();
     for (name, value) in &effect.parameters {
+        if let ParameterValue::Formula(formula) = value {
+            parts.push(formula.clone());
+        }
         if let (ParameterValue::Number(value), Some(ParameterValue::Number(deviation))) =
             (value, effect.std.get(name))
         {

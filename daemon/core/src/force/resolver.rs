@@ -7,8 +7,10 @@ use dynocar_shared::{SampleField, TrainSample};
 
 use crate::terms::bearings::WarmUp;
 use crate::terms::delay::DelayLine;
+use crate::terms::extra::Covariate;
 use crate::terms::{
-    Resistance, ambient, bearings, curve, gradient, place, rotating, traction, tunnel, wheel, wind,
+    Resistance, ambient, bearings, curve, extra, gradient, place, rotating, traction, tunnel,
+    wheel, wind,
 };
 use crate::track::Track;
 use crate::train::{Corrections, TrainModel};
@@ -65,6 +67,19 @@ impl ResolvedSample {
     /// Traction minus brake in N; `None` while either is not measured.
     pub fn control_force_n(&self) -> Option<f64> {
         Some(self.traction_force_n? - self.brake_force_n?)
+    }
+
+    /// What a force may depend on, where it is known.
+    #[inline]
+    pub fn covariate(&self, of: Covariate) -> Option<f64> {
+        match of {
+            Covariate::Speed => Some(self.speed_mps),
+            Covariate::Chainage => self.position_m,
+            Covariate::TimeSinceStart => Some(self.since_cold_s),
+            Covariate::TractionForce => self.traction_force_n,
+            Covariate::BrakeForce => self.brake_force_n,
+            Covariate::Temperature => self.ambient_temperature_degc,
+        }
     }
 
     /// Everything known that retards the train in proportion to its weight, in N/kN: gradient
@@ -239,6 +254,8 @@ impl ForceResolver {
         if let Some(extra_n_per_kn) = on_track(Track::resistance_n_per_kn) {
             place::act(extra_n_per_kn, &mut resistance);
         }
+        let known = |of: Covariate| sample.covariate(of);
+        extra::act(&train.extra, sample.speed_mps, known, &mut resistance);
         resistance
     }
 

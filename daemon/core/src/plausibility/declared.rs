@@ -104,6 +104,7 @@ mod tests {
             brake: EffortCurve::new(vec![(0.0, 220e3)]),
             brake_gear: BrakeGear::default(),
             corrections: Default::default(),
+            extra: Vec::new(),
         };
         change(&mut train);
         misdeclared(&train, None).into_iter().map(|it| it.code).collect()

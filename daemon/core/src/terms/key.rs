@@ -1,5 +1,6 @@
 //! Where a number of a term stands in the files, and what may stand there.
 
+use super::extra::Extra;
 use crate::train::TrainModel;
 
 /// How a number that was found comes to one that is declared already.
@@ -41,6 +42,8 @@ pub enum Entry {
     List(&'static str, Vec<Vec<f64>>),
     /// Further rows of a list of `[track]`.
     Rows(&'static str, Vec<Vec<f64>>),
+    /// A further table of `[[extra]]` of `train.toml`.
+    Extra(Extra),
 }
 
 impl PartialEq for Key {

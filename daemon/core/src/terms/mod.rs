@@ -12,6 +12,7 @@ pub mod bearings;
 pub mod brake;
 pub mod curve;
 pub mod delay;
+pub mod extra;
 pub mod gradient;
 mod key;
 pub mod masses;

@@ -20,8 +20,11 @@ pub struct Resistance {
     pub place_n_per_kn: f64,
     /// Of cold bearings, in N/kN.
     pub bearing_n_per_kn: f64,
-    /// Of everything in no library, in N/kN.
+    /// Of everything in no library, in N/kN: at standstill, with a slope over the speed in N/kN per
+    /// m/s that holds near the sample's.
     pub other_n_per_kn: f64,
+    /// That slope.
+    pub other_per_mps: f64,
     /// Factor on the basic resistance.
     pub factor: f64,
     /// What tunnels add to c, as share of it.
@@ -42,6 +45,7 @@ impl Resistance {
         place_n_per_kn: 0.0,
         bearing_n_per_kn: 0.0,
         other_n_per_kn: 0.0,
+        other_per_mps: 0.0,
         factor: 1.0,
         c_share: 0.0,
         dc: 0.0,
@@ -49,7 +53,7 @@ impl Resistance {
         outside: 1.0,
     };
 
-    /// What does not depend on speed, in N/kN.
+    /// What is there at standstill, in N/kN.
     #[inline]
     fn constant_n_per_kn(&self) -> f64 {
         self.curve_n_per_kn
@@ -71,6 +75,7 @@ impl Resistance {
         let square = speed_mps * speed_mps;
         let ahead_mps = speed_mps + self.headwind_mps;
         self.constant_n_per_kn()
+            + self.other_per_mps * speed_mps
             + self.c_share * davis.c * square
             + self.dc * square
             + self.outside * davis.c * (ahead_mps * ahead_mps.abs() - square)
@@ -86,7 +91,7 @@ impl Resistance {
         let blown = self.outside * sign * davis.c;
         [
             self.constant_n_per_kn() + factor * davis.a + blown * wind * wind,
-            factor * davis.b + 2.0 * blown * wind,
+            factor * davis.b + self.other_per_mps + 2.0 * blown * wind,
             self.dc + davis.c * (factor + self.c_share + self.outside * (sign - 1.0)),
         ]
     }
@@ -115,6 +120,7 @@ mod tests {
             place_n_per_kn: 0.4,
             bearing_n_per_kn: 0.3,
             other_n_per_kn: -0.1,
+            other_per_mps: 0.02,
             factor: 1.08,
             c_share: 0.4,
             dc: 2e-4,
@@ -134,8 +140,8 @@ mod tests {
             assert!((by_polynomial - by_sum).abs() < 1e-12, "{speed_mps}");
             let [a, b, c] = all.davis_slopes(speed_mps);
             let constant = Resistance { dc: 0.0, ..all }.constant_n_per_kn();
-            let by_slopes =
-                a * DAVIS.a + b * DAVIS.b + c * DAVIS.c + constant + all.dc * speed_mps * speed_mps;
+            let sloped = |v: f64| v * (all.other_per_mps + all.dc * v);
+            let by_slopes = a * DAVIS.a + b * DAVIS.b + c * DAVIS.c + constant + sloped(speed_mps);
             assert!((by_slopes - by_sum).abs() < 1e-12, "{speed_mps}");
         }
     }

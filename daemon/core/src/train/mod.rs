@@ -5,6 +5,8 @@ mod corrections;
 pub use corrections::Corrections;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
+use crate::terms::extra::Extra;
+
 /// Davis coefficients of the unit basic resistance w0(v) = a + b v + c v² in N/kN, v in m/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Davis {
@@ -126,6 +128,8 @@ pub struct TrainModel {
     pub brake_gear: BrakeGear,
     /// What measured runs have added.
     pub corrections: Corrections,
+    /// Resistances of forms of their own.
+    pub extra: Vec<Extra>,
 }
 
 impl TrainModel {
@@ -146,6 +150,7 @@ impl TrainModel {
             brake: None,
             brake_gear: BrakeGear::default(),
             corrections: Corrections::default(),
+            extra: Vec::new(),
         }
     }
 

@@ -37,6 +37,7 @@ pub fn train() -> TrainModel {
             friction_brake: None,
         },
         corrections: Default::default(),
+        extra: Vec::new(),
     }
 }
 

@@ -33,6 +33,7 @@ pub fn train() -> Arc<TrainModel> {
         brake: None,
         brake_gear: BrakeGear::default(),
         corrections: Default::default(),
+        extra: Vec::new(),
     })
 }
 

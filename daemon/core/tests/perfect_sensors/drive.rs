@@ -102,6 +102,7 @@ pub fn train() -> Arc<TrainModel> {
         brake: None,
         brake_gear: gear,
         corrections: Default::default(),
+        extra: Vec::new(),
     })
 }
 

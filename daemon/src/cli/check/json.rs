@@ -6,6 +6,7 @@ use dynocar_core::dataset::{
     ColumnMapping, DatasetError, DatasetHead, ForceSource, GradientSource, Manifest, Note,
     PositionSource, Quantity, Remark, Role, Run, RunEntry, RunQuality,
 };
+use dynocar_core::terms::extra::Extra;
 use dynocar_core::track::Track;
 use dynocar_core::train::{Corrections, EffortCurve, TrainModel};
 use serde::Serialize;
@@ -98,6 +99,9 @@ struct TrainAnswer<'a> {
     brake_effort: Option<&'a [(f64, f64)]>,
     /// As in `train.toml`; `null` when nothing is corrected.
     corrections: Option<CorrectionsAnswer>,
+    /// Formulas of the resistances of forms of their own.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    extra: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -228,6 +232,7 @@ fn train_answer(train: &TrainModel) -> TrainAnswer<'_> {
         traction_effort: train.traction.as_ref().map(EffortCurve::points),
         brake_effort: train.brake.as_ref().map(EffortCurve::points),
         corrections: corrections_answer(train.corrections),
+        extra: train.extra.iter().map(Extra::law).collect(),
     }
 }
 

@@ -87,6 +87,9 @@ fn train(train: &TrainModel) -> String {
             text += &line(if index == 0 { "corrections" } else { "" }, words);
         }
     }
+    for (index, extra) in train.extra.iter().enumerate() {
+        text += &line(if index == 0 { "extra force" } else { "" }, &extra.law());
+    }
     text
 }
 

@@ -48,5 +48,16 @@ pub fn section(subject: &Subject) -> Section {
     } else {
         body += &table.html();
     }
+    let forms = subject.explanation.answer.effects.iter().flat_map(|effect| &effect.runners_up);
+    let forms: Vec<String> = forms
+        .map(|other| {
+            let less = minus(&format!("{:.0}", other.evidence_less));
+            format!("<li>{} (evidence less by {less})</li>\n", escape(&minus(&other.formula)))
+        })
+        .collect();
+    if !forms.is_empty() {
+        body += "<p>Other forms that the force outside the library may have:</p>\n<ul>\n";
+        body += &(forms.concat() + "</ul>\n");
+    }
     Section { id: "candidates", title: "What else was considered", body }
 }

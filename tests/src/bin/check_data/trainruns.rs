@@ -121,6 +121,7 @@ fn running_time_s(train: &TheirTrain, effort: &[Vec<f64>], sections: &[Vec<f64>]
         brake: None,
         brake_gear: BrakeGear::default(),
         corrections: Default::default(),
+        extra: Vec::new(),
     };
     let effort = EffortCurve::new(effort.iter().map(|row| (row[0] / 3.6, row[1])).collect())?;
     let scale = THEIR_GRAVITY_MPS2 / STANDARD_GRAVITY_MPS2;

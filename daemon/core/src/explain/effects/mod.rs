@@ -16,10 +16,10 @@ mod gradient_shift;
 mod local_resistance;
 mod low_adhesion;
 mod mass_change;
-mod residual_band;
 mod rotating_mass;
 mod traction_gain;
 mod tunnel_drag;
+mod unknown;
 mod wheel_diameter;
 mod wind;
 
@@ -53,8 +53,10 @@ pub const LIBRARY: [&dyn Effect; 16] = [
     &bearing_temperature::BearingTemperature,
     &dragging_brake::DraggingBrake,
     &low_adhesion::LowAdhesion,
-    &residual_band::ResidualBand,
+    UNKNOWN,
 ];
+/// What is in no library.
+pub const UNKNOWN: &dyn Effect = &unknown::Unknown;
 
 /// What an estimate says outside: values and standard deviations by the names of the answer.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -171,6 +173,11 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         true
     }
 
+    /// Why parameters like these are not what the kind says, whatever speaks for them.
+    fn contradiction(&self, _parameters: &[f64]) -> Option<&'static str> {
+        None
+    }
+
     /// The value of each parameter at which there is no effect.
     fn none(&self) -> f64 {
         0.0
@@ -205,6 +212,11 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
 
     /// What the effect is in the files of a train and a line; `None` where these cannot hold it.
     fn entries(&self, _parameters: &[f64]) -> Option<Vec<Entry>> {
+        None
+    }
+
+    /// The law in a formula, for what has no name.
+    fn formula(&self, _parameters: &[f64]) -> Option<String> {
         None
     }
 

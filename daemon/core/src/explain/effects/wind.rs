@@ -10,6 +10,9 @@ use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 use crate::terms::wind;
 
+/// A headwind that both directions share is at most so many times what they do not share.
+const AHEAD_MAX: f64 = 3.0;
+
 /// The kind.
 pub struct Wind;
 
@@ -89,6 +92,23 @@ impl Hypothesis for ByRun {
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
         parameters.iter().any(|mps| mps.abs() > wind::LEAST_MPS)
+    }
+
+    fn contradiction(&self, parameters: &[f64]) -> Option<&'static str> {
+        let winds = || self.runs.iter().zip(parameters).map(|((_, way), wind)| (*way, *wind));
+        let mean = |way: f64| {
+            let own: Vec<f64> = winds().filter(|it| it.0 == way).map(|it| it.1).collect();
+            (own.iter().sum::<f64>() / own.len() as f64, own.len() as f64)
+        };
+        let ((plus, plus_runs), (minus, minus_runs)) = (mean(1.0), mean(-1.0));
+        let (along, ahead) = (0.5 * (plus + minus), 0.5 * (plus - minus));
+        let away = |(way, wind): (f64, f64)| wind - if way > 0.0 { plus } else { minus };
+        let freedom = (plus_runs + minus_runs - 2.0).max(1.0);
+        let scatter = (winds().map(|it| away(it).powi(2)).sum::<f64>() / freedom).sqrt();
+        let may_be = along.abs().max(scatter).max(wind::LEAST_MPS);
+        (ahead.abs() > AHEAD_MAX * may_be).then_some(
+            "it would blow against every run alike, whichever way that goes: something of the train",
+        )
     }
 
     fn touches(&self, parameter: usize, run: &RunData) -> bool {

@@ -105,6 +105,8 @@ fn effect_rows(dataset: &Dataset, effect: &EffectAnswer) -> Vec<ParameterRow> {
                     );
                 }
             }
+            // The formula is told with the effect; its numbers stand here.
+            ParameterValue::Formula(_) => {}
             ParameterValue::Profile(entries) => {
                 for (i, [at_m, value]) in entries.iter().enumerate() {
                     let deviation = match std {

@@ -114,6 +114,7 @@ fn sizes(effect: &EffectAnswer) -> Vec<String> {
                     .replace('-', "−")
                 }));
             }
+            ParameterValue::Formula(formula) => sizes.push(formula.clone()),
             ParameterValue::Windows(windows) => {
                 let shown = windows.iter().take(PLACES_MAX);
                 sizes.extend(shown.map(|w| {
@@ -221,6 +222,7 @@ mod tests {
             std: number(107.5),
             p_value: 1e-9,
             error_reduction: 0.8,
+            runners_up: Vec::new(),
         };
         assert_eq!(
             described(&effect),
@@ -237,6 +239,7 @@ mod tests {
             std: [(parameter.to_string(), ParameterValue::Number(0.1))].into(),
             p_value: 1e-9,
             error_reduction: 0.8,
+            runners_up: Vec::new(),
         };
         let none = DavisDeviations { a: 0.0, b: 0.0, c: 0.0 };
         let mut answer = Answer {

@@ -26,6 +26,8 @@ pub enum Refusal {
     Immaterial,
     /// A parameter lies at the bound of what is looked for: these data do not hold it.
     AtBound(AtBound),
+    /// What was fitted is not what the kind says.
+    Contradiction(&'static str),
     /// It takes away this share of the open-loop error, which is too little.
     LittleOfTheError(f64),
     /// Evidence and share of the error are too small together.
@@ -37,7 +39,7 @@ pub enum Refusal {
 impl Refusal {
     /// Whether all but its name speaks for the effect: something is left to explain.
     pub fn leaves_a_residual(&self) -> bool {
-        matches!(self, Refusal::AtBound(_))
+        matches!(self, Refusal::AtBound(_) | Refusal::Contradiction(_))
     }
 }
 
@@ -54,6 +56,7 @@ impl std::fmt::Display for Refusal {
                      looked for"
                 );
             }
+            Refusal::Contradiction(why) => return f.write_str(why),
             Refusal::LittleOfTheError(share) if *share < 0.005 => {
                 return f.write_str("takes nothing from the error");
             }
@@ -82,7 +85,9 @@ impl Search<'_> {
         } else if !self.holds_by_run(base, trial) {
             Some(Refusal::NotInEveryRun)
         } else {
-            at_bound(&trial.fit, trial.last()).map(Refusal::AtBound)
+            contradiction(trial)
+                .map(Refusal::Contradiction)
+                .or_else(|| at_bound(&trial.fit, trial.last()).map(Refusal::AtBound))
         }
     }
 
@@ -94,6 +99,7 @@ impl Search<'_> {
             .filter(|trial| {
                 trial.evidence > EVIDENCE_MIN
                     && is_material(trial)
+                    && contradiction(trial).is_none()
                     && at_bound(&trial.fit, trial.last()).is_none()
                     && self.holds_by_run(&outcome.base, trial)
             })
@@ -117,6 +123,12 @@ fn is_material(trial: &Trial) -> bool {
     let last = trial.last();
     let parameters = trial.fit.effect_parameters(last);
     trial.fit.model.effects[last].is_material(parameters, trial.fit.theta[2])
+}
+
+/// Why the last effect of a trial is not what its kind says.
+fn contradiction(trial: &Trial) -> Option<&'static str> {
+    let last = trial.last();
+    trial.fit.model.effects[last].contradiction(trial.fit.effect_parameters(last))
 }
 
 /// What the last effect of a trial must take away.

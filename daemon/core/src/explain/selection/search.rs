@@ -8,7 +8,7 @@ use super::significance::{
     AMBIGUOUS, EVIDENCE_MIN, REDUCTION_MIN, STRENGTH_MIN, at_bound, discounted, model_penalty,
     penalty,
 };
-use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal};
+use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal, UNKNOWN};
 use crate::explain::evidence::{Fit, FitProblem, GrownModel, Noise, RunData};
 use crate::explain::scan::Scan;
 use crate::explain::score::{self, FitErrors};
@@ -29,6 +29,8 @@ const FINALIST_SHARE: f64 = 0.1;
 /// at least this share of the open-loop error, a sixth of what an effect needs.
 const MANY_OBSERVATIONS: usize = 5_000;
 const FINALIST_REDUCTION: f64 = 0.02;
+/// Shares of the slow part of a noise under which a kind looks again.
+const STIFF: [f64; 2] = [0.01, 1e-4];
 /// Less observations than this tell nothing.
 pub const OBSERVATIONS_MIN: usize = 80;
 
@@ -189,7 +191,8 @@ impl Search<'_> {
         finished
     }
 
-    fn scan<'s>(&'s self, fit: &'s Fit) -> Option<Scan<'s>> {
+    /// A scan around a fit; `None` when the fit's information is singular.
+    pub fn scan<'s>(&'s self, fit: &'s Fit) -> Option<Scan<'s>> {
         Scan::new(self.problem, self.holdout, self.train, self.track, fit)
     }
 
@@ -228,7 +231,7 @@ impl Search<'_> {
         let mut best = refit(&trial);
         for attempt in 0..3 {
             let own = best.fit.noise;
-            let noises = [own, own.stiff(0.01), own.stiff(1e-4)];
+            let noises = [own, own.stiff(STIFF[0]), own.stiff(STIFF[1])];
             let looks = if attempt == 0 { &noises[..] } else { &noises[..1] };
             let mut is_better = false;
             for &noise in looks {
@@ -254,6 +257,28 @@ impl Search<'_> {
             .into_iter()
             .map(|candidate| self.attempt(base, &onto, candidate, true))
             .max_by(|one, other| one.advantage.total_cmp(&other.advantage))
+    }
+
+    /// Looks for a form of what is left, under noises too small to hold it: the noise of a model
+    /// that lacks a large force holds that force. What is found stands in the place of everything
+    /// found before, or beside it, whichever explains more.
+    pub fn look_under_noise(&self, outcome: &mut Outcome) {
+        let models = [outcome.base.clone(), outcome.fit.clone()];
+        for base in models.iter().take(1 + usize::from(!outcome.fit.model.effects.is_empty())) {
+            if base.model.effects.iter().any(|own| own.kind() == EffectKind::Unknown) {
+                continue;
+            }
+            let before = FitErrors::of(self.problem, base);
+            for share in STIFF {
+                let noise = base.noise.stiff(share);
+                let Some(mut trial) = self.look_again(base, noise, UNKNOWN) else { continue };
+                trial.reduction = FitErrors::of(self.problem, &trial.fit).reduction_from(&before);
+                let is_better = Self::total(&trial.fit) < Self::total(&outcome.fit) - EVIDENCE_MIN;
+                if is_better && self.refusal(base, &trial).is_none() {
+                    outcome.fit = trial.fit;
+                }
+            }
+        }
     }
 
     /// Share of the open-loop error of the fit runs that the larger model takes away, over whole

@@ -30,6 +30,7 @@ fn train() -> Arc<TrainModel> {
         brake: None,
         brake_gear: BrakeGear::default(),
         corrections: Default::default(),
+        extra: Vec::new(),
     })
 }
 

@@ -1,33 +1,28 @@
 //! A residual that is real but fits no kind of the library: an extra force in a range of some
 //! covariate. It is not an explanation; it says where an explanation is to be looked for.
 
-mod covariate;
-
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
+use super::OUTSIDE_COST;
+use super::band_axis::{AXES, BandAxis};
 use crate::explain::answer::{CovariateRange, Place};
+use crate::explain::effects::{Candidate, Hypothesis, Parameter};
 use crate::explain::evidence::{Bin, RunData, SampleForces, SharedHypothesis};
 use crate::explain::places::{Axis, End, MAP_ERROR_PERMILLE, Reach};
 use crate::explain::scan::{Scan, Tuple};
-use covariate::{COVARIATES, Covariate};
+use crate::terms::extra::Covariate;
 
 /// Cells into which the range of a covariate is cut.
 const CELLS: usize = 20;
 /// Motion in s that a band must hold.
 const BAND_MIN_S: f64 = 60.0;
-/// The library comes first: a band must explain more than a known kind.
-const OUTSIDE_COST: f64 = 10.0;
-
-/// The kind.
-pub struct ResidualBand;
 
 #[derive(Clone, Debug)]
 struct Band {
-    covariate: Covariate,
+    axis: BandAxis,
     low: f64,
     high: f64,
     /// Least and greatest value of the covariate, and the width of a cell.
@@ -38,18 +33,13 @@ struct Band {
     choice_cost: f64,
 }
 
-impl Effect for ResidualBand {
-    fn kind(&self) -> EffectKind {
-        EffectKind::Unknown
-    }
-
-    fn propose(&self, scan: &Scan) -> Proposal {
-        let mut bands: Vec<(f64, Candidate)> =
-            COVARIATES.iter().filter_map(|&covariate| best_band(scan, covariate)).collect();
-        bands.sort_by(|one, other| other.0.total_cmp(&one.0));
-        bands.truncate(2);
-        Proposal::Candidates(bands.into_iter().map(|(_, candidate)| candidate).collect())
-    }
+/// The ranges in which an extra force explains most, one of each covariate, with what it explains;
+/// the best first.
+pub fn bands(scan: &Scan) -> Vec<(f64, Candidate)> {
+    let mut bands: Vec<(f64, Candidate)> =
+        AXES.iter().filter_map(|&axis| best_band(scan, axis)).collect();
+    bands.sort_by(|one, other| other.0.total_cmp(&one.0));
+    bands
 }
 
 /// Equal cells of the range of a covariate.
@@ -65,14 +55,14 @@ struct Cells {
 
 impl Cells {
     /// `None` where the covariate does not vary.
-    fn of(scan: &Scan, covariate: Covariate) -> Option<Self> {
+    fn of(scan: &Scan, axis: BandAxis) -> Option<Self> {
         let runs = &scan.problem.runs;
         let by_run: Vec<Vec<Option<f64>>> = runs
             .iter()
             .enumerate()
             .map(|(number, run)| {
                 let middles = run.bins.iter().map(Bin::middle);
-                middles.map(|i| covariate.value(run, Some(number), i)).collect()
+                middles.map(|i| axis.value(run, Some(number), i)).collect()
             })
             .collect();
         let (low, high) = by_run
@@ -83,14 +73,14 @@ impl Cells {
         if high - low < 1e-6 || !(high - low).is_finite() {
             return None;
         }
-        let is_run = covariate == Covariate::Run;
+        let is_run = axis == BandAxis::Run;
         let count = if is_run { runs.len() } else { CELLS };
         let width = if is_run { 1.0 } else { (high - low) / count as f64 * (1.0 + 1e-9) };
         let low = if is_run { -0.5 } else { low };
         let tuples = vec![Tuple::zero(scan.fit.theta.len()); count];
         let mut cells = Cells { low, width, count, tuples, seconds: vec![0.0; count] };
         for (number, values) in by_run.iter().enumerate() {
-            cells.add_run(scan, covariate, number, values);
+            cells.add_run(scan, axis, number, values);
         }
         Some(cells)
     }
@@ -99,13 +89,7 @@ impl Cells {
         self.low + self.width * cell as f64
     }
 
-    fn add_run(
-        &mut self,
-        scan: &Scan,
-        covariate: Covariate,
-        number: usize,
-        values: &[Option<f64>],
-    ) {
+    fn add_run(&mut self, scan: &Scan, axis: BandAxis, number: usize, values: &[Option<f64>]) {
         let run = &scan.problem.runs[number];
         let time_s = run.recording.time_s();
         let mut shapes: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
@@ -113,7 +97,7 @@ impl Cells {
             let Some(value) = value else { continue };
             let cell = (((value - self.low) / self.width) as usize).min(self.count - 1);
             let shape = shapes.entry(cell).or_insert_with(|| vec![0.0; run.bins.len()]);
-            shape[k] = covariate.shape(scan, &run.samples()[bin.middle()]);
+            shape[k] = axis.shape(scan, &run.samples()[bin.middle()]);
             self.seconds[cell] += time_s[bin.end - 1] - time_s[bin.first];
         }
         for (cell, shape) in shapes {
@@ -123,8 +107,8 @@ impl Cells {
 }
 
 /// The range of a covariate in which an extra force explains most.
-fn best_band(scan: &Scan, covariate: Covariate) -> Option<(f64, Candidate)> {
-    let cells = Cells::of(scan, covariate)?;
+fn best_band(scan: &Scan, axis: BandAxis) -> Option<(f64, Candidate)> {
+    let cells = Cells::of(scan, axis)?;
     let count = cells.count;
     let mut best: Option<(f64, f64, usize, usize)> = None;
     for from in 0..count {
@@ -140,12 +124,12 @@ fn best_band(scan: &Scan, covariate: Covariate) -> Option<(f64, Candidate)> {
         }
     }
     let (gain, estimate, from, to) = best?;
-    let structures = COVARIATES.len() as f64 * (count * (count + 1)) as f64 / 2.0;
+    let structures = AXES.len() as f64 * (count * (count + 1)) as f64 / 2.0;
     let choice_cost = OUTSIDE_COST + 2.0 * structures.ln();
     let files = scan.problem.runs.iter().map(|run| run.file.clone()).collect();
     let (low, high) = (cells.edge(from), cells.edge(to));
     let span = [cells.edge(0), cells.edge(count)];
-    let band = Band { covariate, low, high, span, cell: cells.width, files, choice_cost };
+    let band = Band { axis, low, high, span, cell: cells.width, files, choice_cost };
     Some((gain, Candidate::new(band, vec![estimate])))
 }
 
@@ -155,7 +139,7 @@ impl Hypothesis for Band {
     }
 
     fn parameters(&self) -> &[Parameter] {
-        self.covariate.parameters()
+        self.axis.parameters()
     }
 
     fn choice_cost(&self) -> f64 {
@@ -164,40 +148,46 @@ impl Hypothesis for Band {
 
     fn shared_error(&self) -> f64 {
         // A band of chainage is an error of the map, which every passage has in full.
-        if self.covariate == Covariate::Chainage { MAP_ERROR_PERMILLE } else { 0.0 }
+        if self.axis == BandAxis::Of(Covariate::Chainage) { MAP_ERROR_PERMILLE } else { 0.0 }
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
-        let least = match self.covariate {
-            Covariate::Chainage => 0.3,
-            Covariate::TractionForce | Covariate::BrakeForce => 0.02,
+        let least = match self.axis {
+            BandAxis::Of(Covariate::Chainage) => 0.3,
+            BandAxis::Of(Covariate::TractionForce) | BandAxis::Of(Covariate::BrakeForce) => 0.02,
             _ => 0.1,
         };
         // At its bound a band stands for something of another form.
-        let most = 0.9 * self.covariate.parameters()[0].upper;
+        let most = 0.9 * self.axis.parameters()[0].upper;
         (least..most).contains(&parameters[0].abs())
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         let number = self.files.iter().position(|file| *file == run.file);
         for (i, force) in forces.iter_mut().enumerate() {
-            let value = self.covariate.value(run, number, i);
+            let value = self.axis.value(run, number, i);
             if !value.is_some_and(|value| value >= self.low && value < self.high) {
                 continue;
             }
-            match self.covariate {
-                Covariate::Chainage => {
+            match self.axis {
+                BandAxis::Of(Covariate::Chainage) => {
                     force.gradient_permille += run.samples()[i].direction * parameters[0];
                 }
-                Covariate::TractionForce => force.traction_n *= 1.0 + parameters[0],
-                Covariate::BrakeForce => force.brake_n *= 1.0 + parameters[0],
+                BandAxis::Of(Covariate::TractionForce) => force.traction_n *= 1.0 + parameters[0],
+                BandAxis::Of(Covariate::BrakeForce) => force.brake_n *= 1.0 + parameters[0],
                 _ => force.resistance.other_n_per_kn += parameters[0],
             }
         }
     }
 
+    fn formula(&self, parameters: &[f64]) -> Option<String> {
+        let (name, [low, high]) = (self.axis.name(), [self.low, self.high]);
+        let parameter = &self.axis.parameters()[0];
+        Some(format!("{} = {:.4} · ({low:.4} ≤ {name} < {high:.4})", parameter.name, parameters[0]))
+    }
+
     fn ends(&self) -> Vec<End> {
-        if self.covariate == Covariate::Run {
+        if self.axis == BandAxis::Run {
             return Vec::new();
         }
         // Bounds of the covariate itself are no ends.
@@ -223,10 +213,12 @@ impl Hypothesis for Band {
 
     fn place(&self) -> Place {
         let mut place = Place::default();
-        match self.covariate {
-            Covariate::Speed => place.speed_range_mps = Some([self.low, self.high]),
-            Covariate::Chainage => place.intervals_m = Some(vec![[self.low, self.high]]),
-            Covariate::Run => {
+        match self.axis {
+            BandAxis::Of(Covariate::Speed) => place.speed_range_mps = Some([self.low, self.high]),
+            BandAxis::Of(Covariate::Chainage) => {
+                place.intervals_m = Some(vec![[self.low, self.high]])
+            }
+            BandAxis::Run => {
                 let inside = self.files.iter().enumerate().filter(|(k, _)| {
                     let k = *k as f64;
                     k >= self.low && k < self.high
@@ -235,10 +227,8 @@ impl Hypothesis for Band {
             }
             _ => {}
         }
-        place.covariate = Some(CovariateRange {
-            name: self.covariate.name().into(),
-            range: [self.low, self.high],
-        });
+        place.covariate =
+            Some(CovariateRange { name: self.axis.name().into(), range: [self.low, self.high] });
         place
     }
 }

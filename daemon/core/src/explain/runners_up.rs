@@ -1,0 +1,42 @@
+//! Other forms that a force outside the library may have.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::answer::RunnerUp;
+use super::effects::{Proposal, UNKNOWN};
+use super::selection::{Outcome, Search, penalty};
+
+/// Runners-up at most.
+const SHOWN: usize = 3;
+
+/// The forms next best to the one that was found, each fitted with everything else; empty where
+/// nothing outside the library was found.
+pub fn runners_up(search: &Search, outcome: &Outcome) -> Vec<RunnerUp> {
+    let fit = &outcome.fit;
+    let is_unknown = |kind: EffectKind| kind == EffectKind::Unknown;
+    let Some(index) = fit.model.effects.iter().position(|effect| is_unknown(effect.kind())) else {
+        return Vec::new();
+    };
+    let found = fit.model.effects[index].formula(fit.effect_parameters(index));
+    let own = fit.cost + penalty(fit, index);
+    let rest = search.without(fit, index);
+    let onto = search.problem.fit(&rest.model, rest.theta.clone(), fit.noise);
+    let Some(scan) = search.scan(&onto) else { return Vec::new() };
+    let Proposal::Candidates(candidates) = UNKNOWN.propose(&scan) else { return Vec::new() };
+    let mut others: Vec<RunnerUp> = candidates
+        .into_iter()
+        .filter_map(|candidate| {
+            let model = onto.model.with(candidate.hypothesis.clone());
+            let start = onto.theta.iter().chain(&candidate.start).copied().collect();
+            let other = search.problem.fit(&model, start, fit.noise);
+            let last = other.model.effects.len() - 1;
+            let formula = candidate.hypothesis.formula(other.effect_parameters(last))?;
+            let evidence_less = other.cost + penalty(&other, last) - own;
+            Some(RunnerUp { formula, evidence_less })
+        })
+        .filter(|other| found.as_ref() != Some(&other.formula) && other.evidence_less > 0.5)
+        .collect();
+    others.sort_by(|one, other| one.evidence_less.total_cmp(&other.evidence_less));
+    others.truncate(SHOWN);
+    others
+}

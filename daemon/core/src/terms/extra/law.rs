@@ -1,0 +1,59 @@
+//! A force and what it depends on.
+
+use super::covariate::Covariate;
+use super::form::Form;
+
+/// A function without unit of one covariate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Factor {
+    /// What it depends on.
+    pub of: Covariate,
+    /// How.
+    pub form: Form,
+    /// The numbers of the form, in the order of [`Form::numbers`]; a number that the form does not
+    /// have is not looked at.
+    pub numbers: [f64; 2],
+}
+
+/// A force and the factors that it is multiplied by.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Extra {
+    /// The resistance in N/kN where all factors are 1.
+    pub n_per_kn: f64,
+    /// One or two.
+    pub factors: Vec<Factor>,
+}
+
+impl Factor {
+    /// Its value and its slope over the speed in 1/(m/s); `None` where the covariate is not known.
+    #[inline]
+    fn at(&self, known: impl Fn(Covariate) -> Option<f64>) -> Option<(f64, f64)> {
+        let (value, slope) = self.form.value_and_slope(self.numbers, known(self.of)?);
+        Some((value, if self.of == Covariate::Speed { slope } else { 0.0 }))
+    }
+
+    /// The formula.
+    pub fn law(&self) -> String {
+        self.form.law(self.numbers, self.of.name())
+    }
+}
+
+impl Extra {
+    /// The formula, in N/kN.
+    pub fn law(&self) -> String {
+        let factors = self.factors.iter().map(|factor| format!(" · {}", factor.law()));
+        format!("{:.4} N/kN{}", self.n_per_kn, factors.collect::<String>())
+    }
+
+    /// The force in N/kN and its slope over the speed, for what is known of the covariates; none
+    /// where one that it takes is not.
+    #[inline]
+    pub fn at(&self, known: impl Fn(Covariate) -> Option<f64>) -> (f64, f64) {
+        let joined = self.factors.iter().try_fold((1.0, 0.0), |(value, slope), factor| {
+            let (own, own_slope) = factor.at(&known)?;
+            Some((value * own, slope * own + value * own_slope))
+        });
+        let (value, slope) = joined.unwrap_or((0.0, 0.0));
+        (self.n_per_kn * value, self.n_per_kn * slope)
+    }
+}
