@@ -126,7 +126,7 @@ pub fn grade(
         iou,
         ends_held,
         parameters,
-        share: attained.map(|attained| attained.share),
+        share: attained.and_then(|attained| attained.share),
         left_ratio: attained.map(|attained| attained.left_ratio),
         strength: explanation.strength,
     }
@@ -135,8 +135,8 @@ pub fn grade(
 /// An answer against the true model, on the holdout runs.
 #[derive(Clone, Copy)]
 struct Attained {
-    /// Share of the attainable reduction of the error.
-    share: f64,
+    /// Share of the attainable reduction of the error, where there is much to reduce.
+    share: Option<f64>,
     /// Error over that of the true model.
     left_ratio: f64,
 }
@@ -154,7 +154,8 @@ fn attained(simulated: &SimulatedDataset, explanation: &Explanation) -> Option<A
     let oracle = score(simulated).full_run.true_mps;
     let (before, after) = (explanation.answer.rmse_before?, explanation.answer.rmse_after?);
     let share = (before - after) / (before - oracle);
-    (before > 1.2 * oracle).then(|| Attained { share, left_ratio: after / oracle })
+    let share = (before > 1.2 * oracle).then_some(share);
+    (oracle > 0.0).then(|| Attained { share, left_ratio: after / oracle })
 }
 
 /// Parameters that have a single true number; the size of an effect is its distance from none.

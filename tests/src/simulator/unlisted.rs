@@ -133,6 +133,11 @@ impl Unlisted {
             5 => Law::FastInCold { at_mps: speed(0.8), until_degc: warmest_degc - of(2.0, 6.0) },
             _ => Law::FastLater { at_mps: speed(0.8), from_s: duration_s * of(0.3, 0.6) },
         };
-        Unlisted { law, n_per_kn: w0_n_per_kn * of(0.6, 1.2) }
+        let greatest = match law {
+            // A train still has to start against it.
+            Law::Slow { below_mps, least_mps } => 0.4 * (below_mps / least_mps - 1.0),
+            _ => 1.0,
+        };
+        Unlisted { law, n_per_kn: w0_n_per_kn * of(0.6, 1.2) / greatest }
     }
 }

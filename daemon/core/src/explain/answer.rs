@@ -209,9 +209,12 @@ pub struct BaseAnswer {
     pub c: f64,
     /// Their standard deviations.
     pub std: DavisDeviations,
+    /// Share of their variance before the data that the data take away: 1 where they say all, 0
+    /// where they say nothing.
+    pub told_by_data: DavisDeviations,
 }
 
-/// Standard deviations of a, b, c.
+/// A number for each of a, b, c.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DavisDeviations {
     /// Of a.

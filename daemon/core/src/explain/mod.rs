@@ -9,7 +9,7 @@
 //!   time, would explain
 //! - [`selection`]: the search for effects, its significance, evidence by run
 //! - [`score`]: open-loop prediction of fit and holdout runs
-//! - [`unexplained`], [`rivals`], [`runners_up`], [`verdict`], [`answer`]: the statement
+//! - [`unexplained`], [`told`], [`rivals`], [`runners_up`], [`verdict`], [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
 //!
 //! [`explain`] runs it all.
@@ -25,6 +25,7 @@ pub mod runners_up;
 pub mod scan;
 pub mod score;
 pub mod selection;
+pub mod told;
 pub mod unexplained;
 pub mod verdict;
 

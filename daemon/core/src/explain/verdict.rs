@@ -14,6 +14,7 @@ use super::rivals::{is_in, rivals, separating_run};
 use super::runners_up::runners_up;
 use super::score::{self, Score};
 use super::selection::{Outcome, Search, deviations, discounted, p_value, penalty};
+use super::told::{not_told, told_by_data};
 use super::unexplained::Unexplained;
 use crate::dataset::Note;
 use crate::plausibility::Severity;
@@ -50,7 +51,11 @@ pub fn answer(
     let (statement, experiment) = if impossible.is_empty() {
         let (text, experiment) =
             statement(search, outcome, verdict, &effects, &rivals, left.as_ref());
-        (text + &worse_held_out(&effects, score), experiment)
+        let not_told = match verdict {
+            Verdict::InsufficientData => String::new(),
+            _ => not_told(search.problem, fit, &deviation),
+        };
+        (text + &worse_held_out(&effects, score) + &not_told, experiment)
     } else {
         let text = format!("The data cannot be true as described: {}", impossible.join("; "));
         (text, Some("Set right what is named and run this again.".into()))
@@ -67,6 +72,7 @@ pub fn answer(
             b: fit.theta[1],
             c: fit.theta[2],
             std: DavisDeviations { a: deviation[0], b: deviation[1], c: deviation[2] },
+            told_by_data: told_by_data(search.problem, &deviation),
         },
         metric: "full_run",
         scored_runs: score.holdout_runs.iter().filter(|run| run[0].count > 0).count(),

@@ -249,7 +249,7 @@ mod tests {
             effects: vec![effect("local_resistance", "extra_n_per_kn")],
             ambiguous_with: vec!["tunnel_drag"],
             experiment: None,
-            base: BaseAnswer { a: 1.0, b: 0.0, c: 0.0, std: none },
+            base: BaseAnswer { a: 1.0, b: 0.0, c: 0.0, std: none, told_by_data: none },
             metric: "full_run",
             scored_runs: 1,
             unscored: None,

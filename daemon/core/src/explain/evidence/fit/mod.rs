@@ -132,6 +132,11 @@ impl FitProblem {
         FitProblem { runs, declared, prior_deviation, scatter_columns, way_ratio }
     }
 
+    /// Standard deviation of the declared a (0), b (1) or c (2).
+    pub fn prior_deviation(&self, coefficient: usize) -> f64 {
+        self.prior_deviation[coefficient]
+    }
+
     /// Least and greatest a (0), b (1) or c (2): physical, and within the tolerance of what is
     /// declared; what is declared as none has no greatest.
     fn declared_bounds(&self, coefficient: usize) -> (f64, f64) {

@@ -1,0 +1,28 @@
+//! Every kind of effect, simulated alone, is found by its name.
+
+use dynocar_core::dataset::Dataset;
+use dynocar_core::explain::answer::Verdict;
+use dynocar_core::explain::explain;
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_tests::simulator::dataset_writer::dataset_files;
+use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
+
+/// The first seed of the matrix of effects.
+const SEED: u64 = 9001;
+
+#[test]
+fn every_kind_is_found_by_its_name() {
+    for &kind in EffectKind::ALL.iter().filter(|kind| **kind != EffectKind::None) {
+        let request = EffectRequest::Kinds(vec![kind]);
+        let files = dataset_files(&simulate(&SimulatorSettings::new(SEED, request)));
+        let texts: Vec<(&str, &str)> =
+            files.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
+        let dataset = Dataset::load(&texts[..]).expect("a simulated dataset");
+        let answer = explain(&dataset, &|_, _| {}).expect("usable runs").answer;
+        let verdict = if kind == EffectKind::Unknown { Verdict::Unknown } else { Verdict::Effect };
+        assert_eq!(answer.verdict, verdict, "{kind}: {}", answer.statement);
+        let found: Vec<&str> = answer.effects.iter().map(|effect| effect.kind).collect();
+        assert_eq!(found, [kind.name()], "{}", answer.statement);
+        assert!(answer.rmse_after < answer.rmse_before, "{kind}: {}", answer.statement);
+    }
+}
