@@ -116,6 +116,21 @@ pub fn require_file(path: &Path, mark: &str) -> Result<(), OutputError> {
     }
 }
 
+/// Refuses, before the work begins, a name that is taken, be it by a link that leads nowhere.
+///
+/// # Errors
+///
+/// When something is there.
+pub fn require_new(path: &Path) -> Result<(), OutputError> {
+    if std::fs::symlink_metadata(path).is_ok() { Err(taken(path)) } else { Ok(()) }
+}
+
+fn taken(path: &Path) -> OutputError {
+    let problem = "exists already, and is not overwritten: nothing was written; give another \
+                   folder, or move it away";
+    OutputError::Name { path: path.into(), problem }
+}
+
 /// Refuses, before the work begins, a file in the place of a folder for results.
 ///
 /// # Errors
@@ -155,6 +170,42 @@ pub fn write_in_folder(folder: &Path, name: &str, content: &str) -> Result<PathB
         .map_err(|source| OutputError::File { path: path.clone(), source })?;
     write_file(&path, content)?;
     Ok(path)
+}
+
+/// Writes files that are not there yet, all of them or none, into a folder, which is made when it
+/// is not there. What somebody else writes meanwhile stays.
+///
+/// # Errors
+///
+/// When one of them is there, or cannot be written.
+pub fn write_new_in_folder(folder: &Path, files: &[(&str, &str)]) -> Result<(), OutputError> {
+    let mut written: Vec<PathBuf> = Vec::new();
+    for (name, content) in files {
+        let path = folder.join(name);
+        let made = std::fs::create_dir_all(folder).and_then(|()| write_new(&path, content));
+        if let Err(source) = made {
+            for path in written {
+                // Without the others it would be half an answer; that it stays harms nobody.
+                let _ = std::fs::remove_file(path);
+            }
+            return Err(match source.kind() {
+                ErrorKind::AlreadyExists => taken(&path),
+                _ => OutputError::File { path, source },
+            });
+        }
+        written.push(path);
+    }
+    Ok(())
+}
+
+fn write_new(path: &Path, content: &str) -> io::Result<()> {
+    let mut file = OpenOptions::new().write(true).create_new(true).mode(0o666).open(path)?;
+    let written = file.write_all(content.as_bytes()).and_then(|()| file.sync_data());
+    if written.is_err() {
+        // The half-written file is of no use; that it cannot be removed changes nothing.
+        let _ = std::fs::remove_file(path);
+    }
+    written
 }
 
 /// Writes a file as a whole. A link stays a link; a device or a pipe is written as it is.
@@ -217,6 +268,23 @@ mod tests {
         assert_eq!(std::fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o640);
         assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_eq!(names(folder.path()), ["a.json", "link"], "nothing beside it");
+    }
+
+    #[test]
+    fn new_files_are_all_written_or_none_and_never_over_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let new = at("new/deep");
+        write_new_in_folder(&new, &[("a", "1"), ("b", "2")]).unwrap();
+        assert_eq!(names(&new), ["a", "b"]);
+        let error = write_new_in_folder(&new, &[("c", "3"), ("b", "4")]).unwrap_err();
+        assert!(matches!(error, OutputError::Name { .. }), "{error}");
+        assert_eq!(names(&new), ["a", "b"], "no half of an answer");
+        assert_eq!(std::fs::read_to_string(new.join("b")).unwrap(), "2");
+        symlink(at("nowhere"), at("link")).unwrap();
+        assert!(require_new(&at("link")).is_err() && require_new(&at("free")).is_ok());
+        let error = write_new_in_folder(folder.path(), &[("link", "x")]).unwrap_err();
+        assert!(matches!(error, OutputError::Name { .. }) && !at("nowhere").exists());
     }
 
     #[test]

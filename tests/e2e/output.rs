@@ -14,7 +14,7 @@ const SOAK: &str = env!("CARGO_BIN_EXE_dynocar-soak");
 const DEMO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo");
 
 /// Commands with a result on standard output, that end by themselves.
-const COMMANDS: [(&str, &[&str]); 13] = [
+const COMMANDS: [(&str, &[&str]); 15] = [
     (DYNOCAR, &["--help"]),
     (DYNOCAR, &["explain", "--help"]),
     (DYNOCAR, &["--version"]),
@@ -26,6 +26,8 @@ const COMMANDS: [(&str, &[&str]); 13] = [
     (DYNOCAR, &["explain", DEMO, "--json", "-"]),
     (DYNOCAR, &["stops", DEMO, "--applied", "0.3"]),
     (DYNOCAR, &["stops", DEMO, "--applied", "0.3", "--json", "-"]),
+    (DYNOCAR, &["init", "--help"]),
+    (DYNOCAR, &["completions", "bash"]),
     (SOAK, &["--help"]),
     (SOAK, &["fuzz", "--rounds", "1"]),
 ];

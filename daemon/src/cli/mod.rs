@@ -4,11 +4,14 @@
 //! 1 the work failed, 2 the command line or an input file is wrong; `health` has some of its own.
 
 mod check;
+mod completions;
 mod demo;
 mod explain;
 mod failure;
 mod health;
 mod identify;
+mod init;
+mod man;
 mod replay;
 mod run;
 mod stops;
@@ -18,7 +21,7 @@ mod text;
 use std::path::Path;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 pub use failure::{ErrorAnswer, Failure};
 
@@ -35,6 +38,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::DemoArguments),
+    Init(init::InitArguments),
     Explain(explain::ExplainArguments),
     Run(run::RunArguments),
     Health(health::HealthArguments),
@@ -43,6 +47,8 @@ enum Command {
     Identify(identify::IdentifyArguments),
     Stops(stops::StopsArguments),
     Survey(survey::SurveyArguments),
+    Completions(completions::CompletionsArguments),
+    Man(man::ManArguments),
 }
 
 impl Command {
@@ -56,6 +62,7 @@ impl Command {
             Command::Survey(arguments) => arguments.json.as_deref(),
             // `check` has an answer of its own for what is wrong.
             Command::Check(_) | Command::Run(_) | Command::Health(_) | Command::Replay(_) => None,
+            Command::Init(_) | Command::Completions(_) | Command::Man(_) => None,
         }
     }
 }
@@ -68,6 +75,7 @@ pub fn main() -> ExitCode {
     };
     let result: Result<(), Failure> = match &arguments.command {
         Command::Demo(arguments) => demo::execute(arguments),
+        Command::Init(arguments) => init::execute(arguments),
         Command::Explain(arguments) => explain::execute(arguments),
         Command::Run(arguments) => run::execute(arguments),
         Command::Health(arguments) => health::execute(arguments),
@@ -76,6 +84,8 @@ pub fn main() -> ExitCode {
         Command::Identify(arguments) => identify::execute(arguments),
         Command::Stops(arguments) => stops::execute(arguments),
         Command::Survey(arguments) => survey::execute(arguments),
+        Command::Completions(arguments) => completions::execute(arguments, Arguments::command()),
+        Command::Man(arguments) => man::execute(arguments, Arguments::command()),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

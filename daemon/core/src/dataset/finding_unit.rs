@@ -5,10 +5,10 @@ use super::quantity::Quantity;
 use super::units::Unit;
 use crate::plausibility::{Finding, Slip};
 
-/// The unit in which the manifest reads the quantity of a finding.
-pub(super) fn read_as(manifest: &Manifest, finding: Finding) -> &'static str {
+/// The quantities that a slip is about, and the unit to tell it in where none of them is mapped.
+pub(super) fn concerned(slip: Slip) -> (&'static [Quantity], &'static str) {
     use Quantity::*;
-    let (quantities, otherwise): (&[Quantity], _) = match finding.slip {
+    match slip {
         Slip::TimeScale => (&[Time], "s"),
         Slip::SpeedScale => (&[Speed], "m/s"),
         Slip::PositionScale | Slip::DirectionReversed => (&[Position], "m"),
@@ -19,7 +19,12 @@ pub(super) fn read_as(manifest: &Manifest, finding: Finding) -> &'static str {
         }
         Slip::GradientSign | Slip::GradientScale => (&[Gradient], "permille"),
         Slip::PressureScale => (&[BrakeCylinderPressure], "Pa"),
-    };
+    }
+}
+
+/// The unit in which the manifest reads the quantity of a finding.
+pub(super) fn read_as(manifest: &Manifest, finding: Finding) -> &'static str {
+    let (quantities, otherwise) = concerned(finding.slip);
     let mapped = quantities.iter().find_map(|&quantity| manifest.mapping(quantity));
     mapped.map_or(otherwise, |mapping| mapping.unit.name())
 }

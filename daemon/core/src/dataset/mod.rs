@@ -17,6 +17,7 @@
 //! - `order`, `spikes`, `motion`, `forces`, `altitude`: from columns to time, speed, position,
 //!   forces and gradient
 //! - `resolved`, [`run`], [`quality`], [`remark`], [`note`]: samples, counts and warnings
+//! - [`guess`]: a description of files that nobody has described yet
 
 mod altitude;
 mod corrections;
@@ -25,6 +26,7 @@ pub mod error;
 mod extra;
 mod finding_unit;
 mod forces;
+pub mod guess;
 pub mod manifest;
 mod motion;
 mod names;

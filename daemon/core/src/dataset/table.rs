@@ -244,7 +244,7 @@ fn find_column(
 }
 
 /// The number in a trimmed cell, `NaN` for an empty one; `None` when it is something else.
-fn parse_cell(cell: &[u8], decimal: u8) -> Option<f64> {
+pub(super) fn parse_cell(cell: &[u8], decimal: u8) -> Option<f64> {
     if cell.is_empty() {
         return Some(f64::NAN);
     }

@@ -1,0 +1,123 @@
+#!/bin/sh
+# Builds dynocar_<version>_<arch>.deb from the release binaries.
+# usage: build.sh [--program FILE] [--libraries FOLDER] [--out FOLDER]
+#   --program    the program, default target/release/dynocar
+#   --libraries  where libdynocar_client.a and .so lie, default target/release
+#   --out        where the package goes, default target/debian
+# Build first: cargo build --release -p dynocar && cargo build --release -p dynocar-client
+set -eu
+
+here=$(cd "$(dirname "$0")" && pwd)
+project=$(cd "$here/../.." && pwd)
+program=$project/target/release/dynocar
+libraries=$project/target/release
+out=$project/target/debian
+
+fail() {
+    echo "build.sh: $*" >&2
+    exit 1
+}
+
+while [ $# -gt 0 ]; do
+    [ $# -ge 2 ] || fail "$1: expected a value"
+    case $1 in
+    --program) program=$2 ;;
+    --libraries) libraries=$2 ;;
+    --out) out=$2 ;;
+    *) fail "$1: expected --program, --libraries or --out" ;;
+    esac
+    shift 2
+done
+
+for file in "$program" "$libraries/libdynocar_client.a" "$libraries/libdynocar_client.so"; do
+    [ -f "$file" ] || fail "$file: no such file; build it with cargo build --release"
+done
+for tool in dpkg dpkg-deb gzip; do
+    command -v "$tool" >/dev/null || fail "no $tool found"
+done
+
+version=$("$program" --version | cut -d ' ' -f 2)
+arch=$(dpkg --print-architecture)
+root=$(mktemp -d)
+trap 'rm -rf "$root"' EXIT
+chmod 755 "$root"
+umask 022
+
+put() { # SOURCE TARGET [MODE]
+    install -D -m "${3:-644}" "$1" "$root/$2"
+}
+
+# The program, what shells offer for it, and its manual.
+put "$program" usr/bin/dynocar 755
+completions() { # SHELL TARGET
+    mkdir -p "$root/$(dirname "$2")"
+    "$program" completions "$1" >"$root/$2"
+}
+completions bash usr/share/bash-completion/completions/dynocar
+completions zsh usr/share/zsh/vendor-completions/_dynocar
+completions fish usr/share/fish/vendor_completions.d/dynocar.fish
+"$program" man --out "$root/usr/share/man/man1" 2>/dev/null
+gzip -9n "$root"/usr/share/man/man1/*.1
+
+# What a controller links.
+put "$project/client/include/dynocar.h" usr/include/dynocar.h
+put "$libraries/libdynocar_client.a" usr/lib/libdynocar_client.a
+put "$libraries/libdynocar_client.so" usr/lib/libdynocar_client.so
+put "$project/client/python/dynocar.py" usr/lib/python3/dist-packages/dynocar.py
+if command -v strip >/dev/null; then
+    strip --strip-unneeded "$root/usr/bin/dynocar" "$root/usr/lib/libdynocar_client.so"
+    strip --strip-debug "$root/usr/lib/libdynocar_client.a"
+fi
+
+# The daemon: a configuration to be filled in, and the unit that is not enabled before that.
+"$program" init "$root/etc/dynocar" --name "fill in: the train of this host" >/dev/null
+unit=usr/lib/systemd/system/dynocar.service
+put "$project/config/dynocar.service" "$unit"
+sed -i 's|^ExecStart=/usr/local/bin/dynocar |ExecStart=/usr/bin/dynocar |' "$root/$unit"
+grep -q '^ExecStart=/usr/bin/dynocar ' "$root/$unit" || fail "config/dynocar.service has no ExecStart"
+put "$here/sysusers.conf" usr/lib/sysusers.d/dynocar.conf
+
+# What goes with it.
+document=usr/share/doc/dynocar
+put "$here/copyright" "$document/copyright"
+put "$project/client/README.md" "$document/client.md"
+for guide in "$project"/docs/guides/*.md; do
+    put "$guide" "$document/guides/$(basename "$guide")"
+done
+put "$project/CHANGELOG.md" "$document/changelog"
+gzip -9n "$root/$document/changelog"
+
+# The package's own files. The newest C library that is called for is the oldest that will do.
+mkdir "$root/DEBIAN"
+glibc=$(grep -aoh 'GLIBC_2\.[0-9]*' "$root/usr/bin/dynocar" "$root/usr/lib/libdynocar_client.so" |
+    sed 's/GLIBC_//' | sort -uV | tail -n 1)
+size=$(du -sk --exclude=DEBIAN "$root" | cut -f 1)
+cat >"$root/DEBIAN/control" <<EOF
+Package: dynocar
+Version: $version
+Architecture: $arch
+Maintainer: The Dynocar developers <dynocar@localhost>
+Installed-Size: $size
+Depends: libc6 (>= ${glibc:-2.31}), libgcc-s1
+Recommends: systemd
+Suggests: python3
+Section: science
+Priority: optional
+Description: learns online how a train really behaves
+ A dynamometer car in software. A daemon beside a train controller reads its samples from shared
+ memory, learns running resistance, mass, adhesion and brake friction, and answers with estimates
+ that say how sure they are. On recorded runs it finds the effect that a model of a train lacks.
+ .
+ The package holds the program, the daemon's unit, and the library that a controller links, for C,
+ C++ and Python.
+EOF
+(cd "$root" && find etc -type f | sort | sed 's|^|/|') >"$root/DEBIAN/conffiles"
+(cd "$root" && find usr -type f -exec md5sum {} + | sort -k 2) >"$root/DEBIAN/md5sums"
+for script in postinst prerm postrm; do
+    put "$here/$script" "DEBIAN/$script" 755
+done
+
+mkdir -p "$out"
+package=$out/dynocar_${version}_$arch.deb
+dpkg-deb --root-owner-group -Zxz -z1 --build "$root" "$package" >/dev/null
+echo "$package"

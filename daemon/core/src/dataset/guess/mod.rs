@@ -1,0 +1,70 @@
+//! A description of recordings that nobody has described yet: which column is which quantity, in
+//! which unit.
+//!
+//! Names tell the quantity, names or values the unit. Nothing is taken silently: every guess says
+//! what speaks for it, what makes it doubtful and what was not taken; what says nothing is left
+//! out. How trains move ([`Guess::correct`]) has the last word about a unit that no name gives.
+//!
+//! # Layout, in the order of the work
+//!
+//! - `layout`, `columns`, `facts`: delimiter, decimal mark, header; what the values are like
+//! - `name`, `spelling`, `vocabulary`: a name in words, units as people write them, what recorders
+//!   call the quantities
+//! - `matching`, `plausible`: which quantity a column speaks for, and its likeliest unit
+//! - `assignment`, `forces`, `correction`: one column for each quantity, and what cannot stand
+//! - [`guessed`], [`problem`]: what comes out, or why nothing does
+
+mod assignment;
+mod columns;
+mod correction;
+mod facts;
+mod forces;
+pub mod guessed;
+mod layout;
+mod matching;
+mod name;
+mod plausible;
+pub mod problem;
+mod spelling;
+mod vocabulary;
+
+#[cfg(test)]
+mod tests;
+
+pub use guessed::{Guess, GuessedColumn, GuessedRun, Recording, Told, Unmapped};
+pub use name::Name;
+pub use problem::{GuessError, GuessProblem};
+
+use super::{Place, Quantity};
+
+/// Guesses the description of recordings that are laid out alike, and takes what is told for
+/// granted.
+///
+/// # Errors
+///
+/// Where a file is none that a dataset can have, or holds no time or no speed that can be
+/// recognised; with file, line and what was expected.
+pub fn guess(files: &[Recording], told: &[Told]) -> Result<Guess, GuessError> {
+    let read = columns::Columns::read(files)?;
+    let label = files.first().map_or("", |file| file.label);
+    let mut assignment = assignment::Assignment::new(&read, told, label)?;
+    forces::settle(&mut assignment);
+    for quantity in [Quantity::Time, Quantity::Speed] {
+        if !assignment.has(quantity) {
+            let (reasons, columns) = (assignment.near(quantity), read.names());
+            let problem = GuessProblem::Missing { quantity, reasons, columns };
+            return Err(GuessError::new(Place::line(label, 1), problem));
+        }
+    }
+    let (columns, unmapped) = assignment.finish();
+    let position = columns.iter().find(|column| column.quantity == Quantity::Position);
+    let position =
+        position.and_then(|it| read.columns.iter().find(|column| column.name == it.name));
+    let runs = files.iter().zip(&read.rows).enumerate().map(|(index, (file, &rows))| GuessedRun {
+        label: file.label.into(),
+        rows,
+        direction: position.map_or(1, |column| column.facts[index].direction()),
+    });
+    let runs = runs.collect();
+    Ok(Guess { delimiter: read.delimiter, decimal: read.decimal, columns, unmapped, runs })
+}

@@ -1,0 +1,151 @@
+//! A column's name in words.
+
+use super::spelling;
+
+/// A column's name, taken apart.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Name {
+    /// As in the header, without surrounding spaces.
+    pub text: String,
+    /// Its words in small letters, without the unit in brackets.
+    pub words: Vec<String>,
+    /// The unit that the name gives in brackets or behind a stroke, as written.
+    pub unit: Option<String>,
+}
+
+impl Name {
+    /// Takes a name apart: `F_trac [kN]` is f, trac and the unit kN.
+    pub fn parse(text: &str) -> Self {
+        let text = text.trim();
+        let (rest, unit) = split_unit(text);
+        Name { text: text.into(), words: words(&rest), unit }
+    }
+
+    /// The name for messages: one line of at most 60 letters.
+    pub fn shown(&self) -> String {
+        let letters = self.text.chars().take(60);
+        letters.map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
+    }
+}
+
+/// The name without its unit, and the unit: in brackets, behind ` / ` as DIN 461 writes axes, or
+/// behind `in`.
+fn split_unit(text: &str) -> (String, Option<String>) {
+    for (open, close) in [('[', ']'), ('(', ')'), ('{', '}'), ('<', '>')] {
+        let Some(start) = text.rfind(open) else { continue };
+        let Some(length) = text[start..].find(close) else { continue };
+        let inside = &text[start + open.len_utf8()..start + length];
+        if spelling::is_unit(inside) {
+            let after = &text[start + length + close.len_utf8()..];
+            let before = text[..start].trim_end().trim_end_matches('/');
+            return (format!("{before} {after}"), Some(inside.trim().into()));
+        }
+    }
+    for mark in [" / ", " in "] {
+        if let Some((before, after)) = text.rsplit_once(mark)
+            && spelling::is_unit(after)
+            && !before.trim().is_empty()
+        {
+            return (before.into(), Some(after.trim().into()));
+        }
+    }
+    (text.into(), None)
+}
+
+/// The words of a name: separated by marks, by capitals and by digits.
+fn words(text: &str) -> Vec<String> {
+    let letters: Vec<char> = text.chars().collect();
+    let mut words: Vec<String> = Vec::new();
+    let mut word = String::new();
+    for (at, &letter) in letters.iter().enumerate() {
+        let next = letters.get(at + 1).copied();
+        let before = at.checked_sub(1).map(|at| letters[at]);
+        if !word.is_empty() && before.is_some_and(|it| begins_word(it, letter, next, &word)) {
+            words.push(std::mem::take(&mut word));
+        }
+        if letter.is_alphanumeric() || "%‰°".contains(letter) {
+            fold_into(&mut word, letter);
+        } else if !word.is_empty() {
+            words.push(std::mem::take(&mut word));
+        }
+    }
+    if !word.is_empty() {
+        words.push(word);
+    }
+    words
+}
+
+/// True where a new word begins without a mark: `tractionForce`, `FTrac`, `vIst`, `speed2`; but kN
+/// is one word.
+fn begins_word(before: char, letter: char, next: Option<char>, word: &str) -> bool {
+    let is_small_next = next.is_some_and(char::is_lowercase);
+    if letter.is_uppercase() && before.is_lowercase() {
+        return word.chars().count() > 1 || is_small_next;
+    }
+    if letter.is_uppercase() && before.is_uppercase() {
+        return is_small_next;
+    }
+    letter.is_ascii_digit() != before.is_ascii_digit()
+        && letter.is_alphanumeric()
+        && before.is_alphanumeric()
+}
+
+/// Adds a letter in the spelling that the vocabulary has.
+fn fold_into(word: &mut String, letter: char) {
+    for letter in letter.to_lowercase() {
+        match letter {
+            'ä' | 'æ' => word.push_str("ae"),
+            'ö' | 'ø' => word.push_str("oe"),
+            'ü' => word.push_str("ue"),
+            'ß' => word.push_str("ss"),
+            'é' | 'è' | 'ê' => word.push('e'),
+            'à' | 'á' | 'å' => word.push('a'),
+            'ó' | 'ò' => word.push('o'),
+            'í' => word.push('i'),
+            'ú' | 'ů' => word.push('u'),
+            'ç' => word.push('c'),
+            'ñ' => word.push('n'),
+            '²' => word.push('2'),
+            letter => word.push(letter),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_any_style_fall_into_words_and_unit() {
+        let cases: [(&str, &[&str], Option<&str>); 17] = [
+            ("speed_kmh", &["speed", "kmh"], None),
+            ("v [m/s]", &["v"], Some("m/s")),
+            ("v / (km/h)", &["v"], Some("km/h")),
+            ("Geschwindigkeit / km/h", &["geschwindigkeit"], Some("km/h")),
+            ("Geschwindigkeit in km/h", &["geschwindigkeit"], Some("km/h")),
+            ("F_trac [kN]", &["f", "trac"], Some("kN")),
+            ("F_kN", &["f", "kn"], None),
+            ("tractionForce", &["traction", "force"], None),
+            ("FTrac", &["f", "trac"], None),
+            ("vIst", &["v", "ist"], None),
+            ("BCPressure (bar)", &["bc", "pressure"], Some("bar")),
+            ("Speed (GPS)", &["speed", "gps"], None),
+            ("Außentemperatur [°C]", &["aussentemperatur"], Some("°C")),
+            ("speed2", &["speed", "2"], None),
+            ("Neigung[‰]", &["neigung"], Some("‰")),
+            ("TIME", &["time"], None),
+            ("", &[], None),
+        ];
+        for (text, words, unit) in cases {
+            let name = Name::parse(text);
+            assert_eq!(name.words, words, "{text}");
+            assert_eq!(name.unit.as_deref(), unit, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_name_is_shown_in_one_line() {
+        assert_eq!(Name::parse("a\nb").shown(), "a b");
+        assert_eq!(Name::parse(&"x".repeat(99)).shown().len(), 60);
+    }
+}

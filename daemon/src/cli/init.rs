@@ -1,0 +1,180 @@
+//! `dynocar init`: the first description of a train and of its recordings.
+
+mod dataset_text;
+mod described;
+mod draft;
+mod paths;
+mod summary;
+mod train_text;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use dynocar_core::dataset::guess::{Guess, GuessError, GuessProblem, Recording, Told, guess};
+use dynocar_core::dataset::note::notes;
+use dynocar_core::dataset::units::Unit;
+use dynocar_core::dataset::{MANIFEST_FILE, Place, Quantity};
+
+use super::Failure;
+use crate::dataset::{file_error, read_text};
+use crate::output::{print, require_folder, require_new, write_new_in_folder};
+use described::{DAEMON_FILE, Described, TRACK_FILE, TRAIN_FILE};
+use draft::Draft;
+use train_text::{TrainArguments, TrainText};
+
+/// Units that the values did not tell are set right so many times at most.
+const CORRECTIONS_MAX: usize = 4;
+
+/// Write a first train.toml and daemon.toml and, from recordings, a dataset.toml that says of every
+/// column what it was taken for and why. Nothing is overwritten.
+#[derive(Debug, Args)]
+pub struct InitArguments {
+    /// The folder for the files; it is made where there is none
+    folder: PathBuf,
+    /// Recorded runs of the train, laid out alike; of several the last one is held out
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    csv: Vec<PathBuf>,
+    /// Say what a column holds, as speed=v_ist:km/h; may be given several times
+    #[arg(long, value_name = "QUANTITY=COLUMN[:UNIT]", value_parser = told)]
+    column: Vec<Told>,
+    #[command(flatten)]
+    train: TrainArguments,
+}
+
+/// Writes the first description.
+///
+/// # Errors
+///
+/// An input failure where a recording or a figure of the train is wrong, or a file is there already;
+/// a failure of the work where a file cannot be written.
+pub fn execute(arguments: &InitArguments) -> Result<(), Failure> {
+    let folder = &arguments.folder;
+    require_folder(folder)?;
+    let with_dataset = !arguments.csv.is_empty();
+    if !with_dataset && !arguments.column.is_empty() {
+        return Err(Failure::Input("--column: expected recordings beside it: --csv FILE".into()));
+    }
+    let mut names = vec![TRAIN_FILE, DAEMON_FILE];
+    names.extend(with_dataset.then_some(MANIFEST_FILE));
+    for name in names {
+        require_new(&folder.join(name))?;
+    }
+    let has_track = folder.join(TRACK_FILE).is_file();
+    let mut train = arguments.train.text(None)?;
+    let described = match with_dataset {
+        true => Some(describe(arguments, &mut train, has_track)?),
+        false => None,
+    };
+    let daemon = train_text::daemon(has_track);
+    let mut files = vec![(TRAIN_FILE, train.text.as_str()), (DAEMON_FILE, daemon.as_str())];
+    files.extend(described.as_ref().map(|it| (MANIFEST_FILE, it.text.as_str())));
+    write_new_in_folder(folder, &files)?;
+    Ok(print(&summary::text(folder, &train, described.as_ref()))?)
+}
+
+/// Reads the recordings, guesses what they hold, and reads them once more as that.
+fn describe(
+    arguments: &InitArguments,
+    train: &mut TrainText,
+    has_track: bool,
+) -> Result<Described, Failure> {
+    let mut texts = Vec::new();
+    for path in &arguments.csv {
+        let label = path.display().to_string();
+        let text = read_text(path).map_err(|problem| file_error(&label, problem))?;
+        texts.push((label, text));
+    }
+    let files = paths::from_folder(&arguments.folder, &arguments.csv)?;
+    let recordings: Vec<Recording> =
+        texts.iter().map(|(label, text)| Recording { label, text }).collect();
+    let mut guess = guess(&recordings, &arguments.column).map_err(failure)?;
+    let track = match has_track {
+        true => Some(read_track(&arguments.folder.join(TRACK_FILE))?),
+        false => None,
+    };
+    if let Some(mass_t) = recorded_mass_t(&guess) {
+        *train = arguments.train.text(Some(mass_t))?;
+    }
+    let name = dataset_text::name_of(&arguments.folder);
+    let mut corrections = 0;
+    loop {
+        let text = dataset_text::dataset(&guess, &name, &files, has_track);
+        let csv = files.iter().map(String::as_str).zip(recordings.iter().copied());
+        let draft = Draft {
+            folder: &arguments.folder,
+            dataset: &text,
+            train: &train.text,
+            track: track.as_deref(),
+            csv: csv.collect(),
+        };
+        let (head, runs) = draft.read()?;
+        let is_corrected = corrections < CORRECTIONS_MAX
+            && guess.correct(&runs, arguments.train.knows_mass()).is_some();
+        corrections += 1;
+        if !is_corrected {
+            let notes = notes(&head.train, head.track.as_deref(), &runs);
+            return Ok(Described { guess, files, notes, text });
+        }
+    }
+}
+
+/// The middle of a recorded mass in t.
+fn recorded_mass_t(guess: &Guess) -> Option<f64> {
+    let column = guess.column(Quantity::TrainMass)?;
+    let mass_t = column.unit.to_base(column.middle * column.scale) / 1000.0;
+    (mass_t > 0.0 && mass_t.is_finite()).then_some((mass_t * 10.0).round() / 10.0)
+}
+
+fn read_track(path: &Path) -> Result<String, Failure> {
+    Ok(read_text(path).map_err(|problem| file_error(&path.display().to_string(), problem))?)
+}
+
+/// A guess that failed, with what helps.
+fn failure(error: GuessError) -> Failure {
+    let message = match *error.problem {
+        GuessProblem::Missing { quantity, .. } => format!(
+            "{error}; say which it is: --column {quantity}=COLUMN:UNIT{}",
+            if quantity == Quantity::Time { " (numbers that grow, not dates)" } else { "" }
+        ),
+        _ => error.to_string(),
+    };
+    Failure::At(Place { file: error.place.file, line: error.place.line }, message)
+}
+
+/// What somebody says of a column: `QUANTITY=COLUMN` or `QUANTITY=COLUMN:UNIT`.
+fn told(text: &str) -> Result<Told, String> {
+    let expected = "expected QUANTITY=COLUMN or QUANTITY=COLUMN:UNIT, as speed=v_ist:km/h";
+    let (name, rest) = text.split_once('=').ok_or(expected)?;
+    let names = || Quantity::ALL.map(Quantity::name).join(", ");
+    let quantity = Quantity::from_name(name.trim())
+        .ok_or_else(|| format!("'{name}' is no quantity; the quantities: {}", names()))?;
+    // A name may hold colons itself: what follows the last one counts where it is a unit.
+    let unit_of = |unit: &str| Unit::find(quantity.dimension(), unit.trim());
+    let (column, unit) = match rest.rsplit_once(':') {
+        Some((column, unit)) if unit_of(unit).is_some() => (column, unit_of(unit)),
+        _ => (rest, None),
+    };
+    if column.trim().is_empty() {
+        return Err(expected.into());
+    }
+    Ok(Told { quantity, column: column.trim().into(), unit })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_column_is_told_with_or_without_its_unit() {
+        let kmh = Unit::find(Quantity::Speed.dimension(), "km/h");
+        let speed =
+            |column: &str, unit| Told { quantity: Quantity::Speed, column: column.into(), unit };
+        assert_eq!(told("speed=v_ist:km/h"), Ok(speed("v_ist", kmh)));
+        assert_eq!(told("speed=v_ist"), Ok(speed("v_ist", None)));
+        assert_eq!(told("speed=MVB:v=1:km/h"), Ok(speed("MVB:v=1", kmh)));
+        assert_eq!(told("speed=MVB:v"), Ok(speed("MVB:v", None)));
+        assert!(told("speed").unwrap_err().starts_with("expected QUANTITY=COLUMN"));
+        assert!(told("velocity=v").unwrap_err().contains("'velocity' is no quantity; the quant"));
+        assert!(told("speed= ").is_err());
+    }
+}

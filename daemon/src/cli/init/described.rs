@@ -1,0 +1,23 @@
+//! What is written, and what was understood of recordings.
+
+use dynocar_core::dataset::Note;
+use dynocar_core::dataset::guess::Guess;
+
+/// Name of the train's file.
+pub const TRAIN_FILE: &str = "train.toml";
+/// Name of the daemon's configuration.
+pub const DAEMON_FILE: &str = "daemon.toml";
+/// Name of the line's file, which is taken up where the folder has one.
+pub const TRACK_FILE: &str = "track.toml";
+
+/// What was understood of the recordings.
+pub struct Described {
+    /// Which column was taken for what.
+    pub guess: Guess,
+    /// The runs' files, as the dataset names them.
+    pub files: Vec<String>,
+    /// What cannot be true of the runs as they were understood, the worst first.
+    pub notes: Vec<Note>,
+    /// `dataset.toml`.
+    pub text: String,
+}

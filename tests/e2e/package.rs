@@ -1,0 +1,175 @@
+//! The Debian package, built as its page says and installed into an empty root; completions and
+//! manual, which it holds.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use dynocar_tests::process::Site;
+
+#[path = "init/commands.rs"]
+mod commands;
+#[path = "../../client/tests/support/mod.rs"]
+mod support;
+use commands::{DYNOCAR, done, dynocar, said};
+use support::{client_directory, compiler, library_directory, must_succeed, require};
+
+/// What the package must hold, for the program that is tested.
+const FILES: [&str; 15] = [
+    "usr/bin/dynocar",
+    "usr/lib/systemd/system/dynocar.service",
+    "usr/lib/sysusers.d/dynocar.conf",
+    "usr/include/dynocar.h",
+    "usr/lib/libdynocar_client.a",
+    "usr/lib/libdynocar_client.so",
+    "usr/lib/python3/dist-packages/dynocar.py",
+    "usr/share/bash-completion/completions/dynocar",
+    "usr/share/zsh/vendor-completions/_dynocar",
+    "usr/share/fish/vendor_completions.d/dynocar.fish",
+    "usr/share/man/man1/dynocar.1.gz",
+    "usr/share/man/man1/dynocar-init.1.gz",
+    "usr/share/doc/dynocar/copyright",
+    "etc/dynocar/daemon.toml",
+    "etc/dynocar/train.toml",
+];
+
+fn build(out: &Path) -> Output {
+    require("dpkg-deb", "dpkg");
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/debian/build.sh");
+    let mut command = Command::new(script);
+    command.args(["--program", DYNOCAR, "--libraries"]).arg(library_directory());
+    command.arg("--out").arg(out).output().unwrap()
+}
+
+/// The package in a folder.
+fn package(folder: &Path) -> PathBuf {
+    let output = build(folder);
+    let words = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{words}");
+    let path = PathBuf::from(String::from_utf8(output.stdout).unwrap().trim());
+    let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+    let arch = must_succeed(Command::new("dpkg").arg("--print-architecture"));
+    assert_eq!(name, format!("dynocar_{}_{}.deb", env!("CARGO_PKG_VERSION"), arch.trim()));
+    path
+}
+
+/// Puts the package into a root: by dpkg, with its scripts, where the test may; else unpacked.
+fn install(package: &Path, root: &Path) -> bool {
+    let state = root.join("var/lib/dpkg");
+    std::fs::create_dir_all(state.join("info")).unwrap();
+    std::fs::create_dir_all(state.join("updates")).unwrap();
+    std::fs::write(state.join("status"), "").unwrap();
+    if !rustix::process::geteuid().is_root() {
+        must_succeed(Command::new("dpkg-deb").arg("-x").arg(package).arg(root));
+        return false;
+    }
+    let mut dpkg = Command::new("dpkg");
+    dpkg.arg(format!("--root={}", root.display()));
+    // The root is empty: neither a C library to depend on nor a shell to change into it with.
+    dpkg.args(["--force-depends", "--force-script-chrootless", "--install"]).arg(package);
+    must_succeed(&mut dpkg);
+    true
+}
+
+#[test]
+fn the_package_is_built_installed_and_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let package = package(folder.path());
+    let root = folder.path().join("root");
+    let by_dpkg = install(&package, &root);
+    for file in FILES {
+        assert!(root.join(file).is_file(), "{file}");
+    }
+    let field =
+        |name: &str| must_succeed(Command::new("dpkg-deb").arg("--field").arg(&package).arg(name));
+    assert!(field("Depends").starts_with("libc6 (>= 2."), "{}", field("Depends"));
+    if by_dpkg {
+        let mut query = Command::new("dpkg-query");
+        query.arg(format!("--admindir={}", root.join("var/lib/dpkg").display()));
+        query.args(["--showformat", "${Status}\n${Conffiles}\n", "--show", "dynocar"]);
+        let told = must_succeed(&mut query);
+        assert!(told.starts_with("install ok installed\n"), "{told}");
+        for file in ["/etc/dynocar/daemon.toml ", "/etc/dynocar/train.toml "] {
+            assert!(told.contains(file), "{told}");
+        }
+    }
+    let program = root.join("usr/bin/dynocar");
+    let version = must_succeed(Command::new(&program).arg("--version"));
+    assert_eq!(version.trim(), concat!("dynocar ", env!("CARGO_PKG_VERSION")));
+    for file in ["daemon.toml", "train.toml"] {
+        must_succeed(Command::new(&program).arg("check").arg(root.join("etc/dynocar").join(file)));
+    }
+    let unit = std::fs::read_to_string(root.join(FILES[1])).unwrap();
+    let keys: HashMap<&str, &str> = unit.lines().filter_map(|line| line.split_once('=')).collect();
+    assert_eq!(keys["ExecStart"], "/usr/bin/dynocar run --config /etc/dynocar/daemon.toml");
+    links_and_runs(&root, folder.path());
+}
+
+/// A controller in C is built from nothing but what the package holds.
+fn links_and_runs(root: &Path, folder: &Path) {
+    let (source, out) = (folder.join("version.c"), folder.join("version"));
+    let text = "#include <dynocar.h>\n#include <stdio.h>\n\
+                int main(void) { return puts(dynocar_version()) < 0; }\n";
+    std::fs::write(&source, text).unwrap();
+    let standard = compiler("CC", "cc", "c99");
+    let mut command = Command::new(standard.get_program());
+    command.arg("-std=c99").arg("-I").arg(root.join("usr/include")).arg(&source);
+    command.arg(root.join("usr/lib/libdynocar_client.a"));
+    must_succeed(command.args(["-lpthread", "-ldl", "-lm", "-o"]).arg(&out));
+    assert_eq!(must_succeed(&mut Command::new(&out)).trim(), env!("CARGO_PKG_VERSION"));
+    let script = "import dynocar; print(dynocar.__file__)";
+    let mut python = support::python(Path::new("-c"));
+    python.arg(script).env("PYTHONPATH", root.join("usr/lib/python3/dist-packages"));
+    python.env("DYNOCAR_LIBRARY", root.join("usr/lib/libdynocar_client.so"));
+    assert!(must_succeed(&mut python).contains("dist-packages"));
+    assert!(client_directory().join("include/dynocar.h").is_file());
+}
+
+#[test]
+fn a_package_without_its_parts_is_refused_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/debian/build.sh");
+    let refusal = |arguments: &[&str]| {
+        let output = Command::new(&script).args(arguments).output().unwrap();
+        assert!(!output.status.success(), "{arguments:?}");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let nowhere = folder.path().join("nowhere").display().to_string();
+    let message = refusal(&["--program", &nowhere]);
+    assert!(message.contains("nowhere: no such file; build it with cargo"), "{message}");
+    assert!(refusal(&["--colour", "red"]).contains("expected --program, --libraries or --out"));
+    assert!(refusal(&["--out"]).contains("--out: expected a value"));
+}
+
+#[test]
+fn completions_and_manual_tell_of_every_command() {
+    let site = Site::new();
+    let help = done(&site, &["--help"]);
+    let commands: Vec<&str> = help
+        .lines()
+        .skip_while(|line| *line != "Commands:")
+        .skip(1)
+        .map_while(|line| line.strip_prefix("  ")?.split(' ').next())
+        .filter(|name| !name.is_empty() && *name != "help")
+        .collect();
+    assert!(commands.len() > 10 && commands.contains(&"init"), "{help}");
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let script = done(&site, &["completions", shell]);
+        for name in &commands {
+            assert!(script.contains(name), "{shell}: {name}");
+        }
+    }
+    site.write("dynocar.bash", &done(&site, &["completions", "bash"]));
+    let words = "source dynocar.bash && complete -p dynocar";
+    let bash = Command::new("bash").args(["-c", words]).current_dir(site.path()).output().unwrap();
+    assert!(bash.status.success(), "{}", said(&bash));
+    assert_eq!(dynocar(&site, &["completions", "tcsh"]).status.code(), Some(2));
+    done(&site, &["man", "--out", "man"]);
+    let pages = std::fs::read_dir(site.path().join("man")).unwrap().count();
+    assert_eq!(pages, commands.len() + 1);
+    for name in commands {
+        let page =
+            std::fs::read_to_string(site.path().join(format!("man/dynocar-{name}.1"))).unwrap();
+        assert!(page.contains(".SH NAME") && page.contains(".SH OPTIONS"), "{name}: {page}");
+    }
+}
