@@ -10,19 +10,28 @@ use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
 /// The first seed of the matrix of effects.
 const SEED: u64 = 9001;
 
+/// Explains a dataset with one effect of a kind.
+fn is_found(kind: EffectKind) {
+    let request = EffectRequest::Kinds(vec![kind]);
+    let files = dataset_files(&simulate(&SimulatorSettings::new(SEED, request)));
+    let texts: Vec<(&str, &str)> =
+        files.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
+    let dataset = Dataset::load(&texts[..]).expect("a simulated dataset");
+    let answer = explain(&dataset, &|_, _| {}).expect("usable runs").answer;
+    let verdict = if kind == EffectKind::Unknown { Verdict::Unknown } else { Verdict::Effect };
+    assert_eq!(answer.verdict, verdict, "{kind}: {}", answer.statement);
+    let found: Vec<&str> = answer.effects.iter().map(|effect| effect.kind).collect();
+    assert_eq!(found, [kind.name()], "{}", answer.statement);
+    assert!(answer.rmse_after < answer.rmse_before, "{kind}: {}", answer.statement);
+}
+
 #[test]
 fn every_kind_is_found_by_its_name() {
-    for &kind in EffectKind::ALL.iter().filter(|kind| **kind != EffectKind::None) {
-        let request = EffectRequest::Kinds(vec![kind]);
-        let files = dataset_files(&simulate(&SimulatorSettings::new(SEED, request)));
-        let texts: Vec<(&str, &str)> =
-            files.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
-        let dataset = Dataset::load(&texts[..]).expect("a simulated dataset");
-        let answer = explain(&dataset, &|_, _| {}).expect("usable runs").answer;
-        let verdict = if kind == EffectKind::Unknown { Verdict::Unknown } else { Verdict::Effect };
-        assert_eq!(answer.verdict, verdict, "{kind}: {}", answer.statement);
-        let found: Vec<&str> = answer.effects.iter().map(|effect| effect.kind).collect();
-        assert_eq!(found, [kind.name()], "{}", answer.statement);
-        assert!(answer.rmse_after < answer.rmse_before, "{kind}: {}", answer.statement);
-    }
+    let kinds: Vec<EffectKind> =
+        EffectKind::ALL.iter().copied().filter(|kind| *kind != EffectKind::None).collect();
+    std::thread::scope(|scope| {
+        for some in kinds.chunks(kinds.len().div_ceil(2)) {
+            scope.spawn(move || some.iter().for_each(|&kind| is_found(kind)));
+        }
+    });
 }

@@ -2,7 +2,7 @@
 
 use dynocar::grown::grow;
 use dynocar_core::dataset::{Dataset, parse_track, parse_train};
-use dynocar_core::explain::effects::{Candidate, LIBRARY, Proposal};
+use dynocar_core::explain::effects::{Candidate, LIBRARY, Proposal, UNKNOWN};
 use dynocar_core::explain::evidence::prepare;
 use dynocar_core::explain::evidence::{Fit, FitProblem, GrownModel, Noise, RunData, SampleForces};
 use dynocar_core::explain::scan::Scan;
@@ -78,7 +78,7 @@ fn every_kind_written_as_a_grown_model_is_applied_to_the_bit() {
     let track = dataset.track.as_ref();
     let scan = Scan::new(&problem, &[], &dataset.train, track, &base).expect("a sound fit");
     let mut applied = Vec::new();
-    for effect in LIBRARY {
+    for effect in LIBRARY.into_iter().chain([UNKNOWN]) {
         let Proposal::Candidates(candidates) = effect.propose(&scan) else { continue };
         for Candidate { hypothesis, start } in candidates {
             let theta = base.theta.iter().chain(&start).copied().collect();

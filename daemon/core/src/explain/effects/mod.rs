@@ -53,10 +53,11 @@ pub const LIBRARY: [&dyn Effect; 16] = [
     &bearing_temperature::BearingTemperature,
     &dragging_brake::DraggingBrake,
     &low_adhesion::LowAdhesion,
-    UNKNOWN,
+    &unknown::Bands,
 ];
-/// What is in no library.
-pub const UNKNOWN: &dyn Effect = &unknown::Unknown;
+/// What is in no library, by its form: tried where the library leaves a force.
+pub const UNKNOWN: &dyn Effect = &unknown::Forms;
+pub use unknown::leaves_a_force;
 
 /// What an estimate says outside: values and standard deviations by the names of the answer.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -26,3 +26,6 @@ pub use run_data::{Bin, RunData, RunDataError, prepare};
 pub use run_scatter::WeightedFilter;
 pub use sample_forces::SampleForces;
 pub use whitener::Whitener;
+
+/// Evidence that an effect must have: decrease of -2 log likelihood beyond the penalty.
+pub const EVIDENCE_MIN: f64 = 9.0;

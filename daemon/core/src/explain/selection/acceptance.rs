@@ -12,7 +12,8 @@ use crate::explain::evidence::Fit;
 const SMALL_REDUCTION_MIN: f64 = 0.06;
 /// Strength beyond any doubt.
 const CERTAIN_STRENGTH: f64 = 30.0;
-/// A further one, or one outside the library, this share of what the others leave.
+/// A further one, or one outside the library that is not beyond doubt, this share of what the
+/// others leave.
 const FURTHER_REDUCTION_MIN: f64 = 0.15;
 
 /// Why an effect is not accepted.
@@ -133,11 +134,11 @@ fn contradiction(trial: &Trial) -> Option<&'static str> {
 
 /// What the last effect of a trial must take away.
 fn reduction_min(trial: &Trial) -> f64 {
-    if trial.fit.model.effects.len() > 1 || trial.kind == EffectKind::Unknown {
-        FURTHER_REDUCTION_MIN
-    } else if trial.strength() > CERTAIN_STRENGTH {
-        SMALL_REDUCTION_MIN
-    } else {
-        REDUCTION_MIN
+    let is_first = trial.fit.model.effects.len() == 1;
+    let is_certain = trial.strength() > CERTAIN_STRENGTH;
+    match (is_first, is_certain) {
+        (true, true) => SMALL_REDUCTION_MIN,
+        (true, false) if trial.kind != EffectKind::Unknown => REDUCTION_MIN,
+        _ => FURTHER_REDUCTION_MIN,
     }
 }

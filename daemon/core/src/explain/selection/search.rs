@@ -8,7 +8,7 @@ use super::significance::{
     AMBIGUOUS, EVIDENCE_MIN, REDUCTION_MIN, STRENGTH_MIN, at_bound, discounted, model_penalty,
     penalty,
 };
-use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal, UNKNOWN};
+use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal, UNKNOWN, leaves_a_force};
 use crate::explain::evidence::{Fit, FitProblem, GrownModel, Noise, RunData};
 use crate::explain::scan::Scan;
 use crate::explain::score::{self, FitErrors};
@@ -149,6 +149,10 @@ impl Search<'_> {
             if base.model.effects.iter().any(|own| own.kind() == kind) {
                 continue;
             }
+            let effect = match kind {
+                EffectKind::Unknown if self.library_leaves_a_force(base, &trials) => UNKNOWN,
+                _ => effect,
+            };
             match effect.propose(&scan) {
                 Proposal::NotTestable(reason) => {
                     if !not_testable.iter().any(|(other, _)| *other == kind) {
@@ -189,6 +193,13 @@ impl Search<'_> {
         }
         finished.sort_by(by_advantage);
         finished
+    }
+
+    /// Whether the kind of the library that explains most leaves a force that has some form.
+    fn library_leaves_a_force(&self, base: &Fit, trials: &[(Trial, &dyn Effect)]) -> bool {
+        let trials = trials.iter().map(|(trial, _)| trial).filter(|trial| trial.advantage > 0.0);
+        let best = trials.max_by(|one, other| one.advantage.total_cmp(&other.advantage));
+        self.scan(best.map_or(base, |best| &best.fit)).is_some_and(|scan| leaves_a_force(&scan))
     }
 
     /// A scan around a fit; `None` when the fit's information is singular.

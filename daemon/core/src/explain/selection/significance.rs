@@ -5,8 +5,7 @@ use nalgebra::{Cholesky, DMatrix};
 use crate::explain::effects::AtBound;
 use crate::explain::evidence::Fit;
 
-/// Evidence that an effect must have: decrease of -2 log likelihood beyond the penalty.
-pub const EVIDENCE_MIN: f64 = 9.0;
+pub use crate::explain::evidence::EVIDENCE_MIN;
 /// The first effect must take away this share of the open-loop error of the fit runs.
 pub const REDUCTION_MIN: f64 = 0.12;
 /// Strength that an effect must have: its evidence times the share of the open-loop error that it

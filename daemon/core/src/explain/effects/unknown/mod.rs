@@ -12,27 +12,53 @@ mod grammar;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Effect, Proposal};
+use super::{Candidate, Effect, Proposal};
+use crate::explain::evidence::EVIDENCE_MIN;
 use crate::explain::scan::Scan;
 
 /// The library comes first: what is outside must explain more than a known kind.
 const OUTSIDE_COST: f64 = 10.0;
 /// Bands and forms that are worth a fit.
 const BANDS_MAX: usize = 2;
-const FORMS_MAX: usize = 4;
+const FORMS_MAX: usize = 2;
 
-/// The kind.
-pub struct Unknown;
+/// The kind, as bands alone: what is tried beside every kind of the library.
+pub struct Bands;
 
-impl Effect for Unknown {
+/// The kind, as forms and bands: where the library leaves something.
+pub struct Forms;
+
+/// Whether some range of some covariate holds a force that would be accepted: whatever has a form
+/// shows there too.
+pub fn leaves_a_force(scan: &Scan) -> bool {
+    band::bands(scan).first().is_some_and(|best| counts(scan, best))
+}
+
+/// Whether a band explains its price, and as much more as an effect needs.
+fn counts(scan: &Scan, (gain, band): &(f64, Candidate)) -> bool {
+    let size = (scan.fit.observations().max(2) as f64).ln();
+    *gain > band.hypothesis.choice_cost() + size + EVIDENCE_MIN
+}
+
+impl Effect for Bands {
+    fn kind(&self) -> EffectKind {
+        EffectKind::Unknown
+    }
+
+    fn propose(&self, scan: &Scan) -> Proposal {
+        let bands = band::bands(scan).into_iter().map(|(_, candidate)| candidate);
+        Proposal::Candidates(bands.take(BANDS_MAX).collect())
+    }
+}
+
+impl Effect for Forms {
     fn kind(&self) -> EffectKind {
         EffectKind::Unknown
     }
 
     fn propose(&self, scan: &Scan) -> Proposal {
         let bands = band::bands(scan);
-        // Whatever has a form shows in some range of some covariate too.
-        let shows = bands.first().is_some_and(|(gain, band)| *gain > band.hypothesis.choice_cost());
+        let shows = bands.first().is_some_and(|best| counts(scan, best));
         let forms = if shows { grammar::forms(scan) } else { Vec::new() };
         let bands = bands.into_iter().map(|(_, candidate)| candidate).take(BANDS_MAX);
         Proposal::Candidates(forms.into_iter().take(FORMS_MAX).chain(bands).collect())
