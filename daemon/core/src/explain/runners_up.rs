@@ -9,6 +9,14 @@ use super::selection::{Outcome, Search, penalty};
 /// Runners-up at most.
 const SHOWN: usize = 3;
 
+/// A formula without its numbers.
+fn form(formula: String) -> String {
+    formula
+        .chars()
+        .filter(|letter| !(letter.is_ascii_digit() || ".-+−".contains(*letter)))
+        .collect()
+}
+
 /// The forms next best to the one that was found, each fitted with everything else; empty where
 /// nothing outside the library was found.
 pub fn runners_up(search: &Search, outcome: &Outcome) -> Vec<RunnerUp> {
@@ -17,7 +25,7 @@ pub fn runners_up(search: &Search, outcome: &Outcome) -> Vec<RunnerUp> {
     let Some(index) = fit.model.effects.iter().position(|effect| is_unknown(effect.kind())) else {
         return Vec::new();
     };
-    let found = fit.model.effects[index].formula(fit.effect_parameters(index));
+    let found = fit.model.effects[index].formula(fit.effect_parameters(index)).map(form);
     let own = fit.cost + penalty(fit, index);
     let rest = search.without(fit, index);
     let onto = search.problem.fit(&rest.model, rest.theta.clone(), fit.noise);
@@ -34,7 +42,7 @@ pub fn runners_up(search: &Search, outcome: &Outcome) -> Vec<RunnerUp> {
             let evidence_less = other.cost + penalty(&other, last) - own;
             Some(RunnerUp { formula, evidence_less })
         })
-        .filter(|other| found.as_ref() != Some(&other.formula) && other.evidence_less > 0.5)
+        .filter(|other| found != Some(form(other.formula.clone())))
         .collect();
     others.sort_by(|one, other| one.evidence_less.total_cmp(&other.evidence_less));
     others.truncate(SHOWN);

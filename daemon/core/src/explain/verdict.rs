@@ -304,7 +304,7 @@ fn describe(effect: &EffectAnswer) -> String {
     let mut parts = Vec::new();
     for (name, value) in &effect.parameters {
         if let ParameterValue::Formula(formula) = value {
-            parts.push(formula.clone());
+            parts.insert(0, formula.clone());
         }
         if let (ParameterValue::Number(value), Some(ParameterValue::Number(deviation))) =
             (value, effect.std.get(name))

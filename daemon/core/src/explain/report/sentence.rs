@@ -114,7 +114,7 @@ fn sizes(effect: &EffectAnswer) -> Vec<String> {
                     .replace('-', "−")
                 }));
             }
-            ParameterValue::Formula(formula) => sizes.push(formula.clone()),
+            ParameterValue::Formula(formula) => sizes.insert(0, formula.clone()),
             ParameterValue::Windows(windows) => {
                 let shown = windows.iter().take(PLACES_MAX);
                 sizes.extend(shown.map(|w| {
