@@ -36,7 +36,11 @@ fn fitted_numbers(form: Form, [least, low, high]: [f64; 3]) -> Vec<(usize, (f64,
     let width = high - low;
     match form {
         Form::Power => vec![(1, (0.1, 5.0))],
-        Form::Hyperbola => vec![(0, (0.05 * high, 3.0 * high)), (1, (least, 0.3 * high))],
+        Form::Hyperbola => {
+            // Runs that are never slow hold no low least.
+            let least_bounds = (least, (0.3 * high).max(1.5 * least));
+            vec![(0, (0.05 * high, 3.0 * high)), (1, least_bounds)]
+        }
         Form::Above | Form::Below => vec![(0, (low, high))],
         // Their value jumps: they are sought, not fitted.
         Form::Between | Form::From | Form::UpTo => Vec::new(),
@@ -173,7 +177,9 @@ impl Hypothesis for FormForce {
     }
 
     fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
-        Some(vec![Entry::Extra(self.extra(parameters))])
+        let extra = self.extra(parameters);
+        let is_read_back = extra.factors.iter().all(|it| it.form.refusal(it.numbers).is_none());
+        is_read_back.then(|| vec![Entry::Extra(extra)])
     }
 
     fn formula(&self, parameters: &[f64]) -> Option<String> {
@@ -188,5 +194,21 @@ impl Hypothesis for FormForce {
         let formula = self.extra(context.parameters).law();
         reported.values.insert("formula".into(), ParameterValue::Formula(formula));
         reported
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_are_in_order_however_slow_or_fast_the_runs_are() {
+        for form in Form::ALL {
+            for range in [[1.0, 0.8, 30.0], [12.0, 10.0, 22.0], [18.9, 18.5, 19.4]] {
+                for (_, (lower, upper)) in fitted_numbers(form, range) {
+                    assert!(lower < upper, "{form:?} over {range:?}: {lower} to {upper}");
+                }
+            }
+        }
     }
 }
