@@ -13,6 +13,7 @@
 //! - [`run`]: the daemon, every stage on one screen
 //! - [`runtime`]: its threads
 //! - [`state`]: estimates that outlive the daemon
+//! - [`storage`]: files that are replaced as a whole
 //! - [`supervision`]: what a supervisor and an operator see of the daemon
 //! - [`survey`]: raw recordings to a dataset on a surveyed line
 //! - [`replay`]: recorded runs into the sample channel
@@ -29,5 +30,6 @@ pub mod report;
 pub mod run;
 pub mod runtime;
 pub mod state;
+pub mod storage;
 pub mod supervision;
 pub mod survey;

@@ -4,12 +4,13 @@
 //! A file is written beside and takes its name once it is whole, so that whenever the program ends
 //! the old or the new one is there, never a part of one.
 
-use std::fs::{File, Metadata, OpenOptions};
+use std::fs::{File, Metadata};
 use std::io::{self, ErrorKind, Read, Write};
-use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
+
+use crate::storage::{self, Disk, Rights, Storage, folder_of};
 
 /// Why a result cannot be given.
 #[derive(Debug, thiserror::Error)]
@@ -155,10 +156,6 @@ fn begins_with(path: &Path, mark: &str) -> bool {
     read.is_ok() && (start.is_empty() || start == mark.as_bytes())
 }
 
-fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
 /// Writes a file of a folder, which is made when it is not there.
 ///
 /// # Errors
@@ -182,7 +179,8 @@ pub fn write_new_in_folder(folder: &Path, files: &[(&str, &str)]) -> Result<(), 
     let mut written: Vec<PathBuf> = Vec::new();
     for (name, content) in files {
         let path = folder.join(name);
-        let made = std::fs::create_dir_all(folder).and_then(|()| write_new(&path, content));
+        let made = std::fs::create_dir_all(folder)
+            .and_then(|()| Disk.write_new(&path, content.as_bytes(), &Rights::Usual));
         if let Err(source) = made {
             for path in written {
                 // Without the others it would be half an answer; that it stays harms nobody.
@@ -198,16 +196,6 @@ pub fn write_new_in_folder(folder: &Path, files: &[(&str, &str)]) -> Result<(), 
     Ok(())
 }
 
-fn write_new(path: &Path, content: &str) -> io::Result<()> {
-    let mut file = OpenOptions::new().write(true).create_new(true).mode(0o666).open(path)?;
-    let written = file.write_all(content.as_bytes()).and_then(|()| file.sync_data());
-    if written.is_err() {
-        // The half-written file is of no use; that it cannot be removed changes nothing.
-        let _ = std::fs::remove_file(path);
-    }
-    written
-}
-
 /// Writes a file as a whole. A link stays a link; a device or a pipe is written as it is.
 ///
 /// # Errors
@@ -218,28 +206,21 @@ pub fn write_file(path: &Path, content: &str) -> Result<(), OutputError> {
     let known = std::fs::metadata(&target).ok();
     let written = match known {
         Some(known) if !known.is_file() => std::fs::write(&target, content),
-        known => replace(&target, known.as_ref(), content.as_bytes()),
+        known => replace(&target, known, content.as_bytes()),
     };
     written.map_err(|source| OutputError::File { path: path.into(), source })
 }
 
-fn replace(target: &Path, known: Option<&Metadata>, content: &[u8]) -> io::Result<()> {
+fn replace(target: &Path, known: Option<Metadata>, content: &[u8]) -> io::Result<()> {
     let mut name = std::ffi::OsString::from(".");
     name.push(target.file_name().unwrap_or_default());
     name.push(format!(".{}.part", std::process::id()));
-    let beside = folder_of(target).join(name);
-    let mut file =
-        OpenOptions::new().write(true).create(true).truncate(true).mode(0o666).open(&beside)?;
-    let written = known
-        .map_or(Ok(()), |known| file.set_permissions(known.permissions()))
-        .and_then(|()| file.write_all(content))
-        .and_then(|()| file.sync_data())
-        .and_then(|()| std::fs::rename(&beside, target));
-    if written.is_err() {
-        // The half-written file is of no use; that it cannot be removed changes nothing.
-        let _ = std::fs::remove_file(&beside);
+    let rights = known.map_or(Rights::Usual, |known| Rights::Like(known.permissions()));
+    match storage::replace(&Disk, target, &folder_of(target).join(name), (content, &rights)) {
+        // A folder that one may write in but not read cannot be brought to the disk.
+        Err(error) if !error.is_replaced() => Err(error.source),
+        _ => Ok(()),
     }
-    written
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! - [`browser`]: a headless browser that says what a page did
 //! - [`fuzz`]: mutations of a corpus thrown at everything that reads foreign bytes
 //! - [`golden`]: what every estimator makes of the recorded runs, bit for bit
+//! - [`power_cut`]: a disk that loses what was not brought to it
 //! - [`process`]: real processes with a run-time directory of their own, cleaned up on drop
 //! - [`sensor_failures`]: how sensors and channels fail
 //! - [`simulator`]: recorded runs of random trains with known, undeclared effects
@@ -13,6 +14,7 @@
 pub mod browser;
 pub mod fuzz;
 pub mod golden;
+pub mod power_cut;
 pub mod process;
 pub mod sensor_failures;
 pub mod simulator;

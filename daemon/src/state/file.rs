@@ -4,16 +4,14 @@
 //! dynocar-state 1 <bytes of content> <checksum of content, 16 hexadecimal digits>
 //! ```
 //!
-//! A file is replaced as a whole: written beside, brought to the disk, renamed over the old one,
-//! and the directory brought to the disk. Whenever the writer dies, the old or the new file is
-//! there, never a part of one.
+//! A file is replaced as a whole, see [`mod@crate::storage`].
 
-use std::fs::{File, OpenOptions};
-use std::io::{ErrorKind, Read, Write};
-use std::os::unix::fs::OpenOptionsExt;
+use std::fs::File;
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use super::StateError;
+use crate::storage::{self, Disk, Rights, Storage, StorageError};
 
 /// Version of the state file.
 pub const SCHEMA: u32 = 1;
@@ -86,26 +84,19 @@ pub fn bytes_of(content: &str) -> Vec<u8> {
 ///
 /// The system's answer; the file there was stays as it is.
 pub fn replace(path: &Path, content: &str) -> Result<(), StateError> {
-    let beside = beside(path);
-    // What a writer that died left behind.
-    let mut file = OpenOptions::new()
-        .write(true)
-        .create(true)
-        .truncate(true)
-        .mode(0o600)
-        .open(&beside)
-        .map_err(failed(&beside, "making the file"))?;
-    let written = file.write_all(&bytes_of(content)).and_then(|()| file.sync_all());
-    if let Err(source) = written {
-        // The half-written file is of no use; that it cannot be removed changes nothing.
-        let _ = std::fs::remove_file(&beside);
-        return Err(failed(&beside, "writing")(source));
-    }
-    std::fs::rename(&beside, path).map_err(failed(path, "replacing"))?;
-    let directory = path.parent().unwrap_or(Path::new("."));
-    File::open(directory)
-        .and_then(|directory| directory.sync_all())
-        .map_err(failed(directory, "bringing the directory to the disk"))
+    replace_on(&Disk, path, content)
+}
+
+/// The same on any storage.
+///
+/// # Errors
+///
+/// As [`replace`].
+pub fn replace_on(storage: &impl Storage, path: &Path, content: &str) -> Result<(), StateError> {
+    let new = (&bytes_of(content)[..], &Rights::Owner);
+    storage::replace(storage, path, &beside(path), new).map_err(
+        |StorageError { path, action, source }| StateError::System { path, action, source },
+    )
 }
 
 /// One name for each state file, so that dead writers leave at most one behind; a train has one

@@ -1,0 +1,145 @@
+//! Files that are replaced as a whole, whatever dies: a process, or the power.
+//!
+//! New content is written beside the old, brought to the disk, renamed over it, and the directory
+//! is brought to the disk. At every moment the name holds the old content or the new, never a
+//! part of one; when [`replace`] has returned, it holds the new for good.
+
+use std::fs::{File, OpenOptions, Permissions};
+use std::io::{self, ErrorKind, Write};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+
+/// Who may read and write a new file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Rights {
+    /// Its owner alone.
+    Owner,
+    /// Whoever the user lets by default.
+    Usual,
+    /// The same as those of another file.
+    Like(Permissions),
+}
+
+/// What a file system does for [`replace`]; each operation is one at which power may fail.
+pub trait Storage {
+    /// Makes a file that was not there, writes it and brings it to the disk.
+    ///
+    /// # Errors
+    ///
+    /// The system's answer; a file that was made and not written is removed.
+    fn write_new(&self, path: &Path, content: &[u8], rights: &Rights) -> io::Result<()>;
+
+    /// Gives a file another name, in place of the file of that name.
+    ///
+    /// # Errors
+    ///
+    /// The system's answer.
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
+
+    /// Removes a file.
+    ///
+    /// # Errors
+    ///
+    /// The system's answer.
+    fn remove(&self, path: &Path) -> io::Result<()>;
+
+    /// Brings the names in a directory to the disk.
+    ///
+    /// # Errors
+    ///
+    /// The system's answer.
+    fn sync_directory(&self, path: &Path) -> io::Result<()>;
+}
+
+/// The file system.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Disk;
+
+impl Storage for Disk {
+    fn write_new(&self, path: &Path, content: &[u8], rights: &Rights) -> io::Result<()> {
+        let mode = if *rights == Rights::Owner { 0o600 } else { 0o666 };
+        let mut file = OpenOptions::new().write(true).create_new(true).mode(mode).open(path)?;
+        let like = match rights {
+            Rights::Like(permissions) => file.set_permissions(permissions.clone()),
+            Rights::Owner | Rights::Usual => Ok(()),
+        };
+        let written = like.and_then(|()| file.write_all(content)).and_then(|()| file.sync_all());
+        if written.is_err() {
+            // The half-written file is of no use; that it cannot be removed changes nothing.
+            let _ = std::fs::remove_file(path);
+        }
+        written
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        std::fs::rename(from, to)
+    }
+
+    fn remove(&self, path: &Path) -> io::Result<()> {
+        std::fs::remove_file(path)
+    }
+
+    fn sync_directory(&self, path: &Path) -> io::Result<()> {
+        File::open(path)?.sync_all()
+    }
+}
+
+/// The last action: the file is replaced, though not yet for good.
+const TO_THE_DISK: &str = "bringing the directory to the disk";
+
+/// What the system did not do.
+#[derive(Debug, thiserror::Error)]
+#[error("{path}: {action} failed: {source}")]
+pub struct StorageError {
+    /// The file or directory.
+    pub path: PathBuf,
+    /// What was tried.
+    pub action: &'static str,
+    /// The system's answer.
+    pub source: io::Error,
+}
+
+impl StorageError {
+    /// True when the file was replaced, and only not brought to the disk for good.
+    pub fn is_replaced(&self) -> bool {
+        self.action == TO_THE_DISK
+    }
+}
+
+/// Replaces a file as a whole, by way of a file `beside` it in the same directory.
+///
+/// # Errors
+///
+/// The system's answer; the file there was stays as it is, unless only its directory could not be
+/// brought to the disk.
+pub fn replace(
+    storage: &impl Storage,
+    path: &Path,
+    beside: &Path,
+    (content, rights): (&[u8], &Rights),
+) -> Result<(), StorageError> {
+    // What a writer that died left behind. It may be the same file as that at `path`, on a file
+    // system that lost half of a renaming: it is removed, not written over.
+    match storage.remove(beside) {
+        Err(error) if error.kind() != ErrorKind::NotFound => {
+            return Err(failed(beside, "removing what was left")(error));
+        }
+        _ => {}
+    }
+    storage.write_new(beside, content, rights).map_err(failed(beside, "writing"))?;
+    if let Err(source) = storage.rename(beside, path) {
+        let _ = storage.remove(beside);
+        return Err(failed(path, "replacing")(source));
+    }
+    let directory = folder_of(path);
+    storage.sync_directory(directory).map_err(failed(directory, TO_THE_DISK))
+}
+
+/// The directory that a file lies in.
+pub fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+fn failed<'a>(path: &'a Path, action: &'static str) -> impl FnOnce(io::Error) -> StorageError + 'a {
+    move |source| StorageError { path: path.to_path_buf(), action, source }
+}
