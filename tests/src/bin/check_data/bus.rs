@@ -6,12 +6,18 @@ use std::path::Path;
 use dynocar::dataset;
 use dynocar::survey::answer::Answer;
 use dynocar::survey::survey_folder;
+use dynocar_core::dataset::Dataset;
 use dynocar_core::explain::explain;
+use dynocar_shared::PipelineKind;
 
 use super::report::Report;
+use super::stop_masses::{self, Masses};
 
 /// Largest error in m/s over 60 s in open loop on trips left out, over all of them.
 const ERROR_MAX_MPS: f64 = 0.30;
+/// Largest scatter in t of the mass from stop to stop, and its least correlation with the counted one.
+const STOP_MASS_T: f64 = 0.38;
+const CORRELATION: f64 = 0.9;
 /// What independent analyses of the day leave open, for each quantity.
 const INERTIAL_MASS_T: [f64; 2] = [19.4, 20.1];
 const PASSENGER_KG: [f64; 2] = [60.0, 82.0];
@@ -26,7 +32,39 @@ pub fn check(report: &mut Report, folder: &Path) {
         whole.as_ref().map_err(Clone::clone).and_then(learned),
     );
     let outcome = whole.and_then(|answer| left_out(folder, &answer));
-    report.note("bus: 60 s in open loop, trips left out two by two", outcome);
+    let error = outcome.as_ref().map_err(Clone::clone).and_then(LeftOut::error);
+    report.note("bus: 60 s in open loop, trips left out two by two", error);
+    for (place, (told, ..)) in WAYS.iter().enumerate() {
+        let masses = outcome.as_ref().map_err(Clone::clone).map(|it| &it.masses[place]);
+        report.note(told, masses.and_then(held));
+    }
+}
+
+/// How the mass from stop to stop is learned on trips left out.
+const WAYS: [(&str, fn(&Dataset, PipelineKind) -> Masses, PipelineKind); 2] = [
+    ("bus: mass from stop to stop, live", stop_masses::live, PipelineKind::MassKalman),
+    ("bus: mass of each section alone", stop_masses::alone, PipelineKind::JointLeastSquares),
+];
+
+fn held(masses: &Masses) -> Result<String, String> {
+    let (scatter_t, correlation, words) = masses.summary();
+    if scatter_t <= STOP_MASS_T && correlation >= CORRELATION { Ok(words) } else { Err(words) }
+}
+
+/// What trips say that took no part in their line.
+#[derive(Default)]
+struct LeftOut {
+    errors_mps: Vec<f64>,
+    masses: [Masses; WAYS.len()],
+}
+
+impl LeftOut {
+    fn error(&self) -> Result<String, String> {
+        let squares: f64 = self.errors_mps.iter().map(|error| error * error).sum();
+        let all_mps = (squares / self.errors_mps.len() as f64).sqrt();
+        let words = format!("{all_mps:.3} m/s, by pair {:.3?}", self.errors_mps);
+        if all_mps <= ERROR_MAX_MPS { Ok(words) } else { Err(words) }
+    }
 }
 
 fn surveyed(source: &Path) -> Result<Answer, String> {
@@ -52,13 +90,12 @@ fn learned(answer: &Answer) -> Result<String, String> {
     if is_inside { Ok(words.join(", ")) } else { Err(words.join(", ")) }
 }
 
-/// Root mean square of the errors on trips that took no part in their line.
-fn left_out(folder: &Path, whole: &Answer) -> Result<String, String> {
+fn left_out(folder: &Path, whole: &Answer) -> Result<LeftOut, String> {
     let trips = &whole.trips;
     // A trip's recording reaches to the middle of the stands beside it.
     let middles: Vec<f64> =
         trips.windows(2).map(|pair| 0.5 * (pair[0].to_s + pair[1].from_s)).collect();
-    let mut errors_mps = Vec::new();
+    let mut all = LeftOut::default();
     for first in (0..trips.len()).step_by(2) {
         let raw = tempfile::tempdir().map_err(|error| error.to_string())?;
         let out = tempfile::tempdir().map_err(|error| error.to_string())?;
@@ -68,12 +105,12 @@ fn left_out(folder: &Path, whole: &Answer) -> Result<String, String> {
         let mapped = dataset::load(out.path()).map_err(|error| error.to_string())?;
         let explained = explain(&mapped, &|_, _| {}).map_err(|error| error.to_string())?;
         let score = &explained.score.holdout_window60[0];
-        errors_mps.push(score.rmse_mps().ok_or("no trip is held out")?);
+        all.errors_mps.push(score.rmse_mps().ok_or("no trip is held out")?);
+        for (masses, (_, learn, kind)) in all.masses.iter_mut().zip(WAYS) {
+            masses.extend(learn(&mapped, kind));
+        }
     }
-    let squares: f64 = errors_mps.iter().map(|error| error * error).sum();
-    let all_mps = (squares / errors_mps.len() as f64).sqrt();
-    let words = format!("{all_mps:.3} m/s, by pair {errors_mps:.3?}");
-    if all_mps <= ERROR_MAX_MPS { Ok(words) } else { Err(words) }
+    Ok(all)
 }
 
 /// Cuts the day into one recording for each trip, some of them held out.

@@ -12,6 +12,7 @@ mod monitor;
 mod report;
 mod resistance;
 mod simulation;
+mod stop_masses;
 mod stops;
 mod trainruns;
 mod truth;

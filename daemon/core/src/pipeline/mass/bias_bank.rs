@@ -224,9 +224,25 @@ impl BiasBank {
 
     /// Inverse mass and bias, averaged over the behaviours by their evidence.
     pub fn moments(&self) -> Moments {
+        self.averaged(&self.weights())
+    }
+
+    /// The same of those behaviours alone that know of forces which jump between samples.
+    pub fn moments_after_a_jump(&self) -> Moments {
+        let mut log_weights = self.log_weights;
+        for (log_weight, model) in log_weights.iter_mut().zip(&self.models) {
+            if !model.knows_of_jumps() {
+                *log_weight = f64::NEG_INFINITY;
+            }
+        }
+        to_shares(&mut log_weights);
+        self.averaged(&log_weights)
+    }
+
+    fn averaged(&self, weights: &[f64; MODELS]) -> Moments {
         let mut mixture = Mixture::<2>::default();
-        for ((weight, model), filter) in self.weights().iter().zip(&self.models).zip(&self.filters)
-        {
+        let behaviours = weights.iter().zip(&self.models).zip(&self.filters);
+        for ((weight, model), filter) in behaviours.filter(|((weight, _), _)| **weight > 0.0) {
             let shape = model.shape(filter.mean[SPEED]);
             let [_, inverse_mass, bias] = filter.mean.into();
             let own = &filter.covariance;

@@ -23,10 +23,14 @@ impl BiasModel {
         BiasModel { std_mps2, time_s, grows_with_speed }
     }
 
-    /// Variance in (m/s)² of what a step misses because the acceleration changes by so much over it.
     /// A behaviour that lasts for ever also believes that forces run straight between samples.
+    pub fn knows_of_jumps(&self) -> bool {
+        self.time_s.is_finite()
+    }
+
+    /// Variance in (m/s)² of what a step misses because the acceleration changes by so much over it.
     pub fn jump_variance(&self, change_mps2: f64, step_s: f64) -> f64 {
-        if self.time_s.is_finite() { jump_variance(change_mps2, step_s) } else { 0.0 }
+        if self.knows_of_jumps() { jump_variance(change_mps2, step_s) } else { 0.0 }
     }
 
     /// Share of the bias that is left after a time in s.

@@ -23,8 +23,10 @@ use crate::train::TrainModel;
 
 /// Samples over which the evidence for a behaviour of the bias is remembered.
 const EVIDENCE_MEMORY: f64 = 3000.0;
-/// Used samples below which nothing is said of the mass.
+/// Used samples below which nothing is said of the mass, unless they reach over `MOVED_MIN_S`.
 const SAMPLES_MIN: u64 = 50;
+/// Motion in s from which few samples are enough, where a second or more lies between them.
+const MOVED_MIN_S: f64 = 20.0;
 /// Share by which a declared mass has to change to be followed; load weighing is not steadier.
 const DECLARED_CHANGE_MIN: f64 = 0.02;
 
@@ -58,6 +60,7 @@ pub struct MassKalman {
     monitor: InnovationMonitor,
     health: InputHealth,
     speeds: SpeedRange,
+    moved_s: f64,
     was_known: bool,
     is_fresh_reset: bool,
     generation: u64,
@@ -97,6 +100,7 @@ impl MassKalman {
             monitor: InnovationMonitor::new(500),
             health: InputHealth::default(),
             speeds: SpeedRange::default(),
+            moved_s: 0.0,
             was_known: false,
             is_fresh_reset: false,
             generation: 0,
@@ -175,14 +179,17 @@ impl MassKalman {
         self.noise.learn(residual_mps, filter.covariance[(SPEED, SPEED)], measured.weight);
         self.last = Some(motion);
         self.speeds.push(motion.speed_mps);
+        self.moved_s += step_s;
         self.publish(0.5 * (from.force_n + motion.force_n).abs())
     }
 
-    /// Takes the mass over under a force that has settled; the bias always.
+    /// Takes the mass over under force, the bias always. Until a force that jumped has settled,
+    /// the behaviours speak alone that know of jumps.
     fn publish(&mut self, force_n: f64) -> Outcome {
-        let now = self.bank.moments();
+        let is_settled = self.settling.is_settled();
+        let now = if is_settled { self.bank.moments() } else { self.bank.moments_after_a_jump() };
         let weight_kn = TrainModel::weight_kn(self.reference_mass_kg);
-        if self.settling.is_settled() && force_n >= self.settings.force_min_n_per_kn * weight_kn {
+        if force_n >= self.settings.force_min_n_per_kn * weight_kn {
             self.moments = now;
             let is_known = self.is_known();
             self.was_known |= is_known;
@@ -208,12 +215,16 @@ impl MassKalman {
         std_kg <= 0.01 * self.settings.usable_std_percent * mass_kg
     }
 
+    fn is_ready(&self) -> bool {
+        self.health.used() >= SAMPLES_MIN || self.moved_s >= MOVED_MIN_S
+    }
+
     fn case(&self) -> Case {
         let failure = (Status::Invalid, Reason::NumericalFailure);
         Case {
             fault: self.is_fresh_reset.then_some(failure),
             input: self.health.complaint().or(self.gate.complaint()),
-            is_ready: self.health.used() >= SAMPLES_MIN,
+            is_ready: self.is_ready(),
             is_known: self.is_known(),
             lacking: if self.was_known { Status::Degraded } else { Status::Unestimated },
             contradiction: self.monitor.contradiction(),
@@ -275,7 +286,7 @@ impl Estimator for MassKalman {
             &Matrix2::new(mass_std_kg * mass_std_kg, cross, cross, bias_std * bias_std),
         );
         let is_known = self.is_known();
-        let is_bias_known = self.health.used() >= SAMPLES_MIN;
+        let is_bias_known = self.is_ready();
         snapshot.excited = u32::from(is_known) | (u32::from(is_bias_known) << 1);
         snapshot.missing_manoeuvres = if is_known { 0 } else { Manoeuvre::Accelerate.bit() };
         write_status(snapshot, self.case().verdict());
