@@ -14,6 +14,7 @@ use crate::explain::command::{ExplainArguments, explain};
 use crate::latency::server::{PeerArguments, serve};
 use crate::latency::{self, LatencyArguments, plot};
 use crate::load::{self, LoadArguments};
+use crate::monitor::command::{MonitorArguments, monitor};
 use crate::output::give;
 use crate::papers::{self, Row, Seeds, Verdict, table};
 use crate::survey::{self, SurveyArguments};
@@ -32,6 +33,7 @@ enum Command {
     Explain(ExplainArguments),
     Latency(LatencyArguments),
     Load(LoadArguments),
+    Monitor(MonitorArguments),
     Papers(PapersArguments),
     Survey(SurveyArguments),
     #[command(hide = true)]
@@ -105,6 +107,7 @@ pub fn main() -> ExitCode {
         Command::Explain(arguments) => explain(arguments),
         Command::Latency(arguments) => latency(arguments),
         Command::Load(arguments) => load(arguments),
+        Command::Monitor(arguments) => monitor(arguments),
         Command::Papers(arguments) => papers(arguments),
         Command::Survey(arguments) => survey::run(arguments),
         Command::Peer(arguments) => serve(arguments).map_err(|error| (error.to_string(), 1)),

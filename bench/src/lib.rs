@@ -6,7 +6,9 @@
 //! - [`latency`]: sample → snapshot through real processes, beside the floor and alternatives
 //! - [`load`]: many trains against one daemon
 //! - [`rig`]: what the two share
+//! - [`monitor`]: what the residual monitor suspects on simulated driving, how soon and how wrongly
 //! - [`output`]: results for people and for machines
+//! - [`parallel`]: the same work over many cases, on some threads
 //! - [`papers`]: accuracy of every estimator over seeded runs, beside the statistical bound
 //! - [`survey`](mod@survey): how the work of a survey grows with passes
 
@@ -15,7 +17,9 @@ pub mod estimators;
 pub mod explain;
 pub mod latency;
 pub mod load;
+pub mod monitor;
 pub mod output;
 pub mod papers;
+pub mod parallel;
 pub mod rig;
 pub mod survey;

@@ -49,7 +49,7 @@ extern "C" {
 
 #define DYNOCAR_SCHEMA 1u
 #define DYNOCAR_SAMPLE_LAYOUT UINT64_C(0xdc0c8856b34a4c70)
-#define DYNOCAR_SNAPSHOT_LAYOUT UINT64_C(0x8e8e8dd9aba836be)
+#define DYNOCAR_SNAPSHOT_LAYOUT UINT64_C(0x6af21c1d0863ae21)
 
 #define DYNOCAR_PIPELINES_MAX 32      /* pipelines of one train */
 #define DYNOCAR_PARAMETERS_MAX 6      /* parameters that one pipeline estimates together */
@@ -292,6 +292,8 @@ typedef struct dynocar_parameter_snapshot {
     uint32_t excited;            /* one bit for each parameter that the data excited */
     uint32_t missing_manoeuvres; /* DYNOCAR_MANOEUVRE_... that would excite the others */
     uint32_t suspected_effect;   /* DYNOCAR_EFFECT_... */
+    uint32_t suspected_alternatives; /* 1 << DYNOCAR_EFFECT_...: hardly told from it */
+    uint32_t suspicion_age_s;        /* s for which the suspicion has stood */
     uint32_t parameters[DYNOCAR_PARAMETERS_MAX];   /* DYNOCAR_PARAMETER_... */
     double values[DYNOCAR_PARAMETERS_MAX];         /* in the parameters' units */
     double covariance[DYNOCAR_COVARIANCE_ENTRIES]; /* (0,0), (1,0), (1,1), (2,0), ... */
@@ -572,7 +574,7 @@ DYNOCAR_AT_(dynocar_train_sample, ambient_temperature_degc, 104);
 DYNOCAR_AT_(dynocar_train_sample, gradient_permille, 112);
 DYNOCAR_AT_(dynocar_train_sample, curve_radius_m, 120);
 
-DYNOCAR_SIZE_(dynocar_parameter_snapshot, 512);
+DYNOCAR_SIZE_(dynocar_parameter_snapshot, 520);
 DYNOCAR_AT_(dynocar_parameter_snapshot, epoch, 0);
 DYNOCAR_AT_(dynocar_parameter_snapshot, sequence, 8);
 DYNOCAR_AT_(dynocar_parameter_snapshot, generation, 16);
@@ -597,19 +599,21 @@ DYNOCAR_AT_(dynocar_parameter_snapshot, parameter_count, 192);
 DYNOCAR_AT_(dynocar_parameter_snapshot, excited, 196);
 DYNOCAR_AT_(dynocar_parameter_snapshot, missing_manoeuvres, 200);
 DYNOCAR_AT_(dynocar_parameter_snapshot, suspected_effect, 204);
-DYNOCAR_AT_(dynocar_parameter_snapshot, parameters, 208);
-DYNOCAR_AT_(dynocar_parameter_snapshot, values, 232);
-DYNOCAR_AT_(dynocar_parameter_snapshot, covariance, 280);
-DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_normalised, 448);
-DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_mean_square, 456);
-DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_correlation, 464);
-DYNOCAR_AT_(dynocar_parameter_snapshot, unexplained_force_n, 472);
-DYNOCAR_AT_(dynocar_parameter_snapshot, unexplained_force_std_n, 480);
-DYNOCAR_AT_(dynocar_parameter_snapshot, suspicion_evidence, 488);
-DYNOCAR_AT_(dynocar_parameter_snapshot, speed_min_mps, 496);
-DYNOCAR_AT_(dynocar_parameter_snapshot, speed_max_mps, 504);
+DYNOCAR_AT_(dynocar_parameter_snapshot, suspected_alternatives, 208);
+DYNOCAR_AT_(dynocar_parameter_snapshot, suspicion_age_s, 212);
+DYNOCAR_AT_(dynocar_parameter_snapshot, parameters, 216);
+DYNOCAR_AT_(dynocar_parameter_snapshot, values, 240);
+DYNOCAR_AT_(dynocar_parameter_snapshot, covariance, 288);
+DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_normalised, 456);
+DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_mean_square, 464);
+DYNOCAR_AT_(dynocar_parameter_snapshot, innovation_correlation, 472);
+DYNOCAR_AT_(dynocar_parameter_snapshot, unexplained_force_n, 480);
+DYNOCAR_AT_(dynocar_parameter_snapshot, unexplained_force_std_n, 488);
+DYNOCAR_AT_(dynocar_parameter_snapshot, suspicion_evidence, 496);
+DYNOCAR_AT_(dynocar_parameter_snapshot, speed_min_mps, 504);
+DYNOCAR_AT_(dynocar_parameter_snapshot, speed_max_mps, 512);
 
-DYNOCAR_SIZE_(dynocar_reading, 536);
+DYNOCAR_SIZE_(dynocar_reading, 544);
 DYNOCAR_AT_(dynocar_reading, age_ns, 0);
 DYNOCAR_AT_(dynocar_reading, status, 8);
 DYNOCAR_AT_(dynocar_reading, reason, 12);

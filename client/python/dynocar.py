@@ -37,7 +37,7 @@ PathLike = Union[str, "os.PathLike[str]"]
 
 SCHEMA = 1
 SAMPLE_LAYOUT = 0xdc0c8856b34a4c70
-SNAPSHOT_LAYOUT = 0x8e8e8dd9aba836be
+SNAPSHOT_LAYOUT = 0x6af21c1d0863ae21
 PARAMETERS_MAX = 6
 COVARIANCE_ENTRIES = 21
 REJECTION_REASONS = 16
@@ -308,6 +308,8 @@ class ParameterSnapshot(ctypes.Structure):
         ("excited", c_uint32),
         ("missing_manoeuvres", c_uint32),
         ("suspected_effect", c_uint32),
+        ("suspected_alternatives", c_uint32),
+        ("suspicion_age_s", c_uint32),
         ("parameters", c_uint32 * PARAMETERS_MAX),
         ("values", c_double * PARAMETERS_MAX),
         ("covariance", c_double * COVARIANCE_ENTRIES),
@@ -564,6 +566,17 @@ class Snapshot:
     def suspected_effect(self) -> Effect:
         """The effect that the model may lack."""
         return Effect(self.raw.suspected_effect)
+
+    @property
+    def suspected_alternatives(self) -> List[Effect]:
+        """Other effects that these data hardly tell from the suspected one."""
+        bits = self.raw.suspected_alternatives
+        return [effect for effect in Effect if bits >> effect & 1]
+
+    @property
+    def suspicion_age_s(self) -> int:
+        """How long the suspicion has stood, in s."""
+        return self.raw.suspicion_age_s
 
     @property
     def rejected(self) -> Dict[RejectionReason, int]:

@@ -1,6 +1,8 @@
 //! What the daemon answers, one snapshot for each train and pipeline.
 
-use crate::vocabulary::{Parameter, PipelineKind, Quantity, Reason, RejectionReason, Status};
+use crate::vocabulary::{
+    EffectKind, Parameter, PipelineKind, Quantity, Reason, RejectionReason, Status,
+};
 use crate::wire_struct;
 
 /// The most parameters one pipeline estimates together.
@@ -69,6 +71,11 @@ wire_struct! {
         pub missing_manoeuvres: u32,
         /// Suspected missing effect, [`crate::vocabulary::EffectKind`] by number.
         pub suspected_effect: u32,
+        /// Other effects that these data hardly tell from it: one bit for each
+        /// [`crate::vocabulary::EffectKind`].
+        pub suspected_alternatives: u32,
+        /// How long the suspicion has stood, in whole s of the controller's clock.
+        pub suspicion_age_s: u32,
         /// [`Parameter`] by number.
         pub parameters: [u32; 6],
         /// Values in the parameters' units.
@@ -123,6 +130,8 @@ impl ParameterSnapshot {
             excited: 0,
             missing_manoeuvres: 0,
             suspected_effect: 0,
+            suspected_alternatives: 0,
+            suspicion_age_s: 0,
             parameters: [0; PARAMETERS_MAX],
             values: [0.0; PARAMETERS_MAX],
             covariance: [0.0; COVARIANCE_ENTRIES],
@@ -158,6 +167,12 @@ impl ParameterSnapshot {
     /// True when this pipeline answers a quantity for the train.
     pub const fn answers(&self, quantity: Quantity) -> bool {
         self.quantities & quantity.bit() != 0
+    }
+
+    /// The effects that the data hardly tell from the suspected one.
+    pub fn alternatives(&self) -> impl Iterator<Item = EffectKind> {
+        let bits = self.suspected_alternatives;
+        EffectKind::ALL.iter().copied().filter(move |kind| bits & kind.bit() != 0)
     }
 
     /// Samples refused for one reason.

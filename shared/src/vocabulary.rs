@@ -274,6 +274,13 @@ impl Manoeuvre {
     }
 }
 
+impl EffectKind {
+    /// The effect's bit in [`crate::ParameterSnapshot::suspected_alternatives`].
+    pub const fn bit(self) -> u32 {
+        1 << self as u32
+    }
+}
+
 vocabulary! {
     /// An effect that a model may lack, as in the answers of `dynocar explain`.
     EffectKind: u32 {

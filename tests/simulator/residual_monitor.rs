@@ -8,7 +8,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
 use dynocar_tests::simulator::sensors::SIMULATED_TRAIN;
 use dynocar_tests::simulator::{
-    Effect, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate,
+    Defects, Effect, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate,
 };
 
 fn dataset(seed: u64, train_type: Option<TrainType>, effects: EffectRequest) -> SimulatedDataset {
@@ -53,6 +53,71 @@ fn nothing_undeclared_raises_no_alarm_on_any_type_of_train() {
         });
         assert!(blocks > 200, "{}: {blocks} blocks", train_type.name());
     }
+}
+
+#[test]
+fn a_row_in_fifty_that_is_wildly_wrong_raises_no_alarm() {
+    for seed in 110..113 {
+        let mut settings = SimulatorSettings::new(seed, EffectRequest::none());
+        settings.defects = Defects { outliers: 0.02, ..Defects::ALL };
+        watch(&simulate(&settings), |run, time_s, snapshot| {
+            assert_eq!(suspect(snapshot), EffectKind::None, "seed {seed}, run {run}, {time_s} s");
+        });
+    }
+}
+
+#[test]
+fn what_no_force_or_a_scale_of_forces_tells_is_named_too() {
+    for (seed, kind) in [
+        (310, EffectKind::WheelDiameter),
+        (311, EffectKind::ActuatorDelay),
+        (312, EffectKind::TractionGain),
+        (313, EffectKind::LowAdhesion),
+        (314, EffectKind::MassChange),
+    ] {
+        let data = dataset(seed, None, EffectRequest::Kinds(vec![kind]));
+        let mut named = 0;
+        watch(&data, |_, _, snapshot| named += usize::from(suspect(snapshot) == kind));
+        assert!(named > 100, "{kind}, seed {seed}: for {named} samples");
+    }
+}
+
+#[test]
+fn what_cannot_be_told_apart_is_told_as_alternatives() {
+    // On a level, straight line another rotating mass does what another mass does.
+    let kinds = EffectRequest::Kinds(vec![EffectKind::RotatingMass]);
+    let mut settings = SimulatorSettings::new(320, kinds);
+    settings.is_level_and_straight = true;
+    let mut said: Vec<Vec<EffectKind>> = Vec::new();
+    watch(&simulate(&settings), |_, _, snapshot| {
+        if suspect(snapshot) != EffectKind::None {
+            let mut all: Vec<_> = snapshot.alternatives().chain([suspect(snapshot)]).collect();
+            all.sort_unstable();
+            said.push(all);
+        }
+    });
+    assert!(!said.is_empty(), "nothing is suspected");
+    assert!(said.iter().all(|kinds| kinds.len() > 1), "one of two as good ones: {said:?}");
+}
+
+#[test]
+fn a_suspicion_ends_with_its_cause() {
+    let kinds = EffectRequest::Kinds(vec![EffectKind::DraggingBrake]);
+    let data = dataset(200, Some(TrainType::Metro), kinds);
+    let Effect::DraggingBrake { windows, .. } = &data.effects[0] else {
+        panic!("expected a dragging brake, got {:?}", data.effects);
+    };
+    let drags_in = |run: usize| windows.iter().any(|window| window.run == run);
+    assert!((0..data.runs.len()).any(drags_in) && !(0..data.runs.len()).all(drags_in));
+    let mut age_s = 0;
+    watch(&data, |run, time_s, snapshot| {
+        if !drags_in(run) {
+            assert_eq!(suspect(snapshot), EffectKind::None, "run {run}, {time_s} s");
+            assert_eq!(snapshot.suspicion_age_s, 0);
+        }
+        age_s = age_s.max(snapshot.suspicion_age_s);
+    });
+    assert!(age_s > 60, "it stood for {age_s} s");
 }
 
 #[test]

@@ -105,6 +105,7 @@ fn mix_snapshot(hash: &mut u64, it: &ParameterSnapshot) {
     let words = [it.status, it.reason, it.parameter_count, it.excited]
         .into_iter()
         .chain([it.missing_manoeuvres, it.suspected_effect])
+        .chain([it.suspected_alternatives, it.suspicion_age_s])
         .chain(it.parameters)
         .chain(it.rejected_by_reason);
     words.for_each(|word| mix(hash, u64::from(word)));

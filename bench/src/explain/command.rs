@@ -44,17 +44,12 @@ pub struct ExplainArguments {
 
 impl ExplainArguments {
     fn scenarios(&self) -> Result<Vec<Scenario>, (String, u8)> {
-        if self.kinds.is_empty() {
+        let all = || {
             use EffectKind::{DraggingBrake, None, TunnelDrag, Wind};
             let few = [None, TunnelDrag, DraggingBrake, Wind].map(Scenario::Kind);
-            return Ok(if self.growth { few.to_vec() } else { Scenario::all() });
-        }
-        let named = |name: &String| {
-            let names: Vec<_> = Scenario::all().iter().map(|scenario| scenario.name()).collect();
-            Scenario::from_name(name)
-                .ok_or((format!("--kind {name}: expected one of {}", names.join(", ")), 2))
+            if self.growth { few.to_vec() } else { Scenario::all() }
         };
-        self.kinds.iter().map(named).collect()
+        Ok(Scenario::named(&self.kinds)?.unwrap_or_else(all))
     }
 }
 

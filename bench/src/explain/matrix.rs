@@ -1,14 +1,13 @@
 //! All kinds over all seeds.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
 
 use serde::Serialize;
 
 use super::case::{Case, explained, read};
 use super::grade::{Grade, grade};
 use super::scenario::Scenario;
+use crate::parallel::over;
 
 /// What came out for one kind.
 #[derive(Clone, Debug, Serialize)]
@@ -55,7 +54,8 @@ pub struct Matrix {
     pub false_alarms: FalseAlarms,
 }
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
+/// The middle of some values, the upper one of two.
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
     if values.is_empty() {
         return None;
     }
@@ -83,25 +83,13 @@ pub fn run(
     tell: &(dyn Fn(&Case, &Grade) + Sync),
 ) -> Matrix {
     let cases = cases(scenarios, seeds, first_seed);
-    let grades: Mutex<Vec<Option<Grade>>> = Mutex::new(vec![None; cases.len()]);
-    let next = AtomicUsize::new(0);
-    std::thread::scope(|scope| {
-        for _ in 0..threads {
-            scope.spawn(|| {
-                while let Some((at, case)) = Some(next.fetch_add(1, Ordering::Relaxed))
-                    .and_then(|at| Some((at, cases.get(at)?)))
-                {
-                    let simulated = case.simulate();
-                    let explanation = explained(&read(&simulated));
-                    let graded = grade(&simulated, case.scenario.rival(), &explanation);
-                    tell(case, &graded);
-                    grades.lock().unwrap_or_else(PoisonError::into_inner)[at] = Some(graded);
-                }
-            });
-        }
+    let grades = over(&cases, threads, |case| {
+        let simulated = case.simulate();
+        let explanation = explained(&read(&simulated));
+        let graded = grade(&simulated, case.scenario.rival(), &explanation);
+        tell(case, &graded);
+        graded
     });
-    let grades: Vec<Grade> =
-        grades.into_inner().unwrap_or_else(PoisonError::into_inner).into_iter().flatten().collect();
     let rows = scenarios.iter().zip(grades.chunks(seeds.max(1)));
     let nulls = rows.clone().filter(|(scenario, _)| scenario.is_null());
     let raised = nulls.clone().map(|(_, grades)| grades.iter().filter(|g| !g.is_right).count());

@@ -25,5 +25,5 @@ pub const SUSPECT: Suspect = Suspect {
     is_positive: true,
     least: Least::Size(0.04),
     changes_at_stops: true,
-    unit: |seen| seen.brake,
+    unit: |seen| -seen.brake,
 };

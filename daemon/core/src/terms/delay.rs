@@ -27,6 +27,8 @@ pub const PARAMETERS: [Parameter; 2] = [
 ];
 /// A shorter delay and lag together in s are within a cycle of most controllers.
 pub const LEAST_S: f64 = 0.15;
+/// Delay in s that the live monitor takes for a matter of stamps.
+pub const TOLERATED_S: f64 = 0.3;
 
 /// Samples kept: six seconds of the fastest controllers.
 const CAPACITY: usize = 2048;

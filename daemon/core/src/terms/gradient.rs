@@ -1,7 +1,9 @@
 //! The gradient under the train, a profile that lies elsewhere than the map says, and one that is
 //! wrong by a smooth function of the chainage, with opposite forces in the two directions.
 
-use super::Parameter;
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Least, Parameter, Suspect};
 use crate::track::{LinearProfile, Track};
 
 /// The number of `[track]` by which the true profile is the map's moved towards growing chainage.
@@ -43,3 +45,13 @@ pub fn along_travel_permille(
     let at_m = position_m - shift_m;
     Some(direction * track.gradient_towards_permille(direction, at_m, length_m)?)
 }
+
+/// Unit: the error of the gradient that was found at the same place in earlier passes.
+pub const SUSPECT: Suspect = Suspect {
+    effect: EffectKind::GradientError,
+    prior_std: 1.0,
+    is_positive: true,
+    least: Least::Share(1.0),
+    changes_at_stops: false,
+    unit: |seen| seen.earlier_uphill,
+};

@@ -45,7 +45,7 @@ pub const CORRECTIONS: [&Key; 11] = [
 ];
 
 /// What the monitor looks for, one column of its regression each.
-pub const SUSPECTS: [Suspect; 10] = [
+pub const SUSPECTS: [Suspect; 11] = [
     tunnel::SUSPECT,
     curve::SUSPECT,
     wind::SUSPECT,
@@ -55,6 +55,7 @@ pub const SUSPECTS: [Suspect; 10] = [
     bearings::SUSPECT,
     ambient::SUSPECT,
     place::SUSPECT,
+    gradient::SUSPECT,
     adhesion::SUSPECT,
 ];
 

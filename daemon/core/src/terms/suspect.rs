@@ -36,8 +36,10 @@ pub struct Seen {
     pub brake: f64,
     /// Traction minus brake minus all that is known to retard.
     pub driving: f64,
-    /// The force found at the same place in earlier passes.
+    /// The force found at the same place in earlier passes, as a resistance.
     pub earlier: f64,
+    /// The same as an error of the gradient, as it acts in this direction.
+    pub earlier_uphill: f64,
 }
 
 /// One effect that is looked for.

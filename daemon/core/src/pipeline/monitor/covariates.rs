@@ -38,6 +38,8 @@ pub fn covariates(
     declared: &Davis,
     places: &PlaceMemory,
 ) -> Covariates {
+    let earlier = sample.position_m.map(|m| places.earlier(m, sample.direction));
+    let earlier = earlier.unwrap_or_default();
     let seen = Seen {
         speed_mps: sample.speed_mps,
         direction: sample.direction,
@@ -49,7 +51,8 @@ pub fn covariates(
         traction: unit.traction,
         brake: unit.brake,
         driving: unit.driving,
-        earlier: sample.position_m.map_or(0.0, |m| places.earlier(m)),
+        earlier: earlier.resistance,
+        earlier_uphill: earlier.uphill,
     };
     Covariates::from_fn(|place, _| (BANK[place].unit)(&seen))
 }

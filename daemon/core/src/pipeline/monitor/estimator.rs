@@ -9,10 +9,11 @@ use super::information::{BaseVector, Information, JOINT};
 use super::onsets::Onsets;
 use super::place_memory::PlaceMemory;
 use super::pressure::ReleasedPressure;
-use super::rows::{Parameters, Rows};
+use super::rows::{Parameters, Row, Rows};
 use super::settings::MonitorSettings;
 use super::suspects::{BASE, FIRST_ONSET, ONSETS, SUSPECTS, suspect_of};
 use super::verdict::{Evidence, Verdict};
+use super::wheel_scale::WheelScale;
 use crate::force::ResolvedSample;
 use crate::pipeline::judge::Case;
 use crate::pipeline::motion::{STANDING_MPS, SpeedRange};
@@ -31,6 +32,12 @@ use crate::train::{Davis, TrainModel};
 const ROWS_MIN: f64 = 12.0;
 /// Innovations that their statistics look back over.
 const MONITOR_ROWS: u32 = 150;
+/// The same where an effect is sought that no suspect explains: what is over is soon forgotten.
+const CUT_ROWS: u32 = 60;
+/// Innovations count as no larger for an effect that no suspect explains: beyond lie outliers.
+const CUT: f64 = 3.0;
+/// Samples over which the time between samples is averaged.
+const PERIOD_SAMPLES: f64 = 100.0;
 /// The force that the model does not explain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Unexplained {
@@ -51,6 +58,8 @@ pub struct ResidualMonitor {
     has_stopped: bool,
     places: PlaceMemory,
     pressure: ReleasedPressure,
+    wheels: WheelScale,
+    period_s: f64,
     blocks: MomentumBlocks,
     impulse: CovariateImpulse,
     rows: Rows,
@@ -58,6 +67,10 @@ pub struct ResidualMonitor {
     information: Information,
     verdict: Verdict,
     innovations: InnovationMonitor,
+    cut_innovations: InnovationMonitor,
+    /// Since when the suspected effect has been suspected.
+    suspected_since: Option<(EffectKind, i64)>,
+    newest_ns: i64,
     /// The model as it is believed: base parameters about the declared ones, and the suspect's.
     model: Parameters,
     known: Davis,
@@ -100,6 +113,8 @@ impl ResidualMonitor {
             has_stopped: false,
             places: PlaceMemory::new(),
             pressure: ReleasedPressure::new(),
+            wheels: WheelScale::default(),
+            period_s: 0.0,
             blocks: MomentumBlocks::new(settings.data),
             impulse: CovariateImpulse::new(),
             rows: Rows::new(&settings, declared),
@@ -107,6 +122,9 @@ impl ResidualMonitor {
             information: Information::new(&base_std),
             verdict: Verdict::new(&settings, kept_per_row),
             innovations: InnovationMonitor::new(MONITOR_ROWS),
+            cut_innovations: InnovationMonitor::new(CUT_ROWS),
+            suspected_since: None,
+            newest_ns: i64::MIN,
             model: Parameters::zeros(),
             known: declared,
             last_block: None,
@@ -122,7 +140,7 @@ impl ResidualMonitor {
 
     /// A run starts: brakes are released, and whatever dragged is over.
     fn start_run(&mut self) {
-        let dragged = self.verdict.named_onset();
+        let dragged = self.verdict.naming().onset();
         for place in 0..ONSETS {
             self.retire(FIRST_ONSET + place, dragged == Some(place));
         }
@@ -137,7 +155,7 @@ impl ResidualMonitor {
         for place in (0..SUSPECTS).filter(|&place| BANK[place].changes_at_stops) {
             let parameter = BASE + place;
             self.verdict.hold_over_stop(parameter);
-            self.retire(parameter, self.verdict.is_suspicious(parameter));
+            self.retire(parameter, self.verdict.naming().is_clearly(parameter));
         }
     }
 
@@ -153,7 +171,7 @@ impl ResidualMonitor {
 
     fn take_block(&mut self, block: &MomentumBlock, sample: &ResolvedSample) -> bool {
         let impulse = self.impulse.close();
-        if let Some(place) = self.onsets.open(self.verdict.named_onset()) {
+        if let Some(place) = self.onsets.open(self.verdict.naming().onset()) {
             self.retire(FIRST_ONSET + place, false);
         }
         self.onsets.advance();
@@ -167,15 +185,31 @@ impl ResidualMonitor {
             return false;
         };
         row.observed -= row.features.fixed_rows::<BASE>(0).dot(declared);
+        let innovation = row.observed - row.features.dot(model);
         if self.information.count() >= ROWS_MIN {
-            self.innovations.push(row.observed - row.features.dot(model));
+            self.innovations.push(innovation);
+            self.cut_innovations.push(innovation.clamp(-CUT, CUT));
         }
+        self.watch_end(&row, innovation);
         self.information.push(&row, self.kept_per_row);
+        self.wheels.forget(self.kept_per_row);
         self.speeds.push(block.speed_mps);
         let resistance = self.declared.w0_n_per_kn(block.speed_mps) * block.impulse[1];
         self.verdict.note_forces(&self.units(&impulse, block.impulse[1]), resistance);
-        self.judge(&(impulse / block.impulse[1]), block.speed_mps);
+        let passes = sample.position_m.map(|m| self.places.earlier(m, sample.direction).passes);
+        self.judge(&(impulse / block.impulse[1]), block.speed_mps, passes == Some(0.0));
         true
+    }
+
+    /// Whether the cause of the suspicion has ended, by a row.
+    fn watch_end(&mut self, row: &Row, innovation: f64) {
+        let Some(parameter) = self.verdict.naming().parameter() else { return };
+        let without = innovation + row.features[parameter] * self.model[parameter];
+        let weight = row.weight;
+        if self.verdict.has_ended(weight * innovation.powi(2), weight * without.powi(2)) {
+            self.retire(parameter, true);
+            self.verdict.clear(parameter);
+        }
     }
 
     /// One value for each parameter beyond the base model: the bank's, and `onset` for each
@@ -192,8 +226,11 @@ impl ResidualMonitor {
     /// Notes what the base model leaves at this place, unless another suspect explains it.
     fn remember_place(&mut self, block: &MomentumBlock, sample: &ResolvedSample) {
         let before = self.last_block.replace((sample.position_m, block.momentum));
-        let has_other_suspect = self.verdict.named().is_some_and(|named| {
-            !matches!(named.effect, EffectKind::LocalResistance | EffectKind::Unknown)
+        let has_other_suspect = self.verdict.naming().named().is_some_and(|named| {
+            use EffectKind::{DraggingBrake, GradientError, LocalResistance, Unknown};
+            let may_be_the_place = named.alternatives & LocalResistance.bit() != 0;
+            !matches!(named.effect, LocalResistance | GradientError | Unknown)
+                && !(named.effect == DraggingBrake && may_be_the_place)
         });
         if block.is_first || has_other_suspect {
             return;
@@ -203,19 +240,25 @@ impl ResidualMonitor {
         let known: f64 =
             (0..BASE).map(|i| block.impulse[1 + i] * (self.declared_base[i] + self.model[i])).sum();
         let unexplained = block.impulse[0] - known - (block.momentum - momentum);
-        self.places.push(position_m, unexplained / block.impulse[1]);
+        self.places.push(position_m, sample.direction, unexplained / block.impulse[1]);
     }
 
-    fn judge(&mut self, covariates: &Covariates, speed_mps: f64) {
+    fn judge(&mut self, covariates: &Covariates, speed_mps: f64, is_new_place: bool) {
         let Ok(base) = self.information.base() else { return self.reset() };
         self.verdict.judge(&Evidence {
             information: &self.information,
             base: &base,
             onsets: &self.onsets,
             is_pressure_raised: self.pressure.is_raised(),
-            innovations: &self.innovations,
+            is_new_place,
+            wheel: self.wheels.evidence(),
+            period_s: self.period_s,
+            force_scale_std: self.settings.data.force_scale_std,
+            force_delay_std_s: self.settings.data.force_delay_std_s,
+            cut_innovations: &self.cut_innovations,
         });
-        let suspect = self.verdict.named().and_then(|named| named.parameter);
+        self.note_since();
+        let suspect = self.verdict.naming().parameter();
         // Without a suspect the joint solution has a parameter that no row sees.
         let parameter = suspect.unwrap_or(BASE);
         let prior_std = if suspect.is_some() { suspect_of(parameter).prior_std } else { 1e-6 };
@@ -246,6 +289,13 @@ impl ResidualMonitor {
         self.unexplained = Unexplained { n_per_kn: value, std_n_per_kn: total.max(0.0).sqrt() };
     }
 
+    fn note_since(&mut self) {
+        let effect = self.verdict.naming().named().map(|named| named.effect);
+        if effect != self.suspected_since.map(|(effect, _)| effect) {
+            self.suspected_since = effect.map(|effect| (effect, self.newest_ns));
+        }
+    }
+
     /// Starts anew after a numerical failure.
     fn reset(&mut self) {
         self.information = Information::new(&self.base_std);
@@ -266,6 +316,10 @@ impl Estimator for ResidualMonitor {
 
     fn update(&mut self, sample: &ResolvedSample) -> Outcome {
         self.weight_kn = sample.weight_kn;
+        self.newest_ns = sample.time_ns;
+        if sample.step_s > 0.0 {
+            self.period_s += (sample.step_s - self.period_s) / PERIOD_SAMPLES;
+        }
         if self.clock.push(sample.time_ns) {
             self.start_run();
         }
@@ -282,6 +336,7 @@ impl Estimator for ResidualMonitor {
         };
         if unit.speed_mps < self.settings.data.speed_min_mps {
             self.blocks.break_chain();
+            self.wheels.push(sample);
             return Outcome::Used;
         }
         if std::mem::take(&mut self.has_stopped) {
@@ -291,6 +346,7 @@ impl Estimator for ResidualMonitor {
             Ok(closed) => closed,
             Err(reason) => return Outcome::Rejected(reason),
         };
+        self.wheels.push(sample);
         let Some(chain_start_ns) = self.blocks.chain_start_ns() else { return Outcome::Used };
         let values = covariates(sample, &unit, &self.declared, &self.places);
         self.impulse.push(chain_start_ns, unit.time_ns, &values);
@@ -310,7 +366,7 @@ impl Estimator for ResidualMonitor {
             &Vector1::new(force_n),
             &covariance,
         );
-        let named = self.verdict.named();
+        let named = self.verdict.naming().named();
         let has_rows = self.information.count() >= ROWS_MIN;
         let case = Case {
             fault: None,
@@ -329,6 +385,10 @@ impl Estimator for ResidualMonitor {
         snapshot.unexplained_force_std_n = std_n;
         snapshot.suspected_effect = named.map_or(EffectKind::None, |named| named.effect) as u32;
         snapshot.suspicion_evidence = named.map_or(0.0, |named| named.evidence);
+        snapshot.suspected_alternatives = named.map_or(0, |named| named.alternatives);
+        let since_ns = self.suspected_since.filter(|_| named.is_some()).map(|(_, ns)| ns);
+        let age_ns = since_ns.map_or(0, |ns| self.newest_ns.saturating_sub(ns));
+        snapshot.suspicion_age_s = u32::try_from(age_ns / 1_000_000_000).unwrap_or(0);
         self.speeds.write(snapshot);
     }
 }

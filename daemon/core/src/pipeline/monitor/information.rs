@@ -43,10 +43,27 @@ pub struct BaseSolution {
 pub struct Alternative {
     /// Its parameter.
     pub value: f64,
-    /// Twice the log-likelihood ratio.
-    pub ratio: f64,
+    /// Precision of it.
+    pub precision: f64,
     /// What the freedom of its size costs.
     pub cost: f64,
+}
+
+impl Alternative {
+    /// Twice the log-likelihood ratio against parameters of no more than a size.
+    pub fn beyond(&self, size: f64) -> f64 {
+        let beyond = (self.value.abs() - size).max(0.0);
+        beyond * beyond * self.precision
+    }
+}
+
+impl BaseSolution {
+    /// A parameter of the base model: value and variance.
+    pub fn parameter(&self, place: usize) -> (f64, f64) {
+        let unit = BaseVector::from_fn(|i, _| if i == place { 1.0 } else { 0.0 });
+        let solved = self.factor.l_dirty().solve_lower_triangular(&unit).unwrap_or(unit);
+        (solved.dot(&self.reduced), solved.norm_squared())
+    }
 }
 
 impl Information {
@@ -119,7 +136,7 @@ impl Information {
         parameter: usize,
         prior_std: f64,
     ) -> Alternative {
-        let none = Alternative { value: 0.0, ratio: 0.0, cost: 0.0 };
+        let none = Alternative { value: 0.0, precision: 0.0, cost: 0.0 };
         let column: BaseVector = self.matrix.fixed_view::<BASE, 1>(0, parameter).into_owned();
         let Some(reduced) = base.factor.l_dirty().solve_lower_triangular(&column) else {
             return none;
@@ -129,9 +146,26 @@ impl Information {
         let precision = own + 1.0 / (prior_std * prior_std);
         Alternative {
             value: rest / precision,
-            ratio: rest * rest / precision,
+            precision,
             cost: (own * prior_std * prior_std).ln_1p(),
         }
+    }
+
+    /// A suspect that the base model holds in part, with that part: against the base model alone, a
+    /// small scale is free, so that a scale of any size would have little to speak for it.
+    pub fn together(&self, base: (usize, f64), suspect: (usize, f64)) -> Alternative {
+        let none = Alternative { value: 0.0, precision: 0.0, cost: 0.0 };
+        let ((place, base_std), (parameter, prior_std)) = (base, suspect);
+        let Ok((values, covariance)) = self.joint(parameter, prior_std) else { return none };
+        // The suspect's column is the base model's with the other sign.
+        let value = values[BASE] - values[place];
+        let variance =
+            covariance[(BASE, BASE)] + covariance[(place, place)] - 2.0 * covariance[(BASE, place)];
+        let prior = prior_std * prior_std + base_std * base_std;
+        if !(variance > 0.0 && variance <= prior) {
+            return none;
+        }
+        Alternative { value, precision: 1.0 / variance, cost: (prior / variance).ln() }
     }
 
     /// Mean square of what base model and a suspect of such a ratio leave of the rows.

@@ -4,22 +4,25 @@
 //! forces, as in [`crate::pipeline::resistance`]. Each suspect adds one column: what one unit of
 //! it would take off the momentum. All columns go through one whitener and into one information
 //! matrix, from which the likelihood ratio of every suspect against the base model follows at
-//! any time, a, b and c being refitted together with it.
+//! any time, a, b and c being refitted together with it. The way by position against the way by
+//! speed adds the wheels' diameter.
 //!
 //! # Layout, in the order a sample takes
 //!
 //! - `settings`: thresholds and noise
 //! - `suspects`: the effects that are looked for
-//! - `covariates`, `place_memory`, `pressure`: what a sample says of each of them
+//! - `covariates`, `place_memory`, `pressure`, `wheel_scale`: what a sample says of each of them
 //! - `rows`: blocks to independent rows of unit variance
 //! - `onsets`: since when a brake may drag
 //! - `information`: the likelihood ratios
-//! - `verdict`: from ratios to a suspect
+//! - `verdict`: what speaks for each of them
+//! - `naming`: who is suspected, what is hardly told from it, and when it has ended
 //! - `estimator`: the pipeline around all of it
 
 mod covariates;
 mod estimator;
 mod information;
+mod naming;
 mod onsets;
 mod place_memory;
 mod pressure;
@@ -27,6 +30,7 @@ mod rows;
 mod settings;
 mod suspects;
 mod verdict;
+mod wheel_scale;
 
 pub use estimator::ResidualMonitor;
 pub use settings::MonitorSettings;

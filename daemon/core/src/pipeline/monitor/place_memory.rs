@@ -4,19 +4,39 @@
 const CELL_M: f64 = 150.0;
 /// Cells; longer lines share them.
 const CELLS: usize = 2048;
-/// Passes that the mean looks back over.
+/// Passes in a direction that the mean looks back over.
 const PASSES_MAX: f64 = 6.0;
+
+/// A mean over passes of one direction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Mean {
+    n_per_kn: f64,
+    passes: f64,
+}
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Cell {
     index: i64,
     pass: u32,
-    /// Means over the passes before this one.
-    earlier: f64,
-    passes: f64,
+    /// Means over the passes before this one, towards falling and growing chainage.
+    earlier: [Mean; 2],
+    /// Direction of this pass.
+    is_growing: bool,
     /// Mean over this pass.
     now: f64,
     count: f64,
+}
+
+/// What earlier passes of a place left unexplained, in N/kN; 0 where there was none.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Earlier {
+    /// As a resistance: the same in both directions.
+    pub resistance: f64,
+    /// As an error of the gradient, which acts the other way in the other direction; as it acts
+    /// in the direction asked for.
+    pub uphill: f64,
+    /// Passes behind it.
+    pub passes: f64,
 }
 
 /// Unexplained force by place.
@@ -37,14 +57,14 @@ impl PlaceMemory {
         self.pass = self.pass.wrapping_add(1);
     }
 
-    /// The mean force in N/kN of the passes before this one; 0 where there was none.
-    pub fn earlier(&self, position_m: f64) -> f64 {
+    /// What the passes before this one left at a place, for travel in a direction.
+    pub fn earlier(&self, position_m: f64, direction: f64) -> Earlier {
         let (place, index) = place(position_m);
         let cell = &self.cells[place];
         match cell.index == index {
-            true if cell.pass == self.pass => cell.earlier,
-            true => cell.with_pass_closed().earlier,
-            false => 0.0,
+            true if cell.pass == self.pass => told(&cell.earlier, direction),
+            true => told(&cell.with_pass_closed().earlier, direction),
+            false => Earlier::default(),
         }
     }
 
@@ -53,17 +73,28 @@ impl PlaceMemory {
     /// # Real-time
     ///
     /// Bounded work, no allocation.
-    pub fn push(&mut self, position_m: f64, n_per_kn: f64) {
+    pub fn push(&mut self, position_m: f64, direction: f64, n_per_kn: f64) {
         let (place, index) = place(position_m);
+        let is_growing = direction > 0.0;
         let cell = &mut self.cells[place];
         if cell.index != index {
-            *cell = Cell { index, pass: self.pass, ..Cell::default() };
-        } else if cell.pass != self.pass {
-            *cell = Cell { pass: self.pass, ..cell.with_pass_closed() };
+            *cell = Cell { index, pass: self.pass, is_growing, ..Cell::default() };
+        } else if cell.pass != self.pass || cell.is_growing != is_growing {
+            *cell = Cell { pass: self.pass, is_growing, ..cell.with_pass_closed() };
         }
         cell.count += 1.0;
         cell.now += (n_per_kn - cell.now) / cell.count;
     }
+}
+
+/// The means of both directions, as they act in one.
+fn told([falling, growing]: &[Mean; 2], direction: f64) -> Earlier {
+    let passes = falling.passes + growing.passes;
+    if passes == 0.0 {
+        return Earlier::default();
+    }
+    let (down, up) = (falling.n_per_kn * falling.passes, growing.n_per_kn * growing.passes);
+    Earlier { resistance: (up + down) / passes, uphill: direction * (up - down) / passes, passes }
 }
 
 impl Cell {
@@ -71,9 +102,11 @@ impl Cell {
         if self.count == 0.0 {
             return *self;
         }
-        let passes = (self.passes + 1.0).min(PASSES_MAX);
-        let earlier = self.earlier + (self.now - self.earlier) / passes;
-        Cell { earlier, passes, now: 0.0, count: 0.0, ..*self }
+        let mut closed = Cell { now: 0.0, count: 0.0, ..*self };
+        let mean = &mut closed.earlier[usize::from(self.is_growing)];
+        mean.passes = (mean.passes + 1.0).min(PASSES_MAX);
+        mean.n_per_kn += (self.now - mean.n_per_kn) / mean.passes;
+        closed
     }
 }
 
@@ -89,15 +122,32 @@ mod tests {
     #[test]
     fn only_earlier_passes_are_remembered() {
         let mut memory = PlaceMemory::new();
-        memory.push(1000.0, 3.0);
-        assert_eq!(memory.earlier(1000.0), 0.0);
+        let resistance = |memory: &PlaceMemory, at_m: f64| memory.earlier(at_m, 1.0).resistance;
+        memory.push(1000.0, 1.0, 3.0);
+        assert_eq!(resistance(&memory, 1000.0), 0.0);
         memory.next_pass();
-        assert_eq!(memory.earlier(1000.0), 3.0);
-        memory.push(1000.0, 1.0);
-        assert_eq!(memory.earlier(1000.0), 3.0);
+        assert_eq!(resistance(&memory, 1000.0), 3.0);
+        memory.push(1000.0, 1.0, 1.0);
+        assert_eq!(resistance(&memory, 1000.0), 3.0);
         memory.next_pass();
-        assert_eq!(memory.earlier(1010.0), 2.0);
-        assert_eq!(memory.earlier(5000.0), 0.0);
-        assert_eq!(memory.earlier(1000.0 + CELL_M * CELLS as f64), 0.0);
+        assert_eq!(resistance(&memory, 1010.0), 2.0);
+        assert_eq!(resistance(&memory, 5000.0), 0.0);
+        assert_eq!(resistance(&memory, 1000.0 + CELL_M * CELLS as f64), 0.0);
+    }
+
+    #[test]
+    fn both_directions_tell_a_resistance_from_a_wrong_gradient() {
+        for (back_n_per_kn, expected) in [(2.0, (2.0, 0.0)), (-2.0, (0.0, 2.0))] {
+            let mut memory = PlaceMemory::new();
+            memory.push(700.0, 1.0, 2.0);
+            memory.next_pass();
+            let one_way = memory.earlier(700.0, -1.0);
+            assert_eq!((one_way.resistance, one_way.uphill), (2.0, -2.0), "not yet told apart");
+            memory.push(700.0, -1.0, back_n_per_kn);
+            memory.next_pass();
+            let both = memory.earlier(700.0, 1.0);
+            assert_eq!((both.resistance, both.uphill), expected);
+            assert_eq!(memory.earlier(700.0, -1.0).uphill, -expected.1);
+        }
     }
 }

@@ -8,7 +8,7 @@ settings! {
     #[derive(Copy)]
     MonitorSettings {
         /// Evidence, less what the search costs, from which a suspect is named.
-        evidence_min: f64 = 25.0 => (1 to 1000000);
+        evidence_min: f64 = 20.0 => (1 to 1000000);
         /// Share of the resistance below which an unexplained force is no matter.
         share_min: f64 = 0.08 => (0 to 1);
         /// Standard deviation of each declared Davis coefficient, as a share of it.

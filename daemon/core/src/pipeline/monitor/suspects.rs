@@ -1,4 +1,9 @@
-//! The effects that the monitor looks for, each with one column of the regression.
+//! The effects that the monitor looks for.
+//!
+//! Most have a column of the regression each. The delay of the forces is one of the base model's
+//! own parameters, and the wheels' diameter is told by positions, without any force.
+
+use dynocar_shared::vocabulary::EffectKind;
 
 use crate::pipeline::resistance::regression::UNKNOWNS;
 use crate::terms::{SUSPECTS as BANK, Suspect, brake};
@@ -13,8 +18,23 @@ pub const ONSETS: usize = 12;
 pub const FIRST_ONSET: usize = BASE + SUSPECTS;
 /// All parameters of the regression.
 pub const PARAMETERS: usize = FIRST_ONSET + ONSETS;
+/// Candidate without a column: forces that act late.
+pub const DELAY: usize = PARAMETERS;
+/// Candidate without a column: wheels of another diameter.
+pub const WHEEL: usize = PARAMETERS + 1;
+/// All candidates are those from `BASE` to here.
+pub const CANDIDATES: usize = PARAMETERS + 2;
 
 /// The suspect behind a parameter beyond the base model.
 pub fn suspect_of(parameter: usize) -> &'static Suspect {
     if parameter >= FIRST_ONSET { &brake::SUSPECT } else { &BANK[parameter - BASE] }
+}
+
+/// The effect behind a candidate.
+pub fn effect_of(candidate: usize) -> EffectKind {
+    match candidate {
+        DELAY => EffectKind::ActuatorDelay,
+        WHEEL => EffectKind::WheelDiameter,
+        parameter => suspect_of(parameter).effect,
+    }
 }

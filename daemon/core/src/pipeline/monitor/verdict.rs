@@ -1,44 +1,32 @@
-//! From likelihood ratios to a suspect.
+//! What speaks for each candidate.
 
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::information::{BaseSolution, Information};
+use super::naming::{Naming, Standing};
 use super::onsets::Onsets;
 use super::rows::Parameters;
 use super::settings::MonitorSettings;
-use super::suspects::{BASE, FIRST_ONSET, ONSETS, PARAMETERS, SUSPECTS, suspect_of};
+use super::suspects::{
+    BASE, CANDIDATES, DELAY, FIRST_ONSET, PARAMETERS, SUSPECTS, WHEEL, suspect_of,
+};
 use crate::pipeline::InnovationMonitor;
-use crate::terms::Least;
+use crate::pipeline::resistance::regression::{FORCE_DELAY, TRACTION_SCALE};
+use crate::terms::{Least, delay, wheel};
 
 /// Blocks that a dragging brake must have dragged.
 const ONSET_AGE_MIN: u32 = 5;
 /// What a raised pressure of released brakes speaks for a dragging one.
 const PRESSURE_EVIDENCE: f64 = 10.0;
-/// A named suspect stays until its evidence is below this share of what named it.
-const STAYS_SHARE: f64 = 0.5;
-/// Another suspect takes over when its evidence is greater by this.
-const TAKES_OVER_BY: f64 = 5.0;
+/// Share of the least size worth naming up to which an effect counts as none: surveys, maps and
+/// calibrations are never exact, and what is small and lasts gathers evidence without end.
+const TOLERATED_SHARE: f64 = 0.25;
 /// Share of evidence that outlasts a stop, for effects that may change there.
 const KEPT_AT_STOP: f64 = 0.7;
+/// Share of it that outlasts a block: what is still there shows again within a minute.
+const KEPT_PER_BLOCK: f64 = 0.9;
 /// Rows for which unit variance counts beside the rows seen.
 const PRIOR_ROWS: f64 = 20.0;
-/// Blocks in a row for which evidence must last.
-const LASTING_BLOCKS: u32 = 2;
-/// Innovations before their statistics are judged.
-const INNOVATIONS_MIN: f64 = 60.0;
-/// Mean square of the innovations up to which small things that are no effect are believed.
-const MEAN_SQUARE_MAX: f64 = 3.0;
-
-/// A named suspect.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Named {
-    /// The effect.
-    pub effect: EffectKind,
-    /// Its parameter; `None` for an unknown effect.
-    pub parameter: Option<usize>,
-    /// Evidence less what the search costs.
-    pub evidence: f64,
-}
 
 /// What the verdict is formed from.
 #[derive(Clone, Copy, Debug)]
@@ -51,14 +39,23 @@ pub struct Evidence<'a> {
     pub onsets: &'a Onsets,
     /// True while released brakes hold pressure.
     pub is_pressure_raised: bool,
-    /// Innovation statistics of the model as it is believed.
-    pub innovations: &'a InnovationMonitor,
+    /// True where no earlier pass tells what the place does.
+    pub is_new_place: bool,
+    /// The error of the speed's scale, and what speaks for it.
+    pub wheel: (f64, f64),
+    /// Time in s between samples, which limits what can be said of a delay.
+    pub period_s: f64,
+    /// Standard deviation of the scales of the forces that the base model takes for usual.
+    pub force_scale_std: f64,
+    /// The same of their delay, in s.
+    pub force_delay_std_s: f64,
+    /// Statistics of the innovations of the model as it is believed, cut off where outliers begin.
+    pub cut_innovations: &'a InnovationMonitor,
 }
 
-/// Judges the suspects, block by block.
+/// Judges the candidates, block by block.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
-    evidence_min: f64,
     share_min: f64,
     kept_per_row: f64,
     /// Force of one unit of each parameter where it acts, and the resistance there, summed.
@@ -66,9 +63,14 @@ pub struct Verdict {
     resistance: Parameters,
     /// Evidence that outlasted stops.
     held: [f64; SUSPECTS],
-    net: [f64; PARAMETERS],
-    named: Option<Named>,
-    candidate: (Option<usize>, u32),
+    /// Evidence of the stretches between earlier stops, for what is another after each.
+    gathered: [f64; SUSPECTS],
+    /// Evidence of the rows in hand for each being there.
+    own: [f64; CANDIDATES],
+    /// The same against the base model, by which candidates are compared: a scale of the forces
+    /// that the base model takes up in part is there all the same.
+    beside: [f64; CANDIDATES],
+    naming: Naming,
     scale: f64,
 }
 
@@ -76,37 +78,27 @@ impl Verdict {
     /// No suspicion.
     pub fn new(settings: &MonitorSettings, kept_per_row: f64) -> Self {
         Verdict {
-            evidence_min: settings.evidence_min,
             share_min: settings.share_min,
             kept_per_row,
             unit_force: Parameters::zeros(),
             resistance: Parameters::zeros(),
             held: [0.0; SUSPECTS],
-            net: [0.0; PARAMETERS],
-            named: None,
-            candidate: (None, 0),
+            gathered: [0.0; SUSPECTS],
+            own: [0.0; CANDIDATES],
+            beside: [0.0; CANDIDATES],
+            naming: Naming::new(settings.evidence_min),
             scale: 1.0,
         }
     }
 
-    /// The suspect, if any.
-    pub fn named(&self) -> Option<&Named> {
-        self.named.as_ref()
-    }
-
-    /// The onset that is named as that of a dragging brake.
-    pub fn named_onset(&self) -> Option<usize> {
-        self.named.and_then(|named| named.parameter)?.checked_sub(FIRST_ONSET)
+    /// Who is suspected.
+    pub fn naming(&self) -> &Naming {
+        &self.naming
     }
 
     /// Variance of the rows, at least 1.
     pub fn scale(&self) -> f64 {
         self.scale
-    }
-
-    /// True when a parameter's rows should be integrated out, and not taken as without it.
-    pub fn is_suspicious(&self, parameter: usize) -> bool {
-        self.net[parameter] > STAYS_SHARE * self.evidence_min
     }
 
     /// Notes how strongly one unit of each parameter acted in a block, beside the resistance in
@@ -123,20 +115,31 @@ impl Verdict {
         }
     }
 
-    /// A stop: what may change there loses some of its evidence.
+    /// A stop: what may change there loses some of its evidence for being there now, and keeps it
+    /// for being what it was.
     pub fn hold_over_stop(&mut self, parameter: usize) {
-        let own = self.net[parameter].max(0.0);
-        self.held[parameter - BASE] = KEPT_AT_STOP * own;
+        let suspect = parameter - BASE;
+        let own = self.own[parameter];
+        self.held[suspect] = KEPT_AT_STOP * own.max(self.held[suspect]);
+        self.gathered[suspect] = (self.gathered[suspect] + own + searched()).max(0.0);
+        self.own[parameter] = 0.0;
     }
 
-    /// A parameter's place is taken by another.
+    /// Forgets a parameter: its place is taken by another, or what it stood for has ended.
     pub fn clear(&mut self, parameter: usize) {
         self.unit_force[parameter] = 0.0;
         self.resistance[parameter] = 0.0;
-        self.net[parameter] = 0.0;
-        if self.named.is_some_and(|named| named.parameter == Some(parameter)) {
-            self.named = None;
+        self.own[parameter] = 0.0;
+        if let Some(suspect) = parameter.checked_sub(BASE).filter(|&suspect| suspect < SUSPECTS) {
+            (self.held[suspect], self.gathered[suspect]) = (0.0, 0.0);
         }
+        self.naming.clear(parameter);
+    }
+
+    /// Takes in a row that the named suspect acts on: the squares of what is left of it with the
+    /// suspect and without. True when its cause has ended.
+    pub fn has_ended(&mut self, with: f64, without: f64) -> bool {
+        self.naming.has_ended((with - without) / self.scale)
     }
 
     /// Judges the rows so far.
@@ -145,8 +148,9 @@ impl Verdict {
     ///
     /// One small triangular solution for each suspect, no allocation.
     pub fn judge(&mut self, evidence: &Evidence) {
-        let mut ratios = [0.0; PARAMETERS];
-        let mut costs = [0.0; PARAMETERS];
+        let mut found = [(0.0, 0.0); CANDIDATES];
+        let mut beside = [None; CANDIDATES];
+        let mut best: f64 = 0.0;
         for parameter in BASE..PARAMETERS {
             let suspect = suspect_of(parameter);
             let onset = parameter.checked_sub(FIRST_ONSET);
@@ -156,78 +160,84 @@ impl Verdict {
             if is_too_young {
                 continue;
             }
-            let found =
+            let alternative =
                 evidence.information.alternative(evidence.base, parameter, suspect.prior_std);
-            let is_possible = found.value > 0.0 || !suspect.is_positive;
-            if is_possible && self.is_material(parameter, found.value) {
-                (ratios[parameter], costs[parameter]) = (found.ratio, found.cost);
+            let whole = match suspect.effect {
+                EffectKind::TractionGain => evidence.information.together(
+                    (TRACTION_SCALE, evidence.force_scale_std),
+                    (parameter, suspect.prior_std),
+                ),
+                _ => alternative,
+            };
+            let is_possible = whole.value > 0.0 || !suspect.is_positive;
+            let least = self.least(parameter);
+            if is_possible && whole.value.abs() >= least {
+                let tolerated = TOLERATED_SHARE * least;
+                best = best.max(alternative.beyond(0.0));
+                found[parameter] = (whole.beyond(tolerated), whole.cost);
+                beside[parameter] = Some((alternative.beyond(tolerated), alternative.cost));
             }
         }
-        let best = ratios.iter().copied().fold(0.0, f64::max);
+        found[DELAY] = late(evidence);
         self.scale = evidence.information.mean_square(evidence.base, best, PRIOR_ROWS).max(1.0);
-        // Evidence is the greatest of as many ratios as suspects and onsets are searched.
-        let searched = 2.0 * ((SUSPECTS + ONSETS) as f64).ln();
-        for parameter in BASE..PARAMETERS {
-            let hint = match parameter >= FIRST_ONSET && ratios[parameter] > 0.0 {
-                true if evidence.is_pressure_raised => PRESSURE_EVIDENCE,
-                _ => 0.0,
+        for candidate in BASE..CANDIDATES {
+            let (ratio, cost) = found[candidate];
+            let is_onset = (FIRST_ONSET..PARAMETERS).contains(&candidate);
+            let hint = match is_onset && ratio > 0.0 && evidence.is_pressure_raised {
+                true => PRESSURE_EVIDENCE,
+                false => 0.0,
             };
-            let own = ratios[parameter] / self.scale + hint - costs[parameter] - searched;
-            let held = self.held.get(parameter - BASE).copied().unwrap_or(0.0);
-            self.net[parameter] = own.max(held);
+            self.own[candidate] = ratio / self.scale + hint - cost - searched();
+            let (ratio, cost) = beside[candidate].unwrap_or((ratio, cost));
+            self.beside[candidate] = ratio / self.scale + hint - cost - searched();
         }
+        let (error, told) = evidence.wheel;
+        self.own[WHEEL] = if error.abs() >= wheel::LEAST { told } else { 0.0 } - searched();
+        self.beside[WHEEL] = self.own[WHEEL];
         self.name(evidence);
     }
 
-    fn is_material(&self, parameter: usize, value: f64) -> bool {
+    fn name(&mut self, evidence: &Evidence) {
+        let mut net = self.own;
+        let mut rank = self.beside;
+        for suspect in 0..SUSPECTS {
+            self.held[suspect] *= KEPT_PER_BLOCK;
+            self.gathered[suspect] *= self.kept_per_row;
+            net[BASE + suspect] = net[BASE + suspect].max(self.held[suspect]);
+            rank[BASE + suspect] =
+                rank[BASE + suspect].max(self.held[suspect]) + self.gathered[suspect];
+        }
+        self.naming.take(&Standing {
+            net: &net,
+            rank: &rank,
+            cut_innovations: evidence.cut_innovations,
+            is_new_place: evidence.is_new_place,
+            is_pressure_raised: evidence.is_pressure_raised,
+        });
+    }
+
+    /// The least size of a parameter worth naming; infinite while it has not acted.
+    fn least(&self, parameter: usize) -> f64 {
         match suspect_of(parameter).least {
-            Least::Size(least) => value.abs() >= least,
+            Least::Size(least) => least,
             Least::Share(times) => {
-                let least = times * self.share_min * self.resistance[parameter];
-                value.abs() * self.unit_force[parameter] >= least.max(f64::MIN_POSITIVE)
+                times * self.share_min * self.resistance[parameter]
+                    / self.unit_force[parameter].max(f64::MIN_POSITIVE)
             }
         }
     }
+}
 
-    fn name(&mut self, evidence: &Evidence) {
-        let leading = (BASE..PARAMETERS)
-            .max_by(|&one, &other| self.net[one].total_cmp(&self.net[other]))
-            .filter(|&parameter| self.net[parameter] > self.evidence_min);
-        let is_same = |one: Option<usize>, other: Option<usize>| {
-            one.map(|it| suspect_of(it).effect) == other.map(|it| suspect_of(it).effect)
-        };
-        let lasted = if is_same(leading, self.candidate.0) { self.candidate.1 + 1 } else { 1 };
-        self.candidate = (leading, lasted);
-        let before = self.named.and_then(|named| named.parameter);
-        let stays =
-            before.filter(|&parameter| self.net[parameter] > STAYS_SHARE * self.evidence_min);
-        let takes_over = leading.filter(|&parameter| {
-            let is_ahead =
-                stays.is_none_or(|old| self.net[parameter] > self.net[old] + TAKES_OVER_BY);
-            is_same(leading, before) || (lasted >= LASTING_BLOCKS && is_ahead)
-        });
-        self.named = takes_over.or(stays).map(|parameter| Named {
-            effect: suspect_of(parameter).effect,
-            parameter: Some(parameter),
-            evidence: self.net[parameter],
-        });
-        if self.named.is_none() {
-            self.named = self.unknown(evidence.innovations);
-        }
-    }
+/// Evidence is the greatest of as many ratios as there are candidates.
+fn searched() -> f64 {
+    2.0 * ((CANDIDATES - BASE) as f64).ln()
+}
 
-    /// Innovations larger than small things explain, and no suspect.
-    fn unknown(&self, innovations: &InnovationMonitor) -> Option<Named> {
-        let count = innovations.effective_count();
-        let mean_square = innovations.mean_square();
-        // Twice the log-likelihood ratio of normal innovations of that variance against 1,
-        // in terms of what is believed at most.
-        let excess = mean_square / MEAN_SQUARE_MAX;
-        let evidence = count * (excess - 1.0 - excess.ln());
-        (count > INNOVATIONS_MIN && excess > 1.0 && evidence > self.evidence_min).then_some(Named {
-            effect: EffectKind::Unknown,
-            parameter: None,
-            evidence,
-        })
-    }
+/// What speaks for forces that act late, and its cost: the base model's own delay, beyond what a
+/// logger that writes means over a step is off by.
+fn late(evidence: &Evidence) -> (f64, f64) {
+    let (late_s, variance) = evidence.base.parameter(FORCE_DELAY);
+    let beyond_s = late_s - delay::TOLERATED_S.max(evidence.period_s);
+    let cost = (evidence.force_delay_std_s.powi(2) / variance).ln().max(0.0);
+    if beyond_s >= delay::LEAST_S { (beyond_s * beyond_s / variance, cost) } else { (0.0, 0.0) }
 }

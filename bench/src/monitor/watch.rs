@@ -1,0 +1,131 @@
+//! One simulated dataset, fed to the monitor sample by sample.
+
+use std::sync::Arc;
+
+use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
+use dynocar_tests::simulator::sensors::SIMULATED_TRAIN;
+use dynocar_tests::simulator::true_run::TRUE_STEP_S;
+use dynocar_tests::simulator::{SimulatedDataset, SimulatedRun};
+
+use super::acting::{MOVING_MPS, acts};
+
+/// A longer step in s between samples is a gap, not driving.
+const STEP_MAX_S: f64 = 5.0;
+
+/// What the monitor said of a dataset; times are of motion.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Watched {
+    /// The kinds that are undeclared.
+    pub truth: Vec<EffectKind>,
+    /// Time driven in s.
+    pub driven_s: f64,
+    /// Time in s from the first moment at which the effect acted until it was named, alone or
+    /// among alternatives.
+    pub named_after_s: Option<f64>,
+    /// The same, until it led.
+    pub led_after_s: Option<f64>,
+    /// True when the effect ever acted.
+    pub has_acted: bool,
+    /// Suspicions in the order in which they were raised: the leading kind, and the time driven.
+    pub raised: Vec<(EffectKind, f64)>,
+    /// Time in s during which a suspicion stood that did not hold the effect.
+    pub wrong_s: f64,
+    /// Time in s during which alternatives were told.
+    pub ambiguous_s: f64,
+    /// Time in s during which the effect was named in runs in which it did not act.
+    pub stale_s: f64,
+    /// The leading kind at the end.
+    pub last: Option<EffectKind>,
+}
+
+/// The monitor as it stands after a sample.
+struct Said {
+    leading: Option<EffectKind>,
+    holds_truth: bool,
+    is_ambiguous: bool,
+}
+
+impl Said {
+    fn of(snapshot: &ParameterSnapshot, truth: &[EffectKind]) -> Said {
+        let leading = EffectKind::from_number(snapshot.suspected_effect).expect("a known kind");
+        let leading = Some(leading).filter(|&kind| kind != EffectKind::None);
+        let others = snapshot.suspected_alternatives;
+        let is_told = |kind: &EffectKind| leading == Some(*kind) || others & kind.bit() != 0;
+        Said { leading, holds_truth: truth.iter().any(is_told), is_ambiguous: others != 0 }
+    }
+}
+
+/// Feeds all runs of a dataset to one monitor.
+///
+/// # Panics
+///
+/// When the monitor cannot be built with its default settings.
+pub fn watch(data: &SimulatedDataset) -> Watched {
+    let train = Arc::new(data.declared_train().clone());
+    let settings = EstimatorSettings::default_of(PipelineKind::ResidualMonitor);
+    let monitor = settings.expect("the kind can be built").build(&train).expect("default settings");
+    let track = Some(Arc::new(data.track().clone()));
+    let mut pipeline = Pipeline::new(SIMULATED_TRAIN, 0, train, track, monitor);
+    let truth: Vec<EffectKind> = data.effects.iter().map(|effect| effect.kind()).collect();
+    let mut watched = Watched { truth: truth.clone(), ..Watched::default() };
+    let mut acted_at_s = None;
+    let mut sequence = 0;
+    for run in &data.runs {
+        let acts_in_run = run.states.iter().any(|state| acts(data, run, state));
+        let mut last_ns = None;
+        for sample in &run.samples {
+            sequence += 1;
+            let said = Said::of(pipeline.process(&TrainSample { sequence, ..*sample }), &truth);
+            watched.note_raised(&said);
+            let step_s = driven_s(&mut last_ns, sample);
+            watched.driven_s += step_s;
+            if acted_at_s.is_none() && acts_at(data, run, sample) {
+                acted_at_s = Some(watched.driven_s);
+            }
+            watched.note(&said, step_s, acted_at_s, acts_in_run);
+        }
+    }
+    watched.has_acted = acted_at_s.is_some();
+    watched
+}
+
+/// Time driven in s since the sample before.
+fn driven_s(last_ns: &mut Option<i64>, sample: &TrainSample) -> f64 {
+    let before_ns = last_ns.replace(sample.time_ns);
+    let step_s = before_ns.map_or(0.0, |before_ns| (sample.time_ns - before_ns) as f64 * 1e-9);
+    let is_driving = sample.speed_mps > MOVING_MPS && (0.0..STEP_MAX_S).contains(&step_s);
+    if is_driving { step_s } else { 0.0 }
+}
+
+fn acts_at(data: &SimulatedDataset, run: &SimulatedRun, sample: &TrainSample) -> bool {
+    let start_ns = run.samples[0].time_ns;
+    let place = ((sample.time_ns - start_ns) as f64 * 1e-9 / TRUE_STEP_S).max(0.0) as usize;
+    acts(data, run, &run.states[place.min(run.states.len() - 1)])
+}
+
+impl Watched {
+    fn note_raised(&mut self, said: &Said) {
+        if let Some(kind) = said.leading.filter(|_| said.leading != self.last) {
+            self.raised.push((kind, self.driven_s));
+        }
+        self.last = said.leading;
+    }
+
+    fn note(&mut self, said: &Said, step_s: f64, acted_at_s: Option<f64>, acts_in_run: bool) {
+        if said.leading.is_none() {
+            return;
+        }
+        let if_true = |is_true: bool| if is_true { step_s } else { 0.0 };
+        self.wrong_s += if_true(!said.holds_truth);
+        self.ambiguous_s += if_true(said.is_ambiguous);
+        self.stale_s += if_true(said.holds_truth && !acts_in_run);
+        let Some(acted_at_s) = acted_at_s.filter(|_| said.holds_truth) else { return };
+        let after_s = self.driven_s - acted_at_s;
+        self.named_after_s.get_or_insert(after_s);
+        if !said.is_ambiguous {
+            self.led_after_s.get_or_insert(after_s);
+        }
+    }
+}

@@ -1,0 +1,265 @@
+//! From evidence to a name, to alternatives, and to the end of a suspicion.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::suspects::{BASE, CANDIDATES, FIRST_ONSET, PARAMETERS, effect_of};
+use crate::pipeline::InnovationMonitor;
+
+/// A named suspect stays until its evidence is below this share of what named it.
+const STAYS_SHARE: f64 = 0.5;
+/// Another suspect takes over when its evidence is greater by this; below it, the two are told as
+/// alternatives.
+const TAKES_OVER_BY: f64 = 5.0;
+/// Blocks in a row for which evidence must last.
+const LASTING_BLOCKS: u32 = 2;
+/// Twice the log-likelihood ratio of no effect against the effect as found, over the rows since
+/// it was last there, from which its cause has ended.
+const ENDED: f64 = 16.0;
+/// Suspected brakes that let go while the train drove, from which another is doubted.
+const LET_GO_MAX: f64 = 1.5;
+/// Share of them that is remembered from block to block: four hours.
+const LET_GO_KEPT: f64 = 1.0 - 1.0 / 2880.0;
+/// What acts at a place that was never passed looks like a brake that drags.
+const PLACES: u32 = EffectKind::LocalResistance.bit()
+    | EffectKind::GradientError.bit()
+    | EffectKind::GradientShift.bit();
+/// Innovations before their statistics are judged.
+const INNOVATIONS_MIN: f64 = 40.0;
+/// Mean square of the innovations up to which small things that are no effect are believed.
+const MEAN_SQUARE_MAX: f64 = 3.0;
+
+/// A named suspect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Named {
+    /// The effect.
+    pub effect: EffectKind,
+    /// Its candidate; `None` for an unknown effect.
+    candidate: Option<usize>,
+    /// Evidence less what the search costs.
+    pub evidence: f64,
+    /// Bits of the effects that are hardly told from it.
+    pub alternatives: u32,
+}
+
+impl Named {
+    /// Its parameter of the regression, if it has one.
+    pub fn parameter(&self) -> Option<usize> {
+        self.candidate.filter(|&candidate| candidate < PARAMETERS)
+    }
+}
+
+/// What speaks for the candidates after a block.
+#[derive(Clone, Copy, Debug)]
+pub struct Standing<'a> {
+    /// Evidence for each being there now.
+    pub net: &'a [f64; CANDIDATES],
+    /// Evidence for each by all that was seen, by which they are compared.
+    pub rank: &'a [f64; CANDIDATES],
+    /// Statistics of the innovations without outliers.
+    pub cut_innovations: &'a InnovationMonitor,
+    /// True where no earlier pass tells what the place does.
+    pub is_new_place: bool,
+    /// True while released brakes hold pressure.
+    pub is_pressure_raised: bool,
+}
+
+/// Who is suspected.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Naming {
+    evidence_min: f64,
+    named: Option<Named>,
+    /// Who leads, and for how many blocks.
+    leading: (Option<usize>, u32),
+    /// What speaks for the cause of the named effect having ended.
+    ending: f64,
+    /// Brakes lately that were suspected and let go while the train drove.
+    let_go: f64,
+}
+
+impl Naming {
+    /// Nobody yet.
+    pub fn new(evidence_min: f64) -> Self {
+        Naming { evidence_min, named: None, leading: (None, 0), ending: 0.0, let_go: 0.0 }
+    }
+
+    /// The suspect, if any.
+    pub fn named(&self) -> Option<&Named> {
+        self.named.as_ref()
+    }
+
+    /// The parameter of the suspect, if any.
+    pub fn parameter(&self) -> Option<usize> {
+        self.named.and_then(|named| named.parameter())
+    }
+
+    /// The onset that is named as that of a dragging brake.
+    pub fn onset(&self) -> Option<usize> {
+        self.parameter()?.checked_sub(FIRST_ONSET)
+    }
+
+    /// True when a parameter is named, and nothing else could be meant: its rows should be
+    /// integrated out, and not taken as without it.
+    pub fn is_clearly(&self, parameter: usize) -> bool {
+        self.named.is_some_and(|it| it.parameter() == Some(parameter) && it.alternatives == 0)
+    }
+
+    /// A parameter stands for something else now.
+    pub fn clear(&mut self, parameter: usize) {
+        if self.parameter() == Some(parameter) {
+            self.named = None;
+            self.ending = 0.0;
+        }
+        if self.leading.0 == Some(parameter) {
+            self.leading = (None, 0);
+        }
+    }
+
+    /// Adds what a row speaks for no effect against the effect as found (CUSUM); true when its
+    /// cause has ended.
+    pub fn has_ended(&mut self, gone: f64) -> bool {
+        self.ending = (self.ending + gone).max(0.0);
+        let has_ended = self.ending > ENDED;
+        if has_ended && self.onset().is_some() {
+            self.let_go += 1.0;
+        }
+        has_ended
+    }
+
+    /// Takes in what speaks for whom after a block.
+    pub fn take(&mut self, standing: &Standing) {
+        let Standing { net, rank, .. } = *standing;
+        self.let_go *= LET_GO_KEPT;
+        let least = STAYS_SHARE * self.evidence_min;
+        let leading = (BASE..CANDIDATES)
+            .filter(|&candidate| net[candidate] > self.evidence_min)
+            .max_by(|&one, &other| rank[one].total_cmp(&rank[other]));
+        let is_same =
+            |one: Option<usize>, other: Option<usize>| one.map(effect_of) == other.map(effect_of);
+        let lasted = if is_same(leading, self.leading.0) { self.leading.1 + 1 } else { 1 };
+        self.leading = (leading, lasted);
+        let before = self.named.and_then(|named| named.candidate);
+        let stays = before.filter(|&candidate| net[candidate] > least);
+        let takes_over = leading.filter(|&candidate| {
+            let is_ahead = stays.is_none_or(|old| rank[candidate] > rank[old] + TAKES_OVER_BY);
+            is_same(leading, before) || (lasted >= LASTING_BLOCKS && is_ahead)
+        });
+        let chosen = takes_over.or(stays);
+        if !is_same(chosen, before) {
+            self.ending = 0.0;
+        }
+        self.named = match chosen {
+            Some(candidate) => Some(self.told(candidate, least, standing)),
+            None => self.unknown(standing),
+        };
+    }
+
+    /// A candidate as it is told.
+    fn told(&self, candidate: usize, least: f64, standing: &Standing) -> Named {
+        let effect = effect_of(candidate);
+        let mut bits = alternatives(candidate, least, standing);
+        let is_a_brake = effect == EffectKind::DraggingBrake && !standing.is_pressure_raised;
+        if is_a_brake && standing.is_new_place {
+            bits |= PLACES;
+        }
+        // Brakes that let go again and again while the train drives are something else.
+        let is_in_doubt = is_a_brake && self.let_go >= LET_GO_MAX;
+        let evidence = standing.net[candidate];
+        let candidate = Some(candidate);
+        match is_in_doubt {
+            true => Named {
+                effect: EffectKind::Unknown,
+                candidate,
+                evidence,
+                alternatives: bits | effect.bit() | PLACES,
+            },
+            false => Named { effect, candidate, evidence, alternatives: bits },
+        }
+    }
+
+    /// Innovations larger than small things explain, and no suspect; what earlier stretches spoke for
+    /// may be behind it.
+    fn unknown(&self, standing: &Standing) -> Option<Named> {
+        let innovations = standing.cut_innovations;
+        let count = innovations.effective_count();
+        // Twice the log-likelihood ratio of normal innovations of that variance against 1,
+        // in terms of what is believed at most.
+        let excess = innovations.mean_square() / MEAN_SQUARE_MAX;
+        let evidence = count * (excess - 1.0 - excess.ln());
+        let is_there = count > INNOVATIONS_MIN && excess > 1.0 && evidence > self.evidence_min;
+        is_there.then(|| Named {
+            effect: EffectKind::Unknown,
+            candidate: None,
+            evidence,
+            alternatives: bits_of(|candidate| standing.rank[candidate] > self.evidence_min),
+        })
+    }
+}
+
+/// The bits of the effects of those candidates that are so.
+fn bits_of(is_so: impl Fn(usize) -> bool) -> u32 {
+    let so = (BASE..CANDIDATES).filter(|&candidate| is_so(candidate));
+    so.fold(0, |bits, candidate| bits | effect_of(candidate).bit())
+}
+
+/// The effects that are hardly told from the chosen one: by their evidence, or by what they are.
+fn alternatives(chosen: usize, least: f64, standing: &Standing) -> u32 {
+    let Standing { net, rank, .. } = *standing;
+    let effect = effect_of(chosen);
+    // What is there in part in the base model may be sure, and yet not what it looks like.
+    let is_likely = |other: usize| net[other] > least || rank[other] > 0.0;
+    let is_close = |other: usize| is_likely(other) && rank[other] > rank[chosen] - TAKES_OVER_BY;
+    let bits = bits_of(is_close) & !effect.bit();
+    // A profile that is moved is one that is wrong; `explain` tells the two apart.
+    let alike =
+        if effect == EffectKind::GradientError { EffectKind::GradientShift.bit() } else { 0 };
+    bits | alike
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::suspects::{DELAY, WHEEL};
+    use super::*;
+
+    fn after(naming: &mut Naming, blocks: u32, evidence: &[(usize, f64)]) {
+        let mut net = [0.0; CANDIDATES];
+        for &(candidate, value) in evidence {
+            net[candidate] = value;
+        }
+        let cut_innovations = InnovationMonitor::new(100);
+        for _ in 0..blocks {
+            naming.take(&Standing {
+                net: &net,
+                rank: &net,
+                cut_innovations: &cut_innovations,
+                is_new_place: false,
+                is_pressure_raised: false,
+            });
+        }
+    }
+
+    #[test]
+    fn evidence_must_last_and_a_close_rival_is_told() {
+        let mut naming = Naming::new(25.0);
+        after(&mut naming, 1, &[(DELAY, 30.0)]);
+        assert_eq!(naming.named(), None, "a block is no evidence that lasts");
+        after(&mut naming, 1, &[(DELAY, 30.0), (WHEEL, 27.0)]);
+        let named = naming.named().unwrap();
+        assert_eq!(named.effect, EffectKind::ActuatorDelay);
+        assert_eq!(named.alternatives, EffectKind::WheelDiameter.bit());
+        after(&mut naming, 2, &[(DELAY, 30.0), (WHEEL, 60.0)]);
+        let named = naming.named().unwrap();
+        assert_eq!((named.effect, named.alternatives), (EffectKind::WheelDiameter, 0));
+        after(&mut naming, 1, &[(WHEEL, 12.0)]);
+        assert_eq!(naming.named(), None);
+    }
+
+    #[test]
+    fn rows_that_deny_the_effect_end_the_suspicion_however_long_it_stood() {
+        let mut naming = Naming::new(25.0);
+        for _ in 0..1000 {
+            assert!(!naming.has_ended(-1.0));
+        }
+        let rows = (0..100).position(|_| naming.has_ended(1.5)).unwrap();
+        assert!((8..=12).contains(&rows), "{rows}");
+    }
+}
