@@ -15,6 +15,7 @@
 //! - [`state`]: estimates that outlive the daemon
 //! - [`supervision`]: what a supervisor and an operator see of the daemon
 //! - [`survey`]: raw recordings to a dataset on a surveyed line
+//! - [`track_text`]: the text of a line's file
 //! - [`replay`]: recorded runs into the sample channel
 
 pub mod cli;
@@ -31,3 +32,4 @@ pub mod runtime;
 pub mod state;
 pub mod supervision;
 pub mod survey;
+pub mod track_text;
