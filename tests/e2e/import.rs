@@ -6,6 +6,7 @@ use std::path::Path;
 use dynocar::dataset::{load_track, load_train};
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
+use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_tests::browser::Browser;
 use dynocar_tests::process::Site;
 
@@ -64,7 +65,7 @@ fn an_imported_train_is_read_back_with_the_numbers_of_its_source() {
 
     let site = Site::new();
     let told = import(&site, "osrd_each_kg.json", &[]);
-    assert_close(train(&site).resistance.a, 8.0 / 9.80665);
+    assert_close(train(&site).resistance.a, 8.0 / STANDARD_GRAVITY_MPS2);
     assert!(told.contains("for each kg: 4.49 N/kN at 40.0 m/s"), "{told}");
     let site = Site::new();
     import(&site, "osrd_whole.json", &["--mode", "1500V", "--format", "osrd"]);
@@ -108,7 +109,7 @@ fn what_a_file_does_not_tell_is_a_marked_default_unless_somebody_says_it() {
     assert!(!told.contains("defaults"), "{told}");
     let model = train(&site);
     assert_eq!((model.length_m, model.name.as_str()), (74.08, "T 1"));
-    assert_close(model.resistance.a, 2200.0 / (150.0 * 9.80665));
+    assert_close(model.resistance.a, 2200.0 / (150.0 * STANDARD_GRAVITY_MPS2));
 }
 
 #[test]

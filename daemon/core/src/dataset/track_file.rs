@@ -335,7 +335,7 @@ tunnels = [[2200.0, 2900.0]]
                 "track.toml:12: unknown key 'tunnel' in [track]; did you mean 'tunnels'? \
                  (choices: 'name', 'length_m', 'gradient', 'gradient_shift_m', 'gradient_error', \
                  'curves', 'tunnels', 'resistance', 'masses', 'gradient_falling', 'gradient_std', \
-                 'stops', 'alignment', 'alignment_falling')",
+                 'stops', 'permitted_speed', 'alignment', 'alignment_falling')",
             ),
         ];
         for ((from, to), expected) in cases {

@@ -4,10 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use dynocar_core::import::{Imported, Reading, Source, import};
-use dynocar_core::train::TrainModel;
 
 use super::report::Report;
-use super::trainruns::TRAINS;
+use super::trainruns::{THEIR_GRAVITY_MPS2, TRAINS};
 
 /// Largest relative difference from figures that were read off results.
 const TOLERANCE: f64 = 1e-6;
@@ -41,7 +40,7 @@ pub fn check(report: &mut Report, folder: &Path) {
             let found = it.trains.first().ok_or("no train")?;
             let davis = found.resistance.ok_or("no resistance")?;
             let factor = found.rotating_mass_factor.ok_or("no rotating mass")?;
-            let weight_kn = TrainModel::weight_kn(found.mass_kg);
+            let weight_kn = found.mass_kg * THEIR_GRAVITY_MPS2 / 1000.0;
             let pairs = [
                 (found.mass_kg, train.mass_kg),
                 (found.length_m.unwrap_or_default(), train.length_m),

@@ -16,7 +16,7 @@ use dynocar_tests::simulator::driving::{Controls, TrainOnLine, drive};
 use super::report::Report;
 
 /// Gravity in m/s² of TrainRuns.jl.
-const THEIR_GRAVITY_MPS2: f64 = 9.80665;
+pub const THEIR_GRAVITY_MPS2: f64 = 9.80665;
 /// Largest relative difference of a running time.
 const TOLERANCE: f64 = 0.005;
 const STEP_S: f64 = 0.05;
