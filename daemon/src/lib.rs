@@ -16,6 +16,7 @@
 //! - [`storage`]: files that are replaced as a whole
 //! - [`supervision`]: what a supervisor and an operator see of the daemon
 //! - [`survey`]: raw recordings to a dataset on a surveyed line
+//! - [`track_text`]: the text of a line's file
 //! - [`replay`]: recorded runs into the sample channel
 
 pub mod cli;
@@ -33,3 +34,4 @@ pub mod state;
 pub mod storage;
 pub mod supervision;
 pub mod survey;
+pub mod track_text;

@@ -11,6 +11,7 @@ use std::sync::Arc;
 use dynocar::config::DaemonConfig;
 use dynocar::state::{entry::StateContent, file};
 use dynocar_core::dataset::{Dataset, parse_track, parse_train};
+use dynocar_core::import::{Reading, Source, import};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
 use dynocar_core::train::TrainModel;
 use dynocar_shared::{PipelineKind, TrainId, TrainSample};
@@ -28,6 +29,8 @@ pub enum Target {
     Train,
     /// A track file.
     Track,
+    /// A file of another project.
+    Import,
     /// The daemon's configuration.
     Daemon,
     /// The settings of an estimator, and the estimator built from them.
@@ -71,11 +74,12 @@ const CSV: &str = include_str!("../corpus/csv/run.csv");
 
 impl Target {
     /// All of them.
-    pub const ALL: [Target; 8] = [
+    pub const ALL: [Target; 9] = [
         Target::Dataset,
         Target::Csv,
         Target::Train,
         Target::Track,
+        Target::Import,
         Target::Daemon,
         Target::Estimator,
         Target::State,
@@ -103,6 +107,10 @@ impl Target {
                 true
             }),
             Target::Track => parse_track("track.toml", &text).is_ok(),
+            Target::Import => {
+                let source = [Source { label: "file", text: &text }];
+                import(&source, None, &Reading::default()).is_ok()
+            }
             // Names of files in the text lead into the corpus.
             Target::Daemon => {
                 let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo/daemon.toml");

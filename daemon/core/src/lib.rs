@@ -18,11 +18,13 @@
 //! - [`stops`]: what recorded stops say of a brake of unknown force
 //! - [`survey`]: a line and its gradient from recordings with GNSS
 //! - [`explain`]: which undeclared effect explains what the declared model leaves
+//! - [`import`]: trains and lines from other projects' files
 
 pub mod dataset;
 pub mod explain;
 pub mod filter;
 pub mod force;
+pub mod import;
 pub mod pipeline;
 pub mod plausibility;
 pub mod simulate;

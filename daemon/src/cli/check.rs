@@ -2,6 +2,7 @@
 //! understood.
 
 mod daemon;
+mod draw;
 mod json;
 mod report;
 mod runs;
@@ -19,7 +20,7 @@ use dynocar_core::train::TrainModel;
 use super::Failure;
 use crate::config::DaemonConfig;
 use crate::dataset::{self, FileKind, LoadError, file_error, kind_of, read_text};
-use crate::output::{give, require_file, tell, write_json};
+use crate::output::{give, require_file, require_folder, tell, write_json};
 
 /// Validate a dataset, train, track or daemon configuration and say what was understood.
 #[derive(Clone, Debug, Args)]
@@ -29,6 +30,9 @@ pub struct CheckArguments {
     /// Also write the result as JSON; '-' for standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Also draw the line's profile and the train's effort curves as SVG into this folder.
+    #[arg(long, value_name = "FOLDER")]
+    draw: Option<PathBuf>,
 }
 
 /// What was understood.
@@ -50,6 +54,9 @@ pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
     if let Some(file) = json {
         require_file(file, "{")?;
     }
+    if let Some(folder) = &arguments.draw {
+        require_folder(folder)?;
+    }
     let understood = match read(path) {
         Ok(understood) => understood,
         Err(failure) => {
@@ -63,6 +70,9 @@ pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
         }
     };
     give(json, &json::answer(path, &understood), || report::report(&understood))?;
+    if let Some(folder) = &arguments.draw {
+        draw::draw(&understood, folder)?;
+    }
     let errors: Vec<_> = understood.errors().map(ToString::to_string).collect();
     if errors.is_empty() { Ok(()) } else { Err(Failure::Input(errors.join("\ndynocar: "))) }
 }

@@ -1,11 +1,11 @@
 //! `dynocar init`: the first description of a train and of its recordings.
 
+mod daemon_text;
 mod dataset_text;
 mod described;
 mod draft;
 mod paths;
 mod summary;
-mod train_text;
 
 use std::path::{Path, PathBuf};
 
@@ -14,14 +14,17 @@ use dynocar_core::dataset::guess::{Guess, GuessError, GuessProblem, Recording, T
 use dynocar_core::dataset::note::notes;
 use dynocar_core::dataset::units::Unit;
 use dynocar_core::dataset::{MANIFEST_FILE, Place, Quantity};
+use toml::Value;
 
 use super::Failure;
+use super::train_text::{Found, TRAIN_FILE, TrainArguments, TrainText};
 use crate::dataset::{file_error, read_text};
 use crate::output::{print, require_folder, require_new, write_new_in_folder};
-use described::{DAEMON_FILE, Described, TRACK_FILE, TRAIN_FILE};
+use crate::track_text::TRACK_FILE;
+use described::{DAEMON_FILE, Described};
 use draft::Draft;
-use train_text::{TrainArguments, TrainText};
 
+const WRITER: &str = "dynocar init";
 /// Units that the values did not tell are set right so many times at most.
 const CORRECTIONS_MAX: usize = 4;
 
@@ -60,12 +63,12 @@ pub fn execute(arguments: &InitArguments) -> Result<(), Failure> {
         require_new(&folder.join(name))?;
     }
     let has_track = folder.join(TRACK_FILE).is_file();
-    let mut train = arguments.train.text(None)?;
+    let mut train = arguments.train.text(WRITER, &Found::default())?;
     let described = match with_dataset {
         true => Some(describe(arguments, &mut train, has_track)?),
         false => None,
     };
-    let daemon = train_text::daemon(has_track);
+    let daemon = daemon_text::daemon(has_track);
     let mut files = vec![(TRAIN_FILE, train.text.as_str()), (DAEMON_FILE, daemon.as_str())];
     files.extend(described.as_ref().map(|it| (MANIFEST_FILE, it.text.as_str())));
     write_new_in_folder(folder, &files)?;
@@ -93,7 +96,9 @@ fn describe(
         false => None,
     };
     if let Some(mass_t) = recorded_mass_t(&guess) {
-        *train = arguments.train.text(Some(mass_t))?;
+        let from = "t, the middle of the mass that the recordings hold".into();
+        let figures = vec![("mass_t", Value::Float(mass_t), from)];
+        *train = arguments.train.text(WRITER, &Found { figures, traction: None })?;
     }
     let name = dataset_text::name_of(&arguments.folder);
     let mut corrections = 0;

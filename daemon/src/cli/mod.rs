@@ -10,6 +10,7 @@ mod explain;
 mod failure;
 mod health;
 mod identify;
+mod import;
 mod init;
 mod man;
 mod replay;
@@ -17,6 +18,7 @@ mod run;
 mod stops;
 mod survey;
 mod text;
+mod train_text;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -39,6 +41,7 @@ struct Arguments {
 enum Command {
     Demo(demo::DemoArguments),
     Init(init::InitArguments),
+    Import(import::ImportArguments),
     Explain(explain::ExplainArguments),
     Run(run::RunArguments),
     Health(health::HealthArguments),
@@ -62,7 +65,8 @@ impl Command {
             Command::Survey(arguments) => arguments.json.as_deref(),
             // `check` has an answer of its own for what is wrong.
             Command::Check(_) | Command::Run(_) | Command::Health(_) | Command::Replay(_) => None,
-            Command::Init(_) | Command::Completions(_) | Command::Man(_) => None,
+            Command::Init(_) | Command::Import(_) => None,
+            Command::Completions(_) | Command::Man(_) => None,
         }
     }
 }
@@ -76,6 +80,7 @@ pub fn main() -> ExitCode {
     let result: Result<(), Failure> = match &arguments.command {
         Command::Demo(arguments) => demo::execute(arguments),
         Command::Init(arguments) => init::execute(arguments),
+        Command::Import(arguments) => import::execute(arguments),
         Command::Explain(arguments) => explain::execute(arguments),
         Command::Run(arguments) => run::execute(arguments),
         Command::Health(arguments) => health::execute(arguments),

@@ -92,6 +92,32 @@ pub fn short(value: f64, decimals: usize) -> String {
     if text == "-0" { "0".into() } else { text.into() }
 }
 
+/// Words without line breaks and other marks that would end a line.
+pub fn on_one_line(words: &str) -> String {
+    words.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
+}
+
+/// A comment of a TOML file, in lines that begin alike.
+pub fn comment(indent: &str, words: &str) -> String {
+    let lines = wrap(&on_one_line(words), WIDTH - indent.len());
+    lines.iter().map(|line| format!("# {indent}{line}\n")).collect()
+}
+
+/// A sentence that begins with its subject, the lines after the first further in.
+pub fn entry(indent: &str, words: &str) -> String {
+    let lines = wrap(words, WIDTH - indent.len());
+    format!("{indent}{}\n", lines.join(&format!("\n{indent}  ")))
+}
+
+/// A path as a shell takes it.
+pub fn for_shell(path: &str) -> String {
+    let is_plain = |letter: char| letter.is_alphanumeric() || "/._-+@%:,".contains(letter);
+    if !path.is_empty() && path.chars().all(is_plain) {
+        return path.into();
+    }
+    format!("'{}'", path.replace('\'', "'\\''"))
+}
+
 /// An entry: a key and what is said of it, broken into lines.
 pub fn line(key: &str, value: &str) -> String {
     let mut lines = wrap(value, WIDTH - KEY_WIDTH).into_iter();
@@ -119,6 +145,13 @@ mod tests {
     fn text_is_wrapped_between_words() {
         assert_eq!(wrap("a bb ccc  dddd", 6), ["a bb", "ccc", "dddd"]);
         assert_eq!(wrap("", 10), [] as [String; 0]);
+    }
+
+    #[test]
+    fn paths_are_quoted_for_a_shell_where_they_must_be() {
+        assert_eq!(for_shell("a/b-1.toml"), "a/b-1.toml");
+        assert_eq!(for_shell("my train"), "'my train'");
+        assert_eq!(for_shell("it's"), "'it'\\''s'");
     }
 
     #[test]

@@ -13,6 +13,7 @@ use super::material::Material;
 use super::trip_rows::{Column, columns, run_csv};
 use crate::dataset::open;
 use crate::output::{require_file, write_in_folder};
+use crate::track_text::TrackText;
 
 /// Length of the beginning by which a file of a survey is known.
 const MARK_LENGTH: usize = 20;
@@ -182,30 +183,20 @@ fn track_toml(material: &Material) -> String {
     let Some(profile) = &survey.profile else { return String::new() };
     let ways = &survey.ways;
     let length_m = ways.chainage_per_m * ways.growing.length_m();
-    let name = Value::String(format!("{}, surveyed", material.dataset.name)).to_string();
-    let mut text = format!(
-        "{MARK} from {} passes.\n[track]\nname = {name}\n\
-         length_m = {length_m:.1}\nalignment = \"alignment.csv\"\n",
-        profile.trips.len()
-    );
-    let mut list = |key: &str, entries: &mut dyn Iterator<Item = String>| {
-        let _ = writeln!(text, "{key} = [");
-        for entry in entries {
-            let _ = writeln!(text, "  [{entry}],");
-        }
-        text += "]\n";
-    };
+    let name = Value::String(format!("{}, surveyed", material.dataset.name));
+    let mut text = TrackText::new(&format!("{MARK} from {} passes.\n", profile.trips.len()));
+    text.value("name", name);
+    text.value("length_m", format!("{length_m:.1}"));
+    text.value("alignment", "\"alignment.csv\"");
     let growing = gradient_entries(survey, profile, 1);
     let bounded = |gradient: f64| gradient.clamp(-149.0, 149.0);
-    list("gradient", &mut growing.iter().map(|it| format!("{:.2}, {:.3}", it.0, bounded(it.1))));
-    list(
-        "gradient_std",
-        &mut growing.iter().step_by(5).map(|it| format!("{:.2}, {:.3}", it.0, it.2.min(149.0))),
-    );
+    let entry = |it: &(f64, f64, f64)| format!("{:.2}, {:.3}", it.0, bounded(it.1));
+    text.list("gradient", growing.iter().map(entry));
+    let stds = growing.iter().step_by(5);
+    text.list("gradient_std", stds.map(|it| format!("{:.2}, {:.3}", it.0, it.2.min(149.0))));
     if !ways.is_one_track() {
         let falling = gradient_entries(survey, profile, -1);
-        let entry = |it: &(f64, f64, f64)| format!("{:.2}, {:.3}", it.0, bounded(it.1));
-        list("gradient_falling", &mut falling.iter().map(entry));
+        text.list("gradient_falling", falling.iter().map(entry));
     }
     if ways.is_one_track() {
         let per_m = ways.chainage_per_m;
@@ -213,17 +204,17 @@ fn track_toml(material: &Material) -> String {
             let (from_m, to_m) = (per_m * curve.from_m, per_m * curve.to_m);
             format!("{from_m:.1}, {to_m:.1}, {:.1}", curve.radius_m)
         };
-        list("curves", &mut profile.curves.iter().map(entry));
+        text.list("curves", profile.curves.iter().map(entry));
     }
     let stop = |stop: &dynocar_core::survey::stops::Stop| {
         let name = Value::String(stop.name.clone()).to_string();
         format!("{:.1}, {name}", stop.chainage_m.value)
     };
-    list("stops", &mut survey.stops.iter().map(stop));
+    text.list("stops", survey.stops.iter().map(stop));
     if !ways.is_one_track() {
-        text += "alignment_falling = \"alignment_falling.csv\"\n";
+        text.value("alignment_falling", "\"alignment_falling.csv\"");
     }
-    text
+    text.into_text()
 }
 
 fn alignment(survey: &Survey, direction: i8) -> String {

@@ -102,7 +102,7 @@ pub enum Problem {
     /// The text does not follow the language.
     #[error("not valid {language}: {message}")]
     Syntax {
-        /// `TOML` or `CSV`.
+        /// `TOML`, `CSV`, `YAML` or `JSON`.
         language: &'static str,
         /// The parser's words.
         message: String,

@@ -34,6 +34,7 @@ pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
         "gradient_falling",
         "gradient_std",
         "stops",
+        "permitted_speed",
         "alignment",
         "alignment_falling",
     ])?;
@@ -86,9 +87,32 @@ fn with_survey(track: Track, section: &Section) -> Result<Track, DatasetError> {
         gradient_falling: profile("gradient_falling", -GRADIENT_MAX_PERMILLE)?,
         gradient_std_permille: profile("gradient_std", 0.0)?,
         stops: section.named_chainages("stops")?,
+        permitted_speed_mps: permitted_speed(section)?,
         alignment: section.text("alignment")?.map(Into::into),
         alignment_falling: section.text("alignment_falling")?.map(Into::into),
     }))
+}
+
+/// The list of [chainage_m, speed_mps] under `permitted_speed`.
+fn permitted_speed(section: &Section) -> Result<Option<StepProfile>, DatasetError> {
+    const KEY: &str = "permitted_speed";
+    let Some(entries) = section.entries::<2>(KEY, "[chainage_m, speed_mps]")? else {
+        return Ok(None);
+    };
+    for (index, ([_, speed_mps], place)) in entries.iter().enumerate() {
+        if !(*speed_mps > 0.0 && *speed_mps <= 200.0) {
+            let key = format!("{} entry {}", section.full(KEY), index + 1);
+            let (value, allowed) =
+                (speed_mps.to_string(), "a speed in m/s above 0, at most 200".into());
+            return Err(place.clone().problem(Problem::OutOfRange { key, value, allowed }));
+        }
+    }
+    let list: Vec<(f64, f64)> =
+        entries.into_iter().map(|([at_m, speed], _)| (at_m, speed)).collect();
+    let made = StepProfile::new(&list).map_err(|error| {
+        section.place_of(KEY).problem(Problem::Track(TrackError::PermittedSpeed(error)))
+    })?;
+    Ok(Some(made))
 }
 
 /// Adds what measured runs have shown of the line: resistance at places, other masses in sections.
@@ -156,6 +180,7 @@ impl Places {
             TrackError::Gradient(
                 ProfileError::NotFinite { index, .. } | ProfileError::NotIncreasing { index, .. },
             ) => (&self.gradient, *index),
+            TrackError::PermittedSpeed(_) => return section.place_of("permitted_speed"),
             TrackError::BadRadius { index, .. } => (&self.curves, *index),
             TrackError::BadInterval { list, index, .. } => (self.list(list), *index),
             TrackError::Overlap { list, index, .. } => {
@@ -242,12 +267,25 @@ tunnels = [[2200.0, 2900.0]]
     fn what_a_survey_adds_is_read() {
         let text = FULL.to_string()
             + "gradient_falling = [[0.0, 1.5]]\ngradient_std = [[0.0, 0.4]]\n\
-               stops = [[120.0, \"Depot\"], [2900, \"\"]]\nalignment = \"alignment.csv\"\n";
+               stops = [[120.0, \"Depot\"], [2900, \"\"]]\nalignment = \"alignment.csv\"\n\
+               permitted_speed = [[0.0, 22.5], [1500, 11]]\n";
         let track = parse_track("track.toml", &text).unwrap();
         assert_eq!(track.gradient_towards_permille(-1.0, 1300.0, 0.0), Some(1.5));
         let survey = track.survey();
         assert_eq!(survey.stops, [(120.0, "Depot".into()), (2900.0, String::new())]);
         assert_eq!(survey.alignment.as_deref(), Some("alignment.csv"));
+        let permitted = survey.permitted_speed_mps.as_ref().map(|it| it.value_at(1600.0));
+        assert_eq!(permitted, Some(11.0));
+        assert_eq!(
+            refusal(&text.replace("[1500, 11]", "[1500, 0]")),
+            "track.toml:17: track.permitted_speed entry 2 = 0: expected a speed in m/s above 0, at \
+             most 200"
+        );
+        assert_eq!(
+            refusal(&text.replace("[1500, 11]", "[0, 11]")),
+            "track.toml:17: permitted_speed: entry 2: expected a chainage above the one before (0 m), \
+             got 0 m"
+        );
         assert_eq!(
             refusal(&text.replace("[[0.0, 0.4]]", "[[0.0, -0.4]]")),
             "track.toml:14: track.gradient_std entry 1 = -0.4: expected from 0 to 150 permille"
@@ -297,7 +335,7 @@ tunnels = [[2200.0, 2900.0]]
                 "track.toml:12: unknown key 'tunnel' in [track]; did you mean 'tunnels'? \
                  (choices: 'name', 'length_m', 'gradient', 'gradient_shift_m', 'gradient_error', \
                  'curves', 'tunnels', 'resistance', 'masses', 'gradient_falling', 'gradient_std', \
-                 'stops', 'alignment', 'alignment_falling')",
+                 'stops', 'permitted_speed', 'alignment', 'alignment_falling')",
             ),
         ];
         for ((from, to), expected) in cases {

@@ -10,7 +10,7 @@ mod profile;
 pub use entries::{Curve, MassSection, Tunnel};
 pub use profile::{LinearProfile, ProfileError, StepProfile};
 
-/// What a survey adds to a line.
+/// What is known of a line beside its profile: by a survey, or from another project's files.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrackSurvey {
     /// Gradient for falling chainage as (chainage in m, ‰ climbing positive as the chainage
@@ -20,6 +20,8 @@ pub struct TrackSurvey {
     pub gradient_std_permille: Option<StepProfile>,
     /// Stops: chainage in m and name.
     pub stops: Vec<(f64, String)>,
+    /// Permitted speed in m/s; nothing but drawings uses it.
+    pub permitted_speed_mps: Option<StepProfile>,
     /// Path of the file that holds the way on the map.
     pub alignment: Option<String>,
     /// The same for falling chainage, where it is another way.
@@ -32,6 +34,9 @@ pub enum TrackError {
     /// The gradient list breaks a rule of profiles.
     #[error("gradient: {0}")]
     Gradient(ProfileError),
+    /// The list of permitted speeds breaks a rule of profiles.
+    #[error("permitted_speed: {0}")]
+    PermittedSpeed(ProfileError),
     /// An interval is empty, reversed or not finite.
     #[error(
         "{list} entry {index}: expected start < end, both within a million km, got {start_m} m to \

@@ -241,6 +241,14 @@ fn track(track: &Track) -> String {
             }
         },
     );
+    let survey = track.survey();
+    if !survey.stops.is_empty() {
+        text += &line("stops", &survey.stops.len().to_string());
+    }
+    if let Some(permitted) = &survey.permitted_speed_mps {
+        let (low, high) = range(permitted.entries().map(|(_, speed_mps)| 3.6 * speed_mps));
+        text += &line("permitted", &format!("{} to {} km/h", short(low, 1), short(high, 1)));
+    }
     if track.gradient_shift_m() != 0.0 {
         let shift = short(track.gradient_shift_m(), 1);
         text += &line("shift", &format!("the gradient lies {shift} m further"));

@@ -5,11 +5,9 @@ use std::path::Path;
 use dynocar_core::dataset::guess::{Guess, GuessedColumn};
 use toml::Value;
 
-use super::described::{TRACK_FILE, TRAIN_FILE};
-use crate::cli::text::wrap;
-
-/// Widest line of a comment.
-const COMMENT_WIDTH: usize = 96;
+use crate::cli::text::comment;
+use crate::cli::train_text::TRAIN_FILE;
+use crate::track_text::TRACK_FILE;
 
 /// A name for a dataset: its folder's.
 pub fn name_of(folder: &Path) -> String {
@@ -84,15 +82,6 @@ fn column_text(column: &GuessedColumn) -> String {
     };
     let (name, unit) = (quoted(&column.name.text), quoted(column.unit.name()));
     text + &format!("{} = {{ column = {name}, unit = {unit}{scale} }}\n", column.quantity)
-}
-
-/// A comment in lines that begin alike.
-fn comment(indent: &str, words: &str) -> String {
-    // A name may hold marks that would end the line.
-    let words: String =
-        words.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect();
-    let lines = wrap(&words, COMMENT_WIDTH - indent.len());
-    lines.iter().map(|line| format!("# {indent}{line}\n")).collect()
 }
 
 /// A text as TOML writes it, on one line.

@@ -3,12 +3,8 @@
 use dynocar_core::dataset::Note;
 use dynocar_core::dataset::guess::Guess;
 
-/// Name of the train's file.
-pub const TRAIN_FILE: &str = "train.toml";
 /// Name of the daemon's configuration.
 pub const DAEMON_FILE: &str = "daemon.toml";
-/// Name of the line's file, which is taken up where the folder has one.
-pub const TRACK_FILE: &str = "track.toml";
 
 /// What was understood of the recordings.
 pub struct Described {

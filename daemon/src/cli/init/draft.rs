@@ -5,8 +5,9 @@ use std::path::Path;
 use dynocar_core::dataset::guess::Recording;
 use dynocar_core::dataset::{DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Run};
 
-use super::described::{TRACK_FILE, TRAIN_FILE};
 use crate::cli::Failure;
+use crate::cli::train_text::TRAIN_FILE;
+use crate::track_text::TRACK_FILE;
 
 /// The texts of a dataset's files.
 pub struct Draft<'t> {

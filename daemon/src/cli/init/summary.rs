@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use super::described::{DAEMON_FILE, Described, TRAIN_FILE};
-use super::train_text::TrainText;
-use crate::cli::text::{TextTable, WIDTH, notes, wrap};
+use super::described::{DAEMON_FILE, Described};
+use crate::cli::text::{TextTable, entry, for_shell, notes};
+use crate::cli::train_text::{TRAIN_FILE, TrainText};
 use dynocar_core::dataset::MANIFEST_FILE;
 
 /// What was written, understood and is left to do.
@@ -67,17 +67,12 @@ fn recordings(described: &Described) -> String {
     text + &notes(&described.notes)
 }
 
-fn entry(indent: &str, words: &str) -> String {
-    let lines = wrap(words, WIDTH - indent.len());
-    format!("{indent}{}\n", lines.join(&format!("\n{indent}  ")))
-}
-
 /// The commands that come next.
 fn next(folder: &Path, described: Option<&Described>) -> String {
-    let at = |name: &str| quoted(&folder.join(name).display().to_string());
+    let at = |name: &str| for_shell(&folder.join(name).display().to_string());
     let mut commands = Vec::new();
     if described.is_some() {
-        let folder = quoted(&folder.display().to_string());
+        let folder = for_shell(&folder.display().to_string());
         commands.push((format!("dynocar check {}", at(MANIFEST_FILE)), "what was understood"));
         commands.push((format!("dynocar identify {folder}"), "resistance and mass from the runs"));
         let report = at("report.html");
@@ -92,25 +87,4 @@ fn next(folder: &Path, described: Option<&Described>) -> String {
         text += &format!("  {command}    # {what}\n");
     }
     text
-}
-
-/// A path as a shell takes it.
-fn quoted(path: &str) -> String {
-    let is_plain = |letter: char| letter.is_alphanumeric() || "/._-+@%:,".contains(letter);
-    if !path.is_empty() && path.chars().all(is_plain) {
-        return path.into();
-    }
-    format!("'{}'", path.replace('\'', "'\\''"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn paths_are_quoted_for_a_shell_where_they_must_be() {
-        assert_eq!(quoted("a/b-1.toml"), "a/b-1.toml");
-        assert_eq!(quoted("my train"), "'my train'");
-        assert_eq!(quoted("it's"), "'it'\\''s'");
-    }
 }

@@ -5,7 +5,9 @@
 //! replaces each by a variable ([`colour_rules`]), so that they follow the reader's scheme.
 
 mod axes;
+pub mod effort;
 pub mod gradient;
+pub mod line;
 pub mod panel;
 pub mod runs;
 pub mod speeds;

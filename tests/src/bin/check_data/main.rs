@@ -1,13 +1,15 @@
 //! Checks Dynocar against a folder of recorded and simulated data: every dataset loads, the
 //! resistance that `dynocar identify` finds is the true one where the truth is known, and the
 //! forward simulation comes out where other simulators do; what is undeclared in them is found,
-//! offline and live; a bus's line is surveyed and predicts trips that took no part in it.
+//! offline and live; a bus's line is surveyed and predicts trips that took no part in it; files of other
+//! projects are imported, and their invalid ones refused.
 //!
-//! `dynocar-check-data FOLDER`, with the folders `practice`, `practice-truth`, `independent` and
-//! `measured` in it. Exit status 1 when a check fails.
+//! `dynocar-check-data FOLDER`, with the folders `practice`, `practice-truth`, `independent`,
+//! `measured` and `imports` in it. Exit status 1 when a check fails.
 
 mod bus;
 mod explaining;
+mod imports;
 mod monitor;
 mod report;
 mod resistance;
@@ -34,6 +36,7 @@ fn main() -> ExitCode {
     resistance::check(&mut report, &folder);
     simulation::check(&mut report, &folder);
     trainruns::check(&mut report, &folder.join("independent/trainruns"));
+    imports::check(&mut report, &folder);
     explaining::check(&mut report, &folder);
     monitor::check(&mut report, &folder);
     stops::check(&mut report, &folder);

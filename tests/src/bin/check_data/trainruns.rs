@@ -16,25 +16,27 @@ use dynocar_tests::simulator::driving::{Controls, TrainOnLine, drive};
 use super::report::Report;
 
 /// Gravity in m/s² of TrainRuns.jl.
-const THEIR_GRAVITY_MPS2: f64 = 9.80665;
+pub const THEIR_GRAVITY_MPS2: f64 = 9.80665;
 /// Largest relative difference of a running time.
 const TOLERANCE: f64 = 0.005;
 const STEP_S: f64 = 0.05;
 
-struct TheirTrain {
-    name: &'static str,
-    length_m: f64,
+/// A train of theirs, loaded to its limit.
+pub struct TheirTrain {
+    pub name: &'static str,
+    pub length_m: f64,
     /// Inertial mass in kg.
-    inertia_kg: f64,
+    pub inertia_kg: f64,
     /// Mass in kg that the gradient pulls at.
-    mass_kg: f64,
+    pub mass_kg: f64,
     /// Resistance in N, N/(m/s) and N/(m/s)².
-    resistance: [f64; 3],
+    pub resistance: [f64; 3],
     braking_mps2: f64,
     speed_max_mps: f64,
 }
 
-const TRAINS: [TheirTrain; 3] = [
+/// Their trains, as their results tell them.
+pub const TRAINS: [TheirTrain; 3] = [
     TheirTrain {
         name: "freight",
         length_m: 204.72,

@@ -1,0 +1,161 @@
+//! railtoolkit's running paths: sections of permitted speed and resistance. The schema of 2022.05 writes
+//! a section as a list, the later main as keys and values, of which speed or resistance may be missing.
+
+use super::error::{ImportError, ImportProblem};
+use super::imported::{Account, ImportedLine};
+use super::item::Item;
+use crate::dataset::Place;
+
+const SECTIONS: &str = "characteristic_sections";
+/// Reasons for fields that have no place.
+const WITHOUT_PLACE: [(&str, &str); 3] = [
+    ("UUID", "track.toml holds no identifier"),
+    ("description", "track.toml holds no description"),
+    ("points_of_interest", "points where a run is to be measured, no stops"),
+];
+
+/// A section: from `position_m` on, until the next.
+struct Section {
+    position_m: f64,
+    speed_mps: Option<f64>,
+    resistance_permille: Option<f64>,
+}
+
+/// The paths of a file.
+pub(super) fn lines(root: &Item) -> Result<Vec<ImportedLine>, ImportError> {
+    let mut seen: Vec<(&str, usize)> = Vec::new();
+    let mut lines = Vec::new();
+    for item in root.need("paths", "a list of paths")?.list("paths", 1)? {
+        let id = item.need("id", "an identifier")?.text("an identifier")?;
+        if let Some(&(_, first_line)) = seen.iter().find(|(other, _)| *other == id) {
+            let (key, id) = (item.full("id"), id.into());
+            return Err(item.wrong(ImportProblem::Repeated { key, id, first_line }));
+        }
+        seen.push((id, item.line()));
+        lines.push(line(&item, id)?);
+    }
+    Ok(lines)
+}
+
+fn line(item: &Item, id: &str) -> Result<ImportedLine, ImportError> {
+    let list = item.need(SECTIONS, "a list of sections")?;
+    let items = list.list("sections", 2)?;
+    // The names became optional with the keys.
+    let name = match (item.get("name"), items[0].is_list()) {
+        (Some(name), _) => name.text("a name")?,
+        (None, true) => item.need("name", "a name")?.text("a name")?,
+        (None, false) => id,
+    };
+    let mut account = Account::default();
+    let mut sections: Vec<Section> = Vec::new();
+    for item in &items {
+        let section = if item.is_map() { by_keys(item)? } else { by_place(item)? };
+        if item.is_map() {
+            let known = ["position", "speed", "resistance"];
+            account.rest("paths.characteristic_sections.", item.keys(), &known, &[]);
+        }
+        let before = sections.last().map(|before| before.position_m);
+        if let Some(before_m) = before.filter(|before_m| section.position_m <= *before_m) {
+            let allowed = format!("a position above the one before ({before_m} m)");
+            return Err(item.out_of_range(&format!("{} m", section.position_m), &allowed));
+        }
+        sections.push(section);
+    }
+    let (first_m, last_m) = (sections[0].position_m, sections[sections.len() - 1].position_m);
+    let positions = "paths.characteristic_sections.position";
+    account.taken(positions, "length_m", "m, the last less the first");
+    let resistance = "paths.characteristic_sections.resistance";
+    let gradient = steps(&sections, |it| it.resistance_permille);
+    match gradient.first() {
+        Some(&(from_m, _)) => {
+            let how = format!("‰, whatever resists{}", since(from_m, first_m));
+            account.taken(resistance, "gradient", how);
+        }
+        None => account.unknown("gradient", "no section has a resistance"),
+    }
+    let permitted = steps(&sections, |it| it.speed_mps);
+    match permitted.first() {
+        Some(&(from_m, _)) => {
+            let how = format!("km/h / 3.6{}", since(from_m, first_m));
+            let speed = "paths.characteristic_sections.speed";
+            account.taken(speed, "permitted_speed", how);
+        }
+        None => account.unknown("permitted_speed", "no section has a speed"),
+    }
+    account.unknown("curves", "the format has none: its resistance holds theirs with the gradient");
+    account.unknown("tunnels", "the format has none");
+    account.unknown("stops", "the format has none");
+    account.rest("paths.", item.keys(), &["id", "name", SECTIONS], &WITHOUT_PLACE);
+    Ok(ImportedLine {
+        id: id.into(),
+        place: Place::line(item.label(), item.line()),
+        name: name.into(),
+        length_m: last_m - first_m,
+        gradient: Some(gradient).filter(|list| !list.is_empty()),
+        curves: None,
+        stops: Vec::new(),
+        permitted_speed: Some(permitted).filter(|list| !list.is_empty()),
+        account,
+    })
+}
+
+/// The values where they change; the last section only ends the line.
+fn steps(sections: &[Section], value: impl Fn(&Section) -> Option<f64>) -> Vec<(f64, f64)> {
+    let mut steps: Vec<(f64, f64)> = Vec::new();
+    for section in &sections[..sections.len() - 1] {
+        let Some(value) = value(section) else { continue };
+        if steps.last().is_none_or(|last| last.1 != value) {
+            steps.push((section.position_m, value));
+        }
+    }
+    steps
+}
+
+/// What is to be said where a list begins after the line does.
+fn since(from_m: f64, first_m: f64) -> String {
+    if from_m == first_m {
+        return String::new();
+    }
+    format!("; the file tells it from {from_m} m on, and the first value holds before it too")
+}
+
+const POSITION: &str = "a position in m, within 1e9";
+const SPEED: &str = "a speed in km/h above 0, at most 720";
+const RESISTANCE: &str = "a resistance in permil from -150 to 150";
+
+fn position_m(item: &Item) -> Result<f64, ImportError> {
+    item.number(POSITION, |it| it.abs() <= 1e9)
+}
+
+fn speed_mps(item: &Item) -> Result<f64, ImportError> {
+    Ok(item.number(SPEED, |it| it > 0.0 && it <= 720.0)? / 3.6)
+}
+
+fn permille(item: &Item) -> Result<f64, ImportError> {
+    item.number(RESISTANCE, |it| it.abs() <= 150.0)
+}
+
+/// A section as `[m, km/h, ‰]`.
+fn by_place(item: &Item) -> Result<Section, ImportError> {
+    let [position, speed, resistance] =
+        item.tuple("[position m, speed km/h, resistance permil]")?;
+    Ok(Section {
+        position_m: position_m(&position)?,
+        speed_mps: Some(speed_mps(&speed)?),
+        resistance_permille: Some(permille(&resistance)?),
+    })
+}
+
+/// A section as keys and values.
+fn by_keys(item: &Item) -> Result<Section, ImportError> {
+    let speed = item.get("speed").map(|it| speed_mps(&it)).transpose()?;
+    let resistance = item.get("resistance").map(|it| permille(&it)).transpose()?;
+    if speed.is_none() && resistance.is_none() {
+        item.need("speed", "a speed in km/h, or a resistance in permil")?;
+    }
+    Ok(Section {
+        position_m: position_m(&item.need("position", POSITION)?)?,
+        speed_mps: speed,
+        resistance_permille: resistance,
+    })
+}
