@@ -213,12 +213,12 @@ fn write_new(path: &Path, content: &str) -> io::Result<()> {
 /// # Errors
 ///
 /// When it cannot be written; the file there was stays as it is.
-pub fn write_file(path: &Path, content: &str) -> Result<(), OutputError> {
+pub fn write_file(path: &Path, content: impl AsRef<[u8]>) -> Result<(), OutputError> {
     let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.into());
     let known = std::fs::metadata(&target).ok();
     let written = match known {
         Some(known) if !known.is_file() => std::fs::write(&target, content),
-        known => replace(&target, known.as_ref(), content.as_bytes()),
+        known => replace(&target, known.as_ref(), content.as_ref()),
     };
     written.map_err(|source| OutputError::File { path: path.into(), source })
 }
