@@ -2,9 +2,9 @@
 # Builds dynocar_<version>_<arch>.deb from the release binaries.
 # usage: build.sh [--program FILE] [--libraries FOLDER] [--out FOLDER]
 #   --program    the program, default target/release/dynocar
-#   --libraries  where libdynocar_client.a and .so lie, default target/release
+#   --libraries  where libdynocar_client.a, .so and libdynocar_fmu.so lie, default target/release
 #   --out        where the package goes, default target/debian
-# Build first: cargo build --release -p dynocar && cargo build --release -p dynocar-client
+# Build first: cargo build --release -p dynocar && cargo build --release -p dynocar-client -p dynocar-fmu
 set -eu
 
 here=$(cd "$(dirname "$0")" && pwd)
@@ -29,7 +29,8 @@ while [ $# -gt 0 ]; do
     shift 2
 done
 
-for file in "$program" "$libraries/libdynocar_client.a" "$libraries/libdynocar_client.so"; do
+for file in "$program" "$libraries/libdynocar_client.a" "$libraries/libdynocar_client.so" \
+    "$libraries/libdynocar_fmu.so"; do
     [ -f "$file" ] || fail "$file: no such file; build it with cargo build --release"
 done
 for tool in dpkg dpkg-deb gzip; do
@@ -63,9 +64,11 @@ gzip -9n "$root"/usr/share/man/man1/*.1
 put "$project/client/include/dynocar.h" usr/include/dynocar.h
 put "$libraries/libdynocar_client.a" usr/lib/libdynocar_client.a
 put "$libraries/libdynocar_client.so" usr/lib/libdynocar_client.so
+put "$libraries/libdynocar_fmu.so" usr/lib/dynocar/libdynocar_fmu.so
 put "$project/client/python/dynocar.py" usr/lib/python3/dist-packages/dynocar.py
 if command -v strip >/dev/null; then
-    strip --strip-unneeded "$root/usr/bin/dynocar" "$root/usr/lib/libdynocar_client.so"
+    strip --strip-unneeded "$root/usr/bin/dynocar" "$root/usr/lib/libdynocar_client.so" \
+        "$root/usr/lib/dynocar/libdynocar_fmu.so"
     strip --strip-debug "$root/usr/lib/libdynocar_client.a"
 fi
 

@@ -6,6 +6,7 @@
 //! - [`config`]: the daemon's configuration
 //! - [`dataset`]: recorded runs from disk
 //! - [`identify`]: the pipelines over recorded runs
+//! - [`fmu`]: the estimators as an FMU
 //! - [`grown`]: the model with its effects as train and track files
 //! - [`output`]: where results go
 //! - [`report`]: an explanation as a page of HTML
@@ -23,6 +24,7 @@ pub mod cli;
 pub mod config;
 pub mod dataset;
 pub mod demo;
+pub mod fmu;
 pub mod grown;
 pub mod identify;
 pub mod output;

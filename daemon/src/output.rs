@@ -201,12 +201,12 @@ pub fn write_new_in_folder(folder: &Path, files: &[(&str, &str)]) -> Result<(), 
 /// # Errors
 ///
 /// When it cannot be written; the file there was stays as it is.
-pub fn write_file(path: &Path, content: &str) -> Result<(), OutputError> {
+pub fn write_file(path: &Path, content: impl AsRef<[u8]>) -> Result<(), OutputError> {
     let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.into());
     let known = std::fs::metadata(&target).ok();
     let written = match known {
         Some(known) if !known.is_file() => std::fs::write(&target, content),
-        known => replace(&target, known, content.as_bytes()),
+        known => replace(&target, known, content.as_ref()),
     };
     written.map_err(|source| OutputError::File { path: path.into(), source })
 }

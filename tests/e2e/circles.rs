@@ -194,7 +194,15 @@ impl Package {
 #[test]
 fn imports_between_files_run_one_way() {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    for root in ["shared/src", "client/src", "daemon/core/src", "daemon/src", "bench/src"] {
+    let roots = [
+        "shared/src",
+        "client/src",
+        "daemon/core/src",
+        "daemon/fmu/src",
+        "daemon/src",
+        "bench/src",
+    ];
+    for root in roots {
         let package = Package::read(&workspace.join(root));
         assert!(package.imports.len() > 5, "the sources of {root} were found");
         let known: Vec<&[&str]> =

@@ -48,6 +48,11 @@ fn what_a_controller_links_pulls_in_no_estimator() {
 }
 
 #[test]
+fn what_a_simulator_loads_has_no_channel() {
+    assert_free_of("dynocar-fmu", &["iceoryx2", "dynocar-client", "tracing", "rustix", "clap"]);
+}
+
+#[test]
 fn the_contract_depends_on_nothing() {
     assert_eq!(dependencies("dynocar-shared"), ["dynocar-shared"]);
 }

@@ -15,13 +15,14 @@ use commands::{DYNOCAR, done, dynocar, said};
 use support::{client_directory, compiler, library_directory, must_succeed, require};
 
 /// What the package must hold, for the program that is tested.
-const FILES: [&str; 15] = [
+const FILES: [&str; 16] = [
     "usr/bin/dynocar",
     "usr/lib/systemd/system/dynocar.service",
     "usr/lib/sysusers.d/dynocar.conf",
     "usr/include/dynocar.h",
     "usr/lib/libdynocar_client.a",
     "usr/lib/libdynocar_client.so",
+    "usr/lib/dynocar/libdynocar_fmu.so",
     "usr/lib/python3/dist-packages/dynocar.py",
     "usr/share/bash-completion/completions/dynocar",
     "usr/share/zsh/vendor-completions/_dynocar",
@@ -99,6 +100,9 @@ fn the_package_is_built_installed_and_runs() {
     for file in ["daemon.toml", "train.toml"] {
         must_succeed(Command::new(&program).arg("check").arg(root.join("etc/dynocar").join(file)));
     }
+    let fmu = folder.path().join("dynocar.fmu");
+    must_succeed(Command::new(&program).arg("fmu").arg("-o").arg(&fmu));
+    assert!(fmu.is_file(), "the library is found where the package puts it");
     let unit = std::fs::read_to_string(root.join(FILES[1])).unwrap();
     let keys: HashMap<&str, &str> = unit.lines().filter_map(|line| line.split_once('=')).collect();
     assert_eq!(keys["ExecStart"], "/usr/bin/dynocar run --config /etc/dynocar/daemon.toml");

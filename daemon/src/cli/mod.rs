@@ -8,6 +8,7 @@ mod completions;
 mod demo;
 mod explain;
 mod failure;
+mod fmu;
 mod health;
 mod identify;
 mod import;
@@ -50,6 +51,7 @@ enum Command {
     Identify(identify::IdentifyArguments),
     Stops(stops::StopsArguments),
     Survey(survey::SurveyArguments),
+    Fmu(fmu::FmuArguments),
     Completions(completions::CompletionsArguments),
     Man(man::ManArguments),
 }
@@ -65,7 +67,7 @@ impl Command {
             Command::Survey(arguments) => arguments.json.as_deref(),
             // `check` has an answer of its own for what is wrong.
             Command::Check(_) | Command::Run(_) | Command::Health(_) | Command::Replay(_) => None,
-            Command::Init(_) | Command::Import(_) => None,
+            Command::Init(_) | Command::Import(_) | Command::Fmu(_) => None,
             Command::Completions(_) | Command::Man(_) => None,
         }
     }
@@ -89,6 +91,7 @@ pub fn main() -> ExitCode {
         Command::Identify(arguments) => identify::execute(arguments),
         Command::Stops(arguments) => stops::execute(arguments),
         Command::Survey(arguments) => survey::execute(arguments),
+        Command::Fmu(arguments) => fmu::execute(arguments),
         Command::Completions(arguments) => completions::execute(arguments, Arguments::command()),
         Command::Man(arguments) => man::execute(arguments, Arguments::command()),
     };

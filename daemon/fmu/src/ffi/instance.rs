@@ -1,0 +1,149 @@
+//! What an `fmi2Component` points to, and the wall that panics do not pass.
+
+use std::ffi::{CStr, CString, c_void};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use super::types::{CallbackFunctions, Component, Logger, Status, Text};
+use crate::error::ModelError;
+use crate::model::Model;
+
+/// A model with the simulator's logger.
+pub struct Instance {
+    model: Model,
+    log: Log,
+}
+
+impl Instance {
+    /// An instance on the heap, for the simulator to hold.
+    pub(super) fn hand_out(model: Model, log: Log) -> Component {
+        Box::into_raw(Box::new(Instance { model, log })).cast()
+    }
+}
+
+/// Where messages of an instance go.
+pub(super) struct Log {
+    name: CString,
+    logger: Option<Logger>,
+    environment: *mut c_void,
+}
+
+impl Log {
+    /// The log of an instance by name and callbacks.
+    pub(super) fn new(name: &CStr, callbacks: &CallbackFunctions) -> Self {
+        let CallbackFunctions { logger, component_environment: environment, .. } = *callbacks;
+        Log { name: name.into(), logger, environment }
+    }
+
+    /// Tells the simulator why a call was refused.
+    pub(super) fn tell(&self, words: &str) {
+        let Some(logger) = self.logger else { return };
+        // The message is a format, where these signs have a meaning of their own.
+        let words = words.replace('%', "%%").replace('#', "##").replace('\0', " ");
+        let Ok(words) = CString::new(words) else { return };
+        let category = c"logStatusError";
+        // SAFETY: the simulator lends the logger and its environment for as long as the instance
+        // lives; all texts end with NUL and outlive the call; the format asks for no argument.
+        unsafe {
+            logger(
+                self.environment,
+                self.name.as_ptr(),
+                Status::Error as i32,
+                category.as_ptr(),
+                words.as_ptr(),
+            );
+        }
+    }
+}
+
+const FAULT: &str = "a fault inside the FMU; its words went to standard error";
+
+/// Runs the body of an exported function on the model: a refusal is told and becomes an error, and
+/// so does a panic, after which only a reset helps.
+///
+/// # Safety
+///
+/// See [the module](super#safety).
+pub(super) unsafe fn call(
+    component: Component,
+    work: impl FnOnce(&mut Model) -> Result<(), ModelError>,
+) -> Status {
+    if component.is_null() {
+        return Status::Error;
+    }
+    // SAFETY: a component that is not NULL points to an instance that this thread alone is in.
+    let Instance { model, log } = unsafe { &mut *component.cast::<Instance>() };
+    match catch_unwind(AssertUnwindSafe(|| work(model))) {
+        Ok(Ok(())) => Status::Ok,
+        Ok(Err(refusal)) => {
+            log.tell(&refusal.to_string());
+            Status::Error
+        }
+        Err(payload) => {
+            // Dropping a foreign payload may panic once more; leaking it cannot.
+            std::mem::forget(payload);
+            model.break_off();
+            log.tell(FAULT);
+            Status::Error
+        }
+    }
+}
+
+/// Takes an instance back and drops it; NULL is gone already.
+///
+/// # Safety
+///
+/// See [the module](super#safety).
+pub(super) unsafe fn take_back(component: Component) {
+    if component.is_null() {
+        return;
+    }
+    // SAFETY: the pointer came from `hand_out`, and the simulator gives it up.
+    let instance = unsafe { Box::from_raw(component.cast::<Instance>()) };
+    if let Err(payload) = catch_unwind(AssertUnwindSafe(|| drop(instance))) {
+        std::mem::forget(payload);
+    }
+}
+
+/// The text behind a pointer, `None` for NULL.
+///
+/// # Safety
+///
+/// See [the module](super#safety).
+pub(super) unsafe fn text<'a>(place: Text) -> Option<&'a CStr> {
+    // SAFETY: a text that is not NULL ends with a NUL byte.
+    (!place.is_null()).then(|| unsafe { CStr::from_ptr(place) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_becomes_an_error_after_which_only_a_reset_helps() {
+        let callbacks = CallbackFunctions {
+            logger: None,
+            allocate_memory: None,
+            free_memory: None,
+            step_finished: None,
+            component_environment: std::ptr::null_mut(),
+        };
+        let component = Instance::hand_out(Model::new("".into()), Log::new(c"", &callbacks));
+        let run = |work: fn(&mut Model) -> Result<(), ModelError>| {
+            // SAFETY: the component lives until the end of the test, in this thread.
+            unsafe { call(component, work) }
+        };
+        assert_eq!(run(|_| panic!("on purpose")), Status::Error);
+        assert_eq!(run(Model::set_up_experiment), Status::Error);
+        assert_eq!(run(|model| model.set_real(3, 1.0)), Status::Error);
+        assert_eq!(
+            run(|model| {
+                model.reset();
+                Ok(())
+            }),
+            Status::Ok
+        );
+        assert_eq!(run(Model::set_up_experiment), Status::Ok);
+        // SAFETY: it is not used any more.
+        unsafe { take_back(component) };
+    }
+}

@@ -1,0 +1,176 @@
+//! From instantiation to the end, and the steps between.
+
+#![allow(non_snake_case, reason = "the names are the standard's")]
+
+use std::ffi::{c_char, c_int};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use super::instance::{Instance, Log, call, take_back, text};
+use super::types::{Boolean, CO_SIMULATION, CallbackFunctions, Component, Status, Text};
+use crate::model::Model;
+use crate::variables::GUID;
+
+/// The platform of the types.
+#[unsafe(no_mangle)]
+pub extern "C" fn fmi2GetTypesPlatform() -> *const c_char {
+    c"default".as_ptr()
+}
+
+/// The version of the standard.
+#[unsafe(no_mangle)]
+pub extern "C" fn fmi2GetVersion() -> *const c_char {
+    c"2.0".as_ptr()
+}
+
+/// Makes an instance; NULL, with words to the logger, when it is asked for another FMU than this one.
+///
+/// # Safety
+///
+/// See [the module](super#safety).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2Instantiate(
+    name: Text,
+    kind: c_int,
+    guid: Text,
+    resources: Text,
+    callbacks: *const CallbackFunctions,
+    _visible: Boolean,
+    _logging_on: Boolean,
+) -> Component {
+    if callbacks.is_null() {
+        return std::ptr::null_mut();
+    }
+    // SAFETY: promised by the caller.
+    let (callbacks, name, guid, resources) =
+        unsafe { (*callbacks, text(name), text(guid), text(resources)) };
+    let make = || {
+        let log = Log::new(name.unwrap_or(c"dynocar"), &callbacks);
+        let guid = guid.unwrap_or_default().to_string_lossy();
+        if kind != CO_SIMULATION {
+            log.tell("this FMU is for co-simulation only");
+            None
+        } else if guid != GUID {
+            log.tell(&format!("modelDescription.xml is of {guid}, the library of {GUID}"));
+            None
+        } else {
+            let resources = resources.unwrap_or_default().to_string_lossy().into_owned();
+            Some(Instance::hand_out(Model::new(resources), log))
+        }
+    };
+    match catch_unwind(AssertUnwindSafe(make)) {
+        Ok(component) => component.unwrap_or(std::ptr::null_mut()),
+        Err(payload) => {
+            std::mem::forget(payload);
+            std::ptr::null_mut()
+        }
+    }
+}
+
+/// Frees an instance.
+///
+/// # Safety
+///
+/// See [the module](super#safety).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2FreeInstance(component: Component) {
+    // SAFETY: promised by the caller.
+    unsafe { take_back(component) }
+}
+
+/// Accepted without effect: errors are always logged, and there is nothing else to log.
+///
+/// # Safety
+///
+/// See [the module](super#safety).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetDebugLogging(
+    component: Component,
+    _logging_on: Boolean,
+    _count: usize,
+    _categories: *const Text,
+) -> Status {
+    // SAFETY: promised by the caller.
+    unsafe { call(component, |_| Ok(())) }
+}
+
+/// Takes note of an experiment; tolerance, start and stop matter to no estimator.
+///
+/// # Safety
+///
+/// See [the module](super#safety).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetupExperiment(
+    component: Component,
+    _tolerance_defined: Boolean,
+    _tolerance: f64,
+    _start_time_s: f64,
+    _stop_time_defined: Boolean,
+    _stop_time_s: f64,
+) -> Status {
+    // SAFETY: promised by the caller.
+    unsafe { call(component, Model::set_up_experiment) }
+}
+
+/// Reads the files of train and line.
+///
+/// # Safety
+///
+/// See [the module](super#safety).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2EnterInitializationMode(component: Component) -> Status {
+    // SAFETY: promised by the caller.
+    unsafe { call(component, Model::enter_initialization) }
+}
+
+/// Ends the initialization.
+///
+/// # Safety
+///
+/// See [the module](super#safety).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2ExitInitializationMode(component: Component) -> Status {
+    // SAFETY: promised by the caller.
+    unsafe { call(component, Model::exit_initialization) }
+}
+
+/// Takes the inputs as the sample of the moment at which the step begins.
+///
+/// # Safety
+///
+/// See [the module](super#safety).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2DoStep(
+    component: Component,
+    time_s: f64,
+    step_s: f64,
+    _no_set_state_prior: Boolean,
+) -> Status {
+    // SAFETY: promised by the caller.
+    unsafe { call(component, |model| model.step(time_s, step_s)) }
+}
+
+/// Ends the simulation.
+///
+/// # Safety
+///
+/// See [the module](super#safety).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2Terminate(component: Component) -> Status {
+    // SAFETY: promised by the caller.
+    unsafe { call(component, Model::terminate) }
+}
+
+/// Forgets everything since the instance was made.
+///
+/// # Safety
+///
+/// See [the module](super#safety).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2Reset(component: Component) -> Status {
+    let reset = |model: &mut Model| {
+        model.reset();
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { call(component, reset) }
+}

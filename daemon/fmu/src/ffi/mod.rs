@@ -1,0 +1,32 @@
+//! The functions that a simulator calls, by the FMI standard 2.0 for co-simulation.
+//!
+//! Thin on purpose: each function checks its pointers and calls the [`Model`](crate::Model) behind the
+//! instance. What is refused is told to the simulator's logger in words and answered by
+//! [`Status::Error`]; no panic crosses the boundary.
+//!
+//! # Layout
+//!
+//! - [`types`]: the standard's types
+//! - [`instance`]: what an `fmi2Component` points to, and the wall that panics do not pass
+//! - [`life`]: from instantiation to the end, and the steps between
+//! - [`values`]: setting and getting variables
+//! - [`unsupported`]: functions that the description does not promise
+//!
+//! # Safety
+//!
+//! All functions here share these conditions, and add none of their own; the standard sets them:
+//!
+//! - a component is NULL or comes from [`life::fmi2Instantiate`] and has not been freed, and no
+//!   other thread is in a call with it;
+//! - an array is NULL or holds as many elements as its count says, aligned, that nobody else
+//!   touches during the call;
+//! - a text is NULL or ends with a NUL byte;
+//! - the callbacks may be called as long as the component lives.
+
+pub mod instance;
+pub mod life;
+pub mod types;
+pub mod unsupported;
+pub mod values;
+
+pub use types::Status;

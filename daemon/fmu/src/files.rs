@@ -1,0 +1,125 @@
+//! The files that describe train and line, and the estimators for them.
+
+use std::ffi::{CStr, CString};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use dynocar_core::dataset::{parse_track, parse_train};
+use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_core::track::Track;
+use dynocar_core::train::TrainModel;
+use dynocar_shared::{PipelineKind, TrainId};
+
+use crate::error::ModelError;
+use crate::location::folder_of;
+use crate::variables::{ModelFile, PIPELINES};
+
+/// The train of an instance; there is no other in it.
+pub const TRAIN: TrainId = TrainId(1);
+
+impl ModelFile {
+    /// The file's name inside the FMU, in the folder `resources`.
+    pub const fn own_name(self) -> &'static str {
+        match self {
+            ModelFile::Train => "train.toml",
+            ModelFile::Track => "track.toml",
+        }
+    }
+}
+
+/// Which files describe train and line.
+#[derive(Clone, Debug)]
+pub struct Files {
+    resources: String,
+    /// As they were set; empty for the FMU's own.
+    train: CString,
+    track: CString,
+}
+
+impl Files {
+    /// The FMU's own files at a location, as the simulator names it.
+    pub fn of(resources: String) -> Self {
+        Files { resources, train: CString::default(), track: CString::default() }
+    }
+
+    /// Where the FMU's own files are.
+    pub fn resources(&self) -> String {
+        self.resources.clone()
+    }
+
+    /// The path that was set.
+    pub fn path(&self, file: ModelFile) -> &CStr {
+        match file {
+            ModelFile::Train => &self.train,
+            ModelFile::Track => &self.track,
+        }
+    }
+
+    /// Names another file.
+    pub fn set(&mut self, file: ModelFile, path: &CStr) {
+        match file {
+            ModelFile::Train => self.train = path.into(),
+            ModelFile::Track => self.track = path.into(),
+        }
+    }
+
+    /// The recommended estimators for this train on this line.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with the files.
+    pub fn estimators(&self) -> Result<Vec<Pipeline>, ModelError> {
+        let train = Arc::new(self.read_train()?);
+        let track = self.read_track()?.map(Arc::new);
+        let pipeline = |(index, &kind): (usize, &PipelineKind)| {
+            let settings = EstimatorSettings::default_of(kind).expect("every kind can be built");
+            let estimator = settings.build(&train)?;
+            Ok(Pipeline::new(TRAIN, index as u32, Arc::clone(&train), track.clone(), estimator))
+        };
+        PIPELINES.iter().enumerate().map(pipeline).collect()
+    }
+
+    fn read_train(&self) -> Result<TrainModel, ModelError> {
+        let path = self.place(ModelFile::Train)?;
+        let text = text_of(&path).map_err(|error| match error {
+            ModelError::Unreadable { path, source }
+                if self.train.is_empty() && source.kind() == ErrorKind::NotFound =>
+            {
+                ModelError::NoTrain(path)
+            }
+            error => error,
+        })?;
+        Ok(parse_train(&path.display().to_string(), &text)?)
+    }
+
+    /// `None` where no line was named and the FMU brings none along.
+    fn read_track(&self) -> Result<Option<Track>, ModelError> {
+        let path = match self.place(ModelFile::Track) {
+            Err(ModelError::NoFolder(_)) if self.track.is_empty() => return Ok(None),
+            place => place?,
+        };
+        if self.track.is_empty() && !path.exists() {
+            return Ok(None);
+        }
+        let text = text_of(&path)?;
+        Ok(Some(parse_track(&path.display().to_string(), &text)?))
+    }
+
+    /// Where a file lies; a relative path counts from the FMU's own files.
+    fn place(&self, file: ModelFile) -> Result<PathBuf, ModelError> {
+        let set = self.path(file).to_string_lossy();
+        let path = Path::new(if set.is_empty() { file.own_name() } else { &*set });
+        if path.is_absolute() {
+            return Ok(path.into());
+        }
+        let folder = folder_of(&self.resources)
+            .ok_or_else(|| ModelError::NoFolder(self.resources.clone()))?;
+        Ok(folder.join(path))
+    }
+}
+
+fn text_of(path: &Path) -> Result<String, ModelError> {
+    let unreadable = |source| ModelError::Unreadable { path: path.into(), source };
+    std::fs::read_to_string(path).map_err(unreadable)
+}

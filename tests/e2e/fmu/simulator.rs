@@ -1,0 +1,145 @@
+//! A simulator as an FMU meets it: it calls the standard's functions, and hears what the FMU says.
+
+use std::cell::RefCell;
+use std::ffi::{CStr, CString, c_int, c_void};
+
+use dynocar_fmu::ffi::Status;
+use dynocar_fmu::ffi::life::{
+    fmi2DoStep, fmi2EnterInitializationMode, fmi2ExitInitializationMode, fmi2FreeInstance,
+    fmi2Instantiate, fmi2SetupExperiment,
+};
+use dynocar_fmu::ffi::types::{CO_SIMULATION, CallbackFunctions, Component, Logger, Text};
+use dynocar_fmu::ffi::values::{
+    fmi2GetInteger, fmi2GetReal, fmi2SetBoolean, fmi2SetInteger, fmi2SetReal, fmi2SetString,
+};
+use dynocar_fmu::{GUID, VARIABLES};
+
+/// What an FMU said, one message each.
+type Said = RefCell<Vec<String>>;
+
+/// A logger for formats that ask for no argument.
+type PlainLogger = unsafe extern "C" fn(*mut c_void, Text, c_int, Text, Text);
+
+/// Takes a message down; the FMU's formats ask for no argument.
+unsafe extern "C" fn take_down(
+    said: *mut c_void,
+    _name: Text,
+    _status: c_int,
+    _category: Text,
+    words: Text,
+) {
+    // SAFETY: the environment is the list of the instance that speaks, and words end with NUL.
+    let (said, words) = unsafe { (&*said.cast::<Said>(), CStr::from_ptr(words)) };
+    said.borrow_mut().push(words.to_str().unwrap().into());
+}
+
+/// The value reference of a name.
+pub fn reference(name: &str) -> u32 {
+    let place = VARIABLES.iter().position(|variable| variable.name == name);
+    place.unwrap_or_else(|| panic!("no variable {name}")) as u32
+}
+
+/// An instance, freed at the end.
+pub struct Fmu {
+    /// What the functions are called with.
+    pub component: Component,
+    said: Box<Said>,
+}
+
+impl Drop for Fmu {
+    fn drop(&mut self) {
+        // SAFETY: nobody uses the component any more.
+        unsafe { fmi2FreeInstance(self.component) };
+    }
+}
+
+impl Fmu {
+    /// Asks for an instance; NULL where the FMU refuses.
+    pub fn instantiate(kind: c_int, guid: &str, resources: &str) -> Fmu {
+        let said = Box::<Said>::default();
+        let callbacks = CallbackFunctions {
+            // SAFETY: on the platforms of the project a call with no further arguments is the same.
+            logger: Some(unsafe { std::mem::transmute::<PlainLogger, Logger>(take_down) }),
+            allocate_memory: None,
+            free_memory: None,
+            step_finished: None,
+            component_environment: std::ptr::from_ref(&*said).cast_mut().cast(),
+        };
+        let (guid, resources) = (CString::new(guid).unwrap(), CString::new(resources).unwrap());
+        let (name, (guid, place)) = (c"train 1".as_ptr(), (guid.as_ptr(), resources.as_ptr()));
+        // SAFETY: texts and callbacks outlive the call, the list of messages the component.
+        let component = unsafe { fmi2Instantiate(name, kind, guid, place, &callbacks, 0, 0) };
+        Fmu { component, said }
+    }
+
+    /// An instance of the FMU that was unpacked beside this folder of resources.
+    pub fn new(resources: &str) -> Fmu {
+        let fmu = Fmu::instantiate(CO_SIMULATION, GUID, resources);
+        assert!(!fmu.component.is_null(), "{}", fmu.said());
+        fmu
+    }
+
+    /// What it said since it was asked last.
+    pub fn said(&self) -> String {
+        self.said.take().join("\n")
+    }
+
+    /// From instantiation to the first step.
+    pub fn initialize(&self) {
+        // SAFETY: the component lives.
+        let went = unsafe {
+            [
+                fmi2SetupExperiment(self.component, 0, 0.0, 0.0, 0, 0.0),
+                fmi2EnterInitializationMode(self.component),
+                fmi2ExitInitializationMode(self.component),
+            ]
+        };
+        assert_eq!(went, [Status::Ok; 3], "{}", self.said());
+    }
+
+    /// A step from a time.
+    pub fn step(&self, time_s: f64) -> Status {
+        // SAFETY: the component lives.
+        unsafe { fmi2DoStep(self.component, time_s, 0.1, 1) }
+    }
+
+    /// A number.
+    pub fn real(&self, reference: u32) -> Option<f64> {
+        let mut value = 0.0;
+        // SAFETY: the arrays hold one element each.
+        let went = unsafe { fmi2GetReal(self.component, &reference, 1, &mut value) };
+        (went == Status::Ok).then_some(value)
+    }
+
+    /// A whole number.
+    pub fn integer(&self, reference: u32) -> Option<i32> {
+        let mut value = 0;
+        // SAFETY: the arrays hold one element each.
+        let went = unsafe { fmi2GetInteger(self.component, &reference, 1, &mut value) };
+        (went == Status::Ok).then_some(value)
+    }
+
+    /// Sets a number.
+    pub fn set_real(&self, reference: u32, value: f64) -> Status {
+        // SAFETY: the arrays hold one element each.
+        unsafe { fmi2SetReal(self.component, &reference, 1, &value) }
+    }
+
+    /// Sets a whole number.
+    pub fn set_integer(&self, reference: u32, value: i32) -> Status {
+        // SAFETY: the arrays hold one element each.
+        unsafe { fmi2SetInteger(self.component, &reference, 1, &value) }
+    }
+
+    /// Sets a truth value.
+    pub fn set_boolean(&self, reference: u32, value: c_int) -> Status {
+        // SAFETY: the arrays hold one element each.
+        unsafe { fmi2SetBoolean(self.component, &reference, 1, &value) }
+    }
+
+    /// Sets a text.
+    pub fn set_string(&self, reference: u32, value: &CStr) -> Status {
+        // SAFETY: the arrays hold one element each, and the text ends with NUL.
+        unsafe { fmi2SetString(self.component, &reference, 1, &value.as_ptr()) }
+    }
+}
