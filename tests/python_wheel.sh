@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds the Python wheel, installs it into an empty environment and runs its tests there, against the
-# programs that cargo builds; then runs the tutorial's notebook as it stands. Everything else is made in
-# a folder that goes afterwards. Installs Debian's or Ubuntu's python3-venv where there is none.
+# programs that cargo builds; the tutorial's notebook is one of them. Everything else is made in a folder
+# that goes afterwards. Installs Debian's or Ubuntu's python3-venv where there is none.
 # usage: python_wheel.sh [FOLDER]   keeps the wheel in FOLDER
 set -euo pipefail
 cd "$(dirname "$0")/.."

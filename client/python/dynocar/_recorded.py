@@ -205,6 +205,9 @@ class Plot(NamedTuple):
     name: str
     svg: str
 
+    def __repr__(self) -> str:
+        return f"<plot {self.name}>"
+
     def _repr_svg_(self) -> str:
         return self.svg
 

@@ -19,7 +19,7 @@ def words(notebook: Any) -> list[str]:
     told = []
     for output in (it for cell in notebook.cells if cell.cell_type == "code" for it in cell.outputs):
         text = output.get("text") or output.get("data", {}).get("text/plain", "")
-        told.append(text.split("svg=")[0])
+        told.append(text)
     return told
 
 
