@@ -8,9 +8,10 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
-from pathlib import Path
+from collections.abc import Iterator
 
 import dynocar
 import pytest
@@ -246,12 +247,19 @@ def test_the_example_uses_the_daemon_and_falls_back(played: PlayedDaemon) -> Non
         example.process.wait(PATIENCE_S)
 
 
-def test_the_shipped_example_is_answered_by_the_shipped_daemon(tmp_path: Path) -> None:
-    environment = {**os.environ, "DYNOCAR_ROOT": str(tmp_path)}
+@pytest.fixture
+def root() -> Iterator[str]:
+    """A run-time directory of a short name: sockets lie in it."""
+    with tempfile.TemporaryDirectory(prefix="dynocar-") as folder:
+        yield folder
+
+
+def test_the_shipped_example_is_answered_by_the_shipped_daemon(root: str) -> None:
+    environment = {**os.environ, "DYNOCAR_ROOT": root}
     command = [PROGRAMS / "dynocar", "run", "--config", ROOT / "config/daemon.toml"]
-    daemon = Lines(*command, env=environment, stderr=subprocess.DEVNULL)
+    daemon = Lines(*command, env=environment, stderr=subprocess.STDOUT)
     try:
-        # It waits for the daemon.
+        daemon.wait_for_line("serving")
         replay = dynocar_command("replay", ROOT / "config/demo", "--rate", 1000, env=environment)
         assert replay.returncode == 0, replay.stderr
         example = Lines(sys.executable, EXAMPLE, 1, PATIENCE_S, env=environment)
