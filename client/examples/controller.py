@@ -1,7 +1,7 @@
 """A controller's cycle: publish a sample, poll, use what the daemon learned, and fall back to the
 built-in parameters whenever that is not usable.
 
-    PYTHONPATH=client/python python3 client/examples/controller.py [train id] [seconds]
+    python client/examples/controller.py [train id] [seconds]
 
 tells on standard output whenever its resistance comes from another source. Ten seconds of coasting
 teach the daemon next to nothing: let ``dynocar replay config/demo --rate 200`` drive train 1 first,

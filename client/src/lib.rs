@@ -37,7 +37,7 @@
 //! - [`publisher`], [`reader`]: the two ends a controller holds
 //! - [`answers`]: which pipeline answers which quantity
 //! - [`clock`]: the host's monotonic clock
-//! - [`ffi`]: the same for C, C++ and Python
+//! - [`ffi`]: the same for C and C++
 
 mod announcement;
 pub mod answers;

@@ -1,4 +1,4 @@
-//! C, C++ and Python controllers in processes of their own; this process plays the daemon.
+//! C and C++ controllers in processes of their own; this process plays the daemon.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -146,30 +146,9 @@ fn a_cpp_controller_goes_the_whole_way() {
 }
 
 #[test]
-fn a_python_controller_goes_the_whole_way() {
-    let mut command = support::python(&foreign("round_trip.py"));
-    assert_round_trip(&mut command, &PlayedDaemon::start());
-}
-
-/// Runs a script of 100 readers and publishers that are dropped unclosed, and of 13 at once.
-#[test]
-fn python_readers_and_publishers_that_are_dropped_give_their_places_back() {
-    let daemon = PlayedDaemon::start();
-    let mut command = support::python(&foreign("dropped.py"));
-    let said = support::must_succeed(command.arg(daemon.root()).arg(TRAIN.to_string()));
-    assert!(said.contains("12 places, then NO_PLACE_LEFT"), "{said}");
-    assert!(said.contains("all 12 places are taken"), "{said}");
-}
-
-#[test]
 fn the_c_example_uses_the_daemon_and_falls_back() {
     let directory = tempfile::tempdir().unwrap();
     assert_example_falls_back(&mut c_program(&example("controller.c"), Link::Shared, &directory));
-}
-
-#[test]
-fn the_python_example_uses_the_daemon_and_falls_back() {
-    assert_example_falls_back(&mut support::python(&example("controller.py")));
 }
 
 #[test]

@@ -1,8 +1,7 @@
-//! `dynocar.h`, `dynocar.py` and the library agree on every size, offset, type and number.
+//! `dynocar.h` and the library agree on every size, offset, type and number.
 
 use std::collections::BTreeSet;
 use std::fmt::{Debug, Write};
-use std::path::Path;
 use std::process::Command;
 
 use dynocar_client::ffi::about::DaemonState;
@@ -107,7 +106,7 @@ fn vocabulary_members() -> Vec<(&'static str, String, i64)> {
     members
 }
 
-/// Names and numbers that header and Python file both declare beside the vocabularies.
+/// Names and numbers that the header declares beside the vocabularies.
 fn constants() -> [(&'static str, u64); 6] {
     [
         ("SCHEMA", u64::from(SCHEMA_MAJOR)),
@@ -119,7 +118,7 @@ fn constants() -> [(&'static str, u64); 6] {
     ]
 }
 
-/// What the C program and the Python script must print, one line for each fact.
+/// What the C program must print, one line for each fact.
 fn expected_lines() -> BTreeSet<String> {
     let mut lines = BTreeSet::new();
     for it in &STRUCTS {
@@ -174,14 +173,14 @@ fn layout_program() -> String {
     text + "return 0;\n}\n"
 }
 
-fn assert_same(printed: &str, of_whom: &str) {
+fn assert_same(printed: &str) {
     let printed: BTreeSet<String> = printed.lines().map(str::to_owned).collect();
     let expected = expected_lines();
     let missing: Vec<_> = expected.difference(&printed).collect();
     let surplus: Vec<_> = printed.difference(&expected).collect();
     assert!(
         missing.is_empty() && surplus.is_empty(),
-        "{of_whom} lacks {missing:#?} and has instead {surplus:#?}"
+        "dynocar.h lacks {missing:#?} and has instead {surplus:#?}"
     );
 }
 
@@ -246,7 +245,7 @@ fn header_and_library_agree_on_every_field_and_number() {
     let program = directory.path().join("layout");
     std::fs::write(&source, layout_program()).unwrap();
     support::build_c(&source, "c11", Link::Static, &program);
-    assert_same(&must_succeed(&mut Command::new(&program)), "dynocar.h");
+    assert_same(&must_succeed(&mut Command::new(&program)));
 }
 
 #[test]
@@ -316,11 +315,4 @@ fn the_shared_library_exports_the_functions_of_the_header_and_no_other_of_ours()
         .map(str::to_owned)
         .collect();
     assert_eq!(exported, header_functions());
-}
-
-#[test]
-fn python_file_and_library_agree_on_every_field_and_number() {
-    let script = Path::new("tests/foreign/layout.py");
-    let mut command = support::python(&client_directory().join(script));
-    assert_same(&must_succeed(&mut command), "dynocar.py");
 }

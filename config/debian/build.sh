@@ -65,7 +65,6 @@ put "$project/client/include/dynocar.h" usr/include/dynocar.h
 put "$libraries/libdynocar_client.a" usr/lib/libdynocar_client.a
 put "$libraries/libdynocar_client.so" usr/lib/libdynocar_client.so
 put "$libraries/libdynocar_fmu.so" usr/lib/dynocar/libdynocar_fmu.so
-put "$project/client/python/dynocar.py" usr/lib/python3/dist-packages/dynocar.py
 if command -v strip >/dev/null; then
     strip --strip-unneeded "$root/usr/bin/dynocar" "$root/usr/lib/libdynocar_client.so" \
         "$root/usr/lib/dynocar/libdynocar_fmu.so"
@@ -103,7 +102,6 @@ Maintainer: The Dynocar developers <dynocar@localhost>
 Installed-Size: $size
 Depends: libc6 (>= ${glibc:-2.31}), libgcc-s1
 Recommends: systemd
-Suggests: python3
 Section: science
 Priority: optional
 Description: learns online how a train really behaves
@@ -111,8 +109,8 @@ Description: learns online how a train really behaves
  memory, learns running resistance, mass, adhesion and brake friction, and answers with estimates
  that say how sure they are. On recorded runs it finds the effect that a model of a train lacks.
  .
- The package holds the program, the daemon's unit, and the library that a controller links, for C,
- C++ and Python.
+ The package holds the program, the daemon's unit, and the library that a controller links, for C
+ and C++.
 EOF
 (cd "$root" && find etc -type f | sort | sed 's|^|/|') >"$root/DEBIAN/conffiles"
 (cd "$root" && find usr -type f -exec md5sum {} + | sort -k 2) >"$root/DEBIAN/md5sums"

@@ -25,14 +25,15 @@ fn rust_files(folder: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-/// Pairs (file, test) in a document: `` `path/file.rs::name` ``.
+/// Pairs (file, test) in a document: `` `path/file.rs::name` ``, or a file of Python.
 fn named_tests(document: &str) -> Vec<(String, String)> {
     document
         .split('`')
         .skip(1)
         .step_by(2)
-        .filter_map(|code| code.split_once(".rs::"))
-        .map(|(file, name)| (format!("{file}.rs"), name.to_owned()))
+        .filter_map(|code| code.split_once("::"))
+        .filter(|(file, _)| file.ends_with(".rs") || file.ends_with(".py"))
+        .map(|(file, name)| (file.to_owned(), name.to_owned()))
         .collect()
 }
 
@@ -42,6 +43,12 @@ fn every_test_that_the_promises_name_exists() {
     assert!(named.len() > 40, "the table is found: {} tests", named.len());
     for (file, name) in named {
         let text = read(&file);
+        if file.ends_with(".py") {
+            assert!(text.contains(&format!("\ndef {name}(")), "{file}: no {name}");
+            assert!(name.starts_with("test_"), "{file}: {name} is no test");
+            assert!(!text.contains("skip") && !text.contains("xfail"), "{file}: it is passed over");
+            continue;
+        }
         let place = text.find(&format!("fn {name}("));
         let place = place.unwrap_or_else(|| panic!("{file}: no {name}"));
         // `#[test]`, or the macro `proptest!`, which lends its functions the same attribute.
@@ -136,7 +143,15 @@ fn what_the_reading_guide_recommends_is_the_default_and_what_is_shipped() {
 #[test]
 fn every_unsafe_block_is_counted_and_justified() {
     let mut files = Vec::new();
-    for folder in ["shared/src", "client/src", "daemon/src", "daemon/core/src", "daemon/fmu/src"] {
+    let folders = [
+        "shared/src",
+        "client/src",
+        "client/python/src",
+        "daemon/src",
+        "daemon/core/src",
+        "daemon/fmu/src",
+    ];
+    for folder in folders {
         rust_files(&workspace().join(folder), &mut files);
     }
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();

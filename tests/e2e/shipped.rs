@@ -1,5 +1,5 @@
 //! What is shipped together works together: the daemon with `config/daemon.toml`, the demo's
-//! recording, and the examples in C, C++, Python and Rust as they are.
+//! recording, and the examples in C, C++ and Rust as they are (that in Python: `client/python/tests`).
 
 use std::path::Path;
 use std::process::Command;
@@ -41,7 +41,6 @@ fn examples(folder: &Path) -> Vec<(&'static str, Command)> {
     vec![
         ("C", built("controller-c")),
         ("C++", built("controller-cpp")),
-        ("Python", support::python(&source.join("controller.py"))),
         ("Rust", Command::new(CONTROLLER)),
         ("C, stopping", built("stopping-c")),
         ("C++, stopping", built("stopping-cpp")),

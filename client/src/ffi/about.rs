@@ -30,6 +30,24 @@ impl DaemonState {
         [DaemonState::Absent, DaemonState::Compatible, DaemonState::Incompatible];
 }
 
+/// Who serves a train now, as a state and in words. Opens files: not for the control cycle.
+///
+/// # Errors
+///
+/// When the announcement cannot be read.
+pub fn state_of_daemon(host: &Host, train: TrainId) -> Result<(DaemonState, String), ChannelError> {
+    let peer = Peer::look_up(host, train, Role::Daemon)?;
+    Ok(match &peer {
+        Peer::Absent => (DaemonState::Absent, format!("no daemon serves train {train}")),
+        Peer::Compatible(daemon) => (DaemonState::Compatible, daemon.to_string()),
+        Peer::Incompatible(_) => {
+            let refusal = peer.require_compatible(train, Role::Controller);
+            let words = refusal.err().map_or_else(String::new, |error| error.to_string());
+            (DaemonState::Incompatible, words)
+        }
+    })
+}
+
 /// The host that a root names; NULL takes it from the environment.
 ///
 /// # Safety
@@ -66,17 +84,7 @@ pub unsafe extern "C" fn dynocar_daemon_state(
         let place = unsafe { state.as_mut() }.ok_or(Failure::Interface(Code::NullArgument))?;
         // SAFETY: promised by the caller.
         let host = unsafe { host_of(root)? };
-        let train = TrainId(train_id);
-        let peer = Peer::look_up(&host, train, Role::Daemon)?;
-        let (state, words) = match &peer {
-            Peer::Absent => (DaemonState::Absent, format!("no daemon serves train {train}")),
-            Peer::Compatible(daemon) => (DaemonState::Compatible, daemon.to_string()),
-            Peer::Incompatible(_) => {
-                let refusal = peer.require_compatible(train, Role::Controller);
-                let words = refusal.err().map_or_else(String::new, |error| error.to_string());
-                (DaemonState::Incompatible, words)
-            }
-        };
+        let (state, words) = state_of_daemon(&host, TrainId(train_id))?;
         *place = state as i32;
         message.write(&words);
         Ok(())

@@ -1,4 +1,4 @@
-//! The C interface: what C, C++ and Python controllers link, declared in `include/dynocar.h`.
+//! The C interface: what C and C++ controllers link, declared in `include/dynocar.h`.
 //!
 //! Thin on purpose: each function checks its pointers, calls the Rust end that a Rust controller
 //! uses, and gives a [`Code`]. No panic crosses the boundary ([`error`]), and a handle used by

@@ -1,5 +1,4 @@
-/* Drives a train through the C interface and prints what it sees; the test plays the daemon.
- * round_trip.py does the same and prints the same lines. */
+/* Drives a train through the C interface and prints what it sees; the test plays the daemon. */
 #define _POSIX_C_SOURCE 200809L
 
 #include <inttypes.h>

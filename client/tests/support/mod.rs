@@ -95,16 +95,6 @@ pub fn must_succeed(command: &mut Command) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// A call of a script that finds `dynocar.py` and the library just built.
-pub fn python(script: &Path) -> Command {
-    require("python3", "python3");
-    let mut command = Command::new("python3");
-    command.arg("-B").arg(script);
-    command.env("PYTHONPATH", client_directory().join("python"));
-    command.env("DYNOCAR_LIBRARY", library_directory().join("libdynocar_client.so"));
-    command
-}
-
 /// Sees to a program: installs Debian's or Ubuntu's package where there is none, or fails.
 pub fn require(program: &str, package: &str) {
     let is_there =

@@ -16,8 +16,9 @@ use dynocar_core::dataset::{
 };
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
+use serde::Serialize;
 
-use super::Failure;
+use super::{ErrorAnswer, Failure};
 use crate::config::DaemonConfig;
 use crate::dataset::{self, FileKind, LoadError, file_error, kind_of, read_text};
 use crate::output::{give, require_file, require_folder, tell, write_json};
@@ -36,10 +37,14 @@ pub struct CheckArguments {
 }
 
 /// What was understood.
-enum Understood {
+pub enum Understood {
+    /// A dataset, with what became of each of its runs.
     Dataset(Box<DatasetHead>, Vec<Result<Run, DatasetError>>),
+    /// A train.
     Train(Box<TrainModel>),
+    /// A line.
     Track(Box<Track>),
+    /// A daemon's configuration.
     Daemon(Box<DaemonConfig>),
 }
 
@@ -57,19 +62,19 @@ pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
     if let Some(folder) = &arguments.draw {
         require_folder(folder)?;
     }
-    let understood = match read(path) {
+    let understood = match understand(path) {
         Ok(understood) => understood,
         Err(failure) => {
             if let (Some(file), Some(error)) = (json, failure.answer()) {
                 // The exit status is that of what is wrong with the input.
-                if let Err(error) = write_json(file, &json::refusal(path, error)) {
+                if let Err(error) = write_json(file, &refusal(path, error)) {
                     tell(&format!("dynocar: {error}"));
                 }
             }
             return Err(failure);
         }
     };
-    give(json, &json::answer(path, &understood), || report::report(&understood))?;
+    give(json, &understood.answer(path), || understood.text())?;
     if let Some(folder) = &arguments.draw {
         draw::draw(&understood, folder)?;
     }
@@ -77,7 +82,22 @@ pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
     if errors.is_empty() { Ok(()) } else { Err(Failure::Input(errors.join("\ndynocar: "))) }
 }
 
+/// The answer, for machines, where nothing could be understood.
+pub fn refusal(path: &Path, error: ErrorAnswer) -> impl Serialize {
+    json::refusal(path, error)
+}
+
 impl Understood {
+    /// The answer for machines.
+    pub fn answer(&self, path: &Path) -> impl Serialize {
+        json::answer(path, self)
+    }
+
+    /// The answer for people.
+    pub fn text(&self) -> String {
+        report::report(self)
+    }
+
     fn kind(&self) -> FileKind {
         match self {
             Understood::Dataset(..) => FileKind::Dataset,
@@ -99,7 +119,7 @@ impl Understood {
     }
 
     /// What is wrong with single runs.
-    fn errors(&self) -> impl Iterator<Item = &DatasetError> {
+    pub fn errors(&self) -> impl Iterator<Item = &DatasetError> {
         let runs = match self {
             Understood::Dataset(_, runs) => &runs[..],
             Understood::Train(_) | Understood::Track(_) | Understood::Daemon(_) => &[],
@@ -108,7 +128,12 @@ impl Understood {
     }
 }
 
-fn read(path: &Path) -> Result<Understood, Failure> {
+/// Reads whatever a path leads to; the errors of single runs are within.
+///
+/// # Errors
+///
+/// When the path leads to nothing known, or a file that everything rests on is wrong.
+pub fn understand(path: &Path) -> Result<Understood, Failure> {
     if !path.is_file() {
         return read_dataset(path);
     }

@@ -7,23 +7,26 @@ use std::time::Duration;
 
 use clap::Args;
 use dynocar_core::dataset::{Dataset, DatasetFiles, Place, Role};
-use dynocar_core::explain::answer::RunnerUp;
+use dynocar_core::explain::answer::{Answer, RunnerUp};
 use dynocar_core::explain::evidence::RunDataError;
+use dynocar_core::explain::selection::Progress;
 use dynocar_core::explain::{Explanation, explain};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Failure;
 use super::text::notes;
 use crate::dataset::{self, DatasetFolder};
-use crate::grown::{GROWN_FILES, GROWN_MARK, GrownError, write_grown};
+use crate::grown::{GROWN_FILES, GROWN_MARK, GrownError, GrownFiles, write_grown};
 use crate::output::{
     OutputError, give, require_file, require_folder, tell, write_file, write_in_folder,
 };
 use crate::report;
-use crate::report::provenance::Provenance;
+use crate::report::provenance::{Provenance, own_command_line};
 
 /// First line of a file with predictions.
 const PREDICTIONS_HEADER: &str = "time_s,speed_mps\n";
+/// Why nothing is grown from data that cannot be true.
+const IMPOSSIBLE: &str = "no grown model is written: the data cannot be true";
 
 /// Find what the declared model leaves, trace it to an effect, and score the grown model.
 #[derive(Debug, Args)]
@@ -57,14 +60,12 @@ pub struct ExplainArguments {
 /// A wrong dataset or name of a result is an input failure.
 pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
     require_names(arguments)?;
-    let mut dataset = dataset::load(&arguments.dataset)?;
+    let path = &arguments.dataset;
+    let dataset = read(path, arguments.traction_only)?;
     if let Some(folder) = &arguments.predictions {
         for name in prediction_names(&dataset).values() {
             require_replaceable(&folder.join(name), PREDICTIONS_HEADER)?;
         }
-    }
-    if arguments.traction_only {
-        dataset.keep_traction_only();
     }
     let bar = progress_bar();
     let progress = |share: f64, what: &str| {
@@ -74,25 +75,50 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
     };
     let explained = explain(&dataset, &progress);
     bar.finish_and_clear();
-    let mut explanation =
-        explained.map_err(|error| unusable(&arguments.dataset, &dataset, error))?;
+    let mut explanation = explained.map_err(|error| unusable(path, &dataset, error))?;
     if let Some(folder) = &arguments.predictions {
         explanation.answer.predictions = write_predictions(folder, &dataset, &explanation)?;
     }
     if let Some(folder) = &arguments.grown {
         if explanation.answer.impossibilities().next().is_none() {
-            grow(folder, &arguments.dataset, &explanation)?;
+            tell_grown(&grow(folder, path, &explanation)?);
         } else {
-            tell("no grown model is written: the data cannot be true");
+            tell(IMPOSSIBLE);
         }
     }
     if let Some(file) = &arguments.report {
-        write_report(file, &arguments.dataset, &dataset, &explanation)?;
+        let page = page(path, &dataset, &explanation, own_command_line())?;
+        write_file(file, &page)?;
+        tell(&format!("report: {}", file.display()));
     }
     if let Some(folder) = &arguments.plots {
         write_plots(folder, &dataset, &explanation)?;
     }
-    Ok(give(arguments.json.as_deref(), &explanation.answer, || text(&explanation))?)
+    Ok(give(arguments.json.as_deref(), &explanation.answer, || text(&explanation.answer))?)
+}
+
+/// Explains the dataset at a path; `progress` is told how far that is, and may unwind to end it.
+///
+/// # Errors
+///
+/// A wrong dataset is an input failure.
+pub fn answer(
+    path: &Path,
+    traction_only: bool,
+    progress: Progress,
+) -> Result<(Dataset, Explanation), Failure> {
+    let dataset = read(path, traction_only)?;
+    let explanation =
+        explain(&dataset, progress).map_err(|error| unusable(path, &dataset, error))?;
+    Ok((dataset, explanation))
+}
+
+fn read(path: &Path, traction_only: bool) -> Result<Dataset, Failure> {
+    let mut dataset = dataset::load(path)?;
+    if traction_only {
+        dataset.keep_traction_only();
+    }
+    Ok(dataset)
 }
 
 /// Refuses wrong names of results before the work begins.
@@ -101,14 +127,10 @@ fn require_names(arguments: &ExplainArguments) -> Result<(), Failure> {
     for (file, mark) in files {
         file.as_deref().map_or(Ok(()), |file| require_file(file, mark))?;
     }
-    for folder in [&arguments.plots, &arguments.predictions, &arguments.grown] {
+    for folder in [&arguments.plots, &arguments.predictions] {
         folder.as_deref().map_or(Ok(()), require_folder)?;
     }
-    if let Some(folder) = &arguments.grown {
-        for name in GROWN_FILES {
-            require_replaceable(&folder.join(name), GROWN_MARK)?;
-        }
-    }
+    arguments.grown.as_deref().map_or(Ok(()), require_growable)?;
     match (&arguments.json, &arguments.report) {
         (Some(json), Some(report)) if json == report => Err(Failure::Output(OutputError::Name {
             path: report.clone(),
@@ -131,11 +153,29 @@ fn unusable(path: &Path, dataset: &Dataset, error: RunDataError) -> Failure {
     Failure::At(Place::whole(&label), format!("{label}: {source}{notes}"))
 }
 
-fn grow(folder: &Path, dataset: &Path, explanation: &Explanation) -> Result<(), Failure> {
-    let grown = write_grown(dataset, explanation, folder).map_err(|error| match error {
+/// Writes the grown model of the dataset at a path into a folder.
+///
+/// # Errors
+///
+/// When the data cannot be true, or a file cannot be written or would take the place of another.
+pub fn grow(folder: &Path, path: &Path, explanation: &Explanation) -> Result<GrownFiles, Failure> {
+    require_growable(folder)?;
+    if explanation.answer.impossibilities().next().is_some() {
+        return Err(Failure::Work(IMPOSSIBLE.into()));
+    }
+    write_grown(path, explanation, folder).map_err(|error| match error {
         GrownError::Output(error) => error.into(),
         error => Failure::Work(error.to_string()),
-    })?;
+    })
+}
+
+/// Refuses a folder in which the files of a grown model would take the place of others.
+fn require_growable(folder: &Path) -> Result<(), OutputError> {
+    require_folder(folder)?;
+    GROWN_FILES.iter().try_for_each(|name| require_replaceable(&folder.join(name), GROWN_MARK))
+}
+
+fn tell_grown(grown: &GrownFiles) {
     for file in &grown.files {
         tell(&format!("grown model: {}", file.display()));
     }
@@ -143,7 +183,6 @@ fn grow(folder: &Path, dataset: &Path, explanation: &Explanation) -> Result<(), 
         let kinds = grown.not_expressed.join(", ");
         tell(&format!("the files cannot express {kinds}: use the answer of --json for it"));
     }
-    Ok(())
 }
 
 /// A bar on standard error while that is a terminal; nothing otherwise.
@@ -157,18 +196,19 @@ fn progress_bar() -> ProgressBar {
     bar
 }
 
-fn write_report(
-    file: &Path,
+/// The report on an explanation of the dataset at a path; `command` makes the same one.
+///
+/// # Errors
+///
+/// When a file of the dataset cannot be read any more, or a plot cannot be drawn.
+pub fn page(
     path: &Path,
     dataset: &Dataset,
     explanation: &Explanation,
-) -> Result<(), Failure> {
-    let provenance = Provenance::of(path)?;
-    let page = report::page(dataset, explanation, provenance)
-        .map_err(|error| Failure::Work(format!("{}: {error}", file.display())))?;
-    write_file(file, &page)?;
-    tell(&format!("report: {}", file.display()));
-    Ok(())
+    command: String,
+) -> Result<String, Failure> {
+    let provenance = Provenance::of(path, command)?;
+    report::page(dataset, explanation, provenance).map_err(|error| Failure::Work(error.to_string()))
 }
 
 fn write_plots(folder: &Path, dataset: &Dataset, explanation: &Explanation) -> Result<(), Failure> {
@@ -214,8 +254,8 @@ fn write_predictions(
     Ok(files)
 }
 
-fn text(explanation: &Explanation) -> String {
-    let answer = &explanation.answer;
+/// The answer for people.
+pub fn text(answer: &Answer) -> String {
     let mut text = notes(&answer.notes) + &format!("{}\n", answer.statement);
     if let Some(experiment) = &answer.experiment {
         text += &format!("To settle it: {experiment}\n");

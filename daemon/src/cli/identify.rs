@@ -3,7 +3,7 @@
 mod answer;
 mod runs;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use dynocar_core::dataset::{Dataset, Note};
@@ -38,8 +38,22 @@ pub struct IdentifyArguments {
     pub(super) json: Option<PathBuf>,
 }
 
+/// What is to be learned from.
+#[derive(Clone, Copy, Debug)]
+pub struct Question<'a> {
+    /// The dataset's folder.
+    pub dataset: &'a Path,
+    /// Only this estimator; all of them by default.
+    pub estimator: Option<&'a str>,
+    /// From each run alone, too.
+    pub per_run: bool,
+    /// Use the forces under traction only.
+    pub traction_only: bool,
+}
+
+/// What was learned.
 #[derive(Debug, Serialize)]
-struct Answer {
+pub struct Answer {
     dataset: String,
     /// What may spoil the results, the worst first.
     notes: Vec<Note>,
@@ -61,22 +75,36 @@ pub fn execute(arguments: &IdentifyArguments) -> Result<(), Failure> {
     if let Some(file) = &arguments.json {
         require_file(file, "{")?;
     }
-    let estimators = chosen_estimators(arguments.estimator.as_deref())?;
-    let mut dataset = dataset::load(&arguments.dataset)?;
-    if arguments.traction_only {
+    let answer = answer(Question {
+        dataset: &arguments.dataset,
+        estimator: arguments.estimator.as_deref(),
+        per_run: arguments.per_run,
+        traction_only: arguments.traction_only,
+    })?;
+    Ok(give(arguments.json.as_deref(), &answer, || text(&answer))?)
+}
+
+/// Runs the estimators over a dataset.
+///
+/// # Errors
+///
+/// A wrong dataset or estimator name is an input failure.
+pub fn answer(question: Question) -> Result<Answer, Failure> {
+    let estimators = chosen_estimators(question.estimator)?;
+    let mut dataset = dataset::load(question.dataset)?;
+    if question.traction_only {
         dataset.keep_traction_only();
     }
     let all: Vec<usize> = (0..dataset.runs.len()).collect();
     let learned = learned(&dataset, &all, &estimators)?;
-    let runs = if arguments.per_run { Some(by_run(&dataset, &estimators)?) } else { None };
-    let answer = Answer {
+    let runs = if question.per_run { Some(by_run(&dataset, &estimators)?) } else { None };
+    Ok(Answer {
         dataset: dataset.name.clone(),
         notes: dataset.notes(),
         estimators: learned,
         between_runs: runs.as_deref().map(runs::spreads),
         runs,
-    };
-    Ok(give(arguments.json.as_deref(), &answer, || text(&answer))?)
+    })
 }
 
 /// What every estimator learns from some runs, one after the other.
@@ -117,7 +145,8 @@ fn chosen_estimators(name: Option<&str>) -> Result<Vec<EstimatorSettings>, Failu
     Ok(chosen)
 }
 
-fn text(answer: &Answer) -> String {
+/// The answer for people.
+pub fn text(answer: &Answer) -> String {
     let mut text = format!("{}\n{}", answer.dataset, notes(&answer.notes));
     for it in &answer.estimators {
         let reason = if it.reason == "none" { String::new() } else { format!(", {}", it.reason) };

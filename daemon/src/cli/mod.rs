@@ -1,16 +1,17 @@
-//! The commands of `dynocar`, one file each.
+//! The commands of `dynocar`, one file each; what `check`, `explain` and `identify` answer is there for
+//! other callers, too.
 //!
 //! Messages for people go to standard error, results to standard output. Exit status: 0 done,
 //! 1 the work failed, 2 the command line or an input file is wrong; `health` has some of its own.
 
-mod check;
+pub mod check;
 mod completions;
 mod demo;
-mod explain;
+pub mod explain;
 mod failure;
 mod fmu;
 mod health;
-mod identify;
+pub mod identify;
 mod import;
 mod init;
 mod man;

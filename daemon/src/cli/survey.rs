@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::Failure;
 use crate::output::{give, require_file, require_folder, tell, write_file};
-use crate::report::provenance::Provenance;
+use crate::report::provenance::{Provenance, own_command_line};
 use crate::survey::answer::Answer;
 use crate::survey::{SurveyFailure, page, survey_folder};
 use clap::Args;
@@ -42,8 +42,8 @@ pub fn execute(arguments: &SurveyArguments) -> Result<(), Failure> {
     let made = survey_folder(source, line, &arguments.out).map_err(failure)?;
     tell(&format!("dataset: {} files in {}", made.files.len(), arguments.out.display()));
     if let Some(file) = &arguments.report {
-        let provenance =
-            Provenance::of(source).map_err(|error| Failure::Input(error.to_string()))?;
+        let provenance = Provenance::of(source, own_command_line())
+            .map_err(|error| Failure::Input(error.to_string()))?;
         let page = page::html(&made.raw, &made.survey, &made.answer, &provenance)
             .map_err(|error| Failure::Work(format!("{}: {error}", file.display())))?;
         write_file(file, &page)?;

@@ -37,18 +37,17 @@ pub struct Provenance {
 }
 
 impl Provenance {
-    /// Of a report on a dataset made by this process now.
+    /// Of a report on a dataset made now; `command` makes the same report.
     ///
     /// # Errors
     ///
     /// When a file of the dataset cannot be read.
-    pub fn of(path: &Path) -> Result<Self, LoadError> {
+    pub fn of(path: &Path, command: String) -> Result<Self, LoadError> {
         let files = digests(path)?;
         let lines: String =
             files.iter().map(|file| format!("{}  {}\n", file.sha256, file.path)).collect();
-        let arguments: Vec<String> = std::env::args().skip(1).collect();
         Ok(Provenance {
-            command: command_line(&arguments),
+            command,
             version: env!("CARGO_PKG_VERSION"),
             machine: format!("{} on {}", std::env::consts::OS, std::env::consts::ARCH),
             day: day(SystemTime::now()),
@@ -82,9 +81,14 @@ fn hex(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// The command line as one would type it.
-fn command_line(arguments: &[String]) -> String {
-    let words = arguments.iter().map(|argument| quoted(argument));
+/// The command line of this process, as one would type it.
+pub fn own_command_line() -> String {
+    command_line(std::env::args().skip(1))
+}
+
+/// A command line of the program with these arguments, as one would type it.
+pub fn command_line(arguments: impl IntoIterator<Item = String>) -> String {
+    let words = arguments.into_iter().map(|argument| quoted(&argument));
     std::iter::once("dynocar".to_string()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
@@ -131,10 +135,7 @@ mod tests {
     #[test]
     fn a_command_line_can_be_typed_again() {
         let arguments = ["explain", "my data", "it's", "--report", "a.html"].map(String::from);
-        assert_eq!(
-            command_line(&arguments),
-            r"dynocar explain 'my data' 'it'\''s' --report a.html"
-        );
+        assert_eq!(command_line(arguments), r"dynocar explain 'my data' 'it'\''s' --report a.html");
     }
 
     #[test]

@@ -15,7 +15,8 @@ use crate::explain::score::{self, FitErrors};
 use crate::track::Track;
 use crate::train::TrainModel;
 
-/// Told how far the work is: share done, and what is being done.
+/// Told how far the work is: share done, and what is being done. It may unwind to end the work, which
+/// holds nothing that would have to be put right.
 pub type Progress<'p> = &'p dyn Fn(f64, &str);
 
 /// Effects at most.
@@ -149,6 +150,7 @@ impl Search<'_> {
             if base.model.effects.iter().any(|own| own.kind() == kind) {
                 continue;
             }
+            (self.progress)((0.1 + 0.25 * base.model.effects.len() as f64).min(0.8), kind.name());
             let effect = match kind {
                 EffectKind::Unknown if self.library_leaves_a_force(base, &trials) => UNKNOWN,
                 _ => effect,

@@ -1,0 +1,80 @@
+//! Clock, versions, who serves a train, and the vocabularies by which the tests hold those in Python.
+
+use std::fmt::Debug;
+use std::path::PathBuf;
+
+use dynocar_client::Host;
+use dynocar_client::ffi::about::{DaemonState, state_of_daemon};
+use dynocar_client::ffi::{Code, Rail};
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::{
+    Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Quantity, Reason, RejectionReason,
+    SCHEMA_MAJOR, SampleField, Status, TrainId, TrainSample,
+};
+use pyo3::prelude::*;
+
+use crate::errors::of_channel;
+
+/// Who serves a train, as a number and in words.
+#[pyfunction]
+pub(crate) fn daemon_state(
+    py: Python<'_>,
+    train_id: u64,
+    root: Option<PathBuf>,
+) -> PyResult<(i32, String)> {
+    let looked_up = py.detach(move || {
+        let host = root.map_or_else(Host::from_environment, |root| Host::at(&root))?;
+        state_of_daemon(&host, TrainId(train_id))
+    });
+    let (state, words) = looked_up.map_err(|error| of_channel(py, &error))?;
+    Ok((state as i32, words))
+}
+
+/// The host's monotonic clock in ns.
+#[pyfunction]
+pub(crate) fn monotonic_now_ns() -> i64 {
+    dynocar_client::monotonic_now_ns()
+}
+
+/// The release.
+#[pyfunction]
+pub(crate) fn version() -> &'static str {
+    env!("CARGO_PKG_VERSION")
+}
+
+/// Schema major of the channels, layout hashes of sample and snapshot.
+#[pyfunction]
+pub(crate) fn layouts() -> (u32, u64, u64) {
+    (SCHEMA_MAJOR, TrainSample::LAYOUT_HASH, ParameterSnapshot::LAYOUT_HASH)
+}
+
+/// Names of the fields of a snapshot.
+#[pyfunction]
+pub(crate) fn snapshot_fields() -> Vec<&'static str> {
+    ParameterSnapshot::LAYOUT.iter().map(|field| field.name).collect()
+}
+
+/// The members of a vocabulary: their names as in Rust, and their numbers.
+type Members = Vec<(String, i64)>;
+
+/// Every vocabulary with its members.
+#[pyfunction]
+pub(crate) fn vocabularies() -> Vec<(&'static str, Members)> {
+    fn members<V: Debug + Copy>(all: &[V], number: impl Fn(V) -> i64) -> Members {
+        all.iter().map(|&member| (format!("{member:?}"), number(member))).collect()
+    }
+    vec![
+        ("Code", members(Code::ALL, |it| it as i64)),
+        ("Rail", members(&Rail::ALL, |it| it as i64)),
+        ("DaemonState", members(&DaemonState::ALL, |it| it as i64)),
+        ("Status", members(Status::ALL, |it| it as i64)),
+        ("Reason", members(Reason::ALL, |it| it as i64)),
+        ("PipelineKind", members(PipelineKind::ALL, |it| it as i64)),
+        ("Quantity", members(Quantity::ALL, |it| it as i64)),
+        ("Parameter", members(Parameter::ALL, |it| it as i64)),
+        ("RejectionReason", members(RejectionReason::ALL, |it| it as i64)),
+        ("Manoeuvre", members(Manoeuvre::ALL, |it| i64::from(it.bit()))),
+        ("Effect", members(EffectKind::ALL, |it| it as i64)),
+        ("Has", members(&SampleField::ALL, |it| i64::from(it.bit()))),
+    ]
+}

@@ -1,0 +1,94 @@
+//! `explain`: the answer, the report with its plots, what the grown model predicts, and its files.
+
+use std::path::PathBuf;
+
+use dynocar::cli::Failure;
+use dynocar::cli::explain as command;
+use dynocar::report::images::images;
+use dynocar::report::provenance::command_line;
+use dynocar_core::dataset::Dataset;
+use dynocar_core::explain::Explanation;
+use dynocar_core::explain::score::PredictedRun;
+use pyo3::prelude::*;
+
+use crate::background::in_background;
+use crate::errors::of_failure;
+use crate::recorded::json;
+use crate::table::Table;
+
+/// An explained dataset.
+#[pyclass(frozen, module = "dynocar._native")]
+pub(crate) struct Explained {
+    path: PathBuf,
+    traction_only: bool,
+    dataset: Dataset,
+    explanation: Explanation,
+}
+
+/// Explains the dataset at a path.
+#[pyfunction]
+pub(crate) fn explain(
+    py: Python<'_>,
+    path: PathBuf,
+    traction_only: bool,
+    progress: Option<Bound<'_, PyAny>>,
+) -> PyResult<Explained> {
+    let of = path.clone();
+    let explained = in_background(py, progress.as_ref(), move |progress| {
+        command::answer(&of, traction_only, progress)
+    })?;
+    let (dataset, explanation) = explained.map_err(|failure| of_failure(py, &failure))?;
+    Ok(Explained { path, traction_only, dataset, explanation })
+}
+
+#[pymethods]
+impl Explained {
+    fn json(&self, py: Python<'_>) -> PyResult<String> {
+        json(&self.explanation.answer).map_err(|failure| of_failure(py, &failure))
+    }
+
+    fn text(&self) -> String {
+        command::text(&self.explanation.answer)
+    }
+
+    /// The report, one page of HTML.
+    fn page(&self, py: Python<'_>) -> PyResult<String> {
+        let mut arguments = vec!["explain".to_owned(), self.path.display().to_string()];
+        arguments.extend(self.traction_only.then(|| "--traction-only".to_owned()));
+        arguments.extend(["--report", "report.html"].map(str::to_owned));
+        let page = py.detach(|| {
+            let command = command_line(arguments);
+            command::page(&self.path, &self.dataset, &self.explanation, command)
+        });
+        page.map_err(|failure| of_failure(py, &failure))
+    }
+
+    /// Names and SVG of the report's plots.
+    fn plots(&self, py: Python<'_>) -> PyResult<Vec<(String, String)>> {
+        let drawn = py.detach(|| images(&self.dataset, &self.explanation));
+        let drawn =
+            drawn.map_err(|error| of_failure(py, &Failure::Work(error.to_string())))?.into_iter();
+        Ok(drawn.map(|image| (image.name, image.svg)).collect())
+    }
+
+    /// Speeds that the grown model predicts, by run.
+    fn predictions(&self) -> PyResult<Vec<(String, Table)>> {
+        let table = |run: &PredictedRun| -> PyResult<(String, Table)> {
+            let columns =
+                vec![("time_s", run.time_s.clone()), ("speed_mps", run.speed_mps.clone())];
+            Ok((run.file.clone(), Table::of(columns)?))
+        };
+        self.explanation.predictions.iter().map(table).collect()
+    }
+
+    /// Writes the grown model into a folder; gives the files, and the kinds that they cannot express.
+    fn write_grown(
+        &self,
+        py: Python<'_>,
+        folder: PathBuf,
+    ) -> PyResult<(Vec<PathBuf>, Vec<String>)> {
+        let written = py.detach(|| command::grow(&folder, &self.path, &self.explanation));
+        let grown = written.map_err(|failure| of_failure(py, &failure))?;
+        Ok((grown.files, grown.not_expressed))
+    }
+}

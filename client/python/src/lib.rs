@@ -1,0 +1,42 @@
+//! The native half of the Python package `dynocar`, its module `dynocar._native`: what users import is
+//! written in Python beside it (`dynocar/`).
+//!
+//! # Layout
+//!
+//! - [`errors`]: failures as the exceptions of `dynocar/_errors.py`
+//! - [`ends`]: ends of channels, each kept in the thread that opened it
+//! - [`channel`]: publisher and reader, [`snapshot`]: what a reader gives
+//! - [`about`]: clock, versions, who serves a train, vocabularies
+//! - [`background`]: long work that Ctrl-C ends
+//! - [`recorded`]: `check`, `read`, `identify`, [`explained`]: `explain`
+//! - [`table`]: columns for NumPy, tables for Arrow
+
+mod about;
+mod background;
+mod channel;
+mod ends;
+mod errors;
+mod explained;
+mod recorded;
+mod snapshot;
+mod table;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use crate::about::{
+        daemon_state, layouts, monotonic_now_ns, snapshot_fields, version, vocabularies,
+    };
+    #[pymodule_export]
+    use crate::channel::{Publisher, Reader};
+    #[pymodule_export]
+    use crate::explained::{Explained, explain};
+    #[pymodule_export]
+    use crate::recorded::{check, identify, read};
+    #[pymodule_export]
+    use crate::snapshot::{ParameterSnapshot, Reading};
+    #[pymodule_export]
+    use crate::table::{Column, Table};
+}

@@ -1,0 +1,78 @@
+//! `check`, `read` and `identify` over recorded runs: the answers of the commands, as JSON and in words.
+
+use std::path::PathBuf;
+
+use dynocar::cli::check::{self as checking, Understood};
+use dynocar::cli::{Failure, identify as identifying};
+use dynocar::output::OutputError;
+use pyo3::prelude::*;
+use serde::Serialize;
+
+use crate::background::in_background;
+use crate::errors::of_failure;
+use crate::table::Table;
+
+/// An answer as JSON and in words.
+pub(crate) type Answer = (String, String);
+
+/// An answer for machines, as the command line gives it.
+pub(crate) fn json(answer: &impl Serialize) -> Result<String, Failure> {
+    serde_json::to_string(answer).map_err(|error| Failure::Output(OutputError::Json(error)))
+}
+
+/// What was understood of a path; what is wrong with it is the answer, too.
+#[pyfunction]
+pub(crate) fn check(py: Python<'_>, path: PathBuf) -> PyResult<Answer> {
+    let answer = in_background(py, None, move |_| match checking::understand(&path) {
+        Ok(understood) => Ok((json(&understood.answer(&path))?, understood.text())),
+        Err(failure) => match failure.answer() {
+            Some(error) => {
+                let words = error.message.clone();
+                Ok((json(&checking::refusal(&path, error))?, words))
+            }
+            None => Err(failure),
+        },
+    })?;
+    answer.map_err(|failure: Failure| of_failure(py, &failure))
+}
+
+/// A dataset: what `check` says of it, and the tables of its runs and of all of them.
+#[pyfunction]
+pub(crate) fn read(py: Python<'_>, path: PathBuf) -> PyResult<(Answer, Vec<Table>, Table)> {
+    let read = in_background(py, None, move |_| {
+        let understood = checking::understand(&path)?;
+        let wrong: Option<Failure> = understood.errors().next().map(|it| it.clone().into());
+        let answer = (json(&understood.answer(&path))?, understood.text());
+        match (understood, wrong) {
+            (_, Some(failure)) => Err(failure),
+            (Understood::Dataset(_, runs), None) => {
+                Ok((answer, runs.into_iter().flatten().collect::<Vec<_>>()))
+            }
+            _ => {
+                let words = "expected a dataset's folder or its dataset.toml";
+                Err(Failure::Input(format!("{}: {words}", path.display())))
+            }
+        }
+    })?;
+    let (answer, runs) = read.map_err(|failure| of_failure(py, &failure))?;
+    let (each, all) = Table::of_runs(&runs)?;
+    Ok((answer, each, all))
+}
+
+/// What the daemon's pipelines learn from a dataset.
+#[pyfunction]
+pub(crate) fn identify(
+    py: Python<'_>,
+    path: PathBuf,
+    estimator: Option<String>,
+    per_run: bool,
+    traction_only: bool,
+) -> PyResult<Answer> {
+    let answer = in_background(py, None, move |_| {
+        let estimator = estimator.as_deref();
+        let question = identifying::Question { dataset: &path, estimator, per_run, traction_only };
+        let answer = identifying::answer(question)?;
+        Ok((json(&answer)?, identifying::text(&answer)))
+    })?;
+    answer.map_err(|failure: Failure| of_failure(py, &failure))
+}

@@ -1,0 +1,168 @@
+//! Columns for NumPy and tables for Arrow, which share their memory: nothing is copied.
+
+use std::sync::Arc;
+
+use arrow_array::ffi_stream::FFI_ArrowArrayStream;
+use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch, RecordBatchIterator, UInt32Array};
+use arrow_buffer::{NullBuffer, ScalarBuffer};
+use dynocar_core::dataset::{Extras, Run};
+use dynocar_shared::SampleField;
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use pyo3::types::{PyCapsule, PyDict};
+
+/// Name of the column that tells the runs of a dataset apart.
+const RUN: &str = "run";
+
+/// The quantities of a sample by the names of their columns.
+const QUANTITIES: [(SampleField, &str); SampleField::ALL.len()] = [
+    (SampleField::Position, "position_m"),
+    (SampleField::Speed, "speed_mps"),
+    (SampleField::TractionForce, "traction_force_n"),
+    (SampleField::BrakeForce, "brake_force_n"),
+    (SampleField::BrakeCylinderPressure, "brake_cylinder_pressure_pa"),
+    (SampleField::Acceleration, "acceleration_mps2"),
+    (SampleField::SpecificForce, "specific_force_mps2"),
+    (SampleField::Mass, "mass_kg"),
+    (SampleField::AmbientTemperature, "ambient_temperature_degc"),
+    (SampleField::Gradient, "gradient_permille"),
+    (SampleField::CurveRadius, "curve_radius_m"),
+];
+
+/// Named columns of one length, NaN where a value is missing.
+pub(crate) type Columns = Vec<(&'static str, Vec<f64>)>;
+
+/// A column of numbers, which NumPy takes by `numpy.asarray`.
+#[pyclass(frozen, module = "dynocar._native")]
+pub(crate) struct Column(ScalarBuffer<f64>);
+
+#[pymethods]
+impl Column {
+    /// NumPy's array interface: where the numbers lie; they cannot be written.
+    #[getter(__array_interface__)]
+    fn array_interface<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let interface = PyDict::new(py);
+        interface.set_item("version", 3)?;
+        interface
+            .set_item("typestr", if cfg!(target_endian = "little") { "<f8" } else { ">f8" })?;
+        interface.set_item("shape", (self.0.len(),))?;
+        interface.set_item("data", (self.0.as_ptr() as usize, true))?;
+        Ok(interface)
+    }
+}
+
+/// A table, which pandas, polars and pyarrow take by Arrow's C stream interface.
+#[pyclass(frozen, module = "dynocar._native")]
+pub(crate) struct Table(Vec<RecordBatch>);
+
+#[pymethods]
+impl Table {
+    /// The columns of numbers of the first batch, with their names.
+    fn columns(&self) -> Vec<(String, Column)> {
+        let Some(batch) = self.0.first() else { return Vec::new() };
+        let named = batch.schema_ref().fields().iter().zip(batch.columns());
+        named
+            .filter_map(|(field, array)| {
+                let numbers = array.as_any().downcast_ref::<Float64Array>()?;
+                Some((field.name().clone(), Column(numbers.values().clone())))
+            })
+            .collect()
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.iter().map(RecordBatch::num_rows).sum()
+    }
+
+    /// A consumer that wants another schema casts by itself, as the protocol allows.
+    #[pyo3(signature = (requested_schema=None))]
+    fn __arrow_c_stream__<'py>(
+        &self,
+        py: Python<'py>,
+        requested_schema: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyCapsule>> {
+        drop(requested_schema);
+        let empty = || PyRuntimeError::new_err("a table without a batch");
+        let schema = self.0.first().ok_or_else(empty)?.schema();
+        let batches = RecordBatchIterator::new(self.0.clone().into_iter().map(Ok), schema);
+        let stream = FFI_ArrowArrayStream::new(Box::new(batches));
+        PyCapsule::new_with_value(py, stream, c"arrow_array_stream")
+    }
+}
+
+impl Table {
+    /// A table of one stretch of time.
+    pub(crate) fn of(columns: Columns) -> PyResult<Self> {
+        Ok(Table(vec![batch(None, columns)?]))
+    }
+
+    /// The table of each run, and of all of them with a column that numbers the runs. They hold the
+    /// quantities of which any run has a value.
+    pub(crate) fn of_runs(runs: &[Run]) -> PyResult<(Vec<Self>, Self)> {
+        let mut read: Vec<Columns> = runs.iter().map(quantities).collect();
+        let is_there = |place: usize| {
+            read.iter().any(|columns| columns[place].1.iter().any(|value| !value.is_nan()))
+        };
+        let kept: Vec<bool> = (0..read.first().map_or(0, Vec::len)).map(is_there).collect();
+        for columns in &mut read {
+            let mut kept = kept.iter();
+            columns.retain(|_| kept.next() == Some(&true));
+        }
+        let numbered = |(run, columns): (&Run, Columns)| batch(Some(run.number), columns);
+        let all = runs.iter().zip(read).map(numbered).collect::<PyResult<Vec<_>>>()?;
+        // The columns after the run's number, in the same memory.
+        let alone = |whole: &RecordBatch| -> PyResult<Self> {
+            let places: Vec<usize> = (1..whole.num_columns()).collect();
+            Ok(Table(vec![whole.project(&places).map_err(unexpected)?]))
+        };
+        Ok((all.iter().map(alone).collect::<PyResult<_>>()?, Table(all)))
+    }
+}
+
+/// What a run holds: its times, the quantities of its samples, and those beyond them.
+fn quantities(run: &Run) -> Columns {
+    let samples = &run.samples;
+    let mut columns = vec![("time_s", samples.iter().map(|it| it.time_ns as f64 / 1e9).collect())];
+    for (field, name) in QUANTITIES {
+        let values = samples.iter().map(|sample| sample.get(field).unwrap_or(f64::NAN));
+        columns.push((name, values.collect()));
+    }
+    for (name, values) in extras(&run.extras) {
+        let known = values.iter().flatten().map(|value| value.unwrap_or(f64::NAN));
+        columns
+            .push((name, known.chain(std::iter::repeat(f64::NAN)).take(samples.len()).collect()));
+    }
+    columns
+}
+
+fn extras(extras: &Extras) -> [(&'static str, &Option<Vec<Option<f64>>>); 11] {
+    [
+        ("relative_humidity", &extras.relative_humidity),
+        ("wind_speed_mps", &extras.wind_speed_mps),
+        ("passengers", &extras.passengers),
+        ("altitude_m", &extras.altitude_m),
+        ("latitude_deg", &extras.latitude_deg),
+        ("longitude_deg", &extras.longitude_deg),
+        ("course_deg", &extras.course_deg),
+        ("curvature_per_m", &extras.curvature_per_m),
+        ("door_open", &extras.door_open),
+        ("traction_power_w", &extras.traction_power_w),
+        ("line_power_w", &extras.line_power_w),
+    ]
+}
+
+/// Columns in Arrow's form: what is missing is null there, and NaN in the memory that NumPy sees.
+fn batch(run: Option<u32>, columns: Columns) -> PyResult<RecordBatch> {
+    let rows = columns.first().map_or(0, |(_, values)| values.len());
+    let number = run.map(|run| (RUN, Arc::new(UInt32Array::from(vec![run; rows])) as ArrayRef));
+    let numbers = columns.into_iter().map(|(name, values)| {
+        let known: NullBuffer = values.iter().map(|it| !it.is_nan()).collect::<Vec<_>>().into();
+        let nulls = (known.null_count() > 0).then_some(known);
+        (name, Arc::new(Float64Array::new(values.into(), nulls)) as ArrayRef)
+    });
+    let all = number.into_iter().chain(numbers).map(|(name, array)| (name, array, true));
+    RecordBatch::try_from_iter_with_nullable(all).map_err(unexpected)
+}
+
+fn unexpected(error: impl std::fmt::Display) -> PyErr {
+    PyRuntimeError::new_err(error.to_string())
+}
