@@ -201,7 +201,7 @@ pub fn write_new_in_folder(folder: &Path, files: &[(&str, &str)]) -> Result<(), 
 /// # Errors
 ///
 /// When it cannot be written; the file there was stays as it is.
-pub fn write_file(path: &Path, content: impl AsRef<[u8]>) -> Result<(), OutputError> {
+pub fn write_file(path: &Path, content: &(impl AsRef<[u8]> + ?Sized)) -> Result<(), OutputError> {
     let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.into());
     let known = std::fs::metadata(&target).ok();
     let written = match known {
