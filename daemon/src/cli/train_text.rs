@@ -201,7 +201,7 @@ impl Lines<'_> {
         let assignment = format!("{key} = {value}");
         self.text += &match comment {
             "" => format!("{assignment}\n"),
-            comment => format!("{assignment:<32}# {comment}\n"),
+            comment => format!("{assignment:<31} # {comment}\n"),
         };
     }
 }

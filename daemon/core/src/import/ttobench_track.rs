@@ -153,9 +153,13 @@ fn curves(item: &Item, length_m: f64) -> Result<Vec<Curve>, ImportError> {
             let piece = piece as f64;
             // Curvature is linear along a transition: the middle has the mean.
             let curvature = first + (last - first) * (piece + 0.5) / pieces;
-            let (start_m, end_m) = (start_m + piece * step_m, start_m + (piece + 1.0) * step_m);
-            if curvature.abs() * RADIUS_MAX_M >= 1.0 && end_m > start_m {
-                curves.push(Curve { start_m, end_m, radius_m: 1.0 / curvature.abs() });
+            // No rounding may let the last piece reach into the next section.
+            let ends_here = piece + 1.0 >= pieces;
+            let piece_end_m = if ends_here { end_m } else { start_m + (piece + 1.0) * step_m };
+            let piece_start_m = start_m + piece * step_m;
+            if curvature.abs() * RADIUS_MAX_M >= 1.0 && piece_end_m > piece_start_m {
+                let radius_m = 1.0 / curvature.abs();
+                curves.push(Curve { start_m: piece_start_m, end_m: piece_end_m, radius_m });
             }
         }
     }

@@ -19,6 +19,9 @@ const SPEED_MPS: f64 = 40.0;
 /// Points of the resistance.
 const POINTS: u32 = 100;
 
+/// A curve of (km/h, kN) with its name and colour.
+type Line = (&'static str, RGBColor, Vec<(f64, f64)>);
+
 /// The curves as SVG; `None` for a train without any.
 ///
 /// # Errors
@@ -29,7 +32,7 @@ pub fn draw(train: &TrainModel) -> Result<Option<String>, PlotError> {
         return Ok(None);
     }
     let top_mps = train.speed_max_mps().filter(|top| *top > 0.0).unwrap_or(SPEED_MPS);
-    let mut lines: Vec<(&str, RGBColor, Vec<(f64, f64)>)> = Vec::new();
+    let mut lines: Vec<Line> = Vec::new();
     for (name, colour, curve) in
         [("traction", AFTER, &train.traction), ("brake", BEFORE, &train.brake)]
     {

@@ -16,6 +16,8 @@ const HEIGHT: u32 = 190;
 /// Nominal width in px of the letters of a stop's name, and of the gap to the next.
 const LETTER_PX: f64 = 7.0;
 const GAP_PX: f64 = 10.0;
+/// Curves so near in m to each other follow without straight track between them.
+const JOINED_M: f64 = 0.1;
 
 /// One property of the line.
 struct Panel {
@@ -117,12 +119,21 @@ fn steps(profile: &StepProfile, [from_m, to_m]: [f64; 2], factor: f64) -> Vec<(f
 fn curvature(track: &Track, ends_m: [f64; 2]) -> Vec<(f64, f64)> {
     let mut curves = track.curves().to_vec();
     curves.sort_by(|one, other| one.start_m.total_cmp(&other.start_m));
-    let corners = curves.iter().flat_map(|it| {
-        let (start_km, end_km, per_km) = (it.start_m / 1e3, it.end_m / 1e3, 1e3 / it.radius_m);
-        [(start_km, 0.0), (start_km, per_km), (end_km, per_km), (end_km, 0.0)]
-    });
-    let [first, last] = ends_m.map(|at_m| (at_m / 1e3, 0.0));
-    [first].into_iter().chain(corners).chain([last]).collect()
+    let mut points = vec![(ends_m[0] / 1e3, 0.0)];
+    for (index, curve) in curves.iter().enumerate() {
+        let per_km = 1e3 / curve.radius_m;
+        let is_joined = |from_m: f64, to_m: f64| (to_m - from_m).abs() < JOINED_M;
+        if index == 0 || !is_joined(curves[index - 1].end_m, curve.start_m) {
+            points.push((curve.start_m / 1e3, 0.0));
+        }
+        points.push((curve.start_m / 1e3, per_km));
+        points.push((curve.end_m / 1e3, per_km));
+        if curves.get(index + 1).is_none_or(|next| !is_joined(curve.end_m, next.start_m)) {
+            points.push((curve.end_m / 1e3, 0.0));
+        }
+    }
+    points.push((ends_m[1] / 1e3, 0.0));
+    points
 }
 
 /// A line at each stop and, where there is room, its name above.
@@ -203,6 +214,11 @@ mod tests {
         }
         assert!(!svg.contains("hidden"), "two names would overlap");
         assert!(svg.contains("fill=\"#E4EEF7\""), "tunnels are shaded");
+        let joined = LINE.replace("[[500, 700, 400]]", "[[500, 600, 1000], [600, 700, 500]]");
+        let track = parse_track("track.toml", &joined).unwrap();
+        let corners = [(0.0, 0.0), (0.5, 0.0), (0.5, 1.0), (0.6, 1.0), (0.6, 2.0), (0.7, 2.0)];
+        let rest = [(0.7, 0.0), (2.0, 0.0)];
+        assert_eq!(curvature(&track, [0.0, 2000.0]), [&corners[..], &rest].concat());
     }
 
     #[test]
