@@ -228,9 +228,11 @@ impl ResidualMonitor {
         let before = self.last_block.replace((sample.position_m, block.momentum));
         let has_other_suspect = self.verdict.naming().named().is_some_and(|named| {
             use EffectKind::{DraggingBrake, GradientError, LocalResistance, Unknown};
-            let may_be_the_place = named.alternatives & LocalResistance.bit() != 0;
-            !matches!(named.effect, LocalResistance | GradientError | Unknown)
-                && !(named.effect == DraggingBrake && may_be_the_place)
+            match named.effect {
+                LocalResistance | GradientError | Unknown => false,
+                DraggingBrake => named.alternatives & LocalResistance.bit() == 0,
+                _ => true,
+            }
         });
         if block.is_first || has_other_suspect {
             return;
