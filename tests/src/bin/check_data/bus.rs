@@ -40,8 +40,11 @@ pub fn check(report: &mut Report, folder: &Path) {
     }
 }
 
+/// Learns the masses of a dataset's sections by a kind of pipeline.
+type Learn = fn(&Dataset, PipelineKind) -> Masses;
+
 /// How the mass from stop to stop is learned on trips left out.
-const WAYS: [(&str, fn(&Dataset, PipelineKind) -> Masses, PipelineKind); 2] = [
+const WAYS: [(&str, Learn, PipelineKind); 2] = [
     ("bus: mass from stop to stop, live", stop_masses::live, PipelineKind::MassKalman),
     ("bus: mass of each section alone", stop_masses::alone, PipelineKind::JointLeastSquares),
 ];
