@@ -7,7 +7,7 @@
 //! # Layout, in the order of the work
 //!
 //! - `tree`, `item`: YAML and JSON with the line of every value; what may be expected of one
-//! - [`format`]: which project's file it is, by its content
+//! - [`mod@format`]: which project's file it is, by its content
 //! - `rolling_stock`, `vehicle`, `running_path`: railtoolkit's schemas
 //! - `ttobench`, `ttobench_train`, `ttobench_track`: TTOBench's files
 //! - `osrd`: OSRD's rolling stock
