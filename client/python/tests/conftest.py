@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 import subprocess
 import threading
 import time
@@ -19,6 +20,9 @@ ROOT = Path(__file__).resolve().parents[3]
 PROGRAMS = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release"
 # Whatever takes longer than this has failed.
 PATIENCE_S = 300
+
+# A shell starts what runs in its background with Ctrl-C ignored, and the tests send one.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 TRAIN = 11
 
 
