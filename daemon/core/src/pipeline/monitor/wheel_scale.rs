@@ -20,7 +20,7 @@ const JUMP_SAMPLES: u32 = 10;
 /// Standard deviation of the scale's error before the data.
 const PRIOR_STD: f64 = 0.02;
 
-/// A line through the points of a row, as sums about its first point.
+/// A line through the points of a row, as sums over them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Row {
     count: f64,
