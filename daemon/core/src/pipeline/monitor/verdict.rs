@@ -220,9 +220,9 @@ impl Verdict {
     fn least(&self, parameter: usize) -> f64 {
         match suspect_of(parameter).least {
             Least::Size(least) => least,
+            Least::Share(_) if self.unit_force[parameter] == 0.0 => f64::INFINITY,
             Least::Share(times) => {
-                times * self.share_min * self.resistance[parameter]
-                    / self.unit_force[parameter].max(f64::MIN_POSITIVE)
+                times * self.share_min * self.resistance[parameter] / self.unit_force[parameter]
             }
         }
     }
