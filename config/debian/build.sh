@@ -2,7 +2,7 @@
 # Builds dynocar_<version>_<arch>.deb from the release binaries.
 # usage: build.sh [--program FILE] [--libraries FOLDER] [--out FOLDER]
 #   --program    the program, default target/release/dynocar
-#   --libraries  where libdynocar_client.a, .so and libdynocar_fmu.so lie, default target/release
+#   --libraries  where libdynocar_client.a and libdynocar_fmu.so lie, default target/release
 #   --out        where the package goes, default target/debian
 # Build first: cargo build --release -p dynocar && cargo build --release -p dynocar-client -p dynocar-fmu
 set -eu
@@ -29,11 +29,10 @@ while [ $# -gt 0 ]; do
     shift 2
 done
 
-for file in "$program" "$libraries/libdynocar_client.a" "$libraries/libdynocar_client.so" \
-    "$libraries/libdynocar_fmu.so"; do
+for file in "$program" "$libraries/libdynocar_client.a" "$libraries/libdynocar_fmu.so"; do
     [ -f "$file" ] || fail "$file: no such file; build it with cargo build --release"
 done
-for tool in dpkg dpkg-deb gzip; do
+for tool in cc dpkg dpkg-deb gzip; do
     command -v "$tool" >/dev/null || fail "no $tool found"
 done
 
@@ -63,10 +62,26 @@ gzip -9n "$root"/usr/share/man/man1/*.1
 # What a controller links.
 put "$project/client/include/dynocar.h" usr/include/dynocar.h
 put "$libraries/libdynocar_client.a" usr/lib/libdynocar_client.a
-put "$libraries/libdynocar_client.so" usr/lib/libdynocar_client.so
+# The shared library bears the interface's version in its name; below 1.0 that is the minor one.
+minor=${version#*.} major=${version%%.*}
+minor=${minor%%.*}
+soname=libdynocar_client.so.$major.$minor
+cc -shared -Wl,-soname,"$soname" -Wl,--version-script,"$here/client/exports.map" -Wl,--gc-sections \
+    -Wl,--whole-archive "$libraries/libdynocar_client.a" -Wl,--no-whole-archive \
+    -lpthread -ldl -lm -lgcc_s -o "$root/usr/lib/$soname"
+chmod 644 "$root/usr/lib/$soname"
+ln -s "$soname" "$root/usr/lib/libdynocar_client.so"
+told() { # TEMPLATE TARGET: for those who build with pkg-config or CMake
+    mkdir -p "$root/$(dirname "$2")"
+    sed -e "s/@VERSION@/$version/" -e "s/@SONAME@/$soname/" -e "s/@MAJOR@/$major/" \
+        -e "s/@MINOR@/$minor/" "$here/client/$1" >"$root/$2"
+}
+told dynocar-client.pc usr/lib/pkgconfig/dynocar-client.pc
+told dynocar-config.cmake usr/lib/cmake/dynocar/dynocar-config.cmake
+told dynocar-config-version.cmake usr/lib/cmake/dynocar/dynocar-config-version.cmake
 put "$libraries/libdynocar_fmu.so" usr/lib/dynocar/libdynocar_fmu.so
 if command -v strip >/dev/null; then
-    strip --strip-unneeded "$root/usr/bin/dynocar" "$root/usr/lib/libdynocar_client.so" \
+    strip --strip-unneeded "$root/usr/bin/dynocar" "$root/usr/lib/$soname" \
         "$root/usr/lib/dynocar/libdynocar_fmu.so"
     strip --strip-debug "$root/usr/lib/libdynocar_client.a"
 fi
@@ -91,7 +106,7 @@ gzip -9n "$root/$document/changelog"
 
 # The package's own files. The newest C library that is called for is the oldest that will do.
 mkdir "$root/DEBIAN"
-glibc=$(grep -aoh 'GLIBC_2\.[0-9]*' "$root/usr/bin/dynocar" "$root/usr/lib/libdynocar_client.so" |
+glibc=$(grep -aoh 'GLIBC_2\.[0-9]*' "$root/usr/bin/dynocar" "$root/usr/lib/$soname" |
     sed 's/GLIBC_//' | sort -uV | tail -n 1)
 size=$(du -sk --exclude=DEBIAN "$root" | cut -f 1)
 cat >"$root/DEBIAN/control" <<EOF

@@ -3,7 +3,7 @@
 use dynocar_core::dataset::Dataset;
 use dynocar_core::explain::answer::{ParameterValue, Verdict};
 use dynocar_core::explain::explain;
-use dynocar_core::track::LinearProfile;
+use dynocar_core::track::{LinearProfile, StepProfile};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::dataset_files;
 use dynocar_tests::simulator::{Effect, EffectRequest, SimulatorSettings, TrainType, simulate};
@@ -50,4 +50,42 @@ fn a_wrong_gradient_is_found_with_its_profile_and_ambiguous_where_all_runs_go_on
     assert_eq!(answer.verdict, Verdict::Ambiguous, "{}", answer.statement);
     assert_eq!(answer.effects[0].kind, "gradient_error", "{}", answer.statement);
     assert!(answer.ambiguous_with.contains(&"local_resistance"), "{}", answer.statement);
+}
+
+#[test]
+fn a_line_declared_level_is_found_to_climb() {
+    let simulated = simulate(&SimulatorSettings {
+        train_type: Some(TrainType::Regional),
+        ..SimulatorSettings::new(9002, EffectRequest::none())
+    });
+    let mut files = dataset_files(&simulated);
+    let (_, track) = files.iter_mut().find(|(path, _)| path == "track.toml").expect("a line");
+    let mut document: toml::Table = track.parse().expect("the line's file");
+    let line = document["track"].as_table_mut().expect("a table");
+    let declared: Vec<(f64, f64)> =
+        line["gradient"].clone().try_into().expect("a list of chainages and gradients");
+    line.insert("gradient".into(), toml::Value::from(vec![vec![0.0, 0.0]]));
+    *track = document.to_string();
+    let texts: Vec<(&str, &str)> =
+        files.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
+    let dataset = Dataset::load(&texts[..]).expect("a simulated dataset");
+
+    let answer = explain(&dataset, &|_, _| {}).expect("usable runs").answer;
+    let kinds: Vec<&str> = answer.effects.iter().map(|effect| effect.kind).collect();
+    assert_eq!(kinds, ["gradient_error"], "{}", answer.statement);
+    let (before, after) = (answer.rmse_before.unwrap(), answer.rmse_after.unwrap());
+    assert!(after < 0.25 * before, "{before} to {after} m/s");
+    let Some(ParameterValue::Profile(found)) = answer.effects[0].parameters.get("profile") else {
+        panic!("{:?}", answer.effects)
+    };
+    // Of the climb that a straight line between the nodes can follow, most.
+    let truth = StepProfile::new(&declared).expect("the simulator's line");
+    let apart_m = found[1][0] - found[0][0];
+    let (mut squares, mut left) = (0.0, 0.0);
+    for [at_m, permille] in found {
+        let true_permille = truth.mean_around(*at_m, apart_m);
+        squares += true_permille.powi(2);
+        left += (permille - true_permille).powi(2);
+    }
+    assert!(left < 0.25 * squares, "{left} of {squares}");
 }

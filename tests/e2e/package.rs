@@ -15,13 +15,16 @@ use commands::{DYNOCAR, done, dynocar, said};
 use support::{compiler, library_directory, must_succeed, require};
 
 /// What the package must hold, for the program that is tested.
-const FILES: [&str; 15] = [
+const FILES: [&str; 18] = [
     "usr/bin/dynocar",
     "usr/lib/systemd/system/dynocar.service",
     "usr/lib/sysusers.d/dynocar.conf",
     "usr/include/dynocar.h",
     "usr/lib/libdynocar_client.a",
     "usr/lib/libdynocar_client.so",
+    "usr/lib/pkgconfig/dynocar-client.pc",
+    "usr/lib/cmake/dynocar/dynocar-config.cmake",
+    "usr/lib/cmake/dynocar/dynocar-config-version.cmake",
     "usr/lib/dynocar/libdynocar_fmu.so",
     "usr/share/bash-completion/completions/dynocar",
     "usr/share/zsh/vendor-completions/_dynocar",
@@ -102,24 +105,42 @@ fn the_package_is_built_installed_and_runs() {
     let fmu = folder.path().join("dynocar.fmu");
     must_succeed(Command::new(&program).arg("fmu").arg("-o").arg(&fmu));
     assert!(fmu.is_file(), "the library is found where the package puts it");
-    let unit = std::fs::read_to_string(root.join(FILES[1])).unwrap();
+    let unit =
+        std::fs::read_to_string(root.join("usr/lib/systemd/system/dynocar.service")).unwrap();
     let keys: HashMap<&str, &str> = unit.lines().filter_map(|line| line.split_once('=')).collect();
     assert_eq!(keys["ExecStart"], "/usr/bin/dynocar run --config /etc/dynocar/daemon.toml");
     links_and_runs(&root, folder.path());
 }
 
-/// A controller in C is built from nothing but what the package holds.
+/// A controller in C is built from nothing but what the package holds: with the archive, and with
+/// the shared library as pkg-config tells it.
 fn links_and_runs(root: &Path, folder: &Path) {
     let (source, out) = (folder.join("version.c"), folder.join("version"));
     let text = "#include <dynocar.h>\n#include <stdio.h>\n\
                 int main(void) { return puts(dynocar_version()) < 0; }\n";
     std::fs::write(&source, text).unwrap();
-    let standard = compiler("CC", "cc", "c99");
-    let mut command = Command::new(standard.get_program());
-    command.arg("-std=c99").arg("-I").arg(root.join("usr/include")).arg(&source);
-    command.arg(root.join("usr/lib/libdynocar_client.a"));
-    must_succeed(command.args(["-lpthread", "-ldl", "-lm", "-o"]).arg(&out));
-    assert_eq!(must_succeed(&mut Command::new(&out)).trim(), env!("CARGO_PKG_VERSION"));
+    let library = root.join("usr/lib");
+    let built = |options: &[String]| {
+        let standard = compiler("CC", "cc", "c99");
+        let mut command = Command::new(standard.get_program());
+        command.arg("-std=c99").arg(&source).args(options).arg("-o").arg(&out);
+        must_succeed(&mut command);
+        let mut program = Command::new(&out);
+        let version = must_succeed(program.env("LD_LIBRARY_PATH", &library));
+        assert_eq!(version.trim(), env!("CARGO_PKG_VERSION"), "{options:?}");
+    };
+    let archive = [format!("-I{}", root.join("usr/include").display())].into_iter();
+    let archive = archive.chain([library.join("libdynocar_client.a").display().to_string()]);
+    built(&archive.chain(["-lpthread", "-ldl", "-lm"].map(String::from)).collect::<Vec<_>>());
+
+    require("pkg-config", "pkg-config");
+    let mut asked = Command::new("pkg-config");
+    asked.env("PKG_CONFIG_PATH", library.join("pkgconfig"));
+    let told = must_succeed(asked.args(["--cflags", "--libs", "dynocar-client"]));
+    built(&told.split_whitespace().map(String::from).collect::<Vec<_>>());
+    let needed = must_succeed(Command::new("ldd").arg(&out).env("LD_LIBRARY_PATH", &library));
+    let (major, minor) = (env!("CARGO_PKG_VERSION_MAJOR"), env!("CARGO_PKG_VERSION_MINOR"));
+    assert!(needed.contains(&format!("libdynocar_client.so.{major}.{minor} => ")), "{needed}");
 }
 
 #[test]

@@ -194,17 +194,32 @@ pub fn declarations(kind: EffectKind) -> Vec<Declaration> {
             sample: |sample, _| sample.valid &= !SampleField::Gradient.bit(),
             ..NOTHING
         }],
-        EffectKind::GradientError => vec![Declaration {
-            name: "gradient_error",
-            // The survey, 2 ‰ less steep, and that it lacks them.
-            track: "
+        // The survey, 2 ‰ less steep, and that it lacks them; then the same for each direction.
+        EffectKind::GradientError => vec![
+            Declaration {
+                name: "gradient_error",
+                track: "
                 gradient = [[0.0, 0.0], [1200.0, -5.0], [2500.0, 2.5], [4100.0, -3.0],
                             [5600.0, -7.0], [7300.0, 1.0], [9000.0, -4.0], [11000.0, -1.0]]
                 gradient_error = [[0.0, 2.0], [5000.0, 2.0], [12000.0, 2.0]]
             ",
-            sample: |sample, _| sample.valid &= !SampleField::Gradient.bit(),
-            ..NOTHING
-        }],
+                sample: |sample, _| sample.valid &= !SampleField::Gradient.bit(),
+                ..NOTHING
+            },
+            Declaration {
+                name: "gradient_error_falling",
+                track: "
+                gradient = [[0.0, 0.0], [1200.0, -5.0], [2500.0, 2.5], [4100.0, -3.0],
+                            [5600.0, -7.0], [7300.0, 1.0], [9000.0, -4.0], [11000.0, -1.0]]
+                gradient_falling = [[0.0, 1.0], [1200.0, -4.0], [2500.0, 3.5], [4100.0, -2.0],
+                            [5600.0, -6.0], [7300.0, 2.0], [9000.0, -3.0], [11000.0, 0.0]]
+                gradient_error = [[0.0, 2.0], [12000.0, 2.0]]
+                gradient_error_falling = [[0.0, 1.0], [12000.0, 1.0]]
+            ",
+                sample: |sample, _| sample.valid &= !SampleField::Gradient.bit(),
+                ..NOTHING
+            },
+        ],
         EffectKind::MassChange => vec![Declaration {
             name: "masses",
             track: "masses = [[-1e6, 1e6, 1.0, 1.08], [-1e6, 1e6, -1.0, 1.08]]",

@@ -1,5 +1,6 @@
 //! How the effects change the physics and the sensors of one run.
 
+use dynocar_core::terms::gradient::GradientError;
 use dynocar_core::terms::{
     Resistance, adhesion, ambient, bearings, brake, curve, place, tunnel, wind,
 };
@@ -30,7 +31,7 @@ pub struct Disturbances {
     /// How far in m the true gradient lies towards +chainage of the map's.
     pub gradient_shift_m: f64,
     /// What the map's gradient lacks in ‰ by chainage.
-    pub gradient_error: Option<LinearProfile>,
+    pub gradient_error: Option<GradientError>,
     /// Basic resistance of this run over the train's ordinary one.
     pub resistance_factor: f64,
     /// Reading of the force sensors of this run over the reported forces.
@@ -186,7 +187,7 @@ impl Disturbances {
             Effect::GradientError { profile } => {
                 let error = LinearProfile::new(profile.clone()).expect("ascending chainages");
                 self.gradient = with_error(&self.gradient, profile, &error);
-                self.gradient_error = Some(error);
+                self.gradient_error = Some(GradientError { profile: error, falling: None });
             }
             Effect::MassChangeSections(sections) => {
                 let of_direction =

@@ -1,5 +1,7 @@
 //! Names that a user may mistype, and what was meant.
 
+use strsim::levenshtein;
+
 /// The names that were possible, with the one most like what was written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Choices {
@@ -41,10 +43,10 @@ impl std::fmt::Display for Choices {
 fn nearest(word: &str, names: &[String]) -> Option<usize> {
     let word = folded(word);
     let names: Vec<_> = names.iter().map(|name| folded(name)).collect();
-    let distances =
-        names.iter().enumerate().map(|(index, name)| (edit_distance(&word, name), index));
+    let distances = names.iter().enumerate().map(|(index, name)| (levenshtein(&word, name), index));
     let (distance, index) = distances.min()?;
-    if distance <= word.len().max(names[index].len()) / 3 {
+    let letters = |name: &str| name.chars().count();
+    if distance <= letters(&word).max(letters(&names[index])) / 3 {
         return Some(index);
     }
     let mut begun = (0..names.len()).filter(|&index| names[index].starts_with(&word));
@@ -52,25 +54,10 @@ fn nearest(word: &str, names: &[String]) -> Option<usize> {
 }
 
 /// Case and what separates words do not tell names apart for the purpose of a guess.
-fn folded(name: &str) -> Vec<char> {
+fn folded(name: &str) -> String {
     // A word of any length may come from a file; a name's first letters are enough for a guess.
     let letters = name.chars().take(80).flat_map(char::to_lowercase);
     letters.map(|letter| if letter == '-' || letter == ' ' { '_' } else { letter }).collect()
-}
-
-/// Number of single-letter changes between two words (Levenshtein 1966).
-fn edit_distance(one: &[char], other: &[char]) -> usize {
-    let mut row: Vec<usize> = (0..=other.len()).collect();
-    for (i, letter) in one.iter().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, other_letter) in other.iter().enumerate() {
-            let replaced = diagonal + usize::from(letter != other_letter);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(row[j + 1] + 1);
-        }
-    }
-    row[other.len()]
 }
 
 #[cfg(test)]
@@ -93,13 +80,5 @@ mod tests {
     fn choices_are_listed_after_the_suggestion() {
         let shown = Choices::new("sped", ["speed", "time"]).to_string();
         assert_eq!(shown, "; did you mean 'speed'? (choices: 'speed', 'time')");
-    }
-
-    #[test]
-    fn edit_distance_counts_single_changes() {
-        let distance = |one: &str, other: &str| edit_distance(&folded(one), &folded(other));
-        assert_eq!(distance("kitten", "sitting"), 3);
-        assert_eq!(distance("", "abc"), 3);
-        assert_eq!(distance("same", "same"), 0);
     }
 }

@@ -2,7 +2,8 @@
 
 use super::document::{Document, Section};
 use super::error::{DatasetError, Place, Problem};
-use crate::terms::{gradient, masses, place};
+use crate::terms::gradient::{self, GradientError};
+use crate::terms::{masses, place};
 use crate::track::{
     Curve, LinearProfile, MassSection, ProfileError, StepProfile, Track, TrackError, TrackSurvey,
     Tunnel,
@@ -27,6 +28,7 @@ pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
         "gradient",
         gradient::SHIFT,
         gradient::ERROR,
+        gradient::ERROR_FALLING,
         "curves",
         "tunnels",
         place::LIST,
@@ -123,13 +125,19 @@ fn with_corrections(mut track: Track, section: &Section) -> Result<Track, Datase
     if let Some(shift_m) = section.number(gradient::SHIFT, shift, is_shift)? {
         track = track.with_gradient_shift(shift_m);
     }
-    if let Some(entries) = section.entries::<2>(gradient::ERROR, "[chainage_m, permille]")? {
-        let entries = entries.into_iter().map(|([at_m, permille], _)| (at_m, permille)).collect();
-        let refused = |error| {
-            let problem = Problem::Track(TrackError::Gradient(error));
-            section.place_of(gradient::ERROR).problem(problem)
-        };
-        track = track.with_gradient_error(LinearProfile::new(entries).map_err(refused)?);
+    let falling = gradient_error(section, gradient::ERROR_FALLING)?;
+    match (gradient_error(section, gradient::ERROR)?, falling) {
+        (Some(profile), falling) => {
+            track = track.with_gradient_error(GradientError { profile, falling });
+        }
+        (None, Some(_)) => {
+            let key = section.full(gradient::ERROR_FALLING);
+            let value = "without gradient_error".to_string();
+            let allowed = "the list gradient_error beside it, for growing chainage".to_string();
+            let problem = Problem::OutOfRange { key, value, allowed };
+            return Err(section.place_of(gradient::ERROR_FALLING).problem(problem));
+        }
+        (None, None) => {}
     }
     if let Some(entries) = section.entries::<3>(place::LIST, RESISTANCE)? {
         let places: Vec<_> =
@@ -157,6 +165,20 @@ fn with_corrections(mut track: Track, section: &Section) -> Result<Track, Datase
         track = track.with_masses(sections);
     }
     Ok(track)
+}
+
+/// What the declared gradient lacks, in one of its lists.
+fn gradient_error(
+    section: &Section,
+    name: &'static str,
+) -> Result<Option<LinearProfile>, DatasetError> {
+    let Some(entries) = section.entries::<2>(name, "[chainage_m, permille]")? else {
+        return Ok(None);
+    };
+    let entries = entries.into_iter().map(|([at_m, permille], _)| (at_m, permille)).collect();
+    let refused =
+        |error| section.place_of(name).problem(Problem::Track(TrackError::Gradient(error)));
+    LinearProfile::new(entries).map(Some).map_err(refused)
 }
 
 /// Where the entries of the lists stand.
@@ -334,7 +356,7 @@ tunnels = [[2200.0, 2900.0]]
                 ("tunnels", "tunnel"),
                 "track.toml:12: unknown key 'tunnel' in [track]; did you mean 'tunnels'? \
                  (choices: 'name', 'length_m', 'gradient', 'gradient_shift_m', 'gradient_error', \
-                 'curves', 'tunnels', 'resistance', 'masses', 'gradient_falling', 'gradient_std', \
+                 'gradient_error_falling', 'curves', 'tunnels', 'resistance', 'masses', 'gradient_falling', 'gradient_std', \
                  'stops', 'permitted_speed', 'alignment', 'alignment_falling')",
             ),
         ];

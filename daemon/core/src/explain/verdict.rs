@@ -90,13 +90,15 @@ pub fn answer(
 
 /// That the runs held out are predicted worse with what was found; empty when they are not.
 fn worse_held_out(effects: &[EffectAnswer], score: &Score) -> String {
-    match score.holdout_rmse_mps() {
-        [Some(before), Some(after)] if after > before && !effects.is_empty() => format!(
-            " The runs held out are predicted worse with it, {before:.3} m/s before and {after:.3} \
-             after: it holds for the runs that were fitted, not for those."
-        ),
-        _ => String::new(),
+    let [Some(before), Some(after)] = score.holdout_rmse_mps() else { return String::new() };
+    let [shown_before, shown_after] = [before, after].map(|error| format!("{error:.3}"));
+    if effects.is_empty() || after <= before || shown_after == shown_before {
+        return String::new();
     }
+    format!(
+        " The runs held out are predicted worse with it, {shown_before} m/s before and \
+         {shown_after} after: it holds for the runs that were fitted, not for those."
+    )
 }
 
 /// Why nothing was scored, and what is known instead; `None` when something was.

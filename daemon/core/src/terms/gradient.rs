@@ -18,19 +18,52 @@ pub const SHIFT_LEAST_M: f64 = 5.0;
 
 /// The list of `[track]` that holds [chainage in m, permille]: what the declared gradient lacks.
 pub const ERROR: &str = "gradient_error";
+/// The same for falling chainage, where it is another way; else both directions have one.
+pub const ERROR_FALLING: &str = "gradient_error_falling";
 /// What it lacks at one chainage.
-pub const ERROR_PARAMETER: Parameter = Parameter::new("permille", (-30.0, 30.0), 0.05);
-/// Standard deviation in ‰ of such an error before the data: that of a map drawn from altitudes.
-pub const ERROR_PRIOR_PERMILLE: f64 = 1.5;
-/// Length in m over which it changes: a wrong vertical curve, a smoothed hill.
-pub const ERROR_LENGTH_M: f64 = 1500.0;
+pub const ERROR_PARAMETER: Parameter = Parameter::new("permille", (-150.0, 150.0), 0.05);
+/// How a declared gradient may be wrong, before the data.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ErrorScale {
+    /// Standard deviation in ‰.
+    pub permille: f64,
+    /// Length in m over which it changes.
+    pub length_m: f64,
+}
+
+/// A map drawn from altitudes, with a wrong vertical curve or a smoothed hill.
+pub const MAP: ErrorScale = ErrorScale { permille: 1.5, length_m: 1500.0 };
+/// A line whose gradient nobody surveyed: a railway's, and a street's in hills.
+pub const UNSURVEYED: [ErrorScale; 2] =
+    [ErrorScale { permille: 8.0, length_m: 600.0 }, ErrorScale { permille: 25.0, length_m: 200.0 }];
 /// A root mean square in ‰ below this is what good surveys differ by.
 pub const ERROR_LEAST_PERMILLE: f64 = 0.25;
 
-/// The gradient is steeper in ‰ along growing chainage by what a profile says.
+/// What a declared gradient lacks in ‰ along growing chainage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GradientError {
+    /// For both directions, or for growing chainage.
+    pub profile: LinearProfile,
+    /// For falling chainage, where it is another way.
+    pub falling: Option<LinearProfile>,
+}
+
+impl GradientError {
+    /// What is lacking in ‰ at a chainage, climbing positive as the chainage grows, for a train in
+    /// a direction of travel, +1 or -1.
+    #[inline]
+    pub fn at(&self, position_m: f64, direction: f64) -> f64 {
+        match &self.falling {
+            Some(falling) if direction < 0.0 => falling.at(position_m),
+            _ => self.profile.at(position_m),
+        }
+    }
+}
+
+/// The gradient is steeper in ‰ along growing chainage by what an error says.
 #[inline]
-pub fn err(error: &LinearProfile, (position_m, direction): (f64, f64), permille: &mut f64) {
-    *permille += direction * error.at(position_m);
+pub fn err(error: &GradientError, (position_m, direction): (f64, f64), permille: &mut f64) {
+    *permille += direction * error.at(position_m, direction);
 }
 
 /// Gradient in ‰ along the travel under a train of a length in m, whose profile is moved by

@@ -10,6 +10,8 @@ mod profile;
 pub use entries::{Curve, MassSection, Tunnel};
 pub use profile::{LinearProfile, ProfileError, StepProfile};
 
+use crate::terms::gradient::GradientError;
+
 /// What is known of a line beside its profile: by a survey, or from another project's files.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrackSurvey {
@@ -87,7 +89,7 @@ pub struct Track {
     curves: Vec<Curve>,
     tunnels: Vec<Tunnel>,
     gradient_shift_m: f64,
-    gradient_error_permille: Option<LinearProfile>,
+    gradient_error: Option<GradientError>,
     resistance_n_per_kn: Option<StepProfile>,
     masses: Vec<MassSection>,
     survey: TrackSurvey,
@@ -131,7 +133,7 @@ impl Track {
             curves: curves.unwrap_or_default(),
             tunnels: tunnels.unwrap_or_default(),
             gradient_shift_m: 0.0,
-            gradient_error_permille: None,
+            gradient_error: None,
             resistance_n_per_kn: None,
             masses: Vec::new(),
             survey: TrackSurvey::default(),
@@ -155,10 +157,10 @@ impl Track {
         self
     }
 
-    /// The same line whose true gradient is steeper in ‰ by a profile.
+    /// The same line whose true gradient is steeper by what the declared one lacks.
     #[must_use]
-    pub fn with_gradient_error(mut self, error_permille: LinearProfile) -> Self {
-        self.gradient_error_permille = Some(error_permille);
+    pub fn with_gradient_error(mut self, error: GradientError) -> Self {
+        self.gradient_error = Some(error);
         self
     }
 
@@ -213,8 +215,8 @@ impl Track {
         };
         let true_m = centre_m - self.gradient_shift_m;
         let mapped = profile.mean_around(true_m, train_length_m);
-        Some(match &self.gradient_error_permille {
-            Some(error) => mapped + error.at(centre_m),
+        Some(match &self.gradient_error {
+            Some(error) => mapped + error.at(centre_m, direction),
             None => mapped,
         })
     }
@@ -232,6 +234,12 @@ impl Track {
     /// True when both directions have one gradient profile.
     pub fn is_one_profile(&self) -> bool {
         self.survey.gradient_falling.is_none()
+    }
+
+    /// True when a level line is declared, or none: nobody surveyed its gradient.
+    pub fn is_level(&self) -> bool {
+        let profiles = [self.gradient_permille.as_ref(), self.survey.gradient_falling.as_ref()];
+        profiles.into_iter().flatten().all(|profile| profile.entries().all(|(_, it)| it == 0.0))
     }
 
     /// Mean of 1/R in 1/m along a train; `None` when no curves are known.
@@ -255,9 +263,9 @@ impl Track {
         self.gradient_shift_m
     }
 
-    /// What the declared gradient lacks in ‰, when known.
-    pub fn gradient_error_permille(&self) -> Option<&LinearProfile> {
-        self.gradient_error_permille.as_ref()
+    /// What the declared gradient lacks, when known.
+    pub fn gradient_error(&self) -> Option<&GradientError> {
+        self.gradient_error.as_ref()
     }
 
     /// The gradient profile as surveyed, when known.

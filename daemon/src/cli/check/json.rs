@@ -7,7 +7,7 @@ use dynocar_core::dataset::{
     PositionSource, Quantity, Remark, Role, Run, RunEntry, RunQuality,
 };
 use dynocar_core::terms::extra::Extra;
-use dynocar_core::track::Track;
+use dynocar_core::track::{LinearProfile, Track};
 use dynocar_core::train::{Corrections, EffortCurve, TrainModel};
 use serde::Serialize;
 
@@ -131,6 +131,8 @@ struct TrackAnswer<'a> {
     gradient_shift_m: f64,
     /// (m, ‰) that the declared gradient lacks.
     gradient_error: Vec<(f64, f64)>,
+    /// The same for falling chainage, where it is another way.
+    gradient_error_falling: Vec<(f64, f64)>,
     /// Steps (m, N/kN) of further resistance; `null`: not known.
     resistance: Option<Vec<(f64, f64)>>,
     /// [from_m, to_m, direction, mass factor]
@@ -260,6 +262,9 @@ fn track_answer(track: &Track) -> TrackAnswer<'_> {
             (low.min(permille), high.max(permille))
         })
     });
+    let lacks = |profile: Option<&LinearProfile>| {
+        profile.map_or_else(Vec::new, |profile| profile.entries().to_vec())
+    };
     TrackAnswer {
         name: &track.name,
         length_m: track.length_m,
@@ -268,9 +273,10 @@ fn track_answer(track: &Track) -> TrackAnswer<'_> {
         curves: track.knows_curves().then(|| track.curves().len()),
         tunnels: track.knows_tunnels().then(|| track.tunnels().len()),
         gradient_shift_m: track.gradient_shift_m(),
-        gradient_error: track
-            .gradient_error_permille()
-            .map_or_else(Vec::new, |error| error.entries().to_vec()),
+        gradient_error: lacks(track.gradient_error().map(|error| &error.profile)),
+        gradient_error_falling: lacks(
+            track.gradient_error().and_then(|error| error.falling.as_ref()),
+        ),
         resistance: track.resistance().map(|profile| profile.entries().collect()),
         masses: track
             .masses()

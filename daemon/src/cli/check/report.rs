@@ -1,7 +1,7 @@
 //! What was understood, in words and columns.
 
 use dynocar_core::dataset::{Manifest, PositionReference, Quantity};
-use dynocar_core::track::Track;
+use dynocar_core::track::{LinearProfile, Track};
 use dynocar_core::train::{BrakeGear, Corrections, EffortCurve, TrainModel};
 
 use super::{Understood, daemon, runs};
@@ -253,9 +253,11 @@ fn track(track: &Track) -> String {
         let shift = short(track.gradient_shift_m(), 1);
         text += &line("shift", &format!("the gradient lies {shift} m further"));
     }
-    if let Some(error) = track.gradient_error_permille() {
-        let (low, high) = range(error.entries().iter().map(|(_, permille)| *permille));
-        let (low, high, count) = (short(low, 3), short(high, 3), error.entries().len());
+    if let Some(error) = track.gradient_error() {
+        let both = [Some(&error.profile), error.falling.as_ref()];
+        let entries = || both.into_iter().flatten().flat_map(LinearProfile::entries);
+        let (low, high) = range(entries().map(|(_, permille)| *permille));
+        let (low, high, count) = (short(low, 3), short(high, 3), entries().count());
         let lacks = format!("the gradient lacks {low} to {high} ‰ at {count} chainages");
         text += &line("error", &lacks);
     }

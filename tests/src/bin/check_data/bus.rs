@@ -7,6 +7,7 @@ use dynocar::dataset;
 use dynocar::survey::answer::Answer;
 use dynocar::survey::survey_folder;
 use dynocar_core::dataset::Dataset;
+use dynocar_core::explain::answer::Answer as ExplainAnswer;
 use dynocar_core::explain::explain;
 use dynocar_shared::PipelineKind;
 
@@ -18,6 +19,8 @@ const ERROR_MAX_MPS: f64 = 0.30;
 /// Largest scatter in t of the mass from stop to stop, and its least correlation with the counted one.
 const STOP_MASS_T: f64 = 0.38;
 const CORRELATION: f64 = 0.9;
+/// Share of the error that is left when the gradient of a line declared level is found.
+const LEVEL_SHARE_MAX: f64 = 0.25;
 /// What independent analyses of the day leave open, for each quantity.
 const INERTIAL_MASS_T: [f64; 2] = [19.4, 20.1];
 const PASSENGER_KG: [f64; 2] = [60.0, 82.0];
@@ -34,6 +37,8 @@ pub fn check(report: &mut Report, folder: &Path) {
     let outcome = whole.and_then(|answer| left_out(folder, &answer));
     let error = outcome.as_ref().map_err(Clone::clone).and_then(LeftOut::error);
     report.note("bus: 60 s in open loop, trips left out two by two", error);
+    let climbs = outcome.as_ref().map_err(Clone::clone).and_then(|it| told_to_climb(&it.level));
+    report.note("bus: its line declared level", climbs);
     for (place, (told, ..)) in WAYS.iter().enumerate() {
         let masses = outcome.as_ref().map_err(Clone::clone).map(|it| &it.masses[place]);
         report.note(told, masses.and_then(held));
@@ -59,6 +64,8 @@ fn held(masses: &Masses) -> Result<String, String> {
 struct LeftOut {
     errors_mps: Vec<f64>,
     masses: [Masses; WAYS.len()],
+    /// What is found when the first of these lines is declared level.
+    level: Option<ExplainAnswer>,
 }
 
 impl LeftOut {
@@ -109,11 +116,41 @@ fn left_out(folder: &Path, whole: &Answer) -> Result<LeftOut, String> {
         let explained = explain(&mapped, &|_, _| {}).map_err(|error| error.to_string())?;
         let score = &explained.score.holdout_window60[0];
         all.errors_mps.push(score.rmse_mps().ok_or("no trip is held out")?);
+        if first == 0 {
+            let level = declared_level(out.path())?;
+            let explained = explain(&level, &|_, _| {}).map_err(|error| error.to_string())?;
+            all.level = Some(explained.answer);
+        }
         for (masses, (_, learn, kind)) in all.masses.iter_mut().zip(WAYS) {
             masses.extend(learn(&mapped, kind));
         }
     }
     Ok(all)
+}
+
+/// The same trips on a line of which no gradient is known.
+fn declared_level(folder: &Path) -> Result<Dataset, String> {
+    let file = folder.join("track.toml");
+    let text = std::fs::read_to_string(&file).map_err(|error| error.to_string())?;
+    let mut document: toml::Table = text.parse().map_err(|error| format!("{error}"))?;
+    let line = document.get_mut("track").and_then(toml::Value::as_table_mut).ok_or("no line")?;
+    line.retain(|name, _| !name.starts_with("gradient"));
+    line.insert("gradient".into(), toml::Value::from(vec![vec![0.0, 0.0]]));
+    std::fs::write(&file, document.to_string()).map_err(|error| error.to_string())?;
+    dataset::load(folder).map_err(|error| error.to_string())
+}
+
+fn told_to_climb(answer: &Option<ExplainAnswer>) -> Result<String, String> {
+    let answer = answer.as_ref().ok_or("nothing was explained")?;
+    let error = |error: Option<f64>| error.unwrap_or(f64::NAN);
+    let (before, after) = (error(answer.rmse_before), error(answer.rmse_after));
+    let kinds: Vec<&str> = answer.effects.iter().map(|effect| effect.kind).collect();
+    let words = format!("{}, {before:.2} to {after:.2} m/s", kinds.join(", "));
+    if kinds == ["gradient_error"] && after < LEVEL_SHARE_MAX * before {
+        Ok(words)
+    } else {
+        Err(words)
+    }
 }
 
 /// Cuts the day into one recording for each trip, some of them held out.

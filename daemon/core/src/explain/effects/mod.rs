@@ -117,6 +117,17 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         true
     }
 
+    /// True when each parameter adds a gradient in proportion to it, and nothing else.
+    fn is_gradient(&self) -> bool {
+        false
+    }
+
+    /// The gradient in ‰ along the travel that a unit of a parameter adds at each sample of a run.
+    fn gradient_permille(&self, _parameter: usize, run: &RunData, permille: &mut Vec<f64>) {
+        permille.clear();
+        permille.resize(run.samples().len(), 0.0);
+    }
+
     /// Measured over true speed.
     fn speed_scale(&self, _parameters: &[f64]) -> f64 {
         1.0

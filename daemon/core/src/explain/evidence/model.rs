@@ -130,6 +130,12 @@ impl GrownForces {
         };
         integrate_bins(run, slope, bins);
     }
+
+    /// What they change by for a gradient in ‰ along the travel at each sample.
+    pub fn gradient_slopes(&self, run: &RunData, permille: &[f64], bins: &mut Vec<f64>) {
+        let slope = |i: usize| self.speed_scale * self.samples[i].gradient_slope() * permille[i];
+        integrate_bins(run, slope, bins);
+    }
 }
 
 impl ForceModel for GrownForces {

@@ -63,6 +63,12 @@ impl SampleForces {
         ]
     }
 
+    /// What the acceleration changes by for each ‰ of gradient along the travel.
+    #[inline]
+    pub(super) fn gradient_slope(&self) -> f64 {
+        -self.per_unit_resistance_mps2()
+    }
+
     /// What the acceleration changes by for each unit of a, b and c.
     #[inline]
     pub(super) fn davis_slopes(&self, speed_mps: f64) -> [f64; 3] {

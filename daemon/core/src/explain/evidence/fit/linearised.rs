@@ -7,6 +7,7 @@ use super::super::noise::Noise;
 use super::robust::{RunFilters, Whitened};
 use super::{Fit, FitProblem, RunNormal};
 use crate::explain::evidence::RunData;
+use crate::filter::lanes::dot;
 
 /// Working memory of evaluations.
 #[derive(Default)]
@@ -160,8 +161,8 @@ impl FitProblem {
     }
 }
 
-/// Regressors of one run at the parameters of the prediction made last: a, b, c by their slopes,
-/// the others by differences; empty for a parameter that does not touch the run.
+/// Regressors of one run at the parameters of the prediction made last: a, b, c and gradients by their
+/// slopes, the others by differences; empty for a parameter that does not touch the run.
 fn whitened_columns(
     model: &GrownModel,
     run: &RunData,
@@ -176,18 +177,30 @@ fn whitened_columns(
         forces.davis_slopes(run, coefficient, moved);
         filters.whitener.whiten(moved, column);
     }
-    let mut elsewhere = theta.to_vec();
-    for (effect, range) in model.effects.iter().zip(model.ranges()) {
-        for i in range.clone().filter(|i| effect.touches(i - range.start, run)) {
-            let step = steps[i - 3];
-            elsewhere[i] += step;
-            model.predict_bins(run, &elsewhere, forces, moved);
-            elsewhere[i] = theta[i];
-            for (moved, base) in moved.iter_mut().zip(bins.iter()) {
-                *moved = (*moved - base) / step;
-            }
+    let touched = || {
+        model.effects.iter().zip(model.ranges()).flat_map(move |(effect, range)| {
+            let from = range.start;
+            range.filter(move |i| effect.touches(i - from, run)).map(move |i| (effect, i - from, i))
+        })
+    };
+    let mut permille = Vec::new();
+    for (effect, parameter, i) in touched() {
+        if effect.is_gradient() {
+            effect.gradient_permille(parameter, run, &mut permille);
+            forces.gradient_slopes(run, &permille, moved);
             filters.whitener.whiten(moved, &mut columns[i]);
         }
+    }
+    let mut elsewhere = theta.to_vec();
+    for (_, _, i) in touched().filter(|(effect, ..)| !effect.is_gradient()) {
+        let step = steps[i - 3];
+        elsewhere[i] += step;
+        model.predict_bins(run, &elsewhere, forces, moved);
+        elsewhere[i] = theta[i];
+        for (moved, base) in moved.iter_mut().zip(bins.iter()) {
+            *moved = (*moved - base) / step;
+        }
+        filters.whitener.whiten(moved, &mut columns[i]);
     }
     columns
 }
@@ -195,16 +208,21 @@ fn whitened_columns(
 /// `free` are the columns less what the run's own factors would explain.
 fn normal_equations(columns: &[Vec<f64>], free: &[Vec<f64>], whitened: &Whitened) -> RunNormal {
     let (count, weights) = (columns.len(), whitened.filter.weights());
+    let weighted: Vec<Vec<f64>> = columns
+        .iter()
+        .map(|column| column.iter().zip(weights).map(|(value, weight)| weight * value).collect())
+        .collect();
     // A column that is empty is zero.
-    let product = |one: &[f64], other: &[f64]| -> f64 {
-        one.iter().zip(other).zip(weights).map(|((one, other), weight)| weight * one * other).sum()
+    let product = |one: &[f64], other: &[f64]| match one.is_empty() || other.is_empty() {
+        true => 0.0,
+        false => dot(one, other),
     };
     let mut information = DMatrix::zeros(count, count);
     let mut score = DVector::zeros(count);
     for i in 0..count {
-        score[i] = product(&columns[i], &whitened.innovations);
+        score[i] = product(&weighted[i], &whitened.innovations);
         for j in 0..=i {
-            let sum = product(&columns[i], &free[j]);
+            let sum = product(&weighted[i], &free[j]);
             (information[(i, j)], information[(j, i)]) = (sum, sum);
         }
     }

@@ -1,0 +1,40 @@
+#!/usr/bin/env bash
+# Builds a controller with CMake from nothing but the Debian package: shared and static.
+# CMake is that of PyPI, in an environment of its own, where there is none.
+# Build first: cargo build --release -p dynocar && cargo build --release -p dynocar-client -p dynocar-fmu
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cmake=$(command -v cmake || true)
+if [ -z "$cmake" ]; then
+    python3 -m venv "$work/python"
+    "$work/python/bin/pip" install --quiet cmake
+    cmake=$work/python/bin/cmake
+fi
+
+package=$(config/debian/build.sh --out "$work")
+dpkg-deb -x "$package" "$work/root"
+mkdir "$work/source"
+cp client/examples/controller.c "$work/source"
+cat >"$work/source/CMakeLists.txt" <<'END'
+cmake_minimum_required(VERSION 3.16)
+project(controller C)
+find_package(dynocar 0.1 REQUIRED)
+foreach(kind client client_static)
+    add_executable(${kind} controller.c)
+    target_link_libraries(${kind} PRIVATE dynocar::${kind})
+endforeach()
+END
+"$cmake" -S "$work/source" -B "$work/build" -Ddynocar_DIR="$work/root/usr/lib/cmake/dynocar" >"$work/log" ||
+    { cat "$work/log"; exit 1; }
+"$cmake" --build "$work/build"
+for kind in client client_static; do
+    # Without a daemon the example says so and goes on driving: it only has to start.
+    status=0
+    timeout 2 "$work/build/$kind" >"$work/out" 2>&1 || status=$?
+    [ "$status" = 124 ] || [ "$status" = 0 ] || { cat "$work/out"; echo "$kind: exit status $status"; exit 1; }
+    [ -s "$work/out" ] || { echo "$kind said nothing"; exit 1; }
+    echo "$kind: $(head -n 1 "$work/out")"
+done
