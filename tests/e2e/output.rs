@@ -88,6 +88,22 @@ fn what_tells_people_on_standard_error_survives_its_loss() {
             assert_eq!(status, expected, "{it:?}");
         }
     }
+    let stock = concat!(env!("CARGO_MANIFEST_DIR"), "/corpus/import/rolling_stock.yaml");
+    for (number, lost) in [Stdio::null(), closed_pipe(), full_disk()].into_iter().enumerate() {
+        let out = format!("imported{number}");
+        let import = (DYNOCAR, &["import", stock, "--train", "ore", "--out", &out][..]);
+        let mut import = command(&site, import);
+        let status = import.current_dir(site.path()).stdout(Stdio::null()).stderr(lost).status();
+        assert_eq!(status.unwrap().code(), Some(0), "import {number}");
+        assert!(site.path().join(out).join("train.toml").is_file());
+    }
+    for (number, lost) in [Stdio::null(), closed_pipe(), full_disk()].into_iter().enumerate() {
+        let out = format!("dynocar{number}.fmu");
+        let mut fmu = command(&site, (DYNOCAR, &["fmu", "-o", &out][..]));
+        let status = fmu.current_dir(site.path()).stdout(Stdio::null()).stderr(lost).status();
+        assert_eq!(status.unwrap().code(), Some(0), "fmu {number}");
+        assert!(site.path().join(out).is_file());
+    }
     let demo = (DYNOCAR, &["demo", "--rate", "1000"][..]);
     let output = command(&site, demo).stdout(full_disk()).output().unwrap();
     assert!(said(&output).contains("standard output: cannot be written"), "{}", said(&output));
