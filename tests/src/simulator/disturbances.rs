@@ -1,10 +1,9 @@
 //! How the effects change the physics and the sensors of one run.
 
-use dynocar_core::terms::gradient::GradientError;
 use dynocar_core::terms::{
     Resistance, adhesion, ambient, bearings, brake, curve, place, tunnel, wind,
 };
-use dynocar_core::track::{LinearProfile, StepProfile};
+use dynocar_core::track::{GradientError, LinearProfile, StepProfile};
 
 use super::effects::{Effect, MassSection, RunWindow};
 use super::line_maker::Line;

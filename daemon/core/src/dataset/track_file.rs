@@ -2,11 +2,10 @@
 
 use super::document::{Document, Section};
 use super::error::{DatasetError, Place, Problem};
-use crate::terms::gradient::{self, GradientError};
-use crate::terms::{masses, place};
+use crate::terms::{gradient, masses, place};
 use crate::track::{
-    Curve, LinearProfile, MassSection, ProfileError, StepProfile, Track, TrackError, TrackSurvey,
-    Tunnel,
+    Curve, GradientError, LinearProfile, MassSection, ProfileError, StepProfile, Track, TrackError,
+    TrackSurvey, Tunnel,
 };
 
 /// A steeper gradient in ‰ than any adhesion railway has is a mistake of unit.

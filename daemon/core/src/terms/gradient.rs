@@ -4,7 +4,7 @@
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Least, Parameter, Suspect};
-use crate::track::{LinearProfile, Track};
+use crate::track::{GradientError, Track};
 
 /// The number of `[track]` by which the true profile is the map's moved towards growing chainage.
 pub const SHIFT: &str = "gradient_shift_m";
@@ -38,27 +38,6 @@ pub const UNSURVEYED: [ErrorScale; 2] =
     [ErrorScale { permille: 8.0, length_m: 600.0 }, ErrorScale { permille: 25.0, length_m: 200.0 }];
 /// A root mean square in ‰ below this is what good surveys differ by.
 pub const ERROR_LEAST_PERMILLE: f64 = 0.25;
-
-/// What a declared gradient lacks in ‰ along growing chainage.
-#[derive(Clone, Debug, PartialEq)]
-pub struct GradientError {
-    /// For both directions, or for growing chainage.
-    pub profile: LinearProfile,
-    /// For falling chainage, where it is another way.
-    pub falling: Option<LinearProfile>,
-}
-
-impl GradientError {
-    /// What is lacking in ‰ at a chainage, climbing positive as the chainage grows, for a train in
-    /// a direction of travel, +1 or -1.
-    #[inline]
-    pub fn at(&self, position_m: f64, direction: f64) -> f64 {
-        match &self.falling {
-            Some(falling) if direction < 0.0 => falling.at(position_m),
-            _ => self.profile.at(position_m),
-        }
-    }
-}
 
 /// The gradient is steeper in ‰ along growing chainage by what an error says.
 #[inline]

@@ -8,9 +8,7 @@ mod entries;
 mod profile;
 
 pub use entries::{Curve, MassSection, Tunnel};
-pub use profile::{LinearProfile, ProfileError, StepProfile};
-
-use crate::terms::gradient::GradientError;
+pub use profile::{GradientError, LinearProfile, ProfileError, StepProfile};
 
 /// What is known of a line beside its profile: by a survey, or from another project's files.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -165,6 +165,27 @@ impl LinearProfile {
     }
 }
 
+/// What a declared gradient lacks in ‰ along growing chainage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GradientError {
+    /// For both directions, or for growing chainage.
+    pub profile: LinearProfile,
+    /// For falling chainage, where it is another way.
+    pub falling: Option<LinearProfile>,
+}
+
+impl GradientError {
+    /// What is lacking in ‰ at a chainage, climbing positive as the chainage grows, for a train in
+    /// a direction of travel, +1 or -1.
+    #[inline]
+    pub fn at(&self, position_m: f64, direction: f64) -> f64 {
+        match &self.falling {
+            Some(falling) if direction < 0.0 => falling.at(position_m),
+            _ => self.profile.at(position_m),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

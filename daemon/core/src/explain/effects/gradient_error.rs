@@ -19,7 +19,7 @@ use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{MAP_ERROR_PERMILLE, span_m};
 use crate::explain::scan::Scan;
 use crate::terms::gradient::{self, ErrorScale};
-use crate::track::LinearProfile;
+use crate::track::{self, LinearProfile};
 
 /// Nodes in the length over which the error changes.
 const NODES_A_LENGTH: f64 = 3.0;
@@ -141,13 +141,13 @@ impl Profile {
         names.into_iter().zip(values.chunks(self.nodes_m.len()))
     }
 
-    fn error(&self, values: &[f64]) -> Option<gradient::GradientError> {
+    fn error(&self, values: &[f64]) -> Option<track::GradientError> {
         let mut ways = values.chunks(self.nodes_m.len()).map(|values| {
             LinearProfile::new(self.nodes_m.iter().copied().zip(values.iter().copied()).collect())
         });
         let profile = ways.next()?.ok()?;
         let falling = ways.next().transpose().ok()?;
-        Some(gradient::GradientError { profile, falling })
+        Some(track::GradientError { profile, falling })
     }
 }
 
