@@ -1,14 +1,12 @@
-//! Commands that programs of their own carry out: what they are built on is nothing that a daemon needs.
+//! Commands that programs of their own carry out.
 
-use std::ffi::{OsStr, OsString};
-use std::io;
+use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
-use std::path::PathBuf;
-use std::process::Command;
 
 use clap::Args;
 
 use super::Failure;
+use crate::programs::{call, not_started};
 
 /// What follows a command whose program reads it itself.
 #[derive(Debug, Args)]
@@ -17,6 +15,12 @@ pub struct Passed {
     /// Options, as the command's own `--help` tells them
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "OPTIONS")]
     words: Vec<OsString>,
+}
+
+impl From<Vec<OsString>> for Passed {
+    fn from(words: Vec<OsString>) -> Self {
+        Passed { words }
+    }
 }
 
 /// Becomes the program that carries out a command, with the command's words.
@@ -28,30 +32,6 @@ pub struct Passed {
 ///
 /// Only when there is no such program, or it cannot be started.
 pub fn become_it(package: &str, command: Option<&str>, passed: &Passed) -> Result<(), Failure> {
-    let program = beside_this(package).unwrap_or_else(|| package.into());
-    let error = command_line(&program, command, &passed.words).exec();
-    Err(not_started(package, &error))
-}
-
-fn command_line(program: &OsStr, command: Option<&str>, words: &[OsString]) -> Command {
-    let mut line = Command::new(program);
-    line.args(command).args(words);
-    line
-}
-
-/// The program where this one lies; else the search path has it.
-fn beside_this(package: &str) -> Option<OsString> {
-    let this: PathBuf = std::env::current_exe().ok()?;
-    let program = this.parent()?.join(package);
-    program.is_file().then(|| program.into_os_string())
-}
-
-fn not_started(package: &str, error: &io::Error) -> Failure {
-    if error.kind() == io::ErrorKind::NotFound {
-        return Failure::Work(format!(
-            "this command needs the program {package}, which is neither beside dynocar nor on the \
-             search path; `cargo build --release -p {package}` makes it"
-        ));
-    }
-    Failure::Work(format!("{package} cannot be started: {error}"))
+    let error = call(package).args(command).args(&passed.words).exec();
+    Err(Failure::Work(not_started(package, &error)))
 }

@@ -31,9 +31,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 pub use failure::{ErrorAnswer, Failure};
 
 use crate::output::{OutputError, write_json};
-
-/// The program of everything about recordings.
-const RECORDING: &str = "dynocar-recording";
+use crate::programs::RECORDING;
 
 /// Dynocar, a dynamometer car in software.
 #[derive(Debug, Parser)]
