@@ -1,4 +1,4 @@
-//! Datasets on disk.
+//! Datasets on disk; a recording is one once it is unpacked.
 
 use std::fs::{File, FileType};
 use std::io::{ErrorKind, Read};
@@ -11,6 +11,9 @@ use dynocar_core::dataset::{
 };
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
+
+pub use crate::unpacking::is_recording;
+use crate::unpacking::{UnpackError, Unpacked};
 
 /// Why a path leads to no dataset.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -37,6 +40,9 @@ pub enum LoadError {
         /// What it is.
         found: &'static str,
     },
+    /// A recording cannot be unpacked.
+    #[error(transparent)]
+    Recording(#[from] UnpackError),
     /// A file of the dataset is wrong.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
@@ -44,25 +50,33 @@ pub enum LoadError {
 
 /// A dataset's folder; the manifest may have another name than [`MANIFEST_FILE`] when it is
 /// given itself.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct DatasetFolder {
     folder: PathBuf,
     manifest: PathBuf,
+    /// The recording that was unpacked into the folder, which goes with the last who knows it.
+    recording: Option<Unpacked>,
 }
 
 impl DatasetFolder {
-    /// The dataset at a path: its folder, or its `dataset.toml`.
+    /// The dataset at a path: its folder, or its `dataset.toml`, or a recording.
     ///
     /// # Errors
     ///
     /// When there is nothing, or a folder that is no dataset.
     pub fn at(path: &Path) -> Result<Self, LoadError> {
+        if is_recording(path) {
+            let unpacked = Unpacked::of(path)?;
+            let folder = unpacked.folder();
+            let manifest = folder.join(MANIFEST_FILE);
+            return Ok(DatasetFolder { folder, manifest, recording: Some(unpacked) });
+        }
         if path.is_dir() {
             let manifest = path.join(MANIFEST_FILE);
             if !manifest.exists() {
                 return Err(LoadError::NotADataset { path: path.into(), hint: described(path) });
             }
-            return Ok(DatasetFolder { folder: path.into(), manifest });
+            return Ok(DatasetFolder { folder: path.into(), manifest, recording: None });
         }
         if !path.exists() {
             return Err(LoadError::NoSuchPath { path: path.into() });
@@ -71,7 +85,7 @@ impl DatasetFolder {
             return Err(LoadError::NoManifest { path: path.into(), found: "not a TOML file" });
         }
         let folder = path.parent().unwrap_or(Path::new("")).into();
-        Ok(DatasetFolder { folder, manifest: path.into() })
+        Ok(DatasetFolder { folder, manifest: path.into(), recording: None })
     }
 
     fn path_of(&self, path: &str) -> PathBuf {
@@ -85,7 +99,10 @@ impl DatasetFiles for DatasetFolder {
     }
 
     fn label(&self, path: &str) -> String {
-        self.path_of(path).display().to_string()
+        match &self.recording {
+            Some(unpacked) => format!("{}/{path}", unpacked.recording().display()),
+            None => self.path_of(path).display().to_string(),
+        }
     }
 }
 

@@ -9,6 +9,7 @@
 //! - [`fmu`]: the estimators as an FMU
 //! - [`grown`]: the model with its effects as train and track files
 //! - [`output`]: where results go
+//! - [`programs`]: commands that are programs of their own
 //! - [`report`]: an explanation as a page of HTML
 //! - [`demo`]: the main job as a show
 //! - [`run`]: the daemon, every stage on one screen
@@ -18,6 +19,7 @@
 //! - [`supervision`]: what a supervisor and an operator see of the daemon
 //! - [`survey`]: raw recordings to a dataset on a surveyed line
 //! - [`track_text`]: the text of a line's file
+//! - [`unpacking`]: recordings as datasets
 //! - [`replay`]: recorded runs into the sample channel
 
 pub mod cli;
@@ -28,6 +30,7 @@ pub mod fmu;
 pub mod grown;
 pub mod identify;
 pub mod output;
+pub mod programs;
 pub mod replay;
 pub mod report;
 pub mod run;
@@ -37,3 +40,4 @@ pub mod storage;
 pub mod supervision;
 pub mod survey;
 pub mod track_text;
+pub mod unpacking;

@@ -137,7 +137,11 @@ fn tell_who_answers(config: &DaemonConfig) {
 }
 
 /// A flag that SIGTERM and SIGINT set.
-pub(crate) fn stop_on_signals() -> Result<Arc<AtomicBool>, RunError> {
+///
+/// # Errors
+///
+/// When the system takes no handler.
+pub fn stop_on_signals() -> Result<Arc<AtomicBool>, RunError> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
         signal_hook::flag::register(signal, Arc::clone(&stop))
@@ -211,7 +215,13 @@ fn number_lanes(plans: &mut [WorkerPlan], train: TrainId, count: &SampleCount) {
     count.serve(threads, pipelines);
 }
 
-fn build_pipeline(
+/// A pipeline of the configuration for one of its trains, before its first sample; `index` is its
+/// number in the configuration.
+///
+/// # Errors
+///
+/// When a setting is out of range.
+pub fn build_pipeline(
     settings: &PipelineConfig,
     index: u32,
     train: &TrainConfig,

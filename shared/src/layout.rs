@@ -2,7 +2,7 @@
 //!
 //! [`wire_struct!`](crate::wire_struct) declares a `#[repr(C)]` struct, refuses padding at compile time, and gives
 //! the struct a `LAYOUT` (name, type, offset and size of each field) and a `LAYOUT_HASH` over
-//! it. Two peers whose hashes differ never exchange a byte: the hash is part of the type name
+//! it; what each field means, and its words by its place, serve whoever writes the struct down. Two peers whose hashes differ never exchange a byte: the hash is part of the type name
 //! that the channel compares before it maps anything.
 
 /// One field of a shared-memory type.
@@ -16,6 +16,65 @@ pub struct FieldLayout {
     pub offset: usize,
     /// Bytes the field takes.
     pub size: usize,
+}
+
+/// A field as words of 64 bits: a number is one, an array as many as it has entries.
+///
+/// A float's word holds its bits, an integer's its value, negative ones in two's complement.
+pub trait Words {
+    /// How many words.
+    fn count(&self) -> usize;
+    /// A word by its place.
+    ///
+    /// # Panics
+    ///
+    /// When there is none.
+    fn word(&self, place: usize) -> u64;
+    /// Sets a word by its place; an integer keeps the bits that it has room for.
+    ///
+    /// # Panics
+    ///
+    /// When there is none.
+    fn set_word(&mut self, place: usize, word: u64);
+}
+
+macro_rules! words {
+    ($($ty:ty: $value:ident => $to:expr, $word:ident => $from:expr;)*) => { $(
+        impl Words for $ty {
+            fn count(&self) -> usize {
+                1
+            }
+            fn word(&self, _: usize) -> u64 {
+                let $value = *self;
+                $to
+            }
+            fn set_word(&mut self, _: usize, $word: u64) {
+                *self = $from;
+            }
+        }
+    )* };
+}
+
+words! {
+    u8: value => u64::from(value), word => word as u8;
+    u16: value => u64::from(value), word => word as u16;
+    u32: value => u64::from(value), word => word as u32;
+    u64: value => value, word => word;
+    i8: value => value as u64, word => word as i8;
+    i64: value => value as u64, word => word as i64;
+    f64: value => value.to_bits(), word => f64::from_bits(word);
+}
+
+impl<T: Words, const N: usize> Words for [T; N] {
+    fn count(&self) -> usize {
+        N
+    }
+    fn word(&self, place: usize) -> u64 {
+        self[place].word(0)
+    }
+    fn set_word(&mut self, place: usize, word: u64) {
+        self[place].set_word(0, word);
+    }
 }
 
 const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
@@ -72,17 +131,17 @@ pub const fn hex_digits(hash: u64) -> [u8; 16] {
     digits
 }
 
-/// Declares a shared-memory struct: `#[repr(C)]`, no padding, with `LAYOUT`, `LAYOUT_HASH` and
-/// the `WIRE_NAME` that a channel compares (`dynocar.<Struct>.<hash>`).
+/// Declares a shared-memory struct: `#[repr(C)]`, no padding, with `LAYOUT`, `MEANINGS`,
+/// `LAYOUT_HASH` and the `WIRE_NAME` that a channel compares (`dynocar.<Struct>.<hash>`).
 #[macro_export]
 macro_rules! wire_struct {
     ($(#[$meta:meta])* pub struct $name:ident {
-        $( $(#[$field_meta:meta])* pub $field:ident : $ty:ty ),* $(,)?
+        $( $(#[doc = $doc:literal])* pub $field:ident : $ty:ty ),* $(,)?
     }) => {
         $(#[$meta])*
         #[repr(C)]
         #[derive(Clone, Copy, Debug, PartialEq)]
-        pub struct $name { $( $(#[$field_meta])* pub $field: $ty ),* }
+        pub struct $name { $( $(#[doc = $doc])* pub $field: $ty ),* }
 
         impl $name {
             /// Name, type, offset and size of each field, in order.
@@ -94,6 +153,8 @@ macro_rules! wire_struct {
                     size: ::core::mem::size_of::<$ty>(),
                 } ),*
             ];
+            /// What each field means, in the order of `LAYOUT`, as its documentation has it.
+            pub const MEANINGS: &'static [&'static str] = &[ $( concat!($($doc),*) ),* ];
             /// Hash over the layout; peers with different hashes are incompatible.
             pub const LAYOUT_HASH: u64 = $crate::layout::layout_hash(
                 stringify!($name), ::core::mem::size_of::<$name>(), Self::LAYOUT);
@@ -114,6 +175,40 @@ macro_rules! wire_struct {
                     Err(_) => panic!("a wire name is ASCII"),
                 }
             };
+
+            /// Every field by its place in `LAYOUT`.
+            pub fn fields(&self) -> [&dyn $crate::layout::Words; $name::LAYOUT.len()] {
+                [ $( &self.$field ),* ]
+            }
+
+            /// Every field by its place in `LAYOUT`, to be set.
+            pub fn fields_mut(&mut self) -> [&mut dyn $crate::layout::Words; $name::LAYOUT.len()] {
+                [ $( &mut self.$field ),* ]
+            }
+        }
+
+        impl $crate::layout::Words for $name {
+            fn count(&self) -> usize {
+                self.fields().iter().map(|field| field.count()).sum()
+            }
+            fn word(&self, mut place: usize) -> u64 {
+                for field in self.fields() {
+                    if place < field.count() {
+                        return field.word(place);
+                    }
+                    place -= field.count();
+                }
+                panic!("no such word")
+            }
+            fn set_word(&mut self, mut place: usize, word: u64) {
+                for field in self.fields_mut() {
+                    if place < field.count() {
+                        return field.set_word(place, word);
+                    }
+                    place -= field.count();
+                }
+                panic!("no such word")
+            }
         }
 
         const _: () = assert!(
@@ -141,6 +236,24 @@ mod tests {
     fn layout_lists_every_field_with_its_offset() {
         assert_eq!(Pair::LAYOUT.len(), 2);
         assert_eq!((Pair::LAYOUT[1].name, Pair::LAYOUT[1].offset), ("second_mps", 8));
+    }
+
+    #[test]
+    fn every_word_is_read_and_set_by_its_place() {
+        let mut pair = Pair { first: 7, second_mps: -0.5 };
+        assert_eq!((pair.count(), pair.word(0), pair.word(1)), (2, 7, (-0.5f64).to_bits()));
+        pair.set_word(1, 2.5f64.to_bits());
+        pair.fields_mut()[0].set_word(0, u64::MAX);
+        assert_eq!(pair, Pair { first: u64::MAX, second_mps: 2.5 });
+        let mut small = [1i8, -1];
+        assert_eq!(small.word(1), u64::MAX);
+        small.set_word(0, -3i64 as u64);
+        assert_eq!(small, [-3, -1]);
+    }
+
+    #[test]
+    fn what_a_field_means_is_its_documentation() {
+        assert_eq!(Pair::MEANINGS, [" First.", " Second."]);
     }
 
     #[test]

@@ -15,6 +15,7 @@
 //! - [`adhesion`]: adhesion laws over speed
 //! - [`stopping`]: braking distance and time from a speed, with a bound
 //! - [`quantile`]: quantiles of the normal distribution
+//! - [`schema`]: what each field of sample and snapshot is, in which unit, and when it is missing
 //! - [`services`]: names, prefix and schema version of the channels
 
 pub mod adhesion;
@@ -22,6 +23,7 @@ pub mod layout;
 pub mod quantile;
 pub mod resistance;
 pub mod sample;
+pub mod schema;
 pub mod services;
 pub mod sleeper;
 pub mod snapshot;

@@ -56,6 +56,23 @@ impl SampleField {
         SampleField::CurveRadius,
     ];
 
+    /// The name of the sample's field.
+    pub const fn name(self) -> &'static str {
+        match self {
+            SampleField::Position => "position_m",
+            SampleField::Speed => "speed_mps",
+            SampleField::TractionForce => "traction_force_n",
+            SampleField::BrakeForce => "brake_force_n",
+            SampleField::BrakeCylinderPressure => "brake_cylinder_pressure_pa",
+            SampleField::Acceleration => "acceleration_mps2",
+            SampleField::SpecificForce => "specific_force_mps2",
+            SampleField::Mass => "mass_kg",
+            SampleField::AmbientTemperature => "ambient_temperature_degc",
+            SampleField::Gradient => "gradient_permille",
+            SampleField::CurveRadius => "curve_radius_m",
+        }
+    }
+
     /// The field's bit in [`TrainSample::valid`].
     pub const fn bit(self) -> u16 {
         1 << self as u16

@@ -5,11 +5,11 @@
 
 /// Declares an enum with explicit wire numbers, a snake-case name and conversion from the number.
 macro_rules! vocabulary {
-    ($(#[$meta:meta])* $name:ident : $repr:ty { $( $(#[$item_meta:meta])* $item:ident = $number:literal $text:literal ),* $(,)? }) => {
+    ($(#[$meta:meta])* $name:ident : $repr:ty { $( $(#[doc = $doc:literal])* $item:ident = $number:literal $text:literal ),* $(,)? }) => {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
         #[repr($repr)]
-        pub enum $name { $( $(#[$item_meta])* $item = $number ),* }
+        pub enum $name { $( $(#[doc = $doc])* $item = $number ),* }
 
         impl $name {
             /// Every member, in the order of its number.
@@ -18,6 +18,11 @@ macro_rules! vocabulary {
             /// The member's name in files, command lines and machine-readable results.
             pub const fn name(self) -> &'static str {
                 match self { $( $name::$item => $text ),* }
+            }
+
+            /// What the member means, as its documentation has it.
+            pub const fn meaning(self) -> &'static str {
+                match self { $( $name::$item => concat!($($doc),*) ),* }
             }
 
             /// The member with this wire number.

@@ -53,6 +53,13 @@ fn what_a_simulator_loads_has_no_channel() {
 }
 
 #[test]
+fn what_recordings_are_written_with_is_in_no_controller_and_no_daemon() {
+    for package in ["dynocar", "dynocar-client", "dynocar-fmu", "dynocar-core"] {
+        assert_free_of(package, &["dynocar-recording", "mcap", "prost", "parquet", "arrow"]);
+    }
+}
+
+#[test]
 fn the_contract_depends_on_nothing() {
     assert_eq!(dependencies("dynocar-shared"), ["dynocar-shared"]);
 }

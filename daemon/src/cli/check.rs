@@ -26,7 +26,7 @@ use crate::output::{give, require_file, require_folder, tell, write_json};
 /// Validate a dataset, train, track or daemon configuration and say what was understood.
 #[derive(Clone, Debug, Args)]
 pub struct CheckArguments {
-    /// A dataset's folder or its dataset.toml, a train.toml, a track.toml or a daemon.toml.
+    /// A dataset's folder or its dataset.toml, a recording, a train.toml, a track.toml or a daemon.toml.
     path: PathBuf,
     /// Also write the result as JSON; '-' for standard output.
     #[arg(long, value_name = "FILE")]
@@ -134,7 +134,7 @@ impl Understood {
 ///
 /// When the path leads to nothing known, or a file that everything rests on is wrong.
 pub fn understand(path: &Path) -> Result<Understood, Failure> {
-    if !path.is_file() {
+    if !path.is_file() || dataset::is_recording(path) {
         return read_dataset(path);
     }
     let label = path.display().to_string();

@@ -31,7 +31,7 @@ const IMPOSSIBLE: &str = "no grown model is written: the data cannot be true";
 /// Find what the declared model leaves, trace it to an effect, and score the grown model.
 #[derive(Debug, Args)]
 pub struct ExplainArguments {
-    /// The dataset's folder
+    /// The dataset's folder, or a recording
     dataset: PathBuf,
     /// Use the forces under traction only: for recordings without the friction brake's force
     #[arg(long)]

@@ -9,6 +9,7 @@ use serde::Serialize;
 use crate::config::ConfigError;
 use crate::dataset::LoadError;
 use crate::output::{OutputError, require_file, tell, write_json};
+use crate::unpacking::UnpackError;
 
 /// Why a command ended without a result; says which exit status follows.
 #[derive(Debug)]
@@ -110,7 +111,9 @@ impl From<LoadError> for Failure {
         let message = error.to_string();
         match error {
             LoadError::Dataset(error) => error.into(),
-            LoadError::NoSuchPath { path }
+            LoadError::Recording(UnpackError::Failed { .. }) => Failure::Work(message),
+            LoadError::Recording(UnpackError::Content { path, .. })
+            | LoadError::NoSuchPath { path }
             | LoadError::NotADataset { path, .. }
             | LoadError::NoManifest { path, .. } => {
                 Failure::At(Place::whole(&path.display().to_string()), message)

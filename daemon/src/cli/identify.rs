@@ -22,7 +22,7 @@ use crate::output::{give, require_file};
 /// Learn the train's parameters from recorded runs with the daemon's own pipelines.
 #[derive(Debug, Args)]
 pub struct IdentifyArguments {
-    /// The dataset's folder
+    /// The dataset's folder, or a recording
     dataset: PathBuf,
     /// Only this estimator, as v_mils; all of them by default
     #[arg(long, value_name = "NAME")]

@@ -9,15 +9,23 @@ use dynocar_shared::{PipelineKind, TrainId};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Failure;
+use super::companion;
 use crate::dataset;
 use crate::output::tell;
+use crate::programs::RECORDING;
 use crate::replay::{Rate, ReplayReport, Replayer};
 
 /// Play recorded runs into the sample channel, as a controller would.
 #[derive(Debug, Args)]
 pub struct ReplayArguments {
-    /// The dataset's folder
+    /// The dataset's folder, or a recording
     dataset: PathBuf,
+    /// Play nothing: compute every snapshot of a recording again and say whether each bit is the same
+    #[arg(long, conflicts_with_all = ["run", "rate", "train", "wait"])]
+    verify: bool,
+    /// With --verify: also say what another configuration of the daemon would have told
+    #[arg(long, value_name = "FILE", requires = "verify")]
+    with: Option<PathBuf>,
     /// Only this run, counted from 1
     #[arg(long, value_name = "N")]
     run: Option<usize>,
@@ -39,6 +47,11 @@ pub struct ReplayArguments {
 /// A wrong dataset or run number is an input failure; a channel that cannot be opened, and samples
 /// that nobody used, are a failure of the work.
 pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
+    if arguments.verify {
+        let with = arguments.with.iter().flat_map(|it| ["--with".into(), it.into()]);
+        let words: Vec<_> = std::iter::once(arguments.dataset.clone().into()).chain(with).collect();
+        return companion::become_it(RECORDING, Some("verify"), &words.into());
+    }
     let dataset = dataset::load(&arguments.dataset)?;
     let runs = match arguments.run {
         None => &dataset.runs[..],

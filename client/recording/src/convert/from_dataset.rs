@@ -1,0 +1,117 @@
+//! A dataset to a recording.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Component, Path, PathBuf};
+
+use dynocar::dataset::{self, LoadError};
+use dynocar::identify::published_samples;
+use dynocar_core::dataset::{Dataset, DatasetFiles, MANIFEST_FILE};
+use dynocar_shared::{TrainId, TrainSample};
+use mcap::McapError;
+
+use super::DATASET_FOLDER;
+use super::rows::{RowError, from_rows, is_rows};
+use crate::writing::{RecordingWriter, WallClock};
+
+/// Between two runs of a dataset, for nobody knows the time that passed, in ns.
+const BETWEEN_RUNS_NS: i64 = 1_000_000_000;
+
+/// Why a dataset becomes no recording.
+#[derive(Debug, thiserror::Error)]
+pub enum FromDatasetError {
+    /// It cannot be read.
+    #[error(transparent)]
+    Dataset(#[from] LoadError),
+    /// A run that was made of a recording cannot be read.
+    #[error(transparent)]
+    Rows(#[from] RowError),
+    /// A file lies elsewhere, so that it would not come back to its place.
+    #[error("{label}: names {file:?}: expected a path below the dataset's folder")]
+    Outside {
+        /// The manifest.
+        label: String,
+        /// The path.
+        file: String,
+    },
+    /// The recording cannot be written.
+    #[error("{}: cannot be written: {source}", path.display())]
+    Write {
+        /// The recording.
+        path: PathBuf,
+        /// What stopped it.
+        source: McapError,
+    },
+}
+
+/// Writes a dataset as a new recording; gives the number of samples.
+///
+/// # Errors
+///
+/// See [`FromDatasetError`].
+pub fn from_dataset(folder: &Path, path: &Path) -> Result<usize, FromDatasetError> {
+    let (files, head) = dataset::open(folder)?;
+    let manifest = &head.manifest;
+    let mut names = vec![MANIFEST_FILE.to_owned(), manifest.train_file.path.clone()];
+    names.extend(manifest.track_file.iter().map(|it| it.path.clone()));
+    names.extend(manifest.runs.iter().map(|it| it.file.clone()));
+    let is_plain = |it: Component| matches!(it, Component::Normal(_));
+    if let Some(file) = names.iter().find(|it| !Path::new(it).components().all(is_plain)) {
+        let (label, file) = (files.label(MANIFEST_FILE), file.clone());
+        return Err(FromDatasetError::Outside { label, file });
+    }
+    let dataset = dataset::load(folder)?;
+    // They were read a moment ago.
+    let texts: Vec<(String, String)> = names
+        .into_iter()
+        .map(|name| (name.clone(), files.read(&name).unwrap_or_default()))
+        .collect();
+    let samples = samples(&dataset, &texts)?;
+    write(path, &texts, &samples)
+        .map_err(|source| FromDatasetError::Write { path: path.into(), source })?;
+    Ok(samples.len())
+}
+
+/// The samples of runs that were made of a recording; else those that a controller would publish.
+fn samples(
+    dataset: &Dataset,
+    texts: &[(String, String)],
+) -> Result<Vec<TrainSample>, FromDatasetError> {
+    let runs = &texts[texts.len() - dataset.runs.len()..];
+    if !runs.iter().all(|(_, text)| is_rows(text)) {
+        return Ok(published_samples(dataset, TrainId(1)));
+    }
+    let mut samples = Vec::new();
+    for (file, text) in runs {
+        samples.extend(from_rows(file, text)?);
+    }
+    Ok(samples)
+}
+
+fn write(
+    path: &Path,
+    texts: &[(String, String)],
+    samples: &[TrainSample],
+) -> Result<(), McapError> {
+    let file = BufWriter::new(File::create_new(path)?);
+    let mut writer = RecordingWriter::new(file, WallClock::of_another_host())?;
+    for (name, content) in texts {
+        writer.attach(&format!("{DATASET_FOLDER}{name}"), content.as_bytes(), 0)?;
+    }
+    let (mut offset_ns, mut newest_ns) = (0, 0);
+    let mut run = None;
+    for sample in samples {
+        if run.is_some_and(|run| run != sample.run) && sample.published_ns == 0 {
+            offset_ns = newest_ns + BETWEEN_RUNS_NS - sample.time_ns;
+        }
+        run = Some(sample.run);
+        let at_ns = match sample.published_ns {
+            0 => sample.time_ns.saturating_add(offset_ns),
+            published_ns => published_ns,
+        };
+        newest_ns = at_ns.max(newest_ns);
+        writer.sample(sample, at_ns)?;
+    }
+    writer.finish()?.into_inner().map_err(|error| error.into_error())?.sync_all()?;
+    Ok(())
+}

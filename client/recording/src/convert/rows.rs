@@ -1,0 +1,119 @@
+//! Samples as rows of CSV, and back, to the bit; of NaN there is one.
+
+use dynocar_shared::layout::Words;
+use dynocar_shared::schema::{Field, Missing};
+use dynocar_shared::{TrainId, TrainSample};
+
+use crate::schema::SAMPLE_FIELDS;
+
+/// Column of the wheel-slide bit of `flags`, for a dataset knows no bits.
+pub const WHEEL_SLIDE: &str = "wheel_slide";
+
+/// Why a text holds no samples.
+#[derive(Debug, thiserror::Error)]
+pub enum RowError {
+    /// It is no CSV.
+    #[error("{file}: {source}")]
+    Csv {
+        /// The file.
+        file: String,
+        /// Where, and what is wrong.
+        source: csv::Error,
+    },
+    /// A cell is no number of its field's type.
+    #[error("{file}:{line}: {column} = {cell:?}: expected a number of type {expected}")]
+    Cell {
+        /// The file.
+        file: String,
+        /// The line.
+        line: u64,
+        /// The column.
+        column: &'static str,
+        /// What it holds.
+        cell: String,
+        /// The field's type.
+        expected: &'static str,
+    },
+}
+
+fn columns() -> impl Iterator<Item = &'static Field> {
+    SAMPLE_FIELDS.iter().filter(|it| it.missing != Missing::SaidByOthers)
+}
+
+/// Samples as CSV, one row for each.
+pub fn to_rows<'a>(samples: impl IntoIterator<Item = &'a TrainSample>) -> String {
+    let names: Vec<_> = columns().map(|it| it.layout.name).collect();
+    let mut text = format!("{},{WHEEL_SLIDE}\n", names.join(","));
+    for sample in samples {
+        let fields = sample.fields();
+        for field in columns() {
+            text += &cell(field, sample, fields[field.place]);
+            text.push(',');
+        }
+        let is_sliding = sample.flags & dynocar_shared::sample::FLAG_WHEEL_SLIDE != 0;
+        text += if is_sliding { "1\n" } else { "0\n" };
+    }
+    text
+}
+
+fn cell(field: &Field, sample: &TrainSample, words: &dyn Words) -> String {
+    let word = words.word(0);
+    match (field.missing, field.layout.type_name) {
+        (Missing::Unless(quantity), _) if sample.valid & quantity.bit() == 0 => String::new(),
+        // The shortest text that reads as the same number.
+        (_, "f64") => f64::from_bits(word).to_string(),
+        (_, "i64" | "i8") => (word as i64).to_string(),
+        _ => word.to_string(),
+    }
+}
+
+/// True for a text that [`to_rows`] has written.
+pub fn is_rows(text: &str) -> bool {
+    let header = to_rows([]);
+    text.lines().next() == header.lines().next()
+}
+
+/// The samples of a text that [`to_rows`] has written; `file` names it in messages.
+///
+/// # Errors
+///
+/// Names file, line and column.
+pub fn from_rows(file: &str, text: &str) -> Result<Vec<TrainSample>, RowError> {
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let mut samples = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|source| RowError::Csv { file: file.into(), source })?;
+        let mut sample = TrainSample::empty(TrainId(0));
+        let mut valid = 0;
+        let fields = sample.fields_mut();
+        for (field, cell) in columns().zip(record.iter()) {
+            match field.missing {
+                Missing::Unless(_) if cell.is_empty() => continue,
+                Missing::Unless(quantity) => valid |= quantity.bit(),
+                _ => {}
+            }
+            let word = word(field, cell).ok_or_else(|| RowError::Cell {
+                file: file.into(),
+                line: record.position().map_or(0, |it| it.line()),
+                column: field.layout.name,
+                cell: cell.into(),
+                expected: field.layout.type_name,
+            })?;
+            fields[field.place].set_word(0, word);
+        }
+        sample.valid = valid;
+        samples.push(sample);
+    }
+    Ok(samples)
+}
+
+fn word(field: &Field, cell: &str) -> Option<u64> {
+    Some(match field.layout.type_name {
+        "f64" => cell.parse::<f64>().ok()?.to_bits(),
+        "i64" => cell.parse::<i64>().ok()? as u64,
+        "i8" => cell.parse::<i8>().ok()? as u64,
+        "u8" => cell.parse::<u8>().ok()?.into(),
+        "u32" => cell.parse::<u32>().ok()?.into(),
+        _ => cell.parse::<u64>().ok()?,
+    })
+}

@@ -1,0 +1,261 @@
+//! A recording to a dataset.
+
+use std::path::{Component, Path, PathBuf};
+
+use dynocar::output::{OutputError, require_new, write_file};
+use dynocar::storage::folder_of;
+use dynocar_core::dataset::{MANIFEST_FILE, Quantity};
+use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
+use dynocar_shared::{SampleField, TrainSample};
+
+use super::DATASET_FOLDER;
+use super::rows::{WHEEL_SLIDE, to_rows};
+use crate::reading::ReadError;
+use crate::recording::Recording;
+
+/// Files of the train and the line for a recording to which none are attached.
+#[derive(Clone, Debug, Default)]
+pub struct ModelFiles {
+    /// The train's.
+    pub train: Option<PathBuf>,
+    /// The line's.
+    pub track: Option<PathBuf>,
+}
+
+/// Why a recording becomes no dataset.
+#[derive(Debug, thiserror::Error)]
+pub enum ToDatasetError {
+    /// It cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// A file of the dataset cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// It holds several trains.
+    #[error("{}: holds trains {trains}; a dataset is of one: choose it by --train", path.display())]
+    SeveralTrains {
+        /// The recording.
+        path: PathBuf,
+        /// Their numbers.
+        trains: String,
+    },
+    /// It holds another train.
+    #[error("{}: expected samples of train {wanted}, found trains {trains}", path.display())]
+    NoSuchTrain {
+        /// The recording.
+        path: PathBuf,
+        /// The train asked for.
+        wanted: u64,
+        /// Those that there are.
+        trains: String,
+    },
+    /// Nobody tells the train.
+    #[error(
+        "{}: the file of train {train} is not attached: give it by --train-file", path.display()
+    )]
+    NoTrainFile {
+        /// The recording.
+        path: PathBuf,
+        /// The train.
+        train: u64,
+    },
+    /// A file that was given cannot be read.
+    #[error("{}: {source}", path.display())]
+    ModelFile {
+        /// The file.
+        path: PathBuf,
+        /// The system's answer.
+        source: std::io::Error,
+    },
+    /// An attached file would be written outside the folder.
+    #[error("{}: attached file {name:?}: expected a path below the dataset's folder", path.display())]
+    Outside {
+        /// The recording.
+        path: PathBuf,
+        /// The attached name.
+        name: String,
+    },
+}
+
+/// What was made of a recording.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Unpacked {
+    /// Runs that were written.
+    pub runs: usize,
+    /// Samples in them.
+    pub samples: usize,
+    /// Snapshots and events that a dataset has no place for.
+    pub left_out: usize,
+    /// Where the recording broke off, in words.
+    pub broken: Option<String>,
+}
+
+/// Writes a recording as a dataset into a new folder.
+///
+/// # Errors
+///
+/// See [`ToDatasetError`].
+pub fn to_dataset(
+    path: &Path,
+    folder: &Path,
+    train: Option<u64>,
+    files: &ModelFiles,
+) -> Result<Unpacked, ToDatasetError> {
+    require_new(folder)?;
+    let recording = Recording::load(path)?;
+    let train = chosen(path, &recording, train)?;
+    let attached: Vec<(&str, &Vec<u8>)> = recording
+        .attachments
+        .iter()
+        .filter_map(|(name, content)| Some((name.strip_prefix(DATASET_FOLDER)?, content)))
+        .collect();
+    let mut unpacked = Unpacked {
+        left_out: recording.snapshots.len() + recording.events.len(),
+        broken: recording.broken.clone(),
+        ..Unpacked::default()
+    };
+    if attached.iter().any(|(name, _)| *name == MANIFEST_FILE) {
+        for (name, content) in attached {
+            if !is_below(name) {
+                let (path, name) = (path.into(), name.into());
+                return Err(ToDatasetError::Outside { path, name });
+            }
+            unpacked.runs += usize::from(name.ends_with(".csv"));
+            write(folder, name, content)?;
+        }
+        unpacked.samples = recording.samples.len();
+        return Ok(unpacked);
+    }
+    let (train_text, track_text) = models(path, &recording, train, files)?;
+    write(folder, "train.toml", &train_text)?;
+    if let Some(text) = &track_text {
+        write(folder, "track.toml", text)?;
+    }
+    let samples: Vec<TrainSample> =
+        recording.samples.into_iter().filter(|it| it.train_id == train).collect();
+    let runs: Vec<&[TrainSample]> = samples
+        .chunk_by(|one, next| (one.run, one.direction) == (next.run, next.direction))
+        .collect();
+    let manifest = manifest(path, &runs, &samples, track_text.is_some());
+    write(folder, MANIFEST_FILE, manifest.as_bytes())?;
+    for (place, run) in runs.iter().enumerate() {
+        write(folder, &run_file(place), to_rows(*run).as_bytes())?;
+    }
+    (unpacked.runs, unpacked.samples) = (runs.len(), samples.len());
+    Ok(unpacked)
+}
+
+fn chosen(path: &Path, recording: &Recording, train: Option<u64>) -> Result<u64, ToDatasetError> {
+    let all = recording.trains();
+    let trains = all.iter().map(u64::to_string).collect::<Vec<_>>().join(", ");
+    let path = path.into();
+    match (train, all.as_slice()) {
+        (Some(wanted), all) if all.contains(&wanted) => Ok(wanted),
+        (Some(wanted), _) => Err(ToDatasetError::NoSuchTrain { path, wanted, trains }),
+        (None, [only]) => Ok(*only),
+        (None, _) => Err(ToDatasetError::SeveralTrains { path, trains }),
+    }
+}
+
+/// Texts of the train and, where there is one, the line.
+type Models = (Vec<u8>, Option<Vec<u8>>);
+
+/// What was given, else what the newest attached configuration has of the train.
+fn models(
+    path: &Path,
+    recording: &Recording,
+    train: u64,
+    files: &ModelFiles,
+) -> Result<Models, ToDatasetError> {
+    let read = |path: &PathBuf| {
+        std::fs::read(path)
+            .map_err(|source| ToDatasetError::ModelFile { path: path.clone(), source })
+    };
+    let attached = |name: String| {
+        let end = format!("/{name}");
+        let found = recording.attachments.iter().rev().find(|it| it.0.ends_with(&end));
+        found.map(|it| it.1.clone())
+    };
+    let (train_text, is_given) = match &files.train {
+        Some(file) => (read(file)?, true),
+        None => {
+            let found = attached(format!("train-{train}.toml"));
+            let missing = || ToDatasetError::NoTrainFile { path: path.into(), train };
+            (found.ok_or_else(missing)?, false)
+        }
+    };
+    let track_text = match &files.track {
+        Some(file) => Some(read(file)?),
+        None if is_given => None,
+        None => attached(format!("track-{train}.toml")),
+    };
+    Ok((train_text, track_text))
+}
+
+fn write(folder: &Path, name: &str, content: &[u8]) -> Result<(), OutputError> {
+    let path = folder.join(name);
+    std::fs::create_dir_all(folder_of(&path))
+        .map_err(|source| OutputError::File { path: path.clone(), source })?;
+    write_file(&path, content)
+}
+
+fn is_below(name: &str) -> bool {
+    !name.is_empty() && Path::new(name).components().all(|it| matches!(it, Component::Normal(_)))
+}
+
+fn run_file(place: usize) -> String {
+    format!("runs/{:03}.csv", place + 1)
+}
+
+/// The quantity of a dataset that a field of a sample is.
+const QUANTITIES: [(Quantity, SampleField); 11] = [
+    (Quantity::Position, SampleField::Position),
+    (Quantity::Speed, SampleField::Speed),
+    (Quantity::TractionForce, SampleField::TractionForce),
+    (Quantity::BrakeForce, SampleField::BrakeForce),
+    (Quantity::BrakeCylinderPressure, SampleField::BrakeCylinderPressure),
+    (Quantity::Acceleration, SampleField::Acceleration),
+    (Quantity::SpecificForce, SampleField::SpecificForce),
+    (Quantity::TrainMass, SampleField::Mass),
+    (Quantity::AmbientTemperature, SampleField::AmbientTemperature),
+    (Quantity::Gradient, SampleField::Gradient),
+    (Quantity::CurveRadius, SampleField::CurveRadius),
+];
+
+fn manifest(
+    path: &Path,
+    runs: &[&[TrainSample]],
+    samples: &[TrainSample],
+    has_track: bool,
+) -> String {
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = toml::Value::String(name.into_owned());
+    let mut text = format!("[dataset]\nname = {name}\n\n[train]\nfile = \"train.toml\"\n");
+    if has_track {
+        text += "\n[track]\nfile = \"track.toml\"\n";
+    }
+    text += "\n[columns]\ntime = { column = \"time_ns\", unit = \"ns\" }\n";
+    let mut column = |quantity: Quantity, column: &str| {
+        let unit = quantity.unit().name();
+        text += &format!("{quantity} = {{ column = \"{column}\", unit = \"{unit}\" }}\n");
+    };
+    for (quantity, field) in QUANTITIES {
+        let is_there = samples.iter().any(|it| it.valid & field.bit() != 0);
+        if is_there || quantity == Quantity::Speed {
+            column(quantity, field.name());
+        }
+    }
+    if samples.iter().any(|it| it.flags & FLAG_WHEEL_SLIDE != 0) {
+        column(Quantity::WheelSlide, WHEEL_SLIDE);
+    }
+    for (place, run) in runs.iter().enumerate() {
+        let is_held_out = runs.len() > 1 && place + 1 == runs.len();
+        let role = if is_held_out { "holdout" } else { "fit" };
+        let direction = if run[0].direction < 0 { -1 } else { 1 };
+        text += &format!(
+            "\n[[runs]]\nfile = \"{}\"\nrole = \"{role}\"\ndirection = {direction}\n",
+            run_file(place)
+        );
+    }
+    text
+}

@@ -1,0 +1,32 @@
+//! Recordings of what a controller and the daemon write, as [MCAP](https://mcap.dev) files with
+//! protobuf messages.
+//!
+//! Samples are the truth of a recording: the daemon's pipelines are functions of them, so that every
+//! snapshot can be computed again, and is, by `dynocar replay --verify`.
+//!
+//! # Layout
+//!
+//! - [`schema`]: the protobuf messages, made from the layouts of sample and snapshot
+//! - [`page`]: the reference page of the recorded fields
+//! - [`codec`]: samples and snapshots as messages, and back, to the bit
+//! - [`event`]: what happens around them
+//! - [`writing`], [`reading`]: MCAP files, written without seeking and read as far as they are whole
+//! - [`recording`]: a recording in memory
+//! - [`record`]: the recorder
+//! - [`recover`]: a broken file made whole
+//! - [`convert`]: recordings to datasets and back
+//! - [`verify`]: every recorded snapshot computed again
+//! - [`cli`]: the command line
+
+pub mod cli;
+pub mod codec;
+pub mod convert;
+pub mod event;
+pub mod page;
+pub mod reading;
+pub mod record;
+pub mod recording;
+pub mod recover;
+pub mod schema;
+pub mod verify;
+pub mod writing;

@@ -1,0 +1,306 @@
+//! Reading MCAP files as far as they are whole.
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use dynocar_shared::{ParameterSnapshot, TrainSample};
+use mcap::records::{MessageHeader, Record, op};
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{McapError, parse_record};
+use prost::Message;
+
+use crate::codec::{CodecError, decode_sample, decode_snapshot};
+use crate::event::Event;
+use crate::schema::{EVENT, SAMPLE, SNAPSHOT};
+
+/// Why a file is no recording that can be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// The system does not give it.
+    #[error("{}: {source}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// The system's answer.
+        source: std::io::Error,
+    },
+    /// It is of another format.
+    #[error("{}: not an MCAP file: expected one that begins with the bytes of MCAP, version 0", path.display())]
+    NotMcap {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Its messages are of another release.
+    #[error(
+        "{}: {topic}: recorded with another schema: expected {expected}, found {found}; read it with \
+         the release of dynocar that recorded it", path.display()
+    )]
+    OtherSchema {
+        /// The file.
+        path: PathBuf,
+        /// The channel.
+        topic: String,
+        /// This release's layout.
+        expected: &'static str,
+        /// The file's.
+        found: String,
+    },
+    /// A message is not what its channel says.
+    #[error("{}: {topic}, message {number}: {source}", path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// The channel.
+        topic: String,
+        /// The message's place in the file, counted from 1.
+        number: u64,
+        /// What is wrong.
+        source: CodecError,
+    },
+    /// There is no sample.
+    #[error("{}: no samples: expected a channel of {SAMPLE} messages, found {found}", path.display())]
+    NoSamples {
+        /// The file.
+        path: PathBuf,
+        /// The channels that there are, in words.
+        found: String,
+    },
+}
+
+/// How a file ends.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Ending {
+    /// With its index and its last bytes.
+    Whole,
+    /// Before its end, or damaged.
+    Broken {
+        /// Bytes up to which it was read.
+        read_bytes: u64,
+        /// The file's length.
+        file_bytes: u64,
+        /// What stopped the reading.
+        reason: String,
+    },
+}
+
+/// What a recording holds, in the order in which it was written.
+#[derive(Clone, Debug)]
+pub enum Item<'a> {
+    /// Names and values.
+    Metadata(&'a mcap::records::Metadata),
+    /// A file.
+    Attachment {
+        /// Its name.
+        name: String,
+        /// When it was attached, in ns since 1970.
+        log_time: u64,
+        /// Its kind.
+        media_type: String,
+        /// Its content.
+        content: &'a [u8],
+    },
+    /// A controller's sample.
+    Sample(&'a TrainSample),
+    /// A pipeline's snapshot.
+    Snapshot(&'a ParameterSnapshot),
+    /// What happened.
+    Event(&'a Event),
+}
+
+/// A message or a channel of somebody else, for whoever copies a file.
+#[derive(Debug)]
+pub struct Raw<'a> {
+    /// The channel.
+    pub channel: &'a ChannelInfo,
+    /// Number and times.
+    pub header: MessageHeader,
+    /// The message.
+    pub data: &'a [u8],
+}
+
+/// A channel as the file has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChannelInfo {
+    /// The topic.
+    pub topic: String,
+    /// Encoding of its messages.
+    pub encoding: String,
+    /// What the writer said of it.
+    pub metadata: std::collections::BTreeMap<String, String>,
+    /// Name, encoding and bytes of its schema; `None` without one.
+    pub schema: Option<(String, String, Vec<u8>)>,
+}
+
+/// Who is told what a file holds.
+pub trait Visitor {
+    /// Something of ours.
+    fn item(&mut self, item: Item<'_>);
+    /// Every message, ours or not, before it is read.
+    fn raw(&mut self, _: &Raw<'_>) {}
+}
+
+/// Reads a file, and tells what it holds as far as it is whole.
+///
+/// # Errors
+///
+/// When it is no recording that can be read; a file that breaks off is one.
+pub fn read(path: &Path, visitor: &mut impl Visitor) -> Result<Ending, ReadError> {
+    let unreadable = |source| ReadError::Unreadable { path: path.into(), source };
+    let mut file = File::open(path).map_err(unreadable)?;
+    let file_bytes = file.metadata().map_err(unreadable)?.len();
+    // A damaged length asks for no more memory than the file has bytes.
+    let limit = usize::try_from(file_bytes).unwrap_or(usize::MAX);
+    let options = LinearReaderOptions::default()
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(limit);
+    let mut reader = LinearReader::new_with_options(options);
+    let mut records = Records::new(path);
+    let mut given = 0;
+    let mut good = 0;
+    let reason = loop {
+        match reader.next_event() {
+            None => return Ok(Ending::Whole),
+            Some(Ok(LinearReadEvent::ReadRequest(need))) => {
+                let read = file.read(reader.insert(need)).map_err(unreadable)?;
+                reader.notify_read(read);
+                given += read as u64;
+            }
+            Some(Ok(LinearReadEvent::Record { opcode, data })) => {
+                match records.take(opcode, data, visitor) {
+                    Ok(()) => good = given,
+                    Err(Stop::Refused(error)) => return Err(error),
+                    Err(Stop::Broken(error)) => break error,
+                }
+            }
+            Some(Err(McapError::BadMagic)) if good == 0 => {
+                return Err(ReadError::NotMcap { path: path.into() });
+            }
+            Some(Err(McapError::UnexpectedEof)) if given < 8 => {
+                return Err(ReadError::NotMcap { path: path.into() });
+            }
+            Some(Err(error)) => break error,
+        }
+    };
+    let reason = reason.to_string();
+    Ok(Ending::Broken { read_bytes: good, file_bytes, reason })
+}
+
+/// Why reading stops.
+enum Stop {
+    /// The file is damaged from here on.
+    Broken(McapError),
+    /// It is none that can be read.
+    Refused(ReadError),
+}
+
+impl From<McapError> for Stop {
+    fn from(error: McapError) -> Self {
+        Stop::Broken(error)
+    }
+}
+
+struct Records<'p> {
+    path: &'p Path,
+    schemas: HashMap<u16, (String, String, Vec<u8>)>,
+    channels: HashMap<u16, ChannelInfo>,
+    messages: u64,
+}
+
+impl<'p> Records<'p> {
+    fn new(path: &'p Path) -> Self {
+        Records { path, schemas: HashMap::new(), channels: HashMap::new(), messages: 0 }
+    }
+
+    fn take(&mut self, opcode: u8, data: &[u8], visitor: &mut impl Visitor) -> Result<(), Stop> {
+        if opcode == op::ATTACHMENT && !has_room_for_its_parts(data) {
+            return Err(Stop::Broken(McapError::UnexpectedEof));
+        }
+        match parse_record(opcode, data)? {
+            Record::Schema { header, data } => {
+                self.schemas.insert(header.id, (header.name, header.encoding, data.into_owned()));
+            }
+            Record::Channel(it) => {
+                let schema = self.schemas.get(&it.schema_id).cloned();
+                let (topic, encoding) = (it.topic, it.message_encoding);
+                let known = ChannelInfo { topic, encoding, metadata: it.metadata, schema };
+                self.require_our_layout(&known).map_err(Stop::Refused)?;
+                self.channels.insert(it.id, known);
+            }
+            Record::Message { header, data } => {
+                self.messages += 1;
+                self.message(header, &data, visitor)?;
+            }
+            Record::Metadata(metadata) => visitor.item(Item::Metadata(&metadata)),
+            Record::Attachment { header, data, .. } => {
+                let (name, log_time) = (header.name, header.log_time);
+                let media_type = header.media_type;
+                visitor.item(Item::Attachment { name, log_time, media_type, content: &data });
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn require_our_layout(&self, channel: &ChannelInfo) -> Result<(), ReadError> {
+        let expected = match channel.schema.as_ref().map(|it| it.0.as_str()) {
+            Some(SAMPLE) => TrainSample::WIRE_NAME,
+            Some(SNAPSHOT) => ParameterSnapshot::WIRE_NAME,
+            _ => return Ok(()),
+        };
+        match channel.metadata.get("layout") {
+            Some(found) if found == expected => Ok(()),
+            found => Err(ReadError::OtherSchema {
+                path: self.path.into(),
+                topic: channel.topic.clone(),
+                expected,
+                found: found.cloned().unwrap_or("none".into()),
+            }),
+        }
+    }
+
+    fn message(
+        &self,
+        header: MessageHeader,
+        data: &[u8],
+        visitor: &mut impl Visitor,
+    ) -> Result<(), Stop> {
+        let Some(channel) = self.channels.get(&header.channel_id) else {
+            return Err(Stop::Broken(McapError::UnknownChannel(
+                header.sequence,
+                header.channel_id,
+            )));
+        };
+        visitor.raw(&Raw { channel, header, data });
+        let malformed = |source| {
+            let (path, topic) = (self.path.into(), channel.topic.clone());
+            Stop::Refused(ReadError::Malformed { path, topic, number: self.messages, source })
+        };
+        match channel.schema.as_ref().map(|it| it.0.as_str()) {
+            Some(SAMPLE) => {
+                visitor.item(Item::Sample(&decode_sample(data).map_err(malformed)?));
+            }
+            Some(SNAPSHOT) => {
+                visitor.item(Item::Snapshot(&decode_snapshot(data).map_err(malformed)?));
+            }
+            Some(EVENT) => {
+                let event = Event::decode(data).map_err(|error| malformed(error.into()))?;
+                visitor.item(Item::Event(&event));
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+/// True when an attachment's record holds its two times, its two texts, its length and its checksum:
+/// the parser takes that for granted.
+fn has_room_for_its_parts(record: &[u8]) -> bool {
+    let text_end = |start: usize| {
+        let length = record.get(start..start.checked_add(4)?)?.first_chunk::<4>()?;
+        start.checked_add(4)?.checked_add(u32::from_le_bytes(*length) as usize)
+    };
+    let parts_end = text_end(16).and_then(text_end).and_then(|end| end.checked_add(8 + 4));
+    parts_end.is_some_and(|end| end <= record.len())
+}

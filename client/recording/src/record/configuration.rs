@@ -1,0 +1,75 @@
+//! The daemon's configuration with the files that it names, to be attached.
+
+use std::path::{Path, PathBuf};
+
+use dynocar::dataset::read_text;
+use toml::Table;
+
+/// A file to be attached: its name there and its content.
+pub type File = (String, String);
+
+/// A daemon's configuration, as it was found when the daemon was first seen.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Configuration {
+    /// Where it was found.
+    pub path: PathBuf,
+    /// `daemon.toml`, and `train-<id>.toml` and `track-<id>.toml` for each of its trains.
+    pub files: Vec<File>,
+}
+
+impl Configuration {
+    /// The configuration of the daemon of this process: the file given, else the one that its command
+    /// line names.
+    ///
+    /// # Errors
+    ///
+    /// In words, what is not attached and why.
+    pub fn of(given: Option<&Path>, process: u32) -> Result<Self, String> {
+        let named = match given {
+            Some(path) => Some(path.to_path_buf()),
+            None => named_by(process),
+        };
+        let path = named.ok_or_else(|| {
+            format!(
+                "the daemon (process {process}) does not tell its configuration: none is attached; \
+                 give it by --config"
+            )
+        })?;
+        Configuration::read(&path)
+            .map_err(|problem| format!("the daemon's configuration is not attached: {problem}"))
+    }
+
+    fn read(path: &Path) -> Result<Self, String> {
+        let text = |path: &Path| read_text(path).map_err(|it| format!("{}: {it}", path.display()));
+        let configuration = text(path)?;
+        let table: Table =
+            configuration.parse().map_err(|it| format!("{}: {it}", path.display()))?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let mut files = vec![("daemon.toml".to_owned(), configuration)];
+        for train in table.get("trains").and_then(|it| it.as_array()).into_iter().flatten() {
+            let id = train.get("id").and_then(|it| it.as_integer()).unwrap_or(0);
+            for (key, name) in [("file", "train"), ("track", "track")] {
+                if let Some(file) = train.get(key).and_then(|it| it.as_str()) {
+                    files.push((format!("{name}-{id}.toml"), text(&folder.join(file))?));
+                }
+            }
+        }
+        Ok(Configuration { path: path.into(), files })
+    }
+}
+
+/// The file behind `--config` in the command line of a process of this user.
+fn named_by(process: u32) -> Option<PathBuf> {
+    let folder = PathBuf::from(format!("/proc/{process}"));
+    let line = std::fs::read(folder.join("cmdline")).ok()?;
+    let mut words = line.split(|&byte| byte == 0).filter_map(|it| std::str::from_utf8(it).ok());
+    let mut named = None;
+    while let Some(word) = words.next() {
+        if word == "--config" {
+            named = words.next();
+        } else if let Some(file) = word.strip_prefix("--config=") {
+            named = Some(file);
+        }
+    }
+    Some(std::fs::read_link(folder.join("cwd")).ok()?.join(named?))
+}

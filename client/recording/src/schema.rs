@@ -1,0 +1,230 @@
+//! The protobuf messages of a recording, made from the layouts of sample and snapshot.
+//!
+//! A field's number is its place in the layout, counted from 1.
+//! What is measured is `optional`: missing is missing. Numbers of a vocabulary are protobuf
+//! enumerations. What arrays hold stands once more under names with units in `estimate` and
+//! `rejected`.
+
+use std::sync::LazyLock;
+
+use dynocar_shared::schema::{Field, Missing, sample_fields, snapshot_fields, unit_end};
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::{Parameter, PipelineKind, Reason, RejectionReason, Status};
+use prost::Message;
+use prost_types::field_descriptor_proto::{Label, Type};
+use prost_types::{
+    DescriptorProto, EnumDescriptorProto, EnumValueDescriptorProto, FieldDescriptorProto,
+    FileDescriptorProto, FileDescriptorSet, OneofDescriptorProto,
+};
+
+use crate::event::{EVENT_FIELDS, EventKind};
+
+/// Name of the message of a sample.
+pub const SAMPLE: &str = "dynocar.TrainSample";
+/// Name of the message of a snapshot.
+pub const SNAPSHOT: &str = "dynocar.ParameterSnapshot";
+/// Name of the message of an event.
+pub const EVENT: &str = "dynocar.Event";
+
+/// Number of the field `estimate` of a snapshot: what the parameters are, by name.
+pub const ESTIMATE: u32 = 101;
+/// Number of the field `rejected` of a snapshot: how many samples were refused, by name.
+pub const REJECTED: u32 = 102;
+/// A standard deviation's number in `estimate` is so much greater than the parameter's.
+pub const STD_OFFSET: u32 = 100;
+
+/// The fields of a sample, in order.
+pub static SAMPLE_FIELDS: LazyLock<Vec<Field>> = LazyLock::new(|| sample_fields().collect());
+/// The fields of a snapshot, in order.
+pub static SNAPSHOT_FIELDS: LazyLock<Vec<Field>> = LazyLock::new(|| snapshot_fields().collect());
+
+/// The messages of a recording, as the bytes that an MCAP schema holds.
+pub static DESCRIPTORS: LazyLock<Vec<u8>> = LazyLock::new(|| descriptors().encode_to_vec());
+
+/// The protobuf number of a layout's field.
+pub fn number(field: &Field) -> u32 {
+    field.place as u32 + 1
+}
+
+/// The number of a parameter's value in `estimate`; that of its standard deviation is greater by
+/// [`STD_OFFSET`].
+pub fn parameter_number(parameter: Parameter) -> u32 {
+    parameter as u32
+}
+
+/// The name of a parameter's standard deviation: the unit stays last.
+pub fn std_name(parameter: Parameter) -> String {
+    let name = parameter.full_name();
+    let unit = unit_end(name).0;
+    format!("{}_std{unit}", &name[..name.len() - unit.len()])
+}
+
+/// The number of a reason's count in `rejected`.
+pub fn rejection_number(reason: RejectionReason) -> u32 {
+    reason as u32 + 1
+}
+
+/// The vocabulary whose numbers a field of a snapshot or an event holds.
+pub fn vocabulary_of(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "pipeline_kind" => "PipelineKind",
+        "status" => "Status",
+        "reason" => "Reason",
+        "suspected_effect" => "EffectKind",
+        "parameters" => "Parameter",
+        "kind" => "EventKind",
+        _ => return None,
+    })
+}
+
+fn descriptors() -> FileDescriptorSet {
+    let file = FileDescriptorProto {
+        name: Some("dynocar/recording.proto".into()),
+        package: Some("dynocar".into()),
+        syntax: Some("proto3".into()),
+        message_type: vec![
+            message("TrainSample", SAMPLE_FIELDS.iter().filter_map(layout_field).collect()),
+            message("ParameterSnapshot", snapshot_message()),
+            message("Estimate", estimate_message()),
+            message("Rejected", rejected_message()),
+            message("Event", event_message()),
+        ],
+        enum_type: enums(),
+        ..Default::default()
+    };
+    FileDescriptorSet { file: vec![file] }
+}
+
+/// A message; each optional field gets the group of its own that protobuf asks for.
+fn message(name: &str, mut fields: Vec<FieldDescriptorProto>) -> DescriptorProto {
+    let mut groups = Vec::new();
+    for field in fields.iter_mut().filter(|it| it.proto3_optional == Some(true)) {
+        field.oneof_index = Some(groups.len() as i32);
+        let name = format!("_{}", field.name());
+        groups.push(OneofDescriptorProto { name: Some(name), ..Default::default() });
+    }
+    let name = Some(name.into());
+    DescriptorProto { name, field: fields, oneof_decl: groups, ..Default::default() }
+}
+
+fn field(name: &str, number: u32, of_type: Type, is_optional: bool) -> FieldDescriptorProto {
+    FieldDescriptorProto {
+        name: Some(name.into()),
+        number: Some(number as i32),
+        label: Some(Label::Optional as i32),
+        r#type: Some(of_type as i32),
+        proto3_optional: is_optional.then_some(true),
+        ..Default::default()
+    }
+}
+
+fn typed(mut field: FieldDescriptorProto, of_type: Type, name: &str) -> FieldDescriptorProto {
+    field.r#type = Some(of_type as i32);
+    field.type_name = Some(format!(".dynocar.{name}"));
+    field
+}
+
+fn scalar(type_name: &str) -> Type {
+    match type_name {
+        "f64" => Type::Double,
+        "i64" => Type::Int64,
+        "i8" => Type::Int32,
+        "u64" => Type::Uint64,
+        "string" => Type::String,
+        _ => Type::Uint32,
+    }
+}
+
+/// A field of a layout; `None` for one that is said by others.
+fn layout_field(it: &Field) -> Option<FieldDescriptorProto> {
+    let is_optional = match it.missing {
+        Missing::Never => false,
+        Missing::Unless(_) => true,
+        Missing::SaidByOthers => return None,
+    };
+    let name = it.layout.name;
+    let mut made = field(name, number(it), scalar(it.entry_type()), is_optional);
+    if let Some(vocabulary) = vocabulary_of(name) {
+        made = typed(made, Type::Enum, vocabulary);
+    }
+    if it.is_array() {
+        made.label = Some(Label::Repeated as i32);
+    }
+    Some(made)
+}
+
+fn snapshot_message() -> Vec<FieldDescriptorProto> {
+    let nested = [("estimate", ESTIMATE, "Estimate"), ("rejected", REJECTED, "Rejected")];
+    let nested = nested.map(|(name, number, of_type)| {
+        typed(field(name, number, Type::Message, false), Type::Message, of_type)
+    });
+    SNAPSHOT_FIELDS.iter().filter_map(layout_field).chain(nested).collect()
+}
+
+fn estimate_message() -> Vec<FieldDescriptorProto> {
+    let of = |&it: &Parameter| {
+        let number = parameter_number(it);
+        [
+            field(it.full_name(), number, Type::Double, true),
+            field(&std_name(it), number + STD_OFFSET, Type::Double, true),
+        ]
+    };
+    Parameter::ALL.iter().flat_map(of).collect()
+}
+
+fn rejected_message() -> Vec<FieldDescriptorProto> {
+    let of = |&it: &RejectionReason| field(it.name(), rejection_number(it), Type::Uint32, false);
+    RejectionReason::ALL.iter().map(of).collect()
+}
+
+fn event_message() -> Vec<FieldDescriptorProto> {
+    let of = |it: &crate::event::EventField| {
+        let made = field(it.name, it.number as u32, scalar(it.type_name), it.is_optional);
+        match vocabulary_of(it.name) {
+            Some(vocabulary) => typed(made, Type::Enum, vocabulary),
+            None => made,
+        }
+    };
+    EVENT_FIELDS.iter().map(of).collect()
+}
+
+fn enums() -> Vec<EnumDescriptorProto> {
+    macro_rules! members {
+        ($name:ident) => {
+            enumeration(
+                stringify!($name),
+                $name::ALL.iter().map(|it| (*it as i32, it.name().to_owned())).collect(),
+            )
+        };
+    }
+    vec![
+        members!(PipelineKind),
+        members!(Status),
+        members!(Reason),
+        members!(EffectKind),
+        members!(Parameter),
+        members!(EventKind),
+    ]
+}
+
+/// An enumeration; protobuf asks for a member 0 and for names that are unique in the package.
+fn enumeration(name: &str, mut members: Vec<(i32, String)>) -> EnumDescriptorProto {
+    if members.iter().all(|it| it.0 != 0) {
+        members.insert(0, (0, "unknown_number".into()));
+    }
+    let prefix: String = name
+        .chars()
+        .enumerate()
+        .flat_map(|(place, letter)| {
+            let gap = (place > 0 && letter.is_uppercase()).then_some('_');
+            gap.into_iter().chain(letter.to_uppercase())
+        })
+        .collect();
+    let value = |(number, member): (i32, String)| EnumValueDescriptorProto {
+        name: Some(format!("{prefix}_{}", member.to_uppercase())),
+        number: Some(number),
+        options: None,
+    };
+    let value = members.into_iter().map(value).collect();
+    EnumDescriptorProto { name: Some(name.into()), value, ..Default::default() }
+}

@@ -1,0 +1,141 @@
+//! The configurations that are attached to a recording.
+
+use std::path::{Path, PathBuf};
+
+use dynocar::config::{ConfigError, DaemonConfig};
+use toml::{Table, Value};
+
+use crate::recording::Recording;
+use crate::writing::{CONFIGURATION, folder_of_configuration};
+
+/// Why an attached configuration cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigurationError {
+    /// There is none.
+    #[error("{}: no daemon's configuration is attached: there is nothing to verify by", path.display())]
+    None {
+        /// The recording.
+        path: PathBuf,
+    },
+    /// It cannot be unpacked.
+    #[error("{}: {folder}: {source}", path.display())]
+    Unpacking {
+        /// The recording.
+        path: PathBuf,
+        /// The folder of the attached files.
+        folder: String,
+        /// The system's answer.
+        source: std::io::Error,
+    },
+    /// It is none.
+    #[error("{}: {folder}/daemon.toml: {problem}", path.display())]
+    Malformed {
+        /// The recording.
+        path: PathBuf,
+        /// The folder of the attached files.
+        folder: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// The daemon of this release refuses it.
+    #[error("{}: attached {source}", path.display())]
+    Refused {
+        /// The recording.
+        path: PathBuf,
+        /// What is wrong.
+        source: ConfigError,
+    },
+}
+
+/// A configuration with when it was seen.
+struct Seen {
+    monotonic_ns: i64,
+    config: DaemonConfig,
+    keeps_state: bool,
+}
+
+/// The configurations of a recording, in the order in which they were seen.
+pub struct Configurations {
+    seen: Vec<Seen>,
+}
+
+impl Configurations {
+    /// Reads what is attached.
+    ///
+    /// # Errors
+    ///
+    /// See [`ConfigurationError`].
+    pub fn of(path: &Path, recording: &Recording) -> Result<Self, ConfigurationError> {
+        let mut seen: Vec<Seen> = Vec::new();
+        for metadata in recording.metadata.iter().filter(|it| it.name == CONFIGURATION) {
+            let number = |key| metadata.metadata.get(key).and_then(|it| it.parse::<i64>().ok());
+            let (Some(place), Some(monotonic_ns)) = (number("number"), number("seen_monotonic_ns"))
+            else {
+                continue;
+            };
+            // Every file of a rotating recording has the same one once more.
+            if seen.iter().all(|it| it.monotonic_ns != monotonic_ns) {
+                let folder = folder_of_configuration(place as u32);
+                let (config, keeps_state) = load(path, recording, folder)?;
+                seen.push(Seen { monotonic_ns, config, keeps_state });
+            }
+        }
+        if seen.is_empty() {
+            return Err(ConfigurationError::None { path: path.into() });
+        }
+        seen.sort_by_key(|it| it.monotonic_ns);
+        Ok(Configurations { seen })
+    }
+
+    /// The configuration of a daemon that started at a moment of the monotonic clock, and whether it
+    /// keeps states: the first that was seen after that moment.
+    pub fn of_epoch(&self, epoch: u64) -> (&DaemonConfig, bool) {
+        let start_ns = i64::try_from(epoch).unwrap_or(i64::MAX);
+        let found = self.seen.iter().find(|it| it.monotonic_ns >= start_ns);
+        let newest = &self.seen[self.seen.len() - 1];
+        let it = found.unwrap_or(newest);
+        (&it.config, it.keeps_state)
+    }
+}
+
+/// Unpacks a configuration with its files under the names they were attached by, and reads it.
+fn load(
+    path: &Path,
+    recording: &Recording,
+    folder: String,
+) -> Result<(DaemonConfig, bool), ConfigurationError> {
+    let unpacking = |source| {
+        let (path, folder) = (path.into(), folder.clone());
+        ConfigurationError::Unpacking { path, folder, source }
+    };
+    let malformed = |problem: String| {
+        let (path, folder) = (path.into(), folder.clone());
+        ConfigurationError::Malformed { path, folder, problem }
+    };
+    let place = tempfile::tempdir().map_err(unpacking)?;
+    let mut text = None;
+    for (name, content) in &recording.attachments {
+        let Some(name) = name.strip_prefix(&format!("{folder}/")) else { continue };
+        if name == "daemon.toml" {
+            text = Some(String::from_utf8_lossy(content).into_owned());
+        } else if !name.contains('/') {
+            std::fs::write(place.path().join(name), content).map_err(unpacking)?;
+        }
+    }
+    let text = text.ok_or_else(|| malformed("not attached".into()))?;
+    let mut table: Table = text.parse().map_err(|it: toml::de::Error| malformed(it.to_string()))?;
+    let trains = table.get_mut("trains").and_then(Value::as_array_mut);
+    for train in trains.into_iter().flatten().filter_map(Value::as_table_mut) {
+        let id = train.get("id").and_then(Value::as_integer).unwrap_or(0);
+        for (key, name) in [("file", "train"), ("track", "track")] {
+            if let Some(file) = train.get_mut(key) {
+                *file = Value::String(format!("{name}-{id}.toml"));
+            }
+        }
+    }
+    // Its folder is on another host; what it would change is said in words.
+    let keeps_state = table.remove("state").is_some();
+    let config = DaemonConfig::from_text(&place.path().join("daemon.toml"), &table.to_string())
+        .map_err(|source| ConfigurationError::Refused { path: path.into(), source })?;
+    Ok((config, keeps_state))
+}

@@ -1,0 +1,40 @@
+//! What another configuration would have told of the same samples.
+
+use dynocar::config::DaemonConfig;
+use dynocar::run::build_pipeline;
+use dynocar_shared::{ParameterSnapshot, Quantity, TrainId, TrainSample};
+
+/// What a configuration's pipeline tells of a quantity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Told {
+    /// The train.
+    pub train: u64,
+    /// The quantity.
+    pub quantity: Quantity,
+    /// The pipeline that answers.
+    pub pipeline: String,
+    /// Its snapshot after the last sample.
+    pub snapshot: ParameterSnapshot,
+}
+
+/// What a configuration tells of every quantity after the last of some samples.
+pub fn overlay(config: &DaemonConfig, samples: &[TrainSample]) -> Vec<Told> {
+    let mut told = Vec::new();
+    for train in &config.trains {
+        let TrainId(id) = train.id;
+        if samples.iter().all(|it| it.train_id != id) {
+            continue;
+        }
+        for &quantity in Quantity::ALL {
+            let Some(place) = train.answers.place(quantity) else { continue };
+            let settings = &config.pipelines[place];
+            let Ok(mut pipeline) = build_pipeline(settings, place as u32, train) else { continue };
+            for sample in samples.iter().filter(|it| it.train_id == id) {
+                pipeline.process(sample);
+            }
+            let (pipeline, snapshot) = (settings.name.clone(), *pipeline.snapshot());
+            told.push(Told { train: id, quantity, pipeline, snapshot });
+        }
+    }
+    told
+}

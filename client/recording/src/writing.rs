@@ -1,0 +1,254 @@
+//! Writing MCAP files, without seeking: what has been flushed can be read, whatever happens next.
+
+use std::borrow::Cow;
+use std::collections::{BTreeMap, HashMap};
+use std::io::Write;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use dynocar_client::monotonic_now_ns;
+use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
+use mcap::records::{MessageHeader, Metadata};
+use mcap::write::NoSeek;
+use mcap::{Attachment, McapError, WriteOptions, Writer};
+use prost::Message;
+
+use crate::codec::{encode_sample, encode_snapshot};
+use crate::event::Event;
+use crate::schema::{DESCRIPTORS, EVENT, SAMPLE, SNAPSHOT};
+
+/// Name of the metadata record that every recording begins with.
+pub const METADATA: &str = "dynocar";
+/// Name of the metadata record beside an attached configuration.
+pub const CONFIGURATION: &str = "configuration";
+
+/// The folder in which a configuration of this number is attached.
+pub fn folder_of_configuration(number: u32) -> String {
+    format!("configuration-{number}")
+}
+
+/// Bytes after which a chunk ends by itself.
+const CHUNK_BYTES: u64 = 1 << 20;
+const LIBRARY: &str = concat!("dynocar ", env!("CARGO_PKG_VERSION"));
+
+/// What the host's monotonic clock says in wall time.
+#[derive(Clone, Copy, Debug)]
+pub struct WallClock {
+    offset_ns: i64,
+}
+
+impl WallClock {
+    /// Compares both clocks.
+    pub fn now() -> Self {
+        let wall = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |it| it.as_nanos());
+        WallClock { offset_ns: i64::try_from(wall).unwrap_or(i64::MAX) - monotonic_now_ns() }
+    }
+
+    /// A clock on which both are the same, for what was recorded on another host.
+    pub fn of_another_host() -> Self {
+        WallClock { offset_ns: 0 }
+    }
+
+    /// Nanoseconds since 1970 of a moment on the monotonic clock.
+    pub fn wall_ns(self, monotonic_ns: i64) -> u64 {
+        u64::try_from(self.offset_ns.saturating_add(monotonic_ns)).unwrap_or(0)
+    }
+}
+
+/// A file that is recorded into.
+pub struct RecordingWriter<W: Write> {
+    /// `None` once it is finished or has failed.
+    writer: Option<Writer<NoSeek<W>>>,
+    channels: HashMap<(&'static str, u64, u32), u16>,
+    clock: WallClock,
+    message: Vec<u8>,
+}
+
+impl<W: Write> RecordingWriter<W> {
+    /// Begins a file.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be written.
+    pub fn new(output: W, clock: WallClock) -> Result<Self, McapError> {
+        let writer = WriteOptions::new()
+            .profile("dynocar")
+            .library(LIBRARY)
+            .disable_seeking(true)
+            .chunk_size(Some(CHUNK_BYTES))
+            .create(NoSeek::new(output))?;
+        let (channels, message) = (HashMap::new(), Vec::with_capacity(2048));
+        let mut recording = RecordingWriter { writer: Some(writer), channels, clock, message };
+        recording.metadata(
+            METADATA,
+            &[
+                ("version", env!("CARGO_PKG_VERSION").to_owned()),
+                ("sample", TrainSample::WIRE_NAME.to_owned()),
+                ("snapshot", ParameterSnapshot::WIRE_NAME.to_owned()),
+            ],
+        )?;
+        Ok(recording)
+    }
+
+    /// Takes another comparison of the clocks for what comes from now on.
+    pub fn set_clock(&mut self, clock: WallClock) {
+        self.clock = clock;
+    }
+
+    /// Writes a metadata record.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be written.
+    pub fn metadata(&mut self, name: &str, pairs: &[(&str, String)]) -> Result<(), McapError> {
+        let pairs = pairs.iter().map(|(key, value)| ((*key).to_owned(), value.clone()));
+        let metadata = Metadata { name: name.to_owned(), metadata: pairs.collect() };
+        self.carry(|writer| writer.write_metadata(&metadata))
+    }
+
+    /// Attaches a file.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be written.
+    pub fn attach(
+        &mut self,
+        name: &str,
+        content: &[u8],
+        monotonic_ns: i64,
+    ) -> Result<(), McapError> {
+        let log_time = self.clock.wall_ns(monotonic_ns);
+        let media_type = if name.ends_with(".csv") { "text/csv" } else { "application/toml" };
+        self.carry(|writer| {
+            writer.attach(&Attachment {
+                log_time,
+                create_time: log_time,
+                name: name.to_owned(),
+                media_type: media_type.to_owned(),
+                data: Cow::Borrowed(content),
+            })
+        })
+    }
+
+    /// Writes a sample, logged at a moment of the monotonic clock.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be written.
+    pub fn sample(&mut self, sample: &TrainSample, at_ns: i64) -> Result<(), McapError> {
+        let train = sample.train_id;
+        let topic = || (format!("/train/{train}/samples"), TrainSample::WIRE_NAME);
+        let channel = self.channel((SAMPLE, train, 0), topic)?;
+        self.message.clear();
+        encode_sample(sample, &mut self.message);
+        self.write(channel, sample.sequence, at_ns)
+    }
+
+    /// Writes a snapshot.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be written.
+    pub fn snapshot(&mut self, snapshot: &ParameterSnapshot) -> Result<(), McapError> {
+        let (train, index) = (snapshot.train_id, snapshot.pipeline_index);
+        let kind = snapshot.pipeline_kind().map_or("unknown", PipelineKind::name);
+        let topic = || (format!("/train/{train}/{index}_{kind}"), ParameterSnapshot::WIRE_NAME);
+        let channel =
+            self.channel((SNAPSHOT, train, index << 16 | snapshot.pipeline_kind), topic)?;
+        self.message.clear();
+        encode_snapshot(snapshot, &mut self.message);
+        self.write(channel, snapshot.sequence, snapshot.published_ns)
+    }
+
+    /// Writes an event.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be written.
+    pub fn event(&mut self, event: &Event) -> Result<(), McapError> {
+        let channel = self.channel((EVENT, 0, 0), || ("/events".to_owned(), EVENT))?;
+        self.message.clear();
+        // A vector takes any length.
+        let _ = event.encode(&mut self.message);
+        self.write(channel, 0, event.monotonic_ns)
+    }
+
+    /// Ends the chunk, so that all that was written can be read.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be written.
+    pub fn flush(&mut self) -> Result<(), McapError> {
+        self.carry(Writer::flush)
+    }
+
+    /// Writes index and end; gives the file back.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be written.
+    pub fn finish(mut self) -> Result<W, McapError> {
+        self.carry(|writer| writer.finish().map(|_| ()))?;
+        let writer = self.writer.take().ok_or(McapError::AttemptedWriteAfterFailure)?;
+        Ok(writer.into_inner().into_inner())
+    }
+
+    fn channel(
+        &mut self,
+        key: (&'static str, u64, u32),
+        topic: impl FnOnce() -> (String, &'static str),
+    ) -> Result<u16, McapError> {
+        if let Some(&known) = self.channels.get(&key) {
+            return Ok(known);
+        }
+        let (topic, layout) = topic();
+        let metadata: BTreeMap<String, String> = [("layout".to_owned(), layout.to_owned())].into();
+        let mut id = 0;
+        self.carry(|writer| {
+            let schema = writer.add_schema(key.0, "protobuf", &DESCRIPTORS)?;
+            id = writer.add_channel(schema, &topic, "protobuf", &metadata)?;
+            Ok(())
+        })?;
+        self.channels.insert(key, id);
+        Ok(id)
+    }
+
+    fn write(
+        &mut self,
+        channel_id: u16,
+        sequence: u64,
+        monotonic_ns: i64,
+    ) -> Result<(), McapError> {
+        let log_time = self.clock.wall_ns(monotonic_ns);
+        // As many bits as the format has room for; the whole number is in the message.
+        let sequence = sequence as u32;
+        let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+        let message = std::mem::take(&mut self.message);
+        let written = self.carry(|writer| writer.write_to_known_channel(&header, &message));
+        self.message = message;
+        written
+    }
+
+    /// Does something with the writer; a failed one is let go, for it would write on when dropped.
+    fn carry(
+        &mut self,
+        work: impl FnOnce(&mut Writer<NoSeek<W>>) -> Result<(), McapError>,
+    ) -> Result<(), McapError> {
+        let writer = self.writer.as_mut().ok_or(McapError::AttemptedWriteAfterFailure)?;
+        let done = work(writer);
+        if done.is_err()
+            && let Some(failed) = self.writer.take()
+        {
+            failed.into_inner();
+        }
+        done
+    }
+}
+
+/// Nobody finishes a recording that was not asked to end: it would look whole.
+impl<W: Write> Drop for RecordingWriter<W> {
+    fn drop(&mut self) {
+        if let Some(writer) = self.writer.take() {
+            writer.into_inner();
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! Messages, their tables and the page of the fields say the same.
+
+use std::collections::HashSet;
+
+use dynocar_recording::event::{EVENT_FIELDS, Event, EventKind};
+use dynocar_recording::page::page;
+use dynocar_recording::schema::{DESCRIPTORS, std_name};
+use dynocar_shared::Parameter;
+use prost::Message;
+use prost::encoding::{DecodeContext, decode_key, skip_field};
+use prost_types::FileDescriptorSet;
+
+#[test]
+fn the_table_of_fields_is_that_of_the_message() {
+    let event = Event {
+        monotonic_ns: 1,
+        train_id: 1,
+        kind: EventKind::SamplesLost as i32,
+        pipeline_index: Some(1),
+        status: Some(1),
+        reason: Some(1),
+        count: Some(1),
+        text: "lost".into(),
+    };
+    let bytes = event.encode_to_vec();
+    let mut rest = &bytes[..];
+    let mut numbers = Vec::new();
+    while !rest.is_empty() {
+        let (number, wire_type) = decode_key(&mut rest).unwrap();
+        skip_field(wire_type, number, &mut rest, DecodeContext::default()).unwrap();
+        numbers.push(number as i32);
+    }
+    assert_eq!(numbers, EVENT_FIELDS.map(|it| it.number));
+    for (place, kind) in EventKind::ALL.iter().enumerate() {
+        assert_eq!(*kind as usize, place);
+    }
+    let shown = format!("{event:?}");
+    assert!(EVENT_FIELDS.iter().all(|it| shown.contains(&format!("{}:", it.name))), "{shown}");
+}
+
+#[test]
+fn names_and_numbers_are_unique_in_every_message_and_numbers_never_meet_the_nested_ones() {
+    let set = FileDescriptorSet::decode(&DESCRIPTORS[..]).unwrap();
+    let file = &set.file[0];
+    for message in &file.message_type {
+        let names: HashSet<_> = message.field.iter().map(|it| it.name()).collect();
+        let numbers: HashSet<_> = message.field.iter().map(|it| it.number()).collect();
+        assert_eq!((names.len(), numbers.len()), (message.field.len(), message.field.len()));
+    }
+    let members: Vec<_> =
+        file.enum_type.iter().flat_map(|it| &it.value).map(|it| it.name()).collect();
+    assert_eq!(members.iter().collect::<HashSet<_>>().len(), members.len());
+    assert!(file.enum_type.iter().all(|it| it.value[0].number() == 0));
+}
+
+#[test]
+fn parameters_have_names_with_units_and_deviations_beside_them() {
+    let names: Vec<String> =
+        Parameter::ALL.iter().flat_map(|&it| [it.full_name().into(), std_name(it)]).collect();
+    let expected = [
+        "resistance_a_n_per_kn",
+        "resistance_a_std_n_per_kn",
+        "resistance_b_n_per_kn_per_mps",
+        "resistance_b_std_n_per_kn_per_mps",
+        "resistance_c_n_per_kn_per_mps2",
+        "resistance_c_std_n_per_kn_per_mps2",
+        "mass_t",
+        "mass_std_t",
+        "adhesion",
+        "adhesion_std",
+    ];
+    assert_eq!(names[..expected.len()], expected);
+    assert!(names.contains(&"unexplained_force_std_n".to_owned()));
+}
+
+#[test]
+fn the_page_of_the_fields_is_the_one_in_the_documents() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/recording_fields.md");
+    let kept = std::fs::read_to_string(path).expect("the page");
+    assert!(kept == page(), "`dynocar-recording fields > docs/recording_fields.md`");
+}

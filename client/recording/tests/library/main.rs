@@ -1,0 +1,9 @@
+//! What the library of recordings promises; the recorder as a process is in `process.rs`.
+
+mod codec;
+mod fields;
+mod files;
+mod rotation;
+mod rows;
+mod support;
+mod verify;

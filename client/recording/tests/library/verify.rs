@@ -1,0 +1,94 @@
+//! Recorded snapshots are computed again to the bit, and what is not the same is found.
+
+use crate::support::{samples, snapshots, write};
+use dynocar_recording::recording::Recording;
+use dynocar_recording::verify::{Configurations, Outcome, Verified, verify};
+use dynocar_shared::{ParameterSnapshot, TrainSample};
+
+fn verified(samples: &[TrainSample], snapshots: &[ParameterSnapshot]) -> Vec<Verified> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    write(&path, samples, snapshots);
+    let recording = Recording::load(&path).unwrap();
+    verify(&recording, &Configurations::of(&path, &recording).unwrap())
+}
+
+#[test]
+fn a_recording_from_the_daemons_start_on_is_the_same_to_the_bit() {
+    let samples = samples();
+    let told = snapshots(&samples, 40);
+    let verified = verified(&samples, &told);
+    assert_eq!(verified.len(), 4, "the shipped pipelines");
+    for it in &verified {
+        assert_eq!((it.same, &it.outcome), (it.recorded, &Outcome::Same), "{}", it.name);
+        assert!(it.recorded > 30, "{}: {} snapshots", it.name, it.recorded);
+    }
+}
+
+#[test]
+fn one_bit_that_is_another_is_found_with_field_and_sample() {
+    let samples = samples();
+    let mut told = snapshots(&samples, 40);
+    let place = told.iter().position(|it| it.pipeline_index == 1 && it.sequence > 400).unwrap();
+    let tampered = &mut told[place];
+    tampered.covariance[2] = f64::from_bits(tampered.covariance[2].to_bits() ^ 1);
+    let sample = tampered.sample_sequence;
+    let verified = verified(&samples, &told);
+    match &verified[1].outcome {
+        Outcome::Differs(found) => {
+            assert_eq!((found.field, found.sample), ("covariance", sample), "{found:?}");
+            assert!(verified[1].same < verified[1].recorded);
+        }
+        other => panic!("expected a difference, found {other:?}"),
+    }
+    for place in [0, 2, 3] {
+        assert_eq!(verified[place].outcome, Outcome::Same);
+    }
+}
+
+#[test]
+fn a_sample_that_is_another_is_found() {
+    let mut samples = samples();
+    let told = snapshots(&samples, 40);
+    let changed = samples.iter().position(|it| it.speed_mps > 5.0).unwrap();
+    samples[changed].speed_mps += 0.01;
+    for it in verified(&samples, &told).iter().filter(|it| it.name == "mass_kalman") {
+        let Outcome::Differs(found) = &it.outcome else { panic!("{:?}", it.outcome) };
+        assert!(found.sample >= samples[changed].sequence, "{found:?}");
+    }
+}
+
+#[test]
+fn a_recording_that_begins_later_says_so_and_one_that_lacks_samples_says_up_to_where() {
+    let samples = samples();
+    let told = snapshots(&samples, 40);
+    let late: Vec<_> = told.iter().filter(|it| it.sequence > 300).copied().collect();
+    for it in verified(&samples[250..], &late) {
+        assert_eq!(it.outcome, Outcome::BeginsLate { before: 250 }, "{}", it.name);
+    }
+    let gap: Vec<_> =
+        samples.iter().enumerate().filter(|it| it.0 < 500 || it.0 > 520).map(|it| *it.1).collect();
+    for it in verified(&gap, &told) {
+        let is_told = matches!(
+            it.outcome,
+            Outcome::OtherSamples { agree_up_to, .. } if (480..=620).contains(&agree_up_to)
+        );
+        assert!(
+            is_told || matches!(it.outcome, Outcome::Differs(_)),
+            "{}: {:?}",
+            it.name,
+            it.outcome
+        );
+        assert!(it.same > 0 && it.same < it.recorded, "{}: {}", it.name, it.same);
+    }
+}
+
+#[test]
+fn samples_lost_on_the_way_to_the_daemon_alone_are_no_wrong_bits() {
+    // The recorder began before the daemon: those samples are nobody's.
+    let samples = samples();
+    let told = snapshots(&samples[100..], 40);
+    for it in verified(&samples, &told) {
+        assert_eq!(it.outcome, Outcome::Same, "{}", it.name);
+    }
+}
