@@ -5,6 +5,7 @@
 //! 1 the work failed, 2 the command line or an input file is wrong; `health` has some of its own.
 
 pub mod check;
+mod companion;
 mod completions;
 mod demo;
 pub mod explain;
@@ -31,6 +32,9 @@ pub use failure::{ErrorAnswer, Failure};
 
 use crate::output::{OutputError, write_json};
 
+/// The program of everything about recordings.
+const RECORDING: &str = "dynocar-recording";
+
 /// Dynocar, a dynamometer car in software.
 #[derive(Debug, Parser)]
 #[command(name = "dynocar", version, about)]
@@ -53,6 +57,14 @@ enum Command {
     Stops(stops::StopsArguments),
     Survey(survey::SurveyArguments),
     Fmu(fmu::FmuArguments),
+    /// Record what a controller and the daemon write, as MCAP
+    Record(companion::Passed),
+    /// Make a recording whole whose recorder died
+    Recover(companion::Passed),
+    /// Change recordings between MCAP, CSV datasets and Parquet
+    Convert(companion::Passed),
+    /// See in the terminal what the daemon knows of a train, and what to drive next
+    Watch(companion::Passed),
     Completions(completions::CompletionsArguments),
     Man(man::ManArguments),
 }
@@ -69,6 +81,9 @@ impl Command {
             // `check` has an answer of its own for what is wrong.
             Command::Check(_) | Command::Run(_) | Command::Health(_) | Command::Replay(_) => None,
             Command::Init(_) | Command::Import(_) | Command::Fmu(_) => None,
+            Command::Record(_) | Command::Recover(_) | Command::Convert(_) | Command::Watch(_) => {
+                None
+            }
             Command::Completions(_) | Command::Man(_) => None,
         }
     }
@@ -93,6 +108,10 @@ pub fn main() -> ExitCode {
         Command::Stops(arguments) => stops::execute(arguments),
         Command::Survey(arguments) => survey::execute(arguments),
         Command::Fmu(arguments) => fmu::execute(arguments),
+        Command::Record(passed) => companion::become_it(RECORDING, Some("record"), passed),
+        Command::Recover(passed) => companion::become_it(RECORDING, Some("recover"), passed),
+        Command::Convert(passed) => companion::become_it(RECORDING, Some("convert"), passed),
+        Command::Watch(passed) => companion::become_it("dynocar-watch", None, passed),
         Command::Completions(arguments) => completions::execute(arguments, Arguments::command()),
         Command::Man(arguments) => man::execute(arguments, Arguments::command()),
     };
