@@ -53,6 +53,13 @@ fn what_a_simulator_loads_has_no_channel() {
 }
 
 #[test]
+fn the_terminal_stays_out_of_daemon_and_controller() {
+    for package in ["dynocar", "dynocar-client", "dynocar-core"] {
+        assert_free_of(package, &["ratatui", "crossterm"]);
+    }
+}
+
+#[test]
 fn the_contract_depends_on_nothing() {
     assert_eq!(dependencies("dynocar-shared"), ["dynocar-shared"]);
 }
