@@ -81,7 +81,8 @@ fn lines_tell_of_a_daemon_that_comes_goes_and_is_back_and_a_signal_ends_them() {
     let first = daemon(&site);
     let controller = Controller::of(&site);
     await_words("train 1: daemon");
-    let line = watch.await_line("an estimate", |line| line.contains("mass ") && line.contains("/s, used"));
+    let line =
+        watch.await_line("an estimate", |line| line.contains("mass ") && line.contains("/s, used"));
     assert!(line.contains("resistance") && line.contains("suspect none"), "{line}");
     first.kill();
     let line = await_words("the daemon is gone; what it said last is shown");
@@ -100,9 +101,10 @@ fn an_incompatible_daemon_is_named_and_waited_out() {
     let site = Site::new();
     let lock = RoleLock::claim(&site.host(), TRAIN, Role::Daemon).unwrap();
     let path = std::fs::read_dir(site.host().trains_directory()).unwrap();
-    let path = path.flatten().map(|entry| entry.path()).find(|path| {
-        std::fs::read_to_string(path).is_ok_and(|text| text.contains("role=daemon"))
-    });
+    let path = path
+        .flatten()
+        .map(|entry| entry.path())
+        .find(|path| std::fs::read_to_string(path).is_ok_and(|text| text.contains("role=daemon")));
     let path = path.expect("the announcement");
     let text = std::fs::read_to_string(&path).unwrap();
     let schema = Announcement::of_this_process(Role::Daemon).schema;
@@ -158,7 +160,15 @@ impl Screen {
             site.host().root().display()
         );
         let opened = screen.tmux(&[
-            "-f", "/dev/null", "new-session", "-d", "-x", &size[0], "-y", &size[1], &shell,
+            "-f",
+            "/dev/null",
+            "new-session",
+            "-d",
+            "-x",
+            &size[0],
+            "-y",
+            &size[1],
+            &shell,
         ]);
         assert!(opened.status.success(), "{}", String::from_utf8_lossy(&opened.stderr));
         screen
@@ -236,10 +246,8 @@ fn signals_and_control_c_leave_the_terminal_as_it_was() {
     let screen = Screen::open(&site, 100, 30);
     for (place, end) in ["C-c", "TERM", "HUP"].into_iter().enumerate() {
         let file = site.path().join(format!("pid{place}"));
-        let command = format!(
-            "sh -c 'echo $$ > {}; exec {WATCH}'; echo ended {place} $?",
-            file.display()
-        );
+        let command =
+            format!("sh -c 'echo $$ > {}; exec {WATCH}'; echo ended {place} $?", file.display());
         screen.keys(&[&command, "Enter"]);
         screen.shows(&["No daemon serves any train"]);
         match end {

@@ -14,7 +14,9 @@ use dynocar_core::advice::{best, forecasts, mass};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
 use dynocar_core::simulate::motion::{Motion, advance};
 use dynocar_core::train::{Davis, EffortCurve, TrainModel};
-use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, SampleField, TrainId, TrainSample};
+use dynocar_shared::{
+    Parameter, ParameterSnapshot, PipelineKind, SampleField, TrainId, TrainSample,
+};
 use dynocar_tests::simulator::driving::{Controls, TrainOnLine};
 use dynocar_tests::simulator::random::{Random, Stream};
 
@@ -26,16 +28,23 @@ const MASS_KG: f64 = 220e3;
 const TRUTH: Davis = Davis { a: 1.7, b: 0.02, c: 0.0042 };
 const SEEDS: u64 = 30;
 /// Time in s of driving about before anything is asked.
-const BEFORE_S: f64 = 240.0;
+const BEFORE_S: f64 = 120.0;
+/// A manoeuvre counts that is foretold to leave at most this share of an interval.
+const SHARE_MAX: f64 = 0.8;
 
-fn declared() -> Arc<TrainModel> {
+/// The train as it is declared, with this mass.
+fn declared_at(mass_kg: f64) -> Arc<TrainModel> {
     let resistance = Davis { a: 1.4, b: 0.03, c: 0.0035 };
     Arc::new(TrainModel {
         rotating_mass_factor: 0.06,
         traction: EffortCurve::new(vec![(0.0, 200e3), (10.0, 200e3), (40.0, 50e3)]),
         brake: EffortCurve::new(vec![(0.0, 180e3)]),
-        ..TrainModel::bare("railcar", 200e3, resistance)
+        ..TrainModel::bare("railcar", mass_kg, resistance)
     })
+}
+
+fn declared() -> Arc<TrainModel> {
+    declared_at(MASS_KG)
 }
 
 /// A train with its sensors and one of the daemon's pipelines.
@@ -50,7 +59,9 @@ struct Trial {
 
 impl Trial {
     fn new(kind: PipelineKind, seed: u64) -> Trial {
-        let declared = declared();
+        // Only who looks for the mass is told a wrong one.
+        let is_of_mass = kind == PipelineKind::MassKalman;
+        let declared = declared_at(if is_of_mass { 0.9 * MASS_KG } else { MASS_KG });
         let settings = EstimatorSettings::default_of(kind).unwrap();
         let estimator = settings.build(&declared).unwrap();
         let truth = TrainModel { resistance: TRUTH, ..(*declared).clone() };
@@ -70,10 +81,8 @@ impl Trial {
 
     /// A sample under a control force in N, and the motion to the next.
     fn step(&mut self, force_n: f64) {
-        let controls = Controls {
-            traction_force_n: force_n.max(0.0),
-            brake_force_n: (-force_n).max(0.0),
-        };
+        let controls =
+            Controls { traction_force_n: force_n.max(0.0), brake_force_n: (-force_n).max(0.0) };
         self.sample.sequence += 1;
         self.sample.time_ns += (1e9 * STEP_S) as i64;
         let measured_mps = self.motion.speed_mps + SPEED_NOISE_MPS * self.random.gaussian();
@@ -153,31 +162,34 @@ const STD: fn(&ParameterSnapshot, usize) -> f64 = |snapshot, coefficient| {
 #[test]
 fn the_interval_of_the_resistance_after_a_manoeuvre_is_the_one_foretold() {
     let train = declared();
-    let mut ratios = vec![Vec::new(); 3];
-    let mut gained = Vec::new();
+    let (mut ratios, mut shares) = (vec![Vec::new(); 3], Vec::new());
     for seed in 0..SEEDS {
-        let mut before = Trial::new(PipelineKind::TrajectoryKalman, seed);
-        before.drive_about();
-        let drives = before.scene(&train).catalogue(60.0);
-        let drive = drives[seed as usize % drives.len()];
-        before.begin_at(drive.from_mps);
-        let scene = before.scene(&train);
-        let (_, covariance) = davis_of(before.snapshot()).unwrap();
-        let noise = before.noise.noise(before.snapshot(), &train, MASS_KG).unwrap();
-        let foretold = forecast(&scene, &covariance, &noise, drive).unwrap();
-        let now: Vec<f64> = (0..3).map(|i| STD(before.snapshot(), i)).collect();
-        before.drive(drive);
-        for i in 0..3 {
-            ratios[i].push(foretold.std[i] / STD(before.snapshot(), i));
-            gained.push(STD(before.snapshot(), i) / now[i]);
+        let place = |k: usize| 5 * k + seed as usize;
+        for k in 0..4 {
+            let mut trial = Trial::new(PipelineKind::TrajectoryKalman, seed);
+            trial.drive_about();
+            let drives = trial.scene(&train).catalogue(60.0);
+            let drive = drives[place(k) % drives.len()];
+            trial.begin_at(drive.from_mps);
+            let (_, covariance) = davis_of(trial.snapshot()).unwrap();
+            let noise = trial.noise.noise(trial.snapshot(), &train, MASS_KG).unwrap();
+            let foretold = forecast(&trial.scene(&train), &covariance, &noise, drive).unwrap();
+            let now = [0, 1, 2].map(|i| STD(trial.snapshot(), i));
+            trial.drive(drive);
+            for i in (0..3).filter(|&i| foretold.std[i] <= SHARE_MAX * now[i]) {
+                ratios[i].push(foretold.std[i] / STD(trial.snapshot(), i));
+                shares.push(STD(trial.snapshot(), i) / now[i]);
+            }
         }
     }
-    println!("shares of the interval left: {:.2?}", quantiles(gained));
+    println!("shares of the interval left: {:.2?}", quantiles(shares));
     for (name, ratios) in ["a", "b", "c"].iter().zip(ratios) {
+        let count = ratios.len();
         let [low, median, high] = quantiles(ratios);
-        println!("{name}: foretold / found: median {median:.2}, 10 % {low:.2}, 90 % {high:.2}");
-        assert!((0.8..1.25).contains(&median), "{name}: median {median}");
-        assert!(low > 0.6 && high < 1.6, "{name}: {low} to {high}");
+        println!("{name}: foretold / found in {count}: {median:.2}, 80 %: {low:.2} to {high:.2}");
+        assert!(count >= 10, "{name}: {count} manoeuvres tell of it");
+        assert!((0.85..1.18).contains(&median), "{name}: median {median}");
+        assert!(low > 0.5 && high < 1.6, "{name}: {low} to {high}");
     }
 }
 
@@ -185,7 +197,7 @@ fn the_interval_of_the_resistance_after_a_manoeuvre_is_the_one_foretold() {
 fn the_advised_manoeuvre_tells_more_than_the_others() {
     let train = declared();
     let worst = 2;
-    let (mut ahead, mut lost) = (0, Vec::new());
+    let (mut against_best, mut against_middle) = (Vec::new(), Vec::new());
     for seed in 0..10 {
         let mut first = Trial::new(PipelineKind::TrajectoryKalman, seed);
         first.drive_about();
@@ -200,14 +212,18 @@ fn the_advised_manoeuvre_tells_more_than_the_others() {
             STD(trial.snapshot(), worst)
         };
         let advised_std = left(advised);
-        let others: Vec<f64> =
-            all.iter().filter(|it| it.drive != advised).map(|it| left(it.drive)).collect();
-        let beaten = others.iter().filter(|&&std| advised_std <= 1.1 * std).count();
-        ahead += usize::from(beaten == others.len());
-        lost.push(advised_std / others.iter().copied().fold(f64::INFINITY, f64::min));
+        let others = all.iter().filter(|it| it.drive != advised).map(|it| left(it.drive));
+        let others: Vec<f64> = others.map(|std| advised_std / std).collect();
+        against_best.push(others.iter().copied().fold(0.0, f64::max));
+        against_middle.push(quantiles(others)[1]);
     }
-    println!("within 10 % of the best of all: {ahead} of 10; against the best other {lost:.2?}");
-    assert!(ahead >= 9, "{lost:?}");
+    println!(
+        "advised over the best other {against_best:.2?}, over the middle {against_middle:.2?}"
+    );
+    let [_, best, most] = quantiles(against_best);
+    assert!(best < 1.1 && most < 1.25, "none of the others tells much more: {best}, {most}");
+    let [_, middle, most] = quantiles(against_middle);
+    assert!(middle < 0.6 && most < 0.8, "most of the others tell less: {middle}, {most}");
 }
 
 #[test]

@@ -84,5 +84,5 @@ fn lacking(quantity: Quantity, pipeline: &PipelineState) -> Option<String> {
         .filter(|manoeuvre| missing & manoeuvre.bit() != 0)
         .map(|&manoeuvre| in_words(manoeuvre))
         .collect();
-    (!words.is_empty()).then(|| format!("{quantity}: {}", words.join(", ")))
+    (!words.is_empty()).then(|| format!("{quantity} needs {}", words.join(", ")))
 }

@@ -49,16 +49,19 @@ pub fn run(watcher: &mut Watcher, must_end: &AtomicBool) -> Result<(), Failure> 
 pub fn line(train: &TrainState) -> String {
     let mut parts = vec![daemon(&train.daemon, None)];
     for row in rows(train, &[0.5]) {
-        let value = [row.value, row.interval].join(" ");
-        let value = [row.label.trim(), value.trim()].join(" ");
+        let words = [row.label.trim(), &row.number, &row.interval, row.unit];
+        let value = words.into_iter().filter(|it| !it.is_empty()).collect::<Vec<_>>().join(" ");
         let status = match row.status {
             Some(status) => format!(" {} ({})", status.name(), row.reason),
             None => String::new(),
         };
-        parts.push(value.trim().to_owned() + &status);
+        parts.push(value + &status);
     }
     if !train.pipelines.is_empty() {
-        parts.extend(residual(train).map(|(force, suspect)| format!("unexplained {force}, suspect {suspect}")));
+        parts.extend(
+            residual(train)
+                .map(|(force, suspect)| format!("unexplained {force}, suspect {suspect}")),
+        );
         parts.push(samples(train));
         parts.extend(train.advice.first().map(|advice| format!("next: {advice}")));
     }

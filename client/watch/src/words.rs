@@ -13,10 +13,12 @@ pub const INTERVAL_95: f64 = 1.96;
 pub struct Row {
     /// What it is; parameters of a quantity are indented.
     pub label: String,
-    /// The value with its unit.
-    pub value: String,
+    /// The value; a bound has a sign before it.
+    pub number: String,
     /// Half width of the 95 % interval, with a sign before it.
     pub interval: String,
+    /// The unit of both.
+    pub unit: &'static str,
     /// The status, for a quantity.
     pub status: Option<Status>,
     /// Why.
@@ -41,8 +43,13 @@ pub fn rows(train: &TrainState, shares: &[f64]) -> Vec<Row> {
             all.push(head);
             all.extend(resistance_rows(pipeline, shares));
         } else {
-            let (value, interval) = main_value(quantity, pipeline);
-            all.push(Row { value, interval, ..head });
+            let value = main_value(quantity, pipeline);
+            all.push(Row {
+                number: value.number,
+                interval: value.interval,
+                unit: value.unit,
+                ..head
+            });
         }
     }
     all
@@ -51,24 +58,23 @@ pub fn rows(train: &TrainState, shares: &[f64]) -> Vec<Row> {
 fn resistance_rows(pipeline: &PipelineState, shares: &[f64]) -> Vec<Row> {
     let snapshot = &pipeline.snapshot;
     let of_parameter = |parameter: Parameter| {
-        let (value, interval) =
-            with_interval(snapshot.value(parameter)?, snapshot.std(parameter)?, unit(parameter));
-        Some(Row { label: format!("  {}", parameter.name()), value, interval, ..Row::default() })
+        let (value, std) = (snapshot.value(parameter)?, snapshot.std(parameter)?);
+        let label = format!("  {}", parameter.name());
+        Some(Row { label, ..with_interval(value, std, unit(parameter)) })
     };
     let davis = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
     let (low, high) = (snapshot.speed_min_mps, snapshot.speed_max_mps);
     let at_speed = |share: &f64| {
         let speed_mps = (low + share * (high - low)).round();
         let w0 = snapshot.resistance_at(speed_mps).filter(|_| high > low)?;
-        let (value, interval) = with_interval(w0.w0_n_per_kn, w0.w0_std_n_per_kn, "N/kN");
-        let label = format!("  at {speed_mps:.0} m/s ({:.0} km/h)", 3.6 * speed_mps);
-        Some(Row { label, value, interval, ..Row::default() })
+        let label = format!("  at {:.0} km/h", 3.6 * speed_mps);
+        Some(Row { label, ..with_interval(w0.w0_n_per_kn, w0.w0_std_n_per_kn, "N/kN") })
     };
     davis.into_iter().filter_map(of_parameter).chain(shares.iter().filter_map(at_speed)).collect()
 }
 
-/// The value of a quantity other than the resistance; a bound has a sign before it.
-fn main_value(quantity: Quantity, pipeline: &PipelineState) -> (String, String) {
+/// The value of a quantity other than the resistance.
+fn main_value(quantity: Quantity, pipeline: &PipelineState) -> Row {
     let candidates: &[Parameter] = match quantity {
         Quantity::Resistance => &[],
         Quantity::Mass => &[Parameter::Mass],
@@ -80,13 +86,11 @@ fn main_value(quantity: Quantity, pipeline: &PipelineState) -> (String, String) 
     let found = candidates.iter().find_map(|&parameter| {
         Some((parameter, snapshot.value(parameter)?, snapshot.std(parameter)?))
     });
-    match found {
-        Some((Parameter::AdhesionLowerBound, value, std)) => {
-            let (value, interval) = with_interval(value, std, "");
-            (format!("≥ {value}"), interval)
-        }
-        Some((parameter, value, std)) => with_interval(value, std, unit(parameter)),
-        None => (String::new(), String::new()),
+    let Some((parameter, value, std)) = found else { return Row::default() };
+    let row = with_interval(value, std, unit(parameter));
+    match parameter {
+        Parameter::AdhesionLowerBound => Row { number: format!("≥ {}", row.number), ..row },
+        _ => row,
     }
 }
 
@@ -101,13 +105,12 @@ fn unit(parameter: Parameter) -> &'static str {
     }
 }
 
-/// A value with its unit, and its interval, to two digits of the interval.
-fn with_interval(value: f64, std: f64, unit: &str) -> (String, String) {
+/// A value with its interval, to two digits of the interval.
+fn with_interval(value: f64, std: f64, unit: &'static str) -> Row {
     let half = INTERVAL_95 * std;
     let digits = digits(half);
-    let value = format!("{value:.digits$} {unit}").trim_end().to_owned();
     let interval = if half > 0.0 { format!("± {half:.digits$}") } else { String::new() };
-    (value, interval)
+    Row { number: format!("{value:.digits$}"), interval, unit, ..Row::default() }
 }
 
 /// Decimals that show two digits of an interval.
@@ -192,13 +195,13 @@ mod tests {
     #[test]
     fn two_digits_of_the_interval_are_shown() {
         let told = |value, std, unit| {
-            let (value, interval) = with_interval(value, std, unit);
-            format!("{value} {interval}")
+            let row = with_interval(value, std, unit);
+            [&row.number, row.interval.as_str(), row.unit].join(" ").trim_end().to_owned()
         };
-        assert_eq!(told(1.49832, 0.0274, "N/kN"), "1.498 N/kN ± 0.054");
-        assert_eq!(told(1697.4, 6.0, "t"), "1697 t ± 12");
+        assert_eq!(told(1.49832, 0.0274, "N/kN"), "1.498 ± 0.054 N/kN");
+        assert_eq!(told(1697.4, 6.0, "t"), "1697 ± 12 t");
         assert_eq!(told(0.000_861, 0.000_013, ""), "0.000861 ± 0.000025");
-        assert_eq!(told(0.094, 0.0, ""), "0.094 ");
+        assert_eq!(told(0.094, 0.0, ""), "0.094");
     }
 
     #[test]

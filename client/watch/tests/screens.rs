@@ -134,7 +134,10 @@ fn a_larger_terminal_gets_more_speeds_and_plots() {
 #[test]
 fn a_suspect_is_told_with_what_is_hardly_told_from_it() {
     let drawn = screen(&[&suspected()], Choice::default(), (80, 24));
-    assert!(drawn.contains("dragging_brake for 2 min, evidence 46, hardly told from wind"), "{drawn}");
+    assert!(
+        drawn.contains("dragging_brake for 2 min, evidence 46, hardly told from wind"),
+        "{drawn}"
+    );
 }
 
 #[test]
@@ -195,8 +198,8 @@ fn a_line_says_all_of_a_train() {
     for part in [
         "train 1: daemon 0.1.0 (process 4711)",
         "resistance estimated (weak_excitation)",
-        "a 1.498 N/kN ± 0.053",
-        "mass 1697 t ± 12 estimated (none)",
+        "a 1.498 ± 0.053 N/kN",
+        "mass 1697 ± 12 t estimated (none)",
         "adhesion ≥ 0.094 degraded (only_lower_bound)",
         "suspect dragging_brake",
         "used 20310, rejected 2 (most: outlier), lost 0",

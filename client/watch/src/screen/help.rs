@@ -25,5 +25,8 @@ what the train's file declares.";
 
 /// Draws it.
 pub fn draw(frame: &mut Frame<'_>, area: Rect, palette: Palette) {
-    frame.render_widget(Paragraph::new(HELP).wrap(Wrap { trim: false }).style(palette.plain()), area);
+    frame.render_widget(
+        Paragraph::new(HELP).wrap(Wrap { trim: false }).style(palette.plain()),
+        area,
+    );
 }

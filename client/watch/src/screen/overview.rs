@@ -5,17 +5,17 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
+use super::heading;
 use super::plots::{self, sparkline};
 use super::style::Palette;
-use super::heading;
 use crate::history::Point;
 use crate::state::TrainState;
 use crate::words::{Row, duration, residual, rows};
 
-/// Columns of the table: label, value, interval, status, reason; the age takes the rest.
-const COLUMNS: [usize; 5] = [22, 25, 12, 13, 24];
-/// The same in a narrow terminal, where a parameter's long unit runs into the empty status.
-const COLUMNS_NARROW: [usize; 5] = [22, 14, 11, 12, 16];
+/// Columns of the table after the number: interval and unit, status, reason; the age takes the rest.
+const COLUMNS: [usize; 3] = [20, 15, 26];
+/// The same in a narrow terminal.
+const COLUMNS_NARROW: [usize; 3] = [12, 12, 22];
 /// From this width on there is room for the wide columns.
 const WIDE: u16 = 104;
 /// From this height on the resistance is shown at three speeds, and plots have rows of their own.
@@ -73,36 +73,21 @@ fn quantities(
     lines
 }
 
-fn told(row: Row, columns: [usize; 5], palette: Palette) -> Line<'static> {
-    let [label, value, interval, status, reason] = columns;
-    let text = format!("{:<label$}", row.label);
+fn told(row: Row, columns: [usize; 3], palette: Palette) -> Line<'static> {
+    let [interval, status, reason] = columns;
+    let number = format!("{:>9}  ", row.number);
+    let interval_and_unit = format!("{} {}", row.interval, row.unit);
+    let label = format!("{:<15}", row.label);
     let Some(of_quantity) = row.status else {
-        // The value's number, its interval, then the unit, however long.
-        let (number, unit) = row.value.split_once(' ').unwrap_or((&row.value, ""));
-        return Line::raw(format!("{text}{number:>9}  {:<interval$}{unit}", row.interval));
+        return Line::raw(label + &number + interval_and_unit.trim_start());
     };
-    let number = match row.value.is_empty() {
-        true => " ".repeat(value + interval),
-        false => {
-            let (number, unit) = split_unit(&row.value);
-            format!("{number:>9}  {:<width$}", [&row.interval, unit].join(" "), width = value + interval - 11)
-        }
-    };
-    let age = row.age_s.map_or("no sample".to_owned(), duration);
+    let age = row.age_s.map_or("never".to_owned(), duration);
     Line::from(vec![
-        Span::styled(text, palette.strong()),
-        Span::raw(number),
+        Span::styled(label, palette.strong()),
+        Span::raw(format!("{number}{:<interval$}", interval_and_unit.trim())),
         Span::styled(format!("{:<status$}", of_quantity.name()), palette.status(of_quantity)),
-        Span::raw(format!("{:<reason$} {age}", row.reason)),
+        Span::raw(format!("{:<reason$}{age}", row.reason)),
     ])
-}
-
-/// A number, with a sign of a bound before it, and its unit.
-fn split_unit(value: &str) -> (&str, &str) {
-    match value.rsplit_once(' ') {
-        Some((number, unit)) if unit.parse::<f64>().is_err() => (number, unit),
-        _ => (value, ""),
-    }
 }
 
 fn residual_lines(train: &TrainState, width: u16, palette: Palette) -> Vec<Line<'static>> {

@@ -34,9 +34,9 @@ impl<'a> Scene<'a> {
             train.speed_max_mps().unwrap_or(speed_seen_mps).clamp(0.0, SPEED_MAX_MPS);
         let mut scene = Scene { train, davis, mass_kg, speed_max_mps };
         while scene.speed_max_mps > SPEED_LOW_MPS
-            && scene.full_traction_n(scene.speed_max_mps).is_some_and(|full_n| {
-                full_n <= scene.resistance_n(scene.speed_max_mps)
-            })
+            && scene
+                .full_traction_n(scene.speed_max_mps)
+                .is_some_and(|full_n| full_n <= scene.resistance_n(scene.speed_max_mps))
         {
             scene.speed_max_mps -= 1.0;
         }

@@ -56,9 +56,10 @@ pub fn for_mass(
     }
     let scene = Scene::new(train, davis, 1e3 * mass_t, snapshot.speed_max_mps);
     let within = |within_s: f64| {
-        let drives = scene.catalogue(within_s).into_iter().filter(|drive| {
-            matches!(drive.kind, DriveKind::Accelerate | DriveKind::Brake)
-        });
+        let drives = scene
+            .catalogue(within_s)
+            .into_iter()
+            .filter(|drive| matches!(drive.kind, DriveKind::Accelerate | DriveKind::Brake));
         drives
             .filter_map(|drive| forecast(&scene, std_t, noise, drive))
             .min_by(|one, other| one.std_t.total_cmp(&other.std_t))
@@ -146,8 +147,8 @@ impl<'a> Rehearsal<'a> {
         let mut driver = drive.begin();
         let mut lasts_s = 0.0;
         while lasts_s + self.step_s <= drive.within_s {
-            let resistance_n =
-                TrainModel::weight_kn(self.scene.mass_kg) * self.scene.davis.w0_n_per_kn(self.speed_mps);
+            let resistance_n = TrainModel::weight_kn(self.scene.mass_kg)
+                * self.scene.davis.w0_n_per_kn(self.speed_mps);
             let wanted = if is_free {
                 Some(resistance_n)
             } else {

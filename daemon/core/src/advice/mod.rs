@@ -87,8 +87,7 @@ pub fn for_resistance(
     let top_mps = Scene::new(train, davis, mass_kg, snapshot.speed_max_mps).speed_max_mps;
     let worst = now.component_mul(&Vector3::new(1.0, top_mps, top_mps * top_mps)).imax();
     let share = |it: &Forecast| it.std[worst] / now[worst];
-    let best_within =
-        |within_s| best(&forecasts(snapshot, train, mass_kg, noise, within_s), worst);
+    let best_within = |within_s| best(&forecasts(snapshot, train, mass_kg, noise, within_s), worst);
     let mut chosen = None;
     for within_s in WITHIN_S {
         chosen = best_within(within_s).or(chosen);

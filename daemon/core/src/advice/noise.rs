@@ -99,7 +99,12 @@ impl NoiseSeen {
 
     /// The noise behind the newest snapshot of the pipeline; `None` while nothing has been learned,
     /// or where the pipeline is none whose noise can be told.
-    pub fn noise(&self, newest: &ParameterSnapshot, train: &TrainModel, mass_kg: f64) -> Option<Noise> {
+    pub fn noise(
+        &self,
+        newest: &ParameterSnapshot,
+        train: &TrainModel,
+        mass_kg: f64,
+    ) -> Option<Noise> {
         let step_s = self.step_s?;
         let inertial_mass_kg = mass_kg * (1.0 + train.rotating_mass_factor);
         let rate = if self.rates.len() >= LOOKS_MIN {
@@ -109,7 +114,11 @@ impl NoiseSeen {
             (information_on_a(newest)? - before) / (newest.samples_used as f64 * step_s)
         };
         let noise = Noise {
-            speed_noise_mps: speed_noise_mps(newest.unexplained_force_std_n, inertial_mass_kg, step_s),
+            speed_noise_mps: speed_noise_mps(
+                newest.unexplained_force_std_n,
+                inertial_mass_kg,
+                step_s,
+            ),
             disturbance_n_per_kn_sqrt_s: rate.sqrt().recip(),
             step_s,
         };

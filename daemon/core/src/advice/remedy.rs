@@ -4,7 +4,9 @@ use dynocar_shared::{Manoeuvre, Reason, Status};
 
 /// What lifts a reservation that no manoeuvre lifts; `None` where there is none, or driving helps.
 pub const fn remedy(status: Status, reason: Option<Reason>) -> Option<&'static str> {
-    let Some(reason) = reason else { return Some("a newer daemon gives a reason that is unknown here") };
+    let Some(reason) = reason else {
+        return Some("a newer daemon gives a reason that is unknown here");
+    };
     Some(match reason {
         Reason::None | Reason::TooFewSamples | Reason::WeakExcitation => return None,
         Reason::AtBound if matches!(status, Status::Estimated) => return None,
@@ -17,12 +19,18 @@ pub const fn remedy(status: Status, reason: Option<Reason>) -> Option<&'static s
         Reason::BadInput => "many samples are refused: see the reasons by pipeline",
         Reason::MissingQuantity => "the controller must send what the pipeline's page asks for",
         Reason::GradientUnknown => "declare a track and send the position, or send the gradient",
-        Reason::NumericalFailure => "it learns anew: wait; should it come again, keep the recording",
+        Reason::NumericalFailure => {
+            "it learns anew: wait; should it come again, keep the recording"
+        }
         Reason::EstimateStale => "of an earlier braking: the next braking renews it",
-        Reason::OnlyLowerBound => "the rail carries at least this; more shows only when wheels slide",
+        Reason::OnlyLowerBound => {
+            "the rail carries at least this; more shows only when wheels slide"
+        }
         Reason::DaemonSilent => "the daemon is silent: see dynocar health and its log",
         Reason::ImplausibleForces => "forces cannot be true: check their unit, sign and order",
-        Reason::ImplausibleMotion => "speed, position or time cannot be true: check units and signs",
+        Reason::ImplausibleMotion => {
+            "speed, position or time cannot be true: check units and signs"
+        }
         Reason::ImplausibleMass => "the mass cannot be true: check its unit",
         Reason::ImplausibleGradient => "the gradient cannot be true: check its unit and sign",
         Reason::ImplausiblePressure => "the brake pressure cannot be true: check its unit",
@@ -32,12 +40,12 @@ pub const fn remedy(status: Status, reason: Option<Reason>) -> Option<&'static s
 /// What a manoeuvre is that a pipeline lacks, where no numbers can be given yet.
 pub const fn in_words(manoeuvre: Manoeuvre) -> &'static str {
     match manoeuvre {
-        Manoeuvre::CoastSlow => "coast at low speed",
-        Manoeuvre::CoastFast => "coast at high speed",
-        Manoeuvre::VarySpeed => "drive at other speeds",
-        Manoeuvre::Accelerate => "pull hard",
-        Manoeuvre::Brake => "brake hard",
-        Manoeuvre::Move => "drive",
+        Manoeuvre::CoastSlow => "coasting at low speed",
+        Manoeuvre::CoastFast => "coasting at high speed",
+        Manoeuvre::VarySpeed => "driving at other speeds",
+        Manoeuvre::Accelerate => "strong traction",
+        Manoeuvre::Brake => "strong braking",
+        Manoeuvre::Move => "driving",
     }
 }
 

@@ -50,7 +50,8 @@ pub fn forecast(
         learns_speed_noise: false,
         learns_disturbance: false,
     };
-    let mut filter = Hypothesis::new(&scene.davis, &Vector3::repeat(1.0), LearnedNoise::new(&model));
+    let mut filter =
+        Hypothesis::new(&scene.davis, &Vector3::repeat(1.0), LearnedNoise::new(&model));
     let factor = covariance.cholesky()?.unpack();
     filter.factor.0.fixed_view_mut::<3, 3>(0, 0).copy_from(&factor);
     filter.anchor(drive.from_mps);
