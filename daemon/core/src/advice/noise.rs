@@ -195,7 +195,7 @@ mod tests {
             let ratio = noise.disturbance_n_per_kn_sqrt_s / DISTURBANCE;
             assert!((0.95..1.05).contains(&ratio), "{seconds} s: {ratio}");
             assert!((noise.step_s - 0.1).abs() < 1e-9);
-            assert!((noise.speed_noise_mps - 0.014).abs() < 0.001, "{}", noise.speed_noise_mps);
+            assert!((noise.speed_noise_mps - 0.02).abs() < 0.001, "{}", noise.speed_noise_mps);
         }
     }
 
