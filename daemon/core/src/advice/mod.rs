@@ -47,14 +47,15 @@ pub struct Advice {
 impl Advice {
     /// In words: "20 s coasting from 25 m/s (90 km/h) halves the interval of c".
     pub fn told(&self) -> String {
-        let effect = match self.std_after / self.std_now {
-            share if share < 0.3 => format!("divides the interval of {{}} by {:.0}", share.recip()),
-            share if share < 0.4 => "cuts the interval of {} to a third".to_owned(),
-            share if share <= 0.55 => "halves the interval of {}".to_owned(),
-            share => format!("narrows the interval of {{}} by {:.0} %", 100.0 * (1.0 - share)),
-        };
         let name = if self.parameter == Parameter::Mass { "mass" } else { self.parameter.name() };
-        format!("{} {}", self.drive, effect.replace("{}", name))
+        let interval = format!("the interval of {name}");
+        let effect = match self.std_after / self.std_now {
+            share if share < 0.3 => format!("divides {interval} by {:.0}", share.recip()),
+            share if share < 0.4 => format!("cuts {interval} to a third"),
+            share if share <= 0.55 => format!("halves {interval}"),
+            share => format!("narrows {interval} by {:.0} %", 100.0 * (1.0 - share)),
+        };
+        format!("{} {effect}", self.drive)
     }
 }
 
