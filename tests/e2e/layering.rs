@@ -60,6 +60,13 @@ fn what_recordings_are_written_with_is_in_no_controller_and_no_daemon() {
 }
 
 #[test]
+fn the_terminal_stays_out_of_daemon_and_controller() {
+    for package in ["dynocar", "dynocar-client", "dynocar-core"] {
+        assert_free_of(package, &["ratatui", "crossterm"]);
+    }
+}
+
+#[test]
 fn the_contract_depends_on_nothing() {
     assert_eq!(dependencies("dynocar-shared"), ["dynocar-shared"]);
 }

@@ -18,8 +18,10 @@
 //! - [`stops`]: what recorded stops say of a brake of unknown force
 //! - [`survey`]: a line and its gradient from recordings with GNSS
 //! - [`explain`]: which undeclared effect explains what the declared model leaves
+//! - [`advice`]: what to drive next, so that the estimates become sharper
 //! - [`import`]: trains and lines from other projects' files
 
+pub mod advice;
 pub mod dataset;
 pub mod explain;
 pub mod filter;

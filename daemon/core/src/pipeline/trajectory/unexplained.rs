@@ -10,6 +10,22 @@ use crate::train::Davis;
 /// Time in s that the force is averaged over.
 const AVERAGING_S: f64 = 20.0;
 
+/// Variance in 1/s² of the mean unexplained acceleration over that of the measured speed.
+///
+/// Differences of white noise telescope: an average with gain g over steps of h has the variance
+/// R (g / h)² 2 / (2 - g).
+fn variance_share(step_s: f64) -> f64 {
+    let gain = (step_s / AVERAGING_S).min(1.0);
+    let density = gain / step_s;
+    density * density * 2.0 / (2.0 - gain)
+}
+
+/// The deviation in m/s of the measured speed that a snapshot's `unexplained_force_std_n` was reckoned
+/// with, for samples that come every `step_s`.
+pub fn speed_noise_mps(unexplained_force_std_n: f64, inertial_mass_kg: f64, step_s: f64) -> f64 {
+    unexplained_force_std_n / (inertial_mass_kg * variance_share(step_s).sqrt())
+}
+
 /// Exponential average of the acceleration that a model does not explain.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct UnexplainedForce {
@@ -39,10 +55,7 @@ impl UnexplainedForce {
         self.last_mps = sample.speed_mps;
         let gain = (step.size / AVERAGING_S).min(1.0);
         self.mean_mps2 += gain * (unexplained_mps2 - self.mean_mps2);
-        // Differences of white noise telescope: an average with gain g over steps of h has the
-        // variance R (g / h)² 2 / (2 - g).
-        let density = gain / step.size;
-        self.variance_share = density * density * 2.0 / (2.0 - gain);
+        self.variance_share = variance_share(step.size);
         self.inertial_mass_kg = sample.inertial_mass_kg;
     }
 
@@ -79,5 +92,7 @@ mod tests {
         assert!((snapshot.unexplained_force_n - 2000.0).abs() < 1.0);
         // 0.02 m/s / 20 s on 106 t.
         assert!((snapshot.unexplained_force_std_n - 106.0).abs() < 1.0);
+        let noise_mps = speed_noise_mps(snapshot.unexplained_force_std_n, 1.06e5, 0.2);
+        assert!((noise_mps - 0.02).abs() < 1e-9, "what it was reckoned with: {noise_mps}");
     }
 }

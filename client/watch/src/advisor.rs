@@ -1,0 +1,88 @@
+//! What to drive next, reckoned now and then.
+
+use std::sync::Arc;
+
+use dynocar_core::advice::known::davis_of;
+use dynocar_core::advice::noise::NoiseSeen;
+use dynocar_core::advice::remedy::{in_words, remedy};
+use dynocar_core::advice::{for_resistance, mass::for_mass};
+use dynocar_core::train::TrainModel;
+use dynocar_shared::{Manoeuvre, Parameter, Quantity, Status};
+
+use crate::state::{PipelineState, TrainState};
+
+/// What is needed to advise one train.
+#[derive(Clone, Debug)]
+pub struct Advisor {
+    train: Option<Arc<TrainModel>>,
+    noise: NoiseSeen,
+}
+
+impl Advisor {
+    /// For a train as it is declared, where that is known.
+    pub fn new(train: Option<Arc<TrainModel>>) -> Self {
+        Advisor { train, noise: NoiseSeen::default() }
+    }
+
+    /// Looks at the snapshots; call it with every one or with some of them.
+    pub fn see(&mut self, state: &TrainState) {
+        if let Some(resistance) = state.answering(Quantity::Resistance) {
+            self.noise.see(&resistance.snapshot);
+        }
+    }
+
+    /// What to drive next, the resistance first; then what else helps, quantity by quantity.
+    pub fn advise(&self, state: &TrainState) -> Vec<String> {
+        let mut told = Vec::new();
+        for &quantity in Quantity::ALL {
+            let Some(pipeline) = state.answering(quantity) else { continue };
+            let words = match remedy(pipeline.status, pipeline.reason) {
+                Some(words) => Some(format!("{quantity}: {words}")),
+                None => self.to_drive(quantity, pipeline, state),
+            };
+            told.extend(words);
+        }
+        told
+    }
+
+    fn to_drive(
+        &self,
+        quantity: Quantity,
+        pipeline: &PipelineState,
+        state: &TrainState,
+    ) -> Option<String> {
+        if !matches!(quantity, Quantity::Resistance | Quantity::Mass) {
+            return lacking(quantity, pipeline);
+        }
+        let Some(train) = &self.train else {
+            let words = "give --config FILE: what to drive next needs the train's file";
+            return (quantity == Quantity::Resistance).then(|| words.to_owned());
+        };
+        let resistance = state.answering(Quantity::Resistance)?;
+        let mass = state.answering(Quantity::Mass).filter(|it| it.status == Status::Estimated);
+        let mass_kg = mass.and_then(|it| it.snapshot.value(Parameter::Mass));
+        let mass_kg = mass_kg.map_or(train.mass_kg, |mass_t| 1e3 * mass_t);
+        let Some(noise) = self.noise.noise(&resistance.snapshot, train, mass_kg) else {
+            return lacking(quantity, pipeline);
+        };
+        let advice = match quantity {
+            Quantity::Mass => {
+                let (davis, _) = davis_of(&resistance.snapshot)?;
+                for_mass(&pipeline.snapshot, train, davis, &noise)
+            }
+            _ => for_resistance(&pipeline.snapshot, train, mass_kg, &noise),
+        };
+        advice.map(|advice| advice.told())
+    }
+}
+
+/// What a pipeline itself says that it lacks, without numbers.
+fn lacking(quantity: Quantity, pipeline: &PipelineState) -> Option<String> {
+    let missing = pipeline.snapshot.missing_manoeuvres;
+    let words: Vec<&str> = Manoeuvre::ALL
+        .iter()
+        .filter(|manoeuvre| missing & manoeuvre.bit() != 0)
+        .map(|&manoeuvre| in_words(manoeuvre))
+        .collect();
+    (!words.is_empty()).then(|| format!("{quantity} needs {}", words.join(", ")))
+}

@@ -1,0 +1,87 @@
+//! The command line of `dynocar watch`.
+
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use clap::Parser;
+use dynocar::cli::{Failure, parse};
+use dynocar::config::DaemonConfig;
+use dynocar_client::Host;
+use dynocar_shared::TrainId;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+
+use crate::watcher::Watcher;
+use crate::{plain, terminal};
+
+/// See in the terminal what the daemon knows of a train, and what to drive next: quantities with 95 %
+/// intervals, residual and suspect, samples used, refused and lost. Without options it shows all trains
+/// that any daemon of this host serves. Where standard output is no terminal it writes a line a second
+/// for each train. NO_COLOR is respected; ? shows the keys
+#[derive(Debug, Parser)]
+#[command(name = "dynocar watch", version, about)]
+struct Arguments {
+    /// The daemon's configuration: its root, its trains and what is declared of them; what to drive
+    /// next is reckoned within the limits declared there
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Only this train; may be given several times
+    #[arg(long = "train", value_name = "ID")]
+    trains: Vec<u64>,
+    /// A line a second for each train, on a terminal too
+    #[arg(long)]
+    plain: bool,
+}
+
+/// Parses the command line, watches until told to end, reports a failure on standard error.
+pub fn main() -> ExitCode {
+    let arguments = match parse::<Arguments>("dynocar watch") {
+        Ok(arguments) => arguments,
+        Err(status) => return status,
+    };
+    match execute(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report("dynocar watch", None),
+    }
+}
+
+fn execute(arguments: &Arguments) -> Result<(), Failure> {
+    let work = |error: dynocar_client::ChannelError| Failure::Work(error.to_string());
+    let config = arguments.config.as_deref().map(DaemonConfig::load).transpose()?;
+    let wanted = wanted(arguments, config.as_ref())?;
+    let host = match config.as_ref().and_then(|config| config.root.as_ref()) {
+        Some(root) => Host::at(root).map_err(work)?,
+        None => Host::from_environment().map_err(work)?,
+    };
+    let must_end = Arc::new(AtomicBool::new(false));
+    for signal in [SIGTERM, SIGINT, SIGHUP] {
+        signal_hook::flag::register(signal, Arc::clone(&must_end))
+            .map_err(|error| Failure::Work(format!("signal {signal}: {error}")))?;
+    }
+    let mut watcher = Watcher::new(host, wanted, config);
+    if arguments.plain || !std::io::stdout().is_terminal() {
+        return plain::run(&mut watcher, &must_end);
+    }
+    let has_colour = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+    terminal::run(&mut watcher, &must_end, has_colour)
+}
+
+/// The trains to show; empty for all there are.
+fn wanted(arguments: &Arguments, config: Option<&DaemonConfig>) -> Result<Vec<TrainId>, Failure> {
+    let asked: Vec<TrainId> = arguments.trains.iter().map(|&id| TrainId(id)).collect();
+    let Some(config) = config else { return Ok(asked) };
+    let known: Vec<TrainId> = config.trains.iter().map(|train| train.id).collect();
+    if asked.is_empty() {
+        return Ok(known);
+    }
+    match asked.iter().find(|id| !known.contains(id)) {
+        None => Ok(asked),
+        Some(id) => {
+            let known: Vec<String> = known.iter().map(TrainId::to_string).collect();
+            let known = known.join(", ");
+            Err(Failure::Input(format!("--train {id}: the configuration has train {known}")))
+        }
+    }
+}

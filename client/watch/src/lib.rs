@@ -1,0 +1,26 @@
+//! `dynocar watch`: what the daemon knows of its trains, live in a terminal, and what to drive next.
+//!
+//! It is one reader of the snapshots of each train, as every client is, and touches no control
+//! cycle.
+//!
+//! # Layout
+//!
+//! - [`cli`]: the command line
+//! - [`watcher`]: readers of snapshots, daemons that come and go
+//! - [`state`]: a train as it is shown, without any clock or channel
+//! - [`history`]: the last minutes, for plots
+//! - [`advisor`]: what to drive next, now and then
+//! - [`words`]: numbers with intervals and units, a train's lines
+//! - [`screen`]: the screen, drawn from a [`state`]
+//! - [`plain`]: lines where there is no terminal
+//! - [`terminal`]: keys, signals, and a terminal left as it was
+
+pub mod advisor;
+pub mod cli;
+pub mod history;
+pub mod plain;
+pub mod screen;
+pub mod state;
+pub mod terminal;
+pub mod watcher;
+pub mod words;

@@ -1,0 +1,69 @@
+//! Lines where there is no terminal: one a second for each train.
+
+use std::io::{ErrorKind, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use dynocar::cli::Failure;
+use dynocar::output::OutputError;
+
+use crate::state::TrainState;
+use crate::watcher::Watcher;
+use crate::words::{daemon, residual, rows, samples};
+
+/// How often snapshots are taken.
+const POLL_EVERY: Duration = Duration::from_millis(100);
+/// How often lines are written.
+const WRITE_EVERY: Duration = Duration::from_secs(1);
+
+/// Writes lines until a signal or until nobody reads them any more.
+///
+/// # Errors
+///
+/// When standard output cannot be written.
+pub fn run(watcher: &mut Watcher, must_end: &AtomicBool) -> Result<(), Failure> {
+    // The first look takes what is there; a heartbeat brings it.
+    let mut next = Instant::now() + WRITE_EVERY / 2;
+    while !must_end.load(Ordering::Relaxed) {
+        watcher.look();
+        if Instant::now() >= next {
+            next += WRITE_EVERY;
+            let mut text: String =
+                watcher.trains().into_iter().map(|train| line(train) + "\n").collect();
+            if text.is_empty() {
+                text = format!("no daemon serves any train under {}\n", watcher.place());
+            }
+            let mut output = std::io::stdout().lock();
+            match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
+                Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(()),
+                Err(error) => return Err(OutputError::StandardOutput(error).into()),
+                Ok(()) => {}
+            }
+        }
+        std::thread::sleep(POLL_EVERY);
+    }
+    Ok(())
+}
+
+/// A train in a line.
+pub fn line(train: &TrainState) -> String {
+    let mut parts = vec![daemon(&train.daemon, None)];
+    for row in rows(train, &[0.5]) {
+        let words = [row.label.trim(), &row.number, &row.interval, row.unit];
+        let value = words.into_iter().filter(|it| !it.is_empty()).collect::<Vec<_>>().join(" ");
+        let status = match row.status {
+            Some(status) => format!(" {} ({})", status.name(), row.reason),
+            None => String::new(),
+        };
+        parts.push(value + &status);
+    }
+    if !train.pipelines.is_empty() {
+        parts.extend(
+            residual(train)
+                .map(|(force, suspect)| format!("unexplained {force}, suspect {suspect}")),
+        );
+        parts.push(samples(train));
+        parts.extend(train.advice.first().map(|advice| format!("next: {advice}")));
+    }
+    format!("train {}: {}", train.id, parts.join("; "))
+}

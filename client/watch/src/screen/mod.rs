@@ -1,0 +1,119 @@
+//! The screen, drawn from what is known: no clock, no channel.
+//!
+//! 80 x 24 hold everything; larger terminals get the resistance at more speeds and plots.
+
+mod help;
+mod overview;
+mod pipelines;
+mod plots;
+mod style;
+
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Paragraph, Wrap};
+
+pub use style::Palette;
+
+use crate::state::TrainState;
+use crate::words::{daemon, samples};
+
+/// Less than this shows nothing whole.
+const COLUMNS_MIN: u16 = 60;
+const ROWS_MIN: u16 = 20;
+
+/// What is looked at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum View {
+    /// Quantities, residual, what to drive next.
+    #[default]
+    Overview,
+    /// Every pipeline with its samples.
+    Pipelines,
+}
+
+/// What was chosen by keys.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Choice {
+    /// Place among the trains.
+    pub train: usize,
+    /// The view.
+    pub view: View,
+    /// True while the keys are explained.
+    pub has_help: bool,
+}
+
+/// Draws everything; `place` says where daemons are looked for.
+pub fn draw(
+    frame: &mut Frame<'_>,
+    trains: &[&TrainState],
+    choice: Choice,
+    place: &str,
+    palette: Palette,
+) {
+    let area = frame.area();
+    if area.width < COLUMNS_MIN || area.height < ROWS_MIN {
+        let words = format!(
+            "{} x {} is too small: {COLUMNS_MIN} x {ROWS_MIN} or more, please. q quits",
+            area.width, area.height
+        );
+        frame.render_widget(Paragraph::new(words).wrap(Wrap { trim: true }), area);
+        return;
+    }
+    let [head, body, foot] =
+        Layout::vertical([Constraint::Length(3), Constraint::Fill(1), Constraint::Length(1)])
+            .areas(area);
+    keys(frame, foot, trains.len(), palette);
+    let Some(train) = trains.get(choice.train.min(trains.len().saturating_sub(1))) else {
+        let words = format!(
+            "No daemon serves any train under {place}.\n\nWaiting. `dynocar run --config FILE` starts \
+             one; the variable DYNOCAR_ROOT or --config names another place."
+        );
+        frame.render_widget(Paragraph::new("Dynocar").style(palette.strong()), head);
+        frame.render_widget(Paragraph::new(words).wrap(Wrap { trim: true }), body);
+        return;
+    };
+    title(frame, head, train, (choice.train, trains.len()), palette);
+    if choice.has_help {
+        help::draw(frame, body, palette);
+    } else if choice.view == View::Pipelines {
+        pipelines::draw(frame, body, train, palette);
+    } else {
+        overview::draw(frame, body, train, palette);
+    }
+}
+
+fn title(
+    frame: &mut Frame<'_>,
+    area: Rect,
+    train: &TrainState,
+    (place, count): (usize, usize),
+    palette: Palette,
+) {
+    let mut first = vec![Span::styled(format!("Dynocar  train {}", train.id), palette.strong())];
+    first.extend(train.name.as_ref().map(|name| Span::raw(format!("  {name}"))));
+    if count > 1 {
+        first.push(Span::styled(format!("  ({} of {count})", place + 1), palette.faint()));
+    }
+    let second = daemon(&train.daemon, train.up_s);
+    let third = if train.pipelines.is_empty() { String::new() } else { samples(train) };
+    let is_served = matches!(train.daemon, crate::state::Daemon::Serving { .. });
+    let second_style = if is_served { palette.plain() } else { palette.alarm() };
+    // A long message of an incompatible daemon takes the third line too.
+    let lines = vec![Line::from(first), Line::styled(second, second_style), Line::raw(third)];
+    frame.render_widget(Paragraph::new(lines).wrap(Wrap { trim: true }), area);
+}
+
+fn keys(frame: &mut Frame<'_>, area: Rect, trains: usize, palette: Palette) {
+    let mut words = "q quit   ←→ view   ? help".to_owned();
+    if trains > 1 {
+        words = words.replace("←→ view", "Tab train   ←→ view");
+    }
+    frame.render_widget(Paragraph::new(words).style(palette.faint()), area);
+}
+
+/// A heading over a section, with a rule to the right edge.
+fn heading(words: &str, width: u16, palette: Palette) -> Line<'static> {
+    let rule = "─".repeat(usize::from(width).saturating_sub(words.chars().count() + 4));
+    Line::styled(format!("── {words} {rule}"), palette.faint())
+}

@@ -1,0 +1,132 @@
+//! Quantities, residual, what to drive next; plots where there is room.
+
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Paragraph, Wrap};
+
+use super::heading;
+use super::plots::{self, sparkline};
+use super::style::Palette;
+use crate::history::Point;
+use crate::state::TrainState;
+use crate::words::{Row, duration, residual, rows};
+
+/// Columns of the table after the number: interval and unit, status, reason; the age takes the rest.
+const COLUMNS: [usize; 3] = [20, 15, 26];
+/// The same in a narrow terminal.
+const COLUMNS_NARROW: [usize; 3] = [12, 12, 22];
+/// From this width on there is room for the wide columns.
+const WIDE: u16 = 104;
+/// From this height on the resistance is shown at three speeds, and plots have rows of their own.
+const TALL: u16 = 28;
+/// Rows that the plots take at most.
+const PLOT_ROWS: u16 = 14;
+
+/// Draws the view.
+pub fn draw(frame: &mut Frame<'_>, area: Rect, train: &TrainState, palette: Palette) {
+    let is_tall = area.height >= TALL;
+    let shares: &[f64] = if is_tall { &[0.1, 0.5, 0.9] } else { &[0.5] };
+    let mut lines = quantities(train, shares, area.width, palette);
+    lines.extend(residual_lines(train, area.width, palette));
+    lines.push(heading("what to drive next", area.width, palette));
+    lines.extend(advice(train));
+    let rows: u16 = lines.iter().map(|line| rows_of(line, area.width)).sum();
+    let text = Paragraph::new(lines).wrap(Wrap { trim: false });
+    let has_plots = is_tall && area.height >= rows + 7 && !train.pipelines.is_empty();
+    let plot_rows = if has_plots { (area.height - rows - 1).min(PLOT_ROWS) } else { 0 };
+    let [upper, _, lower] = Layout::vertical([
+        Constraint::Length(rows.min(area.height)),
+        Constraint::Length(u16::from(has_plots)),
+        Constraint::Length(plot_rows),
+    ])
+    .areas(area);
+    frame.render_widget(text, upper);
+    if has_plots && let Some(pipeline) = train.residual() {
+        plots::draw(frame, lower, &pipeline.history, palette);
+    }
+}
+
+/// Rows that a line takes at most when it is wrapped between words.
+fn rows_of(line: &Line<'_>, width: u16) -> u16 {
+    let columns = line.width() as u16;
+    if columns <= width { 1 } else { columns.div_ceil(width.saturating_sub(16).max(1)) }
+}
+
+fn quantities(
+    train: &TrainState,
+    shares: &[f64],
+    width: u16,
+    palette: Palette,
+) -> Vec<Line<'static>> {
+    let columns = if width >= WIDE { COLUMNS } else { COLUMNS_NARROW };
+    let mut lines = vec![heading("quantities, ± 95 %", width, palette)];
+    let table = rows(train, shares);
+    if table.is_empty() {
+        let words = match train.pipelines.is_empty() {
+            true => "nothing has come yet",
+            false => "no pipeline answers a quantity for this train",
+        };
+        lines.push(Line::raw(words));
+    }
+    lines.extend(table.into_iter().map(|row| told(row, columns, palette)));
+    lines
+}
+
+fn told(row: Row, columns: [usize; 3], palette: Palette) -> Line<'static> {
+    let [interval, status, reason] = columns;
+    let number = format!("{:>9}  ", row.number);
+    let interval_and_unit = format!("{} {}", row.interval, row.unit);
+    let label = format!("{:<15}", row.label);
+    let Some(of_quantity) = row.status else {
+        return Line::raw(label + &number + interval_and_unit.trim_start());
+    };
+    let age = row.age_s.map_or("never".to_owned(), duration);
+    Line::from(vec![
+        Span::styled(label, palette.strong()),
+        Span::raw(format!("{number}{:<interval$}", interval_and_unit.trim())),
+        Span::styled(format!("{:<status$}", of_quantity.name()), palette.status(of_quantity)),
+        Span::raw(format!("{:<reason$}{age}", row.reason)),
+    ])
+}
+
+fn residual_lines(train: &TrainState, width: u16, palette: Palette) -> Vec<Line<'static>> {
+    let mut lines = vec![heading("residual: force that the model lacks", width, palette)];
+    let Some(((force, suspect), pipeline)) = residual(train).zip(train.residual()) else {
+        lines.push(Line::raw("no pipeline watches it"));
+        return lines;
+    };
+    let room = usize::from(width).saturating_sub(46);
+    let curve = |of: fn(&Point) -> f64| sparkline(pipeline.history.newest(room).map(of));
+    let plotted = |words: String, curve: String| {
+        let words = format!("{words:<36}");
+        Line::from(vec![Span::raw(words), Span::styled(curve, palette.curve())])
+    };
+    let force = format!("{:<13}{force}", "unexplained");
+    lines.push(plotted(force, curve(|point| point.unexplained_kn)));
+    let (square, alike) =
+        (pipeline.snapshot.innovation_mean_square, pipeline.snapshot.innovation_correlation);
+    let evidence = format!("{:<13}{:.1}", "evidence", pipeline.snapshot.suspicion_evidence);
+    lines.push(plotted(evidence, curve(|point| point.evidence)));
+    let style = if suspect == "none" { palette.plain() } else { palette.alarm() };
+    lines.push(Line::from(vec![
+        Span::raw(format!("{:<13}", "suspect")),
+        Span::styled(suspect, style),
+    ]));
+    lines.push(Line::raw(format!(
+        "{:<13}mean square {square:.2} (1 where the model holds), correlation {alike:+.2}",
+        "innovations"
+    )));
+    lines
+}
+
+fn advice(train: &TrainState) -> Vec<Line<'static>> {
+    if train.advice.is_empty() {
+        let words = match train.pipelines.is_empty() {
+            true => "nothing is known yet",
+            false => "nothing: no three minutes of driving would tell much more",
+        };
+        return vec![Line::raw(words)];
+    }
+    train.advice.iter().map(|words| Line::raw(words.clone())).collect()
+}

@@ -1,0 +1,56 @@
+//! Colours, or none.
+
+use dynocar_shared::Status;
+use ratatui::style::{Color, Modifier, Style};
+
+/// Colours where they are wanted; without them bold and faint alone.
+#[derive(Clone, Copy, Debug)]
+pub struct Palette {
+    has_colour: bool,
+}
+
+impl Palette {
+    /// With colours or without.
+    pub fn new(has_colour: bool) -> Self {
+        Palette { has_colour }
+    }
+
+    fn coloured(self, colour: Color) -> Style {
+        if self.has_colour { Style::new().fg(colour) } else { Style::new() }
+    }
+
+    /// As the terminal writes.
+    pub fn plain(self) -> Style {
+        Style::new()
+    }
+
+    /// Names.
+    pub fn strong(self) -> Style {
+        Style::new().add_modifier(Modifier::BOLD)
+    }
+
+    /// What is read once.
+    pub fn faint(self) -> Style {
+        Style::new().add_modifier(Modifier::DIM)
+    }
+
+    /// What must be seen.
+    pub fn alarm(self) -> Style {
+        self.coloured(Color::Red).add_modifier(Modifier::BOLD)
+    }
+
+    /// Curves.
+    pub fn curve(self) -> Style {
+        self.coloured(Color::Cyan)
+    }
+
+    /// A status.
+    pub fn status(self, status: Status) -> Style {
+        match status {
+            Status::Estimated => self.coloured(Color::Green),
+            Status::Degraded => self.coloured(Color::Yellow),
+            Status::Invalid => self.alarm(),
+            Status::Unestimated => self.faint(),
+        }
+    }
+}

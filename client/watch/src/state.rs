@@ -1,0 +1,121 @@
+//! A train as it is shown, without any clock or channel.
+
+use dynocar_client::Reading;
+use dynocar_shared::{ParameterSnapshot, PipelineKind, Quantity, Reason, Status, TrainId};
+
+use crate::history::History;
+
+/// Who serves a train, as far as one can see.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Daemon {
+    /// Nobody, and nobody was seen before.
+    Absent,
+    /// Nobody any more.
+    Gone,
+    /// A daemon that says this of itself.
+    Serving {
+        /// Its release.
+        version: String,
+        /// Its process.
+        process_id: u32,
+    },
+    /// A daemon that shares no memory format with this program, or a channel that cannot be read.
+    Unreadable(String),
+}
+
+/// The newest of one pipeline.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PipelineState {
+    /// Its name in the configuration, else its kind's.
+    pub name: String,
+    /// The newest snapshot.
+    pub snapshot: ParameterSnapshot,
+    /// The status; invalid while the daemon is silent.
+    pub status: Status,
+    /// Why.
+    pub reason: Option<Reason>,
+    /// Age in s of the newest sample behind it; `None` before the first.
+    pub sample_age_s: Option<f64>,
+    /// The last minutes.
+    pub history: History,
+}
+
+impl PipelineState {
+    /// A pipeline that is first heard of.
+    pub fn new(name: String, reading: &Reading<'_>, now_ns: i64) -> Self {
+        let mut state = PipelineState {
+            name,
+            snapshot: *reading.snapshot,
+            status: Status::Unestimated,
+            reason: None,
+            sample_age_s: None,
+            history: History::default(),
+        };
+        state.take(reading, now_ns);
+        state
+    }
+
+    /// Takes what is newest.
+    pub fn take(&mut self, reading: &Reading<'_>, now_ns: i64) {
+        self.snapshot = *reading.snapshot;
+        self.status = reading.status();
+        self.reason = reading.reason();
+        let age_ns = now_ns.saturating_sub(self.snapshot.sample_published_ns);
+        self.sample_age_s =
+            (self.snapshot.sample_sequence > 0).then_some(1e-9 * age_ns.max(0) as f64);
+    }
+
+    /// The kind's name.
+    pub fn kind(&self) -> &'static str {
+        self.snapshot.pipeline_kind().map_or("unknown", PipelineKind::name)
+    }
+
+    /// The reason's name.
+    pub fn reason_name(&self) -> &'static str {
+        self.reason.map_or("unknown", Reason::name)
+    }
+}
+
+/// A train.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrainState {
+    /// Its number.
+    pub id: TrainId,
+    /// Its name, where the configuration tells.
+    pub name: Option<String>,
+    /// Who serves it.
+    pub daemon: Daemon,
+    /// Time in s since the daemon's start, where it was heard of.
+    pub up_s: Option<f64>,
+    /// Its pipelines, by their number.
+    pub pipelines: Vec<PipelineState>,
+    /// What to drive next and what else helps, the most useful first.
+    pub advice: Vec<String>,
+}
+
+impl TrainState {
+    /// A train of which nothing has been heard.
+    pub fn new(id: TrainId, name: Option<String>) -> Self {
+        TrainState {
+            id,
+            name,
+            daemon: Daemon::Absent,
+            up_s: None,
+            pipelines: Vec::new(),
+            advice: Vec::new(),
+        }
+    }
+
+    /// The pipeline that answers a quantity.
+    pub fn answering(&self, quantity: Quantity) -> Option<&PipelineState> {
+        self.pipelines.iter().find(|it| it.snapshot.answers(quantity))
+    }
+
+    /// The pipeline that watches the residual: the monitor, else the one of the resistance.
+    pub fn residual(&self) -> Option<&PipelineState> {
+        let monitor = |it: &&PipelineState| {
+            it.snapshot.pipeline_kind() == Some(PipelineKind::ResidualMonitor)
+        };
+        self.pipelines.iter().find(monitor).or_else(|| self.answering(Quantity::Resistance))
+    }
+}

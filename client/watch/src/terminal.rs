@@ -1,0 +1,119 @@
+//! Keys and signals, and a terminal that is left as it was.
+
+use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use dynocar::cli::Failure;
+use ratatui::DefaultTerminal;
+use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+
+use crate::screen::{Choice, Palette, View, draw};
+use crate::watcher::Watcher;
+
+/// How often snapshots are taken and keys waited for.
+const POLL_EVERY: Duration = Duration::from_millis(100);
+/// How often the screen is drawn without a key: slow lines carry it.
+const DRAW_EVERY: Duration = Duration::from_millis(500);
+
+/// Shows the screen until a key or a signal ends it; a panic restores the terminal too.
+///
+/// # Errors
+///
+/// When the terminal cannot be used.
+pub fn run(watcher: &mut Watcher, must_end: &AtomicBool, has_colour: bool) -> Result<(), Failure> {
+    let failed = |error: io::Error| Failure::Work(format!("the terminal cannot be used: {error}"));
+    let mut terminal = ratatui::try_init().map_err(failed)?;
+    let result = show(&mut terminal, watcher, must_end, Palette::new(has_colour));
+    let restored = ratatui::try_restore();
+    // A terminal that was hung up needs no restoring.
+    if must_end.load(Ordering::Relaxed) { Ok(()) } else { result.and(restored).map_err(failed) }
+}
+
+fn show(
+    terminal: &mut DefaultTerminal,
+    watcher: &mut Watcher,
+    must_end: &AtomicBool,
+    palette: Palette,
+) -> io::Result<()> {
+    let mut choice = Choice::default();
+    let mut drawn: Option<Instant> = None;
+    while !must_end.load(Ordering::Relaxed) {
+        watcher.look();
+        if drawn.is_none_or(|drawn| drawn.elapsed() >= DRAW_EVERY) {
+            let (trains, place) = (watcher.trains(), watcher.place());
+            choice.train = choice.train.min(trains.len().saturating_sub(1));
+            terminal.draw(|frame| draw(frame, &trains, choice, &place, palette))?;
+            drawn = Some(Instant::now());
+        }
+        if !event::poll(POLL_EVERY)? {
+            continue;
+        }
+        match event::read()? {
+            Event::Key(key) if key.kind == KeyEventKind::Press => {
+                if is_quit(key) {
+                    return Ok(());
+                }
+                choice = pressed(choice, key.code, watcher.trains().len());
+                drawn = None;
+            }
+            Event::Resize(..) => drawn = None,
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn is_quit(key: KeyEvent) -> bool {
+    let is_interrupt = key.modifiers.contains(KeyModifiers::CONTROL);
+    match key.code {
+        KeyCode::Char('q' | 'Q') | KeyCode::Esc => true,
+        KeyCode::Char('c' | 'd') => is_interrupt,
+        _ => false,
+    }
+}
+
+/// What is looked at after a key.
+fn pressed(choice: Choice, key: KeyCode, trains: usize) -> Choice {
+    let trains = trains.max(1);
+    let other = match choice.view {
+        View::Overview => View::Pipelines,
+        View::Pipelines => View::Overview,
+    };
+    match key {
+        KeyCode::Char('?' | 'h') => Choice { has_help: !choice.has_help, ..choice },
+        KeyCode::Tab => Choice { train: (choice.train + 1) % trains, ..choice },
+        KeyCode::BackTab => Choice { train: (choice.train + trains - 1) % trains, ..choice },
+        KeyCode::Left | KeyCode::Right => Choice { view: other, has_help: false, ..choice },
+        KeyCode::Char('1') => Choice { view: View::Overview, has_help: false, ..choice },
+        KeyCode::Char('2') => Choice { view: View::Pipelines, has_help: false, ..choice },
+        _ => choice,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_change_train_and_view_and_go_round() {
+        let start = Choice::default();
+        assert_eq!(pressed(start, KeyCode::BackTab, 3).train, 2);
+        assert_eq!(pressed(Choice { train: 2, ..start }, KeyCode::Tab, 3).train, 0);
+        assert_eq!(pressed(start, KeyCode::Tab, 0).train, 0);
+        assert_eq!(pressed(start, KeyCode::Right, 1).view, View::Pipelines);
+        let helped = pressed(start, KeyCode::Char('?'), 1);
+        assert!(helped.has_help && !pressed(helped, KeyCode::Char('?'), 1).has_help);
+        assert!(!pressed(helped, KeyCode::Char('2'), 1).has_help);
+    }
+
+    #[test]
+    fn q_escape_and_interrupts_quit_and_nothing_else_does() {
+        let key = |code, modifiers| is_quit(KeyEvent::new(code, modifiers));
+        assert!(key(KeyCode::Char('q'), KeyModifiers::NONE));
+        assert!(key(KeyCode::Esc, KeyModifiers::NONE));
+        assert!(key(KeyCode::Char('c'), KeyModifiers::CONTROL));
+        assert!(!key(KeyCode::Char('c'), KeyModifiers::NONE));
+        assert!(!key(KeyCode::Tab, KeyModifiers::NONE));
+    }
+}

@@ -1,0 +1,167 @@
+//! Readers of snapshots, and daemons that come and go.
+
+use std::time::{Duration, Instant};
+
+use dynocar::config::{DaemonConfig, PipelineConfig};
+use dynocar_client::{Host, Peer, Role, SnapshotReader, monotonic_now_ns};
+use dynocar_shared::TrainId;
+
+use crate::advisor::Advisor;
+use crate::state::{Daemon, PipelineState, TrainState};
+
+/// How often daemons are looked for, and points of the plots taken.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
+/// How often it is reckoned what to drive next.
+const ADVISE_EVERY: Duration = Duration::from_secs(5);
+
+/// Watches trains.
+pub struct Watcher {
+    host: Host,
+    /// Empty for every train that is served.
+    wanted: Vec<TrainId>,
+    config: Option<DaemonConfig>,
+    watched: Vec<Watched>,
+    last_look: Option<Instant>,
+    last_advice: Option<Instant>,
+}
+
+/// One train with the one reader of its snapshots.
+struct Watched {
+    state: TrainState,
+    reader: Option<SnapshotReader>,
+    advisor: Advisor,
+}
+
+impl Watcher {
+    /// A watcher of these trains; of all that are served, when none is named.
+    pub fn new(host: Host, wanted: Vec<TrainId>, config: Option<DaemonConfig>) -> Self {
+        let mut watcher = Watcher {
+            host,
+            wanted: wanted.clone(),
+            config,
+            watched: Vec::new(),
+            last_look: None,
+            last_advice: None,
+        };
+        wanted.into_iter().for_each(|train| watcher.add(train));
+        watcher
+    }
+
+    /// Where daemons are looked for, in words.
+    pub fn place(&self) -> String {
+        self.host.root().display().to_string()
+    }
+
+    /// The trains as they are now.
+    pub fn trains(&self) -> Vec<&TrainState> {
+        self.watched.iter().map(|it| &it.state).collect()
+    }
+
+    /// Takes what has come; call it some times a second.
+    pub fn look(&mut self) {
+        let is_due = |last: Option<Instant>, every| last.is_none_or(|it| it.elapsed() >= every);
+        let is_second = is_due(self.last_look, LOOK_EVERY);
+        if is_second {
+            self.last_look = Some(Instant::now());
+            self.find_trains();
+        }
+        let pipelines = self.config.as_ref().map_or(&[][..], |config| &config.pipelines);
+        for watched in &mut self.watched {
+            if is_second {
+                watched.look_up(&self.host);
+            }
+            watched.poll(pipelines, is_second);
+        }
+        if is_due(self.last_advice, ADVISE_EVERY) && self.watched.iter().any(Watched::is_heard) {
+            self.last_advice = Some(Instant::now());
+            for watched in &mut self.watched {
+                watched.state.advice = watched.advisor.advise(&watched.state);
+            }
+        }
+    }
+
+    fn find_trains(&mut self) {
+        if !self.wanted.is_empty() {
+            return;
+        }
+        // A directory that cannot be read now may be read in a second.
+        for train in Peer::trains(&self.host, Role::Daemon).unwrap_or_default() {
+            if self.watched.iter().all(|it| it.state.id != train) {
+                self.add(train);
+            }
+        }
+        self.watched.sort_by_key(|it| it.state.id);
+    }
+
+    fn add(&mut self, train: TrainId) {
+        let mut declared = self.config.iter().flat_map(|config| &config.trains);
+        let model = declared.find(|it| it.id == train).map(|it| it.model.clone());
+        let name = model.as_ref().map(|model| model.name.clone());
+        self.watched.push(Watched {
+            state: TrainState::new(train, name),
+            reader: None,
+            advisor: Advisor::new(model),
+        });
+    }
+}
+
+impl Watched {
+    fn is_heard(&self) -> bool {
+        !self.state.pipelines.is_empty()
+    }
+
+    /// Looks who serves the train, and opens the reader when it can be opened.
+    fn look_up(&mut self, host: &Host) {
+        let train = self.state.id;
+        self.state.daemon = match Peer::look_up(host, train, Role::Daemon) {
+            Ok(Peer::Absent) if self.is_heard() => Daemon::Gone,
+            Ok(Peer::Absent) => Daemon::Absent,
+            Ok(Peer::Compatible(it)) => {
+                Daemon::Serving { version: it.version, process_id: it.process_id }
+            }
+            Ok(peer @ Peer::Incompatible(_)) => {
+                // Its place in the channel is of no use; a daemon that fits gets a new reader.
+                self.reader = None;
+                let refused = peer.require_compatible(train, Role::Controller).err();
+                Daemon::Unreadable(refused.map_or_else(String::new, |error| error.to_string()))
+            }
+            Err(error) => Daemon::Unreadable(error.to_string()),
+        };
+        if self.reader.is_none() && matches!(self.state.daemon, Daemon::Serving { .. }) {
+            match SnapshotReader::open(host, train) {
+                Ok(reader) => self.reader = Some(reader),
+                Err(error) => self.state.daemon = Daemon::Unreadable(error.to_string()),
+            }
+        }
+    }
+
+    fn poll(&mut self, names: &[PipelineConfig], is_second: bool) {
+        let Some(reader) = &mut self.reader else { return };
+        reader.poll();
+        let now_ns = monotonic_now_ns();
+        for reading in reader.readings(now_ns) {
+            let index = reading.snapshot.pipeline_index;
+            let pipelines = &mut self.state.pipelines;
+            let place = pipelines.iter().position(|it| it.snapshot.pipeline_index >= index);
+            let place = place.unwrap_or(pipelines.len());
+            match pipelines.get_mut(place).filter(|it| it.snapshot.pipeline_index == index) {
+                Some(pipeline) => pipeline.take(&reading, now_ns),
+                None => {
+                    let kind = reading.snapshot.pipeline_kind();
+                    let kind = kind.map_or("unknown", dynocar_shared::PipelineKind::name);
+                    let name = names.get(index as usize).map_or(kind, |it| it.name.as_str());
+                    let new = PipelineState::new(name.to_owned(), &reading, now_ns);
+                    pipelines.insert(place, new);
+                }
+            }
+            if is_second {
+                pipelines[place].history.push(reading.snapshot, now_ns);
+            }
+        }
+        let epoch = self.state.pipelines.iter().map(|it| it.snapshot.epoch).max();
+        self.state.up_s = epoch.map(|epoch| 1e-9 * now_ns.saturating_sub(epoch as i64) as f64);
+        if is_second {
+            self.advisor.see(&self.state);
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! Numbers with intervals and units, and what is said of a train, for screen and lines alike.
+
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::{Parameter, Quantity, RejectionReason, Status};
+
+use crate::state::{Daemon, PipelineState, TrainState};
+
+/// Half width of a 95 % interval over the standard deviation.
+pub const INTERVAL_95: f64 = 1.96;
+
+/// A quantity or one of its parameters in a table.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Row {
+    /// What it is; parameters of a quantity are indented.
+    pub label: String,
+    /// The value; a bound has a sign before it.
+    pub number: String,
+    /// Half width of the 95 % interval, with a sign before it.
+    pub interval: String,
+    /// The unit of both.
+    pub unit: &'static str,
+    /// The status, for a quantity.
+    pub status: Option<Status>,
+    /// Why.
+    pub reason: &'static str,
+    /// Age in s of the newest sample behind it.
+    pub age_s: Option<f64>,
+}
+
+/// The table of a train's quantities; the resistance at these shares of the speeds driven.
+pub fn rows(train: &TrainState, shares: &[f64]) -> Vec<Row> {
+    let mut all = Vec::new();
+    for &quantity in Quantity::ALL {
+        let Some(pipeline) = train.answering(quantity) else { continue };
+        let head = Row {
+            label: quantity.name().replace('_', " "),
+            status: Some(pipeline.status),
+            reason: pipeline.reason_name(),
+            age_s: pipeline.sample_age_s,
+            ..Row::default()
+        };
+        if quantity == Quantity::Resistance {
+            all.push(head);
+            all.extend(resistance_rows(pipeline, shares));
+        } else {
+            let value = main_value(quantity, pipeline);
+            all.push(Row {
+                number: value.number,
+                interval: value.interval,
+                unit: value.unit,
+                ..head
+            });
+        }
+    }
+    all
+}
+
+fn resistance_rows(pipeline: &PipelineState, shares: &[f64]) -> Vec<Row> {
+    let snapshot = &pipeline.snapshot;
+    let of_parameter = |parameter: Parameter| {
+        let (value, std) = (snapshot.value(parameter)?, snapshot.std(parameter)?);
+        let label = format!("  {}", parameter.name());
+        Some(Row { label, ..with_interval(value, std, unit(parameter)) })
+    };
+    let davis = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
+    let (low, high) = (snapshot.speed_min_mps, snapshot.speed_max_mps);
+    let at_speed = |share: &f64| {
+        let speed_mps = (low + share * (high - low)).round();
+        let w0 = snapshot.resistance_at(speed_mps).filter(|_| high > low)?;
+        let label = format!("  at {:.0} km/h", 3.6 * speed_mps);
+        Some(Row { label, ..with_interval(w0.w0_n_per_kn, w0.w0_std_n_per_kn, "N/kN") })
+    };
+    davis.into_iter().filter_map(of_parameter).chain(shares.iter().filter_map(at_speed)).collect()
+}
+
+/// The value of a quantity other than the resistance.
+fn main_value(quantity: Quantity, pipeline: &PipelineState) -> Row {
+    let candidates: &[Parameter] = match quantity {
+        Quantity::Resistance => &[],
+        Quantity::Mass => &[Parameter::Mass],
+        Quantity::Adhesion => &[Parameter::Adhesion, Parameter::AdhesionLowerBound],
+        Quantity::BrakeFriction => &[Parameter::DiscFriction],
+        Quantity::BrakingRatio => &[Parameter::BrakingRatio],
+    };
+    let snapshot = &pipeline.snapshot;
+    let found = candidates.iter().find_map(|&parameter| {
+        Some((parameter, snapshot.value(parameter)?, snapshot.std(parameter)?))
+    });
+    let Some((parameter, value, std)) = found else { return Row::default() };
+    let row = with_interval(value, std, unit(parameter));
+    match parameter {
+        Parameter::AdhesionLowerBound => Row { number: format!("≥ {}", row.number), ..row },
+        _ => row,
+    }
+}
+
+/// The unit of a parameter's value in a snapshot.
+fn unit(parameter: Parameter) -> &'static str {
+    match parameter {
+        Parameter::DavisA => "N/kN",
+        Parameter::DavisB => "N/kN per m/s",
+        Parameter::DavisC => "N/kN per (m/s)²",
+        Parameter::Mass => "t",
+        _ => "",
+    }
+}
+
+/// A value with its interval, to two digits of the interval.
+fn with_interval(value: f64, std: f64, unit: &'static str) -> Row {
+    let half = INTERVAL_95 * std;
+    let digits = digits(half);
+    let interval = if half > 0.0 { format!("± {half:.digits$}") } else { String::new() };
+    Row { number: format!("{value:.digits$}"), interval, unit, ..Row::default() }
+}
+
+/// Decimals that show two digits of an interval.
+fn digits(half: f64) -> usize {
+    if half > 0.0 { (1.0 - half.log10().floor()).clamp(0.0, 7.0) as usize } else { 3 }
+}
+
+/// A duration as people say it.
+pub fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 10.0 => format!("{s:.1} s"),
+        s if s < 120.0 => format!("{s:.0} s"),
+        s if s < 7200.0 => format!("{:.0} min", s / 60.0),
+        s if s < 172_800.0 => format!("{:.0} h", s / 3600.0),
+        s => format!("{:.0} days", s / 86_400.0),
+    }
+}
+
+/// Who serves a train.
+pub fn daemon(daemon: &Daemon, up_s: Option<f64>) -> String {
+    match daemon {
+        Daemon::Absent => "no daemon serves it; waiting".to_owned(),
+        Daemon::Gone => "the daemon is gone; what it said last is shown; waiting".to_owned(),
+        Daemon::Serving { version, process_id } => {
+            let up = up_s.map_or(String::new(), |up_s| format!(", up {}", duration(up_s)));
+            format!("daemon {version} (process {process_id}){up}")
+        }
+        Daemon::Unreadable(message) => message.clone(),
+    }
+}
+
+/// Rate, uses, refusals with the most frequent reason, and losses, of the pipeline that has most.
+pub fn samples(train: &TrainState) -> String {
+    let sum = |of: fn(&PipelineState) -> u64| train.pipelines.iter().map(of).max().unwrap_or(0);
+    let used = sum(|it| it.snapshot.samples_used);
+    let rejected = sum(|it| it.snapshot.samples_rejected);
+    let lost = sum(|it| it.snapshot.samples_lost);
+    let rate = train.pipelines.iter().filter_map(|it| it.history.rate_hz()).reduce(f64::max);
+    let rate = rate.map_or("…".to_owned(), |rate| format!("{rate:.1}"));
+    let most = train.pipelines.iter().max_by_key(|it| it.snapshot.samples_rejected);
+    let why = most.and_then(|it| refusals(it).into_iter().next());
+    let why = why.map_or(String::new(), |(reason, _)| format!(" (most: {reason})"));
+    format!("{rate} samples/s, used {used}, rejected {rejected}{why}, lost {lost}")
+}
+
+/// Why a pipeline refused samples, the most frequent first.
+pub fn refusals(pipeline: &PipelineState) -> Vec<(&'static str, u32)> {
+    let count = |&reason: &RejectionReason| (reason.name(), pipeline.snapshot.rejected(reason));
+    let mut all: Vec<_> = RejectionReason::ALL.iter().map(count).filter(|it| it.1 > 0).collect();
+    all.sort_by_key(|it| std::cmp::Reverse(it.1));
+    all
+}
+
+/// The unexplained force with its interval, and the suspect with what is hardly told from it.
+pub fn residual(train: &TrainState) -> Option<(String, String)> {
+    let snapshot = &train.residual()?.snapshot;
+    let force_kn = 1e-3 * snapshot.unexplained_force_n;
+    let half_kn = 1e-3 * INTERVAL_95 * snapshot.unexplained_force_std_n;
+    let force = format!("{force_kn:+.2} ± {half_kn:.2} kN");
+    let kind = EffectKind::from_number(snapshot.suspected_effect);
+    let suspect = match kind {
+        Some(EffectKind::None) => "none".to_owned(),
+        None => "an effect that is unknown here: a newer daemon".to_owned(),
+        Some(kind) => {
+            let since = duration(f64::from(snapshot.suspicion_age_s));
+            let evidence = snapshot.suspicion_evidence;
+            let others: Vec<&str> = snapshot.alternatives().map(|it| it.name()).collect();
+            let others = match others.is_empty() {
+                true => String::new(),
+                false => format!(", hardly told from {}", others.join(", ")),
+            };
+            format!("{kind} for {since}, evidence {evidence:.0}{others}")
+        }
+    };
+    Some((force, suspect))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_digits_of_the_interval_are_shown() {
+        let told = |value, std, unit| {
+            let row = with_interval(value, std, unit);
+            [&row.number, row.interval.as_str(), row.unit].join(" ").trim_end().to_owned()
+        };
+        assert_eq!(told(1.49832, 0.0274, "N/kN"), "1.498 ± 0.054 N/kN");
+        assert_eq!(told(1697.4, 6.0, "t"), "1697 ± 12 t");
+        assert_eq!(told(0.000_861, 0.000_013, ""), "0.000861 ± 0.000025");
+        assert_eq!(told(0.094, 0.0, ""), "0.094");
+    }
+
+    #[test]
+    fn durations_are_said_as_people_say_them() {
+        let all = [0.04, 45.0, 600.0, 9000.0, 864_000.0].map(duration);
+        assert_eq!(all, ["0.0 s", "45 s", "10 min", "2 h", "10 days"]);
+    }
+}
