@@ -9,7 +9,7 @@ use dynocar::output::{tell, write_file};
 use serde::Serialize;
 
 use crate::estimators::measure::Effort;
-use crate::estimators::{self, report};
+use crate::estimators::{self, beside, report};
 use crate::explain::command::{ExplainArguments, explain};
 use crate::latency::server::{PeerArguments, serve};
 use crate::latency::{self, LatencyArguments, plot};
@@ -49,6 +49,9 @@ struct EstimatorsArguments {
     /// Only the cases whose name contains this, as rls
     #[arg(long, value_name = "TEXT")]
     case: Option<String>,
+    /// Another build of this program, measured by turns with this one
+    #[arg(long, value_name = "PROGRAM", requires = "case", conflicts_with = "quick")]
+    beside: Option<PathBuf>,
     /// Write the result for machines; - for standard output
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -122,6 +125,10 @@ pub fn main() -> ExitCode {
 }
 
 fn estimators(arguments: &EstimatorsArguments) -> Result<(), (String, u8)> {
+    if let (Some(other), Some(case)) = (&arguments.beside, &arguments.case) {
+        let cases = beside::measure(other, case).map_err(|error| (error.to_string(), 1))?;
+        return give(&arguments.json, &cases, || beside::table(&cases));
+    }
     let effort = if arguments.quick { Effort::QUICK } else { Effort::FULL };
     let mut cases = estimators::cases().map_err(|error| (error.to_string(), 1))?;
     if let Some(text) = &arguments.case {

@@ -67,6 +67,16 @@ fn a_row_in_fifty_that_is_wildly_wrong_raises_no_alarm() {
 }
 
 #[test]
+fn forces_that_are_calibrated_anew_for_a_run_are_no_brake_that_drags() {
+    for seed in [51_118, 51_276] {
+        let settings = SimulatorSettings::new(seed, EffectRequest::none());
+        watch(&simulate(&settings), |run, time_s, snapshot| {
+            assert_eq!(suspect(snapshot), EffectKind::None, "seed {seed}, run {run}, {time_s} s");
+        });
+    }
+}
+
+#[test]
 fn what_no_force_or_a_scale_of_forces_tells_is_named_too() {
     for (seed, kind) in [
         (310, EffectKind::WheelDiameter),

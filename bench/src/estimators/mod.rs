@@ -9,7 +9,9 @@
 //!   [`resistance`]: the cases
 //! - [`pipelines`]: every kind of pipeline from sample to snapshot
 //! - [`report`]: the table and the JSON
+//! - [`beside`]: another build of the program beside this one
 
+pub mod beside;
 pub mod braking;
 pub mod em_peers;
 pub mod least_squares;

@@ -13,7 +13,7 @@ use dynocar_tests::golden;
 use dynocar_tests::sensor_failures::SensorFailure;
 use dynocar_tests::simulator::TrainType;
 use dynocar_tests::soak::bad_samples::{Scene, Tally};
-use dynocar_tests::soak::{Programs, faults, hostile, load, state_kills};
+use dynocar_tests::soak::{Programs, day, faults, hostile, load, state_kills};
 
 /// Seeded faults, load and bad input for as long as one likes; exit status 101 when a promise breaks.
 #[derive(Debug, Parser)]
@@ -32,6 +32,15 @@ enum Command {
         /// How long, in s
         #[arg(long, default_value_t = 3600)]
         seconds: u64,
+        /// The seed
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+    },
+    /// A day of eight trains in accelerated time, with trouble by the quarter of an hour
+    Day {
+        /// Hours of train time
+        #[arg(long, default_value_t = 24)]
+        hours: usize,
         /// The seed
         #[arg(long, default_value_t = 1)]
         seed: u64,
@@ -86,6 +95,7 @@ fn main() -> ExitCode {
         Command::Load { seconds, seed } => {
             say(format!("{:#?}", load::run(&programs, seconds, seed)));
         }
+        Command::Day { hours, seed } => say(day::hours::table(&day::run(&programs, hours, seed))),
         Command::Hostile(Rounds { rounds, seed }) => {
             hostile::measure(&programs, rounds, seed).iter().for_each(|it| say(format!("{it:?}")));
         }

@@ -20,7 +20,7 @@ const PERIOD: Duration = Duration::from_millis(5);
 /// How long the daemon is stopped at most: longer than its buffers hold.
 const STOPPED_MAX_MS: u64 = 4_000;
 /// Memory may grow by so much after the first quarter, in KiB: pages of the allocator.
-const GROWTH_MAX_KIB: u64 = 2_048;
+pub(super) const GROWTH_MAX_KIB: u64 = 2_048;
 /// Pipelines of each train.
 const KINDS: [&str; 4] = ["v_mils", "mass_kalman", "trajectory_kalman", "echo"];
 
@@ -92,7 +92,8 @@ impl Controller {
     }
 }
 
-fn resident_kib(process: &Process) -> u64 {
+/// Resident memory of a process in KiB.
+pub(super) fn resident_kib(process: &Process) -> u64 {
     let status = std::fs::read_to_string(format!("/proc/{}/status", process.id()));
     let status = status.expect("the daemon's status");
     let line = status.lines().find(|line| line.starts_with("VmRSS:")).expect("VmRSS");

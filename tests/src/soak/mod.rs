@@ -5,12 +5,14 @@
 //! # Layout
 //!
 //! - [`bad_samples`]: every pipeline under every failure of its sensors
+//! - [`day`]: eight trains for a day in accelerated time, with trouble by the quarter of an hour
 //! - [`faults`]: kills, stops and restarts of daemon, controller and client
 //! - [`hostile`]: garbage written into shared memory
 //! - [`load`]: eight trains for hours, with faults
 //! - [`state_kills`]: `kill -9` while a state file is written
 
 pub mod bad_samples;
+pub mod day;
 pub mod faults;
 pub mod hostile;
 pub mod load;

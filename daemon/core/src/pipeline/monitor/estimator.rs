@@ -141,10 +141,11 @@ impl ResidualMonitor {
     /// A run starts: brakes are released, and whatever dragged is over.
     fn start_run(&mut self) {
         let dragged = self.verdict.naming().onset();
-        for place in 0..ONSETS {
-            self.retire(FIRST_ONSET + place, dragged == Some(place));
-        }
+        (0..ONSETS).for_each(|place| self.retire(FIRST_ONSET + place, dragged == Some(place)));
         self.onsets = Onsets::new();
+        for scale in [TRACTION_SCALE, BRAKE_SCALE] {
+            self.information.loosen(scale, self.settings.force_run_std);
+        }
         self.places.next_pass();
         self.pressure.restart();
         self.start_leg();
@@ -152,6 +153,8 @@ impl ResidualMonitor {
 
     /// The train has stopped and moves again: what may change at stops is open anew.
     fn start_leg(&mut self) {
+        self.onsets.start_leg();
+        self.verdict.start_leg();
         for place in (0..SUSPECTS).filter(|&place| BANK[place].changes_at_stops) {
             let parameter = BASE + place;
             self.verdict.hold_over_stop(parameter);

@@ -97,16 +97,22 @@ impl Information {
         self.count
     }
 
+    /// A parameter is another from now on, by a standard deviation: what the rows so far say of it
+    /// is integrated over the difference.
+    pub fn loosen(&mut self, parameter: usize, std: f64) {
+        let column: Parameters = self.matrix.column(parameter).into_owned();
+        let pivot = column[parameter] + 1.0 / (std * std);
+        let share = self.side[parameter] / pivot;
+        self.matrix.ger(-1.0 / pivot, &column, &column, 1.0);
+        self.side.axpy(-share, &column, 1.0);
+        self.square_sum -= share * share * pivot;
+    }
+
     /// Frees a parameter's place for other rows: either it was 0 all along, or, with a prior
     /// standard deviation, it was what the rows say and is integrated out.
     pub fn retire(&mut self, parameter: usize, prior_std: Option<f64>) {
         if let Some(std) = prior_std {
-            let column: Parameters = self.matrix.column(parameter).into_owned();
-            let pivot = column[parameter] + 1.0 / (std * std);
-            let share = self.side[parameter] / pivot;
-            self.matrix.ger(-1.0 / pivot, &column, &column, 1.0);
-            self.side.axpy(-share, &column, 1.0);
-            self.square_sum -= share * share * pivot;
+            self.loosen(parameter, std);
         }
         self.matrix.row_mut(parameter).fill(0.0);
         self.matrix.column_mut(parameter).fill(0.0);
@@ -194,5 +200,25 @@ impl Information {
         let side = SVector::<f64, JOINT>::from_fn(|i, _| self.side[place(i)]);
         let factor = matrix.cholesky().ok_or(NotPositiveDefinite)?;
         Ok((factor.solve(&side), factor.inverse()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::resistance::regression::TRACTION_SCALE;
+
+    #[test]
+    fn a_scale_that_is_another_in_each_run_keeps_its_value_and_is_no_surer_than_runs_differ() {
+        let mut information = Information::new(&BaseVector::repeat(1.0));
+        let mut features = Parameters::zeros();
+        features[TRACTION_SCALE] = 1e4;
+        information.push(&Row { features, observed: 0.02 * 1e4, weight: 1.0 }, 1.0);
+        let scale = |it: &Information| it.base().unwrap().parameter(TRACTION_SCALE);
+        assert!(scale(&information).1.sqrt() < 2e-4);
+        information.loosen(TRACTION_SCALE, 0.003);
+        let (value, variance) = scale(&information);
+        assert!((value - 0.02).abs() < 1e-6, "{value}");
+        assert!((variance.sqrt() - 0.003).abs() < 1e-5, "{variance}");
     }
 }

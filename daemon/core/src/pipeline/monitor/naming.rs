@@ -2,6 +2,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
+use super::onsets::Onsets;
 use super::suspects::{BASE, CANDIDATES, FIRST_ONSET, PARAMETERS, effect_of};
 use crate::pipeline::InnovationMonitor;
 
@@ -23,6 +24,8 @@ const LET_GO_KEPT: f64 = 1.0 - 1.0 / 2880.0;
 const PLACES: u32 = EffectKind::LocalResistance.bit()
     | EffectKind::GradientError.bit()
     | EffectKind::GradientShift.bit();
+/// Blocks that a constant force must have lasted until no other law is meant.
+const CONSTANT_BLOCKS: u32 = 60;
 /// Innovations before their statistics are judged.
 const INNOVATIONS_MIN: f64 = 40.0;
 /// Mean square of the innovations up to which small things that are no effect are believed.
@@ -57,6 +60,8 @@ pub struct Standing<'a> {
     pub rank: &'a [f64; CANDIDATES],
     /// Statistics of the innovations without outliers.
     pub cut_innovations: &'a InnovationMonitor,
+    /// Since when brakes may drag.
+    pub onsets: &'a Onsets,
     /// True where no earlier pass tells what the place does.
     pub is_new_place: bool,
     /// True while released brakes hold pressure.
@@ -97,10 +102,11 @@ impl Naming {
         self.parameter()?.checked_sub(FIRST_ONSET)
     }
 
-    /// True when a parameter is named, and nothing else could be meant: its rows should be
-    /// integrated out, and not taken as without it.
+    /// True when a parameter is named, and no other that is known could be meant: its rows should
+    /// be integrated out, and not taken as without it.
     pub fn is_clearly(&self, parameter: usize) -> bool {
-        self.named.is_some_and(|it| it.parameter() == Some(parameter) && it.alternatives == 0)
+        let is_clear = |it: Named| it.alternatives & !EffectKind::Unknown.bit() == 0;
+        self.named.is_some_and(|it| it.parameter() == Some(parameter) && is_clear(it))
     }
 
     /// A parameter stands for something else now.
@@ -158,8 +164,18 @@ impl Naming {
         let effect = effect_of(candidate);
         let mut bits = alternatives(candidate, least, standing);
         let is_a_brake = effect == EffectKind::DraggingBrake && !standing.is_pressure_raised;
-        if is_a_brake && standing.is_new_place {
+        // What a brake explains, an unknown place explains as well.
+        let is_as_a_brake = is_a_brake || bits & EffectKind::DraggingBrake.bit() != 0;
+        if is_as_a_brake && standing.is_new_place {
             bits |= PLACES;
+        }
+        // A force by another law is constant for a while, too; and what leaves large innovations is
+        // not all there is.
+        let onset = candidate.checked_sub(FIRST_ONSET).filter(|_| is_a_brake);
+        let age = onset.and_then(|place| standing.onsets.age(place));
+        let is_short = age.is_some_and(|age| age < CONSTANT_BLOCKS);
+        if is_short || self.unexplained(standing).is_some() {
+            bits |= EffectKind::Unknown.bit();
         }
         // Brakes that let go again and again while the train drives are something else.
         let is_in_doubt = is_a_brake && self.let_go >= LET_GO_MAX;
@@ -170,15 +186,27 @@ impl Naming {
                 effect: EffectKind::Unknown,
                 candidate,
                 evidence,
-                alternatives: bits | effect.bit() | PLACES,
+                alternatives: (bits & !EffectKind::Unknown.bit()) | effect.bit() | PLACES,
             },
             false => Named { effect, candidate, evidence, alternatives: bits },
         }
     }
 
     /// Innovations larger than small things explain, and no suspect; what earlier stretches spoke for
-    /// may be behind it.
+    /// may be behind it, or a place that was never passed.
     fn unknown(&self, standing: &Standing) -> Option<Named> {
+        let evidence = self.unexplained(standing)?;
+        let likely = bits_of(|candidate| standing.rank[candidate] > self.evidence_min);
+        Some(Named {
+            effect: EffectKind::Unknown,
+            candidate: None,
+            evidence,
+            alternatives: likely | if standing.is_new_place { PLACES } else { 0 },
+        })
+    }
+
+    /// What speaks for something that the model as believed does not explain, when it is enough.
+    fn unexplained(&self, standing: &Standing) -> Option<f64> {
         let innovations = standing.cut_innovations;
         let count = innovations.effective_count();
         // Twice the log-likelihood ratio of normal innovations of that variance against 1,
@@ -186,12 +214,7 @@ impl Naming {
         let excess = innovations.mean_square() / MEAN_SQUARE_MAX;
         let evidence = count * (excess - 1.0 - excess.ln());
         let is_there = count > INNOVATIONS_MIN && excess > 1.0 && evidence > self.evidence_min;
-        is_there.then(|| Named {
-            effect: EffectKind::Unknown,
-            candidate: None,
-            evidence,
-            alternatives: bits_of(|candidate| standing.rank[candidate] > self.evidence_min),
-        })
+        is_there.then_some(evidence)
     }
 }
 
@@ -221,6 +244,10 @@ mod tests {
     use super::*;
 
     fn after(naming: &mut Naming, blocks: u32, evidence: &[(usize, f64)]) {
+        after_with(naming, &Onsets::new(), blocks, evidence);
+    }
+
+    fn after_with(naming: &mut Naming, onsets: &Onsets, blocks: u32, evidence: &[(usize, f64)]) {
         let mut net = [0.0; CANDIDATES];
         for &(candidate, value) in evidence {
             net[candidate] = value;
@@ -231,6 +258,7 @@ mod tests {
                 net: &net,
                 rank: &net,
                 cut_innovations: &cut_innovations,
+                onsets,
                 is_new_place: false,
                 is_pressure_raised: false,
             });
@@ -251,6 +279,20 @@ mod tests {
         assert_eq!((named.effect, named.alternatives), (EffectKind::WheelDiameter, 0));
         after(&mut naming, 1, &[(WHEEL, 12.0)]);
         assert_eq!(naming.named(), None);
+    }
+
+    #[test]
+    fn a_constant_force_is_told_beside_what_is_not_known_until_it_has_lasted() {
+        let mut naming = Naming::new(25.0);
+        let mut onsets = Onsets::new();
+        onsets.open(None);
+        let mut bits_after = |blocks: u32| {
+            (0..blocks).for_each(|_| onsets.advance());
+            after_with(&mut naming, &onsets, 2, &[(FIRST_ONSET, 40.0)]);
+            naming.named().unwrap().alternatives
+        };
+        assert_eq!(bits_after(CONSTANT_BLOCKS - 1), EffectKind::Unknown.bit());
+        assert_eq!(bits_after(1), 0);
     }
 
     #[test]

@@ -23,6 +23,12 @@ impl Onsets {
         self.ages[place]
     }
 
+    /// The train starts from a stop: the next block opens an onset, which brakes may have dragged
+    /// since.
+    pub fn start_leg(&mut self) {
+        self.since_newest = SPACING;
+    }
+
     /// One block later.
     pub fn advance(&mut self) {
         self.since_newest += 1;

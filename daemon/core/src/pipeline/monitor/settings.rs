@@ -20,6 +20,8 @@ settings! {
         disturbance_share: f64 = 0.03 => (0 to 1);
         /// How long such a force lasts, in s.
         disturbance_time_s: f64 = 60.0 => (1 to 10000 "s");
+        /// Standard deviation by which the scales of traction and brake force differ from run to run.
+        force_run_std: f64 = 0.003 => (0.000001 to 0.5);
         /// Time of motion in h over which evidence is forgotten.
         memory_h: f64 = 4.0 => (0.1 to 10000 "h");
         /// How samples become regression data; the source is always momentum.

@@ -14,8 +14,8 @@ use crate::pipeline::InnovationMonitor;
 use crate::pipeline::resistance::regression::{FORCE_DELAY, TRACTION_SCALE};
 use crate::terms::{Least, delay, wheel};
 
-/// Blocks that a dragging brake must have dragged.
-const ONSET_AGE_MIN: u32 = 5;
+/// Blocks that a suspect which began at some moment must have acted.
+const AGE_MIN: u32 = 5;
 /// What a raised pressure of released brakes speaks for a dragging one.
 const PRESSURE_EVIDENCE: f64 = 10.0;
 /// Share of the least size worth naming up to which an effect counts as none: surveys, maps and
@@ -72,6 +72,8 @@ pub struct Verdict {
     beside: [f64; CANDIDATES],
     naming: Naming,
     scale: f64,
+    /// Blocks since the train started from a stop.
+    leg_blocks: u32,
 }
 
 impl Verdict {
@@ -88,6 +90,7 @@ impl Verdict {
             beside: [0.0; CANDIDATES],
             naming: Naming::new(settings.evidence_min),
             scale: 1.0,
+            leg_blocks: 0,
         }
     }
 
@@ -113,6 +116,11 @@ impl Verdict {
                 self.resistance[parameter] += resistance;
             }
         }
+    }
+
+    /// The train starts from a stop.
+    pub fn start_leg(&mut self) {
+        self.leg_blocks = 0;
     }
 
     /// A stop: what may change there loses some of its evidence for being there now, and keeps it
@@ -151,13 +159,17 @@ impl Verdict {
         let mut found = [(0.0, 0.0); CANDIDATES];
         let mut beside = [None; CANDIDATES];
         let mut best: f64 = 0.0;
+        self.leg_blocks = self.leg_blocks.saturating_add(1);
         for parameter in BASE..PARAMETERS {
             let suspect = suspect_of(parameter);
             let onset = parameter.checked_sub(FIRST_ONSET);
-            let is_too_young = onset.is_some_and(|place| {
-                evidence.onsets.age(place).is_none_or(|age| age < ONSET_AGE_MIN)
-            });
-            if is_too_young {
+            // What began with the train's start is no likelier than what began a little later.
+            let age = match onset {
+                Some(place) => evidence.onsets.age(place),
+                None if suspect.changes_at_stops => Some(self.leg_blocks),
+                None => Some(evidence.information.count() as u32),
+            };
+            if age.is_none_or(|age| age < AGE_MIN) {
                 continue;
             }
             let alternative =
@@ -211,6 +223,7 @@ impl Verdict {
             net: &net,
             rank: &rank,
             cut_innovations: evidence.cut_innovations,
+            onsets: evidence.onsets,
             is_new_place: evidence.is_new_place,
             is_pressure_raised: evidence.is_pressure_raised,
         });

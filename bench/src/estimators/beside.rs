@@ -1,0 +1,133 @@
+//! Another build of this program beside this one: what a change of an estimator costs.
+//!
+//! Both programs measure the same cases by turns, each in a process of its own. Ratios and
+//! differences are taken round by round.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::measure::Spread;
+
+/// Rounds of both programs.
+const ROUNDS: usize = 31;
+
+/// A program does not give what is asked of it.
+#[derive(Debug, thiserror::Error)]
+#[error("{program}: expected the times of the cases as JSON, {came}")]
+pub struct BesideError {
+    program: PathBuf,
+    came: String,
+}
+
+/// Times of a case by two builds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CaseBeside {
+    /// Name of the work.
+    pub name: String,
+    /// Median time in ns of an update of this build.
+    pub ns_per_update: f64,
+    /// The same of the other build.
+    pub other_ns_per_update: f64,
+    /// Median over the rounds of the time in ns that this build takes more.
+    pub more_ns: f64,
+    /// Median over the rounds of this build's time over the other's.
+    pub ratio: f64,
+    /// Quartiles of it.
+    pub ratio_quartiles: [f64; 2],
+}
+
+/// Measures the cases whose name contains `case` in this program and in another.
+///
+/// # Errors
+///
+/// When one of them cannot be run, or has no such case.
+pub fn measure(other: &Path, case: &str) -> Result<Vec<CaseBeside>, BesideError> {
+    let ours = std::env::current_exe()
+        .map_err(|error| BesideError { program: "this program".into(), came: error.to_string() })?;
+    let mut rounds: Vec<[Vec<(String, f64)>; 2]> = Vec::with_capacity(ROUNDS);
+    for round in 0..ROUNDS {
+        // Who is first turns from round to round.
+        rounds.push(if round % 2 == 0 {
+            [times(&ours, case)?, times(other, case)?]
+        } else {
+            let theirs = times(other, case)?;
+            [times(&ours, case)?, theirs]
+        });
+    }
+    let named = |all: &[(String, f64)], name: &str| {
+        all.iter().find(|(other, _)| other == name).map(|&(_, ns)| ns)
+    };
+    let names = rounds[0][0].iter().map(|(name, _)| name.clone());
+    Ok(names
+        .filter_map(|name| {
+            let pairs = rounds.iter().map(|[a, b]| Some((named(a, &name)?, named(b, &name)?)));
+            Some(CaseBeside::of(name.clone(), &pairs.collect::<Option<Vec<_>>>()?))
+        })
+        .collect())
+}
+
+impl CaseBeside {
+    fn of(name: String, pairs: &[(f64, f64)]) -> Self {
+        let spread = |of: fn(&(f64, f64)) -> f64| Spread::of(pairs.iter().map(of).collect());
+        let ratio = spread(|(ours, other)| ours / other);
+        CaseBeside {
+            name,
+            ns_per_update: spread(|pair| pair.0).median,
+            other_ns_per_update: spread(|pair| pair.1).median,
+            more_ns: spread(|(ours, other)| ours - other).median,
+            ratio: ratio.median,
+            ratio_quartiles: [ratio.low, ratio.high],
+        }
+    }
+}
+
+/// One measurement of a program: cases by name with the time of an update in ns.
+fn times(program: &Path, case: &str) -> Result<Vec<(String, f64)>, BesideError> {
+    let failed = |came: String| BesideError { program: program.into(), came };
+    let arguments = ["estimators", "--quick", "--case", case, "--json", "-"];
+    let output = Command::new(program).args(arguments).output();
+    let output = output.map_err(|error| failed(error.to_string()))?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr);
+        return Err(failed(format!("{}: {}", output.status, said.trim())));
+    }
+    let answer: Value =
+        serde_json::from_slice(&output.stdout).map_err(|error| failed(error.to_string()))?;
+    let cases = answer["cases"].as_array().ok_or_else(|| failed("none came".into()))?;
+    let own = cases.iter().filter(|it| it["peer"] == false);
+    own.map(|it| Some((it["name"].as_str()?.to_owned(), it["ns_per_update"].as_f64()?)))
+        .collect::<Option<Vec<_>>>()
+        .ok_or_else(|| failed("a case without name or time came".into()))
+}
+
+/// The cases as a table for people.
+pub fn table(cases: &[CaseBeside]) -> String {
+    let mut text = String::from(
+        "case                                  ns   other ns    more ns   ratio (quartiles)\n",
+    );
+    for case in cases {
+        let [low, high] = case.ratio_quartiles;
+        text += &format!(
+            "{:30} {:9.1}  {:9.1}  {:9.1}   {:5.2} ({low:.2} to {high:.2})\n",
+            case.name, case.ns_per_update, case.other_ns_per_update, case.more_ns, case.ratio
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ratios_are_taken_round_by_round_and_a_program_that_measures_nothing_is_named() {
+        let pairs = [(100.0, 50.0), (120.0, 60.0), (90.0, 45.0)];
+        let case = CaseBeside::of("case".into(), &pairs);
+        assert_eq!((case.ratio, case.more_ns), (2.0, 50.0));
+        let error = times(Path::new("/bin/true"), "rls").unwrap_err();
+        assert!(error.to_string().starts_with("/bin/true: expected the times"), "{error}");
+    }
+}

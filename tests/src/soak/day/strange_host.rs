@@ -1,0 +1,66 @@
+//! A wall clock that jumps and a disk that fills, for one program.
+
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+use std::path::Path;
+use std::process::Command;
+
+/// What the program under test has loaded before the C library.
+const SOURCE: &str = include_str!("strange_host.c");
+
+/// The strange host of one program; everybody else's clock and disk are as they are.
+pub struct StrangeHost {
+    control: File,
+    variables: [(&'static str, String); 3],
+}
+
+impl StrangeHost {
+    /// A host that is not strange yet, with files of its own in `site`; its disk is that of `folder`.
+    ///
+    /// # Panics
+    ///
+    /// When the library cannot be compiled or the files cannot be written.
+    pub fn new(site: &Path, folder: &Path) -> Self {
+        let (source, library) = (site.join("strange_host.c"), site.join("strange_host.so"));
+        std::fs::write(&source, SOURCE).expect("a source file");
+        let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
+        let mut command = Command::new(compiler);
+        command.args(["-shared", "-fPIC", "-O1", "-Wall", "-Werror", "-o"]);
+        let status = command.arg(&library).arg(&source).arg("-ldl").status().expect("a C compiler");
+        assert!(status.success(), "the strange host does not compile");
+        let path = site.join("strange_host");
+        let control = File::create(&path).expect("a file that tells how strange the host is");
+        let folder = folder.canonicalize().expect("a folder");
+        let text = |path: &Path| path.to_str().expect("a UTF-8 path").to_owned();
+        let host = StrangeHost {
+            control,
+            variables: [
+                ("LD_PRELOAD", text(&library)),
+                ("STRANGE_HOST", text(&path)),
+                ("STRANGE_FOLDER", text(&folder)),
+            ],
+        };
+        host.set_clock_ahead(0);
+        host.set_free(None);
+        host
+    }
+
+    /// The environment in which the program is to be started.
+    pub fn variables(&self) -> [(&str, &str); 3] {
+        self.variables.each_ref().map(|(name, value)| (*name, value.as_str()))
+    }
+
+    /// Sets the wall clock ahead by so many seconds of the true one, or back.
+    pub fn set_clock_ahead(&self, seconds: i64) {
+        self.set(0, seconds);
+    }
+
+    /// Leaves so many bytes free in the folder; `None` for as many as there are.
+    pub fn set_free(&self, bytes: Option<i64>) {
+        self.set(1, bytes.unwrap_or(-1));
+    }
+
+    fn set(&self, place: u64, value: i64) {
+        self.control.write_all_at(&value.to_ne_bytes(), 8 * place).expect("the host's file");
+    }
+}
