@@ -1,4 +1,5 @@
-//! The report of `dynocar explain` in a real browser, at the widths of a desktop and a phone.
+//! The report of `dynocar explain` in a real browser, at the widths of a desktop and a phone. What a
+//! pointer does to its plots is in `report_pointer.rs`.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -108,8 +109,9 @@ fn look(report: &Report, width_px: u32, is_dark: bool) -> Value {
     seen
 }
 
-const SECTIONS: [&str; 6] = [
+const SECTIONS: [&str; 7] = [
     "Error before and after",
+    "Along the line",
     "The residual force",
     "Parameters",
     "What else was considered",
