@@ -5,8 +5,6 @@ use std::fmt::Write as _;
 use dynocar_core::explain::report::Estimate;
 use dynocar_core::explain::report::words::{self, number};
 
-use super::plots::{Plot, reading};
-
 /// Text from outside, harmless within elements and quoted attributes.
 pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
@@ -93,18 +91,6 @@ fn class(column: Column) -> &'static str {
         Column::Numbers => " class=\"number\"",
         Column::Names => " class=\"name\"",
     }
-}
-
-/// A plot, or one for wide and one for narrow pages, that answers to the pointer; caption and key
-/// are HTML.
-pub fn figure(class: &str, caption: &str, key: &str, plots: &[Plot]) -> String {
-    let readings = plots.first().map_or(String::new(), |plot| reading::json(&plot.readings));
-    let svg: String = plots.iter().map(|plot| &plot.svg[..]).collect();
-    format!(
-        "<figure class=\"{class}\" data-readings=\"{}\">\n<figcaption>{caption}</figcaption>\n\
-         {key}{svg}</figure>\n",
-        escape(&readings)
-    )
 }
 
 /// A value above its 95 % interval.

@@ -2,7 +2,7 @@
 "use strict";
 (() => {
   const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
-  const shown = (value, digits) => (value === null ? "–" : value.toFixed(digits).replace("-", "−"));
+  const shown = (value, digits) => (value === null ? "–" : value.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−"));
 
   // Numbers come as whole steps from one to the next, decimals first.
   const decode = ([digits, ...steps]) => {

@@ -8,9 +8,9 @@ use dynocar_core::survey::Survey;
 use super::answer::Answer;
 use super::write::gradient_entries;
 use crate::report::document::document;
-use crate::report::html::{Column, Table, escape, figure};
+use crate::report::html::{Column, Table, escape};
 use crate::report::plots::speeds::Width;
-use crate::report::plots::{PlotError, gradient};
+use crate::report::plots::{PlotError, figure, gradient};
 use crate::report::provenance::Provenance;
 
 /// Width and height of the map.

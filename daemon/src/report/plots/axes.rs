@@ -10,16 +10,12 @@ use plotters::prelude::{
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{RGBColor, ShapeStyle};
 
-use super::{AXIS, BAND, GRID, PlotError, SCALE, TEXT};
+use super::{AXIS, BAND, Frame, GRID, PlotError, SCALE, TEXT};
 use crate::report::html::minus;
 
 pub(super) type Area<'t> = DrawingArea<SVGBackend<'t>, Shift>;
 pub(super) type Chart<'a, 't> =
     ChartContext<'a, SVGBackend<'t>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
-
-/// Where a chart lies in its drawing: left, top, right, bottom, lower end of the labels below it;
-/// least and greatest value of its horizontal axis.
-pub(super) type Frame = [f64; 7];
 
 /// Nominal size of letters in px.
 const LETTERS_PX: f64 = 12.5;

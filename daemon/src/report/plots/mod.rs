@@ -21,7 +21,6 @@ use plotters::style::RGBColor;
 use serde_json::json;
 
 use super::html::escape;
-use axes::Frame;
 use reading::Reading;
 
 /// What the model without effects is called beside its data.
@@ -40,6 +39,10 @@ pub struct Plot {
     /// The data of its charts, from the top.
     pub readings: Vec<Reading>,
 }
+
+/// Where a chart lies in its drawing: left, top, right, bottom, lower end of the labels below it;
+/// least and greatest value of its horizontal axis.
+type Frame = [f64; 7];
 
 /// Drawn over nominal size.
 const SCALE: u32 = 2;
@@ -109,6 +112,18 @@ fn for_page(
         "<svg class=\"plot {class}\" viewBox=\"0 0 {width} {height}\" role=\"img\" \
          aria-label=\"{}\"{frames}>{body}",
         escape(label)
+    )
+}
+
+/// A plot, or one for wide and one for narrow pages, that answers to the pointer; caption and key
+/// are HTML.
+pub fn figure(class: &str, caption: &str, key: &str, plots: &[Plot]) -> String {
+    let readings = plots.first().map_or(String::new(), |plot| reading::json(&plot.readings));
+    let svg: String = plots.iter().map(|plot| &plot.svg[..]).collect();
+    format!(
+        "<figure class=\"{class}\" data-readings=\"{}\">\n<figcaption>{caption}</figcaption>\n\
+         {key}{svg}</figure>\n",
+        escape(&readings)
     )
 }
 

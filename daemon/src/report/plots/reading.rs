@@ -55,13 +55,14 @@ impl Reading {
     }
 
     fn json(&self) -> Value {
+        let decimals = digits(self.series.iter().flat_map(|it| &it.values));
         let series = self.series.iter().map(|it| {
-            let digits = digits(&it.values);
-            let [values, halves] = [&it.values, &it.halves].map(|list| coded(list, digits));
+            let [values, halves] = [&it.values, &it.halves].map(|list| coded(list, decimals));
             json!([it.name, it.unit, values, halves])
         });
         let series: Vec<Value> = series.collect();
-        let at = coded(&self.at, digits(&self.at));
+        let is_count = self.at.iter().all(|at| at.fract() == 0.0);
+        let at = coded(&self.at, if is_count { 0 } else { 1 + digits(&self.at) });
         json!({ "x": [self.name, self.unit], "points": self.is_points, "at": at, "series": series })
     }
 }
@@ -72,11 +73,12 @@ pub fn json(readings: &[Reading]) -> String {
 }
 
 /// Decimals in which a picture of these values shows a difference.
-fn digits(values: &[f64]) -> i32 {
-    let finite = || values.iter().copied().filter(|value| value.is_finite());
-    let range = finite().fold(f64::MIN, f64::max) - finite().fold(f64::MAX, f64::min);
-    let step = if range > 0.0 { range / STEPS } else { 1e-3 };
-    (-step.log10()).ceil().clamp(0.0, 9.0) as i32
+fn digits<'v>(values: impl IntoIterator<Item = &'v f64>) -> i32 {
+    let finite = values.into_iter().filter(|value| value.is_finite());
+    let (low, high) =
+        finite.fold((f64::MAX, f64::MIN), |range, it| (range.0.min(*it), range.1.max(*it)));
+    let step = if high > low { (high - low) / STEPS } else { 1e-3 };
+    (-step.log10()).round().clamp(0.0, 9.0) as i32
 }
 
 /// Values as whole numbers, each less the one before: decimals first, null for no number.
@@ -120,7 +122,7 @@ mod tests {
 
     #[test]
     fn data_are_whole_steps_as_fine_as_the_picture_shows_them() {
-        let at = vec![0.0, 2.0, f64::NAN, 100.0];
+        let at = vec![0.0, 2.5, f64::NAN, 100.0];
         let reading = Reading::new("Time", "s", false, at).with(
             "speed",
             "m/s",
@@ -129,7 +131,7 @@ mod tests {
         );
         assert_eq!(
             json(&[reading]),
-            r#"[{"at":[2,0,200,null,9800],"points":false,"series":[["speed","m/s",[4,10000,5000,null,-45000],null]],"x":["Time","s"]}]"#
+            r#"[{"at":[2,0,250,null,9750],"points":false,"series":[["speed","m/s",[3,1000,500,null,-4500],null]],"x":["Time","s"]}]"#
         );
     }
 

@@ -7,9 +7,9 @@ use dynocar_core::explain::report::errors::{ErrorPair, Resampling, RunErrors};
 use dynocar_core::explain::report::traces::Trace;
 
 use super::{Section, legend};
-use crate::report::html::{Column, Table, escape, estimate, figure, percent};
+use crate::report::html::{Column, Table, escape, estimate, percent};
 use crate::report::plots::speeds::Width;
-use crate::report::plots::{runs, speeds};
+use crate::report::plots::{figure, runs, speeds};
 use crate::report::{ReportError, Subject};
 
 /// The section.

@@ -1,9 +1,8 @@
 //! The line as a picture: what is declared, what was found, and where the residual lives.
 
 use super::{Section, legend};
-use crate::report::html::figure;
-use crate::report::plots::line;
 use crate::report::plots::speeds::Width;
+use crate::report::plots::{figure, line};
 use crate::report::{ReportError, Subject};
 
 /// The section; none where no line is declared and no position known.

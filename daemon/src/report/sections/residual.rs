@@ -3,8 +3,8 @@
 use dynocar_core::explain::report::covariates::Covariate;
 
 use super::{Section, legend};
-use crate::report::html::{escape, figure};
-use crate::report::plots::panel;
+use crate::report::html::escape;
+use crate::report::plots::{figure, panel};
 use crate::report::{ReportError, Subject};
 
 /// The section.

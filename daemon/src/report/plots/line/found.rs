@@ -5,7 +5,7 @@ use plotters::element::{PathElement, Rectangle, Text};
 use plotters::style::Color;
 use plotters::style::text_anchor::{HPos, VPos};
 
-use super::panel::{Content, Panel};
+use super::panel::{Content, Panel, rows, way};
 use crate::report::plots::axes::{Chart, letters, stroke};
 use crate::report::plots::{ACTING, AFTER, PlotError};
 
@@ -30,19 +30,6 @@ pub(super) fn panels(found: &AlongLine) -> Vec<Panel> {
         push(name, "N/kN", Content::Means(*direction, bins.clone()));
     }
     panels
-}
-
-/// A direction of travel, in words.
-pub(super) fn way(direction: f64) -> &'static str {
-    if direction > 0.0 { "growing chainage" } else { "falling chainage" }
-}
-
-/// The rows of a panel of places: what holds in all runs, or one row for each run.
-pub(super) fn rows(stretches: &[Stretch]) -> Vec<Option<&str>> {
-    let mut rows: Vec<Option<&str>> = stretches.iter().map(|it| it.run.as_deref()).collect();
-    rows.sort_unstable();
-    rows.dedup();
-    rows
 }
 
 /// Bars where an effect was found, the first row on top, with whiskers where their ends may lie.
@@ -75,13 +62,4 @@ pub(super) fn bars(
         chart.draw_series(name)?;
     }
     Ok(())
-}
-
-/// The stretches in words.
-pub(super) fn told(stretches: &[Stretch]) -> String {
-    let one = |it: &Stretch| {
-        let run = it.run.as_ref().map_or(String::new(), |run| format!(" in {run}"));
-        format!("km {:.2} to {:.2}{run}", it.at_m[0] / 1e3, it.at_m[1] / 1e3)
-    };
-    stretches.iter().map(one).collect::<Vec<_>>().join(", ")
 }

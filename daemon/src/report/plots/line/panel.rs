@@ -3,7 +3,6 @@
 use dynocar_core::explain::report::line::Stretch;
 use dynocar_core::explain::report::panels::PanelBin;
 
-use super::found;
 use crate::report::plots::axes::range_with_zero;
 use crate::report::plots::panel::{reading, vertical_range};
 use crate::report::plots::reading::Reading;
@@ -40,7 +39,7 @@ impl Panel {
     pub fn height(&self) -> u32 {
         match &self.content {
             Content::Places(stretches) => {
-                PLACES_HEIGHT + ROW_HEIGHT * (found::rows(stretches).len() as u32 - 1)
+                PLACES_HEIGHT + ROW_HEIGHT * (rows(stretches).len() as u32 - 1)
             }
             _ => HEIGHT,
         }
@@ -65,7 +64,7 @@ impl Panel {
             Content::Places(_) => Reading::new("Chainage", "km", false, Vec::new()),
             Content::Means(direction, bins) => {
                 let mut reading = reading("Chainage", "km", bins, has_effect);
-                let way = found::way(*direction);
+                let way = way(*direction);
                 reading.series.iter_mut().for_each(|it| it.name += &format!(", {way}"));
                 reading
             }
@@ -80,7 +79,7 @@ impl Panel {
     /// What it shows, for those who do not see it.
     pub fn told(&self) -> String {
         match &self.content {
-            Content::Places(stretches) => format!("{} {}", self.name, found::told(stretches)),
+            Content::Places(stretches) => format!("{} {}", self.name, told(stretches)),
             Content::Means(_, bins) => {
                 let most = bins.iter().map(|bin| bin.before_n_per_kn.0.abs()).fold(0.0, f64::max);
                 format!("{}: at most {most:.2} N/kN", self.name)
@@ -93,4 +92,26 @@ impl Panel {
             }
         }
     }
+}
+
+/// A direction of travel, in words.
+pub(super) fn way(direction: f64) -> &'static str {
+    if direction > 0.0 { "growing chainage" } else { "falling chainage" }
+}
+
+/// The rows of a panel of places: what holds in all runs, or one row for each run.
+pub(super) fn rows(stretches: &[Stretch]) -> Vec<Option<&str>> {
+    let mut rows: Vec<Option<&str>> = stretches.iter().map(|it| it.run.as_deref()).collect();
+    rows.sort_unstable();
+    rows.dedup();
+    rows
+}
+
+/// The stretches in words.
+pub(super) fn told(stretches: &[Stretch]) -> String {
+    let one = |it: &Stretch| {
+        let run = it.run.as_ref().map_or(String::new(), |run| format!(" in {run}"));
+        format!("km {:.2} to {:.2}{run}", it.at_m[0] / 1e3, it.at_m[1] / 1e3)
+    };
+    stretches.iter().map(one).collect::<Vec<_>>().join(", ")
 }
