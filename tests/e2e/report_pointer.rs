@@ -4,10 +4,11 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use dynocar_shared::TrainSample;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::browser::Browser;
 use dynocar_tests::simulator::dataset_writer::write_dataset;
-use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
+use dynocar_tests::simulator::{EffectRequest, SimulatedDataset, SimulatorSettings, simulate};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -41,6 +42,7 @@ const TRACE: &str = "#error figure.trace";
 struct Report {
     page: PathBuf,
     folder: TempDir,
+    simulated: SimulatedDataset,
 }
 
 fn explain(dataset: &Path, page: &Path) -> String {
@@ -58,10 +60,11 @@ fn explain(dataset: &Path, page: &Path) -> String {
 fn report() -> Report {
     let folder = tempfile::tempdir().unwrap();
     let settings = SimulatorSettings::new(31, EffectRequest::Kinds(vec![EffectKind::TunnelDrag]));
-    write_dataset(&simulate(&settings), folder.path()).unwrap();
+    let simulated = simulate(&settings);
+    write_dataset(&simulated, folder.path()).unwrap();
     let page = folder.path().join("report.html");
     explain(folder.path(), &page);
-    Report { page, folder }
+    Report { page, folder, simulated }
 }
 
 fn opened(report: &Report) -> Browser {
@@ -107,17 +110,6 @@ fn read(seen: &Value, name: &str) -> f64 {
     word.replace('−', "-").parse().unwrap_or_else(|_| panic!("{name}: a number, not {word}"))
 }
 
-/// Times in s and speeds in m/s of a recorded run.
-fn recorded(file: &Path) -> Vec<(f64, f64)> {
-    let text = std::fs::read_to_string(file).unwrap();
-    let mut rows = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
-    let head = rows.next().unwrap();
-    let column = |name: &str| head.iter().position(|it| it.starts_with(name)).unwrap();
-    let (time, speed) = (column("time"), column("speed"));
-    let value = |row: &[&str], k: usize| row[k].parse().ok();
-    rows.filter_map(|row| Some((value(&row, time)?, value(&row, speed)?))).collect()
-}
-
 #[test]
 fn a_pointer_reads_what_was_recorded_and_a_drag_narrows_the_axis() {
     let report = report();
@@ -126,20 +118,23 @@ fn a_pointer_reads_what_was_recorded_and_a_drag_narrows_the_axis() {
         browser.value("document.querySelector('#error figure.trace figcaption').textContent");
     let file =
         title.as_str().unwrap().split([' ', ',']).find(|word| word.ends_with(".csv")).unwrap();
-    let run = recorded(&report.folder.path().join(file));
+    let run = report.simulated.runs.iter().find(|run| run.plan.file() == file).unwrap();
+    let time_s = |sample: &TrainSample| 1e-9 * sample.time_ns as f64;
     let seen = look(&mut browser, TRACE);
     assert_eq!(seen["reading"], json!([]), "nothing is told before a pointer comes");
     let whole = labelled(&seen);
     let is_recorded = |seen: &Value, [x_px, _]: [f64; 2]| {
-        let (time_s, speed_mps) = (read(seen, "Time in the recording"), read(seen, "measured"));
+        let (at_s, speed_mps) = (read(seen, "Time in the recording"), read(seen, "measured"));
         let by_axis_s = by_labels(seen, x_px);
-        assert!((time_s - by_axis_s).abs() < 0.01 * whole, "{time_s} s, {by_axis_s} s by the axis");
+        assert!((at_s - by_axis_s).abs() < 0.01 * whole, "{at_s} s, {by_axis_s} s by the axis");
         // The picture holds every few seconds of the run, and a line in between.
-        let near =
-            || run.iter().filter(|row| (row.0 - time_s).abs() < 0.01 * whole).map(|row| row.1);
+        let near = || {
+            let all = run.samples.iter().filter(|it| (time_s(it) - at_s).abs() < 0.004 * whole);
+            all.map(|sample| sample.speed_mps)
+        };
         let (low, high) = (near().fold(f64::MAX, f64::min), near().fold(f64::MIN, f64::max));
-        assert!((low - 0.01..=high + 0.01).contains(&speed_mps), "{speed_mps} at {time_s} s");
-        time_s
+        assert!((low - 0.01..=high + 0.01).contains(&speed_mps), "{speed_mps} at {at_s} s");
+        at_s
     };
     for across in [0.2, 0.37, 0.55, 0.9] {
         let at = place(&seen, [across, 0.3]);
@@ -161,9 +156,9 @@ fn a_pointer_reads_what_was_recorded_and_a_drag_narrows_the_axis() {
     let at = place(&zoomed, [0.5, 0.3]);
     browser.mouse("mouseMoved", at, 0);
     let narrowed = look(&mut browser, TRACE);
-    let time_s = is_recorded(&narrowed, at);
+    let at_s = is_recorded(&narrowed, at);
     let ends_s = [from, to].map(|[x_px, _]| by_labels(&seen, x_px));
-    assert!((ends_s[0]..ends_s[1]).contains(&time_s), "{time_s} in {ends_s:?}");
+    assert!((ends_s[0]..ends_s[1]).contains(&at_s), "{at_s} in {ends_s:?}");
     for (kind, clicks) in
         [("mousePressed", 1), ("mouseReleased", 1), ("mousePressed", 2), ("mouseReleased", 2)]
     {
