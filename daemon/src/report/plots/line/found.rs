@@ -58,7 +58,7 @@ pub(super) fn bars(
             }
         }
         let style = letters((HPos::Left, VPos::Center));
-        let name = run.map(|run| Text::new(format!(" {run}"), (from_km, at(0.5)), style));
+        let name = run.map(|run| Text::new(format!("\u{2002}{run}"), (from_km, at(0.5)), style));
         chart.draw_series(name)?;
     }
     Ok(())

@@ -220,7 +220,7 @@ mod tests {
                 "Missing resistance, growing chainage, N/kN",
                 "Missing resistance, falling chainage, N/kN",
                 "Found: a local resistance km 0.30 to 0.60, km 0.30 to 0.40 in 7.csv; ",
-                " 7.csv\n",
+                "\u{2002}7.csv\n",
                 "falling chainage: at most 0.50 N/kN; 3 stops",
             ] {
                 assert!(plot.svg.contains(words), "{words}");

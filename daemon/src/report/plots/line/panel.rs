@@ -64,6 +64,8 @@ impl Panel {
             Content::Places(_) => Reading::new("Chainage", "km", false, Vec::new()),
             Content::Means(direction, bins) => {
                 let mut reading = reading("Chainage", "km", bins, has_effect);
+                // What is not drawn is not read.
+                reading.series.truncate(1 + usize::from(has_effect));
                 let way = way(*direction);
                 reading.series.iter_mut().for_each(|it| it.name += &format!(", {way}"));
                 reading
