@@ -63,6 +63,9 @@ pub fn draw(panel: &Panel, has_effect: bool) -> Result<Plot, PlotError> {
     Ok(Plot { svg, readings: vec![reading] })
 }
 
+/// A mean of a bin, with its half width.
+type Mean = fn(&PanelBin) -> (f64, f64);
+
 /// Bins as a pointer reads them.
 pub(super) fn reading(
     name: &'static str,
@@ -70,7 +73,7 @@ pub(super) fn reading(
     bins: &[PanelBin],
     has_effect: bool,
 ) -> Reading {
-    let sides: [(&str, fn(&PanelBin) -> (f64, f64)); 3] = [
+    let sides: [(&str, Mean); 3] = [
         (before_name(has_effect), |bin| bin.before_n_per_kn),
         ("after", |bin| bin.after_n_per_kn),
         ("effect", |bin| bin.effect_n_per_kn),

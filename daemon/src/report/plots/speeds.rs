@@ -85,6 +85,9 @@ pub fn draw(trace: &Trace, width: Width, has_effect: bool) -> Result<Plot, PlotE
     Ok(Plot { svg, readings: readings(trace, has_effect) })
 }
 
+/// One of the speeds of a point.
+type Speed = fn(&TracePoint) -> f64;
+
 fn readings(trace: &Trace, has_effect: bool) -> Vec<Reading> {
     let values = |value: &dyn Fn(&TracePoint) -> f64| -> Vec<f64> {
         // Nothing is read between two pieces.
@@ -93,7 +96,7 @@ fn readings(trace: &Trace, has_effect: bool) -> Vec<Reading> {
     let time = || Reading::new("Time in the recording", "s", false, values(&|p| p.time_s));
     let (mut speeds, mut errors) =
         (time().with("measured", "m/s", values(&|p| p.measured_mps), Vec::new()), time());
-    let sides: [(&str, fn(&TracePoint) -> f64); 2] =
+    let sides: [(&str, Speed); 2] =
         [(before_name(has_effect), |p| p.before_mps), ("after", |p| p.after_mps)];
     for (name, value) in sides.into_iter().take(1 + usize::from(has_effect)) {
         let away = values(&|p| value(p) - p.measured_mps);
