@@ -1,4 +1,5 @@
-//! The report of `dynocar explain` in a real browser, at the widths of a desktop and a phone.
+//! The report of `dynocar explain` in a real browser, at the widths of a desktop and a phone. What a
+//! pointer does to its plots is in `report_pointer.rs`.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -40,6 +41,7 @@ const LOOK: &str = r#"(() => {
         unlabelled: plots.filter(plot => plot.getAttribute("role") !== "img" || !plot.getAttribute("aria-label")).length,
         points: plots.reduce((sum, plot) => sum + plot.querySelectorAll("circle").length, 0),
         smallest_letters_px: Math.min(...letters.map(text => text.getBoundingClientRect().height)),
+        line: document.querySelector('#line svg.plot').getAttribute('aria-label'),
         tables: all("table").filter(isShown).length,
         rows: all("tbody tr").length,
         not_a_number: /NaN|undefined|inf\b/.test(document.body.innerText),
@@ -108,8 +110,9 @@ fn look(report: &Report, width_px: u32, is_dark: bool) -> Value {
     seen
 }
 
-const SECTIONS: [&str; 6] = [
+const SECTIONS: [&str; 7] = [
     "Error before and after",
+    "Along the line",
     "The residual force",
     "Parameters",
     "What else was considered",
@@ -128,6 +131,17 @@ fn a_report_of_an_effect_renders_on_desktop_and_phone() {
         }
         assert_eq!(seen["sections"][0], "Verdict: Effect found");
         assert_eq!(seen["sections"].as_array().unwrap()[1..], SECTIONS.map(Value::from));
+        let line = seen["line"].as_str().unwrap();
+        for words in [
+            "Height above the start, m from",
+            "Gradient, ‰ from",
+            "Curvature 1/R, 1/km from",
+            "Found: tunnel drag km ",
+            "Missing resistance, growing chainage: at most",
+            "Missing resistance, falling chainage: at most",
+        ] {
+            assert!(line.contains(words), "{words}: {line}");
+        }
         // Runs, speeds of a run, covariates; before and after.
         assert!(seen["plots"].as_u64().unwrap() >= 2 + 1 + 4, "{seen:#}");
         assert!(seen["points"].as_u64().unwrap() > 100, "{seen:#}");
@@ -143,6 +157,7 @@ fn a_report_of_nothing_follows_the_dark_scheme() {
     assert_eq!(light["sections"][0], "Verdict: Nothing undeclared");
     assert!(light["sentence"].as_str().unwrap().contains("Nothing undeclared acts"));
     assert!(light["plots"].as_u64().unwrap() >= 2 + 1 + 4, "{light:#}");
+    assert!(!light["line"].as_str().unwrap().contains("Found"), "{light:#}");
     for k in [0, 1] {
         assert_ne!(light["colours"][k], dark["colours"][k]);
     }

@@ -162,6 +162,38 @@ impl Browser {
         answer["result"]["value"].take()
     }
 
+    /// Turns scripts of pages opened from now on off.
+    ///
+    /// # Panics
+    ///
+    /// When the browser is gone.
+    pub fn forbid_scripts(&mut self) {
+        self.call("Emulation.setScriptExecutionDisabled", json!({ "value": true }));
+    }
+
+    /// Moves the mouse to a place in the window, presses it or lets it go there (`mouseMoved`,
+    /// `mousePressed`, `mouseReleased`), as the count-th click in a row.
+    ///
+    /// # Panics
+    ///
+    /// When the browser is gone.
+    pub fn mouse(&mut self, kind: &str, [x, y]: [f64; 2], clicks: u32) {
+        let button = if kind == "mouseMoved" { "none" } else { "left" };
+        let event = json!({ "type": kind, "x": x, "y": y, "button": button, "clickCount": clicks });
+        self.call("Input.dispatchMouseEvent", event);
+    }
+
+    /// Presses a key by its name and lets it go.
+    ///
+    /// # Panics
+    ///
+    /// When the browser is gone.
+    pub fn key(&mut self, key: &str) {
+        for kind in ["keyDown", "keyUp"] {
+            self.call("Input.dispatchKeyEvent", json!({ "type": kind, "key": key }));
+        }
+    }
+
     /// What the page did since it was opened.
     ///
     /// # Panics

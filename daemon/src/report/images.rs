@@ -8,7 +8,7 @@ use dynocar_core::explain::report::panels::Panel;
 
 use super::ReportError;
 use super::plots::speeds::Width;
-use super::plots::{PlotError, as_file, panel, runs, speeds};
+use super::plots::{Plot, PlotError, as_file, line, panel, runs, speeds};
 
 /// A plot as a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,8 +19,8 @@ pub struct Image {
     pub svg: String,
 }
 
-/// Every plot of the report: the errors of the runs, the speeds of runs, the residual against
-/// covariates.
+/// Every plot of the report: the errors of the runs, the line with what was found along it, the
+/// speeds of runs, the residual against covariates.
 ///
 /// # Errors
 ///
@@ -32,9 +32,9 @@ pub fn images(dataset: &Dataset, explanation: &Explanation) -> Result<Vec<Image>
         dataset.runs.iter().find(|run| run.file == file).map_or(0, |run| run.number as usize)
     };
     let mut images = Vec::new();
-    let mut keep = |name: String, drawn: Result<String, PlotError>| match drawn {
+    let mut keep = |name: String, drawn: Result<Plot, PlotError>| match drawn {
         Ok(plot) => {
-            images.push(Image { name, svg: as_file(&plot) });
+            images.push(Image { name, svg: as_file(&plot.svg) });
             Ok(())
         }
         Err(source) => Err(ReportError::Plot { plot: name, source }),
@@ -50,6 +50,10 @@ pub fn images(dataset: &Dataset, explanation: &Explanation) -> Result<Vec<Image>
         if !own.is_empty() {
             keep(format!("errors_{}.svg", role.name()), runs::draw(&own, role, has_effect))?;
         }
+    }
+    let track = dataset.track.as_deref();
+    if let Some(drawn) = line::draw(track, &data.line, has_effect, Width::Wide).transpose() {
+        keep("line.svg".into(), drawn)?;
     }
     for trace in &data.traces {
         let name = format!("speed_run_{}.svg", number(&trace.file));

@@ -1,15 +1,19 @@
-//! An explanation as one page of HTML that can be handed on: no script, no network, no font.
+//! An explanation as one page of HTML that can be handed on: no network, no font, and one script
+//! that only adds.
 //!
 //! # Layout
 //!
 //! - [`mod@page`]: the page from top to bottom
+//! - [`mod@document`]: head, policy and foot, for the survey's page too
 //! - [`sections`]: its parts
 //! - [`plots`]: the plots, as SVG text
 //! - [`mod@images`]: the same as files of their own
 //! - [`html`]: escaping, tables, numbers
 //! - [`provenance`]: command, versions, content hash
 //! - `style.css`: the style, for wide and narrow, light and dark, screen and paper
+//! - `plots.js`: values at the pointer and zoom
 
+pub mod document;
 pub mod html;
 pub mod images;
 pub mod page;

@@ -7,12 +7,12 @@ use dynocar_core::explain::answer::Verdict;
 use dynocar_core::explain::report::words;
 use dynocar_core::plausibility::Severity;
 
+use super::document::document;
 use super::html::{escape, tonnes};
-use super::plots::colour_rules;
-use super::sections::{Section, candidates, errors, parameters, quality, reproduce, residual};
+use super::sections::{
+    Section, candidates, errors, line, parameters, quality, reproduce, residual,
+};
 use super::{ReportError, Subject};
-
-const STYLE: &str = include_str!("style.css");
 
 /// The page.
 ///
@@ -20,48 +20,30 @@ const STYLE: &str = include_str!("style.css");
 ///
 /// When a plot cannot be drawn.
 pub fn html(subject: &Subject) -> Result<String, ReportError> {
-    let sections = [
-        errors::section(subject)?,
+    let mut sections = vec![errors::section(subject)?];
+    sections.extend(line::section(subject)?);
+    sections.extend([
         residual::section(subject)?,
         parameters::section(subject),
         candidates::section(subject),
         quality::section(subject),
         reproduce::section(subject),
-    ];
+    ]);
     let name = escape(&subject.dataset.name);
-    let mut html = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta name=\"color-scheme\" content=\"light dark\">\n\
-         <meta name=\"generator\" content=\"dynocar {}\">\n\
-         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
-         style-src 'unsafe-inline'\">\n\
-         <title>{name} – residual report</title>\n<style>\n{STYLE}\n{}</style>\n</head>\n<body>\n",
-        subject.provenance.version,
-        colour_rules()
-    );
-    html += &header(subject, &name);
-    html += "<main>\n";
-    html += &notes(subject);
-    html += &verdict(subject);
-    html += &contents(&sections);
+    let mut main = notes(subject);
+    main += &verdict(subject);
+    main += &contents(&sections);
     for section in &sections {
         // Writing to a string cannot fail.
         let _ = write!(
-            html,
+            main,
             "<section id=\"{0}\" aria-labelledby=\"{0}-title\">\n\
              <h2 id=\"{0}-title\">{1}</h2>\n{2}</section>\n",
             section.id, section.title, section.body
         );
     }
-    html += "</main>\n";
-    let _ = write!(
-        html,
-        "<footer><p>Made by Dynocar {} on {}. The page is complete in itself: it loads nothing.\
-         </p></footer>\n</body>\n</html>\n",
-        subject.provenance.version, subject.provenance.day
-    );
-    Ok(html)
+    let title = format!("{name} – residual report");
+    Ok(document(&title, &header(subject, &name), &main, &subject.provenance))
 }
 
 fn header(subject: &Subject, name: &str) -> String {
@@ -81,9 +63,9 @@ fn header(subject: &Subject, name: &str) -> String {
         None => "line not known",
     };
     format!(
-        "<header>\n<p class=\"kicker\">Dynocar · residual report</p>\n<h1>{name}</h1>\n\
+        "<p class=\"kicker\">Dynocar · residual report</p>\n<h1>{name}</h1>\n\
          {description}<p class=\"facts\">{train}{} t, {:.0} m · {line} · {} fit and {} holdout \
-         runs · <span>{}</span></p>\n</header>\n",
+         runs · <span>{}</span></p>\n",
         tonnes(dataset.train.mass_kg),
         dataset.train.length_m,
         count(Role::Fit),

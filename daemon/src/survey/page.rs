@@ -7,12 +7,12 @@ use dynocar_core::survey::Survey;
 
 use super::answer::Answer;
 use super::write::gradient_entries;
+use crate::report::document::document;
 use crate::report::html::{Column, Table, escape};
 use crate::report::plots::speeds::Width;
-use crate::report::plots::{PlotError, colour_rules, gradient};
+use crate::report::plots::{PlotError, figure, gradient};
 use crate::report::provenance::Provenance;
 
-const STYLE: &str = include_str!("../report/style.css");
 /// Width and height of the map.
 const SIZE: (f64, f64) = (980.0, 420.0);
 
@@ -28,25 +28,19 @@ pub fn html(
     made: &Provenance,
 ) -> Result<String, PlotError> {
     let name = escape(&dataset.name);
-    let mut html = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta name=\"color-scheme\" content=\"light dark\">\n\
-         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
-         style-src 'unsafe-inline'\">\n<title>{name} – survey</title>\n<style>\n{STYLE}\n{}</style>\n\
-         </head>\n<body>\n<header>\n<p class=\"kicker\">Dynocar · survey</p>\n<h1>{name}</h1>\n\
-         <p class=\"facts\">{:.1} m · {} stops · {} trips · {} passes learned from · {}</p>\n\
-         </header>\n<main>\n",
-        colour_rules(),
+    let header = format!(
+        "<p class=\"kicker\">Dynocar · survey</p>\n<h1>{name}</h1>\n\
+         <p class=\"facts\">{:.1} m · {} stops · {} trips · {} passes learned from · {}</p>\n",
         answer.line.length_m,
         answer.line.stops.len(),
         answer.trips.len(),
         answer.line.passes,
         made.day
     );
+    let mut main = String::new();
     let mut section = |id: &str, title: &str, body: String| {
         // Writing to a string cannot fail.
-        let _ = write!(html, "<section id=\"{id}\">\n<h2>{title}</h2>\n{body}</section>\n");
+        let _ = write!(main, "<section id=\"{id}\">\n<h2>{title}</h2>\n{body}</section>\n");
     };
     section("map", "The line", map(survey, answer));
     if let Some(profile) = &survey.profile {
@@ -61,13 +55,7 @@ pub fn html(
     section("trips", "Trips", trips(answer));
     section("not-used", "Not used", not_used(answer));
     section("open", "What these recordings cannot tell", open(answer));
-    let _ = write!(
-        html,
-        "</main>\n<footer><p>Made by Dynocar {} on {}. The page is complete in itself: it loads \
-         nothing.</p></footer>\n</body>\n</html>\n",
-        made.version, made.day
-    );
-    Ok(html)
+    Ok(document(&format!("{name} – survey"), &header, &main, made))
 }
 
 fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
@@ -148,10 +136,7 @@ fn scale_bar(span: f64) -> String {
 fn profile_plots(entries: &[(f64, f64, f64)], direction: &str) -> Result<String, PlotError> {
     let [wide, narrow] =
         [Width::Wide, Width::Narrow].map(|width| gradient::draw(entries, direction, width));
-    Ok(format!(
-        "<figure>\n<figcaption>For {direction}</figcaption>\n{}{}</figure>\n",
-        wide?, narrow?
-    ))
+    Ok(figure("trace", &format!("For {direction}"), "", &[wide?, narrow?]))
 }
 
 fn learned(answer: &Answer) -> String {

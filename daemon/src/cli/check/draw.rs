@@ -2,9 +2,12 @@
 
 use std::path::Path;
 
+use dynocar_core::explain::report::line::AlongLine;
+
 use super::Understood;
 use crate::cli::Failure;
 use crate::output::{tell, write_in_folder};
+use crate::report::plots::speeds::Width;
 use crate::report::plots::{as_file, effort, line};
 
 /// Draws the line's profile and the train's effort curves into a folder, as far as they are known.
@@ -25,7 +28,8 @@ pub(super) fn draw(understood: &Understood, folder: &Path) -> Result<(), Failure
         }
     };
     let failed = |error| Failure::Work(format!("the drawing failed: {error}"));
-    let line = track.map(line::draw).transpose().map_err(failed)?.flatten();
+    let line = line::draw(track, &AlongLine::default(), false, Width::Wide).map_err(failed)?;
+    let line = line.map(|plot| plot.svg);
     let effort = train.map(effort::draw).transpose().map_err(failed)?.flatten();
     let drawn = [("line.svg", line), ("effort.svg", effort)];
     if drawn.iter().all(|(_, plot)| plot.is_none()) {

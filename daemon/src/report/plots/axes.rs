@@ -4,11 +4,13 @@ use plotters::backend::SVGBackend;
 use plotters::chart::{ChartBuilder, ChartContext};
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
-use plotters::prelude::{Cartesian2d, Color, DrawingArea, IntoFont, Rectangle, Text, TextStyle};
+use plotters::prelude::{
+    Cartesian2d, Color, DrawingArea, IntoFont, Polygon, Rectangle, Text, TextStyle,
+};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{RGBColor, ShapeStyle};
 
-use super::{ACTING, AXIS, GRID, PlotError, SCALE, TEXT};
+use super::{AXIS, BAND, Frame, GRID, PlotError, SCALE, TEXT};
 use crate::report::html::minus;
 
 pub(super) type Area<'t> = DrawingArea<SVGBackend<'t>, Shift>;
@@ -17,6 +19,8 @@ pub(super) type Chart<'a, 't> =
 
 /// Nominal size of letters in px.
 const LETTERS_PX: f64 = 12.5;
+/// Nominal height in px of the labels below a chart.
+const LABELS_PX: u32 = 22;
 /// The backend writes font sizes divided by this.
 const BACKEND_FACTOR: f64 = 1.24;
 
@@ -56,7 +60,7 @@ pub(super) fn chart<'a, 't>(
         .margin_right(px(12))
         .margin_bottom(px(if x.title.is_empty() { 2 } else { 20 }))
         .margin_left(px(2))
-        .x_label_area_size(px(22))
+        .x_label_area_size(px(LABELS_PX))
         .y_label_area_size(px(44))
         .build_cartesian_2d(x.range[0]..x.range[1], y.range[0]..y.range[1])?;
     area.draw(&Text::new(y.title.to_string(), (px(4) as i32, px(4) as i32), letters(TOP_LEFT)))?;
@@ -90,6 +94,15 @@ pub(super) fn chart<'a, 't>(
     Ok(chart)
 }
 
+/// Where a chart lies.
+pub(super) fn frame(chart: &Chart) -> Frame {
+    let (across, down) = chart.plotting_area().get_pixel_range();
+    let x = chart.x_range();
+    let labels_end = down.end + (LABELS_PX * SCALE) as i32;
+    let px = [across.start, down.start, across.end, down.end, labels_end].map(f64::from);
+    [px[0], px[1], px[2], px[3], px[4], x.start, x.end]
+}
+
 const TOP_LEFT: (HPos, VPos) = (HPos::Left, VPos::Top);
 
 /// Decimals that tell the labels of an axis apart.
@@ -116,20 +129,37 @@ pub(super) fn padded(values: impl Iterator<Item = f64>, share: f64) -> [f64; 2] 
     [low - room, high + room]
 }
 
-/// Shades the ranges in which an effect acts; draw it first.
+/// Shades ranges, as those in which an effect acts; draw it first.
 pub(super) fn shade(
     chart: &mut Chart,
-    acting: &[[f64; 2]],
+    colour: RGBColor,
+    ranges: &[[f64; 2]],
     x: [f64; 2],
     y: [f64; 2],
 ) -> Result<(), PlotError> {
-    let inside = acting
+    let inside = ranges
         .iter()
         .map(|range| range.map(|value| value.clamp(x[0], x[1])))
         .filter(|[from, to]| to > from);
     chart.draw_series(
-        inside.map(|[from, to]| Rectangle::new([(from, y[0]), (to, y[1])], ACTING.filled())),
+        inside.map(|[from, to]| Rectangle::new([(from, y[0]), (to, y[1])], colour.filled())),
     )?;
+    Ok(())
+}
+
+/// Draws a band of so much to either side of a line, cut where the chart ends.
+pub(super) fn band(
+    chart: &mut Chart,
+    line: &[(f64, f64)],
+    halves: &[f64],
+    y: [f64; 2],
+) -> Result<(), PlotError> {
+    let edge = |side: f64| {
+        let both = line.iter().zip(halves);
+        both.map(move |((at, value), half)| (*at, (value + side * half).clamp(y[0], y[1])))
+    };
+    let outline: Vec<(f64, f64)> = edge(1.0).chain(edge(-1.0).rev()).collect();
+    chart.draw_series([Polygon::new(outline, BAND.filled())])?;
     Ok(())
 }
 

@@ -59,7 +59,7 @@ pub fn draw(train: &TrainModel) -> Result<Option<String>, PlotError> {
         }
         area.present()?;
     }
-    Ok(Some(for_page(&drawing, &label(train, top_mps), "wide", size)))
+    Ok(Some(for_page(&drawing, &label(train, top_mps), "wide", size, &[])))
 }
 
 /// The curve from standstill to a speed, as (km/h, kN).

@@ -2,12 +2,12 @@
 
 use plotters::backend::SVGBackend;
 use plotters::drawing::IntoDrawingArea;
-use plotters::element::{PathElement, Polygon};
-use plotters::style::Color;
+use plotters::element::PathElement;
 
-use super::axes::{Axis, chart, padded, range_with_zero, stroke, zero_line};
+use super::axes::{Axis, band, chart, frame, padded, range_with_zero, stroke, zero_line};
+use super::reading::Reading;
 use super::speeds::Width;
-use super::{AFTER, BAND, PlotError, SCALE, for_page};
+use super::{AFTER, Plot, PlotError, SCALE, for_page};
 
 /// Half width of the 95 % interval in standard deviations.
 const HALF_95: f64 = 1.96;
@@ -17,14 +17,11 @@ const HALF_95: f64 = 1.96;
 /// # Errors
 ///
 /// When the drawing fails.
-pub fn draw(
-    entries: &[(f64, f64, f64)],
-    direction: &str,
-    width: Width,
-) -> Result<String, PlotError> {
+pub fn draw(entries: &[(f64, f64, f64)], direction: &str, width: Width) -> Result<Plot, PlotError> {
     let (nominal, height, _) = width.size();
     let size = (nominal * SCALE, (height + 60) * SCALE);
-    let mut drawing = String::new();
+    let halves: Vec<f64> = entries.iter().map(|entry| HALF_95 * entry.2).collect();
+    let (mut drawing, mut frames) = (String::new(), Vec::new());
     {
         let area = SVGBackend::with_string(&mut drawing, size).into_drawing_area();
         let x = padded(entries.iter().map(|entry| entry.0 / 1e3), 0.005);
@@ -34,21 +31,21 @@ pub fn draw(
         let x_axis = Axis { range: x, title: "Chainage, km", labels, is_whole: false };
         let y_axis = Axis { range: y, title: "Gradient, ‰", labels: 6, is_whole: false };
         let mut chart = chart(&area, &x_axis, &y_axis)?;
-        let edge = |&(at_m, gradient, std): &(f64, f64, f64), side: f64| {
-            (at_m / 1e3, (gradient + side * HALF_95 * std).clamp(y[0], y[1]))
-        };
-        let upper = entries.iter().map(|entry| edge(entry, 1.0));
-        let lower = entries.iter().rev().map(|entry| edge(entry, -1.0));
-        let outline: Vec<(f64, f64)> = upper.chain(lower).collect();
-        chart.draw_series([Polygon::new(outline, BAND.filled())])?;
+        let line: Vec<(f64, f64)> =
+            entries.iter().map(|&(at_m, gradient, _)| (at_m / 1e3, gradient)).collect();
+        band(&mut chart, &line, &halves, y)?;
         zero_line(&mut chart, x)?;
-        let line: Vec<(f64, f64)> = entries.iter().map(|entry| edge(entry, 0.0)).collect();
         chart.draw_series([PathElement::new(line, stroke(AFTER, 1.2))])?;
+        frames.push(frame(&chart));
         area.present()?;
     }
     let (low, high) = entries.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |range, entry| {
         (range.0.min(entry.1), range.1.max(entry.1))
     });
     let label = format!("Gradient over the chainage for {direction}: from {low:.1} to {high:.1} ‰");
-    Ok(for_page(&drawing, &label, width.class(), size))
+    let at = entries.iter().map(|entry| entry.0 / 1e3).collect();
+    let values = entries.iter().map(|entry| entry.1).collect();
+    let reading = Reading::new("Chainage", "km", false, at).with("gradient", "‰", values, halves);
+    let svg = for_page(&drawing, &label, width.class(), size, &frames);
+    Ok(Plot { svg, readings: vec![reading] })
 }

@@ -9,6 +9,7 @@ pub mod effort;
 pub mod gradient;
 pub mod line;
 pub mod panel;
+pub mod reading;
 pub mod runs;
 pub mod speeds;
 
@@ -17,11 +18,31 @@ use std::io;
 
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::style::RGBColor;
+use serde_json::json;
 
 use super::html::escape;
+use reading::Reading;
+
+/// What the model without effects is called beside its data.
+fn before_name(has_effect: bool) -> &'static str {
+    if has_effect { "before" } else { "model" }
+}
 
 /// Why a plot cannot be drawn.
 pub type PlotError = DrawingAreaErrorKind<io::Error>;
+
+/// A plot: the picture, and what a pointer reads from it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plot {
+    /// The picture, for the page.
+    pub svg: String,
+    /// The data of its charts, from the top.
+    pub readings: Vec<Reading>,
+}
+
+/// Where a chart lies in its drawing: left, top, right, bottom, lower end of the labels below it;
+/// least and greatest value of its horizontal axis.
+type Frame = [f64; 7];
 
 /// Drawn over nominal size.
 const SCALE: u32 = 2;
@@ -41,8 +62,9 @@ const BEFORE: RGBColor = RGBColor(0xB8, 0x5C, 0x14);
 const AFTER: RGBColor = RGBColor(0x1B, 0x62, 0xA5);
 const ACTING: RGBColor = RGBColor(0xE4, 0xEE, 0xF7);
 const BAND: RGBColor = RGBColor(0xD9, 0xC3, 0xAE);
+const TUNNEL: RGBColor = RGBColor(0xE2, 0xE3, 0xE7);
 
-const INKS: [Ink; 8] = [
+const INKS: [Ink; 9] = [
     Ink { colour: TEXT, variable: "--muted" },
     Ink { colour: GRID, variable: "--grid" },
     Ink { colour: AXIS, variable: "--axis" },
@@ -51,6 +73,7 @@ const INKS: [Ink; 8] = [
     Ink { colour: AFTER, variable: "--after" },
     Ink { colour: ACTING, variable: "--acting" },
     Ink { colour: BAND, variable: "--band" },
+    Ink { colour: TUNNEL, variable: "--tunnel" },
 ];
 
 /// The style rules that give every colour of the plots its variable.
@@ -68,14 +91,39 @@ pub fn colour_rules() -> String {
     rules
 }
 
-/// Makes a backend's drawing part of the page: it takes its size from the page and tells what it
-/// shows.
-fn for_page(drawing: &str, label: &str, class: &str, (width, height): (u32, u32)) -> String {
+/// Makes a backend's drawing part of the page: it takes its size from the page, tells what it
+/// shows, and where its charts lie.
+fn for_page(
+    drawing: &str,
+    label: &str,
+    class: &str,
+    (width, height): (u32, u32),
+    frames: &[Frame],
+) -> String {
     let body = drawing.find('>').map_or("", |end| &drawing[end + 1..]);
+    // What is opaque need not say so.
+    let body = body.replace(" opacity=\"1\"", "");
+    let frames = if frames.is_empty() {
+        String::new()
+    } else {
+        format!(" data-frames=\"{}\"", json!(frames))
+    };
     format!(
         "<svg class=\"plot {class}\" viewBox=\"0 0 {width} {height}\" role=\"img\" \
-         aria-label=\"{}\">{body}",
+         aria-label=\"{}\"{frames}>{body}",
         escape(label)
+    )
+}
+
+/// A plot, or one for wide and one for narrow pages, that answers to the pointer; caption and key
+/// are HTML.
+pub fn figure(class: &str, caption: &str, key: &str, plots: &[Plot]) -> String {
+    let readings = plots.first().map_or(String::new(), |plot| reading::json(&plot.readings));
+    let svg: String = plots.iter().map(|plot| &plot.svg[..]).collect();
+    format!(
+        "<figure class=\"{class}\" data-readings=\"{}\">\n<figcaption>{caption}</figcaption>\n\
+         {key}{svg}</figure>\n",
+        escape(&readings)
     )
 }
 
@@ -101,7 +149,7 @@ mod tests {
 
     #[test]
     fn a_file_of_its_own_has_a_size_a_name_space_and_a_ground() {
-        let plot = for_page("<svg width=\"9\">\n<g/></svg>", "a", "wide", (800, 600));
+        let plot = for_page("<svg width=\"9\">\n<g/></svg>", "a", "wide", (800, 600), &[]);
         let file = as_file(&plot);
         assert!(file.contains("viewBox=\"0 0 800 600\""), "{file}");
         assert!(
@@ -123,8 +171,15 @@ mod tests {
 
     #[test]
     fn a_drawing_for_the_page_has_no_size_of_its_own() {
-        let svg = for_page("<svg width=\"9\" xmlns=\"x\">\n<g/></svg>", "a \"b\"", "wide", (8, 6));
+        let svg = for_page(
+            "<svg width=\"9\" xmlns=\"x\">\n<g/></svg>",
+            "a \"b\"",
+            "wide",
+            (8, 6),
+            &[[1.5; 7]],
+        );
         assert!(svg.starts_with("<svg class=\"plot wide\" viewBox=\"0 0 8 6\" role=\"img\""));
         assert!(svg.contains("aria-label=\"a &quot;b&quot;\"") && svg.ends_with("<g/></svg>"));
+        assert!(svg.contains("data-frames=\"[[1.5,1.5,"), "{svg}");
     }
 }

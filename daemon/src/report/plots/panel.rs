@@ -4,11 +4,14 @@ use dynocar_core::explain::report::covariates::Covariate;
 use dynocar_core::explain::report::panels::{Panel, PanelBin};
 use plotters::backend::SVGBackend;
 use plotters::drawing::IntoDrawingArea;
-use plotters::element::{Circle, PathElement, Polygon};
+use plotters::element::{Circle, PathElement};
 use plotters::style::{Color, RGBColor};
 
-use super::axes::{Axis, Chart, chart, padded, range_with_zero, shade, stroke, zero_line};
-use super::{AFTER, BAND, BEFORE, PlotError, SCALE, for_page};
+use super::axes::{
+    Axis, Chart, band, chart, frame, padded, range_with_zero, shade, stroke, zero_line,
+};
+use super::reading::Reading;
+use super::{ACTING, AFTER, BEFORE, Plot, PlotError, SCALE, before_name, for_page};
 
 /// Nominal size in px.
 const SIZE: (u32, u32) = (470, 290);
@@ -20,9 +23,9 @@ const APART: f64 = 0.004;
 /// # Errors
 ///
 /// When the drawing fails.
-pub fn draw(panel: &Panel, has_effect: bool) -> Result<String, PlotError> {
+pub fn draw(panel: &Panel, has_effect: bool) -> Result<Plot, PlotError> {
     let size = (SIZE.0 * SCALE, SIZE.1 * SCALE);
-    let mut drawing = String::new();
+    let (mut drawing, mut frames) = (String::new(), Vec::new());
     {
         let area = SVGBackend::with_string(&mut drawing, size).into_drawing_area();
         let is_category = panel.covariate.is_category();
@@ -32,46 +35,90 @@ pub fn draw(panel: &Panel, has_effect: bool) -> Result<String, PlotError> {
             Covariate::Run => [0.4, panel.bins.last().map_or(1.0, |bin| bin.at) + 0.6],
             _ => padded(panel.bins.iter().map(|bin| bin.at), room),
         };
-        let y = vertical_range(panel, has_effect);
+        let y = vertical_range(&panel.bins, has_effect);
         let title = axis_title(panel.covariate);
         let labels = if is_category { panel.bins.len().clamp(3, 13) } else { 6 };
         let x_axis = Axis { range: x, title: &title, labels, is_whole: is_category };
         let y_axis =
             Axis { range: y, title: "Missing resistance, N/kN", labels: 5, is_whole: false };
         let mut chart = chart(&area, &x_axis, &y_axis)?;
-        shade(&mut chart, &panel.acting, x, y)?;
+        shade(&mut chart, ACTING, &panel.acting, x, y)?;
         zero_line(&mut chart, x)?;
         if has_effect && !is_category {
-            band(&mut chart, &panel.bins)?;
+            let (line, halves): (Vec<(f64, f64)>, Vec<f64>) = panel
+                .bins
+                .iter()
+                .map(|bin| ((bin.at, bin.effect_n_per_kn.0), bin.effect_n_per_kn.1))
+                .unzip();
+            band(&mut chart, &line, &halves, y)?;
+            chart.draw_series([PathElement::new(line, stroke(BEFORE, 1.0))])?;
         }
-        let apart = if has_effect { APART * (x[1] - x[0]) } else { 0.0 };
-        let before = panel.bins.iter().map(|bin| (bin.at - apart, bin.before_n_per_kn));
-        points(&mut chart, before, BEFORE, false)?;
-        if has_effect {
-            let after = panel.bins.iter().map(|bin| (bin.at + apart, bin.after_n_per_kn));
-            points(&mut chart, after, AFTER, true)?;
-        }
+        means(&mut chart, &panel.bins, has_effect, x)?;
+        frames.push(frame(&chart));
         area.present()?;
     }
-    Ok(for_page(&drawing, &label(panel, has_effect), "panel", size))
+    let svg = for_page(&drawing, &label(panel, has_effect), "panel", size, &frames);
+    let covariate = panel.covariate;
+    let reading = reading(covariate.title(), covariate.unit(), &panel.bins, has_effect);
+    Ok(Plot { svg, readings: vec![reading] })
+}
+
+/// A mean of a bin, with its half width.
+type Mean = fn(&PanelBin) -> (f64, f64);
+
+/// Bins as a pointer reads them.
+pub(super) fn reading(
+    name: &'static str,
+    unit: &'static str,
+    bins: &[PanelBin],
+    has_effect: bool,
+) -> Reading {
+    let sides: [(&str, Mean); 3] = [
+        (before_name(has_effect), |bin| bin.before_n_per_kn),
+        ("after", |bin| bin.after_n_per_kn),
+        ("effect", |bin| bin.effect_n_per_kn),
+    ];
+    let reading = Reading::new(name, unit, true, bins.iter().map(|bin| bin.at).collect());
+    let shown = sides.into_iter().take(if has_effect { 3 } else { 1 });
+    shown.fold(reading, |reading, (name, side)| {
+        let (values, halves) = bins.iter().map(side).unzip();
+        reading.with(name, "N/kN", values, halves)
+    })
+}
+
+/// The means of bins, before and after, with their whiskers.
+pub(super) fn means(
+    chart: &mut Chart,
+    bins: &[PanelBin],
+    has_effect: bool,
+    x: [f64; 2],
+) -> Result<(), PlotError> {
+    let apart = if has_effect { APART * (x[1] - x[0]) } else { 0.0 };
+    let before = bins.iter().map(|bin| (bin.at - apart, bin.before_n_per_kn));
+    points(chart, before, BEFORE, false)?;
+    if has_effect {
+        let after = bins.iter().map(|bin| (bin.at + apart, bin.after_n_per_kn));
+        points(chart, after, AFTER, true)?;
+    }
+    Ok(())
 }
 
 /// A range that shows every mean with the usual whisker; the longest whiskers may be cut so that
 /// the others stay readable.
-fn vertical_range(panel: &Panel, has_effect: bool) -> [f64; 2] {
+pub(super) fn vertical_range(bins: &[PanelBin], has_effect: bool) -> [f64; 2] {
     let sides = |bin: &PanelBin| {
         let after = if has_effect { bin.after_n_per_kn } else { bin.before_n_per_kn };
         [bin.before_n_per_kn, after]
     };
-    let all: Vec<(f64, f64)> = panel.bins.iter().flat_map(sides).collect();
-    let mut halves: Vec<f64> = panel.bins.iter().map(|bin| bin.before_n_per_kn.1).collect();
+    let all: Vec<(f64, f64)> = bins.iter().flat_map(sides).collect();
+    let mut halves: Vec<f64> = bins.iter().map(|bin| bin.before_n_per_kn.1).collect();
     halves.sort_unstable_by(f64::total_cmp);
     let usual = 1.5 * halves[halves.len() * 3 / 4];
     let whiskers = all.iter().flat_map(|(mean, half)| {
         let shown = half.min(usual);
         [mean - shown, mean + shown]
     });
-    range_with_zero(whiskers.chain(panel.bins.iter().map(|bin| bin.effect_n_per_kn.0)))
+    range_with_zero(whiskers.chain(bins.iter().map(|bin| bin.effect_n_per_kn.0)))
 }
 
 /// A covariate's name with its unit.
@@ -95,23 +142,6 @@ fn points(
     chart.draw_series(points.clone().filter(|point| point.1.1 > 0.0).map(whisker))?;
     let style = if is_filled { colour.filled() } else { stroke(colour, 1.6) };
     chart.draw_series(points.map(|(at, (mean, _))| Circle::new((at, mean), 3 * SCALE, style)))?;
-    Ok(())
-}
-
-/// What the effects account for, with its interval.
-fn band(chart: &mut Chart, bins: &[PanelBin]) -> Result<(), PlotError> {
-    let edge = |bin: &PanelBin, side: f64| {
-        let (mean, half) = bin.effect_n_per_kn;
-        (bin.at, mean + side * half)
-    };
-    let outline: Vec<(f64, f64)> = bins
-        .iter()
-        .map(|bin| edge(bin, 1.0))
-        .chain(bins.iter().rev().map(|bin| edge(bin, -1.0)))
-        .collect();
-    chart.draw_series([Polygon::new(outline, BAND.filled())])?;
-    let middle: Vec<(f64, f64)> = bins.iter().map(|bin| edge(bin, 0.0)).collect();
-    chart.draw_series([PathElement::new(middle, stroke(BEFORE, 1.0))])?;
     Ok(())
 }
 
@@ -152,7 +182,7 @@ mod tests {
 
     #[test]
     fn both_sides_have_a_point_and_a_whisker_for_each_bin() {
-        let svg = draw(&panel(), true).unwrap();
+        let svg = draw(&panel(), true).unwrap().svg;
         assert_eq!(svg.matches("<circle").count(), 16);
         assert_eq!(svg.matches("<polygon").count(), 1);
         assert!(svg.contains("Chainage, km") && svg.contains("fill=\"#E4EEF7\""));
@@ -161,7 +191,7 @@ mod tests {
 
     #[test]
     fn without_an_effect_there_is_no_after() {
-        let svg = draw(&panel(), false).unwrap();
+        let svg = draw(&panel(), false).unwrap().svg;
         assert_eq!(svg.matches("<circle").count(), 8);
         assert!(!svg.contains("after"));
     }

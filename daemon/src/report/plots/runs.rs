@@ -7,8 +7,9 @@ use plotters::drawing::IntoDrawingArea;
 use plotters::element::{Circle, PathElement};
 use plotters::prelude::Color;
 
-use super::axes::{Axis, chart, range_with_zero, stroke};
-use super::{AFTER, AXIS, BEFORE, PlotError, SCALE, for_page};
+use super::axes::{Axis, chart, frame, range_with_zero, stroke};
+use super::reading::Reading;
+use super::{AFTER, AXIS, BEFORE, Plot, PlotError, SCALE, before_name, for_page};
 
 /// Nominal size in px.
 const SIZE: (u32, u32) = (470, 230);
@@ -18,15 +19,11 @@ const SIZE: (u32, u32) = (470, 230);
 /// # Errors
 ///
 /// When the drawing fails.
-pub fn draw(
-    runs: &[(usize, &RunErrors)],
-    role: Role,
-    has_effect: bool,
-) -> Result<String, PlotError> {
+pub fn draw(runs: &[(usize, &RunErrors)], role: Role, has_effect: bool) -> Result<Plot, PlotError> {
     let size = (SIZE.0 * SCALE, SIZE.1 * SCALE);
     let known: Vec<(usize, [f64; 2])> =
         runs.iter().filter_map(|(number, run)| Some((*number, run.full_run_mps?))).collect();
-    let mut drawing = String::new();
+    let (mut drawing, mut frames) = (String::new(), Vec::new());
     {
         let area = SVGBackend::with_string(&mut drawing, size).into_drawing_area();
         let last = known.iter().map(|run| run.0).max().unwrap_or(1) as f64;
@@ -52,11 +49,20 @@ pub fn draw(
         if has_effect {
             chart.draw_series(point(1, AFTER.filled()))?;
         }
+        frames.push(frame(&chart));
         area.present()?;
     }
     let role = if role == Role::Holdout { "holdout" } else { "fit" };
     let label = format!("Error of the predicted speed of {} {role} runs", known.len());
-    Ok(for_page(&drawing, &label, "panel", size))
+    let at = known.iter().map(|run| run.0 as f64).collect();
+    let errors = |side: usize| known.iter().map(|run| run.1[side]).collect();
+    let mut reading = Reading::new("Run", "", true, at);
+    reading = reading.with(before_name(has_effect), "m/s", errors(0), Vec::new());
+    if has_effect {
+        reading = reading.with("after", "m/s", errors(1), Vec::new());
+    }
+    let svg = for_page(&drawing, &label, "panel", size, &frames);
+    Ok(Plot { svg, readings: vec![reading] })
 }
 
 #[cfg(test)]
@@ -71,7 +77,7 @@ mod tests {
             full_run_mps: Some([0.27, 0.08]),
             window60_mps: None,
         };
-        let svg = draw(&[(7, &errors)], Role::Holdout, true).unwrap();
+        let svg = draw(&[(7, &errors)], Role::Holdout, true).unwrap().svg;
         let labels = svg.lines().filter(|line| line.trim() == "7").count();
         assert_eq!(labels, 1, "{svg}");
     }

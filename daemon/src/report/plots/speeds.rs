@@ -7,8 +7,9 @@ use plotters::drawing::IntoDrawingArea;
 use plotters::element::PathElement;
 use plotters::style::RGBColor;
 
-use super::axes::{Axis, Chart, chart, padded, range_with_zero, shade, stroke, zero_line};
-use super::{AFTER, BEFORE, MEASURED, PlotError, SCALE, for_page};
+use super::axes::{Axis, Chart, chart, frame, padded, range_with_zero, shade, stroke, zero_line};
+use super::reading::Reading;
+use super::{ACTING, AFTER, BEFORE, MEASURED, Plot, PlotError, SCALE, before_name, for_page};
 
 /// For which page a plot is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,10 +42,10 @@ impl Width {
 /// # Errors
 ///
 /// When the drawing fails.
-pub fn draw(trace: &Trace, width: Width, has_effect: bool) -> Result<String, PlotError> {
+pub fn draw(trace: &Trace, width: Width, has_effect: bool) -> Result<Plot, PlotError> {
     let (nominal, above, below) = width.size();
     let size = (nominal * SCALE, (above + below) * SCALE);
-    let mut drawing = String::new();
+    let (mut drawing, mut frames) = (String::new(), Vec::new());
     {
         let area = SVGBackend::with_string(&mut drawing, size).into_drawing_area();
         let (speeds, errors) = area.split_vertically(above * SCALE);
@@ -58,7 +59,7 @@ pub fn draw(trace: &Trace, width: Width, has_effect: bool) -> Result<String, Plo
         let y = [0.0, y[1]];
         let y_axis = Axis { range: y, title: "Speed, m/s", labels: 5, is_whole: false };
         let mut upper = chart(&speeds, &x_axis(""), &y_axis)?;
-        shade(&mut upper, &trace.acting_s, x, y)?;
+        shade(&mut upper, ACTING, &trace.acting_s, x, y)?;
         lines(&mut upper, trace, BEFORE, 1.2, |point| point.before_mps)?;
         if has_effect {
             lines(&mut upper, trace, AFTER, 1.2, |point| point.after_mps)?;
@@ -71,15 +72,38 @@ pub fn draw(trace: &Trace, width: Width, has_effect: bool) -> Result<String, Plo
         let y_axis =
             Axis { range: y, title: "Predicted minus measured, m/s", labels: 5, is_whole: false };
         let mut lower = chart(&errors, &x_axis("Time in the recording, s"), &y_axis)?;
-        shade(&mut lower, &trace.acting_s, x, y)?;
+        shade(&mut lower, ACTING, &trace.acting_s, x, y)?;
         zero_line(&mut lower, x)?;
         lines(&mut lower, trace, BEFORE, 1.4, |p| p.before_mps - p.measured_mps)?;
         if has_effect {
             lines(&mut lower, trace, AFTER, 1.4, |p| p.after_mps - p.measured_mps)?;
         }
+        frames.extend([frame(&upper), frame(&lower)]);
         area.present()?;
     }
-    Ok(for_page(&drawing, &label(trace, has_effect), width.class(), size))
+    let svg = for_page(&drawing, &label(trace, has_effect), width.class(), size, &frames);
+    Ok(Plot { svg, readings: readings(trace, has_effect) })
+}
+
+/// One of the speeds of a point.
+type Speed = fn(&TracePoint) -> f64;
+
+fn readings(trace: &Trace, has_effect: bool) -> Vec<Reading> {
+    let values = |value: &dyn Fn(&TracePoint) -> f64| -> Vec<f64> {
+        // Nothing is read between two pieces.
+        trace.pieces.iter().flat_map(|it| it.iter().map(value).chain([f64::NAN])).collect()
+    };
+    let time = || Reading::new("Time in the recording", "s", false, values(&|p| p.time_s));
+    let (mut speeds, mut errors) =
+        (time().with("measured", "m/s", values(&|p| p.measured_mps), Vec::new()), time());
+    let sides: [(&str, Speed); 2] =
+        [(before_name(has_effect), |p| p.before_mps), ("after", |p| p.after_mps)];
+    for (name, value) in sides.into_iter().take(1 + usize::from(has_effect)) {
+        let away = values(&|p| value(p) - p.measured_mps);
+        speeds = speeds.with(name, "m/s", values(&value), Vec::new());
+        errors = errors.with(format!("{name} − measured"), "m/s", away, Vec::new());
+    }
+    vec![speeds, errors]
 }
 
 fn lines(

@@ -9,7 +9,7 @@ use dynocar_core::explain::report::traces::Trace;
 use super::{Section, legend};
 use crate::report::html::{Column, Table, escape, estimate, percent};
 use crate::report::plots::speeds::Width;
-use crate::report::plots::{runs, speeds};
+use crate::report::plots::{figure, runs, speeds};
 use crate::report::{ReportError, Subject};
 
 /// The section.
@@ -33,7 +33,7 @@ pub fn section(subject: &Subject) -> Result<Section, ReportError> {
     body += &summary(subject);
     body += &by_run(subject)?;
     for trace in &subject.data.traces {
-        body += &figure(subject, trace)?;
+        body += &trace_figure(subject, trace)?;
     }
     Ok(Section { id: "error", title: "Error before and after", body })
 }
@@ -109,10 +109,10 @@ fn by_run(subject: &Subject) -> Result<String, ReportError> {
         if own.is_empty() {
             continue;
         }
-        let svg = runs::draw(&own, role, subject.has_effect()).map_err(|source| {
+        let plot = runs::draw(&own, role, subject.has_effect()).map_err(|source| {
             ReportError::Plot { plot: format!("the errors of the {name} runs"), source }
         })?;
-        let _ = write!(figures, "<figure>\n<figcaption>{name} runs</figcaption>\n{svg}</figure>\n");
+        figures += &figure("", &format!("{name} runs"), "", &[plot]);
     }
     html += "<h3>Run by run</h3>\n";
     html += &key(subject, false);
@@ -170,7 +170,7 @@ fn key(subject: &Subject, has_lines: bool) -> String {
     legend(&entries)
 }
 
-fn figure(subject: &Subject, trace: &Trace) -> Result<String, ReportError> {
+fn trace_figure(subject: &Subject, trace: &Trace) -> Result<String, ReportError> {
     let draw = |width| {
         speeds::draw(trace, width, subject.has_effect())
             .map_err(|source| ReportError::Plot { plot: trace.file.clone(), source })
@@ -184,11 +184,7 @@ fn figure(subject: &Subject, trace: &Trace) -> Result<String, ReportError> {
         Some([before, _]) => format!(": {before:.3} m/s"),
         None => String::new(),
     };
-    Ok(format!(
-        "<figure class=\"trace\">\n<figcaption>Run {}, {} ({role}){errors}</figcaption>\n{}{wide}\
-         {narrow}</figure>\n",
-        subject.number(&trace.file),
-        escape(&trace.file),
-        key(subject, true)
-    ))
+    let (number, file) = (subject.number(&trace.file), escape(&trace.file));
+    let caption = format!("Run {number}, {file} ({role}){errors}");
+    Ok(figure("trace", &caption, &key(subject, true), &[wide, narrow]))
 }

@@ -2,6 +2,7 @@
 
 pub mod candidates;
 pub mod errors;
+pub mod line;
 pub mod parameters;
 pub mod places;
 pub mod quality;

@@ -1,12 +1,10 @@
 //! The residual as a force against covariates.
 
-use std::fmt::Write as _;
-
 use dynocar_core::explain::report::covariates::Covariate;
 
 use super::{Section, legend};
 use crate::report::html::escape;
-use crate::report::plots::panel;
+use crate::report::plots::{figure, panel};
 use crate::report::{ReportError, Subject};
 
 /// The section.
@@ -39,17 +37,13 @@ pub fn section(subject: &Subject) -> Result<Section, ReportError> {
             Some(file) => format!("Run {}, {file}, over time", subject.number(file)),
             None => panel.covariate.title().to_string(),
         };
-        let svg = panel::draw(panel, has_effect)
+        let plot = panel::draw(panel, has_effect)
             .map_err(|source| ReportError::Plot { plot: title.clone(), source })?;
         let note = match panel.covariate {
             Covariate::Direction => " <small>(+1: chainage grows)</small>",
             _ => "",
         };
-        let _ = write!(
-            body,
-            "<figure>\n<figcaption>{}{note}</figcaption>\n{svg}</figure>\n",
-            escape(&title)
-        );
+        body += &figure("", &format!("{}{note}", escape(&title)), "", &[plot]);
     }
     body += "</div>\n";
     if subject.data.panels.is_empty() {

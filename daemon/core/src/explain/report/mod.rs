@@ -8,6 +8,7 @@
 //! - [`traces`]: measured and predicted speeds of runs
 //! - [`windows`], [`covariates`], [`panels`]: the residual as a force, window by window, against
 //!   covariates
+//! - [`line`]: the same along the line, by direction, with the places found
 //! - [`parameters`]: what was fitted, with uncertainty
 //! - [`candidates`]: what else was considered
 //!
@@ -19,6 +20,7 @@ pub mod candidates;
 pub mod covariates;
 pub mod errors;
 mod estimate;
+pub mod line;
 pub mod panels;
 pub mod parameters;
 pub mod places;
@@ -32,6 +34,7 @@ use crate::dataset::Dataset;
 use candidates::CandidateRow;
 use errors::Errors;
 pub use estimate::Estimate;
+use line::AlongLine;
 use panels::Panel;
 use parameters::ParameterRow;
 use places::PlaceTable;
@@ -48,6 +51,8 @@ pub struct ReportData {
     pub traces: Vec<Trace>,
     /// The residual against covariates, the one that matters most first.
     pub panels: Vec<Panel>,
+    /// The residual and the places found along the line.
+    pub line: AlongLine,
     /// Base resistance and effects.
     pub parameters: Vec<ParameterRow>,
     /// Where the effects act.
@@ -60,10 +65,12 @@ impl ReportData {
     /// What a report of this explanation of a dataset shows.
     pub fn of(dataset: &Dataset, explanation: &Explanation) -> Self {
         let errors = Errors::of(explanation);
+        let windows = windows::windows(explanation);
         ReportData {
             sentence: sentence::sentence(&explanation.answer, &errors),
             traces: traces::traces(explanation),
-            panels: panels::panels(dataset, explanation),
+            panels: panels::panels(dataset, explanation, &windows),
+            line: AlongLine::of(explanation, &windows),
             parameters: parameters::rows(dataset, explanation),
             places: PlaceTable::of(explanation),
             candidates: candidates::rows(explanation),

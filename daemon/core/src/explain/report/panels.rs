@@ -4,7 +4,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{DMatrix, DVector};
 
 use super::covariates::Covariate;
-use super::windows::{Window, windows};
+use super::windows::Window;
 use crate::dataset::{Dataset, Role};
 use crate::explain::Explanation;
 use crate::explain::answer::{ParameterValue, RunWindow};
@@ -142,14 +142,12 @@ impl Zones {
 
 /// The panels: first the covariate on which the effect is seen best, then those that are always
 /// shown, then those on which the residual is most uneven.
-pub fn panels(dataset: &Dataset, explanation: &Explanation) -> Vec<Panel> {
-    let (runs, windows, zones) =
-        (&explanation.problem.runs, windows(explanation), zones(explanation));
-    let (deviations, covariance) = deviations(&explanation.grown);
-    let covariance = with_deviations(&covariance, &deviations);
+pub fn panels(dataset: &Dataset, explanation: &Explanation, windows: &[Window]) -> Vec<Panel> {
+    let (runs, zones) = (&explanation.problem.runs, zones(explanation));
+    let covariance = covariance(explanation);
     let numbers: Vec<f64> = dataset.with_role(Role::Fit).map(|run| f64::from(run.number)).collect();
     let panel = |covariate: Covariate, file: Option<String>| {
-        let mut bins = bins(covariate, &windows, runs, &covariance);
+        let mut bins = bins(covariate, windows.iter(), runs, &covariance);
         if covariate == Covariate::Run {
             bins.iter_mut().for_each(|bin| bin.at = numbers[bin.at as usize - 1]);
         }
@@ -200,8 +198,9 @@ fn unevenness(panel: &Panel) -> f64 {
     sum / panel.bins.len() as f64
 }
 
-/// The correlations of a covariance with these deviations.
-fn with_deviations(covariance: &DMatrix<f64>, deviations: &[f64]) -> DMatrix<f64> {
+/// Covariance of the grown model's parameters, with the deviations that are told.
+pub(super) fn covariance(explanation: &Explanation) -> DMatrix<f64> {
+    let (deviations, covariance) = deviations(&explanation.grown);
     let count = deviations.len();
     DMatrix::from_fn(count, count, |i, j| {
         let scale = (covariance[(i, i)] * covariance[(j, j)]).sqrt();
@@ -210,14 +209,14 @@ fn with_deviations(covariance: &DMatrix<f64>, deviations: &[f64]) -> DMatrix<f64
     })
 }
 
-fn bins(
+/// Windows in order of a covariate, in bins.
+pub(super) fn bins<'w>(
     covariate: Covariate,
-    windows: &[Window],
+    windows: impl Iterator<Item = &'w Window>,
     runs: &[RunData],
     covariance: &DMatrix<f64>,
 ) -> Vec<PanelBin> {
     let mut known: Vec<(f64, &Window)> = windows
-        .iter()
         .filter_map(|window| Some((covariate.value(window, &runs[window.run])?, window)))
         .filter(|(value, _)| value.is_finite())
         .collect();
