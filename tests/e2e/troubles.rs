@@ -22,9 +22,12 @@ const CALLS: [(&str, &str); 7] = [
     ("error!(", "daemon/src"),
     ("OutputError::Name {", "daemon/src"),
 ];
-/// Whole files whose sentences are messages: of impossible data, of impossible declarations.
-const SENTENCES: [&str; 2] =
-    ["daemon/core/src/plausibility/words.rs", "daemon/core/src/plausibility/declared.rs"];
+/// Whole files whose sentences are messages: of impossible data and declarations, of stops.
+const SENTENCES: [&str; 3] = [
+    "daemon/core/src/plausibility/words.rs",
+    "daemon/core/src/plausibility/declared.rs",
+    "shared/src/stopping.rs",
+];
 /// Stands for what changes from message to message.
 const GAP: char = '\0';
 
