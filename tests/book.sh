@@ -14,5 +14,6 @@ python3 -m venv "$place/venv"
 "$place/venv/bin/pip" install --quiet --disable-pip-version-check mkdocs==1.6.1 markdown==3.11.3
 
 python3 tests/book_pages.py target/book_pages
-"$place/venv/bin/mkdocs" build --strict --quiet --config-file .mkdocs.yml
+# Not --quiet: with it, MkDocs counts no warnings.
+"$place/venv/bin/mkdocs" build --strict --config-file .mkdocs.yml
 echo "the book: target/book/index.html"
