@@ -66,9 +66,10 @@ pub fn execute(arguments: &ImportArguments) -> Result<(), Failure> {
     let train = chosen(&imported.trains, |it| &it.id, arguments.train_id.as_deref(), "train")?;
     let line = chosen(&imported.lines, |it| &it.id, arguments.line_id.as_deref(), "line")?;
     if train.is_none() && !arguments.train.is_empty() {
-        let message =
-            "the files hold no train, so that nothing can be said of one on the command line";
-        return Err(Failure::Input(message.into()));
+        return Err(Failure::Input(
+            "the files hold no train, so that nothing can be said of one on the command line"
+                .into(),
+        ));
     }
     let train = train.map(|it| files::train(it, &arguments.train).map(|text| (it, text)));
     let train = train.transpose()?;

@@ -22,9 +22,10 @@ pub(super) fn draw(understood: &Understood, folder: &Path) -> Result<(), Failure
         Understood::Train(train) => (Some(&**train), None),
         Understood::Track(track) => (None, Some(&**track)),
         Understood::Daemon(_) => {
-            let message =
-                "--draw: expected a dataset, a train or a track, not a daemon's configuration";
-            return Err(Failure::Input(message.into()));
+            return Err(Failure::Input(
+                "--draw: expected a dataset, a train or a track, not a daemon's configuration"
+                    .into(),
+            ));
         }
     };
     let failed = |error| Failure::Work(format!("the drawing failed: {error}"));
