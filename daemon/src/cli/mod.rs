@@ -33,9 +33,6 @@ pub use failure::{ErrorAnswer, Failure};
 use crate::output::{OutputError, write_json};
 use crate::programs::RECORDING;
 
-/// The program of everything about recordings.
-const RECORDING: &str = "dynocar-recording";
-
 /// Dynocar, a dynamometer car in software.
 #[derive(Debug, Parser)]
 #[command(name = "dynocar", version, about)]
