@@ -1,10 +1,12 @@
 #!/bin/sh
-# Builds dynocar_<version>_<arch>.deb from the release binaries.
+# Builds dynocar_<version>_<arch>.deb from the release binaries. dynocar-watch and dynocar-recording go into
+# it where they lie beside the program.
 # usage: build.sh [--program FILE] [--libraries FOLDER] [--out FOLDER]
 #   --program    the program, default target/release/dynocar
 #   --libraries  where libdynocar_client.a and libdynocar_fmu.so lie, default target/release
 #   --out        where the package goes, default target/debian
-# Build first: cargo build --release -p dynocar && cargo build --release -p dynocar-client -p dynocar-fmu
+# Build first: cargo build --release -p dynocar -p dynocar-watch -p dynocar-recording &&
+#              cargo build --release -p dynocar-client -p dynocar-fmu
 set -eu
 
 here=$(cd "$(dirname "$0")" && pwd)
@@ -49,6 +51,13 @@ put() { # SOURCE TARGET [MODE]
 
 # The program, what shells offer for it, and its manual.
 put "$program" usr/bin/dynocar 755
+for companion in dynocar-watch dynocar-recording; do
+    if [ -f "$(dirname "$program")/$companion" ]; then
+        put "$(dirname "$program")/$companion" "usr/bin/$companion" 755
+    else
+        echo "build.sh: no $companion beside the program: the package goes without it" >&2
+    fi
+done
 completions() { # SHELL TARGET
     mkdir -p "$root/$(dirname "$2")"
     "$program" completions "$1" >"$root/$2"
@@ -81,7 +90,7 @@ told dynocar-config.cmake usr/lib/cmake/dynocar/dynocar-config.cmake
 told dynocar-config-version.cmake usr/lib/cmake/dynocar/dynocar-config-version.cmake
 put "$libraries/libdynocar_fmu.so" usr/lib/dynocar/libdynocar_fmu.so
 if command -v strip >/dev/null; then
-    strip --strip-unneeded "$root/usr/bin/dynocar" "$root/usr/lib/$soname" \
+    strip --strip-unneeded "$root"/usr/bin/* "$root/usr/lib/$soname" \
         "$root/usr/lib/dynocar/libdynocar_fmu.so"
     strip --strip-debug "$root/usr/lib/libdynocar_client.a"
 fi
@@ -101,12 +110,13 @@ put "$project/client/README.md" "$document/client.md"
 for guide in "$project"/docs/guides/*.md; do
     put "$guide" "$document/guides/$(basename "$guide")"
 done
+put "$project/docs/troubles.md" "$document/troubles.md"
 put "$project/CHANGELOG.md" "$document/changelog"
 gzip -9n "$root/$document/changelog"
 
 # The package's own files. The newest C library that is called for is the oldest that will do.
 mkdir "$root/DEBIAN"
-glibc=$(grep -aoh 'GLIBC_2\.[0-9]*' "$root/usr/bin/dynocar" "$root/usr/lib/$soname" |
+glibc=$(grep -aoh 'GLIBC_2\.[0-9]*' "$root"/usr/bin/* "$root/usr/lib/$soname" |
     sed 's/GLIBC_//' | sort -uV | tail -n 1)
 size=$(du -sk --exclude=DEBIAN "$root" | cut -f 1)
 cat >"$root/DEBIAN/control" <<EOF

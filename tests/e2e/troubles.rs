@@ -4,13 +4,15 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Where messages are raised.
-const FOLDERS: [&str; 6] = [
+const FOLDERS: [&str; 8] = [
     "daemon/src",
     "daemon/core/src",
     "daemon/fmu/src",
     "shared/src",
     "client/src",
     "client/python/src",
+    "client/recording/src",
+    "client/watch/src",
 ];
 /// A call whose first literal is a message, and the folder in which it is one.
 const CALLS: [(&str, &str); 7] = [
