@@ -8,7 +8,7 @@
 //! - [`traces`]: measured and predicted speeds of runs
 //! - [`windows`], [`covariates`], [`panels`]: the residual as a force, window by window, against
 //!   covariates
-//! - [`line`]: the same along the line, by direction, with the places found
+//! - [`mod@line`]: the same along the line, by direction, with the places found
 //! - [`parameters`]: what was fitted, with uncertainty
 //! - [`candidates`]: what else was considered
 //!
