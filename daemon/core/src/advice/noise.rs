@@ -8,9 +8,11 @@
 //! the measured speed follows from the deviation of the unexplained force.
 
 use dynocar_shared::{ParameterSnapshot, PipelineKind};
+use nalgebra::Vector3;
 
 use super::known::davis_of;
 use crate::pipeline::trajectory::index::A;
+use crate::pipeline::trajectory::kalman::TrajectoryKalmanSettings;
 use crate::pipeline::trajectory::quality::prior_std;
 use crate::pipeline::trajectory::unexplained::speed_noise_mps;
 use crate::train::TrainModel;
@@ -34,9 +36,12 @@ const LOOKS: usize = 36;
 const LOOKS_MIN: usize = 4;
 /// Times between samples in s that can be.
 const STEP_S: (f64, f64) = (1e-4, 2.5);
-/// Standard deviation of the declared coefficients before any data, as a share: the default of
-/// `trajectory_kalman`.
-const PRIOR_SHARE: f64 = 0.5;
+
+/// Standard deviations of the declared coefficients before any data, as `trajectory_kalman` has them by
+/// default.
+fn declared_std(train: &TrainModel) -> Vector3<f64> {
+    prior_std(train, TrajectoryKalmanSettings::default().prior_relative_std)
+}
 
 /// Follows the snapshots of one pipeline of the resistance.
 #[derive(Clone, Debug, Default)]
@@ -110,7 +115,7 @@ impl NoiseSeen {
         let rate = if self.rates.len() >= LOOKS_MIN {
             median(&self.rates)
         } else {
-            let before = prior_std(train, PRIOR_SHARE)[A].powi(-2);
+            let before = declared_std(train)[A].powi(-2);
             (information_on_a(newest)? - before) / (newest.samples_used as f64 * step_s)
         };
         let noise = Noise {
@@ -172,7 +177,7 @@ mod tests {
             rotating_mass_factor: 0.06,
             ..TrainModel::bare("test", 1e5, Davis { a: 1.5, b: 0.02, c: 0.003 })
         };
-        let prior = prior_std(&train, PRIOR_SHARE);
+        let prior = declared_std(&train);
         let mut information = Matrix3::from_diagonal(&prior.map(|std| std.powi(-2)));
         let mut seen = NoiseSeen::default();
         let mut newest = snapshot(0.0, &information);
