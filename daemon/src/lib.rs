@@ -7,6 +7,7 @@
 //! - [`dataset`]: recorded runs from disk
 //! - [`identify`]: the pipelines over recorded runs
 //! - [`fmu`]: the estimators as an FMU
+//! - [`annotation`]: an explanation beside the data that it explains
 //! - [`grown`]: the model with its effects as train and track files
 //! - [`output`]: where results go
 //! - [`programs`]: commands that are programs of their own
@@ -22,6 +23,7 @@
 //! - [`unpacking`]: recordings as datasets
 //! - [`replay`]: recorded runs into the sample channel
 
+pub mod annotation;
 pub mod cli;
 pub mod config;
 pub mod dataset;

@@ -1,7 +1,6 @@
 //! An answer against the truth.
 
 use dynocar_core::explain::Explanation;
-use dynocar_core::explain::answer::Verdict;
 use dynocar_core::track::LinearProfile;
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};
@@ -57,13 +56,7 @@ pub fn grade(
     let mut expected: Vec<&str> =
         simulated.effects.iter().map(|effect| effect.kind().name()).collect();
     let mut found: Vec<&str> = named.iter().map(String::as_str).collect();
-    let verdict = match answer.verdict {
-        Verdict::None => "none",
-        Verdict::Effect => "effect",
-        Verdict::Ambiguous => "ambiguous",
-        Verdict::Unknown => "unknown",
-        Verdict::InsufficientData => "insufficient_data",
-    };
+    let verdict = answer.verdict.name();
     if let Some(rival) = rival.filter(|rival| rival.is_never_told || verdict == "ambiguous") {
         expected.push(rival.kind.name());
     }

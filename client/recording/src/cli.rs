@@ -1,5 +1,7 @@
 //! The command line: `dynocar record`, `recover`, `convert` and `replay --verify` become this program.
 
+mod annotate;
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -33,6 +35,8 @@ enum Command {
     Record(RecordArguments),
     Recover(RecoverArguments),
     Convert(ConvertArguments),
+    #[command(hide = true)]
+    Annotate(annotate::AnnotateArguments),
     #[command(hide = true)]
     Verify(VerifyArguments),
     /// Print the reference page of the recorded fields
@@ -123,6 +127,7 @@ pub fn main() -> ExitCode {
         Command::Record(arguments) => execute_record(arguments),
         Command::Recover(arguments) => execute_recover(arguments),
         Command::Convert(arguments) => execute_convert(arguments),
+        Command::Annotate(arguments) => annotate::execute(arguments),
         Command::Verify(arguments) => execute_verify(arguments),
         Command::Fields => print(&page()).map_err(Failure::from),
     };
@@ -222,15 +227,19 @@ fn execute_convert(arguments: &ConvertArguments) -> Result<(), Failure> {
 }
 
 fn execute_from_dataset(from: &Path, output: &Path, is_quiet: bool) -> Result<(), Failure> {
-    let samples = from_dataset(from, output).map_err(|error| match error {
-        FromDatasetError::Dataset(error) => error.into(),
-        FromDatasetError::Write { .. } => Failure::Work(error.to_string()),
-        error => Failure::Input(error.to_string()),
-    })?;
+    let samples = from_dataset(from, output).map_err(from_dataset_failure)?;
     if !is_quiet {
         tell(&format!("{}: {samples} samples", output.display()));
     }
     Ok(())
+}
+
+fn from_dataset_failure(error: FromDatasetError) -> Failure {
+    match error {
+        FromDatasetError::Dataset(error) => error.into(),
+        FromDatasetError::Write { .. } => Failure::Work(error.to_string()),
+        error => Failure::Input(error.to_string()),
+    }
 }
 
 fn execute_verify(arguments: &VerifyArguments) -> Result<(), Failure> {

@@ -13,14 +13,18 @@
 //! - [`writing`], [`reading`]: MCAP files, written without seeking and read as far as they are whole
 //! - [`recording`]: a recording in memory
 //! - [`record`]: the recorder
+//! - [`copying`]: copies of recordings, ours or not
 //! - [`recover`]: a broken file made whole
+//! - [`annotate`]: an explanation beside the data
 //! - [`convert`]: recordings to datasets and back
 //! - [`verify`]: every recorded snapshot computed again
 //! - [`cli`]: the command line
 
+pub mod annotate;
 pub mod cli;
 pub mod codec;
 pub mod convert;
+pub mod copying;
 pub mod event;
 pub mod page;
 pub mod reading;

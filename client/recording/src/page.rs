@@ -6,10 +6,11 @@ use dynocar_shared::schema::{Field, Missing, unit_of};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Parameter, PipelineKind, Reason, RejectionReason, Status};
 
-use crate::event::{EVENT_FIELDS, EventKind};
+use crate::annotate::schema::MESSAGES;
+use crate::event::{EVENT_FIELDS, EventField, EventKind};
 use crate::schema::{
     ESTIMATE, REJECTED, SAMPLE_FIELDS, SNAPSHOT_FIELDS, number, parameter_number, rejection_number,
-    std_name, vocabulary_of,
+    std_name, vocabulary_of, vocabulary_of_type,
 };
 
 const HEAD: &str = "# Fields of a recording
@@ -19,6 +20,10 @@ protobuf messages. How to record is told in [the guide](guides/recording.md).
 
 A field of which it says *missing unless measured* is `optional`: it is there when the controller
 measured it. Every other number that is not there is 0.
+";
+
+const EXPLANATION: &str = "
+`explain --annotate` adds the following messages.
 ";
 
 /// The page as Markdown.
@@ -48,10 +53,10 @@ pub fn page() -> String {
     for &it in RejectionReason::ALL {
         row(&mut page, it.name(), rejection_number(it), "uint32", "", it.meaning());
     }
-    table(&mut page, "dynocar.Event", "What happened around them.");
-    for it in &EVENT_FIELDS {
-        let of_type = vocabulary_of(it.name).unwrap_or_else(|| protobuf(it.type_name));
-        row(&mut page, it.name, it.number as u32, of_type, unit_of(it.name), it.meaning);
+    listed(&mut page, "Event", "What happened around them.", &EVENT_FIELDS);
+    page.push_str(EXPLANATION);
+    for (name, what, fields) in MESSAGES {
+        listed(&mut page, name, what, fields);
     }
     enumerations(&mut page);
     page
@@ -63,6 +68,15 @@ fn table(page: &mut String, name: &str, what: &str) {
         "\n## `{name}`\n\n{what}\n\n| field | number | type | unit | meaning |\n\
          | --- | --- | --- | --- | --- |\n"
     );
+}
+
+/// A message by the table of its fields.
+fn listed(page: &mut String, name: &str, what: &str, fields: &[EventField]) {
+    table(page, &format!("dynocar.{name}"), &plain(what));
+    for it in fields {
+        let of_type = vocabulary_of_type(it.type_name).unwrap_or_else(|| protobuf(it.type_name));
+        row(page, it.name, it.number as u32, of_type, unit_of(it.name), it.meaning);
+    }
 }
 
 fn row(page: &mut String, name: &str, number: u32, of_type: &str, unit: &str, meaning: &str) {

@@ -141,6 +141,11 @@ pub trait Visitor {
     fn raw(&mut self, _: &Raw<'_>) {}
 }
 
+/// Nobody.
+impl Visitor for () {
+    fn item(&mut self, _: Item<'_>) {}
+}
+
 /// Reads a file, and tells what it holds as far as it is whole.
 ///
 /// # Errors

@@ -17,7 +17,7 @@ use prost_types::{
     FileDescriptorProto, FileDescriptorSet, OneofDescriptorProto,
 };
 
-use crate::event::{EVENT_FIELDS, EventKind};
+use crate::event::{EVENT_FIELDS, EventField, EventKind};
 
 /// Name of the message of a sample.
 pub const SAMPLE: &str = "dynocar.TrainSample";
@@ -64,7 +64,7 @@ pub fn rejection_number(reason: RejectionReason) -> u32 {
     reason as u32 + 1
 }
 
-/// The vocabulary whose numbers a field of a snapshot or an event holds.
+/// The vocabulary whose numbers a field of a snapshot holds.
 pub fn vocabulary_of(name: &str) -> Option<&'static str> {
     Some(match name {
         "pipeline_kind" => "PipelineKind",
@@ -72,9 +72,13 @@ pub fn vocabulary_of(name: &str) -> Option<&'static str> {
         "reason" => "Reason",
         "suspected_effect" => "EffectKind",
         "parameters" => "Parameter",
-        "kind" => "EventKind",
         _ => return None,
     })
+}
+
+/// The vocabulary that a type of a table of fields is.
+pub fn vocabulary_of_type(type_name: &'static str) -> Option<&'static str> {
+    type_name.starts_with(char::is_uppercase).then_some(type_name)
 }
 
 fn descriptors() -> FileDescriptorSet {
@@ -87,7 +91,7 @@ fn descriptors() -> FileDescriptorSet {
             message("ParameterSnapshot", snapshot_message()),
             message("Estimate", estimate_message()),
             message("Rejected", rejected_message()),
-            message("Event", event_message()),
+            message("Event", fields_of(&EVENT_FIELDS)),
         ],
         enum_type: enums(),
         ..Default::default()
@@ -96,7 +100,7 @@ fn descriptors() -> FileDescriptorSet {
 }
 
 /// A message; each optional field gets the group of its own that protobuf asks for.
-fn message(name: &str, mut fields: Vec<FieldDescriptorProto>) -> DescriptorProto {
+pub(crate) fn message(name: &str, mut fields: Vec<FieldDescriptorProto>) -> DescriptorProto {
     let mut groups = Vec::new();
     for field in fields.iter_mut().filter(|it| it.proto3_optional == Some(true)) {
         field.oneof_index = Some(groups.len() as i32);
@@ -177,15 +181,16 @@ fn rejected_message() -> Vec<FieldDescriptorProto> {
     RejectionReason::ALL.iter().map(of).collect()
 }
 
-fn event_message() -> Vec<FieldDescriptorProto> {
-    let of = |it: &crate::event::EventField| {
+/// The fields of a message by its table.
+pub(crate) fn fields_of(table: &[EventField]) -> Vec<FieldDescriptorProto> {
+    let of = |it: &EventField| {
         let made = field(it.name, it.number as u32, scalar(it.type_name), it.is_optional);
-        match vocabulary_of(it.name) {
+        match vocabulary_of_type(it.type_name) {
             Some(vocabulary) => typed(made, Type::Enum, vocabulary),
             None => made,
         }
     };
-    EVENT_FIELDS.iter().map(of).collect()
+    table.iter().map(of).collect()
 }
 
 fn enums() -> Vec<EnumDescriptorProto> {

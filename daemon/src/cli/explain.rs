@@ -9,16 +9,18 @@ use clap::Args;
 use dynocar_core::dataset::{Dataset, DatasetFiles, Place, Role};
 use dynocar_core::explain::answer::{Answer, RunnerUp};
 use dynocar_core::explain::evidence::RunDataError;
+use dynocar_core::explain::report::timeline::Timeline;
 use dynocar_core::explain::selection::Progress;
 use dynocar_core::explain::{Explanation, explain};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Failure;
 use super::text::notes;
+use crate::annotation::{AnnotationError, annotate};
 use crate::dataset::{self, DatasetFolder};
 use crate::grown::{GROWN_FILES, GROWN_MARK, GrownError, GrownFiles, write_grown};
 use crate::output::{
-    OutputError, give, require_file, require_folder, tell, write_file, write_in_folder,
+    OutputError, give, require_file, require_folder, require_new, tell, write_file, write_in_folder,
 };
 use crate::report;
 use crate::report::provenance::{Provenance, own_command_line};
@@ -48,6 +50,9 @@ pub struct ExplainArguments {
     /// Write a report for people: one HTML page that needs nothing else
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
+    /// Write a recording with verdict, effects, residual and predicted speeds beside the data
+    #[arg(long, value_name = "FILE.mcap")]
+    annotate: Option<PathBuf>,
     /// Write the report's plots as SVG files into this folder
     #[arg(long, value_name = "DIR")]
     plots: Option<PathBuf>,
@@ -94,6 +99,13 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
     if let Some(folder) = &arguments.plots {
         write_plots(folder, &dataset, &explanation)?;
     }
+    if let Some(file) = &arguments.annotate {
+        let timeline = Timeline::of(&dataset, &explanation);
+        annotate(path, &timeline, file).map_err(|error| match error {
+            AnnotationError::Input(_) => Failure::Input(error.to_string()),
+            AnnotationError::Failed { .. } => Failure::Work(error.to_string()),
+        })?;
+    }
     Ok(give(arguments.json.as_deref(), &explanation.answer, || text(&explanation.answer))?)
 }
 
@@ -131,6 +143,7 @@ fn require_names(arguments: &ExplainArguments) -> Result<(), Failure> {
         folder.as_deref().map_or(Ok(()), require_folder)?;
     }
     arguments.grown.as_deref().map_or(Ok(()), require_growable)?;
+    arguments.annotate.as_deref().map_or(Ok(()), require_new)?;
     match (&arguments.json, &arguments.report) {
         (Some(json), Some(report)) if json == report => Err(Failure::Output(OutputError::Name {
             path: report.clone(),

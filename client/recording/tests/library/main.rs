@@ -1,5 +1,6 @@
 //! What the library of recordings promises; the recorder as a process is in `process.rs`.
 
+mod annotate;
 mod codec;
 mod fields;
 mod files;

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::dataset::Note;
 use crate::plausibility::Severity;
 
 /// What the data say, in a word.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Nothing undeclared acts, as far as the data tell.
@@ -21,6 +21,19 @@ pub enum Verdict {
     Unknown,
     /// The data do not suffice for a statement.
     InsufficientData,
+}
+
+impl Verdict {
+    /// Its name, as in answers for machines.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Verdict::None => "none",
+            Verdict::Effect => "effect",
+            Verdict::Ambiguous => "ambiguous",
+            Verdict::Unknown => "unknown",
+            Verdict::InsufficientData => "insufficient_data",
+        }
+    }
 }
 
 /// A stretch of time in a run, in the recording's own time.

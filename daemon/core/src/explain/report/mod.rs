@@ -9,6 +9,7 @@
 //! - [`windows`], [`covariates`], [`panels`]: the residual as a force, window by window, against
 //!   covariates
 //! - [`mod@line`]: the same along the line, by direction, with the places found
+//! - [`timeline`]: the explanation as events and series in time
 //! - [`parameters`]: what was fitted, with uncertainty
 //! - [`candidates`]: what else was considered
 //!
@@ -25,6 +26,7 @@ pub mod panels;
 pub mod parameters;
 pub mod places;
 pub mod sentence;
+pub mod timeline;
 pub mod traces;
 pub mod windows;
 pub mod words;

@@ -7,9 +7,10 @@ use super::covariates::Covariate;
 use super::windows::Window;
 use crate::dataset::{Dataset, Role};
 use crate::explain::Explanation;
-use crate::explain::answer::{ParameterValue, RunWindow};
+use crate::explain::answer::{EffectAnswer, ParameterValue, RunWindow};
 use crate::explain::evidence::RunData;
 use crate::explain::selection::deviations;
+use crate::force::ResolvedSample;
 
 /// Panels at most, beside those of single runs.
 const PANELS_MAX: usize = 8;
@@ -63,16 +64,28 @@ pub struct Zones {
 /// Where the effects of an explanation act.
 pub fn zones(explanation: &Explanation) -> Zones {
     let mut zones = Zones::default();
-    for effect in &explanation.answer.effects {
+    explanation.answer.effects.iter().for_each(|effect| zones.add(effect));
+    zones
+}
+
+impl Zones {
+    /// Where one effect acts.
+    pub fn of(effect: &EffectAnswer) -> Self {
+        let mut zones = Zones::default();
+        zones.add(effect);
+        zones
+    }
+
+    fn add(&mut self, effect: &EffectAnswer) {
         let place = &effect.place;
-        zones.intervals_m.extend(place.intervals_m.iter().flatten());
-        zones.windows.extend(place.windows.iter().flatten().cloned());
-        zones.runs.extend(place.runs.iter().flatten().cloned());
-        zones.ranges.extend(place.speed_range_mps.map(|range| (Covariate::Speed, range)));
+        self.intervals_m.extend(place.intervals_m.iter().flatten());
+        self.windows.extend(place.windows.iter().flatten().cloned());
+        self.runs.extend(place.runs.iter().flatten().cloned());
+        self.ranges.extend(place.speed_range_mps.map(|range| (Covariate::Speed, range)));
         let named = place.covariate.as_ref();
         let known = named.and_then(|it| Some((Covariate::of_name(&it.name)?, it.range)));
         // A brake force counts as negative control force, a run by its number from 1.
-        zones.ranges.extend(known.filter(|(covariate, _)| match covariate {
+        self.ranges.extend(known.filter(|(covariate, _)| match covariate {
             Covariate::ControlForce | Covariate::Run | Covariate::Speed => false,
             Covariate::Chainage => place.intervals_m.is_none(),
             _ => true,
@@ -80,10 +93,10 @@ pub fn zones(explanation: &Explanation) -> Zones {
         for value in effect.parameters.values() {
             match value {
                 ParameterValue::Sections(sections) => {
-                    zones.intervals_m.extend(sections.iter().map(|s| [s.from_m, s.to_m]));
+                    self.intervals_m.extend(sections.iter().map(|s| [s.from_m, s.to_m]));
                 }
                 ParameterValue::Windows(windows) => {
-                    zones.windows.extend(windows.iter().map(|w| RunWindow {
+                    self.windows.extend(windows.iter().map(|w| RunWindow {
                         run: w.run.clone(),
                         t_start_s: w.t_start_s,
                         t_end_s: w.t_end_s,
@@ -93,10 +106,30 @@ pub fn zones(explanation: &Explanation) -> Zones {
             }
         }
     }
-    zones
-}
 
-impl Zones {
+    /// Stretches of time in s, in the recording's own count, in which all that is known of one effect's
+    /// runs, windows, chainages and speeds holds; the whole run where nothing is known of them.
+    pub fn acting_s(&self, run: &RunData) -> Vec<[f64; 2]> {
+        let within = |range: &[f64; 2], value: f64| (range[0]..=range[1]).contains(&value);
+        let is_inside = |position_m: f64| self.intervals_m.iter().any(|it| within(it, position_m));
+        let of_speed: Vec<&[f64; 2]> = self
+            .ranges
+            .iter()
+            .filter(|(covariate, _)| *covariate == Covariate::Speed)
+            .map(|(_, range)| range)
+            .collect();
+        let acts = |sample: &ResolvedSample, time_s: f64| {
+            let in_window = |it: &RunWindow| {
+                it.run == run.file && within(&[it.t_start_s, it.t_end_s], time_s)
+            };
+            (self.runs.is_empty() || self.runs.contains(&run.file))
+                && (self.windows.is_empty() || self.windows.iter().any(in_window))
+                && (self.intervals_m.is_empty() || sample.position_m.is_some_and(is_inside))
+                && of_speed.iter().all(|it| within(it, sample.speed_mps))
+        };
+        stretches(run, acts)
+    }
+
     /// Stretches of time in s, in the recording's own count, in which an effect acts on a run.
     pub fn times_s(&self, run: &RunData) -> Vec<[f64; 2]> {
         let own = self.windows.iter().filter(|window| window.run == run.file);
@@ -104,16 +137,7 @@ impl Zones {
         let is_inside = |position_m: f64| {
             self.intervals_m.iter().any(|[from, to]| (*from..=*to).contains(&position_m))
         };
-        let mut open: Option<[f64; 2]> = None;
-        for (sample, time_s) in run.samples().iter().zip(run.recording.time_s()) {
-            let time_s = run.offset_s + time_s;
-            match (sample.position_m.is_some_and(is_inside), &mut open) {
-                (true, Some(stretch)) => stretch[1] = time_s,
-                (true, None) => open = Some([time_s, time_s]),
-                (false, _) => times.extend(open.take()),
-            }
-        }
-        times.extend(open);
+        times.extend(stretches(run, |sample, _| sample.position_m.is_some_and(is_inside)));
         times
     }
 
@@ -138,6 +162,22 @@ impl Zones {
         let per_unit = covariate.per_unit();
         acting.iter().map(|range| range.map(|value| value / per_unit)).collect()
     }
+}
+
+/// Stretches of a run's time in s, in the recording's own count, in which something holds.
+fn stretches(run: &RunData, holds: impl Fn(&ResolvedSample, f64) -> bool) -> Vec<[f64; 2]> {
+    let mut times = Vec::new();
+    let mut open: Option<[f64; 2]> = None;
+    for (sample, time_s) in run.samples().iter().zip(run.recording.time_s()) {
+        let time_s = run.offset_s + time_s;
+        match (holds(sample, time_s), &mut open) {
+            (true, Some(stretch)) => stretch[1] = time_s,
+            (true, None) => open = Some([time_s, time_s]),
+            (false, _) => times.extend(open.take()),
+        }
+    }
+    times.extend(open);
+    times
 }
 
 /// The panels: first the covariate on which the effect is seen best, then those that are always
@@ -178,7 +218,7 @@ pub fn panels(dataset: &Dataset, explanation: &Explanation, windows: &[Window]) 
 }
 
 fn leading(explanation: &Explanation) -> Vec<Covariate> {
-    let of_effect = |effect: &crate::explain::answer::EffectAnswer| {
+    let of_effect = |effect: &EffectAnswer| {
         let named = effect.place.covariate.as_ref();
         named
             .and_then(|it| Covariate::of_name(&it.name))

@@ -58,7 +58,8 @@ pub fn traces(explanation: &Explanation) -> Vec<Trace> {
     ranked.iter().take(TRACES_MAX).map(|(_, run)| trace(explanation, run, &zones)).collect()
 }
 
-fn predicted(fit: &Fit, run: &RunData) -> Prediction {
+/// Speeds of a run predicted open loop from its first sample to its last.
+pub(super) fn predicted(fit: &Fit, run: &RunData) -> Prediction {
     let (mut forces, mut prediction) = (GrownForces::default(), Prediction::new());
     fit.model.forces(run, &fit.theta, &mut forces);
     prediction.simulate(&run.recording, &forces, Restart::FullRun);

@@ -57,12 +57,8 @@ pub fn windows(explanation: &Explanation) -> Vec<Window> {
     let mut windows = Vec::new();
     for (index, run) in explanation.problem.runs.iter().enumerate() {
         let columns = columns(after, run);
-        let (samples, bins) = (run.samples(), &run.bins);
-        for (first, end) in spans(bins) {
-            let own = &bins[first..end];
-            let middle = &samples[own[own.len() / 2].middle()];
-            let per_acceleration = -middle.inertial_mass_kg / middle.weight_kn;
-            let force = |values: &[f64]| per_acceleration * slope(own, &values[first..end]);
+        for (first, end) in spans(&run.bins) {
+            let force = |values: &[f64]| force_n_per_kn(run, first, end, values);
             windows.push(Window {
                 run: index,
                 first,
@@ -74,6 +70,24 @@ pub fn windows(explanation: &Explanation) -> Vec<Window> {
         }
     }
     windows
+}
+
+/// What a difference of speeds within a window is as a resistance in N/kN.
+fn force_n_per_kn(run: &RunData, first: usize, end: usize, differences: &[f64]) -> f64 {
+    let own = &run.bins[first..end];
+    let middle = &run.samples()[own[own.len() / 2].middle()];
+    -middle.inertial_mass_kg / middle.weight_kn * slope(own, &differences[first..end])
+}
+
+/// The resistance in N/kN that a model lacks, for each window of any run: first bin and the one past the
+/// last, and the resistance.
+pub(super) fn missing_resistance(fit: &Fit, run: &RunData) -> Vec<((usize, usize), f64)> {
+    let (mut forces, mut predicted) = (GrownForces::default(), Vec::new());
+    fit.model.predict_bins(run, &fit.theta, &mut forces, &mut predicted);
+    let differences: Vec<f64> =
+        run.bins.iter().zip(&predicted).map(|(bin, it)| bin.speed_mps - it).collect();
+    let of = |(first, end)| ((first, end), force_n_per_kn(run, first, end, &differences));
+    spans(&run.bins).into_iter().map(of).collect()
 }
 
 /// First and end of the windows; none crosses a break of motion.

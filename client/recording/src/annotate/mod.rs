@@ -1,0 +1,195 @@
+//! An explanation beside the data that it explains: a copy of a recording with the verdict, the effects
+//! where they act, the residual and the predicted speeds, on the recording's own timeline.
+
+pub mod messages;
+mod moments;
+pub mod schema;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use dynocar_core::explain::report::timeline::{RunTimeline, Timeline};
+use mcap::McapError;
+use mcap::records::MessageHeader;
+use prost::Message;
+
+use crate::copying::{CopyError, CopyWriter, copy};
+use crate::reading::ReadError;
+use messages::{Effect, PredictedSpeed, Residual, Verdict};
+use moments::{Moments, RunMoments};
+
+/// Why a recording is not annotated.
+#[derive(Debug, thiserror::Error)]
+pub enum AnnotateError {
+    /// It cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The copy cannot be written.
+    #[error("{}: cannot be written: {source}", path.display())]
+    Write {
+        /// The copy.
+        path: PathBuf,
+        /// What stopped it.
+        source: McapError,
+    },
+    /// The explanation is of other data.
+    #[error(
+        "{}: holds {trains} trains and {runs} runs, the explanation is of one train and {explained} runs",
+        path.display()
+    )]
+    OtherRuns {
+        /// The recording.
+        path: PathBuf,
+        /// The trains in it.
+        trains: usize,
+        /// The runs in it.
+        runs: usize,
+        /// The number of the last run that was explained.
+        explained: usize,
+    },
+}
+
+/// What was added.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Annotated {
+    /// Stretches in which an effect acts.
+    pub effects: usize,
+    /// Messages in all.
+    pub messages: usize,
+}
+
+/// Copies a recording into a new file and adds an explanation of the dataset that it is.
+///
+/// # Errors
+///
+/// See [`AnnotateError`]; then there is no new file.
+pub fn annotate(from: &Path, timeline: &Timeline, to: &Path) -> Result<Annotated, AnnotateError> {
+    let mut added = Annotated::default();
+    let mut refused = None;
+    let copied = copy(from, to, &mut Moments::default(), |writer, moments| {
+        match runs_of(moments, timeline) {
+            Ok((train, runs)) => {
+                added = Annotations::new(writer, train)?.write(timeline, &runs)?;
+                Ok(())
+            }
+            Err((trains, runs)) => {
+                refused = Some((trains, runs));
+                Err(McapError::UnexpectedEof)
+            }
+        }
+    });
+    if let Some((trains, runs)) = refused {
+        let explained = timeline.runs.last().map_or(0, |it| it.number as usize);
+        return Err(AnnotateError::OtherRuns { path: from.into(), trains, runs, explained });
+    }
+    match copied {
+        Ok(_) => Ok(added),
+        Err(CopyError::Read(error)) => Err(error.into()),
+        Err(CopyError::Write(source)) => Err(AnnotateError::Write { path: to.into(), source }),
+    }
+}
+
+/// The train and its runs; else how many trains and runs there are.
+fn runs_of(
+    moments: &Moments,
+    timeline: &Timeline,
+) -> Result<(u64, Vec<RunMoments>), (usize, usize)> {
+    let trains = moments.trains();
+    let [train] = trains[..] else { return Err((trains.len(), 0)) };
+    let runs = moments.runs(train);
+    let has_all = timeline.runs.iter().all(|it| (1..=runs.len()).contains(&(it.number as usize)));
+    if has_all { Ok((train, runs)) } else { Err((1, runs.len())) }
+}
+
+/// Where annotations go.
+struct Annotations<'w> {
+    writer: &'w mut CopyWriter,
+    train: u64,
+    verdict: u16,
+    effect: u16,
+    residual: u16,
+    speed: u16,
+    added: Annotated,
+}
+
+impl<'w> Annotations<'w> {
+    fn new(writer: &'w mut CopyWriter, train: u64) -> Result<Self, McapError> {
+        let mut channel = |name: &str, topic: String| {
+            let name = format!("dynocar.{name}");
+            let schema = writer.add_schema(&name, "protobuf", &schema::DESCRIPTORS)?;
+            writer.add_channel(schema, &topic, "protobuf", &BTreeMap::new())
+        };
+        Ok(Annotations {
+            verdict: channel(Verdict::NAME, "/explain/verdict".into())?,
+            effect: channel(Effect::NAME, "/explain/effects".into())?,
+            residual: channel(Residual::NAME, format!("/train/{train}/explain/residual"))?,
+            speed: channel(PredictedSpeed::NAME, format!("/train/{train}/explain/speed"))?,
+            writer,
+            train,
+            added: Annotated::default(),
+        })
+    }
+
+    fn write(mut self, timeline: &Timeline, runs: &[RunMoments]) -> Result<Annotated, McapError> {
+        let first = timeline.runs.first();
+        let begin = first.and_then(|it| Some((it, it.speeds.first()?.time_s)));
+        let begin_ns = begin.map_or(0, |(it, time_s)| runs[it.number as usize - 1].wall_ns(time_s));
+        let verdict = Verdict {
+            verdict: timeline.verdict.name().into(),
+            text: timeline.statement.clone(),
+            rmse_before_mps: timeline.rmse_before_mps,
+            rmse_after_mps: timeline.rmse_after_mps,
+        };
+        self.put(self.verdict, begin_ns, &verdict)?;
+        for run in &timeline.runs {
+            self.run(run, &runs[run.number as usize - 1])?;
+        }
+        Ok(self.added)
+    }
+
+    fn run(&mut self, run: &RunTimeline, moments: &RunMoments) -> Result<(), McapError> {
+        for it in &run.effects {
+            let message = Effect {
+                train_id: self.train,
+                run_file: run.file.clone(),
+                kind: it.kind.clone(),
+                number: it.number,
+                text: it.text.clone(),
+                duration_s: it.to_s - it.from_s,
+                end_ns: moments.wall_ns(it.to_s),
+                begin_position_m: it.positions_m.map(|it| it[0]),
+                end_position_m: it.positions_m.map(|it| it[1]),
+                error_reduction: it.error_reduction,
+                p_value: it.p_value,
+            };
+            self.put(self.effect, moments.wall_ns(it.from_s), &message)?;
+            self.added.effects += 1;
+        }
+        for it in &run.residuals {
+            let message = Residual {
+                duration_s: it.to_s - it.from_s,
+                residual_before_n_per_kn: it.before_n_per_kn,
+                residual_after_n_per_kn: it.after_n_per_kn,
+            };
+            self.put(self.residual, moments.wall_ns(0.5 * (it.from_s + it.to_s)), &message)?;
+        }
+        for it in &run.speeds {
+            let message = PredictedSpeed {
+                measured_speed_mps: it.measured_mps,
+                speed_before_mps: it.before_mps,
+                speed_after_mps: it.after_mps,
+                error_before_mps: it.before_mps - it.measured_mps,
+                error_after_mps: it.after_mps - it.measured_mps,
+            };
+            self.put(self.speed, moments.wall_ns(it.time_s), &message)?;
+        }
+        Ok(())
+    }
+
+    fn put(&mut self, channel_id: u16, at_ns: u64, message: &impl Message) -> Result<(), McapError> {
+        self.added.messages += 1;
+        let sequence = self.added.messages as u32;
+        let header = MessageHeader { channel_id, sequence, log_time: at_ns, publish_time: at_ns };
+        self.writer.write_to_known_channel(&header, &message.encode_to_vec())
+    }
+}

@@ -1,0 +1,61 @@
+//! `dynocar explain --annotate`: an explanation beside the data that it explains.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::PathBuf;
+
+use clap::Args;
+use dynocar::cli::Failure;
+use dynocar::output::{require_new, tell};
+use dynocar_core::explain::report::timeline::Timeline;
+
+use super::from_dataset_failure;
+use crate::annotate::{AnnotateError, annotate};
+use crate::convert::from_dataset;
+
+/// Add an explanation to a copy of the recording that it explains.
+#[derive(Debug, Args)]
+pub struct AnnotateArguments {
+    /// The recording, or the dataset, that was explained
+    from: PathBuf,
+    /// The explanation in time, as JSON
+    #[arg(long, value_name = "FILE")]
+    timeline: PathBuf,
+    /// The new recording
+    #[arg(short, long, value_name = "FILE.mcap")]
+    output: PathBuf,
+}
+
+/// Writes the copy.
+///
+/// # Errors
+///
+/// A recording that cannot be read, or is another, is an input failure.
+pub fn execute(arguments: &AnnotateArguments) -> Result<(), Failure> {
+    let AnnotateArguments { from, timeline, output } = arguments;
+    require_new(output)?;
+    let wrong = |error: String| Failure::Input(format!("{}: {error}", timeline.display()));
+    let file = File::open(timeline).map_err(|error| wrong(error.to_string()))?;
+    let read: Timeline = serde_json::from_reader(BufReader::new(file))
+        .map_err(|error| wrong(format!("no explanation in time: {error}")))?;
+    let added = if from.is_dir() || from.extension().is_some_and(|it| it == "toml") {
+        let folder = tempfile::TempDir::with_prefix("dynocar-")
+            .map_err(|error| Failure::Work(error.to_string()))?;
+        let recording = folder.path().join("dataset.mcap");
+        from_dataset(from, &recording).map_err(from_dataset_failure)?;
+        annotate(&recording, &read, output)
+    } else {
+        annotate(from, &read, output)
+    };
+    let added = added.map_err(|error| match error {
+        AnnotateError::Write { .. } => Failure::Work(error.to_string()),
+        error => Failure::Input(error.to_string()),
+    })?;
+    tell(&format!(
+        "annotated recording: {}: {} stretches in which an effect acts, {} messages in all",
+        output.display(),
+        added.effects,
+        added.messages
+    ));
+    Ok(())
+}

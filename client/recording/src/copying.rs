@@ -1,0 +1,161 @@
+//! Copies of recordings: everything that can be read, with an index and an end.
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+use mcap::records::MessageHeader;
+use mcap::{Attachment, McapError, WriteOptions, Writer};
+
+use crate::reading::{ChannelInfo, Ending, Item, Raw, ReadError, Visitor, read};
+
+/// The writer of a copy.
+pub type CopyWriter = Writer<BufWriter<File>>;
+
+/// Why a file is not copied.
+#[derive(Debug)]
+pub enum CopyError {
+    /// It cannot be read at all.
+    Read(ReadError),
+    /// The copy cannot be written.
+    Write(McapError),
+}
+
+/// What was copied.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Copied {
+    /// Messages.
+    pub messages: u64,
+    /// Attached files.
+    pub attachments: u64,
+    /// How the file ended.
+    pub ending: Ending,
+}
+
+/// Copies what can be read of a file into a new one, ours or not; `watcher` is told what it holds, and
+/// `add` writes what is to follow.
+///
+/// # Errors
+///
+/// When it is no MCAP file, or the new one cannot be written; then there is none.
+pub fn copy<V: Visitor>(
+    from: &Path,
+    to: &Path,
+    watcher: &mut V,
+    add: impl FnOnce(&mut CopyWriter, &mut V) -> Result<(), McapError>,
+) -> Result<Copied, CopyError> {
+    let file = File::create_new(to).map_err(|error| CopyError::Write(error.into()))?;
+    let done = copy_into(from, file, watcher, add);
+    if done.is_err() {
+        // It holds nothing that the first does not.
+        let _ = std::fs::remove_file(to);
+    }
+    done
+}
+
+fn copy_into<V: Visitor>(
+    from: &Path,
+    file: File,
+    watcher: &mut V,
+    add: impl FnOnce(&mut CopyWriter, &mut V) -> Result<(), McapError>,
+) -> Result<Copied, CopyError> {
+    let options = WriteOptions::new().profile("dynocar");
+    let writer = options.create(BufWriter::new(file)).map_err(CopyError::Write)?;
+    let channels = HashMap::new();
+    let mut copier =
+        Copier { writer, channels, messages: 0, attachments: 0, failed: None, watcher };
+    let read = read(from, &mut copier);
+    let Copier { mut writer, messages, attachments, mut failed, watcher, .. } = copier;
+    if read.is_ok() && failed.is_none() {
+        failed = add(&mut writer, watcher).err();
+    }
+    // A writer that is not to be finished is taken apart, for it would finish when it is dropped.
+    match (read, failed) {
+        (_, Some(error)) => {
+            writer.into_inner();
+            Err(CopyError::Write(error))
+        }
+        (Err(error), None) => {
+            writer.into_inner();
+            Err(CopyError::Read(error))
+        }
+        (Ok(ending), None) => {
+            writer.finish().map_err(CopyError::Write)?;
+            let written = writer.into_inner().into_inner();
+            written.map_err(|error| CopyError::Write(error.into_error().into()))?;
+            Ok(Copied { messages, attachments, ending })
+        }
+    }
+}
+
+struct Copier<'v, V> {
+    writer: CopyWriter,
+    channels: HashMap<u16, (ChannelInfo, u16)>,
+    messages: u64,
+    attachments: u64,
+    failed: Option<McapError>,
+    watcher: &'v mut V,
+}
+
+impl<V> Copier<'_, V> {
+    fn message(&mut self, raw: &Raw<'_>) -> Result<(), McapError> {
+        let known = self.channels.get(&raw.header.channel_id);
+        let channel_id = match known.filter(|it| it.0 == *raw.channel) {
+            Some(known) => known.1,
+            None => {
+                let ChannelInfo { topic, encoding, metadata, schema } = raw.channel;
+                let schema = match schema {
+                    Some((name, encoding, data)) => self.writer.add_schema(name, encoding, data)?,
+                    None => 0,
+                };
+                let id = self.writer.add_channel(schema, topic, encoding, metadata)?;
+                self.channels.insert(raw.header.channel_id, (raw.channel.clone(), id));
+                id
+            }
+        };
+        self.messages += 1;
+        self.writer.write_to_known_channel(&MessageHeader { channel_id, ..raw.header }, raw.data)
+    }
+
+    fn other(&mut self, item: Item<'_>) -> Result<(), McapError> {
+        match item {
+            Item::Metadata(metadata) => self.writer.write_metadata(metadata),
+            Item::Attachment { name, log_time, media_type, content } => {
+                self.attachments += 1;
+                self.writer.attach(&Attachment {
+                    log_time,
+                    create_time: log_time,
+                    name,
+                    media_type,
+                    data: content.into(),
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn note(&mut self, done: Result<(), McapError>) {
+        if let Err(error) = done {
+            self.failed.get_or_insert(error);
+        }
+    }
+}
+
+impl<V: Visitor> Visitor for Copier<'_, V> {
+    fn item(&mut self, item: Item<'_>) {
+        self.watcher.item(item.clone());
+        if self.failed.is_none() {
+            let done = self.other(item);
+            self.note(done);
+        }
+    }
+
+    fn raw(&mut self, raw: &Raw<'_>) {
+        self.watcher.raw(raw);
+        if self.failed.is_none() {
+            let done = self.message(raw);
+            self.note(done);
+        }
+    }
+}
