@@ -153,6 +153,7 @@ fn execute_record(arguments: &RecordArguments) -> Result<(), Failure> {
             bytes: arguments.rotate_mib.map(|it| it * MIB),
             age: arguments.rotate_minutes.map(|it| Duration::from_secs(60 * it)),
             keep_bytes: arguments.keep_mib.map(|it| it * MIB),
+            keep_age: None,
         },
         snapshot_interval: Duration::from_millis(arguments.snapshots_ms),
         configuration: arguments.config.clone(),

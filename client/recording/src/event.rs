@@ -47,6 +47,12 @@ kinds! {
     SamplesLost = 8 "samples_lost";
     /// The daemon has vouched for no snapshot of a pipeline for a while.
     DaemonSilent = 9 "daemon_silent";
+    /// The residual's pipeline suspects an effect that it did not suspect before.
+    SuspicionRaised = 10 "suspicion_raised";
+    /// It suspects none any more.
+    SuspicionEnded = 11 "suspicion_ended";
+    /// A person or a program asked to keep this moment for good.
+    KeepRequested = 12 "keep_requested";
 }
 
 /// Something that happened.

@@ -102,7 +102,7 @@ fn quoted(word: &str) -> String {
 }
 
 /// The day of an instant in UTC, as year-month-day.
-fn day(instant: SystemTime) -> String {
+pub fn day(instant: SystemTime) -> String {
     let days = instant.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs() / 86_400);
     // Years that start in March put the leap day last; the count starts on 0000-03-01.
     let shifted = days + 719_468;

@@ -186,7 +186,12 @@ impl<'w> Annotations<'w> {
         Ok(())
     }
 
-    fn put(&mut self, channel_id: u16, at_ns: u64, message: &impl Message) -> Result<(), McapError> {
+    fn put(
+        &mut self,
+        channel_id: u16,
+        at_ns: u64,
+        message: &impl Message,
+    ) -> Result<(), McapError> {
         self.added.messages += 1;
         let sequence = self.added.messages as u32;
         let header = MessageHeader { channel_id, sequence, log_time: at_ns, publish_time: at_ns };

@@ -5,15 +5,17 @@ use std::fs::File;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
+use dynocar::output::tell;
 use dynocar_client::monotonic_now_ns;
-use dynocar_shared::{ParameterSnapshot, TrainSample};
+use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 use mcap::McapError;
 
 use super::configuration::Configuration;
-use super::{RecordError, Recorded};
-use crate::event::Event;
+use super::keeping::{self, Keeper};
+use super::{RecordError, Recorded, event};
+use crate::event::{Event, EventKind};
 use crate::writing::{CONFIGURATION, RecordingWriter, WallClock, folder_of_configuration};
 
 /// When a file is full, and how much of them is kept.
@@ -25,6 +27,8 @@ pub struct Rotation {
     pub age: Option<Duration>,
     /// The most bytes that all files of the recording take; the oldest are removed.
     pub keep_bytes: Option<u64>,
+    /// The age after which a file is removed.
+    pub keep_age: Option<Duration>,
 }
 
 impl Rotation {
@@ -62,6 +66,8 @@ pub struct Files {
     /// The newest configuration, its number and when it was seen.
     configuration: Option<(Configuration, u32, i64)>,
     recorded: Recorded,
+    /// What is kept for good, for a flight recorder.
+    keeper: Option<Keeper>,
 }
 
 impl Files {
@@ -83,7 +89,23 @@ impl Files {
             begun: Instant::now(),
             configuration: None,
             recorded: Recorded::default(),
+            keeper: None,
         })
+    }
+
+    /// Keeps for good what lies around the events that are reasons to.
+    pub fn set_keeper(&mut self, keeper: Keeper) {
+        self.keeper = Some(keeper);
+        self.tell_keeper(|keeper, files| keeper.begun(files));
+    }
+
+    /// A problem of keeping is told, and stops nothing.
+    fn tell_keeper(&mut self, work: impl FnOnce(&mut Keeper, &[PathBuf]) -> Result<(), String>) {
+        let Some(keeper) = &mut self.keeper else { return };
+        let files: Vec<PathBuf> = numbered(&self.output).into_iter().map(|it| it.1).collect();
+        if let Err(problem) = work(keeper, &files) {
+            tell(&format!("nothing is kept for good: {problem}"));
+        }
     }
 
     /// The file that is written.
@@ -121,7 +143,11 @@ impl Files {
     pub fn event(&mut self, event: &Event) -> Result<(), RecordError> {
         self.recorded.events += 1;
         let written = self.writer.event(event);
-        self.told(written)
+        self.told(written)?;
+        if keeping::is_reason(event) {
+            self.tell_keeper(|keeper, files| keeper.keep(event, files));
+        }
+        Ok(())
     }
 
     /// Writes the event that so many samples were passed over.
@@ -161,6 +187,9 @@ impl Files {
     ///
     /// As above.
     pub fn flush(&mut self) -> Result<(), RecordError> {
+        if let Some(text) = self.keeper.as_ref().and_then(Keeper::request) {
+            self.event(&event(TrainId(0), EventKind::KeepRequested, text))?;
+        }
         self.writer.set_clock(WallClock::now());
         let written = self.writer.flush();
         self.told(written)?;
@@ -177,9 +206,8 @@ impl Files {
         self.told(written)?;
         (self.path, self.bytes, self.begun) = (path, bytes, Instant::now());
         self.attach_newest()?;
-        if let Some(most) = self.rotation.keep_bytes {
-            remove_oldest(&self.output, &self.path, most);
-        }
+        self.tell_keeper(|keeper, files| keeper.begun(files));
+        remove_oldest(&self.output, &self.path, self.rotation);
         Ok(())
     }
 
@@ -258,18 +286,23 @@ fn next(output: &Path) -> PathBuf {
     output.with_file_name(format!("{stem}-{number:0DIGITS$}.mcap"))
 }
 
-/// Removes the oldest files until the rest takes no more than so many bytes; never the one that is
-/// written.
-fn remove_oldest(output: &Path, written: &Path, most: u64) {
-    let length = |path: &Path| std::fs::metadata(path).map_or(0, |it| it.len());
-    let files = numbered(output);
-    let mut total: u64 = files.iter().map(|it| length(&it.1)).sum();
-    for (_, path) in files.iter().filter(|it| it.1 != written) {
-        if total <= most {
-            return;
+/// Removes the files that are too old, and the oldest until the rest takes no more than it may; never the
+/// one that is written.
+fn remove_oldest(output: &Path, written: &Path, rotation: Rotation) {
+    let most = rotation.keep_bytes.unwrap_or(u64::MAX);
+    let oldest = rotation.keep_age.and_then(|age| SystemTime::now().checked_sub(age));
+    let found = |(_, path): (u64, PathBuf)| {
+        let known = std::fs::metadata(&path).ok()?;
+        Some((known.modified().ok()?, known.len(), path))
+    };
+    let files: Vec<_> = numbered(output).into_iter().filter_map(found).collect();
+    let mut total: u64 = files.iter().map(|it| it.1).sum();
+    for (modified, length, path) in files.iter().filter(|it| it.2 != written) {
+        let is_too_old = oldest.is_some_and(|oldest| *modified < oldest);
+        if total > most || is_too_old {
+            total -= length;
+            // One that cannot be removed is told of when the disk is full.
+            let _ = std::fs::remove_file(path);
         }
-        total -= length(path).min(total);
-        // One that cannot be removed is told of when the disk is full.
-        let _ = std::fs::remove_file(path);
     }
 }

@@ -6,6 +6,7 @@
 
 mod configuration;
 mod files;
+mod keeping;
 mod lane;
 
 use std::path::PathBuf;
@@ -18,6 +19,7 @@ use dynocar_shared::TrainId;
 use mcap::McapError;
 
 pub use files::{Files, Rotation};
+pub use keeping::{Keeper, Keeping, request as request_keeping};
 
 use lane::Lane;
 

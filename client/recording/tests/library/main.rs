@@ -4,6 +4,7 @@ mod annotate;
 mod codec;
 mod fields;
 mod files;
+mod keeping;
 mod rotation;
 mod rows;
 mod support;

@@ -22,7 +22,8 @@ fn files_are_numbered_on_and_the_oldest_go_when_they_take_too_much() {
     let output = folder.path().join("run.mcap");
     std::fs::write(folder.path().join("run-000041.mcap"), [0; 5000]).unwrap();
     std::fs::write(folder.path().join("run-mine.mcap"), "stays").unwrap();
-    let rotation = Rotation { bytes: Some(20_000), age: None, keep_bytes: Some(60_000) };
+    let rotation =
+        Rotation { bytes: Some(20_000), keep_bytes: Some(60_000), ..Rotation::default() };
     let mut files = Files::begin(&output, rotation).unwrap();
     assert!(files.path().ends_with("run-000042.mcap"));
     for sequence in 1..=4000 {

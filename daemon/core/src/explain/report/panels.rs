@@ -119,9 +119,8 @@ impl Zones {
             .map(|(_, range)| range)
             .collect();
         let acts = |sample: &ResolvedSample, time_s: f64| {
-            let in_window = |it: &RunWindow| {
-                it.run == run.file && within(&[it.t_start_s, it.t_end_s], time_s)
-            };
+            let in_window =
+                |it: &RunWindow| it.run == run.file && within(&[it.t_start_s, it.t_end_s], time_s);
             (self.runs.is_empty() || self.runs.contains(&run.file))
                 && (self.windows.is_empty() || self.windows.iter().any(in_window))
                 && (self.intervals_m.is_empty() || sample.position_m.is_some_and(is_inside))
