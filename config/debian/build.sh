@@ -1,11 +1,11 @@
 #!/bin/sh
-# Builds dynocar_<version>_<arch>.deb from the release binaries. dynocar-watch and dynocar-recording go into
-# it where they lie beside the program.
+# Builds dynocar_<version>_<arch>.deb from the release binaries. dynocar-watch, dynocar-recording and
+# dynocar-live go into it where they lie beside the program.
 # usage: build.sh [--program FILE] [--libraries FOLDER] [--out FOLDER]
 #   --program    the program, default target/release/dynocar
 #   --libraries  where libdynocar_client.a and libdynocar_fmu.so lie, default target/release
 #   --out        where the package goes, default target/debian
-# Build first: cargo build --release -p dynocar -p dynocar-watch -p dynocar-recording &&
+# Build first: cargo build --release -p dynocar -p dynocar-watch -p dynocar-recording -p dynocar-live &&
 #              cargo build --release -p dynocar-client -p dynocar-fmu
 set -eu
 
@@ -51,12 +51,15 @@ put() { # SOURCE TARGET [MODE]
 
 # The program, what shells offer for it, and its manual.
 put "$program" usr/bin/dynocar 755
-for companion in dynocar-watch dynocar-recording; do
+for companion in dynocar-watch dynocar-recording dynocar-live; do
     if [ -f "$(dirname "$program")/$companion" ]; then
         put "$(dirname "$program")/$companion" "usr/bin/$companion" 755
     else
         echo "build.sh: no $companion beside the program: the package goes without it" >&2
     fi
+done
+for layout in foxglove_layout.json plotjuggler_layout.xml grafana_dashboard.json; do
+    put "$project/config/live/$layout" "usr/share/dynocar/live/$layout"
 done
 completions() { # SHELL TARGET
     mkdir -p "$root/$(dirname "$2")"

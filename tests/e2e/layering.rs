@@ -67,6 +67,13 @@ fn the_terminal_stays_out_of_daemon_and_controller() {
 }
 
 #[test]
+fn what_serves_viewers_is_in_no_controller_no_daemon_and_no_recorder() {
+    for package in ["dynocar", "dynocar-client", "dynocar-recording", "dynocar-watch"] {
+        assert_free_of(package, &["dynocar-live", "foxglove", "tokio", "tungstenite"]);
+    }
+}
+
+#[test]
 fn the_contract_depends_on_nothing() {
     assert_eq!(dependencies("dynocar-shared"), ["dynocar-shared"]);
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Where messages are raised.
-const FOLDERS: [&str; 8] = [
+const FOLDERS: [&str; 9] = [
     "daemon/src",
     "daemon/core/src",
     "daemon/fmu/src",
@@ -13,6 +13,7 @@ const FOLDERS: [&str; 8] = [
     "client/python/src",
     "client/recording/src",
     "client/watch/src",
+    "client/live/src",
 ];
 /// A call whose first literal is a message, and the folder in which it is one.
 const CALLS: [(&str, &str); 7] = [

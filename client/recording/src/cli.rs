@@ -11,10 +11,11 @@ use dynocar::cli::{Failure, parse};
 use dynocar::config::DaemonConfig;
 use dynocar::output::{print, require_new, tell};
 use dynocar::run::stop_on_signals;
-use dynocar_client::{ChannelError, Host};
+use dynocar_client::Host;
 use dynocar_shared::TrainId;
 
 use crate::convert::{FromDatasetError, ModelFiles, ToDatasetError, from_dataset, to_dataset};
+use crate::lanes::Wanted;
 use crate::page::page;
 use crate::reading::{Ending, ReadError};
 use crate::record::{RecordError, Rotation, Settings, record};
@@ -51,12 +52,8 @@ struct RecordArguments {
     /// The file; with --rotate-mib or --rotate-minutes the files' names are this with a number
     #[arg(short, long, value_name = "FILE.mcap")]
     output: PathBuf,
-    /// Only this train; may be given several times. By default every train that is there or comes
-    #[arg(long = "train", value_name = "ID")]
-    trains: Vec<u64>,
-    /// The run-time directory; else the variable DYNOCAR_ROOT, else /tmp/dynocar-<user>
-    #[arg(long, value_name = "DIR")]
-    root: Option<PathBuf>,
+    #[command(flatten)]
+    wanted: WantedArguments,
     /// The daemon's configuration to attach; by default the one that its command line names
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
@@ -70,9 +67,39 @@ struct RecordArguments {
     #[arg(long, value_name = "N", requires = "rotation",
           value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
     keep_mib: Option<u64>,
-    /// Record a pipeline's snapshot every so many ms, and each change of its status
+}
+
+/// What a recorder or a live view reads.
+#[derive(Debug, Args)]
+pub struct WantedArguments {
+    /// Only this train; may be given several times. By default every train that is there or comes
+    #[arg(long = "train", value_name = "ID")]
+    trains: Vec<u64>,
+    /// The run-time directory; else the variable DYNOCAR_ROOT, else /tmp/dynocar-<user>
+    #[arg(long, value_name = "DIR")]
+    root: Option<PathBuf>,
+    /// Take a pipeline's snapshot every so many ms, and each change of its status
     #[arg(long, value_name = "MS", default_value_t = 100)]
     snapshots_ms: u64,
+}
+
+impl WantedArguments {
+    /// What is to be read.
+    ///
+    /// # Errors
+    ///
+    /// When there is no run-time directory.
+    pub fn wanted(&self) -> Result<Wanted, Failure> {
+        let host = match &self.root {
+            Some(root) => Host::at(root),
+            None => Host::from_environment(),
+        };
+        Ok(Wanted {
+            host: host.map_err(|error| Failure::Work(error.to_string()))?,
+            trains: self.trains.iter().copied().map(TrainId).collect(),
+            snapshot_interval: Duration::from_millis(self.snapshots_ms),
+        })
+    }
 }
 
 /// Make a recording whole whose recorder died.
@@ -140,14 +167,8 @@ pub fn main() -> ExitCode {
 const MIB: u64 = 1 << 20;
 
 fn execute_record(arguments: &RecordArguments) -> Result<(), Failure> {
-    let work = |error: ChannelError| Failure::Work(error.to_string());
-    let host = match &arguments.root {
-        Some(root) => Host::at(root).map_err(work)?,
-        None => Host::from_environment().map_err(work)?,
-    };
     let settings = Settings {
-        host,
-        trains: arguments.trains.iter().copied().map(TrainId).collect(),
+        wanted: arguments.wanted.wanted()?,
         output: arguments.output.clone(),
         rotation: Rotation {
             bytes: arguments.rotate_mib.map(|it| it * MIB),
@@ -155,7 +176,6 @@ fn execute_record(arguments: &RecordArguments) -> Result<(), Failure> {
             keep_bytes: arguments.keep_mib.map(|it| it * MIB),
             keep_age: None,
         },
-        snapshot_interval: Duration::from_millis(arguments.snapshots_ms),
         configuration: arguments.config.clone(),
     };
     let stop = stop_on_signals().map_err(|error| Failure::Work(error.to_string()))?;

@@ -8,14 +8,15 @@ use dynocar_shared::layout::Words;
 use dynocar_shared::schema::{Field, Missing};
 use dynocar_shared::snapshot::PARAMETERS_MAX;
 use dynocar_shared::{Parameter, ParameterSnapshot, RejectionReason, TrainId, TrainSample};
-use prost::DecodeError;
 use prost::encoding::{
     DecodeContext, WireType, decode_key, decode_varint, encode_key, encode_varint, skip_field,
 };
+use prost::{DecodeError, Message};
 
+use crate::event::Event;
 use crate::schema::{
-    ESTIMATE, REJECTED, SAMPLE_FIELDS, SNAPSHOT_FIELDS, STD_OFFSET, number, parameter_number,
-    rejection_number,
+    ESTIMATE, HIGH_OFFSET, INTERVAL_95, LOW_OFFSET, REJECTED, SAMPLE_FIELDS, SNAPSHOT_FIELDS,
+    STD_OFFSET, number, parameter_number, rejection_number,
 };
 
 /// Why bytes are no message of ours.
@@ -73,9 +74,12 @@ pub fn encode_snapshot(snapshot: &ParameterSnapshot, out: &mut Vec<u8>) {
         for place in 0..count {
             let known = Parameter::from_number(snapshot.parameters[place]);
             let Some(parameter) = known else { continue };
+            let (number, value) = (parameter_number(parameter), snapshot.values[place]);
             let std = snapshot.covariance_at(place, place).max(0.0).sqrt();
-            put_double(parameter_number(parameter), snapshot.values[place], out);
-            put_double(parameter_number(parameter) + STD_OFFSET, std, out);
+            put_double(number, value, out);
+            put_double(number + STD_OFFSET, std, out);
+            put_double(number + LOW_OFFSET, value - INTERVAL_95 * std, out);
+            put_double(number + HIGH_OFFSET, value + INTERVAL_95 * std, out);
         }
     });
     put_nested(REJECTED, out, |out| {
@@ -87,6 +91,12 @@ pub fn encode_snapshot(snapshot: &ParameterSnapshot, out: &mut Vec<u8>) {
             }
         }
     });
+}
+
+/// Appends an event's message.
+pub fn encode_event(event: &Event, out: &mut Vec<u8>) {
+    // A vector takes any length.
+    let _ = event.encode(out);
 }
 
 /// Reads a sample's message.

@@ -10,6 +10,8 @@
 //! - [`page`]: the reference page of the recorded fields
 //! - [`codec`]: samples and snapshots as messages, and back, to the bit
 //! - [`event`]: what happens around them
+//! - [`topic`]: the streams of messages
+//! - [`lanes`]: what a recorder and a live view read of the trains' channels
 //! - [`writing`], [`reading`]: MCAP files, written without seeking and read as far as they are whole
 //! - [`recording`]: a recording in memory
 //! - [`record`]: the recorder
@@ -26,11 +28,13 @@ pub mod codec;
 pub mod convert;
 pub mod copying;
 pub mod event;
+pub mod lanes;
 pub mod page;
 pub mod reading;
 pub mod record;
 pub mod recording;
 pub mod recover;
 pub mod schema;
+pub mod topic;
 pub mod verify;
 pub mod writing;

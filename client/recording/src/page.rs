@@ -9,8 +9,8 @@ use dynocar_shared::{Parameter, PipelineKind, Reason, RejectionReason, Status};
 use crate::annotate::schema::MESSAGES;
 use crate::event::{EVENT_FIELDS, EventField, EventKind};
 use crate::schema::{
-    ESTIMATE, REJECTED, SAMPLE_FIELDS, SNAPSHOT_FIELDS, number, parameter_number, rejection_number,
-    std_name, vocabulary_of, vocabulary_of_type,
+    BESIDE_VALUE, ESTIMATE, REJECTED, SAMPLE_FIELDS, SNAPSHOT_FIELDS, name_beside, number,
+    parameter_number, rejection_number, vocabulary_of, vocabulary_of_type,
 };
 
 const HEAD: &str = "# Fields of a recording
@@ -46,8 +46,10 @@ pub fn page() -> String {
     for &it in Parameter::ALL {
         let (name, number) = (it.full_name(), parameter_number(it));
         row(&mut page, name, number, "double", unit_of(name), it.meaning());
-        let (number, meaning) = (number + crate::schema::STD_OFFSET, "Its standard deviation.");
-        row(&mut page, &std_name(it), number, "double", unit_of(name), meaning);
+        for (offset, word, meaning) in BESIDE_VALUE {
+            let beside = name_beside(it, word);
+            row(&mut page, &beside, number + offset, "double", unit_of(name), meaning);
+        }
     }
     table(&mut page, "dynocar.Rejected", "How many samples a pipeline refused, by reason.");
     for &it in RejectionReason::ALL {

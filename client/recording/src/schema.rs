@@ -32,6 +32,12 @@ pub const ESTIMATE: u32 = 101;
 pub const REJECTED: u32 = 102;
 /// A standard deviation's number in `estimate` is so much greater than the parameter's.
 pub const STD_OFFSET: u32 = 100;
+/// The lower end of its 95 % interval has a number that is so much greater.
+pub const LOW_OFFSET: u32 = 200;
+/// The upper end of its 95 % interval has a number that is so much greater.
+pub const HIGH_OFFSET: u32 = 300;
+/// Half width of a 95 % interval over the standard deviation.
+pub const INTERVAL_95: f64 = 1.96;
 
 /// The fields of a sample, in order.
 pub static SAMPLE_FIELDS: LazyLock<Vec<Field>> = LazyLock::new(|| sample_fields().collect());
@@ -46,17 +52,25 @@ pub fn number(field: &Field) -> u32 {
     field.place as u32 + 1
 }
 
-/// The number of a parameter's value in `estimate`; that of its standard deviation is greater by
-/// [`STD_OFFSET`].
+/// The number of a parameter's value in `estimate`; those of its standard deviation and of the ends
+/// of its 95 % interval are greater by [`STD_OFFSET`], [`LOW_OFFSET`] and [`HIGH_OFFSET`].
 pub fn parameter_number(parameter: Parameter) -> u32 {
     parameter as u32
 }
 
-/// The name of a parameter's standard deviation: the unit stays last.
-pub fn std_name(parameter: Parameter) -> String {
+/// What `estimate` tells of a parameter beside its value: how much greater its number is, the word in
+/// its name, and what it is.
+pub const BESIDE_VALUE: [(u32, &str, &str); 3] = [
+    (STD_OFFSET, "std", "Its standard deviation."),
+    (LOW_OFFSET, "low", "The lower end of its 95 % interval."),
+    (HIGH_OFFSET, "high", "The upper end of its 95 % interval."),
+];
+
+/// The name of what is told of a parameter beside its value: the unit stays last.
+pub fn name_beside(parameter: Parameter, word: &str) -> String {
     let name = parameter.full_name();
     let unit = unit_end(name).0;
-    format!("{}_std{unit}", &name[..name.len() - unit.len()])
+    format!("{}_{word}{unit}", &name[..name.len() - unit.len()])
 }
 
 /// The number of a reason's count in `rejected`.
@@ -168,10 +182,11 @@ fn snapshot_message() -> Vec<FieldDescriptorProto> {
 fn estimate_message() -> Vec<FieldDescriptorProto> {
     let of = |&it: &Parameter| {
         let number = parameter_number(it);
-        [
-            field(it.full_name(), number, Type::Double, true),
-            field(&std_name(it), number + STD_OFFSET, Type::Double, true),
-        ]
+        let value = field(it.full_name(), number, Type::Double, true);
+        let beside = BESIDE_VALUE.map(|(offset, word, _)| {
+            field(&name_beside(it, word), number + offset, Type::Double, true)
+        });
+        std::iter::once(value).chain(beside)
     };
     Parameter::ALL.iter().flat_map(of).collect()
 }

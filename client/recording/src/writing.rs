@@ -6,15 +6,15 @@ use std::io::Write;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use dynocar_client::monotonic_now_ns;
-use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
+use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Attachment, McapError, WriteOptions, Writer};
-use prost::Message;
 
-use crate::codec::{encode_sample, encode_snapshot};
+use crate::codec::{encode_event, encode_sample, encode_snapshot};
 use crate::event::Event;
 use crate::schema::{DESCRIPTORS, EVENT, SAMPLE, SNAPSHOT};
+use crate::topic::{ENCODING, LAYOUT, Topic};
 
 /// Name of the metadata record that every recording begins with.
 pub const METADATA: &str = "dynocar";
@@ -136,8 +136,7 @@ impl<W: Write> RecordingWriter<W> {
     /// When it cannot be written.
     pub fn sample(&mut self, sample: &TrainSample, at_ns: i64) -> Result<(), McapError> {
         let train = sample.train_id;
-        let topic = || (format!("/train/{train}/samples"), TrainSample::WIRE_NAME);
-        let channel = self.channel((SAMPLE, train, 0), topic)?;
+        let channel = self.channel((SAMPLE, train, 0), || Topic::of_samples(TrainId(train)))?;
         self.message.clear();
         encode_sample(sample, &mut self.message);
         self.write(channel, sample.sequence, at_ns)
@@ -150,8 +149,7 @@ impl<W: Write> RecordingWriter<W> {
     /// When it cannot be written.
     pub fn snapshot(&mut self, snapshot: &ParameterSnapshot) -> Result<(), McapError> {
         let (train, index) = (snapshot.train_id, snapshot.pipeline_index);
-        let kind = snapshot.pipeline_kind().map_or("unknown", PipelineKind::name);
-        let topic = || (format!("/train/{train}/{index}_{kind}"), ParameterSnapshot::WIRE_NAME);
+        let topic = || Topic::of_snapshots(TrainId(train), index, snapshot.pipeline_kind());
         let channel =
             self.channel((SNAPSHOT, train, index << 16 | snapshot.pipeline_kind), topic)?;
         self.message.clear();
@@ -165,10 +163,9 @@ impl<W: Write> RecordingWriter<W> {
     ///
     /// When it cannot be written.
     pub fn event(&mut self, event: &Event) -> Result<(), McapError> {
-        let channel = self.channel((EVENT, 0, 0), || ("/events".to_owned(), EVENT))?;
+        let channel = self.channel((EVENT, 0, 0), Topic::of_events)?;
         self.message.clear();
-        // A vector takes any length.
-        let _ = event.encode(&mut self.message);
+        encode_event(event, &mut self.message);
         self.write(channel, 0, event.monotonic_ns)
     }
 
@@ -195,17 +192,18 @@ impl<W: Write> RecordingWriter<W> {
     fn channel(
         &mut self,
         key: (&'static str, u64, u32),
-        topic: impl FnOnce() -> (String, &'static str),
+        topic: impl FnOnce() -> Topic,
     ) -> Result<u16, McapError> {
         if let Some(&known) = self.channels.get(&key) {
             return Ok(known);
         }
-        let (topic, layout) = topic();
-        let metadata: BTreeMap<String, String> = [("layout".to_owned(), layout.to_owned())].into();
+        let topic = topic();
+        let metadata: BTreeMap<String, String> =
+            [(LAYOUT.to_owned(), topic.layout.to_owned())].into();
         let mut id = 0;
         self.carry(|writer| {
-            let schema = writer.add_schema(key.0, "protobuf", &DESCRIPTORS)?;
-            id = writer.add_channel(schema, &topic, "protobuf", &metadata)?;
+            let schema = writer.add_schema(topic.schema, ENCODING, &DESCRIPTORS)?;
+            id = writer.add_channel(schema, &topic.name, ENCODING, &metadata)?;
             Ok(())
         })?;
         self.channels.insert(key, id);

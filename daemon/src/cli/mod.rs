@@ -63,6 +63,8 @@ enum Command {
     Convert(companion::Passed),
     /// See in the terminal what the daemon knows of a train, and what to drive next
     Watch(companion::Passed),
+    /// Serve samples, snapshots and events live to Foxglove or Lichtblick
+    Live(companion::Passed),
     Completions(completions::CompletionsArguments),
     Man(man::ManArguments),
 }
@@ -82,7 +84,7 @@ impl Command {
             Command::Record(_) | Command::Recover(_) | Command::Convert(_) | Command::Watch(_) => {
                 None
             }
-            Command::Completions(_) | Command::Man(_) => None,
+            Command::Live(_) | Command::Completions(_) | Command::Man(_) => None,
         }
     }
 }
@@ -110,6 +112,7 @@ pub fn main() -> ExitCode {
         Command::Recover(passed) => companion::become_it(RECORDING, Some("recover"), passed),
         Command::Convert(passed) => companion::become_it(RECORDING, Some("convert"), passed),
         Command::Watch(passed) => companion::become_it("dynocar-watch", None, passed),
+        Command::Live(passed) => companion::become_it("dynocar-live", None, passed),
         Command::Completions(arguments) => completions::execute(arguments, Arguments::command()),
         Command::Man(arguments) => man::execute(arguments, Arguments::command()),
     };

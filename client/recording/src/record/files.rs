@@ -14,8 +14,9 @@ use mcap::McapError;
 
 use super::configuration::Configuration;
 use super::keeping::{self, Keeper};
-use super::{RecordError, Recorded, event};
+use super::{RecordError, Recorded};
 use crate::event::{Event, EventKind};
+use crate::lanes::event;
 use crate::writing::{CONFIGURATION, RecordingWriter, WallClock, folder_of_configuration};
 
 /// When a file is full, and how much of them is kept.
@@ -142,22 +143,15 @@ impl Files {
     /// As above.
     pub fn event(&mut self, event: &Event) -> Result<(), RecordError> {
         self.recorded.events += 1;
+        if event.kind == EventKind::SamplesLost as i32 {
+            self.recorded.lost += event.count.unwrap_or(0);
+        }
         let written = self.writer.event(event);
         self.told(written)?;
         if keeping::is_reason(event) {
             self.tell_keeper(|keeper, files| keeper.keep(event, files));
         }
         Ok(())
-    }
-
-    /// Writes the event that so many samples were passed over.
-    ///
-    /// # Errors
-    ///
-    /// As above.
-    pub fn lost(&mut self, event: &Event, count: u64) -> Result<(), RecordError> {
-        self.recorded.lost += count;
-        self.event(event)
     }
 
     /// Attaches the configuration of a daemon that has come, unless it is the one before.

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use dynocar_recording::event::{EVENT_FIELDS, Event, EventKind};
 use dynocar_recording::page::page;
-use dynocar_recording::schema::{DESCRIPTORS, std_name};
+use dynocar_recording::schema::{BESIDE_VALUE, DESCRIPTORS, name_beside};
 use dynocar_shared::Parameter;
 use prost::Message;
 use prost::encoding::{DecodeContext, decode_key, skip_field};
@@ -54,22 +54,26 @@ fn names_and_numbers_are_unique_in_every_message_and_numbers_never_meet_the_nest
 }
 
 #[test]
-fn parameters_have_names_with_units_and_deviations_beside_them() {
-    let names: Vec<String> =
-        Parameter::ALL.iter().flat_map(|&it| [it.full_name().into(), std_name(it)]).collect();
+fn parameters_have_names_with_units_and_deviations_and_intervals_beside_them() {
+    let of = |&it: &Parameter| {
+        let beside = BESIDE_VALUE.map(|(_, word, _)| name_beside(it, word));
+        std::iter::once(it.full_name().to_owned()).chain(beside)
+    };
+    let names: Vec<String> = Parameter::ALL.iter().flat_map(of).collect();
     let expected = [
         "resistance_a_n_per_kn",
         "resistance_a_std_n_per_kn",
+        "resistance_a_low_n_per_kn",
+        "resistance_a_high_n_per_kn",
         "resistance_b_n_per_kn_per_mps",
         "resistance_b_std_n_per_kn_per_mps",
-        "resistance_c_n_per_kn_per_mps2",
-        "resistance_c_std_n_per_kn_per_mps2",
-        "mass_t",
-        "mass_std_t",
-        "adhesion",
-        "adhesion_std",
+        "resistance_b_low_n_per_kn_per_mps",
+        "resistance_b_high_n_per_kn_per_mps",
     ];
     assert_eq!(names[..expected.len()], expected);
+    for other in ["mass_t", "mass_std_t", "adhesion", "adhesion_high"] {
+        assert!(names.contains(&other.to_owned()), "{other}");
+    }
     assert!(names.contains(&"unexplained_force_std_n".to_owned()));
 }
 

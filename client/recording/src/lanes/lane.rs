@@ -1,16 +1,17 @@
-//! One train that is recorded.
+//! The channels of one train.
+
+use std::time::Duration;
 
 use dynocar::output::tell;
 use dynocar_client::channel::{Receiver, Transport};
-use dynocar_client::{ChannelError, Peer, Role, SnapshotReader, monotonic_now_ns};
+use dynocar_client::{ChannelError, Host, Peer, Role, SnapshotReader, monotonic_now_ns};
 use dynocar_shared::services::{PIPELINES_MAX, SAMPLE_BUFFER};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, Status, TrainId, TrainSample};
 
-use super::configuration::Configuration;
-use super::{Files, RecordError, Settings, event};
+use super::{Sink, event};
 use crate::event::{Event, EventKind};
 
-/// The most samples taken in a row, before the other trains and the flush have their turn.
+/// The most samples taken in a row, before the other trains have their turn.
 const TURN: usize = 4 * SAMPLE_BUFFER;
 
 /// What was last seen of a pipeline.
@@ -19,7 +20,7 @@ struct Seen {
     epoch: u64,
     sequence: u64,
     status: (u32, u32),
-    written_ns: i64,
+    taken_ns: i64,
     is_silent: bool,
 }
 
@@ -42,26 +43,26 @@ pub struct Lane {
 }
 
 impl Lane {
-    /// Opens the channels of a train.
+    /// Opens the channels of a train; `name` is what their place is called.
     ///
     /// # Errors
     ///
     /// When they cannot be opened or all their places are taken.
     pub fn open(
-        settings: &Settings,
+        host: &Host,
         train: TrainId,
-        files: &mut Files,
-    ) -> Result<Self, RecordError> {
-        let snapshots = SnapshotReader::open(&settings.host, train)?;
-        let transport = Transport::open(&settings.host, "dynocar-recorder")?;
+        interval: Duration,
+        name: &str,
+    ) -> Result<Self, ChannelError> {
+        let snapshots = SnapshotReader::open(host, train)?;
+        let transport = Transport::open(host, name)?;
         let samples = transport.receiver::<TrainSample>(train)?;
         transport.reserve()?;
-        files.event(&event(train, EventKind::RecordingBegan, format!("train {train}")))?;
         Ok(Lane {
             train,
             samples,
             snapshots,
-            interval_ns: settings.snapshot_interval.as_nanos() as i64,
+            interval_ns: interval.as_nanos() as i64,
             newest: None,
             pipelines: [None; PIPELINES_MAX],
             daemon: None,
@@ -76,16 +77,16 @@ impl Lane {
         self.train
     }
 
-    /// Records what has come.
+    /// Hands on what has come.
     ///
     /// # Errors
     ///
-    /// When it cannot be written.
-    pub fn take(&mut self, files: &mut Files) -> Result<(), RecordError> {
+    /// When it is not taken.
+    pub fn take<S: Sink>(&mut self, sink: &mut S) -> Result<(), S::Error> {
         for _ in 0..TURN {
             let Some(sample) = self.samples.receive() else { break };
-            self.count(sample.sequence, files)?;
-            files.sample(&sample)?;
+            self.count(sample.sequence, sink)?;
+            sink.sample(&sample)?;
         }
         self.snapshots.poll();
         let now_ns = monotonic_now_ns();
@@ -98,19 +99,19 @@ impl Lane {
             let is_change = seen.is_none() || status != known.status || it.epoch != known.epoch;
             if seen.is_some()
                 && !is_change
-                && (!is_news || now_ns - known.written_ns < self.interval_ns)
+                && (!is_news || now_ns - known.taken_ns < self.interval_ns)
             {
                 continue;
             }
-            files.snapshot(it)?;
+            sink.snapshot(it)?;
             if is_change {
-                files.event(&status_event(self.train, it))?;
+                sink.event(&status_event(self.train, it))?;
             }
             *seen = Some(Seen {
                 epoch: it.epoch,
                 sequence: it.sequence,
                 status,
-                written_ns: now_ns,
+                taken_ns: now_ns,
                 is_silent: false,
             });
         }
@@ -119,7 +120,7 @@ impl Lane {
 
     /// Counts the numbers that were passed over. A number that is not greater than the last is of a
     /// count that was begun anew.
-    fn count(&mut self, sequence: u64, files: &mut Files) -> Result<(), RecordError> {
+    fn count<S: Sink>(&mut self, sequence: u64, sink: &mut S) -> Result<(), S::Error> {
         let missing = match self.newest.replace(sequence) {
             Some(newest) if sequence > newest => sequence - newest - 1,
             _ => return Ok(()),
@@ -128,58 +129,55 @@ impl Lane {
             self.lost += missing;
             let text = format!("samples {} to {} never came", sequence - missing, sequence - 1);
             let lost = event(self.train, EventKind::SamplesLost, text);
-            files.lost(&Event { count: Some(missing), ..lost }, missing)?;
+            sink.event(&Event { count: Some(missing), ..lost })?;
         }
         Ok(())
     }
 
-    /// Looks who is there, and tells what has changed.
+    /// Looks who is there, and tells what has changed; what one left who is gone comes before that.
     ///
     /// # Errors
     ///
-    /// When it cannot be written.
-    pub fn look(&mut self, settings: &Settings, files: &mut Files) -> Result<(), RecordError> {
+    /// When it is not taken.
+    pub fn look<S: Sink>(&mut self, host: &Host, sink: &mut S) -> Result<(), S::Error> {
         if self.lost > 0 {
             tell(&format!("train {}: {} samples lost", self.train, std::mem::take(&mut self.lost)));
         }
         let train = self.train;
-        let daemon = self.peer(settings, Role::Daemon)?;
+        let daemon = self.peer(host, Role::Daemon)?;
+        let controller = self.peer(host, Role::Controller)?;
+        self.take(sink)?;
         if daemon.as_ref().map(|it| it.0) != self.daemon {
             let (kind, text) = match &daemon {
                 Some((process, words)) => {
-                    let found = Configuration::of(settings.configuration.as_deref(), *process);
-                    match found {
-                        Ok(configuration) => files.attach(configuration)?,
-                        Err(problem) => tell(&format!("train {train}: {problem}")),
-                    }
+                    sink.daemon_came(train, *process)?;
                     (EventKind::DaemonCame, words.clone())
                 }
                 None => (EventKind::DaemonGone, "no daemon".into()),
             };
-            files.event(&event(train, kind, text))?;
+            sink.event(&event(train, kind, text))?;
             self.daemon = daemon.map(|it| it.0);
         }
-        let controller = self.peer(settings, Role::Controller)?;
         if controller.as_ref().map(|it| it.0) != self.controller {
             let (kind, text) = match &controller {
                 Some((_, words)) => (EventKind::ControllerCame, words.clone()),
                 None => (EventKind::ControllerGone, "no controller".into()),
             };
-            files.event(&event(train, kind, text))?;
+            sink.event(&event(train, kind, text))?;
             self.controller = controller.map(|it| it.0);
         }
-        self.note_silence(files)
+        self.note_silence(sink)
     }
 
-    fn peer(&self, settings: &Settings, role: Role) -> Result<Option<(u32, String)>, ChannelError> {
-        Ok(match Peer::look_up(&settings.host, self.train, role)? {
+    fn peer(&self, host: &Host, role: Role) -> Result<Option<(u32, String)>, ChannelError> {
+        Ok(match Peer::look_up(host, self.train, role)? {
             Peer::Absent => None,
             Peer::Compatible(it) => Some((it.process_id, it.to_string())),
             Peer::Incompatible(it) => Some((it.process_id, format!("incompatible: {it}"))),
         })
     }
 
-    fn note_silence(&mut self, files: &mut Files) -> Result<(), RecordError> {
+    fn note_silence<S: Sink>(&mut self, sink: &mut S) -> Result<(), S::Error> {
         for reading in self.snapshots.readings(monotonic_now_ns()) {
             let Some(seen) = &mut self.pipelines[reading.snapshot.pipeline_index as usize] else {
                 continue;
@@ -188,20 +186,11 @@ impl Lane {
                 let text = format!("silent for {} ms", reading.age_ns / 1_000_000);
                 let silent = event(self.train, EventKind::DaemonSilent, text);
                 let pipeline_index = Some(reading.snapshot.pipeline_index);
-                files.event(&Event { pipeline_index, ..silent })?;
+                sink.event(&Event { pipeline_index, ..silent })?;
             }
             seen.is_silent = reading.is_stale;
         }
         Ok(())
-    }
-
-    /// Notes that the recorder was asked to end.
-    ///
-    /// # Errors
-    ///
-    /// When it cannot be written.
-    pub fn end(&mut self, files: &mut Files) -> Result<(), RecordError> {
-        files.event(&event(self.train, EventKind::RecordingEnded, format!("train {}", self.train)))
     }
 }
 

@@ -1,0 +1,54 @@
+//! The command line of `dynocar live`.
+
+use std::net::{IpAddr, SocketAddr};
+use std::process::ExitCode;
+
+use clap::Parser;
+use dynocar::cli::{Failure, parse};
+use dynocar::run::stop_on_signals;
+use dynocar_recording::cli::WantedArguments;
+
+use crate::live::{Settings, live};
+
+/// Serve samples, snapshots and events to Foxglove or Lichtblick as they come, by the Foxglove WebSocket
+/// protocol: the topics and messages of a recording. Trains and daemons may come and go. It is one more
+/// reader of the trains' channels, which nobody waits for
+#[derive(Debug, Parser)]
+#[command(name = "dynocar live", version, about)]
+struct Arguments {
+    #[command(flatten)]
+    wanted: WantedArguments,
+    /// Samples a second that viewers get of each train; 0 for every one
+    #[arg(long, value_name = "HZ", default_value_t = 50,
+          value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    samples_hz: u32,
+    /// The address to serve on. Nothing is encrypted and nobody is asked who they are: name another
+    /// than the default only where all who reach it may see everything
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
+    host: IpAddr,
+    /// The port; 0 for any that is free
+    #[arg(long, value_name = "PORT", default_value_t = 8765)]
+    port: u16,
+}
+
+/// Parses the command line, serves until told to end, reports a failure on standard error.
+pub fn main() -> ExitCode {
+    let arguments = match parse::<Arguments>("dynocar live") {
+        Ok(arguments) => arguments,
+        Err(status) => return status,
+    };
+    match execute(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report("dynocar live", None),
+    }
+}
+
+fn execute(arguments: &Arguments) -> Result<(), Failure> {
+    let settings = Settings {
+        wanted: arguments.wanted.wanted()?,
+        samples_hz: arguments.samples_hz,
+        address: SocketAddr::new(arguments.host, arguments.port),
+    };
+    let stop = stop_on_signals().map_err(|error| Failure::Work(error.to_string()))?;
+    live(&settings, &stop).map_err(|error| Failure::Work(error.to_string()))
+}

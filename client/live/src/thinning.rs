@@ -1,0 +1,52 @@
+//! How many samples viewers get: a picture needs no thousand a second.
+
+/// Lets through as many as are wanted of what comes faster, evenly.
+#[derive(Clone, Copy, Debug)]
+pub struct Thinning {
+    interval_ns: i64,
+    due_ns: i64,
+}
+
+impl Thinning {
+    /// Lets so many a second through; all, when it is 0.
+    pub fn to(per_second: u32) -> Self {
+        let interval_ns = 1_000_000_000_i64.checked_div(i64::from(per_second)).unwrap_or(0);
+        Thinning { interval_ns, due_ns: i64::MIN }
+    }
+
+    /// True where what came at this moment is to go on.
+    pub fn lets_through(&mut self, at_ns: i64) -> bool {
+        if at_ns < self.due_ns && self.due_ns.saturating_sub(at_ns) <= self.interval_ns {
+            return false;
+        }
+        // After a gap, or where the clock was set back, the count begins anew.
+        let is_even = at_ns.saturating_sub(self.due_ns) < self.interval_ns;
+        self.due_ns = if is_even { self.due_ns } else { at_ns }.saturating_add(self.interval_ns);
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn let_through(per_second: u32, moments_ns: impl Iterator<Item = i64>) -> usize {
+        let mut thinning = Thinning::to(per_second);
+        moments_ns.filter(|&at| thinning.lets_through(at)).count()
+    }
+
+    #[test]
+    fn of_a_thousand_a_second_fifty_go_on_and_what_is_slower_goes_on_whole() {
+        let second = |hz: i64| (0..hz).map(move |k| 1_000_000_000 * k / hz);
+        assert_eq!(let_through(50, second(1000)), 50);
+        assert_eq!(let_through(50, second(60)), 50);
+        assert_eq!(let_through(50, second(20)), 20);
+        assert_eq!(let_through(0, second(1000)), 1000);
+    }
+
+    #[test]
+    fn a_clock_that_is_set_back_silences_nobody() {
+        let moments = [0, 1_000_000_000, 5_000_000, 10_000_000, 30_000_000];
+        assert_eq!(let_through(50, moments.into_iter()), 4);
+    }
+}

@@ -1,0 +1,65 @@
+//! What is told of viewers that do not keep up.
+//!
+//! The protocol's library drops the oldest messages of a viewer whose queue is full, and says so in
+//! its log, at most every 30 s; it counts none.
+
+use std::fmt::{Debug, Write};
+
+use dynocar::output::tell;
+use tracing::field::{Field, Visit};
+use tracing::{Event, Level, Subscriber};
+use tracing_subscriber::layer::{Context, Layer, SubscriberExt};
+use tracing_subscriber::registry;
+use tracing_subscriber::util::SubscriberInitExt;
+
+/// How the library's sentence about a full queue begins.
+const FULL_QUEUE: &str = "outbox for client ";
+/// How its sentence about a viewer that broke off begins.
+const BROKEN_OFF: &str = "Error receiving from client ";
+
+/// Tells from now on what the protocol's library has to say of viewers.
+pub fn tell_of_viewers() {
+    // Only a second call fails.
+    let _ = registry().with(Teller).try_init();
+}
+
+struct Teller;
+
+/// The sentence of an event.
+#[derive(Default)]
+struct Sentence(String);
+
+impl Visit for Sentence {
+    fn record_debug(&mut self, field: &Field, value: &dyn Debug) {
+        if field.name() == "message" {
+            // Writing into a String cannot fail.
+            let _ = write!(self.0, "{value:?}");
+        }
+    }
+}
+
+impl<S: Subscriber> Layer<S> for Teller {
+    fn on_event(&self, event: &Event<'_>, _: Context<'_, S>) {
+        let metadata = event.metadata();
+        if !metadata.target().starts_with("foxglove") || *metadata.level() > Level::INFO {
+            return;
+        }
+        let mut sentence = Sentence::default();
+        event.record(&mut sentence);
+        if let Some(words) = words(*metadata.level(), &sentence.0) {
+            tell(&words);
+        }
+    }
+}
+
+fn words(level: Level, sentence: &str) -> Option<String> {
+    if let Some(rest) = sentence.strip_prefix(FULL_QUEUE) {
+        let address = rest.split(' ').next().unwrap_or(rest);
+        return Some(format!(
+            "the viewer at {address} does not keep up: its oldest messages are dropped"
+        ));
+    }
+    // That it has gone is told by others.
+    let is_told = level <= Level::WARN && !sentence.starts_with(BROKEN_OFF);
+    is_told.then(|| format!("viewers: {sentence}"))
+}
