@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 TAKEN = ["*.md", "LICENSE-*", "docs/**/*", "client/README.md", "client/examples/*", "client/include/*",
-         "config/dynocar.service"]
+         "config/dynocar.service", "config/dynocar-flight-recorder.service"]
 
 
 def fenced(language: str, text: str) -> str:

@@ -104,6 +104,11 @@ unit=usr/lib/systemd/system/dynocar.service
 put "$project/config/dynocar.service" "$unit"
 sed -i 's|^ExecStart=/usr/local/bin/dynocar |ExecStart=/usr/bin/dynocar |' "$root/$unit"
 grep -q '^ExecStart=/usr/bin/dynocar ' "$root/$unit" || fail "config/dynocar.service has no ExecStart"
+recorder=usr/lib/systemd/system/dynocar-flight-recorder.service
+if [ -f "$root/usr/bin/dynocar-recording" ]; then
+    put "$project/config/dynocar-flight-recorder.service" "$recorder"
+    sed -i 's|^ExecStart=/usr/local/bin/dynocar |ExecStart=/usr/bin/dynocar |' "$root/$recorder"
+fi
 put "$here/sysusers.conf" usr/lib/sysusers.d/dynocar.conf
 
 # What goes with it.

@@ -1,27 +1,25 @@
 //! The command line: `dynocar record`, `recover`, `convert` and `replay --verify` become this program.
 
 mod annotate;
+mod flight_recorder;
+mod record;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Duration;
 
-use clap::{ArgGroup, Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
 use dynocar::cli::{Failure, parse};
 use dynocar::config::DaemonConfig;
 use dynocar::output::{print, require_new, tell};
-use dynocar::run::stop_on_signals;
-use dynocar_client::Host;
-use dynocar_shared::TrainId;
 
 use crate::convert::{FromDatasetError, ModelFiles, ToDatasetError, from_dataset, to_dataset};
-use crate::lanes::Wanted;
 use crate::page::page;
 use crate::reading::{Ending, ReadError};
-use crate::record::{RecordError, Rotation, Settings, record};
 use crate::recording::Recording;
 use crate::recover::{RecoverError, recover};
 use crate::verify::{Configurations, Outcome, overlay, overlay_text, text, verify};
+
+pub use record::WantedArguments;
 
 /// Recordings of what a controller and the daemon write, as MCAP.
 #[derive(Debug, Parser)]
@@ -33,7 +31,9 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Record(RecordArguments),
+    Record(record::RecordArguments),
+    FlightRecorder(flight_recorder::FlightRecorderArguments),
+    Keep(flight_recorder::KeepArguments),
     Recover(RecoverArguments),
     Convert(ConvertArguments),
     #[command(hide = true)]
@@ -45,68 +45,12 @@ enum Command {
     Fields,
 }
 
-/// Record what a controller and the daemon write, as MCAP.
-#[derive(Debug, Args)]
-#[command(group(ArgGroup::new("rotation").args(["rotate_mib", "rotate_minutes"]).multiple(true)))]
-struct RecordArguments {
-    /// The file; with --rotate-mib or --rotate-minutes the files' names are this with a number
-    #[arg(short, long, value_name = "FILE.mcap")]
-    output: PathBuf,
-    #[command(flatten)]
-    wanted: WantedArguments,
-    /// The daemon's configuration to attach; by default the one that its command line names
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
-    /// Begin a new file after so many MiB
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
-    rotate_mib: Option<u64>,
-    /// Begin a new file after so many minutes
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
-    rotate_minutes: Option<u64>,
-    /// Remove the oldest files when all take more than so many MiB
-    #[arg(long, value_name = "N", requires = "rotation",
-          value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
-    keep_mib: Option<u64>,
-}
-
-/// What a recorder or a live view reads.
-#[derive(Debug, Args)]
-pub struct WantedArguments {
-    /// Only this train; may be given several times. By default every train that is there or comes
-    #[arg(long = "train", value_name = "ID")]
-    trains: Vec<u64>,
-    /// The run-time directory; else the variable DYNOCAR_ROOT, else /tmp/dynocar-<user>
-    #[arg(long, value_name = "DIR")]
-    root: Option<PathBuf>,
-    /// Take a pipeline's snapshot every so many ms, and each change of its status
-    #[arg(long, value_name = "MS", default_value_t = 100)]
-    snapshots_ms: u64,
-}
-
-impl WantedArguments {
-    /// What is to be read.
-    ///
-    /// # Errors
-    ///
-    /// When there is no run-time directory.
-    pub fn wanted(&self) -> Result<Wanted, Failure> {
-        let host = match &self.root {
-            Some(root) => Host::at(root),
-            None => Host::from_environment(),
-        };
-        Ok(Wanted {
-            host: host.map_err(|error| Failure::Work(error.to_string()))?,
-            trains: self.trains.iter().copied().map(TrainId).collect(),
-            snapshot_interval: Duration::from_millis(self.snapshots_ms),
-        })
-    }
-}
-
-/// Make a recording whole whose recorder died.
+/// Make a recording whole whose recorder died, or one recording of the files of one that rotated.
 #[derive(Debug, Args)]
 struct RecoverArguments {
-    /// The broken file; it stays as it is
-    broken: PathBuf,
+    /// The broken file, or all files of a recording in their order; they stay as they are
+    #[arg(required = true)]
+    broken: Vec<PathBuf>,
     /// The whole file
     #[arg(short, long, value_name = "FILE.mcap")]
     output: PathBuf,
@@ -151,7 +95,9 @@ pub fn main() -> ExitCode {
         Err(status) => return status,
     };
     let result = match &arguments.command {
-        Command::Record(arguments) => execute_record(arguments),
+        Command::Record(arguments) => record::execute(arguments),
+        Command::FlightRecorder(arguments) => flight_recorder::execute(arguments),
+        Command::Keep(arguments) => flight_recorder::execute_keep(arguments),
         Command::Recover(arguments) => execute_recover(arguments),
         Command::Convert(arguments) => execute_convert(arguments),
         Command::Annotate(arguments) => annotate::execute(arguments),
@@ -164,47 +110,16 @@ pub fn main() -> ExitCode {
     }
 }
 
-const MIB: u64 = 1 << 20;
-
-fn execute_record(arguments: &RecordArguments) -> Result<(), Failure> {
-    let settings = Settings {
-        wanted: arguments.wanted.wanted()?,
-        output: arguments.output.clone(),
-        rotation: Rotation {
-            bytes: arguments.rotate_mib.map(|it| it * MIB),
-            age: arguments.rotate_minutes.map(|it| Duration::from_secs(60 * it)),
-            keep_bytes: arguments.keep_mib.map(|it| it * MIB),
-            keep_age: None,
-        },
-        configuration: arguments.config.clone(),
-    };
-    let stop = stop_on_signals().map_err(|error| Failure::Work(error.to_string()))?;
-    let recorded = record(&settings, &stop).map_err(|error| match error {
-        RecordError::Taken { .. } => Failure::Input(error.to_string()),
-        error => Failure::Work(error.to_string()),
-    })?;
-    tell(&format!(
-        "{} samples, {} snapshots and {} events recorded, {} samples lost",
-        recorded.samples, recorded.snapshots, recorded.events, recorded.lost
-    ));
-    Ok(())
-}
-
 fn execute_recover(arguments: &RecoverArguments) -> Result<(), Failure> {
     require_new(&arguments.output)?;
     let recovered = recover(&arguments.broken, &arguments.output).map_err(|error| match error {
         RecoverError::Read(error) => read_failure(error),
         error => Failure::Work(error.to_string()),
     })?;
-    let lost = match recovered.ending {
-        Ending::Whole => "nothing is lost: it was whole".to_owned(),
-        Ending::Broken { read_bytes, file_bytes, reason } => {
-            let rest = file_bytes.saturating_sub(read_bytes);
-            format!(
-                "lost: what was not written, and the last {rest} of {file_bytes} bytes ({reason})"
-            )
-        }
-    };
+    let lost: Vec<String> =
+        arguments.broken.iter().zip(&recovered.endings).filter_map(lost).collect();
+    let lost =
+        if lost.is_empty() { "nothing is lost: it was whole".to_owned() } else { lost.join("; ") };
     tell(&format!(
         "{}: {} messages and {} attached files recovered; {lost}",
         arguments.output.display(),
@@ -212,6 +127,16 @@ fn execute_recover(arguments: &RecoverArguments) -> Result<(), Failure> {
         recovered.attachments
     ));
     Ok(())
+}
+
+/// What a file has lost, unless it is whole.
+fn lost((path, ending): (&PathBuf, &Ending)) -> Option<String> {
+    let Ending::Broken { read_bytes, file_bytes, reason } = ending else { return None };
+    let rest = file_bytes.saturating_sub(*read_bytes);
+    let path = path.display();
+    Some(format!(
+        "lost of {path}: what was not written, and the last {rest} of {file_bytes} bytes ({reason})"
+    ))
 }
 
 /// A file that is no recording is wrong input; one that the system does not give is not there.

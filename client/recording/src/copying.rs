@@ -1,9 +1,9 @@
 //! Copies of recordings: everything that can be read, with an index and an end.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::io::BufWriter;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use mcap::records::MessageHeader;
 use mcap::{Attachment, McapError, WriteOptions, Writer};
@@ -29,18 +29,18 @@ pub struct Copied {
     pub messages: u64,
     /// Attached files.
     pub attachments: u64,
-    /// How the file ended.
-    pub ending: Ending,
+    /// How each file ended.
+    pub endings: Vec<Ending>,
 }
 
-/// Copies what can be read of a file into a new one, ours or not; `watcher` is told what it holds, and
-/// `add` writes what is to follow.
+/// Copies what can be read of files, in their order, into a new one, ours or not; `watcher` is told what
+/// they hold, and `add` writes what is to follow. A file that is attached to several is so once.
 ///
 /// # Errors
 ///
-/// When it is no MCAP file, or the new one cannot be written; then there is none.
+/// When one is no MCAP file, or the new one cannot be written; then there is none.
 pub fn copy<V: Visitor>(
-    from: &Path,
+    from: &[PathBuf],
     to: &Path,
     watcher: &mut V,
     add: impl FnOnce(&mut CopyWriter, &mut V) -> Result<(), McapError>,
@@ -55,17 +55,24 @@ pub fn copy<V: Visitor>(
 }
 
 fn copy_into<V: Visitor>(
-    from: &Path,
+    from: &[PathBuf],
     file: File,
     watcher: &mut V,
     add: impl FnOnce(&mut CopyWriter, &mut V) -> Result<(), McapError>,
 ) -> Result<Copied, CopyError> {
     let options = WriteOptions::new().profile("dynocar");
     let writer = options.create(BufWriter::new(file)).map_err(CopyError::Write)?;
-    let channels = HashMap::new();
-    let mut copier =
-        Copier { writer, channels, messages: 0, attachments: 0, failed: None, watcher };
-    let read = read(from, &mut copier);
+    let mut copier = Copier {
+        writer,
+        channels: HashMap::new(),
+        carried: HashSet::new(),
+        messages: 0,
+        attachments: 0,
+        failed: None,
+        watcher,
+    };
+    let read: Result<Vec<Ending>, ReadError> =
+        from.iter().map(|path| read(path, &mut copier)).collect();
     let Copier { mut writer, messages, attachments, mut failed, watcher, .. } = copier;
     if read.is_ok() && failed.is_none() {
         failed = add(&mut writer, watcher).err();
@@ -80,11 +87,11 @@ fn copy_into<V: Visitor>(
             writer.into_inner();
             Err(CopyError::Read(error))
         }
-        (Ok(ending), None) => {
+        (Ok(endings), None) => {
             writer.finish().map_err(CopyError::Write)?;
             let written = writer.into_inner().into_inner();
             written.map_err(|error| CopyError::Write(error.into_error().into()))?;
-            Ok(Copied { messages, attachments, ending })
+            Ok(Copied { messages, attachments, endings })
         }
     }
 }
@@ -92,6 +99,8 @@ fn copy_into<V: Visitor>(
 struct Copier<'v, V> {
     writer: CopyWriter,
     channels: HashMap<u16, (ChannelInfo, u16)>,
+    /// Attached files and metadata that were written, as they were.
+    carried: HashSet<Vec<u8>>,
     messages: u64,
     attachments: u64,
     failed: Option<McapError>,
@@ -120,8 +129,15 @@ impl<V> Copier<'_, V> {
 
     fn other(&mut self, item: Item<'_>) -> Result<(), McapError> {
         match item {
-            Item::Metadata(metadata) => self.writer.write_metadata(metadata),
+            Item::Metadata(metadata) => {
+                let key = format!("{metadata:?}").into_bytes();
+                if self.carried.insert(key) { self.writer.write_metadata(metadata) } else { Ok(()) }
+            }
             Item::Attachment { name, log_time, media_type, content } => {
+                let key = [name.as_bytes(), &[0], content].concat();
+                if !self.carried.insert(key) {
+                    return Ok(());
+                }
                 self.attachments += 1;
                 self.writer.attach(&Attachment {
                     log_time,

@@ -1,4 +1,5 @@
-//! A recording that broke off made whole: everything that can be read, with an index and an end.
+//! A recording that broke off made whole, or the files of one that rotated made one: everything that can
+//! be read, with an index and an end.
 
 use std::path::{Path, PathBuf};
 
@@ -30,20 +31,20 @@ pub struct Recovered {
     pub messages: u64,
     /// Attached files.
     pub attachments: u64,
-    /// How the broken file ended.
-    pub ending: Ending,
+    /// How each file ended.
+    pub endings: Vec<Ending>,
 }
 
-/// Copies what can be read of a file into a new one, ours or not.
+/// Copies what can be read of files, in their order, into a new one, ours or not.
 ///
 /// # Errors
 ///
 /// When it is no MCAP file, or the new one cannot be written; then there is none.
-pub fn recover(from: &Path, to: &Path) -> Result<Recovered, RecoverError> {
+pub fn recover(from: &[PathBuf], to: &Path) -> Result<Recovered, RecoverError> {
     let copied = copy(from, to, &mut (), |_, ()| Ok(())).map_err(|error| match error {
         CopyError::Read(error) => RecoverError::Read(error),
         CopyError::Write(source) => RecoverError::Write { path: to.into(), source },
     })?;
     let (messages, attachments) = (copied.messages, copied.attachments);
-    Ok(Recovered { messages, attachments, ending: copied.ending })
+    Ok(Recovered { messages, attachments, endings: copied.endings })
 }

@@ -60,13 +60,18 @@ impl Place {
 
     /// Starts the recorder and waits until its channels are open.
     fn recorder(&self) -> Child {
+        self.started(&["record", "-o"], "run.mcap")
+    }
+
+    /// Starts a recorder that writes to a place, and waits until its channels are open.
+    fn started(&self, command: &[&str], to: &str) -> Child {
         let mut recorder = Command::new(PROGRAM)
-            .args(["record", "--train", "1", "--snapshots-ms", "20", "--root"])
+            .args(command)
+            .arg(self.at(to))
+            .args(["--train", "1", "--snapshots-ms", "20", "--root"])
             .arg(self.at("root"))
             .arg("--config")
             .arg(self.at("daemon.toml"))
-            .arg("-o")
-            .arg(self.at("run.mcap"))
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
@@ -189,7 +194,7 @@ fn a_recorder_outlives_daemons_and_controllers_and_what_is_killed_is_verified() 
     assert_eq!(attached, ["configuration-1/daemon.toml", "configuration-1/train-1.toml"]);
     let whole = place.at("whole.mcap");
     let recovered = run(&["recover", "-o"], &[&whole, &place.at("run.mcap")]);
-    assert!(recovered.status.success() && words(&recovered).contains("lost: "));
+    assert!(recovered.status.success() && words(&recovered).contains("lost of "));
     let mut again = Recording::default();
     assert_eq!(read(&whole, &mut again).unwrap(), Ending::Whole);
     assert_eq!((&again.samples, &again.snapshots), (&left.samples, &left.snapshots));
@@ -241,4 +246,47 @@ fn a_full_disk_ends_only_the_recorder_and_what_was_written_can_be_read() {
     assert!(told.contains("run.mcap: cannot be written: File too large"), "{told}");
     assert!(place.recording().samples.len() > 50, "{told}");
     controller.await_more(100);
+}
+
+#[test]
+fn a_flight_recorder_keeps_what_it_is_asked_to_whatever_ends_it() {
+    let place = Place::new();
+    let controller = Controller::start(&place);
+    let ring = place.at("ring");
+    let asked = || run(&["keep", "--reason", "a jerk"], &[&ring]);
+    assert_eq!(asked().status.code(), Some(2), "no such folder");
+    let mut recorder = place.started(&["flight-recorder"], "ring");
+    controller.await_more(1);
+    let begun = controller.await_more(100);
+    let again = run(&["flight-recorder"], &[&ring]);
+    assert_eq!(again.status.code(), Some(2), "{}", words(&again));
+    assert!(words(&again).contains("another recorder"), "{}", words(&again));
+
+    assert!(asked().status.success());
+    let stretch = || {
+        let folders = std::fs::read_dir(ring.join("kept")).into_iter().flatten().flatten();
+        folders.map(|it| it.path()).find(|it| it.join("ring-000001.mcap").exists())
+    };
+    await_true("a stretch that is kept", || stretch().is_some());
+    let kept = stretch().unwrap().join("ring-000001.mcap");
+    let newest = || {
+        let mut recording = Recording::default();
+        read(&kept, &mut recording).unwrap();
+        recording.samples.last().map_or(0, |it| it.sequence)
+    };
+    let after = controller.await_more(100);
+    await_true("what came after in what is kept", || newest() >= after);
+    recorder.kill().unwrap();
+    recorder.wait().unwrap();
+    // The ring goes round, or is cleared by hand.
+    std::fs::remove_file(ring.join("ring-000001.mcap")).unwrap();
+    let whole = place.at("whole.mcap");
+    assert!(run(&["recover", "-o"], &[&whole, &kept]).status.success());
+    let recording = Recording::load(&whole).unwrap();
+    assert!(recording.samples.iter().any(|it| it.sequence <= begun), "from before it was asked");
+    let text = std::fs::read_to_string(stretch().unwrap().join("stretch.toml")).unwrap();
+    assert!(text.contains("keep_requested") && text.contains("a jerk"), "{text}");
+    let late = asked();
+    assert_eq!(late.status.code(), Some(1), "{}", words(&late));
+    assert!(words(&late).contains("no flight recorder writes into it"), "{}", words(&late));
 }

@@ -57,6 +57,10 @@ enum Command {
     Fmu(fmu::FmuArguments),
     /// Record what a controller and the daemon write, as MCAP
     Record(companion::Passed),
+    /// Keep the last hours in a ring on disk, and for good what lies around a suspicion or a fault
+    FlightRecorder(companion::Passed),
+    /// Ask a flight recorder to keep this moment for good
+    Keep(companion::Passed),
     /// Make a recording whole whose recorder died
     Recover(companion::Passed),
     /// Change recordings between MCAP, CSV datasets and Parquet
@@ -81,6 +85,7 @@ impl Command {
             // `check` has an answer of its own for what is wrong.
             Command::Check(_) | Command::Run(_) | Command::Health(_) | Command::Replay(_) => None,
             Command::Init(_) | Command::Import(_) | Command::Fmu(_) => None,
+            Command::FlightRecorder(_) | Command::Keep(_) => None,
             Command::Record(_) | Command::Recover(_) | Command::Convert(_) | Command::Watch(_) => {
                 None
             }
@@ -109,6 +114,10 @@ pub fn main() -> ExitCode {
         Command::Survey(arguments) => survey::execute(arguments),
         Command::Fmu(arguments) => fmu::execute(arguments),
         Command::Record(passed) => companion::become_it(RECORDING, Some("record"), passed),
+        Command::FlightRecorder(passed) => {
+            companion::become_it(RECORDING, Some("flight-recorder"), passed)
+        }
+        Command::Keep(passed) => companion::become_it(RECORDING, Some("keep"), passed),
         Command::Recover(passed) => companion::become_it(RECORDING, Some("recover"), passed),
         Command::Convert(passed) => companion::become_it(RECORDING, Some("convert"), passed),
         Command::Watch(passed) => companion::become_it("dynocar-watch", None, passed),

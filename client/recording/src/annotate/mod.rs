@@ -66,18 +66,19 @@ pub struct Annotated {
 pub fn annotate(from: &Path, timeline: &Timeline, to: &Path) -> Result<Annotated, AnnotateError> {
     let mut added = Annotated::default();
     let mut refused = None;
-    let copied = copy(from, to, &mut Moments::default(), |writer, moments| {
-        match runs_of(moments, timeline) {
-            Ok((train, runs)) => {
-                added = Annotations::new(writer, train)?.write(timeline, &runs)?;
-                Ok(())
+    let copied =
+        copy(&[from.into()], to, &mut Moments::default(), |writer, moments| {
+            match runs_of(moments, timeline) {
+                Ok((train, runs)) => {
+                    added = Annotations::new(writer, train)?.write(timeline, &runs)?;
+                    Ok(())
+                }
+                Err((trains, runs)) => {
+                    refused = Some((trains, runs));
+                    Err(McapError::UnexpectedEof)
+                }
             }
-            Err((trains, runs)) => {
-                refused = Some((trains, runs));
-                Err(McapError::UnexpectedEof)
-            }
-        }
-    });
+        });
     if let Some((trains, runs)) = refused {
         let explained = timeline.runs.last().map_or(0, |it| it.number as usize);
         return Err(AnnotateError::OtherRuns { path: from.into(), trains, runs, explained });

@@ -6,6 +6,7 @@ use dynocar::output::tell;
 use dynocar_client::channel::{Receiver, Transport};
 use dynocar_client::{ChannelError, Host, Peer, Role, SnapshotReader, monotonic_now_ns};
 use dynocar_shared::services::{PIPELINES_MAX, SAMPLE_BUFFER};
+use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, Status, TrainId, TrainSample};
 
 use super::{Sink, event};
@@ -20,6 +21,8 @@ struct Seen {
     epoch: u64,
     sequence: u64,
     status: (u32, u32),
+    /// The number of the effect that is suspected.
+    suspect: u32,
     taken_ns: i64,
     is_silent: bool,
 }
@@ -96,7 +99,10 @@ impl Lane {
             let known = seen.unwrap_or_default();
             let is_news = (it.epoch, it.sequence) != (known.epoch, known.sequence);
             let status = (it.status, it.reason);
-            let is_change = seen.is_none() || status != known.status || it.epoch != known.epoch;
+            let is_other_status =
+                seen.is_none() || status != known.status || it.epoch != known.epoch;
+            let is_other_suspect = it.suspected_effect != known.suspect;
+            let is_change = is_other_status || is_other_suspect;
             if seen.is_some()
                 && !is_change
                 && (!is_news || now_ns - known.taken_ns < self.interval_ns)
@@ -104,13 +110,17 @@ impl Lane {
                 continue;
             }
             sink.snapshot(it)?;
-            if is_change {
+            if is_other_status {
                 sink.event(&status_event(self.train, it))?;
+            }
+            if is_other_suspect {
+                sink.event(&suspicion_event(self.train, it))?;
             }
             *seen = Some(Seen {
                 epoch: it.epoch,
                 sequence: it.sequence,
                 status,
+                suspect: it.suspected_effect,
                 taken_ns: now_ns,
                 is_silent: false,
             });
@@ -205,4 +215,20 @@ fn status_event(train: TrainId, it: &ParameterSnapshot) -> Event {
         reason: Some(it.reason as i32),
         ..event(train, EventKind::StatusChanged, text)
     }
+}
+
+fn suspicion_event(train: TrainId, it: &ParameterSnapshot) -> Event {
+    let (kind, text) = match EffectKind::from_number(it.suspected_effect) {
+        Some(EffectKind::None) => (EventKind::SuspicionEnded, "nothing is suspected".to_owned()),
+        suspect => {
+            let name = suspect.map_or("unknown", EffectKind::name);
+            let others: Vec<_> = it.alternatives().map(EffectKind::name).collect();
+            let others = if others.is_empty() { "no other" } else { &others.join(", ") };
+            let evidence = it.suspicion_evidence;
+            let text = format!("{name}, evidence {evidence:.0}, hardly told from: {others}");
+            (EventKind::SuspicionRaised, text)
+        }
+    };
+    let pipeline_index = Some(it.pipeline_index);
+    Event { pipeline_index, ..event(train, kind, text) }
 }

@@ -10,6 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use dynocar::output::tell;
+use dynocar::storage::folder_of;
 use dynocar_client::ChannelError;
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 use mcap::McapError;
@@ -35,6 +36,8 @@ pub struct Settings {
     pub rotation: Rotation,
     /// The daemon's configuration; by default the file that its command line names.
     pub configuration: Option<PathBuf>,
+    /// What is kept for good in the folder of the files, for a flight recorder.
+    pub keeping: Option<Keeping>,
 }
 
 /// Why a recording ends.
@@ -48,6 +51,14 @@ pub enum RecordError {
     Taken {
         /// The file.
         path: PathBuf,
+    },
+    /// A flight recorder cannot write into its folder.
+    #[error("{}: {source}", folder.display())]
+    Ring {
+        /// The folder.
+        folder: PathBuf,
+        /// What stands against it.
+        source: std::io::Error,
     },
     /// A file cannot be written.
     #[error("{}: cannot be written: {}; what was written before can be read", path.display(), words(source))]
@@ -86,7 +97,13 @@ pub struct Recorded {
 ///
 /// See [`RecordError`]; what was written by then can be read.
 pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, RecordError> {
-    let files = Files::begin(&settings.output, settings.rotation)?;
+    let folder = folder_of(&settings.output);
+    let keeper = settings.keeping.map(|keeping| Keeper::begin(folder, keeping)).transpose();
+    let keeper = keeper.map_err(|source| RecordError::Ring { folder: folder.into(), source })?;
+    let mut files = Files::begin(&settings.output, settings.rotation)?;
+    if let Some(keeper) = keeper {
+        files.set_keeper(keeper);
+    }
     let mut recorder = Recorder { files, configuration: settings.configuration.clone() };
     let mut lanes = Lanes::open(settings.wanted.clone(), "dynocar-recorder", &mut recorder)?;
     tell(&format!("recording into {}; Ctrl-C ends it", recorder.files.path().display()));

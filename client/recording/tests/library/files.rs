@@ -113,7 +113,7 @@ fn a_file_cut_anywhere_is_read_up_to_there_and_made_whole() {
         assert_eq!(left.samples, whole.samples[..left.samples.len()]);
         counts.push(left.samples.len());
         let mended = folder.path().join(format!("whole-{share}.mcap"));
-        recover(&cut, &mended).unwrap();
+        recover(std::slice::from_ref(&cut), &mended).unwrap();
         let mut again = Recording::default();
         assert_eq!(read(&mended, &mut again).unwrap(), Ending::Whole);
         assert_eq!(again.samples, left.samples);

@@ -7,6 +7,7 @@ use std::time::{Duration, SystemTime};
 use dynocar_recording::event::{Event, EventKind};
 use dynocar_recording::record::{Files, Keeper, Keeping, Rotation, request_keeping};
 use dynocar_recording::recording::Recording;
+use dynocar_recording::recover::recover;
 use dynocar_shared::{Status, TrainId, TrainSample};
 
 const HOUR: Duration = Duration::from_secs(3600);
@@ -66,13 +67,13 @@ fn what_lies_around_a_suspicion_outlives_the_ring() {
     assert!(before.is_subset(&kept) && after.is_subset(&kept), "{before:?} {after:?} {kept:?}");
     assert!(before.intersection(&after).next().is_none(), "the ring has gone round");
     files.finish().unwrap();
-    // No sample between the first and the last is missing, and all can be read.
-    let mut sequences = Vec::new();
-    for name in kept {
-        let file = Recording::load(&stretch.join(name)).unwrap();
-        assert_eq!(file.broken, None);
-        sequences.extend(file.samples.iter().map(|it| it.sequence));
-    }
+    // No sample between the first and the last is missing, and all can be read as one recording.
+    let whole = folder.path().join("whole.mcap");
+    let parts: Vec<PathBuf> = kept.iter().map(|it| stretch.join(it)).collect();
+    recover(&parts, &whole).unwrap();
+    let recording = Recording::load(&whole).unwrap();
+    assert_eq!((recording.broken, recording.metadata.len()), (None, 1));
+    let sequences: Vec<u64> = recording.samples.iter().map(|it| it.sequence).collect();
     assert_eq!(sequences, (sequences[0]..2000).collect::<Vec<_>>());
 }
 

@@ -1,0 +1,113 @@
+//! `dynocar record`.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{ArgGroup, Args};
+use dynocar::cli::Failure;
+use dynocar::output::tell;
+use dynocar::run::stop_on_signals;
+use dynocar_client::Host;
+use dynocar_shared::TrainId;
+
+use crate::lanes::Wanted;
+use crate::record::{RecordError, Rotation, Settings, record};
+
+/// Record what a controller and the daemon write, as MCAP.
+#[derive(Debug, Args)]
+#[command(group(ArgGroup::new("rotation").args(["rotate_mib", "rotate_minutes"]).multiple(true)))]
+pub struct RecordArguments {
+    /// The file; with --rotate-mib or --rotate-minutes the files' names are this with a number
+    #[arg(short, long, value_name = "FILE.mcap")]
+    output: PathBuf,
+    #[command(flatten)]
+    wanted: WantedArguments,
+    /// The daemon's configuration to attach; by default the one that its command line names
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Begin a new file after so many MiB
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    rotate_mib: Option<u64>,
+    /// Begin a new file after so many minutes
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    rotate_minutes: Option<u64>,
+    /// Remove the oldest files when all take more than so many MiB
+    #[arg(long, value_name = "N", requires = "rotation",
+          value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
+    keep_mib: Option<u64>,
+}
+
+/// What a recorder or a live view reads.
+#[derive(Debug, Args)]
+pub struct WantedArguments {
+    /// Only this train; may be given several times. By default every train that is there or comes
+    #[arg(long = "train", value_name = "ID")]
+    trains: Vec<u64>,
+    /// The run-time directory; else the variable DYNOCAR_ROOT, else /tmp/dynocar-<user>
+    #[arg(long, value_name = "DIR")]
+    root: Option<PathBuf>,
+    /// Take a pipeline's snapshot every so many ms, and each change of its status
+    #[arg(long, value_name = "MS", default_value_t = 100)]
+    snapshots_ms: u64,
+}
+
+impl WantedArguments {
+    /// What is to be read.
+    ///
+    /// # Errors
+    ///
+    /// When there is no run-time directory.
+    pub fn wanted(&self) -> Result<Wanted, Failure> {
+        let host = match &self.root {
+            Some(root) => Host::at(root),
+            None => Host::from_environment(),
+        };
+        Ok(Wanted {
+            host: host.map_err(|error| Failure::Work(error.to_string()))?,
+            trains: self.trains.iter().copied().map(TrainId).collect(),
+            snapshot_interval: Duration::from_millis(self.snapshots_ms),
+        })
+    }
+}
+
+/// Bytes of a MiB.
+pub const MIB: u64 = 1 << 20;
+
+/// Records until it is asked to end.
+///
+/// # Errors
+///
+/// A name that is taken is an input failure.
+pub fn execute(arguments: &RecordArguments) -> Result<(), Failure> {
+    let settings = Settings {
+        wanted: arguments.wanted.wanted()?,
+        output: arguments.output.clone(),
+        rotation: Rotation {
+            bytes: arguments.rotate_mib.map(|it| it * MIB),
+            age: arguments.rotate_minutes.map(|it| Duration::from_secs(60 * it)),
+            keep_bytes: arguments.keep_mib.map(|it| it * MIB),
+            keep_age: None,
+        },
+        configuration: arguments.config.clone(),
+        keeping: None,
+    };
+    run(&settings)
+}
+
+/// Records until it is asked to end, and tells how much that was.
+///
+/// # Errors
+///
+/// As above.
+pub fn run(settings: &Settings) -> Result<(), Failure> {
+    let stop = stop_on_signals().map_err(|error| Failure::Work(error.to_string()))?;
+    let recorded = record(settings, &stop).map_err(|error| match error {
+        RecordError::Taken { .. } | RecordError::Ring { .. } => Failure::Input(error.to_string()),
+        error => Failure::Work(error.to_string()),
+    })?;
+    tell(&format!(
+        "{} samples, {} snapshots and {} events recorded, {} samples lost",
+        recorded.samples, recorded.snapshots, recorded.events, recorded.lost
+    ));
+    Ok(())
+}
