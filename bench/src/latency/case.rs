@@ -4,6 +4,7 @@ use dynocar::config::IdleStrategy;
 use dynocar_client::monotonic_now_ns;
 use dynocar_shared::PipelineKind;
 
+use super::companion::Companion;
 use super::link::{ClientLink, DatagramLink, Link, NotifyingLink};
 use super::schedule::{Schedule, Slice, await_ready, drive};
 use super::server::TRAIN;
@@ -50,16 +51,25 @@ pub struct Case {
     pub idle: IdleStrategy,
     /// Who answers.
     pub answerer: Answerer,
+    /// Who reads the same channels.
+    pub companions: &'static [Companion],
 }
 
 impl Case {
     fn new(name: impl Into<String>, idle: IdleStrategy, answerer: Answerer) -> Self {
-        Case { name: name.into(), idle, answerer }
+        Case { name: name.into(), idle, answerer, companions: &[] }
     }
 
     fn alone(kind: PipelineKind, idle: IdleStrategy) -> Self {
         let answerer = Answerer::Daemon { pipelines: vec![kind], polled: kind };
         Case::new(format!("dynocar/{kind}"), idle, answerer)
+    }
+
+    /// The compared pipeline with other readers of its channels.
+    fn with_readers(companions: &'static [Companion], idle: IdleStrategy) -> Self {
+        let alone = Case::alone(COMPARED, idle);
+        let readers: Vec<&str> = companions.iter().map(|it| it.name()).collect();
+        Case { name: format!("{}+{}", alone.name, readers.join("+")), companions, ..alone }
     }
 
     /// The strategy of the floor that this case is compared with: nothing is lower for an
@@ -102,6 +112,14 @@ pub fn cases(is_quick: bool) -> Vec<Case> {
     cases
 }
 
+/// The cases with other readers, for whoever has built their programs.
+pub fn cases_with_readers() -> Vec<Case> {
+    use Companion::{Live, Recorder};
+    let all: [&[Companion]; 3] = [&[Recorder], &[Live], &[Recorder, Live]];
+    let of = |idle| all.map(|companions| Case::with_readers(companions, idle));
+    [of(IdleStrategy::Event), of(IdleStrategy::Busy)].concat()
+}
+
 /// What one slice brought.
 #[derive(Clone, Debug)]
 pub struct Outcome {
@@ -124,6 +142,10 @@ pub fn measure(case: &Case, cores: Cores, schedule: &Schedule) -> Result<Outcome
     let site = Site::new()?;
     let blocks = case.idle == IdleStrategy::Event;
     let mut peer = start(case, &site, cores)?;
+    let started: Result<Vec<Peer>, RigError> =
+        case.companions.iter().map(|it| it.start(&site)).collect();
+    // They end with the slice.
+    let _companions = started?;
     prioritise(cores.priority);
     match (&case.answerer, blocks) {
         (Answerer::Floor, true) => {
@@ -210,7 +232,7 @@ mod tests {
     #[test]
     fn every_case_has_a_floor_and_a_name_of_the_contract() {
         for is_quick in [false, true] {
-            let cases = cases(is_quick);
+            let cases = [cases(is_quick), cases_with_readers()].concat();
             for case in &cases {
                 let floor =
                     cases.iter().find(|it| it.name == "floor" && it.idle == case.floor_idle());
@@ -225,7 +247,7 @@ mod tests {
 
     #[test]
     fn no_case_is_measured_twice() {
-        let cases = cases(false);
+        let cases = [cases(false), cases_with_readers()].concat();
         for (place, case) in cases.iter().enumerate() {
             let same = |it: &Case| (&it.name, it.idle) == (&case.name, case.idle);
             assert_eq!(cases.iter().position(same), Some(place));

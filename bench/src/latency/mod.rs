@@ -6,6 +6,7 @@
 //! the median of the rounds is told.
 //!
 //! - [`case`]: what is measured beside what
+//! - [`companion`]: programs that read the same channels
 //! - [`schedule`]: the open-loop measurement of one slice
 //! - [`link`]: the controller's end of each transport
 //! - [`server`]: the answering processes
@@ -17,6 +18,7 @@
 
 pub mod bytes;
 pub mod case;
+pub mod companion;
 pub mod costs;
 pub mod link;
 pub mod plain;
@@ -62,6 +64,9 @@ pub struct LatencyArguments {
     /// Only the cases whose name contains this, and the floors
     #[arg(long, value_name = "TEXT")]
     pub case: Option<String>,
+    /// Also measure with a recorder and a live view beside the daemon; their programs lie beside this one
+    #[arg(long)]
+    pub readers: bool,
     /// Core of the controller
     #[arg(long, value_name = "CORE")]
     pub controller_core: Option<usize>,
@@ -136,6 +141,9 @@ pub fn run(arguments: &LatencyArguments) -> Result<Measured, LatencyError> {
     let rounds = arguments.rounds.unwrap_or(if arguments.quick { QUICK_ROUNDS } else { ROUNDS });
     let mut cases: Vec<(Case, Vec<Outcome>)> =
         case::cases(arguments.quick).into_iter().map(|case| (case, Vec::new())).collect();
+    if arguments.readers {
+        cases.extend(case::cases_with_readers().into_iter().map(|case| (case, Vec::new())));
+    }
     if let Some(text) = &arguments.case {
         cases.retain(|(case, _)| case.name == "floor" || case.name.contains(text.as_str()));
     }

@@ -1,7 +1,7 @@
 //! Processes beside the measuring one: this program again, with a hidden command.
 
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStderr, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use dynocar_shared::services::ROOT_VARIABLE;
@@ -32,15 +32,30 @@ impl Peer {
     }
 
     fn start_program(site: &Site, program: &Path, arguments: &[&str]) -> Result<Self, RigError> {
-        let child = Command::new(program)
-            .args(arguments)
+        let mut command = Command::new(program);
+        command.args(arguments);
+        Peer::start_command(site, &arguments[1..].join(" "), command)
+    }
+
+    /// Starts a program on a site, by this name in errors.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be started.
+    pub fn start_command(site: &Site, name: &str, mut command: Command) -> Result<Self, RigError> {
+        let child = command
             .current_dir(site.path())
             .env(ROOT_VARIABLE, site.host().root())
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .spawn()
             .map_err(system("starting a process"))?;
-        Ok(Peer { name: arguments[1..].join(" "), child })
+        Ok(Peer { name: name.to_owned(), child })
+    }
+
+    /// What it tells on standard error, where that was asked for.
+    pub fn take_errors(&mut self) -> Option<ChildStderr> {
+        self.child.stderr.take()
     }
 
     /// Its process number.
