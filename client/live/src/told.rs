@@ -59,6 +59,13 @@ fn words(level: Level, sentence: &str) -> Option<String> {
             "the viewer at {address} does not keep up: its oldest messages are dropped"
         ));
     }
+    if let Some(address) = sentence.strip_prefix("Dropping client ")
+        && let Some(address) = address.strip_suffix(": handshake failed")
+    {
+        return Some(format!(
+            "the viewer at {address} is refused: it does not offer foxglove.sdk.v1"
+        ));
+    }
     // That it has gone is told by others.
     let is_known = BROKEN_OFF.iter().any(|it| sentence.starts_with(it));
     let is_told = level <= Level::WARN && !is_known;
