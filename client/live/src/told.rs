@@ -14,8 +14,8 @@ use tracing_subscriber::util::SubscriberInitExt;
 
 /// How the library's sentence about a full queue begins.
 const FULL_QUEUE: &str = "outbox for client ";
-/// How its sentence about a viewer that broke off begins.
-const BROKEN_OFF: &str = "Error receiving from client ";
+/// How its sentences about a viewer that broke off begin.
+const BROKEN_OFF: [&str; 2] = ["Error receiving from client ", "Error sending message to client "];
 
 /// Tells from now on what the protocol's library has to say of viewers.
 pub fn tell_of_viewers() {
@@ -59,7 +59,15 @@ fn words(level: Level, sentence: &str) -> Option<String> {
             "the viewer at {address} does not keep up: its oldest messages are dropped"
         ));
     }
+    if let Some(address) = sentence.strip_prefix("Dropping client ")
+        && let Some(address) = address.strip_suffix(": handshake failed")
+    {
+        return Some(format!(
+            "the viewer at {address} is refused: it does not offer foxglove.sdk.v1"
+        ));
+    }
     // That it has gone is told by others.
-    let is_told = level <= Level::WARN && !sentence.starts_with(BROKEN_OFF);
+    let is_known = BROKEN_OFF.iter().any(|it| sentence.starts_with(it));
+    let is_told = level <= Level::WARN && !is_known;
     is_told.then(|| format!("viewers: {sentence}"))
 }

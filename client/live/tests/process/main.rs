@@ -106,6 +106,14 @@ fn a_viewer_that_reads_nothing_is_told_of_and_holds_nobody_up() {
 }
 
 #[test]
+fn a_viewer_of_the_older_protocol_is_refused_in_words() {
+    let place = Place::new();
+    let live = place.live(&[]);
+    assert!(Viewer::offer(live.port, "foxglove.websocket.v1").is_none());
+    live.await_told("is refused: it does not offer foxglove.sdk.v1");
+}
+
+#[test]
 fn a_taken_port_and_a_wrong_address_are_told() {
     let place = Place::new();
     let live = place.live(&[]);

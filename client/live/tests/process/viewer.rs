@@ -27,13 +27,17 @@ pub struct Viewer {
 
 impl Viewer {
     pub fn connect(port: u16) -> Self {
+        Viewer::offer(port, "foxglove.sdk.v1").expect("a connection")
+    }
+
+    /// A viewer that offers this protocol; `None` where it is refused.
+    pub fn offer(port: u16, protocol: &str) -> Option<Self> {
         let mut request = format!("ws://127.0.0.1:{port}/").into_client_request().unwrap();
-        let protocol = "foxglove.sdk.v1".parse().unwrap();
-        request.headers_mut().insert("sec-websocket-protocol", protocol);
+        request.headers_mut().insert("sec-websocket-protocol", protocol.parse().unwrap());
         let stream = TcpStream::connect(("127.0.0.1", port)).unwrap();
-        let (socket, _) = tungstenite::client(request, stream).unwrap();
+        let (socket, _) = tungstenite::client(request, stream).ok()?;
         socket.get_ref().set_read_timeout(Some(Duration::from_millis(50))).unwrap();
-        Viewer { socket, channels: HashMap::new(), subscribed: Vec::new() }
+        Some(Viewer { socket, channels: HashMap::new(), subscribed: Vec::new() })
     }
 
     /// The topics that are advertised now.

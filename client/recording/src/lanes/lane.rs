@@ -39,6 +39,8 @@ pub struct Lane {
     pipelines: [Option<Seen>; PIPELINES_MAX],
     daemon: Option<u32>,
     controller: Option<u32>,
+    /// True when samples have come since it was last looked who is there.
+    is_driven: bool,
     /// Samples passed over since that was last told.
     lost: u64,
     /// After the port: the last user goes only when its ports are gone.
@@ -70,6 +72,7 @@ impl Lane {
             pipelines: [None; PIPELINES_MAX],
             daemon: None,
             controller: None,
+            is_driven: false,
             lost: 0,
             _transport: transport,
         })
@@ -90,6 +93,7 @@ impl Lane {
             let Some(sample) = self.samples.receive() else { break };
             self.count(sample.sequence, sink)?;
             sink.sample(&sample)?;
+            self.is_driven = true;
         }
         self.snapshots.poll();
         let now_ns = monotonic_now_ns();
@@ -154,6 +158,7 @@ impl Lane {
             tell(&format!("train {}: {} samples lost", self.train, std::mem::take(&mut self.lost)));
         }
         let train = self.train;
+        let was_driven = std::mem::take(&mut self.is_driven);
         let daemon = self.peer(host, Role::Daemon)?;
         let controller = self.peer(host, Role::Controller)?;
         self.take(sink)?;
@@ -168,7 +173,10 @@ impl Lane {
             sink.event(&event(train, kind, text))?;
             self.daemon = daemon.map(|it| it.0);
         }
-        if controller.as_ref().map(|it| it.0) != self.controller {
+        // One that came and went between two looks is gone too.
+        let was_missed = was_driven && controller.is_none() && self.controller.is_none();
+        if was_missed || controller.as_ref().map(|it| it.0) != self.controller {
+            self.is_driven &= controller.is_some();
             let (kind, text) = match &controller {
                 Some((_, words)) => (EventKind::ControllerCame, words.clone()),
                 None => (EventKind::ControllerGone, "no controller".into()),
