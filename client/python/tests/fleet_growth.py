@@ -2,7 +2,7 @@
 
     python client/python/tests/fleet_growth.py
 
-Every train has four runs of 7.5 minutes; there are eight different ones, 64 are eight of each. Rounds with
+Every train has two runs of 7.5 minutes; there are eight different ones, 64 are eight of each. Rounds with
 one and with two workers take turns, so that what else the machine does meets both.
 """
 
@@ -18,7 +18,7 @@ from dynocar.fleet import explain_fleet
 from dynocar.fleet._cluster import connected
 from fleet_simulator import Truth
 
-DAYS = ["2026-05-03", "2026-05-21"]
+DAYS = ["2026-05-03"]
 
 
 def fleet_of(trains: int, kinds: Path, folder: Path) -> Path:

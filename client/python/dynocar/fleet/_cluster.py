@@ -24,7 +24,7 @@ def connected(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     distributed = needed("distributed")
     if scheduler is None:
         count = workers or os.cpu_count() or 1
-        options = {"n_workers": count, "threads_per_worker": 1, "dashboard_address": None}
+        options = {"n_workers": count, "threads_per_worker": 1, "dashboard_address": ":0"}
         # On a busy machine a worker needs long to come back; given up, it would never.
         patience = {"distributed.deploy.lost-worker-timeout": "1 hour"}
         with (

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any, NamedTuple
 
-from ._estimates import NO_EFFECT, NORMAL_95, UNITS, Answer, Found, effects, is_same
+from ._estimates import NO_EFFECT, NORMAL_95, SAME_PLACE, UNITS, Answer, Found, effects, is_same
 from ._statistics import Estimate, Pooled, pool
-from ._work import ASKABLE, FACTORS, Declared
+from ._work import ASKABLE, Declared
 
 # Of an effect that a single train finds, so many others are asked.
 ASKED_OF_ONE = 5
@@ -154,18 +154,42 @@ def _asked(common: Common, answer: Answer | None) -> tuple[str, Estimate | None]
         return "not_asked", None
     if "error" in answer:
         return "failed", None
-    declared, parameter = answer["declared"], common.parameter
-    for found in effects(answer | {"line": common.line}):
-        is_here = found.kind == common.kind and is_same(found, common.found[0])
-        if is_here and parameter in found.parameters:
-            value, std = found.parameters[parameter]
-            if common.kind in FACTORS:
-                estimate = Estimate(declared["value"] * value, declared["value"] * std)
-            else:
-                estimate = Estimate(declared["value"] + value, std)
-            away = abs(estimate.value - NO_EFFECT.get(parameter, 0.0))
-            return ("absent" if away <= NORMAL_95 * estimate.std else "found"), estimate
-    return "cannot_tell", None
+    declared, found = (
+        answer["declared"],
+        [it for it in effects(answer | {"line": common.line}) if it.kind == common.kind],
+    )
+    estimate = _left(found, common, declared["value"])
+    if estimate is None:
+        return "cannot_tell", None
+    away = abs(estimate.value - NO_EFFECT.get(common.parameter or "", 0.0))
+    return ("absent" if away <= NORMAL_95 * estimate.std else "found"), estimate
+
+
+def _left(found: Sequence[Found], common: Common, declared: float) -> Estimate | None:
+    """What is left of a declared effect after what was found beside it.
+
+    Of a place it is the resistance there less that around it, as far as the place is long: that a
+    place has less and that all the rest has more are the same, but for a, which is fitted, too.
+    """
+    name = common.parameter
+    told = [it for it in found if name is not None and name in it.parameters]
+    if not told or name is None:
+        return None
+    value, std = told[0].parameters[name]
+    if common.interval_m is None:
+        return Estimate(declared * value, declared * std)
+    (start, end), length = common.interval_m, common.interval_m[1] - common.interval_m[0]
+
+    def share(low: float, high: float) -> float:
+        """Of a stretch, what the places found cover."""
+        at = [it.interval_m for it in told if it.interval_m is not None]
+        return sum(max(0.0, min(high, b) - max(low, a)) for a, b in at) / (high - low)
+
+    around = (share(start - length, start) + share(end, end + length)) / 2
+    net = share(start, end) - around
+    if abs(net) < SAME_PLACE:
+        return None
+    return Estimate(declared + net * value, std)
 
 
 def _ends(found: Sequence[Found]) -> list[dict[str, float]] | None:

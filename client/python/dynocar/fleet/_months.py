@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ._estimates import NORMAL_95, Answer, Found, effects, estimates, is_same
-from ._statistics import benjamini_hochberg, normal_tail
+from ._statistics import discoveries, normal_tail
 
 
 def changes(now: Mapping[str, Answer], before: Mapping[str, Answer]) -> list[dict[str, Any]]:
@@ -31,7 +31,7 @@ def changes(now: Mapping[str, Answer], before: Mapping[str, Answer]) -> list[dic
                     "p_value": 2 * normal_tail(abs(change) / std),
                 }
             )
-    is_found = benjamini_hochberg([it["p_value"] for it in told], 0.05)
+    is_found = discoveries([it["p_value"] for it in told], 0.05)
     return [it | {"is_found": found} for it, found in zip(told, is_found)]
 
 

@@ -207,7 +207,7 @@ def _how(report: Report) -> str:
     words = (
         "Means over trains are of random effects: the scatter between trains by restricted maximum "
         "likelihood, the interval after Knapp and Hartung. Trains are told to differ with false "
-        "discoveries kept below the rate after Benjamini and Hochberg. Formulas and their tests: "
+        "discoveries kept below the rate after Benjamini and Yekutieli. Formulas and their tests: "
         "docs/guides/fleet.md."
     )
     return _section("How it is reckoned", words, "")

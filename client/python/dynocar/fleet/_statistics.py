@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 # Fewer others say nothing of their scatter.
 LEAST_OTHERS = 3
-# The first look takes those for far that are so many deviations from the median, of so many: of normal
-# numbers fewer than 1 % of all sets have one.
-FAR, LEAST_FOR_FAR = 8.0, 8
+# The first look takes those for far that are so many deviations from the median, of so many: of sets
+# of 12 normal numbers 1 % have one.
+FAR, LEAST_FOR_FAR = 6.0, 8
 
 
 class Estimate(NamedTuple):
@@ -131,7 +131,7 @@ def differing(
     of its own variance, the scatter between the others and the variance of their mean. Few others
     say little of their scatter: one standard deviation of its estimate is added to it, and the
     degrees of freedom are Satterthwaite's (1946, Biometrics 2, 110). False discoveries are kept
-    below the rate over all at once (Benjamini and Hochberg 1995, J. R. Stat. Soc. B 57, 289).
+    below the rate over all at once (`discoveries`).
 
     So that one does not hide another, those far from the median do not count among the others at
     first; who is not found to differ then does again. After that the farthest one that is found
@@ -154,8 +154,8 @@ def differing(
 
 
 def _far(of_names: Mapping[str, Estimate]) -> set[str]:
-    """Those farther from the median than `FAR` times what their own deviation and the median
-    absolute deviation of all tell (Hampel's identifier); of few these tell nothing."""
+    """Those farther from the median than `FAR` times their own deviation and the one that the median
+    absolute deviation of all tells (Hampel's identifier); of few these tell nothing."""
     if len(of_names) < LEAST_FOR_FAR:
         return set()
     middle = median(estimate.value for estimate in of_names.values())
@@ -163,7 +163,7 @@ def _far(of_names: Mapping[str, Estimate]) -> set[str]:
     return {
         name
         for name, estimate in of_names.items()
-        if abs(estimate.value - middle) > FAR * math.hypot(scale, estimate.std)
+        if abs(estimate.value - middle) > FAR * max(scale, estimate.std)
     }
 
 
@@ -172,7 +172,7 @@ def _judged(
 ) -> list[Difference]:
     """Each estimate beside the others but those that are out, and which are discoveries."""
     told = [it for of in estimates for it in _beside_others(of, estimates[of], out[of])]
-    is_found = benjamini_hochberg([difference.p_value for difference in told], rate)
+    is_found = discoveries([difference.p_value for difference in told], rate)
     return [difference._replace(is_found=found) for difference, found in zip(told, is_found)]
 
 
@@ -211,10 +211,15 @@ def _beside_others(
     return told
 
 
-def benjamini_hochberg(p_values: Sequence[float], rate: float) -> list[bool]:
-    """Which of the tests are discoveries, so that in the mean no more than a share `rate` is false."""
-    ascending = sorted(p_values)
-    passed = [p for k, p in enumerate(ascending, 1) if p <= rate * k / len(ascending)]
+def discoveries(p_values: Sequence[float], rate: float) -> list[bool]:
+    """Which of the tests are discoveries, so that in the mean no more than a share `rate` is false.
+
+    However the tests depend on each other, as those that share their others do (Benjamini and
+    Yekutieli 2001, Ann. Stat. 29, 1165, theorem 1.3).
+    """
+    count = len(p_values)
+    allowed = rate / (count * sum(1 / k for k in range(1, count + 1))) if count else 0.0
+    passed = [p for k, p in enumerate(sorted(p_values), 1) if p <= k * allowed]
     return [p <= passed[-1] if passed else False for p in p_values]
 
 
