@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -24,7 +25,13 @@ def connected(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     distributed = needed("distributed")
     if scheduler is None:
         count = workers or os.cpu_count() or 1
-        options = {"n_workers": count, "threads_per_worker": 1, "dashboard_address": ":0"}
+        options: dict[str, Any] = {
+            "n_workers": count,
+            "threads_per_worker": 1,
+            "dashboard_address": ":0",
+        }
+        # What becomes of the trains is told below; Dask's own words about its ends are none of it.
+        options["silence_logs"] = logging.CRITICAL
         # On a busy machine a worker needs long to come back; given up, it would never.
         patience = {"distributed.deploy.lost-worker-timeout": "1 hour"}
         with (
