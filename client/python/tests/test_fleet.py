@@ -20,7 +20,7 @@ import pytest
 from conftest import PATIENCE_S
 from distributed import Client
 from dynocar.fleet import Fleet, explain_fleet, write_report
-from dynocar.fleet import _folder, _partitions
+from dynocar.fleet import _folder, _partitions, _toml
 from dynocar.fleet._cluster import connected
 from dynocar.fleet._work import Order, explained
 from fleet_simulator import Truth
@@ -351,3 +351,12 @@ def test_the_page_is_complete_in_itself(done: Fleet) -> None:
     assert "prefers-color-scheme: dark" in page
     assert "13 differs from the others in mass over the declared one" in page
     assert "local resistance from 5.0" in page and "it belongs to the line" in page
+
+
+def test_descriptions_are_written_as_they_were_read(tmp_path: Path) -> None:
+    tables = {
+        "track": {"name": 'Zürich 🚂 "x"\n', "curves": [[0.0, 1e16, float("inf")]], "is": True},
+        "extra": [{"n_per_kn": 1.0, "factor": [{"of": "speed_mps", "to": 2}]}],
+    }
+    _toml.write(tables, tmp_path / "written.toml")
+    assert _toml.read(tmp_path / "written.toml") == tables

@@ -47,5 +47,7 @@ def _value(value: Any) -> str:
         return "{ " + ", ".join(f"{json.dumps(k)} = {_value(v)}" for k, v in value.items()) + " }"
     if isinstance(value, list):
         return "[" + ", ".join(map(_value, value)) + "]"
-    # A text, a truth value or a number, written as in JSON.
-    return json.dumps(value)
+    if isinstance(value, float):
+        return repr(value)
+    # A text, a truth value or a whole number, written as in JSON.
+    return json.dumps(value, ensure_ascii=False)
