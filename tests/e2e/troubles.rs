@@ -4,23 +4,26 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Where messages are raised.
-const FOLDERS: [&str; 9] = [
+const FOLDERS: [&str; 10] = [
     "daemon/src",
     "daemon/core/src",
     "daemon/fmu/src",
     "shared/src",
     "client/src",
+    "client/python/dynocar/fleet",
     "client/python/src",
     "client/recording/src",
     "client/watch/src",
     "client/live/src",
 ];
 /// A call whose first literal is a message, and the folder in which it is one.
-const CALLS: [(&str, &str); 7] = [
+const CALLS: [(&str, &str); 9] = [
     ("#[error(", ""),
     ("Failure::Input(", "daemon/src/cli"),
     ("Failure::Work(", "daemon/src/cli"),
     ("Error::new_err(", "client/python/src"),
+    ("InputError(", "client/python/dynocar/fleet"),
+    ("WorkError(", "client/python/dynocar/fleet"),
     ("warn!(", "daemon/src"),
     ("error!(", "daemon/src"),
     ("OutputError::Name {", "daemon/src"),
@@ -52,7 +55,7 @@ fn sources_in(folder: &str, sources: &mut Vec<Source>) {
         let name = path.strip_prefix(&root).expect("of the workspace").display().to_string();
         if path.is_dir() {
             sources_in(&name, sources);
-        } else if name.ends_with(".rs") {
+        } else if name.ends_with(".rs") || name.ends_with(".py") {
             let text = std::fs::read_to_string(&path).expect("a source file");
             sources.push(Source::of(name, &text));
         }
@@ -172,7 +175,7 @@ impl Source {
             let name = inside.split(|it: char| !it.is_alphanumeric() && it != '_').next();
             let constant = self.constants().find(|(it, _)| Some(*it) == name);
             let is_macro = call.ends_with("!(") || call.ends_with('{');
-            let begins = ["\"", "format!(\""].iter().any(|it| flat(inside).starts_with(it));
+            let begins = ["\"", "format!(\"", "f\""].iter().any(|it| flat(inside).starts_with(it));
             match constant {
                 Some((_, text)) => found.push(text),
                 None if begins || is_macro && inside.contains('"') => {
