@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Where messages are raised.
-const FOLDERS: [&str; 9] = [
+const FOLDERS: [&str; 10] = [
     "daemon/src",
     "daemon/core/src",
     "daemon/fmu/src",
@@ -14,12 +14,14 @@ const FOLDERS: [&str; 9] = [
     "client/recording/src",
     "client/watch/src",
     "client/live/src",
+    "client/forward/src",
 ];
 /// A call whose first literal is a message, and the folder in which it is one.
-const CALLS: [(&str, &str); 7] = [
+const CALLS: [(&str, &str); 8] = [
     ("#[error(", ""),
     ("Failure::Input(", "daemon/src/cli"),
     ("Failure::Work(", "daemon/src/cli"),
+    ("Failure::Input(", "client/forward/src"),
     ("Error::new_err(", "client/python/src"),
     ("warn!(", "daemon/src"),
     ("error!(", "daemon/src"),
