@@ -1,11 +1,12 @@
 #!/bin/sh
-# Builds dynocar_<version>_<arch>.deb from the release binaries. dynocar-watch, dynocar-recording and
-# dynocar-live go into it where they lie beside the program.
+# Builds dynocar_<version>_<arch>.deb from the release binaries. dynocar-watch, dynocar-recording,
+# dynocar-live and dynocar-forward go into it where they lie beside the program.
 # usage: build.sh [--program FILE] [--libraries FOLDER] [--out FOLDER]
 #   --program    the program, default target/release/dynocar
 #   --libraries  where libdynocar_client.a and libdynocar_fmu.so lie, default target/release
 #   --out        where the package goes, default target/debian
-# Build first: cargo build --release -p dynocar -p dynocar-watch -p dynocar-recording -p dynocar-live &&
+# Build first: cargo build --release -p dynocar -p dynocar-watch -p dynocar-recording -p dynocar-live \
+#                  -p dynocar-forward &&
 #              cargo build --release -p dynocar-client -p dynocar-fmu
 set -eu
 
@@ -51,7 +52,7 @@ put() { # SOURCE TARGET [MODE]
 
 # The program, what shells offer for it, and its manual.
 put "$program" usr/bin/dynocar 755
-for companion in dynocar-watch dynocar-recording dynocar-live; do
+for companion in dynocar-watch dynocar-recording dynocar-live dynocar-forward; do
     if [ -f "$(dirname "$program")/$companion" ]; then
         put "$(dirname "$program")/$companion" "usr/bin/$companion" 755
     else
@@ -104,10 +105,17 @@ unit=usr/lib/systemd/system/dynocar.service
 put "$project/config/dynocar.service" "$unit"
 sed -i 's|^ExecStart=/usr/local/bin/dynocar |ExecStart=/usr/bin/dynocar |' "$root/$unit"
 grep -q '^ExecStart=/usr/bin/dynocar ' "$root/$unit" || fail "config/dynocar.service has no ExecStart"
-recorder=usr/lib/systemd/system/dynocar-flight-recorder.service
-if [ -f "$root/usr/bin/dynocar-recording" ]; then
-    put "$project/config/dynocar-flight-recorder.service" "$recorder"
-    sed -i 's|^ExecStart=/usr/local/bin/dynocar |ExecStart=/usr/bin/dynocar |' "$root/$recorder"
+# Programs beside the daemon: their units, off until they are wanted.
+unit_of() { # PROGRAM SOURCE
+    [ -f "$root/usr/bin/$1" ] || return 0
+    unit=usr/lib/systemd/system/$(basename "$2")
+    put "$project/$2" "$unit"
+    sed -i 's|^ExecStart=/usr/local/bin/|ExecStart=/usr/bin/|' "$root/$unit"
+}
+unit_of dynocar-recording config/dynocar-flight-recorder.service
+unit_of dynocar-forward config/forward/dynocar-forward.service
+if [ -f "$root/usr/bin/dynocar-forward" ]; then
+    put "$project/config/forward/mosquitto.conf" usr/share/doc/dynocar/mosquitto.conf
 fi
 put "$here/sysusers.conf" usr/lib/sysusers.d/dynocar.conf
 

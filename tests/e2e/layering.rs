@@ -60,6 +60,14 @@ fn what_recordings_are_written_with_is_in_no_controller_and_no_daemon() {
 }
 
 #[test]
+fn no_network_client_is_in_a_controller_or_a_daemon() {
+    for package in ["dynocar", "dynocar-client", "dynocar-core"] {
+        assert_free_of(package, &["dynocar-forward", "mqtt", "tokio"]);
+    }
+    assert_free_of("dynocar-forward", &["tokio", "rustls", "openssl"]);
+}
+
+#[test]
 fn the_terminal_stays_out_of_daemon_and_controller() {
     for package in ["dynocar", "dynocar-client", "dynocar-core"] {
         assert_free_of(package, &["ratatui", "crossterm"]);

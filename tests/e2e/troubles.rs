@@ -15,12 +15,14 @@ const FOLDERS: [&str; 10] = [
     "client/recording/src",
     "client/watch/src",
     "client/live/src",
+    "client/forward/src",
 ];
 /// A call whose first literal is a message, and the folder in which it is one.
-const CALLS: [(&str, &str); 9] = [
+const CALLS: [(&str, &str); 10] = [
     ("#[error(", ""),
     ("Failure::Input(", "daemon/src/cli"),
     ("Failure::Work(", "daemon/src/cli"),
+    ("Failure::Input(", "client/forward/src"),
     ("Error::new_err(", "client/python/src"),
     ("InputError(", "client/python/dynocar/fleet"),
     ("WorkError(", "client/python/dynocar/fleet"),

@@ -69,6 +69,8 @@ enum Command {
     Watch(companion::Passed),
     /// Serve samples, snapshots and events live to Foxglove or Lichtblick
     Live(companion::Passed),
+    /// Forward what the daemon knows to an MQTT broker, as Sparkplug B
+    Forward(companion::Passed),
     Completions(completions::CompletionsArguments),
     Man(man::ManArguments),
 }
@@ -89,7 +91,8 @@ impl Command {
             Command::Record(_) | Command::Recover(_) | Command::Convert(_) | Command::Watch(_) => {
                 None
             }
-            Command::Live(_) | Command::Completions(_) | Command::Man(_) => None,
+            Command::Live(_) | Command::Forward(_) => None,
+            Command::Completions(_) | Command::Man(_) => None,
         }
     }
 }
@@ -122,6 +125,7 @@ pub fn main() -> ExitCode {
         Command::Convert(passed) => companion::become_it(RECORDING, Some("convert"), passed),
         Command::Watch(passed) => companion::become_it("dynocar-watch", None, passed),
         Command::Live(passed) => companion::become_it("dynocar-live", None, passed),
+        Command::Forward(passed) => companion::become_it("dynocar-forward", None, passed),
         Command::Completions(arguments) => completions::execute(arguments, Arguments::command()),
         Command::Man(arguments) => man::execute(arguments, Arguments::command()),
     };

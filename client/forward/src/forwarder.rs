@@ -1,0 +1,248 @@
+//! Connections to the broker one after the other, until told to end.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use dynocar::output::tell;
+use dynocar_client::Host;
+use dynocar_shared::TrainId;
+
+use crate::broker::{Broker, BrokerError, Login, PATIENCE, Told};
+use crate::node::{Known, Message, NodeName, Session, is_rebirth};
+use crate::payload::utc_ms;
+use crate::queue::Counts;
+use crate::watcher::Watcher;
+
+/// How long the broker's words are waited for, before the queue is looked at again.
+const PAUSE: Duration = Duration::from_millis(20);
+/// The most publications between two pings.
+const BATCH: usize = 256;
+/// An idle connection is pinged so often: well within the time after which a broker holds a node for dead.
+const IDLE_PING: Duration = Duration::from_secs(8);
+/// How long to wait after a connection that failed; twice as long after each further one, up to the last.
+const RETRY: [Duration; 2] = [Duration::from_millis(500), Duration::from_secs(15)];
+/// How long the end waits for the broker to take what is left.
+const FAREWELL: Duration = Duration::from_secs(3);
+/// How often drops are told at most.
+const TELL_DROPS: Duration = Duration::from_secs(10);
+
+/// What is forwarded, and where to.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// The run-time directory.
+    pub host: Host,
+    /// The trains; every train that is served, when empty.
+    pub trains: Vec<TrainId>,
+    /// The broker.
+    pub login: Login,
+    /// The edge node.
+    pub name: NodeName,
+    /// How often a train's changes are published; events are at once.
+    pub every: Duration,
+    /// The most publications that wait.
+    pub queue: usize,
+}
+
+/// What reading and sending share; a thread that has died left it whole.
+pub fn locked(known: &Mutex<Known>) -> MutexGuard<'_, Known> {
+    known.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Forwards until the flag is set; gives what has become of the publications.
+pub fn forward(settings: &Settings, must_end: &AtomicBool) -> Counts {
+    let known = Mutex::new(Known::new(settings.queue));
+    let is_all_made = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            let told = ToldAtEnd(&is_all_made);
+            let (host, trains) = (settings.host.clone(), settings.trains.clone());
+            let mut watcher = Watcher::new(host, trains, settings.every, &known);
+            watcher.run(must_end);
+            // The farewell need not wait until many readers are closed.
+            drop(told);
+        });
+        connect_again_and_again(settings, &known, &is_all_made);
+    });
+    locked(&known).queue.counts()
+}
+
+/// Sets its flag when its thread ends, however that ends: sending ends after the last publication is made.
+struct ToldAtEnd<'a>(&'a AtomicBool);
+
+impl Drop for ToldAtEnd<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+fn connect_again_and_again(settings: &Settings, known: &Mutex<Known>, must_end: &AtomicBool) {
+    let (mut attempts, mut connections) = (0, 0);
+    let mut told = String::new();
+    let mut retry = RETRY[0];
+    let mut drops = Drops::default();
+    while !must_end.load(Ordering::Relaxed) {
+        let session = Session::new(&settings.name, attempts, connections + 1);
+        attempts += 1;
+        let commands = settings.name.topic("NCMD");
+        let error =
+            match Broker::connect(&settings.login, session.death(utc_ms()), &commands, must_end) {
+                Err(error) => error,
+                Ok(broker) => {
+                    connections += 1;
+                    (retry, told) = (RETRY[0], String::new());
+                    tell(&format!(
+                        "dynocar forward: connected to {} as {}/{}",
+                        settings.login.address, settings.name.group, settings.name.node
+                    ));
+                    match Sending::begin(broker, session, known).run(
+                        settings.every,
+                        &mut drops,
+                        must_end,
+                    ) {
+                        Ok(()) => return,
+                        Err(error) => error,
+                    }
+                }
+            };
+        locked(known).queue.give_back();
+        let words = error.to_string();
+        if told != words {
+            tell(&format!("dynocar forward: {}: {words}; trying again", settings.login.address));
+            told = words;
+        }
+        let begun = Instant::now();
+        while begun.elapsed() < retry && !must_end.load(Ordering::Relaxed) {
+            drops.tell(locked(known).queue.counts());
+            std::thread::sleep(PAUSE);
+        }
+        retry = (2 * retry).min(RETRY[1]);
+    }
+}
+
+/// What was told of drops.
+#[derive(Default)]
+struct Drops {
+    dropped: u64,
+    told: Option<Instant>,
+}
+
+impl Drops {
+    /// Tells people of drops that they do not know of, now and then.
+    fn tell(&mut self, counts: Counts) {
+        if counts.dropped > self.dropped && self.told.is_none_or(|it| it.elapsed() >= TELL_DROPS) {
+            tell(&format!("dynocar forward: {} publications dropped so far", counts.dropped));
+            (self.dropped, self.told) = (counts.dropped, Some(Instant::now()));
+        }
+    }
+}
+
+/// One connection while it lasts.
+struct Sending<'a> {
+    broker: Broker,
+    session: Session,
+    known: &'a Mutex<Known>,
+    /// When the ping was sent that is not answered yet.
+    pinged: Option<Instant>,
+    last_ping: Instant,
+}
+
+impl<'a> Sending<'a> {
+    fn begin(broker: Broker, session: Session, known: &'a Mutex<Known>) -> Self {
+        locked(known).queue.begin();
+        Sending { broker, session, known, pinged: None, last_ping: Instant::now() }
+    }
+
+    fn run(
+        mut self,
+        every: Duration,
+        drops: &mut Drops,
+        must_end: &AtomicBool,
+    ) -> Result<(), BrokerError> {
+        self.births()?;
+        let mut own_due = Instant::now() + every;
+        let mut ending: Option<Instant> = None;
+        loop {
+            for told in self.broker.receive(PAUSE)? {
+                match told {
+                    Told::Pong => {
+                        self.pinged = None;
+                        locked(self.known).queue.take_note();
+                    }
+                    Told::Command(command) if is_rebirth(&command) => self.births()?,
+                    Told::Command(_) => {}
+                }
+            }
+            if self.pinged.is_some_and(|it| it.elapsed() >= PATIENCE) {
+                return Err(BrokerError::Silent);
+            }
+            if self.pinged.is_none() {
+                self.send_batch()?;
+            }
+            if Instant::now() >= own_due {
+                own_due = Instant::now() + every;
+                drops.tell(locked(self.known).queue.counts());
+                if self.pinged.is_none() {
+                    self.own_data()?;
+                }
+            }
+            if must_end.load(Ordering::Relaxed) {
+                let begun = *ending.get_or_insert_with(Instant::now);
+                let waiting = locked(self.known).queue.counts().waiting;
+                if waiting == 0 || begun.elapsed() >= FAREWELL {
+                    return self.farewell();
+                }
+            }
+        }
+    }
+
+    fn publish(&mut self, messages: Vec<Message>) -> Result<(), BrokerError> {
+        messages.into_iter().try_for_each(|message| self.broker.publish(message))
+    }
+
+    fn births(&mut self) -> Result<(), BrokerError> {
+        let births = self.session.births(&locked(self.known), utc_ms());
+        self.publish(births)?;
+        self.broker.flush()
+    }
+
+    /// Sends what waits, and asks whether it was taken; births and deaths when nothing waits.
+    fn send_batch(&mut self) -> Result<(), BrokerError> {
+        let mut count = 0;
+        while count < BATCH {
+            let messages = self.session.next(&mut locked(self.known), utc_ms());
+            if messages.is_empty() {
+                break;
+            }
+            self.publish(messages)?;
+            count += 1;
+        }
+        let changes = {
+            let known = locked(self.known);
+            let is_all = known.queue.next().is_none();
+            if is_all { self.session.births_and_deaths(&known, utc_ms()) } else { Vec::new() }
+        };
+        let is_idle = count == 0 && changes.is_empty();
+        self.publish(changes)?;
+        if !is_idle || self.last_ping.elapsed() >= IDLE_PING {
+            self.broker.ping()?;
+            self.last_ping = Instant::now();
+            self.pinged = Some(self.last_ping);
+        }
+        self.broker.flush()
+    }
+
+    /// The node's own counts, where they have changed.
+    fn own_data(&mut self) -> Result<(), BrokerError> {
+        let message = self.session.own_data(&locked(self.known), utc_ms());
+        self.publish(message.into_iter().collect())?;
+        self.broker.flush()
+    }
+
+    /// The node's death by its own hand; what waits still is left.
+    fn farewell(mut self) -> Result<(), BrokerError> {
+        let death = self.session.death(utc_ms());
+        self.publish(vec![death])?;
+        self.broker.disconnect()
+    }
+}
