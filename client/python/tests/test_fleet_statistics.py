@@ -132,3 +132,13 @@ def test_false_discoveries_stay_below_5_of_100_and_true_ones_are_found(
 def test_too_few_others_say_nothing() -> None:
     numbers = {"a": {f"train {k}": Estimate(float(k), 0.1) for k in range(3)}}
     assert differing(numbers) == []
+
+
+@pytest.mark.parametrize("trains", [5, 8])
+def test_trains_that_truly_scatter_are_not_told_to_differ(trains: int) -> None:
+    random, false = np.random.default_rng(trains), 0
+    for _ in range(150):
+        numbers, _ = simulated(random, trains, 3.0, 0)
+        false += any(it.is_found for it in differing(numbers))
+    # 150 fleets tell a share of 5 in 100 to 1.8.
+    assert false / 150 <= 0.05 + 0.018

@@ -196,7 +196,8 @@ def _beside_others(
     uncertain = scatter + means.std**2
     variance = stds**2 + uncertain
     z = (values - means.mean) / np.sqrt(variance)
-    freedom = (others - 1) * (variance / uncertain) ** 2
+    # Others that happen to lie close together would make themselves seem known: so much, no more.
+    freedom = (others - 1) * np.minimum((variance / uncertain) ** 2, 3.0)
     told = []
     for k, name in enumerate(names):
         mean, std = float(means.mean[k]), float(means.std[k])
