@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Where messages are raised.
-const FOLDERS: [&str; 10] = [
+const FOLDERS: [&str; 11] = [
     "daemon/src",
     "daemon/core/src",
     "daemon/fmu/src",
@@ -18,11 +18,12 @@ const FOLDERS: [&str; 10] = [
     "client/forward/src",
 ];
 /// A call whose first literal is a message, and the folder in which it is one.
-const CALLS: [(&str, &str); 10] = [
+const CALLS: [(&str, &str); 11] = [
     ("#[error(", ""),
     ("Failure::Input(", "daemon/src/cli"),
     ("Failure::Work(", "daemon/src/cli"),
     ("Failure::Input(", "client/forward/src"),
+    ("Failure::Work(", "client/recording/src/cli"),
     ("Error::new_err(", "client/python/src"),
     ("InputError(", "client/python/dynocar/fleet"),
     ("WorkError(", "client/python/dynocar/fleet"),

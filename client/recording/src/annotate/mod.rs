@@ -32,6 +32,14 @@ pub enum AnnotateError {
         /// What stopped it.
         source: McapError,
     },
+    /// What is to be added is no explanation.
+    #[error("{}: no explanation in time: {source}", path.display())]
+    Timeline {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: serde_json::Error,
+    },
     /// The explanation is of other data.
     #[error(
         "{}: holds {trains} trains and {runs} runs, the explanation is of one train and {explained} runs",

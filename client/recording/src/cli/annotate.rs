@@ -34,10 +34,11 @@ pub struct AnnotateArguments {
 pub fn execute(arguments: &AnnotateArguments) -> Result<(), Failure> {
     let AnnotateArguments { from, timeline, output } = arguments;
     require_new(output)?;
-    let wrong = |error: String| Failure::Input(format!("{}: {error}", timeline.display()));
-    let file = File::open(timeline).map_err(|error| wrong(error.to_string()))?;
-    let read: Timeline = serde_json::from_reader(BufReader::new(file))
-        .map_err(|error| wrong(format!("no explanation in time: {error}")))?;
+    let wrong = |source| {
+        Failure::Input(AnnotateError::Timeline { path: timeline.clone(), source }.to_string())
+    };
+    let file = File::open(timeline).map_err(|error| wrong(serde_json::Error::io(error)))?;
+    let read: Timeline = serde_json::from_reader(BufReader::new(file)).map_err(wrong)?;
     let added = if from.is_dir() || from.extension().is_some_and(|it| it == "toml") {
         let folder = tempfile::TempDir::with_prefix("dynocar-")
             .map_err(|error| Failure::Work(error.to_string()))?;

@@ -11,7 +11,7 @@ use dynocar_client::Host;
 use dynocar_shared::TrainId;
 
 use crate::lanes::Wanted;
-use crate::record::{RecordError, Rotation, Settings, record};
+use crate::record::{KeepError, RecordError, Rotation, Settings, record};
 
 /// Record what a controller and the daemon write, as MCAP.
 #[derive(Debug, Args)]
@@ -102,7 +102,9 @@ pub fn execute(arguments: &RecordArguments) -> Result<(), Failure> {
 pub fn run(settings: &Settings) -> Result<(), Failure> {
     let stop = stop_on_signals().map_err(|error| Failure::Work(error.to_string()))?;
     let recorded = record(settings, &stop).map_err(|error| match error {
-        RecordError::Taken { .. } | RecordError::Ring { .. } => Failure::Input(error.to_string()),
+        RecordError::Taken { .. } | RecordError::Ring(KeepError::Taken { .. }) => {
+            Failure::Input(error.to_string())
+        }
         error => Failure::Work(error.to_string()),
     })?;
     tell(&format!(

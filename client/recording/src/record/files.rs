@@ -13,7 +13,7 @@ use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 use mcap::McapError;
 
 use super::configuration::Configuration;
-use super::keeping::{self, Keeper};
+use super::keeping::{self, KeepError, Keeper};
 use super::{RecordError, Recorded};
 use crate::event::{Event, EventKind};
 use crate::lanes::event;
@@ -101,11 +101,11 @@ impl Files {
     }
 
     /// A problem of keeping is told, and stops nothing.
-    fn tell_keeper(&mut self, work: impl FnOnce(&mut Keeper, &[PathBuf]) -> Result<(), String>) {
+    fn tell_keeper(&mut self, work: impl FnOnce(&mut Keeper, &[PathBuf]) -> Result<(), KeepError>) {
         let Some(keeper) = &mut self.keeper else { return };
         let files: Vec<PathBuf> = numbered(&self.output).into_iter().map(|it| it.1).collect();
         if let Err(problem) = work(keeper, &files) {
-            tell(&format!("nothing is kept for good: {problem}"));
+            tell(&problem.to_string());
         }
     }
 

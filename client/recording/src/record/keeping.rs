@@ -11,7 +11,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use dynocar::output::{tell, write_file};
+use dynocar::output::{OutputError, tell, write_file};
 use dynocar::report::provenance::day;
 use dynocar_shared::Status;
 use serde::{Deserialize, Serialize};
@@ -36,6 +36,36 @@ pub struct Keeping {
     pub after: Duration,
     /// The most bytes that all that is kept takes, but for one file.
     pub most_bytes: u64,
+}
+
+/// Why something is not kept. It stops nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum KeepError {
+    /// What is kept takes all that it may.
+    #[error("nothing is kept for good: {}: takes its {most_mib} MiB already: move stretches away", kept.display())]
+    Full {
+        /// Where it lies.
+        kept: PathBuf,
+        /// What it may take.
+        most_mib: u64,
+    },
+    /// The ring is another recorder's.
+    #[error("{}: another recorder writes into this ring", ring.display())]
+    Taken {
+        /// The ring's folder.
+        ring: PathBuf,
+    },
+    /// The system refuses.
+    #[error("nothing is kept for good: {}: {source}", path.display())]
+    System {
+        /// The file or folder.
+        path: PathBuf,
+        /// Its answer.
+        source: io::Error,
+    },
+    /// The account of the stretch is not written.
+    #[error(transparent)]
+    Account(#[from] OutputError),
 }
 
 /// Keeps what lies around a moment.
@@ -107,12 +137,13 @@ impl Keeper {
     /// # Errors
     ///
     /// When another recorder writes there, or the folder cannot be made.
-    pub fn begin(ring: &Path, keeping: Keeping) -> io::Result<Self> {
-        fs::create_dir_all(ring.join(KEPT_FOLDER))?;
-        let lock = File::options().create(true).append(true).open(ring.join(LOCK_FILE))?;
+    pub fn begin(ring: &Path, keeping: Keeping) -> Result<Self, KeepError> {
+        fs::create_dir_all(ring.join(KEPT_FOLDER)).map_err(refused(ring))?;
+        let lock = File::options().create(true).append(true).open(ring.join(LOCK_FILE));
+        let lock = lock.map_err(refused(ring))?;
         lock.try_lock().map_err(|error| match error {
-            TryLockError::WouldBlock => io::Error::other("another recorder writes into this ring"),
-            TryLockError::Error(error) => error,
+            TryLockError::WouldBlock => KeepError::Taken { ring: ring.into() },
+            TryLockError::Error(error) => refused(ring)(error),
         })?;
         let open = newest_stretch(&ring.join(KEPT_FOLDER));
         Ok(Keeper { ring: ring.into(), keeping, open, is_full_told: false, _lock: lock })
@@ -132,15 +163,15 @@ impl Keeper {
     ///
     /// # Errors
     ///
-    /// In words, when a file cannot be kept.
-    pub fn keep(&mut self, event: &Event, files: &[PathBuf]) -> Result<(), String> {
+    /// When a file cannot be kept.
+    pub fn keep(&mut self, event: &Event, files: &[PathBuf]) -> Result<(), KeepError> {
         let now = SystemTime::now();
         let reason = reason(event, now);
         let (folder, mut stretch) = match self.open.take().filter(|it| it.1.is_open(now)) {
             Some(open) => open,
             None => (self.new_folder(&reason), Stretch::default()),
         };
-        fs::create_dir_all(&folder).map_err(|error| told(&folder, &error))?;
+        fs::create_dir_all(&folder).map_err(refused(&folder))?;
         let is_news = stretch.reasons.last().is_none_or(|last| !last.is_like(&reason));
         stretch.until_unix_s = unix_s(now + self.keeping.after);
         if is_news {
@@ -170,8 +201,8 @@ impl Keeper {
     ///
     /// # Errors
     ///
-    /// In words, when it cannot be kept.
-    pub fn begun(&mut self, files: &[PathBuf]) -> Result<(), String> {
+    /// When it cannot be kept.
+    pub fn begun(&mut self, files: &[PathBuf]) -> Result<(), KeepError> {
         let open = self.open.take().filter(|it| it.1.is_open(SystemTime::now()));
         let kept = match (&open, files.last()) {
             (Some((folder, _)), Some(newest)) => {
@@ -192,7 +223,7 @@ impl Keeper {
         free.next().unwrap_or_else(|| kept.join(&name))
     }
 
-    fn link(&mut self, file: &Path, folder: &Path) -> Result<(), String> {
+    fn link(&mut self, file: &Path, folder: &Path) -> Result<(), KeepError> {
         let Some(name) = file.file_name() else { return Ok(()) };
         let to = folder.join(name);
         if to.exists() {
@@ -205,14 +236,10 @@ impl Keeper {
                 return Ok(());
             }
             let kept = self.ring.join(KEPT_FOLDER);
-            return Err(format!(
-                "{}: takes its {} MiB already: move stretches away",
-                kept.display(),
-                most >> 20
-            ));
+            return Err(KeepError::Full { kept, most_mib: most >> 20 });
         }
         self.is_full_told = false;
-        fs::hard_link(file, &to).map_err(|error| told(&to, &error))
+        fs::hard_link(file, &to).map_err(refused(&to))
     }
 }
 
@@ -221,9 +248,10 @@ impl Stretch {
         unix_s(now) <= self.until_unix_s
     }
 
-    fn write(&self, folder: &Path) -> Result<(), String> {
-        let text = toml::to_string(self).map_err(|error| error.to_string())?;
-        write_file(&folder.join(STRETCH_FILE), &text).map_err(|error| error.to_string())
+    fn write(&self, folder: &Path) -> Result<(), KeepError> {
+        // Numbers and texts always have a text in TOML.
+        let text = toml::to_string(self).unwrap_or_default();
+        Ok(write_file(&folder.join(STRETCH_FILE), &text)?)
     }
 }
 
@@ -251,8 +279,8 @@ fn unix_s(at: SystemTime) -> u64 {
     at.duration_since(UNIX_EPOCH).map_or(0, |it| it.as_secs())
 }
 
-fn told(path: &Path, error: &io::Error) -> String {
-    format!("{}: {error}", path.display())
+fn refused(path: &Path) -> impl FnOnce(io::Error) -> KeepError {
+    move |source| KeepError::System { path: path.into(), source }
 }
 
 /// The stretch with the latest end, by what its folder says.

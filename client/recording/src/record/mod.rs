@@ -20,7 +20,7 @@ use crate::lanes::{Lanes, PAUSE, Sink, Wanted, event};
 use configuration::Configuration;
 
 pub use files::{Files, Rotation};
-pub use keeping::{Keeper, Keeping, request as request_keeping};
+pub use keeping::{KeepError, Keeper, Keeping, request as request_keeping};
 
 /// How often what was taken is handed to the system: what a kill costs at most.
 const FLUSH: Duration = Duration::from_millis(400);
@@ -52,14 +52,9 @@ pub enum RecordError {
         /// The file.
         path: PathBuf,
     },
-    /// A flight recorder cannot write into its folder.
-    #[error("{}: {source}", folder.display())]
-    Ring {
-        /// The folder.
-        folder: PathBuf,
-        /// What stands against it.
-        source: std::io::Error,
-    },
+    /// A flight recorder cannot have its ring.
+    #[error(transparent)]
+    Ring(#[from] KeepError),
     /// A file cannot be written.
     #[error("{}: cannot be written: {}; what was written before can be read", path.display(), words(source))]
     Write {
@@ -98,8 +93,7 @@ pub struct Recorded {
 /// See [`RecordError`]; what was written by then can be read.
 pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, RecordError> {
     let folder = folder_of(&settings.output);
-    let keeper = settings.keeping.map(|keeping| Keeper::begin(folder, keeping)).transpose();
-    let keeper = keeper.map_err(|source| RecordError::Ring { folder: folder.into(), source })?;
+    let keeper = settings.keeping.map(|keeping| Keeper::begin(folder, keeping)).transpose()?;
     let mut files = Files::begin(&settings.output, settings.rotation)?;
     if let Some(keeper) = keeper {
         files.set_keeper(keeper);
