@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Where messages are raised.
-const FOLDERS: [&str; 10] = [
+const FOLDERS: [&str; 11] = [
     "daemon/src",
     "daemon/core/src",
     "daemon/fmu/src",
