@@ -1,12 +1,12 @@
 #!/bin/sh
 # Builds dynocar_<version>_<arch>.deb from the release binaries. dynocar-watch, dynocar-recording,
-# dynocar-live and dynocar-forward go into it where they lie beside the program.
+# dynocar-live, dynocar-forward and dynocar-parquet go into it where they lie beside the program.
 # usage: build.sh [--program FILE] [--libraries FOLDER] [--out FOLDER]
 #   --program    the program, default target/release/dynocar
 #   --libraries  where libdynocar_client.a and libdynocar_fmu.so lie, default target/release
 #   --out        where the package goes, default target/debian
 # Build first: cargo build --release -p dynocar -p dynocar-watch -p dynocar-recording -p dynocar-live \
-#                  -p dynocar-forward &&
+#                  -p dynocar-forward -p dynocar-parquet &&
 #              cargo build --release -p dynocar-client -p dynocar-fmu
 set -eu
 
@@ -52,7 +52,7 @@ put() { # SOURCE TARGET [MODE]
 
 # The program, what shells offer for it, and its manual.
 put "$program" usr/bin/dynocar 755
-for companion in dynocar-watch dynocar-recording dynocar-live dynocar-forward; do
+for companion in dynocar-watch dynocar-recording dynocar-live dynocar-forward dynocar-parquet; do
     if [ -f "$(dirname "$program")/$companion" ]; then
         put "$(dirname "$program")/$companion" "usr/bin/$companion" 755
     else

@@ -6,14 +6,14 @@ use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 
 use dynocar_core::dataset::{
-    Dataset, DatasetError, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Place, Problem,
-    parse_track, parse_train, top_keys,
+    ColumnMapping, Dataset, DatasetError, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE,
+    Place, Problem, is_parquet, parse_track, parse_train, top_keys,
 };
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
 
 pub use crate::unpacking::is_recording;
-use crate::unpacking::{UnpackError, Unpacked};
+use crate::unpacking::{UnpackError, Unpacked, rows_of};
 
 /// Why a path leads to no dataset.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -88,7 +88,8 @@ impl DatasetFolder {
         Ok(DatasetFolder { folder, manifest: path.into(), recording: None })
     }
 
-    fn path_of(&self, path: &str) -> PathBuf {
+    /// Where a file lies that the dataset names.
+    pub fn path_of(&self, path: &str) -> PathBuf {
         if path == MANIFEST_FILE { self.manifest.clone() } else { self.folder.join(path) }
     }
 }
@@ -96,6 +97,15 @@ impl DatasetFolder {
 impl DatasetFiles for DatasetFolder {
     fn read(&self, path: &str) -> Result<String, FileProblem> {
         read_text(&self.path_of(path))
+    }
+
+    fn read_run(&self, path: &str, columns: &[ColumnMapping]) -> Result<String, FileProblem> {
+        let file = self.path_of(path);
+        if !is_parquet(path) {
+            return read_text(&file);
+        }
+        require_regular(&file)?;
+        rows_of(&file, columns).map_err(FileProblem::Table)
     }
 
     fn label(&self, path: &str) -> String {
@@ -259,6 +269,30 @@ fn other_format(head: &[u8]) -> Option<&'static str> {
     })
 }
 
+fn unreadable(error: std::io::Error) -> FileProblem {
+    match error.kind() {
+        ErrorKind::NotFound => FileProblem::Missing,
+        ErrorKind::IsADirectory => FileProblem::IsFolder,
+        kind => FileProblem::Unreadable(kind),
+    }
+}
+
+/// Refuses what is no file of a size that can be read, before it is opened: opening a pipe may wait for
+/// ever.
+fn require_regular(path: &Path) -> Result<(), FileProblem> {
+    let found = std::fs::metadata(path).map_err(unreadable)?;
+    if let Some(what) = irregular(found.file_type()) {
+        return Err(FileProblem::NotRegular(what));
+    }
+    if found.is_dir() {
+        return Err(FileProblem::IsFolder);
+    }
+    if found.len() > BYTES_MAX {
+        return Err(FileProblem::TooLarge { most: BYTES_MAX, found: found.len() });
+    }
+    Ok(())
+}
+
 /// Reads a text file.
 ///
 /// # Errors
@@ -266,19 +300,7 @@ fn other_format(head: &[u8]) -> Option<&'static str> {
 /// When there is none, it is no regular file, too large, of another format, not UTF-8 or not
 /// readable.
 pub fn read_text(path: &Path) -> Result<String, FileProblem> {
-    let unreadable = |error: std::io::Error| match error.kind() {
-        ErrorKind::NotFound => FileProblem::Missing,
-        ErrorKind::IsADirectory => FileProblem::IsFolder,
-        kind => FileProblem::Unreadable(kind),
-    };
-    // Asked before it is opened: opening a pipe may wait for ever.
-    let found = std::fs::metadata(path).map_err(unreadable)?;
-    if let Some(what) = irregular(found.file_type()) {
-        return Err(FileProblem::NotRegular(what));
-    }
-    if found.len() > BYTES_MAX {
-        return Err(FileProblem::TooLarge { most: BYTES_MAX, found: found.len() });
-    }
+    require_regular(path)?;
     let mut file = File::open(path).map_err(unreadable)?;
     let mut bytes = Vec::new();
     file.by_ref().take(HEAD_BYTES).read_to_end(&mut bytes).map_err(unreadable)?;

@@ -2,16 +2,33 @@
 
 use std::ffi::OsString;
 use std::io;
-use std::path::PathBuf;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// The program of everything about recordings.
 pub const RECORDING: &str = "dynocar-recording";
+/// The program of everything about Parquet.
+pub const PARQUET: &str = "dynocar-parquet";
+/// The program of the live screen.
+pub const WATCH: &str = "dynocar-watch";
+
+/// What a user calls who calls a program through this one.
+const USUAL: &str = "dynocar";
 
 /// A call of a program that lies where this one lies; else the search path has it. It bears the name
 /// of the package that it is built from.
 pub fn call(package: &str) -> Command {
-    Command::new(beside_this(package).unwrap_or_else(|| package.into()))
+    let mut command = Command::new(beside_this(package).unwrap_or_else(|| package.into()));
+    command.arg0(USUAL);
+    command
+}
+
+/// What the user called: `dynocar` where that called the program, else the program itself.
+pub fn called_as(package: &'static str) -> &'static str {
+    let name = std::env::args_os().next().unwrap_or_default();
+    let is_usual = Path::new(&name).file_name().is_some_and(|it| it == USUAL);
+    if is_usual { USUAL } else { package }
 }
 
 fn beside_this(package: &str) -> Option<OsString> {

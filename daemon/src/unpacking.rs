@@ -1,20 +1,63 @@
 //! Recordings as datasets: unpacked into a folder for as long as it is needed, by the program that
-//! knows their format.
+//! knows their format; and Parquet files of a dataset as CSV.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
+use std::process::Output;
 use std::sync::Arc;
 
+use dynocar_core::dataset::ColumnMapping;
 use tempfile::TempDir;
 
 use crate::output::tell;
-use crate::programs::{RECORDING, call, not_started};
+use crate::programs::{PARQUET, RECORDING, call, not_started};
 
-/// How a recording's name ends.
-const EXTENSION: &str = "mcap";
+/// The program that knows a recording's format, by the recording's name; `None` for what is none: a file of
+/// MCAP, and a folder or a file of Parquet.
+fn program_of(path: &Path) -> Option<&'static str> {
+    match path.extension()?.to_str()? {
+        "mcap" if path.is_file() => Some(RECORDING),
+        "parquet" if path.exists() => Some(PARQUET),
+        _ => None,
+    }
+}
 
 /// True for the name of a recording.
 pub fn is_recording(path: &Path) -> bool {
-    path.extension().is_some_and(|it| it == EXTENSION) && path.is_file()
+    program_of(path).is_some()
+}
+
+/// The program that carries out a command with these words: that of recordings, unless one of them is
+/// the name of a recording in Parquet.
+pub fn program_for<'w>(words: impl IntoIterator<Item = &'w OsStr>) -> &'static str {
+    let is_parquet = |it: &OsStr| Path::new(it).extension().is_some_and(|it| it == "parquet");
+    if words.into_iter().any(is_parquet) { PARQUET } else { RECORDING }
+}
+
+/// The rows of a Parquet file as CSV: all its columns by name, and what the mapped ones hold.
+///
+/// # Errors
+///
+/// In words, without the file's name.
+pub fn rows_of(file: &Path, columns: &[ColumnMapping]) -> Result<String, String> {
+    let mut command = call(PARQUET);
+    command.arg("rows").arg(file);
+    for it in columns {
+        command.arg("--column").arg(&it.column).arg(it.unit.name());
+    }
+    let output = command.output().map_err(|error| not_started(PARQUET, &error))?;
+    if output.status.success() {
+        return String::from_utf8(output.stdout).map_err(|error| error.to_string());
+    }
+    let words = problem(&output);
+    Err(words.strip_prefix(&format!("{}: ", file.display())).unwrap_or(&words).to_owned())
+}
+
+/// What a program said, without its name.
+fn problem(output: &Output) -> String {
+    let words = String::from_utf8_lossy(&output.stderr);
+    let words = words.trim();
+    words.strip_prefix("dynocar: ").unwrap_or(words).to_owned()
 }
 
 /// Why a recording is not unpacked.
@@ -56,14 +99,15 @@ impl Unpacked {
         let failed = |problem| UnpackError::Failed { path: path.clone(), problem };
         let folder = TempDir::with_prefix("dynocar-").map_err(|it| failed(it.to_string()))?;
         let unpacked = Unpacked { recording: path.clone(), folder: folder.into() };
-        let output = call(RECORDING)
+        let program = program_of(recording).unwrap_or(RECORDING);
+        let output = call(program)
             .args(["convert", "--quiet", "-o"])
             .arg(unpacked.folder())
             .arg(recording)
             .output()
-            .map_err(|error| failed(not_started(RECORDING, &error)))?;
+            .map_err(|error| failed(not_started(program, &error)))?;
         let words = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-        let problem = words.strip_prefix("dynocar: ").unwrap_or(&words).to_owned();
+        let problem = problem(&output);
         match output.status.code() {
             Some(0) if words.is_empty() => Ok(unpacked),
             Some(0) => {

@@ -48,6 +48,24 @@ impl Field {
     pub fn is_array(&self) -> bool {
         self.layout.type_name.starts_with('[')
     }
+
+    /// The type of an entry in NumPy's notation, as it lies in shared memory: `<f8` on most hosts.
+    pub fn numpy_type(&self) -> String {
+        let (kind, bits) = self.entry_type().split_at(1);
+        let bytes = bits.parse().map_or(0, |bits: usize| bits / 8);
+        let order = match (bytes, cfg!(target_endian = "little")) {
+            (1, _) => '|',
+            (_, true) => '<',
+            (_, false) => '>',
+        };
+        format!("{order}{kind}{bytes}")
+    }
+
+    /// How many entries there are; 1 unless it is an array.
+    pub fn entries(&self) -> usize {
+        let count = self.layout.type_name.split_once("; ").map(|it| it.1.trim_end_matches(']'));
+        count.map_or(1, |it| it.parse().unwrap_or(0))
+    }
 }
 
 /// The fields of [`TrainSample`], in order.
@@ -142,5 +160,21 @@ mod tests {
         assert_eq!(unit("unexplained_force_std_n"), Some("N"));
         assert_eq!(unit("innovation_correlation"), Some(""));
         assert_eq!(unit_of(Parameter::DavisC.full_name()), "N/kN per (m/s)²");
+    }
+
+    #[test]
+    fn entries_of_a_numpy_type_fill_the_field_and_the_fields_the_struct() {
+        let sizes = [size_of::<TrainSample>(), size_of::<ParameterSnapshot>()];
+        let fields: [Vec<Field>; 2] = [sample_fields().collect(), snapshot_fields().collect()];
+        for (fields, size) in fields.iter().zip(sizes) {
+            let mut end = 0;
+            for field in fields {
+                assert_eq!(field.layout.offset, end, "{}", field.layout.name);
+                let bytes: usize = field.numpy_type()[2..].parse().unwrap();
+                assert_eq!(field.entries() * bytes, field.layout.size, "{}", field.layout.name);
+                end += field.layout.size;
+            }
+            assert_eq!(end, size);
+        }
     }
 }

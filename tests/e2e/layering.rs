@@ -57,6 +57,7 @@ fn what_recordings_are_written_with_is_in_no_controller_and_no_daemon() {
     for package in ["dynocar", "dynocar-client", "dynocar-fmu", "dynocar-core"] {
         assert_free_of(package, &["dynocar-recording", "mcap", "prost", "parquet", "arrow"]);
     }
+    assert_free_of("dynocar-recording", &["parquet", "arrow"]);
 }
 
 #[test]

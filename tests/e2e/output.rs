@@ -10,11 +10,12 @@ use rustix::process::Signal;
 use serde_json::Value;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
+const WATCH: &str = env!("CARGO_BIN_EXE_dynocar-watch-under-test");
 const SOAK: &str = env!("CARGO_BIN_EXE_dynocar-soak");
 const DEMO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo");
 
 /// Commands with a result on standard output, that end by themselves.
-const COMMANDS: [(&str, &[&str]); 15] = [
+const COMMANDS: [(&str, &[&str]); 16] = [
     (DYNOCAR, &["--help"]),
     (DYNOCAR, &["explain", "--help"]),
     (DYNOCAR, &["--version"]),
@@ -28,6 +29,7 @@ const COMMANDS: [(&str, &[&str]); 15] = [
     (DYNOCAR, &["stops", DEMO, "--applied", "0.3", "--json", "-"]),
     (DYNOCAR, &["init", "--help"]),
     (DYNOCAR, &["completions", "bash"]),
+    (WATCH, &["--help"]),
     (SOAK, &["--help"]),
     (SOAK, &["fuzz", "--rounds", "1"]),
 ];

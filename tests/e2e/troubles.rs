@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Where messages are raised.
-const FOLDERS: [&str; 11] = [
+const FOLDERS: [&str; 12] = [
     "daemon/src",
     "daemon/core/src",
     "daemon/fmu/src",
@@ -13,6 +13,7 @@ const FOLDERS: [&str; 11] = [
     "client/python/dynocar/fleet",
     "client/python/src",
     "client/recording/src",
+    "client/parquet/src",
     "client/watch/src",
     "client/live/src",
     "client/forward/src",

@@ -28,6 +28,7 @@ from ._channel import (
     version,
 )
 from ._errors import ChannelError, DynocarError, InputError, WorkError
+from ._layout import SAMPLE_DTYPE, SNAPSHOT_DTYPE
 from ._native import ParameterSnapshot
 from ._recorded import (
     BaseResistance,
@@ -98,6 +99,8 @@ __all__ = [
     "RejectionReason",
     "Resistance",
     "Run",
+    "SAMPLE_DTYPE",
+    "SNAPSHOT_DTYPE",
     "SamplePublisher",
     "Snapshot",
     "SnapshotReader",

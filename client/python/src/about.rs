@@ -48,12 +48,6 @@ pub(crate) fn layouts() -> (u32, u64, u64) {
     (SCHEMA_MAJOR, TrainSample::LAYOUT_HASH, ParameterSnapshot::LAYOUT_HASH)
 }
 
-/// Names of the fields of a snapshot.
-#[pyfunction]
-pub(crate) fn snapshot_fields() -> Vec<&'static str> {
-    ParameterSnapshot::LAYOUT.iter().map(|field| field.name).collect()
-}
-
 /// The members of a vocabulary: their names as in Rust, and their numbers.
 type Members = Vec<(String, i64)>;
 

@@ -26,9 +26,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use crate::about::{
-        daemon_state, layouts, monotonic_now_ns, snapshot_fields, version, vocabularies,
-    };
+    use crate::about::{daemon_state, layouts, monotonic_now_ns, version, vocabularies};
     #[pymodule_export]
     use crate::channel::{Publisher, Reader};
     #[pymodule_export]
@@ -36,7 +34,7 @@ mod _native {
     #[pymodule_export]
     use crate::recorded::{check, identify, read};
     #[pymodule_export]
-    use crate::snapshot::{ParameterSnapshot, Reading};
+    use crate::snapshot::{ParameterSnapshot, Reading, dtypes};
     #[pymodule_export]
     use crate::table::{Column, Table};
 }

@@ -1,8 +1,10 @@
 //! What a reader gives.
 
 use dynocar_client::ffi::{Code, ReadingCopy};
-use dynocar_shared::snapshot::{COVARIANCE_ENTRIES, PARAMETERS_MAX, REJECTION_REASONS};
+use dynocar_shared::schema::{Field, sample_fields, snapshot_fields};
+use pyo3::exceptions::PyAttributeError;
 use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyList};
 
 use crate::errors::of_code;
 
@@ -51,78 +53,96 @@ impl Reading {
     }
 }
 
+/// w0, its standard deviation, the force, its, and whether the speed was driven.
+type Resistance = (f64, f64, f64, f64, bool);
+
 /// Every field of `dynocar_parameter_snapshot` in `dynocar.h`, under its name there.
 #[pyclass(frozen, module = "dynocar._native")]
 pub(crate) struct ParameterSnapshot(dynocar_shared::ParameterSnapshot);
 
-/// Gives Python the fields, and the function that it asks of a snapshot.
-macro_rules! fields {
-    ($( $field:ident: $kind:ty ),* $(,)?) => {
-        #[pymethods]
-        impl ParameterSnapshot {
-            $(
-                #[getter]
-                fn $field(&self) -> $kind {
-                    self.0.$field
-                }
-            )*
+#[pymethods]
+impl ParameterSnapshot {
+    /// A field by its name: a number, or a list of them.
+    fn __getattr__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let field = snapshot_fields().find(|it| it.layout.name == name).ok_or_else(|| {
+            PyAttributeError::new_err(format!("'ParameterSnapshot' has no field '{name}'"))
+        })?;
+        let entries = self.0.fields()[field.place];
+        let mut numbers = (0..entries.count()).map(|place| number(py, &field, entries.word(place)));
+        if field.is_array() {
+            return Ok(PyList::new(py, numbers.collect::<PyResult<Vec<_>>>()?)?.into_any());
+        }
+        numbers.next().unwrap_or_else(|| Ok(py.None().into_bound(py)))
+    }
 
-            /// w0 and its standard deviation in N/kN, the force and its in N, whether the speed lies
-            /// outside those driven; `None` without a, b and c.
-            fn resistance_at(
-                &self,
-                py: Python<'_>,
-                speed_mps: f64,
-                mass_kg: f64,
-            ) -> PyResult<Option<(f64, f64, f64, f64, bool)>> {
-                if !(speed_mps.is_finite() && mass_kg.is_finite() && mass_kg >= 0.0) {
-                    return Err(of_code(py, Code::BadNumber));
+    fn __dir__(&self) -> Vec<&'static str> {
+        snapshot_fields().map(|it| it.layout.name).chain(["resistance_at"]).collect()
+    }
+
+    /// The bytes as they lie in shared memory, which `numpy.frombuffer` reads by `SNAPSHOT_DTYPE`.
+    fn __bytes__<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        let mut bytes = Vec::with_capacity(size_of_val(&self.0));
+        for field in snapshot_fields() {
+            let (entries, size) =
+                (self.0.fields()[field.place], field.layout.size / field.entries());
+            for place in 0..entries.count() {
+                let word = entries.word(place);
+                match cfg!(target_endian = "little") {
+                    true => bytes.extend(&word.to_le_bytes()[..size]),
+                    false => bytes.extend(&word.to_be_bytes()[8 - size..]),
                 }
-                Ok(self.0.resistance_at(speed_mps).map(|it| {
-                    let (force_n, force_std_n) = it.force_n(mass_kg);
-                    (it.w0_n_per_kn, it.w0_std_n_per_kn, force_n, force_std_n, it.is_extrapolated)
-                }))
             }
         }
-    };
+        PyBytes::new(py, &bytes)
+    }
+
+    /// w0 and its standard deviation in N/kN, the force and its in N, whether the speed lies
+    /// outside those driven; `None` without a, b and c.
+    fn resistance_at(
+        &self,
+        py: Python<'_>,
+        speed_mps: f64,
+        mass_kg: f64,
+    ) -> PyResult<Option<Resistance>> {
+        if !(speed_mps.is_finite() && mass_kg.is_finite() && mass_kg >= 0.0) {
+            return Err(of_code(py, Code::BadNumber));
+        }
+        Ok(self.0.resistance_at(speed_mps).map(|it| {
+            let (force_n, force_std_n) = it.force_n(mass_kg);
+            (it.w0_n_per_kn, it.w0_std_n_per_kn, force_n, force_std_n, it.is_extrapolated)
+        }))
+    }
 }
 
-fields! {
-    epoch: u64,
-    sequence: u64,
-    generation: u64,
-    train_id: u64,
-    pipeline_index: u32,
-    pipeline_kind: u32,
-    status: u32,
-    reason: u32,
-    quantities: u32,
-    train_quantities: u32,
-    sample_time_ns: i64,
-    sample_published_ns: i64,
-    published_ns: i64,
-    vouched_ns: i64,
-    sample_sequence: u64,
-    samples_used: u64,
-    samples_rejected: u64,
-    samples_lost: u64,
-    updates: u64,
-    rejected_by_reason: [u32; REJECTION_REASONS],
-    parameter_count: u32,
-    excited: u32,
-    missing_manoeuvres: u32,
-    suspected_effect: u32,
-    suspected_alternatives: u32,
-    suspicion_age_s: u32,
-    parameters: [u32; PARAMETERS_MAX],
-    values: [f64; PARAMETERS_MAX],
-    covariance: [f64; COVARIANCE_ENTRIES],
-    innovation_normalised: f64,
-    innovation_mean_square: f64,
-    innovation_correlation: f64,
-    unexplained_force_n: f64,
-    unexplained_force_std_n: f64,
-    suspicion_evidence: f64,
-    speed_min_mps: f64,
-    speed_max_mps: f64,
+fn number<'py>(py: Python<'py>, field: &Field, word: u64) -> PyResult<Bound<'py, PyAny>> {
+    Ok(match field.entry_type() {
+        "f64" => f64::from_bits(word).into_pyobject(py)?.into_any(),
+        "i64" | "i8" => (word as i64).into_pyobject(py)?.into_any(),
+        _ => word.into_pyobject(py)?.into_any(),
+    })
+}
+
+/// Names, types in NumPy's notation and offsets of a struct's fields, and its size.
+type Dtype = (Vec<&'static str>, Vec<String>, Vec<usize>, usize);
+
+fn dtype(fields: impl Iterator<Item = Field>, size: usize) -> Dtype {
+    let mut dtype: Dtype = (Vec::new(), Vec::new(), Vec::new(), size);
+    for field in fields {
+        let shape =
+            if field.is_array() { format!("({},)", field.entries()) } else { String::new() };
+        dtype.0.push(field.layout.name);
+        dtype.1.push(shape + &field.numpy_type());
+        dtype.2.push(field.layout.offset);
+    }
+    dtype
+}
+
+/// What NumPy needs to read samples and snapshots as they lie in shared memory.
+#[pyfunction]
+pub(crate) fn dtypes() -> (Dtype, Dtype) {
+    use dynocar_shared::{ParameterSnapshot, TrainSample};
+    (
+        dtype(sample_fields(), size_of::<TrainSample>()),
+        dtype(snapshot_fields(), size_of::<ParameterSnapshot>()),
+    )
 }

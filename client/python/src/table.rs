@@ -14,21 +14,6 @@ use pyo3::types::{PyCapsule, PyDict};
 /// Name of the column that tells the runs of a dataset apart.
 const RUN: &str = "run";
 
-/// The quantities of a sample by the names of their columns.
-const QUANTITIES: [(SampleField, &str); SampleField::ALL.len()] = [
-    (SampleField::Position, "position_m"),
-    (SampleField::Speed, "speed_mps"),
-    (SampleField::TractionForce, "traction_force_n"),
-    (SampleField::BrakeForce, "brake_force_n"),
-    (SampleField::BrakeCylinderPressure, "brake_cylinder_pressure_pa"),
-    (SampleField::Acceleration, "acceleration_mps2"),
-    (SampleField::SpecificForce, "specific_force_mps2"),
-    (SampleField::Mass, "mass_kg"),
-    (SampleField::AmbientTemperature, "ambient_temperature_degc"),
-    (SampleField::Gradient, "gradient_permille"),
-    (SampleField::CurveRadius, "curve_radius_m"),
-];
-
 /// Named columns of one length, NaN where a value is missing.
 pub(crate) type Columns = Vec<(&'static str, Vec<f64>)>;
 
@@ -122,9 +107,9 @@ impl Table {
 fn quantities(run: &Run) -> Columns {
     let samples = &run.samples;
     let mut columns = vec![("time_s", samples.iter().map(|it| it.time_ns as f64 / 1e9).collect())];
-    for (field, name) in QUANTITIES {
+    for field in SampleField::ALL {
         let values = samples.iter().map(|sample| sample.get(field).unwrap_or(f64::NAN));
-        columns.push((name, values.collect()));
+        columns.push((field.name(), values.collect()));
     }
     for (name, values) in extras(&run.extras) {
         let known = values.iter().flatten().map(|value| value.unwrap_or(f64::NAN));

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import inspect
 import os
 import re
 import signal
@@ -12,8 +13,10 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import dynocar
+import numpy as np
 import pytest
 from conftest import PATIENCE_S, PROGRAMS, ROOT, TRAIN, Lines, PlayedDaemon, dynocar_command, wait_for
 from dynocar import Code, Manoeuvre, Parameter, PipelineKind, RejectionReason, _native
@@ -278,10 +281,42 @@ def test_numbers_names_and_fields_are_those_of_the_library() -> None:
         assert {member.name: int(member) for member in vocabulary} == expected, name
     assert PipelineKind.LEAST_SQUARES == PipelineKind.LS
     assert dynocar.Status(99).name == "NUMBER_99"
-    for field in _native.snapshot_fields():
-        assert hasattr(dynocar.ParameterSnapshot, field), field
     header = (ROOT / "client/include/dynocar.h").read_text()
     _, sample, snapshot = _native.layouts()
     for layout in (sample, snapshot):
         assert f"{layout:#x}" in header
     assert dynocar.__version__ == dynocar_command("--version").stdout.split()[1]
+
+
+def test_numpy_reads_a_snapshot_as_it_lies_in_shared_memory(tmp_path: Path) -> None:
+    with dynocar.SnapshotReader(1, tmp_path / "root") as reader:
+        raw = reader.resistance().raw
+    assert len(bytes(raw)) == dynocar.SNAPSHOT_DTYPE.itemsize
+    read = np.frombuffer(bytes(raw), dynocar.SNAPSHOT_DTYPE)[0]
+    names = dynocar.SNAPSHOT_DTYPE.names
+    assert names is not None and set(names) <= set(dir(raw))
+    for name in names:
+        assert np.array_equal(read[name], getattr(raw, name)), name
+    with pytest.raises(AttributeError, match="no field 'speed_kmh'"):
+        raw.speed_kmh  # type: ignore[attr-defined]
+    # What a type checker is told, and what publish takes, are the same fields.
+    stub = (Path(dynocar.__file__).parent / "_native.pyi").read_text()
+    block = stub.split("class ParameterSnapshot:")[1].split("    def ")[0]
+    assert tuple(re.findall(r"^    (\w+): ", block, re.MULTILINE)) == names
+    measured = list(inspect.signature(dynocar.SamplePublisher.publish).parameters)[4:]
+    sample_names = dynocar.SAMPLE_DTYPE.names
+    assert sample_names is not None and list(sample_names[-len(measured) :]) == measured
+
+
+def test_the_page_of_the_fields_says_the_types_for_numpy() -> None:
+    page = (ROOT / "docs/recording_fields.md").read_text()
+    for title, dtype in [
+        ("TrainSample", dynocar.SAMPLE_DTYPE),
+        ("ParameterSnapshot", dynocar.SNAPSHOT_DTYPE),
+    ]:
+        table = page.split(f"## `dynocar.{title}`")[1].split("\n## ")[0]
+        told = re.findall(r"^\| `(\w+)` .*\| `(\S+)` at (\d+) \|", table, re.MULTILINE)
+        fields = dtype.fields
+        assert fields is not None and [name for name, _, _ in told] == list(fields)
+        for name, kind, offset in told:
+            assert (np.dtype(kind), int(offset)) == tuple(fields[name][:2]), name

@@ -11,8 +11,11 @@ use clap::{Args, Parser, Subcommand};
 use dynocar::cli::{Failure, parse};
 use dynocar::config::DaemonConfig;
 use dynocar::output::{print, require_new, tell};
+use dynocar::programs::{RECORDING, called_as};
 
-use crate::convert::{FromDatasetError, ModelFiles, ToDatasetError, from_dataset, to_dataset};
+use crate::convert::{
+    FromDatasetError, ModelFiles, ToDatasetError, Unpacked, from_dataset, to_dataset,
+};
 use crate::page::page;
 use crate::reading::{Ending, ReadError};
 use crate::recording::Recording;
@@ -58,15 +61,16 @@ struct RecoverArguments {
 
 /// Change a recording into a dataset's folder, or a dataset into a recording.
 #[derive(Debug, Args)]
-struct ConvertArguments {
-    /// A recording, or a dataset's folder or dataset.toml
-    from: PathBuf,
-    /// The dataset's folder, or the recording; it must not be there yet
+pub struct ConvertArguments {
+    /// A recording, of one that rotated its files in order; or a dataset's folder or dataset.toml
+    #[arg(required = true)]
+    pub from: Vec<PathBuf>,
+    /// The dataset's folder, or the recording as NAME.mcap or NAME.parquet; it must not be there yet
     #[arg(short, long, value_name = "TO")]
-    output: PathBuf,
-    /// Of a recording, only this train
+    pub output: PathBuf,
+    /// For a dataset, only this train of the recording
     #[arg(long, value_name = "ID")]
-    train: Option<u64>,
+    pub train: Option<u64>,
     /// The train's file, for a recording to which none is attached
     #[arg(long, value_name = "FILE")]
     train_file: Option<PathBuf>,
@@ -75,22 +79,60 @@ struct ConvertArguments {
     track_file: Option<PathBuf>,
     /// Tell only what is wrong
     #[arg(long)]
-    quiet: bool,
+    pub quiet: bool,
+}
+
+impl ConvertArguments {
+    /// The files of train and line that are given.
+    pub fn model_files(&self) -> ModelFiles {
+        ModelFiles { train: self.train_file.clone(), track: self.track_file.clone() }
+    }
+
+    /// The dataset to convert; `None` for recordings.
+    pub fn dataset(&self) -> Option<&Path> {
+        let is_dataset = |it: &Path| match it.extension().and_then(|it| it.to_str()) {
+            Some("toml") => true,
+            Some("parquet") => false,
+            _ => it.is_dir(),
+        };
+        self.from.iter().map(PathBuf::as_path).find(|it| is_dataset(it))
+    }
+
+    /// Says what became of a recording.
+    pub fn tell(&self, unpacked: &Unpacked) {
+        if let Some(broken) = &unpacked.broken {
+            tell(&format!("{}: {broken}; `dynocar recover` makes it whole", program()));
+        }
+        if !self.quiet {
+            let Unpacked { runs, samples, left_out, .. } = unpacked;
+            tell(&format!(
+                "{}: {runs} runs, {samples} samples; {left_out} snapshots and events have no place in \
+                 a dataset",
+                self.output.display()
+            ));
+        }
+    }
 }
 
 /// Compute every recorded snapshot again.
 #[derive(Debug, Args)]
-struct VerifyArguments {
-    /// The recording
-    recording: PathBuf,
+pub struct VerifyArguments {
+    /// The recording; of one that rotated, its files in order
+    #[arg(required = true)]
+    pub recording: Vec<PathBuf>,
     /// Also say what this configuration of the daemon would have told
     #[arg(long, value_name = "FILE")]
     with: Option<PathBuf>,
 }
 
+/// The name by which messages call this program.
+fn program() -> &'static str {
+    called_as(RECORDING)
+}
+
 /// Parses the command line, runs the command, reports a failure on standard error.
 pub fn main() -> ExitCode {
-    let arguments = match parse::<Arguments>("dynocar") {
+    let arguments = match parse::<Arguments>(program()) {
         Ok(arguments) => arguments,
         Err(status) => return status,
     };
@@ -106,7 +148,7 @@ pub fn main() -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report("dynocar", None),
+        Err(failure) => failure.report(program(), None),
     }
 }
 
@@ -145,31 +187,25 @@ fn read_failure(error: ReadError) -> Failure {
 }
 
 fn execute_convert(arguments: &ConvertArguments) -> Result<(), Failure> {
-    let ConvertArguments { from, output, .. } = arguments;
+    let ConvertArguments { from, output, train, quiet, .. } = arguments;
     require_new(output)?;
-    if from.is_dir() || from.extension().is_some_and(|it| it == "toml") {
-        return execute_from_dataset(from, output, arguments.quiet);
+    if let Some(dataset) = arguments.dataset() {
+        if from.len() > 1 {
+            return Err(Failure::Input(format!("{}: expected no file beside", dataset.display())));
+        }
+        return execute_from_dataset(dataset, output, *quiet);
     }
-    let files =
-        ModelFiles { train: arguments.train_file.clone(), track: arguments.track_file.clone() };
-    let unpacked =
-        to_dataset(from, output, arguments.train, &files).map_err(|error| match error {
-            ToDatasetError::Output(error) => error.into(),
-            error => Failure::Input(error.to_string()),
-        })?;
-    if let Some(broken) = &unpacked.broken {
-        tell(&format!("dynocar: {broken}; `dynocar recover` makes it whole"));
-    }
-    if !arguments.quiet {
-        tell(&format!(
-            "{}: {} runs, {} samples; {} snapshots and events have no place in a dataset",
-            output.display(),
-            unpacked.runs,
-            unpacked.samples,
-            unpacked.left_out
-        ));
-    }
+    let unpacked = to_dataset(from, output, *train, &arguments.model_files());
+    arguments.tell(&unpacked.map_err(dataset_failure)?);
     Ok(())
+}
+
+/// A recording that makes no dataset is wrong input; a dataset that cannot be written is not.
+pub fn dataset_failure(error: ToDatasetError) -> Failure {
+    match error {
+        ToDatasetError::Output(error) => error.into(),
+        error => Failure::Input(error.to_string()),
+    }
 }
 
 fn execute_from_dataset(from: &Path, output: &Path, is_quiet: bool) -> Result<(), Failure> {
@@ -180,7 +216,8 @@ fn execute_from_dataset(from: &Path, output: &Path, is_quiet: bool) -> Result<()
     Ok(())
 }
 
-fn from_dataset_failure(error: FromDatasetError) -> Failure {
+/// A dataset that makes no recording is wrong input; a recording that cannot be written is not.
+pub fn from_dataset_failure(error: FromDatasetError) -> Failure {
     match error {
         FromDatasetError::Dataset(error) => error.into(),
         FromDatasetError::Write { .. } => Failure::Work(error.to_string()),
@@ -189,30 +226,42 @@ fn from_dataset_failure(error: FromDatasetError) -> Failure {
 }
 
 fn execute_verify(arguments: &VerifyArguments) -> Result<(), Failure> {
-    let path = &arguments.recording;
-    let wrong = |error: &dyn std::fmt::Display| Failure::Input(error.to_string());
-    let recording = Recording::load(path).map_err(|error| wrong(&error))?;
-    if let Some(broken) = &recording.broken {
-        tell(&format!("dynocar: {broken}"));
-    }
-    if recording.snapshots.is_empty() {
-        return Err(wrong(&format!("{}: no snapshots: nothing to verify", path.display())));
-    }
-    let configurations = Configurations::of(path, &recording).map_err(|error| wrong(&error))?;
-    let other = arguments.with.as_deref().map(DaemonConfig::load).transpose()?;
-    let verified = verify(&recording, &configurations);
-    let (samples, snapshots) = (recording.samples.len(), recording.snapshots.len());
-    print(&format!("{}: {samples} samples, {snapshots} snapshots\n", path.display()))?;
-    print(&text(&verified))?;
-    if let (Some(other), Some(file)) = (&other, &arguments.with) {
-        let newest = verified.last().map_or(0, |it| it.epoch);
-        let recorded = overlay(configurations.of_epoch(newest).0, &recording.samples);
-        let told = overlay(other, &recording.samples);
-        print(&overlay_text(&recorded, &told, &file.display().to_string()))?;
-    }
-    if verified.iter().all(|it| it.outcome == Outcome::Same) {
-        Ok(())
-    } else {
-        Err(Failure::Verdict(1))
+    arguments.verify(&Recording::load_all(&arguments.recording).map_err(read_failure)?)
+}
+
+impl VerifyArguments {
+    /// Computes every snapshot of a recording again, and says what became of them.
+    ///
+    /// # Errors
+    ///
+    /// When it holds none, there is nothing to compute them by, or one is another.
+    pub fn verify(&self, recording: &Recording) -> Result<(), Failure> {
+        let path = &self.recording[0];
+        let wrong = |error: &dyn std::fmt::Display| Failure::Input(error.to_string());
+        if let Some(broken) = &recording.broken {
+            tell(&format!("{}: {broken}", program()));
+        }
+        if recording.snapshots.is_empty() {
+            return Err(wrong(&format!("{}: no snapshots: nothing to verify", path.display())));
+        }
+        let configurations = Configurations::of(path, recording).map_err(|error| wrong(&error))?;
+        let other = self.with.as_deref().map(DaemonConfig::load).transpose()?;
+        let verified = verify(recording, &configurations);
+        let (samples, snapshots) = (recording.samples.len(), recording.snapshots.len());
+        let names = self.recording.iter().map(|it| it.display().to_string()).collect::<Vec<_>>();
+        let names = names.join(", ");
+        print(&format!("{names}: {samples} samples, {snapshots} snapshots\n"))?;
+        print(&text(&verified))?;
+        if let (Some(other), Some(file)) = (&other, &self.with) {
+            let newest = verified.last().map_or(0, |it| it.epoch);
+            let recorded = overlay(configurations.of_epoch(newest).0, &recording.samples);
+            let told = overlay(other, &recording.samples);
+            print(&overlay_text(&recorded, &told, &file.display().to_string()))?;
+        }
+        if verified.iter().all(|it| it.outcome == Outcome::Same) {
+            Ok(())
+        } else {
+            Err(Failure::Verdict(1))
+        }
     }
 }

@@ -84,6 +84,38 @@ pub struct Event {
     pub text: String,
 }
 
+impl Event {
+    /// The number in a field by its place in [`EVENT_FIELDS`], in two's complement; `None` where it is
+    /// missing, and for the text.
+    pub fn word(&self, place: usize) -> Option<u64> {
+        match place {
+            0 => Some(self.monotonic_ns as u64),
+            1 => Some(self.train_id),
+            2 => Some(self.kind as u64),
+            3 => self.pipeline_index.map(u64::from),
+            4 => self.status.map(|it| it as u64),
+            5 => self.reason.map(|it| it as u64),
+            6 => self.count,
+            _ => None,
+        }
+    }
+
+    /// Sets the number in a field by its place; one that is never missing becomes 0 without.
+    pub fn set_word(&mut self, place: usize, word: Option<u64>) {
+        let number = word.unwrap_or(0);
+        match place {
+            0 => self.monotonic_ns = number as i64,
+            1 => self.train_id = number,
+            2 => self.kind = number as i32,
+            3 => self.pipeline_index = word.map(|it| it as u32),
+            4 => self.status = word.map(|it| it as i32),
+            5 => self.reason = word.map(|it| it as i32),
+            6 => self.count = word,
+            _ => {}
+        }
+    }
+}
+
 /// A field of [`Event`]: name, number, whether it may be missing, unit and meaning.
 pub struct EventField {
     /// The name.

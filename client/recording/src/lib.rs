@@ -7,12 +7,14 @@
 //! # Layout
 //!
 //! - [`schema`]: the protobuf messages, made from the layouts of sample and snapshot
+//! - [`columns`]: the same as columns of tables, for whoever writes tables
 //! - [`page`]: the reference page of the recorded fields
 //! - [`codec`]: samples and snapshots as messages, and back, to the bit
 //! - [`event`]: what happens around them
 //! - [`topic`]: the streams of messages
 //! - [`lanes`]: what a recorder and a live view read of the trains' channels
 //! - [`writing`], [`reading`]: MCAP files, written without seeking and read as far as they are whole
+//! - [`joining`]: the files of a recording that rotated, read as one
 //! - [`recording`]: a recording in memory
 //! - [`record`]: the recorder
 //! - [`copying`]: copies of recordings, ours or not
@@ -25,9 +27,11 @@
 pub mod annotate;
 pub mod cli;
 pub mod codec;
+pub mod columns;
 pub mod convert;
 pub mod copying;
 pub mod event;
+pub mod joining;
 pub mod lanes;
 pub mod page;
 pub mod reading;

@@ -2,88 +2,148 @@
 
 use std::fmt::Write;
 
-use dynocar_shared::schema::{Field, Missing, unit_of};
+use dynocar_shared::schema::{Field, unit_of};
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_shared::{Parameter, PipelineKind, Reason, RejectionReason, Status};
+use dynocar_shared::{PipelineKind, Reason, Status};
 
 use crate::annotate::schema::MESSAGES;
+use crate::columns::{Column, EVENTS, SAMPLES, SNAPSHOTS, STAMPS, Source};
 use crate::event::{EVENT_FIELDS, EventField, EventKind};
 use crate::schema::{
     BESIDE_VALUE, ESTIMATE, REJECTED, SAMPLE_FIELDS, SNAPSHOT_FIELDS, name_beside, number,
-    parameter_number, rejection_number, vocabulary_of, vocabulary_of_type,
+    parameter_number, rejection_number, vocabulary_of_type,
 };
 
 const HEAD: &str = "# Fields of a recording
 
 This page is what `dynocar-recording fields` prints; it is made from the same tables as the recordings'
-protobuf messages. How to record is told in [the guide](guides/recording.md).
+protobuf messages, the columns of a recording in Parquet and the types for NumPy. How to record is told
+in [the guide](guides/recording.md).
 
-A field of which it says *missing unless measured* is `optional`: it is there when the controller
-measured it. Every other number that is not there is 0.
+*Number* and *type* are those of the protobuf message. A field of which it says *missing unless measured* is
+`optional`: it is there when the controller measured it. Every other number that is not there is 0.
+
+*Column* is the type in Parquet, in Arrow's words: *null* where a value may be missing. Each column carries its unit,
+its meaning and the names of its numbers as metadata. Before them stand `message_number` (`UInt64`, the message's place
+among the recording's, counted from 1) and `log_time` (`Timestamp(ns, \"UTC\")`, when it was recorded).
+
+*NumPy* is the type in shared memory on a little-endian host with the offset in bytes: `dynocar.SAMPLE_DTYPE` and
+`dynocar.SNAPSHOT_DTYPE` in Python.
 ";
 
 const EXPLANATION: &str = "
-`explain --annotate` adds the following messages.
+`explain --annotate` adds the following messages, which have no place in Parquet.
 ";
 
 /// The page as Markdown.
 pub fn page() -> String {
     let mut page = HEAD.to_owned();
-    layout(&mut page, "dynocar.TrainSample", "One cycle of a train.", &SAMPLE_FIELDS);
+    layout(&mut page, "dynocar.TrainSample", "One cycle of a train.", (&SAMPLE_FIELDS, &SAMPLES));
     layout(
         &mut page,
         "dynocar.ParameterSnapshot",
         "A pipeline's knowledge of one train at one moment.",
-        &SNAPSHOT_FIELDS,
+        (&SNAPSHOT_FIELDS, &SNAPSHOTS),
     );
-    row(&mut page, "estimate", ESTIMATE, "Estimate", "", "The parameters by name, see below.");
-    row(&mut page, "rejected", REJECTED, "Rejected", "", "The refusals by name, see below.");
+    let nested = [("estimate", ESTIMATE, "Estimate"), ("rejected", REJECTED, "Rejected")];
+    for (name, number, of_type) in nested {
+        let row = Row { name, number: Some(number), of_type, ..Row::default() };
+        row.put(&mut page, true, &format!("By name, see `dynocar.{of_type}`."));
+    }
     table(
         &mut page,
         "dynocar.Estimate",
-        "What a pipeline estimates, each missing unless the pipeline estimates it.",
+        "What a pipeline estimates, each missing unless the pipeline estimates it; columns of the snapshots, \
+         under `estimate_` and the name.",
+        false,
     );
-    for &it in Parameter::ALL {
-        let (name, number) = (it.full_name(), parameter_number(it));
-        row(&mut page, name, number, "double", unit_of(name), it.meaning());
-        for (offset, word, meaning) in BESIDE_VALUE {
-            let beside = name_beside(it, word);
-            row(&mut page, &beside, number + offset, "double", unit_of(name), meaning);
-        }
+    for column in SNAPSHOTS.iter() {
+        let (name, number) = match column.source {
+            Source::Value(it) => (it.full_name().to_owned(), parameter_number(it)),
+            Source::Beside(it, place) => {
+                let (offset, word, _) = BESIDE_VALUE[place];
+                (name_beside(it, word), parameter_number(it) + offset)
+            }
+            _ => continue,
+        };
+        let row = Row::of(column, number, "double");
+        Row { name: &name, ..row }.put(&mut page, false, &column.meaning);
     }
-    table(&mut page, "dynocar.Rejected", "How many samples a pipeline refused, by reason.");
-    for &it in RejectionReason::ALL {
-        row(&mut page, it.name(), rejection_number(it), "uint32", "", it.meaning());
+    let what = "How many samples a pipeline refused, by reason; columns of the snapshots, under `rejected_` and \
+                the name.";
+    table(&mut page, "dynocar.Rejected", what, false);
+    for column in SNAPSHOTS.iter() {
+        let Source::Rejected(it) = column.source else { continue };
+        let row = Row::of(column, rejection_number(it), "uint32");
+        Row { name: it.name(), ..row }.put(&mut page, false, &column.meaning);
     }
-    listed(&mut page, "Event", "What happened around them.", &EVENT_FIELDS);
+    let columns: Vec<&Column> = EVENTS.iter().collect();
+    listed(&mut page, "Event", "What happened around them.", &EVENT_FIELDS, &columns[STAMPS..]);
     page.push_str(EXPLANATION);
     for (name, what, fields) in MESSAGES {
-        listed(&mut page, name, what, fields);
+        listed(&mut page, name, what, fields, &[]);
     }
     enumerations(&mut page);
     page
 }
 
-fn table(page: &mut String, name: &str, what: &str) {
+fn table(page: &mut String, name: &str, what: &str, has_layout: bool) {
+    let (title, line) = if has_layout { (" NumPy |", " --- |") } else { ("", "") };
     let _ = write!(
         page,
-        "\n## `{name}`\n\n{what}\n\n| field | number | type | unit | meaning |\n\
-         | --- | --- | --- | --- | --- |\n"
+        "\n## `{name}`\n\n{what}\n\n| field | number | type | column |{title} unit | meaning |\n\
+         | --- | --- | --- | --- |{line} --- | --- |\n"
     );
 }
 
-/// A message by the table of its fields.
-fn listed(page: &mut String, name: &str, what: &str, fields: &[EventField]) {
-    table(page, &format!("dynocar.{name}"), &plain(what));
-    for it in fields {
+/// A message by the table of its fields, and the columns that they are where they are any.
+fn listed(page: &mut String, name: &str, what: &str, fields: &[EventField], columns: &[&Column]) {
+    table(page, &format!("dynocar.{name}"), &plain(what), false);
+    for (place, it) in fields.iter().enumerate() {
         let of_type = vocabulary_of_type(it.type_name).unwrap_or_else(|| protobuf(it.type_name));
-        row(page, it.name, it.number as u32, of_type, unit_of(it.name), it.meaning);
+        let (number, unit) = (it.number as u32, unit_of(it.name));
+        let row = match columns.get(place) {
+            Some(column) => Row::of(column, number, of_type),
+            None => Row { name: it.name, number: Some(number), of_type, unit, ..Row::default() },
+        };
+        row.put(page, false, it.meaning);
     }
 }
 
-fn row(page: &mut String, name: &str, number: u32, of_type: &str, unit: &str, meaning: &str) {
-    let meaning = plain(meaning);
-    let _ = writeln!(page, "| `{name}` | {number} | {of_type} | {unit} | {meaning} |");
+/// A row of a table.
+#[derive(Default)]
+struct Row<'a> {
+    name: &'a str,
+    number: Option<u32>,
+    of_type: &'a str,
+    column: String,
+    numpy: String,
+    unit: &'a str,
+}
+
+impl<'a> Row<'a> {
+    fn of(column: &'a Column, number: u32, of_type: &'a str) -> Self {
+        let null = if column.is_nullable { ", null" } else { "" };
+        Row {
+            name: &column.name,
+            number: Some(number),
+            of_type,
+            column: format!("{}{null}", column.arrow_type()),
+            numpy: String::new(),
+            unit: column.unit,
+        }
+    }
+
+    fn put(&self, page: &mut String, has_layout: bool, meaning: &str) {
+        let Row { name, of_type, column, unit, .. } = self;
+        let number = self.number.map_or("".to_owned(), |it| it.to_string());
+        let numpy = if has_layout { format!(" {} |", self.numpy) } else { String::new() };
+        let meaning = plain(meaning);
+        let _ = writeln!(
+            page,
+            "| `{name}` | {number} | {of_type} | {column} |{numpy} {unit} | {meaning} |"
+        );
+    }
 }
 
 /// A line of documentation without its links.
@@ -107,23 +167,22 @@ fn protobuf(type_name: &str) -> &'static str {
     }
 }
 
-fn layout(page: &mut String, name: &str, what: &str, fields: &[Field]) {
-    table(page, name, what);
+fn layout(page: &mut String, name: &str, what: &str, (fields, columns): (&[Field], &[Column])) {
+    table(page, name, what, true);
     for field in fields {
-        let (missing, is_said) = match field.missing {
-            Missing::Never => ("", false),
-            Missing::Unless(_) => (" Missing unless measured.", false),
-            Missing::SaidByOthers => ("", true),
-        };
-        if is_said {
+        let shape = if field.is_array() { format!("({},)", field.entries()) } else { "".into() };
+        let numpy = format!("`{shape}{}` at {}", field.numpy_type(), field.layout.offset);
+        let Some(column) = columns.iter().find(|it| it.name == field.layout.name) else {
+            let row = Row { name: field.layout.name, numpy, ..Row::default() };
+            row.put(page, true, &format!("{} Elsewhere a value is there or not.", field.meaning));
             continue;
-        }
-        let of_type = vocabulary_of(field.layout.name);
-        let of_type = of_type.unwrap_or_else(|| protobuf(field.entry_type()));
+        };
+        let of_type = column.vocabulary.unwrap_or_else(|| protobuf(field.entry_type()));
         let of_type =
             if field.is_array() { format!("repeated {of_type}") } else { of_type.to_owned() };
-        let meaning = format!("{}{missing}", field.meaning);
-        row(page, field.layout.name, number(field), &of_type, field.unit(), &meaning);
+        let missing = if column.is_nullable { " Missing unless measured." } else { "" };
+        let row = Row::of(column, number(field), &of_type);
+        Row { numpy, ..row }.put(page, true, &format!("{}{missing}", field.meaning));
     }
 }
 

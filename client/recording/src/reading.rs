@@ -59,6 +59,30 @@ pub enum ReadError {
         /// What is wrong.
         source: CodecError,
     },
+    /// Several files are not given in the order in which they were recorded.
+    #[error(
+        "{}: begins before {}: expected a recording's files in the order in which they were recorded",
+        path.display(), before.display()
+    )]
+    OutOfOrder {
+        /// The file.
+        path: PathBuf,
+        /// The one given before it.
+        before: PathBuf,
+    },
+    /// Several files are not of one recording.
+    #[error(
+        "{}: {name} is another than in {}: expected files of one recording",
+        path.display(), before.display()
+    )]
+    OtherRecording {
+        /// The file.
+        path: PathBuf,
+        /// One given before it.
+        before: PathBuf,
+        /// The attached file.
+        name: String,
+    },
     /// There is no sample.
     #[error("{}: no samples: expected a channel of {SAMPLE} messages, found {found}", path.display())]
     NoSamples {
@@ -83,6 +107,17 @@ pub enum Ending {
         /// What stopped the reading.
         reason: String,
     },
+}
+
+impl Ending {
+    /// Where a file breaks off, in words; `None` for a whole one.
+    pub fn words(&self, path: &Path) -> Option<String> {
+        let Ending::Broken { read_bytes, file_bytes, reason } = self else { return None };
+        let shown = path.display();
+        Some(format!(
+            "{shown}: breaks off: {read_bytes} of {file_bytes} bytes can be read ({reason})"
+        ))
+    }
 }
 
 /// What a recording holds, in the order in which it was written.

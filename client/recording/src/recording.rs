@@ -1,11 +1,13 @@
 //! A recording in memory.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use dynocar_shared::{ParameterSnapshot, TrainSample};
+pub use mcap::records::Metadata;
 
 use crate::event::Event;
-use crate::reading::{Ending, Item, Raw, ReadError, Visitor, read};
+use crate::joining::read_all;
+use crate::reading::{Item, Raw, ReadError, Visitor};
 
 /// What a recording holds, each kind in the order in which it was written.
 #[derive(Debug, Default)]
@@ -19,7 +21,7 @@ pub struct Recording {
     /// Attached files: name and content.
     pub attachments: Vec<(String, Vec<u8>)>,
     /// Metadata, in order.
-    pub metadata: Vec<mcap::records::Metadata>,
+    pub metadata: Vec<Metadata>,
     /// The topics, each once.
     pub topics: Vec<String>,
     /// Where a file broke off, in words.
@@ -55,21 +57,42 @@ impl Recording {
     ///
     /// When it is none, or holds no sample.
     pub fn load(path: &Path) -> Result<Self, ReadError> {
+        Recording::load_all(&[path.into()])
+    }
+
+    /// The same of a recording that rotated: its files in order.
+    ///
+    /// # Errors
+    ///
+    /// When one is none, they are not of one recording, or none holds a sample.
+    ///
+    /// # Panics
+    ///
+    /// Without a file.
+    pub fn load_all(paths: &[PathBuf]) -> Result<Self, ReadError> {
         let mut recording = Recording::default();
-        if let Ending::Broken { read_bytes, file_bytes, reason } = read(path, &mut recording)? {
-            let shown = path.display();
-            recording.broken = Some(format!(
-                "{shown}: breaks off: {read_bytes} of {file_bytes} bytes can be read ({reason})"
-            ));
-        }
-        if recording.samples.is_empty() {
-            let found = match recording.topics.as_slice() {
-                [] => "no message".to_owned(),
-                topics => topics.join(", "),
-            };
-            return Err(ReadError::NoSamples { path: path.into(), found });
-        }
+        let endings = read_all(paths, &mut recording)?;
+        let broken: Vec<String> =
+            endings.iter().zip(paths).filter_map(|(ending, path)| ending.words(path)).collect();
+        recording.broken = (!broken.is_empty()).then(|| broken.join("; "));
+        recording.require_samples(&paths[0])?;
         Ok(recording)
+    }
+
+    /// Refuses a recording without samples.
+    ///
+    /// # Errors
+    ///
+    /// Says what there is.
+    pub fn require_samples(&self, path: &Path) -> Result<(), ReadError> {
+        if !self.samples.is_empty() {
+            return Ok(());
+        }
+        let found = match self.topics.as_slice() {
+            [] => "no message".to_owned(),
+            topics => topics.join(", "),
+        };
+        Err(ReadError::NoSamples { path: path.into(), found })
     }
 
     /// The trains that there are samples of, in order.

@@ -208,13 +208,11 @@ pub(crate) fn fields_of(table: &[EventField]) -> Vec<FieldDescriptorProto> {
     table.iter().map(of).collect()
 }
 
-fn enums() -> Vec<EnumDescriptorProto> {
+/// Every vocabulary with its members' numbers and names.
+fn vocabularies() -> Vec<(&'static str, Vec<(i32, &'static str)>)> {
     macro_rules! members {
         ($name:ident) => {
-            enumeration(
-                stringify!($name),
-                $name::ALL.iter().map(|it| (*it as i32, it.name().to_owned())).collect(),
-            )
+            (stringify!($name), $name::ALL.iter().map(|it| (*it as i32, it.name())).collect())
         };
     }
     vec![
@@ -227,11 +225,19 @@ fn enums() -> Vec<EnumDescriptorProto> {
     ]
 }
 
+/// The members of a vocabulary: numbers and names.
+pub fn members_of(vocabulary: &str) -> Vec<(i32, &'static str)> {
+    let found = vocabularies().into_iter().find(|it| it.0 == vocabulary);
+    found.map(|it| it.1).unwrap_or_default()
+}
+
+fn enums() -> Vec<EnumDescriptorProto> {
+    vocabularies().into_iter().map(|(name, members)| enumeration(name, &members)).collect()
+}
+
 /// An enumeration; protobuf asks for a member 0 and for names that are unique in the package.
-fn enumeration(name: &str, mut members: Vec<(i32, String)>) -> EnumDescriptorProto {
-    if members.iter().all(|it| it.0 != 0) {
-        members.insert(0, (0, "unknown_number".into()));
-    }
+fn enumeration(name: &str, members: &[(i32, &str)]) -> EnumDescriptorProto {
+    let unknown = members.iter().all(|it| it.0 != 0).then_some((0, "unknown_number"));
     let prefix: String = name
         .chars()
         .enumerate()
@@ -240,11 +246,11 @@ fn enumeration(name: &str, mut members: Vec<(i32, String)>) -> EnumDescriptorPro
             gap.into_iter().chain(letter.to_uppercase())
         })
         .collect();
-    let value = |(number, member): (i32, String)| EnumValueDescriptorProto {
+    let value = |(number, member): (i32, &str)| EnumValueDescriptorProto {
         name: Some(format!("{prefix}_{}", member.to_uppercase())),
         number: Some(number),
         options: None,
     };
-    let value = members.into_iter().map(value).collect();
+    let value = unknown.into_iter().chain(members.iter().copied()).map(value).collect();
     EnumDescriptorProto { name: Some(name.into()), value, ..Default::default() }
 }

@@ -7,9 +7,10 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use dynocar_client::monotonic_now_ns;
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
+pub use mcap::McapError;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
-use mcap::{Attachment, McapError, WriteOptions, Writer};
+use mcap::{Attachment, WriteOptions, Writer};
 
 use crate::codec::{encode_event, encode_sample, encode_snapshot};
 use crate::event::Event;
@@ -60,6 +61,8 @@ pub struct RecordingWriter<W: Write> {
     writer: Option<Writer<NoSeek<W>>>,
     channels: HashMap<(&'static str, u64, u32), u16>,
     clock: WallClock,
+    /// What the next message is logged at, whatever the clock says.
+    log_time: Option<u64>,
     message: Vec<u8>,
 }
 
@@ -70,14 +73,8 @@ impl<W: Write> RecordingWriter<W> {
     ///
     /// When it cannot be written.
     pub fn new(output: W, clock: WallClock) -> Result<Self, McapError> {
-        let writer = WriteOptions::new()
-            .profile("dynocar")
-            .library(LIBRARY)
-            .disable_seeking(true)
-            .chunk_size(Some(CHUNK_BYTES))
-            .create(NoSeek::new(output))?;
-        let (channels, message) = (HashMap::new(), Vec::with_capacity(2048));
-        let mut recording = RecordingWriter { writer: Some(writer), channels, clock, message };
+        let mut recording = RecordingWriter::copy(output)?;
+        recording.set_clock(clock);
         recording.metadata(
             METADATA,
             &[
@@ -87,6 +84,32 @@ impl<W: Write> RecordingWriter<W> {
             ],
         )?;
         Ok(recording)
+    }
+
+    /// Begins a file for what was recorded before, its metadata included.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be written.
+    pub fn copy(output: W) -> Result<Self, McapError> {
+        let writer = WriteOptions::new()
+            .profile("dynocar")
+            .library(LIBRARY)
+            .disable_seeking(true)
+            .chunk_size(Some(CHUNK_BYTES))
+            .create(NoSeek::new(output))?;
+        Ok(RecordingWriter {
+            writer: Some(writer),
+            channels: HashMap::new(),
+            clock: WallClock::of_another_host(),
+            log_time: None,
+            message: Vec::with_capacity(2048),
+        })
+    }
+
+    /// Logs the next message or attached file at this wall time, whatever the clock says.
+    pub fn log_next_at(&mut self, log_time: u64) {
+        self.log_time = Some(log_time);
     }
 
     /// Takes another comparison of the clocks for what comes from now on.
@@ -116,8 +139,12 @@ impl<W: Write> RecordingWriter<W> {
         content: &[u8],
         monotonic_ns: i64,
     ) -> Result<(), McapError> {
-        let log_time = self.clock.wall_ns(monotonic_ns);
-        let media_type = if name.ends_with(".csv") { "text/csv" } else { "application/toml" };
+        let log_time = self.logged(monotonic_ns);
+        let media_type = match name.rsplit_once('.').map(|it| it.1) {
+            Some("csv") => "text/csv",
+            Some("parquet") => "application/vnd.apache.parquet",
+            _ => "application/toml",
+        };
         self.carry(|writer| {
             writer.attach(&Attachment {
                 log_time,
@@ -216,7 +243,7 @@ impl<W: Write> RecordingWriter<W> {
         sequence: u64,
         monotonic_ns: i64,
     ) -> Result<(), McapError> {
-        let log_time = self.clock.wall_ns(monotonic_ns);
+        let log_time = self.logged(monotonic_ns);
         // As many bits as the format has room for; the whole number is in the message.
         let sequence = sequence as u32;
         let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
@@ -224,6 +251,10 @@ impl<W: Write> RecordingWriter<W> {
         let written = self.carry(|writer| writer.write_to_known_channel(&header, &message));
         self.message = message;
         written
+    }
+
+    fn logged(&mut self, monotonic_ns: i64) -> u64 {
+        self.log_time.take().unwrap_or_else(|| self.clock.wall_ns(monotonic_ns))
     }
 
     /// Does something with the writer; a failed one is let go, for it would write on when dropped.

@@ -1,6 +1,7 @@
 //! The recorder as a process beside a controller and a daemon: killed, asked to end, out of disk.
 
 use std::io::Read;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::Arc;
@@ -289,4 +290,23 @@ fn a_flight_recorder_keeps_what_it_is_asked_to_whatever_ends_it() {
     let late = asked();
     assert_eq!(late.status.code(), Some(1), "{}", words(&late));
     assert!(words(&late).contains("no flight recorder writes into it"), "{}", words(&late));
+}
+
+#[test]
+fn a_closed_pipe_is_no_failure_and_a_full_disk_is_told_by_the_name_that_was_called() {
+    let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    for name in ["dynocar-recording", "dynocar"] {
+        for arguments in [&["fields"][..], &["--help"], &["record", "--help"]] {
+            let mut command = Command::new(PROGRAM);
+            command.arg0(name).args(arguments);
+            let (_, closed) = std::io::pipe().unwrap();
+            let output = command.stdout(closed).output().unwrap();
+            assert_eq!((output.status.code(), words(&output)), (Some(0), String::new()));
+            let output = command.stdout(full()).output().unwrap();
+            let told =
+                format!("{name}: standard output: cannot be written: No space left on device");
+            assert!(words(&output).starts_with(&told), "{}", words(&output));
+            assert_eq!(output.status.code(), Some(1));
+        }
+    }
 }

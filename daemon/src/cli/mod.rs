@@ -32,6 +32,7 @@ pub use failure::{ErrorAnswer, Failure};
 
 use crate::output::{OutputError, write_json};
 use crate::programs::RECORDING;
+use crate::unpacking::program_for;
 
 /// Dynocar, a dynamometer car in software.
 #[derive(Debug, Parser)]
@@ -122,7 +123,9 @@ pub fn main() -> ExitCode {
         }
         Command::Keep(passed) => companion::become_it(RECORDING, Some("keep"), passed),
         Command::Recover(passed) => companion::become_it(RECORDING, Some("recover"), passed),
-        Command::Convert(passed) => companion::become_it(RECORDING, Some("convert"), passed),
+        Command::Convert(passed) => {
+            companion::become_it(program_for(passed.words()), Some("convert"), passed)
+        }
         Command::Watch(passed) => companion::become_it("dynocar-watch", None, passed),
         Command::Live(passed) => companion::become_it("dynocar-live", None, passed),
         Command::Forward(passed) => companion::become_it("dynocar-forward", None, passed),

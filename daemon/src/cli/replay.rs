@@ -1,5 +1,6 @@
 //! `dynocar replay`: recorded runs into the sample channel, as a controller would.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -9,17 +10,18 @@ use dynocar_shared::{PipelineKind, TrainId};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Failure;
-use super::companion;
+use super::companion::{self, Passed};
 use crate::dataset;
 use crate::output::tell;
-use crate::programs::RECORDING;
 use crate::replay::{Rate, ReplayReport, Replayer};
+use crate::unpacking::program_for;
 
 /// Play recorded runs into the sample channel, as a controller would.
 #[derive(Debug, Args)]
 pub struct ReplayArguments {
-    /// The dataset's folder, or a recording
-    dataset: PathBuf,
+    /// The dataset's folder, or a recording; with --verify the files of one that rotated, in order
+    #[arg(required = true)]
+    dataset: Vec<PathBuf>,
     /// Play nothing: compute every snapshot of a recording again and say whether each bit is the same
     #[arg(long, conflicts_with_all = ["run", "rate", "train", "wait"])]
     verify: bool,
@@ -49,10 +51,15 @@ pub struct ReplayArguments {
 pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
     if arguments.verify {
         let with = arguments.with.iter().flat_map(|it| ["--with".into(), it.into()]);
-        let words: Vec<_> = std::iter::once(arguments.dataset.clone().into()).chain(with).collect();
-        return companion::become_it(RECORDING, Some("verify"), &words.into());
+        let files = arguments.dataset.iter().map(OsString::from);
+        let words = Passed::from(files.chain(with).collect::<Vec<_>>());
+        return companion::become_it(program_for(words.words()), Some("verify"), &words);
     }
-    let dataset = dataset::load(&arguments.dataset)?;
+    let [dataset] = &arguments.dataset[..] else {
+        let words = "expected one dataset or recording: several files are for --verify";
+        return Err(Failure::Input(words.into()));
+    };
+    let dataset = dataset::load(dataset)?;
     let runs = match arguments.run {
         None => &dataset.runs[..],
         Some(number) if (1..=dataset.runs.len()).contains(&number) => {

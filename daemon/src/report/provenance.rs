@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use dynocar_core::dataset::{DatasetFiles, MANIFEST_FILE};
+use dynocar_core::dataset::MANIFEST_FILE;
 use sha2::{Digest, Sha256};
 
 use crate::dataset::{self, LoadError};
@@ -71,8 +71,8 @@ fn digests(path: &Path) -> Result<Vec<FileDigest>, LoadError> {
     paths.extend(manifest.runs.iter().map(|run| run.file.clone()));
     let digest = |path: String| {
         // A file that was read a moment ago and is gone now has no content to state.
-        let text = folder.read(&path).unwrap_or_default();
-        FileDigest { bytes: text.len(), sha256: hex(text.as_bytes()), path }
+        let content = std::fs::read(folder.path_of(&path)).unwrap_or_default();
+        FileDigest { bytes: content.len(), sha256: hex(&content), path }
     };
     Ok(paths.into_iter().map(digest).collect())
 }

@@ -62,12 +62,12 @@ pub fn from_dataset(folder: &Path, path: &Path) -> Result<usize, FromDatasetErro
     }
     let dataset = dataset::load(folder)?;
     // They were read a moment ago.
-    let texts: Vec<(String, String)> = names
+    let contents: Vec<(String, Vec<u8>)> = names
         .into_iter()
-        .map(|name| (name.clone(), files.read(&name).unwrap_or_default()))
+        .map(|name| (name.clone(), std::fs::read(files.path_of(&name)).unwrap_or_default()))
         .collect();
-    let samples = samples(&dataset, &texts)?;
-    write(path, &texts, &samples)
+    let samples = samples(&dataset, &contents)?;
+    write(path, &contents, &samples)
         .map_err(|source| FromDatasetError::Write { path: path.into(), source })?;
     Ok(samples.len())
 }
@@ -75,14 +75,14 @@ pub fn from_dataset(folder: &Path, path: &Path) -> Result<usize, FromDatasetErro
 /// The samples of runs that were made of a recording; else those that a controller would publish.
 fn samples(
     dataset: &Dataset,
-    texts: &[(String, String)],
+    contents: &[(String, Vec<u8>)],
 ) -> Result<Vec<TrainSample>, FromDatasetError> {
-    let runs = &texts[texts.len() - dataset.runs.len()..];
-    if !runs.iter().all(|(_, text)| is_rows(text)) {
-        return Ok(published_samples(dataset, TrainId(1)));
-    }
+    let runs = &contents[contents.len() - dataset.runs.len()..];
     let mut samples = Vec::new();
-    for (file, text) in runs {
+    for (file, content) in runs {
+        let Some(text) = std::str::from_utf8(content).ok().filter(|it| is_rows(it)) else {
+            return Ok(published_samples(dataset, TrainId(1)));
+        };
         samples.extend(from_rows(file, text)?);
     }
     Ok(samples)
@@ -90,13 +90,13 @@ fn samples(
 
 fn write(
     path: &Path,
-    texts: &[(String, String)],
+    contents: &[(String, Vec<u8>)],
     samples: &[TrainSample],
 ) -> Result<(), McapError> {
     let file = BufWriter::new(File::create_new(path)?);
     let mut writer = RecordingWriter::new(file, WallClock::of_another_host())?;
-    for (name, content) in texts {
-        writer.attach(&format!("{DATASET_FOLDER}{name}"), content.as_bytes(), 0)?;
+    for (name, content) in contents {
+        writer.attach(&format!("{DATASET_FOLDER}{name}"), content, 0)?;
     }
     let (mut offset_ns, mut newest_ns) = (0, 0);
     let mut run = None;

@@ -10,7 +10,7 @@ mod to_dataset;
 
 pub use from_dataset::{FromDatasetError, from_dataset};
 pub use rows::{RowError, from_rows, is_rows, to_rows};
-pub use to_dataset::{ModelFiles, ToDatasetError, Unpacked, to_dataset};
+pub use to_dataset::{ModelFiles, ToDatasetError, Unpacked, to_dataset, unpack};
 
 /// The folder in which a dataset's files are attached.
 pub const DATASET_FOLDER: &str = "dataset/";

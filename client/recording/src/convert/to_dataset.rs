@@ -90,19 +90,33 @@ pub struct Unpacked {
     pub broken: Option<String>,
 }
 
-/// Writes a recording as a dataset into a new folder.
+/// Writes a recording, of one that rotated its files in order, as a dataset into a new folder.
 ///
 /// # Errors
 ///
 /// See [`ToDatasetError`].
 pub fn to_dataset(
-    path: &Path,
+    paths: &[PathBuf],
     folder: &Path,
     train: Option<u64>,
     files: &ModelFiles,
 ) -> Result<Unpacked, ToDatasetError> {
     require_new(folder)?;
-    let recording = Recording::load(path)?;
+    unpack(&paths[0], Recording::load_all(paths)?, folder, train, files)
+}
+
+/// Writes what a recording holds as a dataset into a new folder; `path` names it.
+///
+/// # Errors
+///
+/// See [`ToDatasetError`].
+pub fn unpack(
+    path: &Path,
+    recording: Recording,
+    folder: &Path,
+    train: Option<u64>,
+    files: &ModelFiles,
+) -> Result<Unpacked, ToDatasetError> {
     let train = chosen(path, &recording, train)?;
     let attached: Vec<(&str, &Vec<u8>)> = recording
         .attachments
@@ -120,7 +134,7 @@ pub fn to_dataset(
                 let (path, name) = (path.into(), name.into());
                 return Err(ToDatasetError::Outside { path, name });
             }
-            unpacked.runs += usize::from(name.ends_with(".csv"));
+            unpacked.runs += usize::from(!name.ends_with(".toml"));
             write(folder, name, content)?;
         }
         unpacked.samples = recording.samples.len();

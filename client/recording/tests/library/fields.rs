@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 
+use dynocar_recording::columns::{EVENTS, SAMPLES, SNAPSHOTS};
 use dynocar_recording::event::{EVENT_FIELDS, Event, EventKind};
 use dynocar_recording::page::page;
 use dynocar_recording::schema::{BESIDE_VALUE, DESCRIPTORS, name_beside};
@@ -75,6 +76,49 @@ fn parameters_have_names_with_units_and_deviations_and_intervals_beside_them() {
         assert!(names.contains(&other.to_owned()), "{other}");
     }
     assert!(names.contains(&"unexplained_force_std_n".to_owned()));
+}
+
+#[test]
+fn columns_are_the_fields_of_the_messages_with_their_numbers_names_and_types() {
+    let set = FileDescriptorSet::decode(&DESCRIPTORS[..]).unwrap();
+    let names = |message: &str| -> Vec<String> {
+        let found = set.file[0].message_type.iter().find(|it| it.name() == message).unwrap();
+        found.field.iter().map(|it| it.name().to_owned()).collect()
+    };
+    let rejected = names("Rejected").into_iter().map(|it| format!("rejected_{it}"));
+    let estimate = names("Estimate").into_iter().map(|it| format!("estimate_{it}"));
+    let nested = |it: &String| it != "estimate" && it != "rejected";
+    let snapshot: Vec<String> = names("ParameterSnapshot")
+        .into_iter()
+        .filter(nested)
+        .chain(estimate)
+        .chain(rejected)
+        .collect();
+    for (columns, expected) in
+        [(&SAMPLES, names("TrainSample")), (&SNAPSHOTS, snapshot), (&EVENTS, names("Event"))]
+    {
+        let told: Vec<&str> = columns.iter().map(|it| it.name.as_str()).collect();
+        assert_eq!(told[..2], ["message_number", "log_time"]);
+        assert_eq!(told[2..], expected);
+        assert_eq!(told.iter().collect::<HashSet<_>>().len(), told.len(), "each name once");
+        assert!(columns.iter().all(|it| it.vocabulary.is_none() || !it.names().is_empty()));
+    }
+}
+
+#[test]
+fn numbers_of_an_event_are_set_as_they_are_read() {
+    let mut event =
+        Event { kind: EventKind::DaemonGone as i32, text: "x".into(), ..Event::default() };
+    for place in 0..EVENT_FIELDS.len() - 1 {
+        event.set_word(place, Some(place as u64 + 1));
+        assert_eq!(event.word(place), Some(place as u64 + 1), "{}", EVENT_FIELDS[place].name);
+        if EVENT_FIELDS[place].is_optional {
+            event.set_word(place, None);
+            assert_eq!(event.word(place), None);
+        }
+    }
+    let shown = format!("{event:?}");
+    assert!(shown.contains("monotonic_ns: 1") && shown.contains("text: \"x\""), "{shown}");
 }
 
 #[test]

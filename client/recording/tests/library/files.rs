@@ -33,7 +33,7 @@ fn refusal(path: &Path) -> String {
         let output = program(arguments);
         told = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
-        assert!(told.starts_with(&format!("dynocar: {shown}: ")), "{told}");
+        assert!(told.starts_with(&format!("dynocar-recording: {shown}: ")), "{told}");
         assert!(!out.exists(), "nothing is left of {arguments:?}");
     }
     told

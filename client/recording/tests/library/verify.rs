@@ -1,8 +1,11 @@
 //! Recorded snapshots are computed again to the bit, and what is not the same is found.
 
+use std::path::PathBuf;
+
 use crate::support::{samples, snapshots, write};
 use dynocar_recording::recording::Recording;
 use dynocar_recording::verify::{Configurations, Outcome, Verified, verify};
+use dynocar_recording::writing::{RecordingWriter, WallClock};
 use dynocar_shared::{ParameterSnapshot, TrainSample};
 
 fn verified(samples: &[TrainSample], snapshots: &[ParameterSnapshot]) -> Vec<Verified> {
@@ -23,6 +26,52 @@ fn a_recording_from_the_daemons_start_on_is_the_same_to_the_bit() {
         assert_eq!((it.same, &it.outcome), (it.recorded, &Outcome::Same), "{}", it.name);
         assert!(it.recorded > 30, "{}: {} snapshots", it.name, it.recorded);
     }
+}
+
+#[test]
+fn the_files_of_a_recording_that_rotated_are_verified_as_one_and_only_in_their_order() {
+    // One run, for the clock of a dataset begins anew with each.
+    let (samples, folder) = (samples()[..700].to_vec(), tempfile::tempdir().unwrap());
+    let told = snapshots(&samples, 20);
+    let files: Vec<PathBuf> =
+        (1..=3).map(|it| folder.path().join(format!("run-00000{it}.mcap"))).collect();
+    // Each file has the configuration attached, and its share of the messages.
+    for (place, file) in files.iter().enumerate() {
+        let share = &samples[place * samples.len() / 3..(place + 1) * samples.len() / 3];
+        let newest = |it: &&ParameterSnapshot| {
+            share.iter().any(|sample| sample.sequence == it.sample_sequence)
+        };
+        let told: Vec<ParameterSnapshot> = told.iter().filter(newest).copied().collect();
+        write(file, share, &told);
+    }
+    let whole = Recording::load_all(&files).unwrap();
+    assert_eq!((whole.samples.len(), whole.attachments.len()), (samples.len(), 3));
+    for it in verify(&whole, &Configurations::of(&files[0], &whole).unwrap()) {
+        assert_eq!((it.same, &it.outcome), (it.recorded, &Outcome::Same), "{}", it.name);
+        assert!(it.recorded > 30, "{}: {} snapshots", it.name, it.recorded);
+    }
+    let last = Recording::load(&files[2]).unwrap();
+    let late = verify(&last, &Configurations::of(&files[2], &last).unwrap());
+    assert!(late.iter().all(|it| matches!(it.outcome, Outcome::BeginsLate { .. })));
+
+    let error = Recording::load_all(&[files[1].clone(), files[0].clone()]).unwrap_err().to_string();
+    assert!(
+        error.contains("run-000001.mcap: begins before ") && error.contains("in the order"),
+        "{error}"
+    );
+    let other = folder.path().join("other.mcap");
+    let mut writer = RecordingWriter::new(
+        std::fs::File::create_new(&other).unwrap(),
+        WallClock::of_another_host(),
+    )
+    .unwrap();
+    writer.attach("configuration-1/daemon.toml", b"[daemon]\n", 0).unwrap();
+    writer.finish().unwrap();
+    let error = Recording::load_all(&[files[2].clone(), other]).unwrap_err().to_string();
+    assert!(
+        error.contains("other.mcap: configuration-1/daemon.toml is another than in"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -50,7 +50,7 @@ pub struct DatasetError {
 }
 
 /// Why a file's text cannot be had.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FileProblem {
     /// There is no such file.
     #[error("no such file")]
@@ -81,6 +81,9 @@ pub enum FileProblem {
     /// The system refuses to read it.
     #[error("cannot be read: {0}")]
     Unreadable(std::io::ErrorKind),
+    /// What is no text does not become a table of numbers; the words are those of its reader.
+    #[error("{0}")]
+    Table(String),
 }
 
 /// What is wrong with a file of a dataset.

@@ -278,7 +278,7 @@ fn run(section: &Section) -> Result<RunEntry, DatasetError> {
         mass > 0.0 && mass <= 1e5
     })?;
     Ok(RunEntry {
-        file: section.required_text("file", "the path of a CSV file")?.into(),
+        file: section.required_text("file", "the path of a CSV or Parquet file")?.into(),
         role,
         direction: if direction == Some(-1.0) { -1 } else { 1 },
         mass_kg: mass_t.map(|mass| mass * 1000.0),

@@ -83,6 +83,17 @@ pub trait DatasetFiles {
     /// When it cannot be had.
     fn read(&self, path: &str) -> Result<String, FileProblem>;
 
+    /// The text of a run's file as CSV, of which the columns that these mappings name are read. Of a
+    /// [`is_parquet`] file it is plain CSV, with commas between the cells and points in the numbers, and
+    /// times are in the unit that the mapping declares.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be had.
+    fn read_run(&self, path: &str, _columns: &[ColumnMapping]) -> Result<String, FileProblem> {
+        self.read(path)
+    }
+
     /// The file's name in messages.
     fn label(&self, path: &str) -> String {
         path.into()
@@ -178,7 +189,9 @@ impl DatasetHead {
             train: &self.train,
             track: self.track.as_ref(),
         };
-        let text = text(files, &entry.file, Some(&entry.place))?;
+        let text = files
+            .read_run(&entry.file, &self.manifest.columns)
+            .map_err(|problem| unread(files.label(&entry.file), problem, Some(&entry.place)))?;
         run::read(context, index as u32 + 1, entry, &files.label(&entry.file), &text)
     }
 }
@@ -209,17 +222,24 @@ fn text(
     path: &str,
     listed_at: Option<&Place>,
 ) -> Result<String, DatasetError> {
-    files.read(path).map_err(|problem| {
-        let file = files.label(path);
-        match (problem, listed_at) {
-            (FileProblem::NotUtf8 { line }, _) => {
-                Place::line(&file, line).problem(Problem::File(problem))
-            }
-            (FileProblem::NotText(_), _) => Place::whole(&file).problem(Problem::File(problem)),
-            (_, None) => Place::whole(&file).problem(Problem::File(problem)),
-            (_, Some(place)) => place.clone().problem(Problem::ListedFile { file, problem }),
+    files.read(path).map_err(|problem| unread(files.label(path), problem, listed_at))
+}
+
+fn unread(file: String, problem: FileProblem, listed_at: Option<&Place>) -> DatasetError {
+    match (&problem, listed_at) {
+        (&FileProblem::NotUtf8 { line }, _) => {
+            Place::line(&file, line).problem(Problem::File(problem))
         }
-    })
+        (FileProblem::NotText(_) | FileProblem::Table(_), _) | (_, None) => {
+            Place::whole(&file).problem(Problem::File(problem))
+        }
+        (_, Some(place)) => place.clone().problem(Problem::ListedFile { file, problem }),
+    }
+}
+
+/// True for the name of a Parquet file, which a run may be in place of CSV.
+pub fn is_parquet(path: &str) -> bool {
+    path.ends_with(".parquet")
 }
 
 /// Handles are shares of a curve, which must then be declared.

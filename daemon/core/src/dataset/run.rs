@@ -1,9 +1,12 @@
 //! One run, from its file to the samples that the pipelines take.
 
+use std::borrow::Cow;
+
 use dynocar_shared::TrainSample;
 
 use super::error::{DatasetError, Place, Problem};
 use super::forces::ForceSource;
+use super::is_parquet;
 use super::manifest::{Role, RunEntry};
 use super::motion::PositionSource;
 use super::quality::{self, RunQuality};
@@ -83,7 +86,13 @@ pub(super) fn read(
     label: &str,
     text: &str,
 ) -> Result<Run, DatasetError> {
-    let table = Table::parse(label, text, context.manifest)?;
+    let mut manifest = Cow::Borrowed(context.manifest);
+    if is_parquet(&entry.file) {
+        // Its text has the usual marks, whatever is declared of the text of others.
+        let manifest = manifest.to_mut();
+        (manifest.delimiter, manifest.decimal) = (b',', b'.');
+    }
+    let table = Table::parse(label, text, &manifest)?;
     let rows = table.lines.rows;
     let has_speed = table.filled(Quantity::Speed).is_some();
     let resolved = Resolved::of(context, entry, table);

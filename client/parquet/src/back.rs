@@ -1,0 +1,55 @@
+//! A recording to a new MCAP file.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use dynocar_recording::columns::Row;
+use dynocar_recording::writing::{McapError, RecordingWriter};
+
+use crate::reading::Content;
+
+/// A recording that cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: cannot be written: {source}", path.display())]
+pub struct BackError {
+    path: PathBuf,
+    source: McapError,
+}
+
+/// Writes a recording; its messages are those from which the Parquet was made.
+///
+/// # Errors
+///
+/// When it cannot be written; then there is no file.
+pub fn write_mcap(content: &Content, path: &Path) -> Result<(), BackError> {
+    let failed = |source| BackError { path: path.into(), source };
+    let file = File::create_new(path).map_err(|error| failed(error.into()))?;
+    let done = write(content, file);
+    if done.is_err() {
+        let _ = std::fs::remove_file(path);
+    }
+    done.map_err(failed)
+}
+
+fn write(content: &Content, file: File) -> Result<(), McapError> {
+    let mut writer = RecordingWriter::copy(BufWriter::new(file))?;
+    for it in &content.metadata {
+        let pairs = it.metadata.iter().map(|(key, value)| (key.as_str(), value.clone()));
+        writer.metadata(&it.name, &pairs.collect::<Vec<_>>())?;
+    }
+    for (name, log_time, data) in &content.attached {
+        writer.log_next_at(*log_time);
+        writer.attach(name, data, 0)?;
+    }
+    for message in &content.messages {
+        writer.log_next_at(message.log_time);
+        match &message.row {
+            Row::Sample(it) => writer.sample(it, 0)?,
+            Row::Snapshot(it) => writer.snapshot(it)?,
+            Row::Event(it) => writer.event(it)?,
+        }
+    }
+    writer.finish()?.into_inner().map_err(|error| error.into_error())?.sync_all()?;
+    Ok(())
+}

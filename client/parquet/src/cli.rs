@@ -1,0 +1,160 @@
+//! The command line: `dynocar convert` and `replay --verify` become this program where Parquet is named, and
+//! the daemon's commands read by it.
+
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+use dynocar::cli::{Failure, parse};
+use dynocar::output::{OutputError, require_new, tell};
+use dynocar::programs::{PARQUET, called_as};
+use dynocar_recording::cli::{
+    ConvertArguments, VerifyArguments, dataset_failure, from_dataset_failure,
+};
+use dynocar_recording::convert::{from_dataset, unpack};
+
+use crate::back::write_mcap;
+use crate::error::TableError;
+use crate::reading::{Content, read};
+use crate::rows::{RowsError, Wanted, write_rows};
+use crate::writing::{WriteError, Written, write_folder};
+
+/// Recordings as Parquet and back.
+#[derive(Debug, Parser)]
+#[command(name = "dynocar", bin_name = "dynocar", version, about)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Convert(ConvertArguments),
+    #[command(hide = true)]
+    Verify(VerifyArguments),
+    #[command(hide = true)]
+    Rows(RowsArguments),
+}
+
+/// Print a Parquet file as CSV.
+#[derive(Debug, Args)]
+struct RowsArguments {
+    /// The file
+    file: PathBuf,
+    /// A column whose cells are wanted, and the unit of its numbers
+    #[arg(long = "column", num_args = 2, value_names = ["NAME", "UNIT"], allow_hyphen_values = true)]
+    columns: Vec<String>,
+}
+
+/// Parses the command line, runs the command, reports a failure on standard error.
+pub fn main() -> ExitCode {
+    let program = called_as(PARQUET);
+    let arguments = match parse::<Arguments>(program) {
+        Ok(arguments) => arguments,
+        Err(status) => return status,
+    };
+    let result = match &arguments.command {
+        Command::Convert(arguments) => convert(arguments),
+        Command::Verify(arguments) => verify(arguments),
+        Command::Rows(arguments) => rows(arguments),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(program, None),
+    }
+}
+
+fn is_parquet(path: &Path) -> bool {
+    path.extension().is_some_and(|it| it == "parquet")
+}
+
+fn convert(arguments: &ConvertArguments) -> Result<(), Failure> {
+    let ConvertArguments { from, output, train, .. } = arguments;
+    require_new(output)?;
+    if is_parquet(output) {
+        return to_parquet(arguments);
+    }
+    let content = one(from)?;
+    if output.extension().is_some_and(|it| it == "mcap") {
+        write_mcap(&content, output).map_err(|error| Failure::Work(error.to_string()))?;
+        if !arguments.quiet {
+            tell(&format!("{}: {} messages", output.display(), content.messages.len()));
+        }
+        return Ok(());
+    }
+    let recording = content.into_recording();
+    let unpacked = unpack(&from[0], recording, output, *train, &arguments.model_files());
+    arguments.tell(&unpacked.map_err(dataset_failure)?);
+    Ok(())
+}
+
+/// The recording, which is one path.
+fn one(paths: &[PathBuf]) -> Result<Content, Failure> {
+    let [path] = paths else {
+        let words = "expected one recording in Parquet";
+        return Err(Failure::Input(format!("{}: {words}", paths[0].display())));
+    };
+    read(path).map_err(table_failure)
+}
+
+fn table_failure(error: TableError) -> Failure {
+    Failure::Input(error.to_string())
+}
+
+fn to_parquet(arguments: &ConvertArguments) -> Result<(), Failure> {
+    let ConvertArguments { from, output, .. } = arguments;
+    if let Some(it) = from.iter().find(|it| is_parquet(it)) {
+        return Err(Failure::Input(format!("{}: it is Parquet already", it.display())));
+    }
+    let written = match arguments.dataset() {
+        None => write_folder(from, output),
+        Some(dataset) => {
+            // A dataset becomes what a controller would have had recorded.
+            let place = tempfile::tempdir().map_err(|error| Failure::Work(error.to_string()))?;
+            let recording = place.path().join("dataset.mcap");
+            from_dataset(dataset, &recording).map_err(from_dataset_failure)?;
+            write_folder(&[recording], output)
+        }
+    };
+    let written = written.map_err(|error| match error {
+        WriteError::Read(error) => Failure::Input(error.to_string()),
+        error => Failure::Work(error.to_string()),
+    })?;
+    let Written { samples, snapshots, events, left_out, broken } = written;
+    for it in broken {
+        tell(&format!("{}: {it}; `dynocar recover` makes it whole", called_as(PARQUET)));
+    }
+    if !arguments.quiet {
+        let others = match left_out {
+            0 => String::new(),
+            count => format!("; {count} messages of others have no place in it"),
+        };
+        let shown = output.display();
+        tell(&format!(
+            "{shown}: {samples} samples, {snapshots} snapshots, {events} events{others}"
+        ));
+    }
+    Ok(())
+}
+
+fn verify(arguments: &VerifyArguments) -> Result<(), Failure> {
+    arguments.verify(&one(&arguments.recording)?.into_recording())
+}
+
+fn rows(arguments: &RowsArguments) -> Result<(), Failure> {
+    let wanted = arguments
+        .columns
+        .chunks(2)
+        .map(|pair| Wanted { column: pair[0].clone(), unit: pair[1].clone() });
+    let output = BufWriter::new(std::io::stdout().lock());
+    match write_rows(&arguments.file, &wanted.collect::<Vec<_>>(), output) {
+        Ok(()) => Ok(()),
+        Err(RowsError::Table(error)) => Err(table_failure(error)),
+        Err(RowsError::Output(error)) => match error.into_kind() {
+            csv::ErrorKind::Io(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+            csv::ErrorKind::Io(error) => Err(OutputError::StandardOutput(error).into()),
+            other => Err(Failure::Work(format!("{other:?}"))),
+        },
+    }
+}

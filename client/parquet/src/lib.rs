@@ -1,0 +1,23 @@
+//! Recordings as Parquet, without loss and back; and Parquet files of anybody as CSV.
+//!
+//! A recording is a folder: one file of samples for each train, one of snapshots for each pipeline, one
+//! of events, one each of what an MCAP file has attached and as metadata. `message_number` says in which order
+//! the messages were recorded. A file of samples alone is a recording too: it carries the configuration.
+//!
+//! # Layout
+//!
+//! - [`cells`]: the columns of `dynocar_recording::columns` as Arrow has them
+//! - [`error`]: why a file is none that can be read
+//! - [`writing`]: MCAP to Parquet
+//! - [`reading`], [`table`]: Parquet to what a recording holds, [`back`]: and to MCAP
+//! - [`rows`]: a Parquet file of anybody as CSV
+//! - [`cli`]: the command line
+
+pub mod back;
+pub mod cells;
+pub mod cli;
+pub mod error;
+pub mod reading;
+pub mod rows;
+pub mod table;
+pub mod writing;

@@ -1,0 +1,141 @@
+//! Parquet files of anybody in place of CSV.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use arrow_array::{
+    ArrayRef, BooleanArray, Decimal128Array, DurationMillisecondArray, Float32Array, Float64Array,
+    Int16Array, StringArray, TimestampMicrosecondArray, UInt64Array,
+};
+use dynocar_core::dataset::{ColumnMapping, Dataset, DatasetFiles, FileProblem, is_parquet};
+use dynocar_parquet::rows::{Wanted, write_rows};
+
+use crate::support::{program, said, shared, table};
+
+fn wanted(columns: &[(&str, &str)]) -> Vec<Wanted> {
+    let wanted = |it: &(&str, &str)| Wanted { column: it.0.into(), unit: it.1.into() };
+    columns.iter().map(wanted).collect()
+}
+
+fn rows(path: &Path, columns: &[(&str, &str)]) -> String {
+    let mut text = Vec::new();
+    write_rows(path, &wanted(columns), &mut text).unwrap();
+    String::from_utf8(text).unwrap()
+}
+
+#[test]
+fn numbers_truths_and_times_of_every_kind_become_cells_and_what_is_missing_is_empty() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("own.parquet");
+    let at = vec![Some(1_700_000_000_000_001), Some(1_700_000_000_500_000), None];
+    let decimals = Decimal128Array::from(vec![Some(-1234), Some(5), None]);
+    table(
+        &path,
+        vec![
+            ("at", shared(TimestampMicrosecondArray::from(at).with_timezone("+02:00"))),
+            ("since", shared(DurationMillisecondArray::from(vec![-1500, 0, 250]))),
+            ("note", shared(StringArray::from(vec!["a", "b", "c"]))),
+            ("v, km/h", shared(Float32Array::from(vec![Some(0.1), None, Some(f32::NAN)]))),
+            ("force", shared(Int16Array::from(vec![-3, 0, 7]))),
+            ("slides", shared(BooleanArray::from(vec![Some(true), Some(false), None]))),
+            ("big", shared(UInt64Array::from(vec![u64::MAX, 0, 1]))),
+            ("dec", shared(decimals.with_precision_and_scale(9, 2).unwrap())),
+        ],
+    );
+    let all = [
+        ("at", "s"),
+        ("v, km/h", "km/h"),
+        ("force", "kN"),
+        ("slides", "1"),
+        ("big", "1"),
+        ("dec", "1"),
+    ];
+    let expected = "at,since,note,\"v, km/h\",force,slides,big,dec\n\
+                    1700000000.000001000,,,0.1,-3,1,18446744073709551615,-12.34\n\
+                    1700000000.500000000,,,,0,0,0,0.05\n,,,NaN,7,,1,\n";
+    assert_eq!(rows(&path, &all), expected);
+    // Times are given in the unit that is declared, whatever the file counts in.
+    let text = rows(&path, &[("since", "ms")]);
+    assert!(text.contains("\n,-1500,") && text.ends_with("\n,250,,,,,,\n"), "{text}");
+    let text = rows(&path, &[("since", "s")]);
+    assert!(text.contains("\n,-1.500000000,"), "{text}");
+    assert_eq!(rows(&path, &[("speed", "m/s")]).lines().count(), 1, "the header tells the choices");
+}
+
+/// The demo's files, its runs as Parquet.
+struct AsParquet {
+    folder: PathBuf,
+    tables: PathBuf,
+}
+
+impl DatasetFiles for AsParquet {
+    fn read(&self, path: &str) -> Result<String, FileProblem> {
+        let text = std::fs::read_to_string(self.folder.join(path)).unwrap();
+        // Marks of CSV do not concern Parquet.
+        let text = text.replace(".csv\"", ".parquet\"");
+        Ok(text.replace("[dataset]\n", "[dataset]\ndelimiter = \";\"\ndecimal = \",\"\n"))
+    }
+
+    fn read_run(&self, path: &str, columns: &[ColumnMapping]) -> Result<String, FileProblem> {
+        assert!(is_parquet(path));
+        let pairs: Vec<_> = columns.iter().map(|it| (it.column.as_str(), it.unit.name())).collect();
+        Ok(rows(&self.tables.join(path), &pairs))
+    }
+}
+
+#[test]
+fn a_dataset_of_parquet_files_is_read_as_one_of_csv() {
+    let folder = tempfile::tempdir().unwrap();
+    let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/demo");
+    std::fs::create_dir(folder.path().join("runs")).unwrap();
+    for number in [1, 2, 3, 6] {
+        let mut reader = csv::Reader::from_path(demo.join(format!("runs/0{number}.csv"))).unwrap();
+        let names: Vec<String> = reader.headers().unwrap().iter().map(Into::into).collect();
+        let mut columns = vec![Vec::new(); names.len()];
+        for record in reader.records() {
+            for (column, cell) in columns.iter_mut().zip(record.unwrap().iter()) {
+                column.push(cell.parse::<f64>().ok());
+            }
+        }
+        let arrays = columns.into_iter().map(|it| Arc::new(Float64Array::from(it)) as ArrayRef);
+        let named = names.iter().map(String::as_str).zip(arrays).collect();
+        table(&folder.path().join(format!("runs/0{number}.parquet")), named);
+    }
+    let files = AsParquet { folder: demo.clone(), tables: folder.path().into() };
+    let mut found = Dataset::load(&files).unwrap();
+    let expected = dynocar::dataset::load(&demo).unwrap();
+    for run in &mut found.runs {
+        run.file = run.file.replace(".parquet", ".csv");
+    }
+    assert!(found == expected, "the same samples to the bit");
+}
+
+#[test]
+fn columns_that_hold_no_numbers_are_named_with_what_they_hold() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("own.parquet");
+    let shown = path.display().to_string();
+    let list =
+        arrow_array::ListArray::from_iter_primitive::<arrow_array::types::Float64Type, _, _>(vec![
+            Some(vec![Some(1.0)]),
+            None,
+        ]);
+    table(
+        &path,
+        vec![
+            ("t", shared(TimestampMicrosecondArray::from(vec![0, 1]))),
+            ("v", shared(list)),
+            ("who", shared(StringArray::from(vec!["a", "b"]))),
+        ],
+    );
+    let cases = [
+        (["v", "m/s"], "column v: expected numbers, true and false, or times, found List(Float64)"),
+        (["who", "s"], "column who: expected numbers, true and false, or times, found Utf8"),
+        (["t", "m/s"], "column t: expected numbers in m/s, found Timestamp(µs)"),
+    ];
+    for ([column, unit], expected) in cases {
+        let output = program(&["rows", &shown, "--column", column, unit]);
+        assert_eq!(output.status.code(), Some(2));
+        assert_eq!(said(&output), format!("dynocar-parquet: {shown}: {expected}\n"));
+    }
+}

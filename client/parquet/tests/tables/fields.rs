@@ -1,0 +1,72 @@
+//! The Arrow schema, the columns and the page of the fields say the same.
+
+use arrow_schema::Schema;
+use dynocar_parquet::cells::schema;
+use dynocar_recording::columns::{Column, EVENTS, SAMPLES, SNAPSHOTS};
+
+fn page() -> String {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/recording_fields.md");
+    std::fs::read_to_string(path).expect("the page")
+}
+
+/// The rows of a message's table on the page: name, column, unit, meaning.
+fn rows(page: &str, message: &str) -> Vec<[String; 4]> {
+    let start = page.find(&format!("## `dynocar.{message}`")).expect("a table");
+    let end = page[start + 1..].find("\n## ").map_or(page.len(), |it| start + 1 + it);
+    let rows = page[start..end].lines().filter(|it| it.starts_with("| `"));
+    rows.map(|row| {
+        let cells: Vec<&str> = row.trim_matches('|').split(" | ").map(str::trim).collect();
+        let last = cells.len() - 1;
+        let name = cells[0].trim_matches('`').to_owned();
+        [name, cells[3].into(), cells[last - 1].into(), cells[last].into()]
+    })
+    .collect()
+}
+
+fn in_words(schema: &Schema, columns: &[Column]) -> Vec<[String; 3]> {
+    let said = |it: &arrow_schema::Field| {
+        let null = if it.is_nullable() { ", null" } else { "" };
+        let unit = it.metadata().get("unit").cloned().unwrap_or_default();
+        [it.name().clone(), format!("{}{null}", it.data_type()), unit]
+    };
+    assert_eq!(schema.fields().len(), columns.len());
+    schema.fields().iter().skip(2).map(|it| said(it)).collect()
+}
+
+#[test]
+fn the_page_tells_the_arrow_type_of_every_column_and_the_schema_has_them_all() {
+    let page = page();
+    let tables = [
+        (&*SAMPLES, &["TrainSample"][..]),
+        (&*SNAPSHOTS, &["ParameterSnapshot", "Estimate", "Rejected"]),
+        (&*EVENTS, &["Event"]),
+    ];
+    for (columns, messages) in tables {
+        let mut told = Vec::new();
+        for message in messages {
+            for [name, column, unit, _] in rows(&page, message) {
+                let name = match *message {
+                    "Rejected" => format!("rejected_{name}"),
+                    "Estimate" => format!("estimate_{name}"),
+                    _ => name,
+                };
+                // `valid`, `estimate` and `rejected` are no columns.
+                if !column.is_empty() {
+                    told.push([name, column, unit]);
+                }
+            }
+        }
+        assert_eq!(in_words(&schema(columns), columns), told);
+    }
+}
+
+#[test]
+fn fields_say_unit_meaning_and_the_names_of_their_numbers() {
+    let schema = schema(&SNAPSHOTS);
+    let said = |name: &str, key: &str| {
+        schema.field_with_name(name).unwrap().metadata().get(key).cloned().unwrap_or_default()
+    };
+    assert_eq!(said("estimate_resistance_c_n_per_kn_per_mps2", "unit"), "N/kN per (m/s)²");
+    assert!(said("status", "names").contains("estimated"), "{}", said("status", "names"));
+    assert!(schema.fields().iter().all(|it| it.metadata()["meaning"].len() > 8));
+}

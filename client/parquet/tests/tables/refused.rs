@@ -1,0 +1,203 @@
+//! What is no recording in Parquet is refused by name, with what was expected.
+
+use std::fs::File;
+use std::path::Path;
+
+use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch, StringArray};
+use dynocar_parquet::cells::schema;
+use dynocar_parquet::reading::read;
+use dynocar_parquet::writing::write_folder;
+use dynocar_recording::columns::{Row, SAMPLES};
+use dynocar_shared::{SampleField, TrainId, TrainSample};
+use parquet::arrow::ArrowWriter;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+use proptest::prelude::*;
+
+use crate::support::{program, said, shared, table, write};
+
+/// What every command says of a path that is wrong.
+fn refusal(path: &Path) -> String {
+    let (shown, out) = (path.display().to_string(), path.with_extension("out"));
+    let out = out.display().to_string();
+    let mut told = String::new();
+    for arguments in [&["convert", &shown, "-o", &out][..], &["verify", &shown]] {
+        let output = program(arguments);
+        told = said(&output);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
+        assert!(told.starts_with(&format!("dynocar-parquet: {shown}")), "{told}");
+        assert!(!Path::new(&out).exists());
+    }
+    told
+}
+
+fn recording(folder: &Path) -> std::path::PathBuf {
+    let sample = TrainSample::empty(TrainId(1)).with(SampleField::Speed, 3.0);
+    let messages: Vec<(u64, Row)> = (0..50).map(|it| (it, Row::Sample(sample))).collect();
+    write(&folder.join("run.mcap"), &messages);
+    write_folder(&[folder.join("run.mcap")], &folder.join("run.parquet")).unwrap();
+    folder.join("run.parquet/samples-1.parquet")
+}
+
+#[test]
+fn other_formats_broken_files_and_tables_of_others_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let whole = std::fs::read(recording(folder.path())).unwrap();
+    std::fs::create_dir(at("empty.parquet")).unwrap();
+    table(&at("own.parquet"), vec![("t", shared(Float64Array::from(vec![1.0])))]);
+    let cases: [(&str, Option<&[u8]>, &str); 7] = [
+        ("text.parquet", Some(b"time_s,speed_mps\n0,1\n"), "not a Parquet file that can be read"),
+        ("nothing.parquet", Some(b""), "not a Parquet file that can be read"),
+        ("cut.parquet", Some(&whole[..whole.len() / 2]), "not a Parquet file that can be read"),
+        ("gone.parquet", None, "No such file"),
+        (
+            "empty.parquet",
+            None,
+            "not a recording: expected Parquet that `dynocar convert` has written",
+        ),
+        (
+            "own.parquet",
+            None,
+            "not a recording: expected Parquet that `dynocar convert` has written",
+        ),
+        ("folder.parquet", None, "folder.parquet/b.parquet: not a recording"),
+    ];
+    std::fs::create_dir(at("folder.parquet")).unwrap();
+    std::fs::write(at("folder.parquet/a.parquet"), &whole).unwrap();
+    std::fs::copy(at("own.parquet"), at("folder.parquet/b.parquet")).unwrap();
+    for (name, content, expected) in cases {
+        if let Some(content) = content {
+            std::fs::write(at(name), content).unwrap();
+        }
+        let told = refusal(&at(name));
+        assert!(told.contains(expected), "{told}");
+    }
+}
+
+/// A table of samples with another column in the place of one, or without it; `layout` is what it says of itself.
+fn altered(path: &Path, from: &Path, column: &str, other: Option<ArrayRef>, layout: Option<&str>) {
+    let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(from).unwrap()).unwrap();
+    let said = builder.metadata().file_metadata().key_value_metadata().cloned().unwrap();
+    let batch = builder.build().unwrap().next().unwrap().unwrap();
+    let schema = batch.schema();
+    let columns =
+        schema.fields().iter().zip(batch.columns()).filter_map(|(field, array)| match &other {
+            Some(other) if field.name() == column => Some((field.name().clone(), other.clone())),
+            None if field.name() == column => None,
+            _ => Some((field.name().clone(), array.clone())),
+        });
+    let batch = RecordBatch::try_from_iter(columns.collect::<Vec<_>>()).unwrap();
+    let said: Vec<KeyValue> = said
+        .into_iter()
+        .filter(|it| it.key != "ARROW:schema")
+        .map(|mut it| {
+            if let (true, Some(layout)) = (it.key == "dynocar.layout", layout) {
+                it.value = Some(layout.to_owned());
+            }
+            it
+        })
+        .collect();
+    let properties = WriterProperties::builder().set_key_value_metadata(Some(said)).build();
+    let file = File::create(path).unwrap();
+    let mut writer = ArrowWriter::try_new(file, batch.schema(), Some(properties)).unwrap();
+    writer.write(&batch).unwrap();
+    writer.close().unwrap();
+}
+
+#[test]
+fn a_table_of_another_release_or_without_a_column_or_with_another_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let from = recording(folder.path());
+    let path = folder.path().join("altered.parquet");
+    let shown = path.display().to_string();
+    let rows = 50;
+    let texts = shared(StringArray::from(vec!["x"; rows]));
+    let nulls: ArrayRef = arrow_array::new_null_array(schema(&SAMPLES).field(2).data_type(), rows);
+    assert!(nulls.is_null(0));
+    let cases = [
+        ("speed_mps", Some(texts), None, "column speed_mps: expected Float64, found Utf8"),
+        ("speed_mps", None, None, "no column speed_mps: expected one of Float64"),
+        ("time_ns", Some(nulls), None, "column time_ns, row 1: expected a value, found none"),
+        (
+            "",
+            None,
+            Some("dynocar.TrainSample.0123456789abcdef"),
+            "samples: recorded with another schema: expected dynocar.TrainSample.",
+        ),
+    ];
+    for (column, other, layout, expected) in cases {
+        altered(&path, &from, column, other, layout);
+        let told = refusal(&path);
+        assert!(told.contains(&format!("{shown}: {expected}")), "{told}");
+    }
+    altered(&path, &from, "", None, None);
+    assert_eq!(read(&path).unwrap().messages.len(), rows, "else it is read");
+}
+
+#[test]
+fn nothing_is_overwritten_and_parquet_is_not_converted_into_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    recording(folder.path());
+    let shown = |name: &str| folder.path().join(name).display().to_string();
+    let cases = [
+        ("run.mcap", "run.parquet", "exists already"),
+        ("run.parquet", "other.parquet", "it is Parquet already"),
+        ("run.parquet", "run.mcap", "exists already"),
+    ];
+    for (from, to, expected) in cases {
+        let output = program(&["convert", &shown(from), "-o", &shown(to)]);
+        assert_eq!(output.status.code(), Some(2), "{from} to {to}");
+        assert!(said(&output).contains(expected), "{}", said(&output));
+    }
+}
+
+#[test]
+fn a_closed_pipe_is_no_failure_and_a_full_disk_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let from = recording(folder.path());
+    let program = env!("CARGO_BIN_EXE_dynocar-parquet");
+    let own = [from.to_str().unwrap(), "--column", "speed_mps", "m/s"];
+    for arguments in [&["--help"][..], &[&["rows"][..], &own].concat()] {
+        let (_, closed) = std::io::pipe().unwrap();
+        let mut command = std::process::Command::new(program);
+        let output = command.args(arguments).stdout(closed).output().unwrap();
+        assert_eq!((output.status.code(), said(&output)), (Some(0), String::new()));
+        let full = File::options().write(true).open("/dev/full").unwrap();
+        let output = command.stdout(full).output().unwrap();
+        let words = "dynocar-parquet: standard output: cannot be written: No space left on device";
+        assert!(said(&output).starts_with(words), "{}", said(&output));
+        assert_eq!(output.status.code(), Some(1));
+    }
+    // A folder is all there or not at all.
+    let (mcap, out) = (folder.path().join("run.mcap"), folder.path().join("no/such.parquet"));
+    let output =
+        crate::support::program(&["convert", mcap.to_str().unwrap(), "-o", out.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert!(said(&output).contains("such.parquet: cannot be written"), "{}", said(&output));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+    #[test]
+    fn damaged_bytes_make_no_reader_panic(
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+    ) {
+        thread_local! {
+            static WHOLE: Vec<u8> = {
+                let folder = tempfile::tempdir().unwrap();
+                std::fs::read(recording(folder.path())).unwrap()
+            };
+        }
+        let mut bytes = WHOLE.with(Clone::clone);
+        for (place, byte) in changes {
+            let place = place.index(bytes.len());
+            bytes[place] = byte;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("damaged.parquet");
+        std::fs::write(&path, &bytes).unwrap();
+        let _ = read(&path);
+    }
+}

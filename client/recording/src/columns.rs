@@ -1,0 +1,240 @@
+//! What a recording holds as columns of tables, made from the tables that the messages are made from.
+//!
+//! Arrays stand as they are, in lists of fixed length, so that nothing is lost; what they hold stands once
+//! more under names with units, as in the messages.
+
+use std::sync::LazyLock;
+
+use dynocar_shared::schema::{Field, Missing, unit_of};
+use dynocar_shared::{Parameter, ParameterSnapshot, RejectionReason, TrainSample};
+
+use crate::event::{EVENT_FIELDS, Event, EventField};
+use crate::schema::{
+    BESIDE_VALUE, INTERVAL_95, SAMPLE_FIELDS, SNAPSHOT_FIELDS, members_of, name_beside,
+    vocabulary_of, vocabulary_of_type,
+};
+
+/// Where a column's values come from.
+#[derive(Clone, Copy, Debug)]
+pub enum Source {
+    /// The message's place in the recording.
+    Number,
+    /// Its `log_time`.
+    LogTime,
+    /// A field of a sample or a snapshot.
+    Field(&'static Field),
+    /// A parameter's value: repeats what arrays hold.
+    Value(Parameter),
+    /// What [`BESIDE_VALUE`] tells of it, by the place there: repeats what arrays hold.
+    Beside(Parameter, usize),
+    /// How many samples were refused for a reason: repeats what an array holds.
+    Rejected(RejectionReason),
+    /// A field of an event, by its place.
+    Event(usize),
+}
+
+/// A column.
+#[derive(Clone, Debug)]
+pub struct Column {
+    /// Its name, with the unit.
+    pub name: String,
+    /// The Rust type of an entry; `string` for a text, `time` for ns since 1970.
+    pub type_name: &'static str,
+    /// Entries of each list; `None` where it holds no lists.
+    pub list: Option<usize>,
+    /// True where a value may be missing.
+    pub is_nullable: bool,
+    /// The unit; empty for none.
+    pub unit: &'static str,
+    /// What it is.
+    pub meaning: String,
+    /// Numbers and names, where it holds numbers of a vocabulary.
+    pub vocabulary: Option<&'static str>,
+    /// Where its values come from.
+    pub source: Source,
+}
+
+/// A message of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Row {
+    /// A sample.
+    Sample(TrainSample),
+    /// A snapshot.
+    Snapshot(Box<ParameterSnapshot>),
+    /// An event.
+    Event(Event),
+}
+
+/// The columns of samples.
+pub static SAMPLES: LazyLock<Vec<Column>> =
+    LazyLock::new(|| stamps().chain(SAMPLE_FIELDS.iter().filter_map(of_field)).collect());
+
+/// The columns of a pipeline's snapshots.
+pub static SNAPSHOTS: LazyLock<Vec<Column>> = LazyLock::new(|| {
+    let fields = SNAPSHOT_FIELDS.iter().filter_map(of_field);
+    let parameters = Parameter::ALL.iter().flat_map(|&it| {
+        let name = format!("estimate_{}", it.full_name());
+        let value = plain(name, "f64", it.meaning(), Source::Value(it));
+        let beside =
+            BESIDE_VALUE.into_iter().enumerate().map(move |(place, (_, word, meaning))| {
+                let name = format!("estimate_{}", name_beside(it, word));
+                plain(name, "f64", meaning, Source::Beside(it, place))
+            });
+        std::iter::once(value).chain(beside).map(nullable)
+    });
+    let rejected = RejectionReason::ALL.iter().map(|&it| {
+        plain(format!("rejected_{}", it.name()), "u32", it.meaning(), Source::Rejected(it))
+    });
+    stamps().chain(fields).chain(parameters).chain(rejected).collect()
+});
+
+/// The columns of events.
+pub static EVENTS: LazyLock<Vec<Column>> = LazyLock::new(|| {
+    let fields = EVENT_FIELDS.iter().enumerate().map(|(place, it)| {
+        let vocabulary = vocabulary_of_type(it.type_name);
+        let type_name = if vocabulary.is_some() { "i32" } else { it.type_name };
+        let EventField { name, meaning, is_optional, .. } = it;
+        let column = plain((*name).to_owned(), type_name, meaning, Source::Event(place));
+        Column { is_nullable: *is_optional, vocabulary, ..column }
+    });
+    stamps().chain(fields).collect()
+});
+
+/// Columns before those of a message's fields.
+pub const STAMPS: usize = 2;
+
+fn stamps() -> impl Iterator<Item = Column> {
+    let number = "The message's place among the recording's, counted from 1.";
+    let logged = "When the message was recorded: wall time.";
+    [
+        plain("message_number".into(), "u64", number, Source::Number),
+        plain("log_time".into(), "time", logged, Source::LogTime),
+    ]
+    .into_iter()
+}
+
+fn plain(name: String, type_name: &'static str, meaning: &str, source: Source) -> Column {
+    Column {
+        unit: unit_of(&name),
+        name,
+        type_name,
+        list: None,
+        is_nullable: false,
+        meaning: meaning.trim().into(),
+        vocabulary: None,
+        source,
+    }
+}
+
+fn nullable(column: Column) -> Column {
+    Column { is_nullable: true, ..column }
+}
+
+/// The column of a layout's field; `None` for one that is said by others.
+fn of_field(field: &'static Field) -> Option<Column> {
+    let name = field.layout.name;
+    let column = plain(name.into(), field.entry_type(), field.meaning, Source::Field(field));
+    let column = Column {
+        list: field.is_array().then(|| field.entries()),
+        vocabulary: vocabulary_of(name),
+        ..column
+    };
+    match field.missing {
+        Missing::Never => Some(column),
+        Missing::Unless(_) => Some(nullable(column)),
+        Missing::SaidByOthers => None,
+    }
+}
+
+impl Column {
+    /// The type in Arrow's words.
+    pub fn arrow_type(&self) -> String {
+        let entry = match self.type_name {
+            "f64" => "Float64",
+            "i64" => "Int64",
+            "i32" => "Int32",
+            "i8" => "Int8",
+            "u64" => "UInt64",
+            "u32" => "UInt32",
+            "u16" => "UInt16",
+            "u8" => "UInt8",
+            "time" => "Timestamp(ns, \"UTC\")",
+            _ => "Utf8",
+        };
+        match self.list {
+            None => entry.into(),
+            Some(entries) => format!("FixedSizeList({entries} x non-null {entry})"),
+        }
+    }
+
+    /// The numbers and names of its vocabulary in words; empty without one.
+    pub fn names(&self) -> String {
+        let members = self.vocabulary.map(members_of).unwrap_or_default();
+        let members = members.iter().map(|(number, name)| format!("{number} {name}"));
+        members.collect::<Vec<_>>().join(", ")
+    }
+
+    /// True for a column that only repeats what others hold.
+    pub fn is_repetition(&self) -> bool {
+        matches!(self.source, Source::Value(_) | Source::Beside(..) | Source::Rejected(_))
+    }
+}
+
+impl Row {
+    /// Appends the words of a column that is neither text nor a stamp; gives false where the value is
+    /// missing, and then appends as many zeros.
+    pub fn put_words(&self, column: &Column, words: &mut Vec<u64>) -> bool {
+        let one = |words: &mut Vec<u64>, word: Option<u64>| {
+            words.push(word.unwrap_or(0));
+            word.is_some()
+        };
+        match (self, column.source) {
+            (Row::Sample(it), Source::Field(field)) => {
+                let is_there = match field.missing {
+                    Missing::Unless(quantity) => it.valid & quantity.bit() != 0,
+                    _ => true,
+                };
+                one(words, is_there.then(|| it.fields()[field.place].word(0)))
+            }
+            (Row::Snapshot(it), Source::Field(field)) => {
+                let entries = it.fields()[field.place];
+                words.extend((0..entries.count()).map(|place| entries.word(place)));
+                true
+            }
+            (Row::Snapshot(it), Source::Value(of)) => one(words, it.value(of).map(f64::to_bits)),
+            (Row::Snapshot(it), Source::Beside(of, place)) => {
+                let told = it.value(of).zip(it.std(of)).map(|(value, std)| match place {
+                    0 => std,
+                    1 => value - INTERVAL_95 * std,
+                    _ => value + INTERVAL_95 * std,
+                });
+                one(words, told.map(f64::to_bits))
+            }
+            (Row::Snapshot(it), Source::Rejected(of)) => one(words, Some(it.rejected(of).into())),
+            (Row::Event(it), Source::Event(place)) => one(words, it.word(place)),
+            _ => one(words, None),
+        }
+    }
+
+    /// Sets what a column holds; `words` is `None` where the value is missing.
+    pub fn set_words(&mut self, column: &Column, words: Option<&[u64]>) {
+        match (self, column.source, words) {
+            (Row::Sample(it), Source::Field(field), Some(words)) => {
+                it.fields_mut()[field.place].set_word(0, words[0]);
+                if let Missing::Unless(quantity) = field.missing {
+                    it.valid |= quantity.bit();
+                }
+            }
+            (Row::Snapshot(it), Source::Field(field), Some(words)) => {
+                let mut fields = it.fields_mut();
+                words.iter().enumerate().for_each(|(place, &word)| {
+                    fields[field.place].set_word(place, word);
+                });
+            }
+            (Row::Event(it), Source::Event(place), words) => {
+                it.set_word(place, words.map(|it| it[0]));
+            }
+            _ => {}
+        }
+    }
+}
