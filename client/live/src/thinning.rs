@@ -20,7 +20,7 @@ impl Thinning {
             return false;
         }
         // After a gap, or where the clock was set back, the count begins anew.
-        let is_even = at_ns.saturating_sub(self.due_ns) < self.interval_ns;
+        let is_even = (0..self.interval_ns).contains(&at_ns.saturating_sub(self.due_ns));
         self.due_ns = if is_even { self.due_ns } else { at_ns }.saturating_add(self.interval_ns);
         true
     }

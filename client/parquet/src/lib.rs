@@ -8,6 +8,7 @@
 //!
 //! - [`cells`]: the columns of `dynocar_recording::columns` as Arrow has them
 //! - [`error`]: why a file is none that can be read
+//! - [`guarded`]: what a damaged file does to the library that reads it
 //! - [`writing`]: MCAP to Parquet
 //! - [`reading`], [`table`]: Parquet to what a recording holds, [`back`]: and to MCAP
 //! - [`rows`]: a Parquet file of anybody as CSV
@@ -17,6 +18,7 @@ pub mod back;
 pub mod cells;
 pub mod cli;
 pub mod error;
+pub mod guarded;
 pub mod reading;
 pub mod rows;
 pub mod table;

@@ -15,6 +15,7 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use crate::cells::{Cells, cells_of, data_type};
 use crate::error::TableError;
+use crate::guarded::guarded;
 use crate::table::{
     ATTACHMENTS, Attached, KIND, LAYOUT, METADATA, add_metadata, attachments_batch, attachments_of,
     metadata_batch,
@@ -51,7 +52,7 @@ pub fn read(path: &Path) -> Result<Content, TableError> {
     let mut content = Content::default();
     let mut metadata = BTreeMap::new();
     for file in files(path)? {
-        read_file(&file, path.is_dir(), &mut content, &mut metadata)?;
+        guarded(&file, || read_file(&file, path.is_dir(), &mut content, &mut metadata))?;
     }
     content.metadata.extend(metadata.into_values());
     content.messages.sort_by_key(|it| it.number);

@@ -20,6 +20,7 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use crate::error::TableError;
+use crate::guarded::guarded;
 
 /// A column that is wanted.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -49,6 +50,10 @@ pub enum RowsError {
 /// When the file cannot be read, a wanted column holds neither numbers nor truths nor times, or the rows cannot
 /// be written.
 pub fn write_rows(path: &Path, wanted: &[Wanted], output: impl Write) -> Result<(), RowsError> {
+    guarded(path, || rows(path, wanted, output))
+}
+
+fn rows(path: &Path, wanted: &[Wanted], output: impl Write) -> Result<(), RowsError> {
     let file =
         File::open(path).map_err(|source| TableError::Unreadable { path: path.into(), source })?;
     let builder = ParquetRecordBatchReaderBuilder::try_new(file)

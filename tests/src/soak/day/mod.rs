@@ -223,14 +223,12 @@ impl<'a> Day<'a> {
         self.ended = self.account();
         self.check_memory();
         await_true(|| self.whole_states() > 0, || "an estimate to be kept".into());
-        match is_last {
-            false => self.daemon.signal(Signal::KILL),
-            true => {
-                self.daemon.signal(Signal::TERM);
-                self.strange.set_clock_ahead(FAR_AHEAD_S);
-            }
-        }
+        self.daemon.signal(if is_last { Signal::TERM } else { Signal::KILL });
         self.daemon.wait();
+        if is_last {
+            // Not before it has ended: what it keeps last would bear the new time.
+            self.strange.set_clock_ahead(FAR_AHEAD_S);
+        }
         self.daemon = start(&self.site, self.programs, &self.config, &self.strange);
         self.starts += 1;
         self.meet();

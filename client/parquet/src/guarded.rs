@@ -1,0 +1,48 @@
+//! The library that reads Parquet takes some of a file's numbers for granted: where a damaged file breaks
+//! that, it panics. For us that is an error of the file like any other.
+
+use std::any::Any;
+use std::cell::Cell;
+use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
+use std::path::Path;
+use std::sync::Once;
+
+use crate::error::TableError;
+
+thread_local! {
+    /// True while this thread reads a file: then a panic is no news.
+    static IS_READING: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Reads a file; what the library panics at is told as the file's.
+///
+/// # Errors
+///
+/// As the work, and where the file makes the library panic.
+pub fn guarded<T, E: From<TableError>>(
+    path: &Path,
+    work: impl FnOnce() -> Result<T, E>,
+) -> Result<T, E> {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let told_before = take_hook();
+        set_hook(Box::new(move |panic| {
+            if !IS_READING.get() {
+                told_before(panic);
+            }
+        }));
+    });
+    IS_READING.set(true);
+    // What the work has half done is dropped with the error.
+    let done = catch_unwind(AssertUnwindSafe(work));
+    IS_READING.set(false);
+    done.unwrap_or_else(|panic| {
+        let problem = format!("damaged: {}", words(panic.as_ref()));
+        Err(TableError::NotParquet { path: path.into(), problem }.into())
+    })
+}
+
+fn words(panic: &(dyn Any + Send)) -> &str {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    text.or(panic.downcast_ref::<&str>().copied()).unwrap_or("unreadable")
+}
