@@ -43,7 +43,7 @@ pub struct WantedArguments {
     /// Only this train; may be given several times. By default every train that is there or comes
     #[arg(long = "train", value_name = "ID")]
     trains: Vec<u64>,
-    /// The run-time directory; else the variable DYNOCAR_ROOT, else /tmp/dynocar-<user>
+    /// The run-time directory; else the variable DYNOCAR_ROOT, else /tmp/dynocar-USER
     #[arg(long, value_name = "DIR")]
     root: Option<PathBuf>,
     /// Take a pipeline's snapshot every so many ms, and each change of its status
