@@ -10,11 +10,13 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use dynocar::config::DaemonConfig;
+use dynocar_client::channel::Transport;
 use dynocar_client::{Host, Peer, Role, SamplePublisher, monotonic_now_ns};
 use dynocar_recording::event::EventKind;
 use dynocar_recording::reading::{Ending, read};
 use dynocar_recording::recording::Recording;
-use dynocar_shared::{SampleField, TrainId, TrainSample};
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::{ParameterSnapshot, PipelineKind, SampleField, TrainId, TrainSample};
 use rustix::process::{Pid, Signal, kill_process};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_dynocar-recording");
@@ -309,4 +311,42 @@ fn a_closed_pipe_is_no_failure_and_a_full_disk_is_told_by_the_name_that_was_call
             assert_eq!(output.status.code(), Some(1));
         }
     }
+}
+
+#[test]
+fn a_flight_recorder_keeps_what_lies_around_a_suspicion() {
+    let place = Place::new();
+    let controller = Controller::start(&place);
+    // A daemon's end of the channel, with nothing but what is suspected behind it.
+    let transport = Transport::open(&place.host(), "monitor").unwrap();
+    let snapshots = transport.sender::<ParameterSnapshot>(TRAIN).unwrap();
+    let mut snapshot = ParameterSnapshot::empty();
+    (snapshot.train_id, snapshot.epoch) = (TRAIN.0, monotonic_now_ns() as u64);
+    snapshot.pipeline_kind = PipelineKind::ResidualMonitor as u32;
+    let mut recorder = place.started(&["flight-recorder"], "ring");
+    controller.await_more(100);
+    let ring = place.at("ring");
+    let accounts = || {
+        let folders = std::fs::read_dir(ring.join("kept")).into_iter().flatten().flatten();
+        let texts = folders.map(|it| std::fs::read_to_string(it.path().join("stretch.toml")));
+        texts.filter_map(Result::ok).collect::<String>()
+    };
+    for suspect in [EffectKind::None, EffectKind::DraggingBrake] {
+        assert_eq!(accounts(), "", "nothing is suspected yet");
+        (snapshot.suspected_effect, snapshot.suspicion_evidence) = (suspect as u32, 35.0);
+        // A reader takes the newest, whenever it joined.
+        for _ in 0..20 {
+            snapshot.sequence += 1;
+            snapshot.vouched_ns = monotonic_now_ns();
+            snapshots.send(&snapshot).unwrap();
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+    await_true("a stretch that is kept", || accounts().contains("suspicion_raised"));
+    assert!(accounts().contains("dragging_brake, evidence 35"), "{}", accounts());
+    signal(recorder.id(), Signal::INT);
+    assert!(recorder.wait().unwrap().success());
+    let recording = Recording::load(&ring.join("ring-000001.mcap")).unwrap();
+    let raised = recording.events.iter().filter(|it| it.kind == EventKind::SuspicionRaised as i32);
+    assert_eq!(raised.count(), 1, "told once, however long it is suspected");
 }
