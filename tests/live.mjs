@@ -89,7 +89,8 @@ function compare(file, recording) {
   assert.ok(first.speed_mps >= 0 && Number.isFinite(first.traction_force_n), JSON.stringify(first));
   assert.ok(!("acceleration_mps2" in first), "missing is missing");
 
-  // Recorder and live view look at different moments; of what both saw each bit is the same.
+  // Recorder and live view look at different moments, the recorder at nearly every one; of what both saw
+  // each bit is the same.
   const mass = "/train/1/1_mass_kalman";
   const known = new Set(of(other, mass));
   const both = of(messages, mass).filter((it) => known.has(it)).length;

@@ -21,15 +21,7 @@ cargo build --release --workspace --bin dynocar --bin dynocar-recording --bin dy
 dynocar=${CARGO_TARGET_DIR:-target}/release/dynocar
 export DYNOCAR_ROOT=$place/root
 
-await() { # FILE WORDS
-  for _ in $(seq 600); do
-    if grep -q "$2" "$1"; then return; fi
-    sleep 0.1
-  done
-  echo "waited in vain for '$2' in $1:" >&2
-  cat "$1" >&2
-  return 1
-}
+. tests/await.sh
 begin() { # NAME COMMAND...: in the background, its words in a file of that name
   local name=$1
   shift
@@ -49,7 +41,7 @@ printf '\n[metrics]\nlisten = "127.0.0.1:%s"\n' "$metrics" >>"$place/daemon.toml
 begin live "$dynocar" live --port 0 --samples-hz 0 --snapshots-ms 50
 await "$place/live" "serving ws://"
 url=$(grep -o -m1 'ws://127.0.0.1:[0-9]*' "$place/live")
-begin record "$dynocar" record -o "$place/run.mcap" --train 1 --snapshots-ms 50
+begin record "$dynocar" record -o "$place/run.mcap" --train 1 --snapshots-ms 1
 await "$place/record" "recording into"
 begin viewer node "$place/live.mjs" view "$url" "$place/seen.json"
 begin other node "$place/live.mjs" view "$url" "$place/other.json"

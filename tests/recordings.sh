@@ -23,15 +23,7 @@ cargo build --release --workspace --bin dynocar --bin dynocar-recording --bin dy
 dynocar=${CARGO_TARGET_DIR:-target}/release/dynocar
 export DYNOCAR_ROOT=$place/root
 
-await() { # FILE WORDS
-  for _ in $(seq 600); do
-    if grep -q "$2" "$1"; then return; fi
-    sleep 0.1
-  done
-  echo "waited in vain for '$2' in $1:" >&2
-  cat "$1" >&2
-  return 1
-}
+. tests/await.sh
 
 "$dynocar" run --config config/daemon.toml 2>"$place/daemon" &
 jobs+=($!)
