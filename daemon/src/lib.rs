@@ -8,6 +8,7 @@
 //! - [`identify`]: the pipelines over recorded runs
 //! - [`fmu`]: the estimators as an FMU
 //! - [`annotation`]: an explanation beside the data that it explains
+//! - [`models`]: a store of models
 //! - [`grown`]: the model with its effects as train and track files
 //! - [`output`]: where results go
 //! - [`programs`]: commands that are programs of their own
@@ -31,6 +32,7 @@ pub mod demo;
 pub mod fmu;
 pub mod grown;
 pub mod identify;
+pub mod models;
 pub mod output;
 pub mod programs;
 pub mod replay;

@@ -2,12 +2,17 @@
 //!
 //! New content is written beside the old, brought to the disk, renamed over it, and the directory
 //! is brought to the disk. At every moment the name holds the old content or the new, never a
-//! part of one; when [`replace`] has returned, it holds the new for good.
+//! part of one; when [`replace`] has returned, it holds the new for good. What must never be
+//! replaced, a file or a folder with files, takes its name in the same way, and only where the name
+//! is free: [`write_once`], [`make_once`].
 
 use std::fs::{File, OpenOptions, Permissions};
 use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use rustix::fs::{CWD, RenameFlags, renameat_with};
 
 /// Who may read and write a new file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,7 +25,7 @@ pub enum Rights {
     Like(Permissions),
 }
 
-/// What a file system does for [`replace`]; each operation is one at which power may fail.
+/// What a file system does for this module; each operation is one at which power may fail.
 pub trait Storage {
     /// Makes a file that was not there, writes it and brings it to the disk.
     ///
@@ -35,6 +40,20 @@ pub trait Storage {
     ///
     /// The system's answer.
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
+
+    /// Gives a file or a folder another name, if that is free: `AlreadyExists` where it is not.
+    ///
+    /// # Errors
+    ///
+    /// The system's answer.
+    fn rename_new(&self, from: &Path, to: &Path) -> io::Result<()>;
+
+    /// Makes a folder for good, with those that it lies in; one that is there stays.
+    ///
+    /// # Errors
+    ///
+    /// The system's answer.
+    fn make_folder(&self, path: &Path) -> io::Result<()>;
 
     /// Removes a file.
     ///
@@ -73,6 +92,22 @@ impl Storage for Disk {
 
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
         std::fs::rename(from, to)
+    }
+
+    fn rename_new(&self, from: &Path, to: &Path) -> io::Result<()> {
+        Ok(renameat_with(CWD, from, CWD, to, RenameFlags::NOREPLACE)?)
+    }
+
+    fn make_folder(&self, path: &Path) -> io::Result<()> {
+        if path.is_dir() {
+            return Ok(());
+        }
+        let parent = folder_of(path);
+        self.make_folder(parent)?;
+        match std::fs::create_dir(path) {
+            Err(error) if error.kind() != ErrorKind::AlreadyExists => Err(error),
+            _ => self.sync_directory(parent),
+        }
     }
 
     fn remove(&self, path: &Path) -> io::Result<()> {
@@ -118,21 +153,82 @@ pub fn replace(
     beside: &Path,
     (content, rights): (&[u8], &Rights),
 ) -> Result<(), StorageError> {
-    // What a writer that died left behind. It may be the same file as that at `path`, on a file
-    // system that lost half of a renaming: it is removed, not written over.
-    match storage.remove(beside) {
-        Err(error) if error.kind() != ErrorKind::NotFound => {
-            return Err(failed(beside, "removing what was left")(error));
-        }
-        _ => {}
-    }
-    storage.write_new(beside, content, rights).map_err(failed(beside, "writing"))?;
+    write_beside(storage, beside, content, rights)?;
     if let Err(source) = storage.rename(beside, path) {
         let _ = storage.remove(beside);
         return Err(failed(path, "replacing")(source));
     }
     let directory = folder_of(path);
     storage.sync_directory(directory).map_err(failed(directory, TO_THE_DISK))
+}
+
+/// Writes a file that is never replaced, by way of a file `beside` it, in a folder that is made when
+/// it is not there.
+///
+/// # Errors
+///
+/// The system's answer; `AlreadyExists` where the name is taken, and then nothing is changed.
+pub fn write_once(
+    storage: &impl Storage,
+    path: &Path,
+    beside: &Path,
+    content: &[u8],
+) -> Result<(), StorageError> {
+    let folder = folder_of(path);
+    storage.make_folder(folder).map_err(failed(folder, "making the folder"))?;
+    write_beside(storage, beside, content, &Rights::Usual)?;
+    if let Err(source) = storage.rename_new(beside, path) {
+        let _ = storage.remove(beside);
+        return Err(failed(path, "naming")(source));
+    }
+    storage.sync_directory(folder).map_err(failed(folder, TO_THE_DISK))
+}
+
+/// Makes a folder with files that are never replaced, by way of a folder `beside` it.
+///
+/// # Errors
+///
+/// The system's answer; `AlreadyExists` where the name is taken, and then nothing is changed.
+pub fn make_once(
+    storage: &impl Storage,
+    folder: &Path,
+    beside: &Path,
+    files: &[(&str, &[u8])],
+) -> Result<(), StorageError> {
+    storage.make_folder(beside).map_err(failed(beside, "making the folder"))?;
+    for (name, content) in files {
+        write_beside(storage, &beside.join(name), content, &Rights::Usual)?;
+    }
+    storage.sync_directory(beside).map_err(failed(beside, TO_THE_DISK))?;
+    storage.rename_new(beside, folder).map_err(failed(folder, "naming"))?;
+    let around = folder_of(folder);
+    storage.sync_directory(around).map_err(failed(around, TO_THE_DISK))
+}
+
+/// A name beside another that no other writer uses, of this process or any that lives.
+pub fn part_of(path: &Path) -> PathBuf {
+    static COUNT: AtomicU64 = AtomicU64::new(0);
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let count = COUNT.fetch_add(1, Ordering::Relaxed);
+    path.with_file_name(format!(".{name}.{}-{count}.part", std::process::id()))
+}
+
+/// Writes a file under a name that only one writer uses.
+fn write_beside(
+    storage: &impl Storage,
+    beside: &Path,
+    content: &[u8],
+    rights: &Rights,
+) -> Result<(), StorageError> {
+    // What a writer that died left behind. It may be the same file as that under the other name, on
+    // a file system that lost half of a renaming: it is removed, not written over.
+    match storage.remove(beside) {
+        Err(error) if error.kind() != ErrorKind::NotFound => {
+            return Err(failed(beside, "removing what was left")(error));
+        }
+        _ => {}
+    }
+    storage.write_new(beside, content, rights).map_err(failed(beside, "writing"))
 }
 
 /// The directory that a file lies in.

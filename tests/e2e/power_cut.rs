@@ -1,7 +1,8 @@
 //! Files of ours after a power cut: whole, and never older than what was told to be kept.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use dynocar::models::{ModelText, Moment, NewModel, Origin, numbered, store};
 use dynocar::state::file;
 use dynocar::storage::{Disk, Rights, replace};
 use dynocar_tests::power_cut::{LossyDisk, Neglect};
@@ -92,4 +93,66 @@ fn what_half_a_renaming_left_is_not_written_over() {
     replace(&Disk, &path, &beside, (b"new", &Rights::Usual)).unwrap();
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "new");
     assert!(!beside.exists());
+}
+
+fn new_model() -> NewModel {
+    let origin = Origin {
+        made: Moment { unix_s: 1 },
+        version: "1".into(),
+        command: "x".into(),
+        parent: None,
+        verdict: None,
+        statement: "s".into(),
+        dataset_sha256: None,
+        error: None,
+        effects: Vec::new(),
+        files: Vec::new(),
+    };
+    let text = ModelText { train: "train".into(), track: Some("track".into()) };
+    NewModel { text, origin, answer_json: Some("{}".into()), report_html: None }
+}
+
+/// Cuts the power after every step of a model being put into the store and a decision being taken;
+/// gives how many disks were looked at, and the first that was not as promised.
+fn cut_store(neglect: Neglect) -> (usize, Option<String>) {
+    let (folder, decisions) = (Path::new("1/00aa"), Path::new("1/decisions"));
+    let model = new_model();
+    let disk = LossyDisk::new(neglect);
+    store::write_model(&disk, folder, &model).expect("this disk takes everything");
+    let put = disk.steps();
+    assert!(numbered::write(&disk, decisions, 1, &model.origin).expect("a disk that takes it"));
+    let decided = disk.steps();
+    assert!(!numbered::write(&disk, decisions, 1, &model.origin).expect("a disk that takes it"));
+    let whole = |content: &[u8]| toml::from_slice::<Origin>(content).ok();
+    let mut looked_at = 0;
+    for count in 0..=disk.steps() {
+        for left in disk.left_after(count) {
+            looked_at += 1;
+            let at = |path: PathBuf| left.get(&path).map(Vec::as_slice);
+            let origin = at(folder.join("origin.toml"));
+            let is_model = at(folder.join("train.toml")) == Some(b"train")
+                && at(folder.join("track.toml")) == Some(b"track")
+                && at(folder.join("answer.json")) == Some(b"{}")
+                && origin.and_then(whole).as_ref() == Some(&model.origin);
+            let is_none = !left.keys().any(|name| name.starts_with(folder));
+            let decision = at(numbered::path_of(decisions, 1));
+            let is_decision = decision.and_then(whole).as_ref() == Some(&model.origin);
+            let is_promised = (is_model || is_none && count < put)
+                && (is_decision || decision.is_none() && count < decided);
+            if !is_promised {
+                return (looked_at, Some(format!("after {count} steps: {:?}", left.keys())));
+            }
+        }
+    }
+    (looked_at, None)
+}
+
+#[test]
+fn a_power_cut_leaves_a_model_or_a_decision_whole_or_not_at_all() {
+    let (looked_at, broken) = cut_store(Neglect::Nothing);
+    assert_eq!(broken, None);
+    assert!(looked_at > 40, "only {looked_at} disks");
+    for neglect in [Neglect::Bytes, Neglect::Names] {
+        assert!(cut_store(neglect).1.is_some(), "{neglect:?} is noticed");
+    }
 }

@@ -28,11 +28,30 @@ pub enum Neglect {
 
 #[derive(Clone, Debug)]
 enum Step {
-    Make { path: PathBuf, file: usize },
-    Write { file: usize, bytes: Vec<u8> },
-    SyncBytes { file: usize },
-    Rename { from: PathBuf, to: PathBuf, file: usize },
-    Remove { path: PathBuf },
+    Make {
+        path: PathBuf,
+        file: usize,
+    },
+    Write {
+        file: usize,
+        bytes: Vec<u8>,
+    },
+    SyncBytes {
+        file: usize,
+    },
+    Rename {
+        from: PathBuf,
+        to: PathBuf,
+        file: usize,
+    },
+    /// Of a folder: all its files at once.
+    RenameFolder {
+        from: PathBuf,
+        to: PathBuf,
+    },
+    Remove {
+        path: PathBuf,
+    },
     SyncNames,
 }
 
@@ -106,6 +125,24 @@ impl Storage for LossyDisk {
         Ok(())
     }
 
+    fn rename_new(&self, from: &Path, to: &Path) -> io::Result<()> {
+        if self.names.borrow().keys().any(|name| name.starts_with(to)) {
+            return Err(io::ErrorKind::AlreadyExists.into());
+        }
+        if self.names.borrow().contains_key(from) {
+            return self.rename(from, to);
+        }
+        let step = Step::RenameFolder { from: from.into(), to: to.into() };
+        apply(&step, &mut self.names.borrow_mut());
+        self.note(step);
+        Ok(())
+    }
+
+    // A folder is there with the files in it.
+    fn make_folder(&self, _: &Path) -> io::Result<()> {
+        Ok(())
+    }
+
     fn remove(&self, path: &Path) -> io::Result<()> {
         self.names.borrow_mut().remove(path).ok_or(io::ErrorKind::NotFound)?;
         self.note(Step::Remove { path: path.into() });
@@ -147,7 +184,10 @@ impl AfterSteps {
                 let changes = std::mem::take(&mut self.changes);
                 changes.iter().for_each(|change| apply(change, &mut self.lasting_names));
             }
-            Step::Make { .. } | Step::Rename { .. } | Step::Remove { .. } => {
+            Step::Make { .. }
+            | Step::Rename { .. }
+            | Step::RenameFolder { .. }
+            | Step::Remove { .. } => {
                 self.changes.push(step.clone());
             }
         }
@@ -213,6 +253,13 @@ fn apply(change: &Step, names: &mut BTreeMap<PathBuf, usize>) {
         Step::Rename { from, to, file } => {
             names.remove(from);
             names.insert(to.clone(), *file);
+        }
+        Step::RenameFolder { from, to } => {
+            let inside = |name: &PathBuf| Some(to.join(name.strip_prefix(from).ok()?));
+            *names = std::mem::take(names)
+                .into_iter()
+                .map(|(name, file)| (inside(&name).unwrap_or(name), file))
+                .collect();
         }
         Step::Remove { path } => {
             names.remove(path);

@@ -17,7 +17,8 @@ use super::{
     Answers, ConfigError, DaemonConfig, IdleStrategy, PipelineConfig, StateConfig, ThreadConfig,
     TrainConfig, is_slow,
 };
-use crate::dataset::{load_track, load_train};
+use crate::dataset::LoadError;
+use crate::models::ModelText;
 
 /// The most pipeline threads that one sample channel serves.
 const THREADS_MAX: usize = 10;
@@ -101,11 +102,13 @@ fn check_trains(
             if !ids.insert(train.id) {
                 return checker.refuse("trains.id", train.id, "a number that no other train has");
             }
-            let track = train.track.map(|file| load_track(&folder.join(file))).transpose()?;
-            let model = Arc::new(load_train(&folder.join(train.file))?);
-            let (id, track, wheel_set) = (TrainId(train.id), track.map(Arc::new), train.wheel_set);
-            let config = TrainConfig { id, model, track, wheel_set, answers: Answers::default() };
-            Ok((config, train.quantities))
+            let (file, line) = (folder.join(train.file), train.track.map(|it| folder.join(it)));
+            let text = ModelText::read(&file, line.as_deref()).map_err(LoadError::from)?;
+            let (model, track) =
+                text.parse(&file, &line.unwrap_or_default()).map_err(LoadError::from)?;
+            let (model, track) = (Arc::new(model), track.map(Arc::new));
+            let (id, wheel_set, answers) = (TrainId(train.id), train.wheel_set, Answers::default());
+            Ok((TrainConfig { id, model, track, text, wheel_set, answers }, train.quantities))
         })
         .collect()
 }

@@ -23,6 +23,7 @@ use dynocar_shared::TrainId;
 use serde::Deserialize;
 
 use crate::dataset::read_text;
+use crate::models::ModelText;
 
 /// What a pipeline thread does while no sample comes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -65,6 +66,8 @@ pub struct TrainConfig {
     pub model: Arc<TrainModel>,
     /// The line it runs on, when known.
     pub track: Option<Arc<Track>>,
+    /// Both as their files spell them.
+    pub text: ModelText,
     /// Which wheels it runs on; estimates are not kept across a change. Empty when not told.
     pub wheel_set: String,
     /// The pipelines that answer a controller's questions, each by its number.

@@ -1,0 +1,130 @@
+//! Who put which model in force, who took it back, and what follows from that.
+
+use serde::{Deserialize, Serialize};
+
+use super::moment::Moment;
+use super::text::ModelHash;
+
+/// What is decided of a model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Action {
+    /// It is put in force.
+    Adopted,
+    /// What is in force is taken back; what was in force before it is so again.
+    RolledBack,
+    /// It is not wanted: it is no candidate any more.
+    Rejected,
+}
+
+impl Action {
+    /// Its name, as in the files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Action::Adopted => "adopted",
+            Action::RolledBack => "rolled_back",
+            Action::Rejected => "rejected",
+        }
+    }
+}
+
+/// A decision that was taken.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Decision {
+    /// What was decided.
+    pub action: Action,
+    /// The model that was adopted or rejected, or that a rollback put in force again; absent for what
+    /// the configuration declares.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<ModelHash>,
+    /// The model in force before; absent for what the configuration declares.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<ModelHash>,
+    /// Who decided: a person's name, or `rule`.
+    pub by: String,
+    /// Why; may be empty.
+    pub reason: String,
+    /// When.
+    pub at: Moment,
+}
+
+/// A decision that is to be taken.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NewDecision {
+    /// What to decide.
+    pub what: Choice,
+    /// Who decides: a person's name, or `rule`.
+    pub by: String,
+    /// Why; may be empty.
+    pub reason: String,
+    /// When.
+    pub at: Moment,
+}
+
+/// What to decide.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Choice {
+    /// Put a model of the store in force.
+    Adopt(ModelHash),
+    /// Put in force again what was so before the model that is.
+    RollBack,
+    /// Strike a model of the store off the candidates.
+    Reject(ModelHash),
+}
+
+/// The models in force after some decisions, the present one last, each on top of what it replaced;
+/// empty while nothing but the configuration's declaration is in force.
+pub fn in_force_after<'d>(decisions: impl IntoIterator<Item = &'d Decision>) -> Vec<ModelHash> {
+    let mut stack = Vec::new();
+    for decision in decisions {
+        match (decision.action, decision.model) {
+            (Action::Adopted, Some(model)) => stack.push(model),
+            (Action::RolledBack, model) => {
+                stack.pop();
+                // What a rollback says that it put in force, holds.
+                match model {
+                    None => stack.clear(),
+                    Some(model) if stack.last() != Some(&model) => stack.push(model),
+                    Some(_) => {}
+                }
+            }
+            _ => {}
+        }
+    }
+    stack
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_rollback_goes_one_adoption_further_back() {
+        let [a, b] = [1, 2].map(|hash| Some(ModelHash(hash)));
+        let decision = |action, model| Decision {
+            action,
+            model,
+            from: None,
+            by: "rule".into(),
+            reason: String::new(),
+            at: Moment { unix_s: 0 },
+        };
+        let (adopt, back) = (Action::Adopted, Action::RolledBack);
+        let steps = [
+            (adopt, a, vec![1]),
+            (adopt, b, vec![1, 2]),
+            (Action::Rejected, Some(ModelHash(3)), vec![1, 2]),
+            (back, a, vec![1]),
+            (back, None, vec![]),
+            (adopt, b, vec![2]),
+            (adopt, a, vec![2, 1]),
+            (back, None, vec![]),
+        ];
+        let mut decisions = Vec::new();
+        for (action, model, expected) in steps {
+            decisions.push(decision(action, model));
+            let expected: Vec<ModelHash> = expected.into_iter().map(ModelHash).collect();
+            assert_eq!(in_force_after(&decisions), expected, "{decisions:?}");
+        }
+    }
+}

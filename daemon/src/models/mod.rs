@@ -1,0 +1,39 @@
+//! A store of models: plain files in one directory, made once and never overwritten.
+//!
+//! ```text
+//! models/1/3f0c5a…/train.toml, track.toml   a model of train 1; the folder's name is the model's hash
+//! models/1/3f0c5a…/origin.toml              where it came from
+//! models/1/3f0c5a…/answer.json, report.html what `explain` said; absent for a declared model
+//! models/1/decisions/000001.toml …          who put what in force, and who took it back
+//! models/1/events/000001.toml …             what belongs to certain runs: maintenance events
+//! ```
+//!
+//! Whatever dies, a process or the power: a model is there as a whole or not at all, and two writers
+//! never take the same number.
+//!
+//! # Layout
+//!
+//! - [`text`]: a model's files as text, and their hash
+//! - [`moment`]: a time in UTC
+//! - [`origin`]: where a model came from
+//! - [`numbered`]: records with numbers: decisions, events
+//! - [`decision`]: what was decided, and what follows from it
+//! - [`event`]: maintenance events
+//! - [`store`]: the directory
+
+pub mod decision;
+mod error;
+pub mod event;
+pub mod moment;
+pub mod numbered;
+pub mod origin;
+pub mod store;
+pub mod text;
+
+pub use decision::{Action, Decision, NewDecision};
+pub use error::ModelsError;
+pub use event::MaintenanceEvent;
+pub use moment::Moment;
+pub use origin::{Figure, FoundEffect, Origin};
+pub use store::{Listing, NewModel, Store, Stored, TrainModels};
+pub use text::{ModelHash, ModelText};

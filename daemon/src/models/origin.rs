@@ -1,0 +1,155 @@
+//! Where a model came from, and what it adds to the model before it.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::moment::Moment;
+use super::text::ModelHash;
+
+/// A number with its standard deviation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Figure {
+    /// The number, in the unit of its name.
+    pub value: f64,
+    /// Its standard deviation.
+    pub std: f64,
+}
+
+impl Figure {
+    /// Half the width of the 95 % interval.
+    pub fn half_width(self) -> f64 {
+        1.96 * self.std
+    }
+
+    /// True where the 95 % intervals of both overlap.
+    pub fn agrees_with(self, other: Figure) -> bool {
+        (self.value - other.value).abs() <= self.half_width() + other.half_width()
+    }
+}
+
+/// An effect that a model adds.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FoundEffect {
+    /// Its kind.
+    pub kind: String,
+    /// Where on the line it acts, in m; empty where it is tied to no place.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub intervals_m: Vec<[f64; 2]>,
+    /// Its numbers by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub parameters: BTreeMap<String, Figure>,
+}
+
+impl FoundEffect {
+    /// True for an effect of the same kind, at the same places, whose numbers agree.
+    pub fn is_same_as(&self, other: &FoundEffect) -> bool {
+        let meets = |[from, to]: [f64; 2], others: &[[f64; 2]]| {
+            others.iter().any(|other| from <= other[1] && other[0] <= to)
+        };
+        let within = |some: &[[f64; 2]], others: &[[f64; 2]]| {
+            some.is_empty() == others.is_empty() && some.iter().all(|it| meets(*it, others))
+        };
+        let agree = |(name, figure): (&String, &Figure)| {
+            other.parameters.get(name).is_none_or(|other| figure.agrees_with(*other))
+        };
+        self.kind == other.kind
+            && within(&self.intervals_m, &other.intervals_m)
+            && within(&other.intervals_m, &self.intervals_m)
+            && self.parameters.iter().all(agree)
+    }
+}
+
+/// A file that a model was learned from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SourceFile {
+    /// Its path in the dataset.
+    pub path: String,
+    /// SHA-256 of its content.
+    pub sha256: String,
+}
+
+/// Open-loop errors in m/s on runs held out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HeldOutError {
+    /// Of the model before.
+    pub before_mps: f64,
+    /// Of this model.
+    pub after_mps: f64,
+}
+
+/// Where a model came from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Origin {
+    /// When it was made.
+    pub made: Moment,
+    /// Version of the program that made it.
+    pub version: String,
+    /// The command that made it.
+    pub command: String,
+    /// The model that it grew from; absent for one that somebody declared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parent: Option<ModelHash>,
+    /// The verdict of `explain`; absent for one that somebody declared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<String>,
+    /// What the model is, in a sentence or two.
+    pub statement: String,
+    /// SHA-256 over the list of files, as the report states it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dataset_sha256: Option<String>,
+    /// The errors before and after, where runs were held out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error: Option<HeldOutError>,
+    /// What it adds to its parent.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<FoundEffect>,
+    /// The files of the dataset that it was learned from.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub files: Vec<SourceFile>,
+}
+
+impl Origin {
+    /// True where both models add the same effects, within their intervals.
+    pub fn adds_the_same_as(&self, other: &Origin) -> bool {
+        let has = |effects: &[FoundEffect], it: &FoundEffect| {
+            effects.iter().any(|other| it.is_same_as(other))
+        };
+        self.effects.len() == other.effects.len()
+            && self.effects.iter().all(|it| has(&other.effects, it))
+            && other.effects.iter().all(|it| has(&self.effects, it))
+    }
+
+    /// What the model adds, in a few words.
+    pub fn adds(&self) -> String {
+        let words = |effect: &FoundEffect| {
+            let places = effect.intervals_m.iter().map(|[from, to]| format!("{from:.0}–{to:.0} m"));
+            let places: Vec<String> = places.collect();
+            let kind = effect.kind.replace('_', " ");
+            if places.is_empty() { kind } else { format!("{kind} at {}", places.join(", ")) }
+        };
+        let effects: Vec<String> = self.effects.iter().map(words).collect();
+        if effects.is_empty() { "declared".into() } else { effects.join("; ") }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn effect(kind: &str, intervals_m: &[[f64; 2]], value: f64) -> FoundEffect {
+        let parameters = [("c_factor".to_owned(), Figure { value, std: 0.1 })].into();
+        FoundEffect { kind: kind.into(), intervals_m: intervals_m.to_vec(), parameters }
+    }
+
+    #[test]
+    fn an_effect_is_the_same_by_kind_place_and_size_within_the_intervals() {
+        let tunnel = effect("tunnel_drag", &[[2000.0, 3500.0]], 2.0);
+        let same = |other: FoundEffect| tunnel.is_same_as(&other) && other.is_same_as(&tunnel);
+        assert!(same(effect("tunnel_drag", &[[1980.0, 3510.0]], 2.3)));
+        assert!(!same(effect("tunnel_drag", &[[1980.0, 3510.0]], 2.5)));
+        assert!(!same(effect("local_resistance", &[[2000.0, 3500.0]], 2.0)));
+        assert!(!same(effect("tunnel_drag", &[[2000.0, 3500.0], [5e3, 6e3]], 2.0)));
+        assert!(!same(effect("tunnel_drag", &[], 2.0)));
+    }
+}
