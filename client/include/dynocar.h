@@ -306,6 +306,7 @@ typedef struct dynocar_parameter_snapshot {
     double suspicion_evidence;      /* 1: twice the log-likelihood ratio of the suspicion */
     double speed_min_mps;           /* lowest speed behind the estimate */
     double speed_max_mps;           /* highest speed behind the estimate */
+    uint64_t model_hash; /* of train and line, as `dynocar models` names it; 0: from no files */
 } dynocar_parameter_snapshot;
 
 /* A snapshot copied out, with its age. */
@@ -574,7 +575,7 @@ DYNOCAR_AT_(dynocar_train_sample, ambient_temperature_degc, 104);
 DYNOCAR_AT_(dynocar_train_sample, gradient_permille, 112);
 DYNOCAR_AT_(dynocar_train_sample, curve_radius_m, 120);
 
-DYNOCAR_SIZE_(dynocar_parameter_snapshot, 520);
+DYNOCAR_SIZE_(dynocar_parameter_snapshot, 528);
 DYNOCAR_AT_(dynocar_parameter_snapshot, epoch, 0);
 DYNOCAR_AT_(dynocar_parameter_snapshot, sequence, 8);
 DYNOCAR_AT_(dynocar_parameter_snapshot, generation, 16);
@@ -612,8 +613,9 @@ DYNOCAR_AT_(dynocar_parameter_snapshot, unexplained_force_std_n, 488);
 DYNOCAR_AT_(dynocar_parameter_snapshot, suspicion_evidence, 496);
 DYNOCAR_AT_(dynocar_parameter_snapshot, speed_min_mps, 504);
 DYNOCAR_AT_(dynocar_parameter_snapshot, speed_max_mps, 512);
+DYNOCAR_AT_(dynocar_parameter_snapshot, model_hash, 520);
 
-DYNOCAR_SIZE_(dynocar_reading, 544);
+DYNOCAR_SIZE_(dynocar_reading, 552);
 DYNOCAR_AT_(dynocar_reading, age_ns, 0);
 DYNOCAR_AT_(dynocar_reading, status, 8);
 DYNOCAR_AT_(dynocar_reading, reason, 12);

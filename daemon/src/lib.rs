@@ -16,6 +16,7 @@
 //! - [`demo`]: the main job as a show
 //! - [`run`]: the daemon, every stage on one screen
 //! - [`runtime`]: its threads
+//! - [`shadow`]: models on trial, and the change from one to another
 //! - [`state`]: estimates that outlive the daemon
 //! - [`storage`]: files that are replaced as a whole
 //! - [`supervision`]: what a supervisor and an operator see of the daemon
@@ -39,6 +40,7 @@ pub mod replay;
 pub mod report;
 pub mod run;
 pub mod runtime;
+pub mod shadow;
 pub mod state;
 pub mod storage;
 pub mod supervision;

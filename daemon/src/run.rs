@@ -19,13 +19,19 @@ use dynocar_core::pipeline::{Pipeline, SettingError};
 use dynocar_shared::{Quantity, TrainId};
 use tracing::{info, warn};
 
-use crate::config::{DaemonConfig, IdleStrategy, PipelineConfig, ThreadConfig, TrainConfig};
+use crate::config::{
+    DaemonConfig, IdleStrategy, ModelsConfig, PipelineConfig, ThreadConfig, TrainConfig,
+};
+use crate::models::Store;
 use crate::runtime::affinity::pin_to_core;
+use crate::runtime::exchange::Exchange;
 use crate::runtime::memory::{STACK_BYTES, lock_all_memory, prefault_stack};
 use crate::runtime::scheduling::set_fifo_priority;
 use crate::runtime::tally::Tally;
 use crate::runtime::watch::{Watch, WatchedPipeline};
 use crate::runtime::worker::{LanePlan, Worker, WorkerPlan};
+use crate::shadow::train::Placed;
+use crate::shadow::{self, Board, ShadowTrain};
 use crate::state::{self, keeper::Keeper};
 use crate::supervision::listener;
 use crate::supervision::notify::{Supervisor, Watchdog};
@@ -63,6 +69,9 @@ pub enum RunError {
 ///
 /// See [`RunError`]; a second daemon on a train is refused with the name of the first.
 pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
+    let mut config = config.clone();
+    shadow::in_force::settle(&mut config);
+    let config = &config;
     let host = match &config.root {
         Some(root) => Host::at(root)?,
         None => Host::from_environment()?,
@@ -83,13 +92,21 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
         lock_memory();
     }
     let state = state::Taken::up(config);
-    let (plans, watched) = plan_workers(config, &host, epoch, &stop, state.as_ref(), &counts)?;
+    let (mut plans, watched) = plan_workers(config, &host, epoch, &stop, state.as_ref(), &counts)?;
+    let board = Board::default();
+    let shadow = plan_shadow(config, &mut plans);
     let workers = start_workers(plans)?;
+    let shadow = shadow
+        .map(|(trains, models)| {
+            shadow::thread::start(trains, models, host.clone(), board.clone(), Arc::clone(&stop))
+        })
+        .transpose()?;
     let keeper = state.map(|state| start_keeper(config, &host, state, &stop)).transpose()?;
     tell_who_answers(config);
     info!(epoch, trains = trains.len(), pipelines = config.pipelines.len(), "serving");
 
-    let listener = config.metrics.map(|address| start_metrics(config, address, &host, &stop));
+    let listener =
+        config.metrics.map(|address| start_metrics(config, address, &host, board, &stop));
     let listener = listener.transpose()?;
 
     let supervisor = Supervisor::from_environment();
@@ -110,7 +127,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
         // A panic was already printed by the thread itself; `ended` names it below.
         let _ = worker.join();
     }
-    for helper in keeper.into_iter().chain(listener) {
+    for helper in keeper.into_iter().chain(listener).chain(shadow) {
         let _ = helper.join();
     }
     watch.report_totals();
@@ -193,7 +210,8 @@ fn plan_workers(
                 Some(lane) => lane.pipelines.push((pipeline, tally)),
                 None => {
                     let (count, pipelines) = (Arc::clone(&counts[place]), vec![(pipeline, tally)]);
-                    lanes.push(LanePlan { train: train.id, count, place: 0, pipelines });
+                    let (train, place, exchange) = (train.id, 0, None);
+                    lanes.push(LanePlan { train, count, place, pipelines, exchange });
                 }
             }
         }
@@ -202,6 +220,35 @@ fn plan_workers(
         number_lanes(&mut plans, train.id, count);
     }
     Ok((plans, watched))
+}
+
+/// The trains whose models are tried, each with a way to the threads that serve it.
+fn plan_shadow(
+    config: &DaemonConfig,
+    plans: &mut [WorkerPlan],
+) -> Option<(Vec<ShadowTrain>, ModelsConfig)> {
+    let models = config.models.clone()?;
+    let store = Store::at(&models.directory);
+    let mut trains = Vec::new();
+    for train in &config.trains {
+        let lanes = plans.iter_mut().flat_map(|plan| &mut plan.lanes);
+        let mut lanes: Vec<&mut LanePlan> = lanes.filter(|it| it.train == train.id).collect();
+        lanes.sort_by_key(|lane| lane.place);
+        let exchange = Arc::new(Exchange::new(lanes.len()));
+        let mut placed = Vec::new();
+        for lane in lanes {
+            lane.exchange = Some(Arc::clone(&exchange));
+            let indices = lane.pipelines.iter().map(|(it, _)| it.snapshot().pipeline_index);
+            placed.extend(indices.map(|index| Placed {
+                settings: config.pipelines[index as usize].clone(),
+                index,
+                seat: lane.place,
+            }));
+        }
+        let own = store.train(train.id);
+        trains.push(ShadowTrain::new(train.clone(), placed, own, models.clone(), exchange));
+    }
+    Some((trains, models))
 }
 
 /// Numbers the lanes of a train, and tells its controllers how many threads and pipelines serve it.
@@ -235,6 +282,7 @@ pub fn build_pipeline(
     let snapshot = pipeline.snapshot_mut();
     snapshot.quantities = train.answers.bits_of(index as usize);
     snapshot.train_quantities = train.answers.all_bits();
+    snapshot.model_hash = train.model_hash.0;
     Ok(pipeline)
 }
 
@@ -262,6 +310,7 @@ fn start_metrics(
     config: &DaemonConfig,
     address: SocketAddr,
     host: &Host,
+    board: Board,
     stop: &Arc<AtomicBool>,
 ) -> Result<JoinHandle<()>, RunError> {
     let failed = |what| move |source| RunError::System { what, source };
@@ -273,7 +322,7 @@ fn start_metrics(
         let readers: Result<Vec<_>, _> =
             trains.into_iter().map(|train| SnapshotReader::open(&host, train)).collect();
         match readers {
-            Ok(mut readers) => listener::serve(&socket, &mut readers, &names, &stop),
+            Ok(mut readers) => listener::serve(&socket, &mut readers, &names, &board, &stop),
             Err(error) => warn!("no metrics: {error}"),
         }
     };

@@ -99,6 +99,9 @@ wire_struct! {
         pub speed_min_mps: f64,
         /// Highest speed in m/s among the data behind the estimate.
         pub speed_max_mps: f64,
+        /// The model of train and line that the pipeline reckons with: the first 8 bytes of SHA-256
+        /// over the train's file, a zero byte and the line's file; 0 when it came from no files.
+        pub model_hash: u64,
     }
 }
 
@@ -143,6 +146,7 @@ impl ParameterSnapshot {
             suspicion_evidence: 0.0,
             speed_min_mps: 0.0,
             speed_max_mps: 0.0,
+            model_hash: 0,
         }
     }
 

@@ -85,6 +85,7 @@ pub fn without_stamps(snapshot: &ParameterSnapshot) -> ParameterSnapshot {
         sample_published_ns: 0,
         published_ns: 0,
         vouched_ns: 0,
+        model_hash: 0,
         ..*snapshot
     }
 }

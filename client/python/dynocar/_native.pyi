@@ -88,6 +88,7 @@ class ParameterSnapshot:
     suspicion_evidence: float
     speed_min_mps: float
     speed_max_mps: float
+    model_hash: int
     def __bytes__(self) -> bytes: ...
     def resistance_at(
         self, speed_mps: float, mass_kg: float

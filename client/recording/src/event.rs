@@ -53,6 +53,8 @@ kinds! {
     SuspicionEnded = 11 "suspicion_ended";
     /// A person or a program asked to keep this moment for good.
     KeepRequested = 12 "keep_requested";
+    /// A pipeline reckons with another model of train and line than before.
+    ModelChanged = 13 "model_changed";
 }
 
 /// Something that happened.

@@ -18,6 +18,7 @@
 //! - [`stops`]: what recorded stops say of a brake of unknown force
 //! - [`survey`]: a line and its gradient from recordings with GNSS
 //! - [`explain`]: which undeclared effect explains what the declared model leaves
+//! - [`trial`]: which of several models predicts better, told while a train runs
 //! - [`advice`]: what to drive next, so that the estimates become sharper
 //! - [`import`]: trains and lines from other projects' files
 
@@ -35,4 +36,5 @@ pub mod survey;
 pub mod terms;
 pub mod track;
 pub mod train;
+pub mod trial;
 pub mod validation;

@@ -47,6 +47,15 @@ pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
         let allowed = format!("at most {THREADS_MAX} threads; let pipelines share one");
         return checker.refuse("threads", threads.len(), allowed);
     }
+    let models = raw.models.map(|it| super::models::check(&checker, it)).transpose()?;
+    if models.is_none() && trains.iter().any(|train| train.candidates.is_some()) {
+        return checker.refuse("trains.candidates", "models", "a store of models, [models]");
+    }
+    if models.is_some() && threads.len() == THREADS_MAX {
+        let allowed =
+            format!("at most {} threads beside the one that tries models", THREADS_MAX - 1);
+        return checker.refuse("threads", threads.len(), allowed);
+    }
     Ok(DaemonConfig {
         root: raw.daemon.root,
         log: raw.daemon.log,
@@ -56,6 +65,7 @@ pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
         lock_memory: raw.daemon.lock_memory,
         metrics: raw.metrics.map(|metrics| check_metrics(&checker, metrics)).transpose()?,
         state: raw.state.map(|state| check_state(&checker, state)).transpose()?,
+        models,
         trains,
         threads,
         pipelines,
@@ -106,9 +116,17 @@ fn check_trains(
             let text = ModelText::read(&file, line.as_deref()).map_err(LoadError::from)?;
             let (model, track) =
                 text.parse(&file, &line.unwrap_or_default()).map_err(LoadError::from)?;
-            let (model, track) = (Arc::new(model), track.map(Arc::new));
-            let (id, wheel_set, answers) = (TrainId(train.id), train.wheel_set, Answers::default());
-            Ok((TrainConfig { id, model, track, text, wheel_set, answers }, train.quantities))
+            let config = TrainConfig {
+                id: TrainId(train.id),
+                model: Arc::new(model),
+                track: track.map(Arc::new),
+                model_hash: text.hash(),
+                text,
+                candidates: super::models::candidates(checker, train.candidates)?,
+                wheel_set: train.wheel_set,
+                answers: Answers::default(),
+            };
+            Ok((config, train.quantities))
         })
         .collect()
 }

@@ -5,6 +5,7 @@
 
 mod check;
 mod checker;
+mod models;
 mod pace;
 mod quantities;
 mod raw;
@@ -23,7 +24,8 @@ use dynocar_shared::TrainId;
 use serde::Deserialize;
 
 use crate::dataset::read_text;
-use crate::models::ModelText;
+use crate::models::{ModelHash, ModelText};
+use crate::shadow::rule::Rule;
 
 /// What a pipeline thread does while no sample comes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -66,8 +68,12 @@ pub struct TrainConfig {
     pub model: Arc<TrainModel>,
     /// The line it runs on, when known.
     pub track: Option<Arc<Track>>,
-    /// Both as their files spell them.
+    /// By what that model of train and line is known.
+    pub model_hash: ModelHash,
+    /// What the configuration declares, as its files spell it.
     pub text: ModelText,
+    /// The models to be tried beside the one in force; those of the store when absent.
+    pub candidates: Option<Vec<ModelHash>>,
     /// Which wheels it runs on; estimates are not kept across a change. Empty when not told.
     pub wheel_set: String,
     /// The pipelines that answer a controller's questions, each by its number.
@@ -83,6 +89,21 @@ pub struct StateConfig {
     pub interval_s: u64,
     /// An older estimate is not taken up, in h.
     pub age_max_h: u64,
+}
+
+/// The store of models, and what becomes of those on trial.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelsConfig {
+    /// The store's directory.
+    pub directory: PathBuf,
+    /// When a model is adopted or taken back.
+    pub rule: Rule,
+    /// The most candidates of a train that are on trial at once.
+    pub candidates_max: usize,
+    /// Processor core of the thread that tries them.
+    pub core: Option<usize>,
+    /// How often the trials are written down, in s.
+    pub interval_s: u64,
 }
 
 /// A thread that serves pipelines.
@@ -134,6 +155,8 @@ pub struct DaemonConfig {
     pub metrics: Option<std::net::SocketAddr>,
     /// Estimates that outlive the daemon; none are kept when absent.
     pub state: Option<StateConfig>,
+    /// The store of models; without it what is declared stays in force.
+    pub models: Option<ModelsConfig>,
     /// The pipelines, by the number that their snapshots carry.
     pub pipelines: Vec<PipelineConfig>,
 }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde::Deserialize;
 
 use super::{IdleStrategy, LogFormat};
+use crate::shadow::rule::Adopt;
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -22,6 +23,7 @@ pub struct RawConfig {
     pub quantities: RawQuantities,
     pub state: Option<RawState>,
     pub metrics: Option<RawMetrics>,
+    pub models: Option<RawModels>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -66,6 +68,7 @@ pub struct RawTrain {
     pub wheel_set: String,
     #[serde(default)]
     pub quantities: RawQuantities,
+    pub candidates: Option<Vec<String>>,
 }
 
 /// Name of the pipeline that answers, by the quantity's name.
@@ -79,6 +82,42 @@ pub struct RawState {
     pub interval_s: u64,
     #[serde(default = "default_age_max_h")]
     pub age_max_h: u64,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RawModels {
+    pub directory: PathBuf,
+    #[serde(default = "default_adopt")]
+    pub adopt: Adopt,
+    #[serde(default = "default_least_gain")]
+    pub least_gain: f64,
+    #[serde(default = "default_trips_between_mistakes")]
+    pub trips_between_mistakes: f64,
+    #[serde(default = "default_candidates_max")]
+    pub candidates_max: u64,
+    #[serde(default = "default_interval_s")]
+    pub interval_s: u64,
+    pub core: Option<usize>,
+    #[serde(default)]
+    pub bounds: BTreeMap<String, [f64; 2]>,
+}
+
+const fn default_adopt() -> Adopt {
+    Adopt::Ask
+}
+
+const fn default_least_gain() -> f64 {
+    0.1
+}
+
+/// Twenty years of twenty-seven trips a day.
+const fn default_trips_between_mistakes() -> f64 {
+    200_000.0
+}
+
+const fn default_candidates_max() -> u64 {
+    2
 }
 
 const fn default_interval_s() -> u64 {

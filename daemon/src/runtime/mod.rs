@@ -1,6 +1,7 @@
 //! The threads of the daemon.
 //!
 //! - [`worker`]: a pipeline thread, from sample to snapshot
+//! - [`exchange`]: pipelines of another model on their way to a thread, and the old ones back
 //! - [`idle`]: what it does while no sample comes
 //! - [`affinity`]: binding it to a core
 //! - [`scheduling`]: its real-time priority
@@ -10,6 +11,7 @@
 //! - [`watch`]: what the main thread does meanwhile: signals, peers, the log
 
 pub mod affinity;
+pub mod exchange;
 pub mod idle;
 pub mod memory;
 pub mod scheduling;

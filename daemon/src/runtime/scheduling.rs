@@ -13,6 +13,13 @@ pub fn set_fifo_priority(priority: u8) -> std::io::Result<()> {
     if answer == 0 { Ok(()) } else { Err(std::io::Error::last_os_error()) }
 }
 
+/// Lets the calling thread run only where no thread of ordinary niceness wants to, or nearly so.
+pub fn stand_back() {
+    const NICENESS: libc::c_int = 10;
+    // SAFETY: no memory is involved; 0 names the calling thread. Who is nice needs no privilege.
+    unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICENESS) };
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

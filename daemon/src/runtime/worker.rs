@@ -6,8 +6,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use dynocar_client::channel::{Receiver, SampleCount, Sender, Sleeper, Transport};
 use dynocar_client::{ChannelError, Host, monotonic_now_ns};
 use dynocar_core::pipeline::Pipeline;
+use dynocar_core::pipeline::motion::STANDING_MPS;
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 
+use super::exchange::Exchange;
 use super::idle::Idler;
 use super::tally::Tally;
 use crate::config::{IdleStrategy, ThreadConfig};
@@ -47,6 +49,8 @@ pub struct LanePlan {
     pub place: usize,
     /// The pipelines, each with the tally it writes.
     pub pipelines: Vec<(Pipeline, Arc<Tally>)>,
+    /// By which pipelines of another model come, when any may come; the thread's seat is its place.
+    pub exchange: Option<Arc<Exchange>>,
 }
 
 struct Slot {
@@ -63,6 +67,11 @@ struct Lane {
     /// A sample taken while falling asleep, to be processed before the channel's next.
     found: Option<TrainSample>,
     slots: Vec<Slot>,
+    exchange: Option<Arc<Exchange>>,
+    /// Number of the newest sample.
+    newest: u64,
+    /// Speed in it; nobody drives the train before the first.
+    newest_speed_mps: f64,
 }
 
 /// A pipeline thread at work; lives in its own thread, for the ports cannot move.
@@ -148,6 +157,7 @@ impl Worker {
                     slot.process(&sample, self.epoch);
                 }
                 lane.count.note_taken(lane.place, sample.sequence);
+                (lane.newest, lane.newest_speed_mps) = (sample.sequence, sample.speed_mps);
                 processed = true;
             }
         }
@@ -160,6 +170,7 @@ impl Worker {
         self.idler.serve_newcomers();
         for lane in &mut self.lanes {
             lane.count_what_was_left(self.epoch, now_ns);
+            lane.change_models(self.epoch, now_ns);
         }
         for slot in self.lanes.iter_mut().flat_map(|lane| &mut lane.slots) {
             if now_ns - slot.last_vouched_ns >= self.heartbeat_ns {
@@ -191,6 +202,22 @@ impl Lane {
             }
         }
         self.count.note_taken(self.place, ended);
+        self.newest_speed_mps = 0.0;
+    }
+
+    /// Puts the pipelines of another model to work, if any came and the train stands.
+    fn change_models(&mut self, epoch: u64, now_ns: i64) {
+        let Some(exchange) = &self.exchange else { return };
+        // A speed that is no number is none at which to change.
+        let stands = self.newest_speed_mps.abs() <= STANDING_MPS;
+        let Some(mut set) = exchange.take(self.place, self.newest, stands) else { return };
+        for (slot, new) in self.slots.iter_mut().zip(&mut set) {
+            new.take_over(&mut slot.pipeline);
+            std::mem::swap(new, &mut slot.pipeline);
+            slot.pipeline.snapshot_mut().sequence += 1;
+            slot.publish(epoch, now_ns);
+        }
+        exchange.give_back(self.place, set);
     }
 }
 
@@ -237,7 +264,16 @@ fn open_lane(transport: &Transport, plan: LanePlan, epoch: u64) -> Result<Lane, 
             Ok(slot)
         })
         .collect::<Result<_, ChannelError>>()?;
-    Ok(Lane { receiver, count: plan.count, place: plan.place, found: None, slots })
+    Ok(Lane {
+        receiver,
+        count: plan.count,
+        place: plan.place,
+        found: None,
+        slots,
+        exchange: plan.exchange,
+        newest: counted_from,
+        newest_speed_mps: 0.0,
+    })
 }
 
 /// True when a sample came while the controllers were told of the sleep; keeps it.

@@ -17,20 +17,17 @@ pub struct ModelKey {
     pub train: u64,
     /// The wheel set by the configuration; empty when it names none.
     pub wheel_set: String,
-    /// Hash over everything declared of the train and its line.
+    /// By what the model of train and line is known.
     pub model: u64,
 }
 
 impl ModelKey {
     /// The key of a configured train.
     pub fn of(train: &TrainConfig) -> Self {
-        // The Debug form spells every declared number out to the bit; comments and order in the
-        // files do not count.
-        let declared = format!("{:?} {:?}", train.model, train.track);
         ModelKey {
             train: train.id.0,
             wheel_set: train.wheel_set.clone(),
-            model: checksum(declared.as_bytes()),
+            model: train.model_hash.0,
         }
     }
 }

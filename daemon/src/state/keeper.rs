@@ -89,6 +89,11 @@ impl Keeper {
             train.reader.poll();
             for reading in train.reader.readings(now_ns) {
                 let place = reading.snapshot.pipeline_index as usize;
+                if reading.snapshot.model_hash != train.content.key.model {
+                    // Another model is in force: what was kept of the one before holds no more.
+                    train.content.key.model = reading.snapshot.model_hash;
+                    train.content.estimates.clear();
+                }
                 if let Some((name, settings)) = self.pipelines.get(place) {
                     let is_news =
                         keep(&mut train.content, name, *settings, reading.snapshot, now_s);

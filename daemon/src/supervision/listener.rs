@@ -13,6 +13,7 @@ use dynocar_client::SnapshotReader;
 use tracing::warn;
 
 use super::metrics;
+use crate::shadow::Board;
 
 /// The longest request in bytes.
 const REQUEST_BYTES_MAX: usize = 4096;
@@ -37,13 +38,14 @@ pub fn serve(
     listener: &TcpListener,
     readers: &mut [SnapshotReader],
     names: &[String],
+    board: &Board,
     stop: &Arc<AtomicBool>,
 ) {
     while !stop.load(Ordering::Relaxed) {
         match listener.accept() {
             Ok((stream, _)) => {
                 // A client that goes away or dawdles is its own misfortune.
-                let _ = answer(stream, || metrics::text(readers, names));
+                let _ = answer(stream, || metrics::text(readers, names, &board.read()));
             }
             Err(error) if error.kind() == ErrorKind::WouldBlock => {
                 // Keeps the channel empty, so that an answer is up to date at once.

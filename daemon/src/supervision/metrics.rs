@@ -9,6 +9,8 @@ use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::registry::Registry;
 use std::sync::atomic::AtomicU64;
 
+use crate::shadow::TrialFigures;
+
 /// The content type of [`text`].
 pub const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
@@ -31,6 +33,11 @@ struct Families {
     deviation: Gauges,
     innovation: Gauges,
     unexplained: Gauges,
+    in_force: Gauges,
+    trial_error: Gauges,
+    trial_ratio: Gauges,
+    trial_evidence: Gauges,
+    trial_trips: Gauges,
 }
 
 impl Families {
@@ -53,10 +60,37 @@ impl Families {
             ("parameter_std", "Standard deviation in the parameter's unit", &self.deviation),
             ("innovation_mean_square", "1 when the model holds", &self.innovation),
             ("unexplained_force_newtons", "Force that the model lacks", &self.unexplained),
+            ("model_in_force", "1 for the model in force, 0 for one on trial", &self.in_force),
+            ("model_error_mps", "Open-loop error of the model over 60 s", &self.trial_error),
+            (
+                "model_error_ratio",
+                "Error of the model over that of the one in force: ends of an interval of 95 %",
+                &self.trial_ratio,
+            ),
+            ("model_evidence", "Evidence that the model is better", &self.trial_evidence),
+            ("model_trips", "Trips over which the model was compared", &self.trial_trips),
         ];
         for (name, help, family) in gauges {
             registry.register(name, help, family.clone());
         }
+    }
+
+    fn take_trial(&self, it: &TrialFigures) {
+        let labels: Labels = vec![("train", it.train.to_string()), ("model", it.model.to_string())];
+        self.in_force.get_or_create(&labels).set(f64::from(u8::from(it.is_in_force)));
+        if let Some(error_mps) = it.error_mps {
+            self.trial_error.get_or_create(&labels).set(error_mps);
+        }
+        if it.is_in_force {
+            return;
+        }
+        for (end, value) in ["low", "high"].into_iter().zip(it.error_ratio.into_iter().flatten()) {
+            let mut labels = labels.clone();
+            labels.push(("end", end.to_owned()));
+            self.trial_ratio.get_or_create(&labels).set(value);
+        }
+        self.trial_evidence.get_or_create(&labels).set(it.capital);
+        self.trial_trips.get_or_create(&labels).set(it.trips as f64);
     }
 
     fn take(&self, reading: &Reading<'_>, name: &str) {
@@ -100,9 +134,11 @@ impl Families {
     }
 }
 
-/// The newest snapshots as OpenMetrics text; `names` are the pipelines' by their number.
-pub fn text(readers: &mut [SnapshotReader], names: &[String]) -> String {
+/// The newest snapshots and what models on trial show, as OpenMetrics text; `names` are the
+/// pipelines' by their number.
+pub fn text(readers: &mut [SnapshotReader], names: &[String], trials: &[TrialFigures]) -> String {
     let families = Families::default();
+    trials.iter().for_each(|it| families.take_trial(it));
     for reader in readers {
         reader.poll();
         for reading in reader.readings(monotonic_now_ns()) {

@@ -23,6 +23,8 @@ struct Seen {
     status: (u32, u32),
     /// The number of the effect that is suspected.
     suspect: u32,
+    /// The model's hash.
+    model: u64,
     taken_ns: i64,
     is_silent: bool,
 }
@@ -106,7 +108,8 @@ impl Lane {
             let is_other_status =
                 seen.is_none() || status != known.status || it.epoch != known.epoch;
             let is_other_suspect = it.suspected_effect != known.suspect;
-            let is_change = is_other_status || is_other_suspect;
+            let is_other_model = seen.is_some() && it.model_hash != known.model;
+            let is_change = is_other_status || is_other_suspect || is_other_model;
             if seen.is_some()
                 && !is_change
                 && (!is_news || now_ns - known.taken_ns < self.interval_ns)
@@ -120,11 +123,15 @@ impl Lane {
             if is_other_suspect {
                 sink.event(&suspicion_event(self.train, it))?;
             }
+            if is_other_model {
+                sink.event(&model_event(self.train, it))?;
+            }
             *seen = Some(Seen {
                 epoch: it.epoch,
                 sequence: it.sequence,
                 status,
                 suspect: it.suspected_effect,
+                model: it.model_hash,
                 taken_ns: now_ns,
                 is_silent: false,
             });
@@ -223,6 +230,13 @@ fn status_event(train: TrainId, it: &ParameterSnapshot) -> Event {
         reason: Some(it.reason as i32),
         ..event(train, EventKind::StatusChanged, text)
     }
+}
+
+fn model_event(train: TrainId, it: &ParameterSnapshot) -> Event {
+    let kind = it.pipeline_kind().map_or("unknown", PipelineKind::name);
+    let text = format!("{kind}: model {:016x} is in force", it.model_hash);
+    let pipeline_index = Some(it.pipeline_index);
+    Event { pipeline_index, ..event(train, EventKind::ModelChanged, text) }
 }
 
 fn suspicion_event(train: TrainId, it: &ParameterSnapshot) -> Event {

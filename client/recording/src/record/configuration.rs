@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use dynocar::dataset::read_text;
+use dynocar::models::{ModelText, Store};
+use dynocar_shared::TrainId;
 use toml::Table;
 
 /// A file to be attached: its name there and its content.
@@ -13,7 +15,8 @@ pub type File = (String, String);
 pub struct Configuration {
     /// Where it was found.
     pub path: PathBuf,
-    /// `daemon.toml`, and `train-<id>.toml` and `track-<id>.toml` for each of its trains.
+    /// `daemon.toml`, and `train-<id>.toml` and `track-<id>.toml` for each of its trains: those of the
+    /// model in force, by the store that the configuration names.
     pub files: Vec<File>,
 }
 
@@ -48,6 +51,11 @@ impl Configuration {
         let mut files = vec![("daemon.toml".to_owned(), configuration)];
         for train in table.get("trains").and_then(|it| it.as_array()).into_iter().flatten() {
             let id = train.get("id").and_then(|it| it.as_integer()).unwrap_or(0);
+            if let Some(adopted) = adopted(&table, folder, id)? {
+                files.push((format!("train-{id}.toml"), adopted.train));
+                files.extend(adopted.track.map(|text| (format!("track-{id}.toml"), text)));
+                continue;
+            }
             for (key, name) in [("file", "train"), ("track", "track")] {
                 if let Some(file) = train.get(key).and_then(|it| it.as_str()) {
                     files.push((format!("{name}-{id}.toml"), text(&folder.join(file))?));
@@ -56,6 +64,16 @@ impl Configuration {
         }
         Ok(Configuration { path: path.into(), files })
     }
+}
+
+/// The model that the store of a configuration has put in force for a train; `None` where what the
+/// configuration declares is.
+fn adopted(table: &Table, folder: &Path, train: i64) -> Result<Option<ModelText>, String> {
+    let directory = table.get("models").and_then(|models| models.get("directory")?.as_str());
+    let Some(directory) = directory else { return Ok(None) };
+    let models = Store::at(&folder.join(directory)).train(TrainId(train as u64));
+    let hash = models.in_force().map_err(|it| it.to_string())?;
+    hash.map(|hash| models.text(hash).map_err(|it| it.to_string())).transpose()
 }
 
 /// The file behind `--config` in the command line of a process of this user.

@@ -127,6 +127,7 @@ fn load(
     let trains = table.get_mut("trains").and_then(Value::as_array_mut);
     for train in trains.into_iter().flatten().filter_map(Value::as_table_mut) {
         let id = train.get("id").and_then(Value::as_integer).unwrap_or(0);
+        train.remove("candidates");
         for (key, name) in [("file", "train"), ("track", "track")] {
             if let Some(file) = train.get_mut(key) {
                 *file = Value::String(format!("{name}-{id}.toml"));
@@ -135,6 +136,8 @@ fn load(
     }
     // Its folder is on another host; what it would change is said in words.
     let keeps_state = table.remove("state").is_some();
+    // The models that were in force are attached in place of those declared.
+    table.remove("models");
     let config = DaemonConfig::from_text(&place.path().join("daemon.toml"), &table.to_string())
         .map_err(|source| ConfigurationError::Refused { path: path.into(), source })?;
     Ok((config, keeps_state))

@@ -134,6 +134,9 @@ fn compare(
     for (same, it) in recorded.iter().enumerate() {
         let agree_up_to = recorded[..same].last().map_or(0, |it| it.sample_sequence);
         let others = |why| (same, Outcome::OtherSamples { agree_up_to, why });
+        if it.model_hash != pipeline.snapshot().model_hash {
+            return others("another model was in force than the attached one");
+        }
         while pipeline.snapshot().sequence < it.sequence {
             let is_newest = pipeline.snapshot().sample_sequence == it.sample_sequence;
             let missed = it.samples_lost.saturating_sub(pipeline.snapshot().samples_lost);

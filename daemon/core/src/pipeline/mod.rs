@@ -45,6 +45,8 @@ pub struct Pipeline {
     plausibility: Plausibility,
     /// Share of the samples lately that validation refused.
     refused_share: f64,
+    /// Resets of the pipelines that this one took over from.
+    resets_before: u64,
     snapshot: ParameterSnapshot,
 }
 
@@ -75,6 +77,7 @@ impl Pipeline {
             resolver: ForceResolver::new(train, track),
             estimator,
             refused_share: 0.0,
+            resets_before: 0,
             snapshot,
         }
     }
@@ -83,8 +86,33 @@ impl Pipeline {
     /// estimator has no use for it.
     pub fn warm_start(&mut self, kept: &KeptEstimate) -> bool {
         let is_taken = self.estimator.warm_start(kept);
-        self.estimator.write(&mut self.snapshot);
+        self.write_estimate();
         is_taken
+    }
+
+    /// Takes the place of another pipeline of the train, with another model: the counts of samples,
+    /// snapshots and resets go on here, this change being one more reset, and a new stretch of motion
+    /// begins; the estimate stays this one's own. The other goes on from here on its own account.
+    ///
+    /// # Real-time
+    ///
+    /// Allocates nothing, locks nothing.
+    pub fn take_over(&mut self, other: &mut Pipeline) {
+        self.validator.exchange(&mut other.validator);
+        let (ours, theirs) = (self.snapshot.model_hash, other.snapshot);
+        self.resets_before = theirs.generation + 1;
+        other.resets_before = 0;
+        let written = &mut self.snapshot;
+        std::mem::swap(written, &mut other.snapshot);
+        (written.model_hash, other.snapshot.model_hash) = (ours, theirs.model_hash);
+        self.write_estimate();
+        other.write_estimate();
+    }
+
+    fn write_estimate(&mut self) {
+        self.snapshot.generation = 0;
+        self.estimator.write(&mut self.snapshot);
+        self.snapshot.generation += self.resets_before;
     }
 
     /// Counts the samples after this number, taken or lost; to be called before the first sample.
@@ -140,8 +168,8 @@ impl Pipeline {
         snapshot.sample_time_ns = sample.time_ns;
         snapshot.sample_published_ns = sample.published_ns;
         snapshot.sample_sequence = sample.sequence;
-        self.estimator.write(snapshot);
-        let is_estimated = snapshot.status() == Status::Estimated;
+        self.write_estimate();
+        let is_estimated = self.snapshot.status() == Status::Estimated;
         if let Some(Finding { slip, .. }) = self.implausible() {
             let snapshot = &mut self.snapshot;
             snapshot.reason = slip.reason() as u32;

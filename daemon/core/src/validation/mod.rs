@@ -127,6 +127,18 @@ impl Validator {
         self.counted = sequence;
     }
 
+    /// Changes places with the validator of another model of the same train: each goes on counting
+    /// where the other stopped, by its own limits, and begins a new stretch of motion.
+    pub fn exchange(&mut self, other: &mut Validator) {
+        std::mem::swap(self, other);
+        std::mem::swap(&mut self.limits, &mut other.limits);
+        std::mem::swap(&mut self.nominal_mass_kg, &mut other.nominal_mass_kg);
+        let stretch = self.stretch.max(other.stretch);
+        for it in [self, other] {
+            (it.stretch, it.last) = (stretch, None);
+        }
+    }
+
     /// No sample up to this number will come any more.
     pub fn count_up_to(&mut self, sequence: u64) {
         let missing = sequence.saturating_sub(self.counted);

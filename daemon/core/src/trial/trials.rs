@@ -1,0 +1,168 @@
+//! The model in force and its rivals on the same samples.
+
+use dynocar_shared::{SampleField, TrainId, TrainSample};
+
+use super::evidence::{Evidence, score};
+use super::ledger::Ledger;
+use super::open_loop::{OpenLoop, WINDOW_S};
+use crate::pipeline::Pipeline;
+use crate::pipeline::motion::MOVING_MPS;
+use crate::simulate::SpeedError;
+use crate::validation::{ValidSample, ValidationLimits, Validator};
+
+/// Moving time in s of which a trip is made that compares models; shorter ones join the next.
+const TRIP_MIN_S: f64 = 120.0;
+/// A controller that counts no trips is compared anew every so many s of motion.
+const TRIP_MAX_S: f64 = 1800.0;
+
+/// A model on trial.
+pub struct Rival {
+    /// Its hash.
+    pub model: u64,
+    /// The configured pipelines, with this model.
+    pub pipelines: Vec<Pipeline>,
+    /// What the trips say for it, against the model in force.
+    pub evidence: Evidence,
+    /// Its errors.
+    pub ledger: Ledger,
+    open_loop: OpenLoop,
+    /// Over the trip that goes on.
+    trip: SpeedError,
+    /// Whether it was there when that trip began.
+    is_whole: bool,
+}
+
+impl Rival {
+    /// A model with what is known of it already.
+    pub fn new(
+        model: u64,
+        open_loop: OpenLoop,
+        pipelines: Vec<Pipeline>,
+        (evidence, ledger): (Evidence, Ledger),
+    ) -> Self {
+        let trip = SpeedError::default();
+        Rival { model, pipelines, evidence, ledger, open_loop, trip, is_whole: false }
+    }
+
+    fn take(&mut self, sample: &TrainSample, valid: Option<&ValidSample>) {
+        for pipeline in &mut self.pipelines {
+            pipeline.process(sample);
+        }
+        if let Some(valid) = valid {
+            self.open_loop.take(valid);
+        }
+    }
+}
+
+/// The window that goes on.
+#[derive(Clone, Copy)]
+struct Window {
+    begin_ns: i64,
+    stretch: u32,
+    first_m: Option<f64>,
+    last_m: Option<f64>,
+}
+
+/// One train's models on trial, by the samples of its controller.
+pub struct Trials {
+    validator: Validator,
+    /// The model in force. Its evidence is against itself and stays empty; its pipelines run
+    /// elsewhere.
+    pub in_force: Rival,
+    /// The others; one that is added is compared from the next trip on.
+    pub rivals: Vec<Rival>,
+    window: Option<Window>,
+    run: Option<u32>,
+    moved_s: f64,
+}
+
+impl Trials {
+    /// Of a train of a nominal mass in kg.
+    pub fn new(train: TrainId, mass_kg: f64, in_force: Rival, rivals: Vec<Rival>) -> Self {
+        let validator = Validator::new(train, mass_kg, ValidationLimits::for_train(mass_kg));
+        let mut trials =
+            Trials { validator, in_force, rivals, window: None, run: None, moved_s: 0.0 };
+        trials.begin_trip();
+        trials
+    }
+
+    /// Takes the next sample; `unix_s` is the time of day, in s since 1970. True when a trip ended
+    /// by it, and with it the models were compared.
+    pub fn take(&mut self, sample: &TrainSample, unix_s: f64) -> bool {
+        let valid = self.validator.check(sample).ok();
+        let mut has_compared = false;
+        if let Some(valid) = &valid {
+            let ends = self.window.is_some_and(|window| {
+                let length_ns = valid.sample.time_ns.saturating_sub(window.begin_ns);
+                window.stretch != valid.stretch || length_ns as f64 * 1e-9 >= WINDOW_S
+            });
+            if ends {
+                self.close_window(unix_s);
+            }
+            let is_next_trip = self.run.is_some_and(|run| run != sample.run);
+            self.run = Some(sample.run);
+            if self.moved_s >= if is_next_trip { TRIP_MIN_S } else { TRIP_MAX_S } {
+                self.compare();
+                has_compared = true;
+            }
+            self.moved_s += if valid.sample.speed_mps > MOVING_MPS { valid.step_s } else { 0.0 };
+            let position_m = sample.get(SampleField::Position);
+            let window = self.window.get_or_insert(Window {
+                begin_ns: sample.time_ns,
+                stretch: valid.stretch,
+                first_m: position_m,
+                last_m: position_m,
+            });
+            window.last_m = position_m;
+        }
+        for model in self.models() {
+            model.take(sample, valid.as_ref());
+        }
+        has_compared
+    }
+
+    /// A rival goes into force, and the model in force becomes a rival in its place. What was
+    /// measured of both stays, what was compared begins anew.
+    pub fn change(&mut self, place: usize) {
+        std::mem::swap(&mut self.in_force, &mut self.rivals[place]);
+        for model in self.models() {
+            model.evidence = Evidence::new(model.evidence.least_gain());
+        }
+        self.begin_trip();
+    }
+
+    /// Every model that is there takes part in the trip from here on.
+    fn begin_trip(&mut self) {
+        for model in self.models() {
+            (model.trip, model.is_whole) = (SpeedError::default(), true);
+        }
+        self.moved_s = 0.0;
+    }
+
+    fn models(&mut self) -> impl Iterator<Item = &mut Rival> {
+        std::iter::once(&mut self.in_force).chain(&mut self.rivals)
+    }
+
+    fn close_window(&mut self, unix_s: f64) {
+        let Some(window) = self.window.take() else { return };
+        let middle_m = window.first_m.zip(window.last_m).map(|(first, last)| 0.5 * (first + last));
+        for model in self.models() {
+            let error = model.open_loop.close();
+            model.ledger.book(error, unix_s, middle_m);
+            model.trip = model.trip + error;
+        }
+    }
+
+    fn compare(&mut self) {
+        let mean = |error: SpeedError| {
+            (error.count > 0).then(|| error.sum_of_squares / error.count as f64)
+        };
+        let in_force = mean(self.in_force.trip);
+        for rival in self.rivals.iter_mut().filter(|rival| rival.is_whole) {
+            if let Some((in_force, own)) = in_force.zip(mean(rival.trip)) {
+                rival.evidence.take(score(in_force, own));
+            }
+        }
+        self.begin_trip();
+    }
+}

@@ -1,0 +1,72 @@
+//! Which model a train has when the daemon starts.
+
+use std::sync::Arc;
+use std::time::SystemTime;
+
+use tracing::{info, warn};
+
+use crate::config::{DaemonConfig, TrainConfig};
+use crate::models::{ModelHash, ModelsError, Moment, NewModel, Origin, Store, TrainModels};
+
+/// Puts what the configuration declares of each train into the store, and gives each train the model
+/// that the store's decisions put in force. Where the store cannot be read, what is declared stays
+/// in force, and the log says why.
+pub fn settle(config: &mut DaemonConfig) {
+    let Some(models) = &config.models else { return };
+    let store = Store::at(&models.directory);
+    for train in &mut config.trains {
+        if let Err(error) = settle_train(&store.train(train.id), train) {
+            warn!(train = train.id.0, "the declared model stays in force: {error}");
+        }
+    }
+}
+
+fn settle_train(models: &TrainModels, train: &mut TrainConfig) -> Result<(), ModelsError> {
+    put_declared(models, train)?;
+    let Some(hash) = models.in_force()? else { return Ok(()) };
+    *train = with_model(models, train, hash)?;
+    let added = models.stored(hash)?.origin.adds();
+    info!(train = train.id.0, model = %hash, "in force, as decided: {added}");
+    Ok(())
+}
+
+/// What the configuration declares, as a model of the store.
+///
+/// # Errors
+///
+/// When it cannot be written.
+pub fn put_declared(models: &TrainModels, train: &TrainConfig) -> Result<ModelHash, ModelsError> {
+    let origin = Origin {
+        made: Moment::of(SystemTime::now()),
+        version: env!("CARGO_PKG_VERSION").into(),
+        command: "dynocar run".into(),
+        parent: None,
+        verdict: None,
+        statement: "Declared by the daemon's configuration.".into(),
+        dataset_sha256: None,
+        error: None,
+        effects: Vec::new(),
+        files: Vec::new(),
+    };
+    let text = train.text.clone();
+    models.put(&NewModel { text, origin, answer_json: None, report_html: None })
+}
+
+/// The train's configuration with another model of the store in place of what is declared.
+///
+/// # Errors
+///
+/// When the store does not give the model.
+pub fn with_model(
+    models: &TrainModels,
+    train: &TrainConfig,
+    hash: ModelHash,
+) -> Result<TrainConfig, ModelsError> {
+    let (model, track) = models.load(hash)?;
+    Ok(TrainConfig {
+        model: Arc::new(model),
+        track: track.map(Arc::new),
+        model_hash: hash,
+        ..train.clone()
+    })
+}

@@ -1,0 +1,30 @@
+//! Models on trial in the shadow of the one in force, and the change from one to another.
+//!
+//! A thread of its own takes the samples of the trains once more, beside the pipeline threads, and
+//! lets the model in force and its rivals predict them ([`dynocar_core::trial`]): candidates of the
+//! store ([`crate::models`]), the model that was in force before, the one that was taken back last. Each
+//! rival has its own pipelines and residual monitor, whose snapshots nobody else sees. When the
+//! store's decisions put another model in force, its pipelines, warm by then, change places with those at
+//! work while the train stands ([`crate::runtime::exchange`]). The pipeline threads and the controller never
+//! wait for any of it.
+//!
+//! # Layout
+//!
+//! - [`in_force`]: which model a train has when the daemon starts
+//! - [`rivals`]: which models are on trial
+//! - [`rule`]: when a rule adopts or takes back, and which bounds no model may leave
+//! - [`train`]: one train's trials, and its change of models
+//! - [`record`]: what the trials measured, as a file that outlives the daemon
+//! - [`figures`]: the same for those who watch the daemon
+//! - [`thread`]: the thread
+
+pub mod figures;
+pub mod in_force;
+pub mod record;
+pub mod rivals;
+pub mod rule;
+pub mod thread;
+pub mod train;
+
+pub use figures::{Board, TrialFigures};
+pub use train::ShadowTrain;

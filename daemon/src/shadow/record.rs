@@ -1,0 +1,117 @@
+//! What the trials of a train measured, as a file beside its models that outlives the daemon.
+//!
+//! `trials.json` is replaced as a whole. A daemon that starts takes up the errors of each model, and
+//! what the trips said for a rival against the same model in force.
+
+use std::path::{Path, PathBuf};
+
+use dynocar_core::trial::evidence::Evidence;
+use dynocar_core::trial::ledger::Ledger;
+use serde::{Deserialize, Serialize};
+use tracing::warn;
+
+use crate::models::{ModelHash, Moment};
+use crate::storage::{Disk, Rights, StorageError, replace};
+
+/// The file, in a train's folder of the store.
+pub const TRIALS_FILE: &str = crate::models::store::TRIALS_FILE;
+/// Models of which errors are kept, those tried last.
+const MODELS_MAX: usize = 32;
+
+/// What a pipeline of a rival says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// The pipeline's name.
+    pub pipeline: String,
+    /// Its status.
+    pub status: String,
+    /// Parameters with value and standard deviation.
+    pub values: Vec<(String, f64, f64)>,
+    /// The effect that a residual monitor suspects with this model; empty for none.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub suspects: String,
+}
+
+/// A model that is or was on trial.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tried {
+    /// The model.
+    pub model: ModelHash,
+    /// When a sample was last predicted by it.
+    pub last: Moment,
+    /// The model in force that it is compared with, while it is on trial.
+    pub against: Option<ModelHash>,
+    /// Its open-loop error over 60 s, in m/s, in all.
+    pub error_mps: Option<f64>,
+    /// Its error over that of the model in force: an interval that holds the truth at all times
+    /// at once with 95 %.
+    pub error_ratio: Option<[f64; 2]>,
+    /// What the trips say for it against the model in force.
+    pub evidence: Evidence,
+    /// Its errors by day and place.
+    pub ledger: Ledger,
+    /// What its pipelines say.
+    #[serde(default)]
+    pub estimates: Vec<Estimate>,
+}
+
+/// The trials of a train.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Trials {
+    /// The model in force.
+    pub in_force: Option<ModelHash>,
+    /// The models that are on trial, and those that were.
+    pub models: Vec<Tried>,
+}
+
+impl Trials {
+    /// What an earlier daemon wrote into a train's folder; nothing where it wrote nothing, or
+    /// where that cannot be read, which the log then says.
+    pub fn read(folder: &Path) -> Self {
+        let path = folder.join(TRIALS_FILE);
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Trials::default(),
+            Err(error) => {
+                warn!("{}: {error}; the trials begin anew", path.display());
+                return Trials::default();
+            }
+        };
+        serde_json::from_str(&text).unwrap_or_else(|error| {
+            warn!("{}: no record of trials: {error}; the trials begin anew", path.display());
+            Trials::default()
+        })
+    }
+
+    /// Replaces the file in a train's folder.
+    ///
+    /// # Errors
+    ///
+    /// The system's answer; what was there stays.
+    pub fn write(&self, folder: &Path) -> Result<(), StorageError> {
+        let text = serde_json::to_string_pretty(self).unwrap_or_default();
+        let (path, beside): (PathBuf, PathBuf) =
+            (folder.join(TRIALS_FILE), folder.join(format!(".{TRIALS_FILE}.part")));
+        replace(&Disk, &path, &beside, (text.as_bytes(), &Rights::Usual))
+    }
+
+    /// What is known of a model.
+    pub fn of(&self, model: ModelHash) -> Option<&Tried> {
+        self.models.iter().find(|it| it.model == model)
+    }
+
+    /// Takes over what models on trial show now; others stay as they were.
+    pub fn update(&mut self, in_force: ModelHash, now: Vec<Tried>) {
+        self.in_force = Some(in_force);
+        for tried in now {
+            match self.models.iter_mut().find(|it| it.model == tried.model) {
+                Some(known) => *known = tried,
+                None => self.models.push(tried),
+            }
+        }
+        while self.models.len() > MODELS_MAX {
+            let oldest = (0..self.models.len()).min_by_key(|&place| self.models[place].last);
+            oldest.map(|place| self.models.remove(place));
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! When a rule adopts a model or takes one back, and which bounds no model may leave.
+
+use std::collections::BTreeMap;
+
+use dynocar_core::trial::Rival;
+use serde::Deserialize;
+use toml::Table;
+
+use super::rivals::Standing;
+use crate::models::decision::Choice;
+use crate::models::{ModelHash, ModelText};
+
+/// Who adopts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Adopt {
+    /// A person, by `dynocar models adopt`; the log says when a rival is better.
+    Ask,
+    /// The rule, as soon as there is evidence enough.
+    WhenBetter,
+}
+
+/// What a rival must show, and what it may not be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rule {
+    /// Who adopts.
+    pub adopt: Adopt,
+    /// Share of the open-loop error that a rival must take away to count as better.
+    pub least_gain: f64,
+    /// While no rival is better, one is taken for better after no fewer trips on average.
+    pub trips_between_mistakes: f64,
+    /// Keys of a train's file as `resistance.a`, with the least and the greatest value.
+    pub bounds: BTreeMap<String, [f64; 2]>,
+}
+
+impl Rule {
+    /// True where a rival has shown that it is better.
+    pub fn is_better(&self, rival: &Rival) -> bool {
+        rival.evidence.capital() >= self.trips_between_mistakes
+    }
+
+    /// What to decide when a rival is better: to take back what is in force, if the rival was
+    /// in force before it, else to adopt the rival.
+    pub fn choice(standing: &Standing, rival: ModelHash) -> Choice {
+        match standing.before {
+            Some(before) if before == rival => Choice::RollBack,
+            _ => Choice::Adopt(rival),
+        }
+    }
+
+    /// What of a model lies outside the bounds, in words; `None` when nothing does.
+    pub fn outside(&self, text: &ModelText) -> Option<String> {
+        let table: Table = text.train.parse().ok()?;
+        self.bounds.iter().find_map(|(key, [low, high])| {
+            let value = number(&table, key)?;
+            let is_outside = !(*low..=*high).contains(&value);
+            is_outside.then(|| format!("{key} = {value}: expected {low} to {high}"))
+        })
+    }
+}
+
+/// The number that a train's file holds under `table.key`.
+fn number(table: &Table, key: &str) -> Option<f64> {
+    let mut parts = key.split('.');
+    let first = table.get(parts.next()?)?;
+    let value = parts.try_fold(first, |value, part| value.get(part))?;
+    value.as_float().or_else(|| value.as_integer().map(|it| it as f64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_model_outside_its_bounds_is_named_with_key_value_and_bounds() {
+        let rule = Rule {
+            adopt: Adopt::Ask,
+            least_gain: 0.1,
+            trips_between_mistakes: 1e5,
+            bounds: [("resistance.a".to_owned(), [0.5, 3.0])].into(),
+        };
+        let text = |a: &str| ModelText { train: format!("[resistance]\na = {a}"), track: None };
+        assert_eq!(rule.outside(&text("2")), None);
+        let outside = rule.outside(&text("3.5")).unwrap();
+        assert_eq!(outside, "resistance.a = 3.5: expected 0.5 to 3");
+    }
+}

@@ -1,0 +1,115 @@
+//! The shadow's thread: one more reader of the samples, which nobody waits for.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use dynocar_client::channel::{Receiver, Transport};
+use dynocar_client::{ChannelError, Host};
+use dynocar_shared::{TrainId, TrainSample};
+use tracing::{info, warn};
+
+use super::figures::Board;
+use super::train::ShadowTrain;
+use crate::config::ModelsConfig;
+use crate::run::RunError;
+use crate::runtime::affinity::pin_to_core;
+use crate::runtime::scheduling::stand_back;
+
+/// How long it sleeps while samples gather; a channel holds more than come meanwhile.
+const NAP: Duration = Duration::from_millis(20);
+/// How often it looks into the store.
+const LOOK: Duration = Duration::from_secs(1);
+/// A train of which no sample comes for so long is not driven.
+const SILENCE: Duration = Duration::from_secs(2);
+
+struct Lane {
+    train: ShadowTrain,
+    receiver: Receiver<TrainSample>,
+    heard: Instant,
+}
+
+/// Starts the thread.
+///
+/// # Errors
+///
+/// When the system gives no thread.
+pub fn start(
+    trains: Vec<ShadowTrain>,
+    settings: ModelsConfig,
+    host: Host,
+    board: Board,
+    stop: Arc<AtomicBool>,
+) -> Result<JoinHandle<()>, RunError> {
+    let work = move || {
+        stand_back();
+        if let Some(core) = settings.core
+            && let Err(error) = pin_to_core(core)
+        {
+            warn!(core, "the thread of models on trial is not bound to its core: {error}");
+        }
+        match open(&host, trains) {
+            Ok(mut lanes) => run(&mut lanes, &settings, &board, &stop),
+            Err(error) => warn!("no models are on trial: {error}"),
+        }
+    };
+    std::thread::Builder::new()
+        .name("shadow".into())
+        .spawn(work)
+        .map_err(|source| RunError::System { what: "thread of models on trial", source })
+}
+
+fn open(host: &Host, trains: Vec<ShadowTrain>) -> Result<Vec<Lane>, ChannelError> {
+    let transport = Transport::open(host, "dynocar-shadow")?;
+    let lane = |train: ShadowTrain| {
+        let receiver = transport.receiver::<TrainSample>(TrainId(train.id()))?;
+        Ok(Lane { train, receiver, heard: Instant::now() })
+    };
+    trains.into_iter().map(lane).collect()
+}
+
+fn run(lanes: &mut [Lane], settings: &ModelsConfig, board: &Board, stop: &AtomicBool) {
+    let every = Duration::from_secs(settings.interval_s);
+    let (mut looked, mut written) = (None::<Instant>, Instant::now());
+    info!(store = %settings.directory.display(), "models are tried");
+    while !stop.load(Ordering::Relaxed) {
+        let is_time_to_look = looked.is_none_or(|at| at.elapsed() >= LOOK);
+        let is_time_to_write = written.elapsed() >= every;
+        for lane in lanes.iter_mut() {
+            lane.hear();
+            if is_time_to_look {
+                lane.train.look(SystemTime::now());
+                board.pin(lane.train.id(), lane.train.figures());
+            }
+            lane.train.go_on();
+            if is_time_to_write {
+                lane.train.write(SystemTime::now());
+            }
+        }
+        if is_time_to_look {
+            looked = Some(Instant::now());
+        }
+        if is_time_to_write {
+            written = Instant::now();
+        }
+        std::thread::sleep(NAP);
+    }
+    for lane in lanes {
+        lane.train.write(SystemTime::now());
+    }
+}
+
+impl Lane {
+    fn hear(&mut self) {
+        let since = SystemTime::now().duration_since(UNIX_EPOCH);
+        let unix_s = since.map_or(0.0, |since| since.as_secs_f64());
+        while let Some(sample) = self.receiver.receive() {
+            self.train.take(&sample, unix_s);
+            self.heard = Instant::now();
+        }
+        if self.heard.elapsed() >= SILENCE {
+            self.train.note_silence();
+        }
+    }
+}
