@@ -75,18 +75,8 @@ impl Cast {
     /// Puts a model into the store that grew from what is declared, with another a.
     fn put(&self, declared: &str, a: &str) -> ModelHash {
         let text = |train: String| ModelText { train, track: Some(self.track.clone()) };
-        let origin = Origin {
-            made: Moment::of(SystemTime::now()),
-            version: "test".into(),
-            command: "test".into(),
-            parent: Some(text(self.train.clone()).hash()),
-            verdict: Some("effect".into()),
-            statement: "Another a.".into(),
-            dataset_sha256: None,
-            error: None,
-            effects: Vec::new(),
-            files: Vec::new(),
-        };
+        let parent = Some(text(self.train.clone()).hash());
+        let origin = Origin::written("Another a.", "test", parent);
         let text = text(self.train.replace(declared, a));
         let new = NewModel { text, origin, answer_json: None, report_html: None };
         self.models().put(&new).expect("a model is put")

@@ -53,11 +53,13 @@ pub struct Case {
     pub answerer: Answerer,
     /// Who reads the same channels.
     pub companions: &'static [Companion],
+    /// Candidates that the daemon tries beside its model.
+    pub candidates: u32,
 }
 
 impl Case {
     fn new(name: impl Into<String>, idle: IdleStrategy, answerer: Answerer) -> Self {
-        Case { name: name.into(), idle, answerer, companions: &[] }
+        Case { name: name.into(), idle, answerer, companions: &[], candidates: 0 }
     }
 
     fn alone(kind: PipelineKind, idle: IdleStrategy) -> Self {
@@ -70,6 +72,12 @@ impl Case {
         let alone = Case::alone(COMPARED, idle);
         let readers: Vec<&str> = companions.iter().map(|it| it.name()).collect();
         Case { name: format!("{}+{}", alone.name, readers.join("+")), companions, ..alone }
+    }
+
+    /// The compared pipeline with two candidates on trial in its shadow.
+    fn in_shadow(idle: IdleStrategy) -> Self {
+        let alone = Case::alone(COMPARED, idle);
+        Case { name: format!("{}+two_candidates", alone.name), candidates: 2, ..alone }
     }
 
     /// The strategy of the floor that this case is compared with: nothing is lower for an
@@ -118,6 +126,11 @@ pub fn cases_with_readers() -> Vec<Case> {
     let all: [&[Companion]; 3] = [&[Recorder], &[Live], &[Recorder, Live]];
     let of = |idle| all.map(|companions| Case::with_readers(companions, idle));
     [of(IdleStrategy::Event), of(IdleStrategy::Busy)].concat()
+}
+
+/// The cases with models on trial.
+pub fn cases_in_shadow() -> Vec<Case> {
+    [IdleStrategy::Event, IdleStrategy::Busy].map(Case::in_shadow).into()
 }
 
 /// What one slice brought.
@@ -205,7 +218,11 @@ fn start(case: &Case, site: &Site, cores: Cores) -> Result<Peer, RigError> {
                 priority: cores.priority,
                 pipelines: pipelines.clone(),
             };
-            let plan = DaemonPlan { trains: 1, threads: vec![thread], lines: String::new() };
+            let lines = match case.candidates {
+                0 => String::new(),
+                count => site.put_candidates(TRAIN, count)?,
+            };
+            let plan = DaemonPlan { trains: 1, threads: vec![thread], lines };
             let config = site.write_config(&plan)?;
             return Peer::start(site, &["daemon", &config.to_string_lossy()]);
         }
@@ -232,7 +249,7 @@ mod tests {
     #[test]
     fn every_case_has_a_floor_and_a_name_of_the_contract() {
         for is_quick in [false, true] {
-            let cases = [cases(is_quick), cases_with_readers()].concat();
+            let cases = [cases(is_quick), cases_with_readers(), cases_in_shadow()].concat();
             for case in &cases {
                 let floor =
                     cases.iter().find(|it| it.name == "floor" && it.idle == case.floor_idle());
@@ -247,7 +264,7 @@ mod tests {
 
     #[test]
     fn no_case_is_measured_twice() {
-        let cases = [cases(false), cases_with_readers()].concat();
+        let cases = [cases(false), cases_with_readers(), cases_in_shadow()].concat();
         for (place, case) in cases.iter().enumerate() {
             let same = |it: &Case| (&it.name, it.idle) == (&case.name, case.idle);
             assert_eq!(cases.iter().position(same), Some(place));

@@ -67,6 +67,9 @@ pub struct LatencyArguments {
     /// Also measure with a recorder and a live view beside the daemon; their programs lie beside this one
     #[arg(long)]
     pub readers: bool,
+    /// Also measure with two candidates on trial in the shadow of the daemon's model
+    #[arg(long)]
+    pub shadow: bool,
     /// Core of the controller
     #[arg(long, value_name = "CORE")]
     pub controller_core: Option<usize>,
@@ -143,6 +146,9 @@ pub fn run(arguments: &LatencyArguments) -> Result<Measured, LatencyError> {
         case::cases(arguments.quick).into_iter().map(|case| (case, Vec::new())).collect();
     if arguments.readers {
         cases.extend(case::cases_with_readers().into_iter().map(|case| (case, Vec::new())));
+    }
+    if arguments.shadow {
+        cases.extend(case::cases_in_shadow().into_iter().map(|case| (case, Vec::new())));
     }
     if let Some(text) = &arguments.case {
         cases.retain(|(case, _)| case.name == "floor" || case.name.contains(text.as_str()));

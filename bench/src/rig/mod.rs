@@ -41,6 +41,9 @@ pub enum RigError {
         /// Why.
         reason: String,
     },
+    /// A store of models does not take a model.
+    #[error(transparent)]
+    Models(#[from] dynocar::models::ModelsError),
     /// A result cannot be written.
     #[error(transparent)]
     Output(#[from] dynocar::output::OutputError),

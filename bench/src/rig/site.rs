@@ -4,8 +4,9 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use dynocar::config::IdleStrategy;
+use dynocar::models::{ModelText, NewModel, Origin, Store};
 use dynocar_client::Host;
-use dynocar_shared::PipelineKind;
+use dynocar_shared::{PipelineKind, TrainId};
 use tempfile::TempDir;
 
 use super::{RigError, system};
@@ -126,6 +127,26 @@ impl Site {
     /// Where the train's file lies.
     pub fn train_file(&self) -> PathBuf {
         self.path().join("train.toml")
+    }
+
+    /// Puts candidates into a store of models, each with another resistance than the train's file; gives
+    /// the lines of the configuration that have them tried.
+    ///
+    /// # Errors
+    ///
+    /// When they cannot be written.
+    pub fn put_candidates(&self, train: TrainId, count: u32) -> Result<String, RigError> {
+        let store = self.path().join("models");
+        std::fs::create_dir(&store).map_err(system("making a store of models"))?;
+        let parent = Some(ModelText { train: TRAIN.into(), track: None }.hash());
+        for number in 1..=count {
+            let a = format!("[resistance]\na = 2.{number}");
+            let text = ModelText { train: TRAIN.replace("[resistance]\na = 1.9", &a), track: None };
+            let origin = Origin::written("Of a measurement.", "dynocar-bench", parent);
+            let new = NewModel { text, origin, answer_json: None, report_html: None };
+            Store::at(&store).train(train).put(&new)?;
+        }
+        Ok("[models]\ndirectory = \"models\"".into())
     }
 
     /// Writes the daemon's configuration and gives its path.

@@ -1,6 +1,7 @@
 //! Where a model came from, and what it adds to the model before it.
 
 use std::collections::BTreeMap;
+use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
 
@@ -110,6 +111,22 @@ pub struct Origin {
 }
 
 impl Origin {
+    /// Of a model that somebody wrote, perhaps from another: nothing was learned.
+    pub fn written(statement: &str, command: &str, parent: Option<ModelHash>) -> Self {
+        Origin {
+            made: Moment::of(SystemTime::now()),
+            version: env!("CARGO_PKG_VERSION").into(),
+            command: command.into(),
+            parent,
+            verdict: None,
+            statement: statement.into(),
+            dataset_sha256: None,
+            error: None,
+            effects: Vec::new(),
+            files: Vec::new(),
+        }
+    }
+
     /// True where both models add the same effects, within their intervals.
     pub fn adds_the_same_as(&self, other: &Origin) -> bool {
         let has = |effects: &[FoundEffect], it: &FoundEffect| {

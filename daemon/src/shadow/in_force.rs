@@ -1,12 +1,11 @@
 //! Which model a train has when the daemon starts.
 
 use std::sync::Arc;
-use std::time::SystemTime;
 
 use tracing::{info, warn};
 
 use crate::config::{DaemonConfig, TrainConfig};
-use crate::models::{ModelHash, ModelsError, Moment, NewModel, Origin, Store, TrainModels};
+use crate::models::{ModelHash, ModelsError, NewModel, Origin, Store, TrainModels};
 
 /// Puts what the configuration declares of each train into the store, and gives each train the model
 /// that the store's decisions put in force. Where the store cannot be read, what is declared stays
@@ -25,7 +24,16 @@ fn settle_train(models: &TrainModels, train: &mut TrainConfig) -> Result<(), Mod
     put_declared(models, train)?;
     let Some(hash) = models.in_force()? else { return Ok(()) };
     *train = with_model(models, train, hash)?;
-    let added = models.stored(hash)?.origin.adds();
+    let declared = train.text.hash();
+    let mut origin = models.stored(hash)?.origin;
+    let added = origin.adds();
+    while let Some(parent) = origin.parent.filter(|&parent| parent != declared) {
+        origin = models.stored(parent)?.origin;
+    }
+    if origin.parent.is_none() && hash != declared {
+        let id = train.id.0;
+        warn!(train = id, "model {hash} grew from other files than those that are declared now");
+    }
     info!(train = train.id.0, model = %hash, "in force, as decided: {added}");
     Ok(())
 }
@@ -36,18 +44,8 @@ fn settle_train(models: &TrainModels, train: &mut TrainConfig) -> Result<(), Mod
 ///
 /// When it cannot be written.
 pub fn put_declared(models: &TrainModels, train: &TrainConfig) -> Result<ModelHash, ModelsError> {
-    let origin = Origin {
-        made: Moment::of(SystemTime::now()),
-        version: env!("CARGO_PKG_VERSION").into(),
-        command: "dynocar run".into(),
-        parent: None,
-        verdict: None,
-        statement: "Declared by the daemon's configuration.".into(),
-        dataset_sha256: None,
-        error: None,
-        effects: Vec::new(),
-        files: Vec::new(),
-    };
+    let statement = "Declared by the daemon's configuration.";
+    let origin = Origin::written(statement, "dynocar run", None);
     let text = train.text.clone();
     models.put(&NewModel { text, origin, answer_json: None, report_html: None })
 }

@@ -13,6 +13,8 @@ use dynocar_tests::golden;
 use dynocar_tests::sensor_failures::SensorFailure;
 use dynocar_tests::simulator::TrainType;
 use dynocar_tests::soak::bad_samples::{Scene, Tally};
+use dynocar_tests::soak::months::story::Span;
+use dynocar_tests::soak::months::{self, Life, LifeSettings, Story};
 use dynocar_tests::soak::{Programs, day, faults, hostile, load, state_kills};
 
 /// Seeded faults, load and bad input for as long as one likes; exit status 101 when a promise breaks.
@@ -42,6 +44,32 @@ enum Command {
         #[arg(long, default_value_t = 24)]
         hours: usize,
         /// The seed
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+    },
+    /// Months of one train: something undeclared appears or goes, and the loop of learning, trying, adopting
+    /// and taking back has to follow; a table
+    Months {
+        /// What happens: `nothing`, `wheels_wear`, `winter`, `brake_drags_for_a_day` or a kind of effect; all when
+        /// absent
+        #[arg(long)]
+        story: Option<String>,
+        /// Days
+        #[arg(long, default_value_t = 50)]
+        days: usize,
+        /// The first day on which something is undeclared
+        #[arg(long, default_value_t = 12)]
+        onset: usize,
+        /// The first day on which nothing is any more, in stories that end
+        #[arg(long, default_value_t = 32)]
+        end: usize,
+        /// Trips of a day
+        #[arg(long, default_value_t = 24)]
+        trips: usize,
+        /// How many lives of each story
+        #[arg(long, default_value_t = 1)]
+        lives: u64,
+        /// The seed of the first
         #[arg(long, default_value_t = 1)]
         seed: u64,
     },
@@ -96,6 +124,36 @@ fn main() -> ExitCode {
             say(format!("{:#?}", load::run(&programs, seconds, seed)));
         }
         Command::Day { hours, seed } => say(day::hours::table(&day::run(&programs, hours, seed))),
+        Command::Months { story, days, onset, end, trips, lives, seed } => {
+            let stories = match story.as_deref().map(|name| (name, Story::from_name(name))) {
+                None => Story::all(),
+                Some((_, Some(story))) => vec![story],
+                Some((name, None)) => {
+                    let names: Vec<String> = Story::all().into_iter().map(Story::name).collect();
+                    tell(&format!("--story {name}: expected one of {}", names.join(", ")));
+                    return ExitCode::from(2);
+                }
+            };
+            print(months::table::HEADER).unwrap_or_else(|error| give_up(&error));
+            for story in stories {
+                for seed in seed..seed + lives {
+                    let span = Span { onset, end };
+                    let (recorded, trips_between_mistakes) = (6, 200_000.0);
+                    let settings = LifeSettings {
+                        story,
+                        span,
+                        seed,
+                        days,
+                        trips,
+                        recorded,
+                        trips_between_mistakes,
+                    };
+                    let folder = tempfile::tempdir().expect("a temporary folder");
+                    let outcome = Life::begin(settings, folder.path()).live();
+                    print(&months::table::line(&outcome)).unwrap_or_else(|error| give_up(&error));
+                }
+            }
+        }
         Command::Hostile(Rounds { rounds, seed }) => {
             hostile::measure(&programs, rounds, seed).iter().for_each(|it| say(format!("{it:?}")));
         }

@@ -111,6 +111,54 @@ impl SimulatedDataset {
 /// When fewer than two runs, a period of sampling outside 0.1 to 1 s, or a duration below 60 s is
 /// asked for.
 pub fn simulate(settings: &SimulatorSettings) -> SimulatedDataset {
+    let world = World::of(settings);
+    let effects = draw_effects(settings, &world.scene());
+    let runs: Vec<SimulatedRun> =
+        world.plans.iter().map(|plan| world.run(plan.clone(), &effects)).collect();
+    let lengths_s: Vec<f64> =
+        runs.iter().map(|run| run.states[run.states.len() - 1].time_s).collect();
+    let effects = effects.into_iter().map(|effect| effect.ended_with_runs(&lengths_s)).collect();
+    let World { settings, train, line, sensors, .. } = world;
+    SimulatedDataset { settings, train, line, effects, sensors, runs }
+}
+
+/// A train, a line and the runs that are planned, before anything is undeclared.
+#[derive(Clone, Debug, PartialEq)]
+pub struct World {
+    /// What was asked for.
+    pub settings: SimulatorSettings,
+    /// The train, declared and true.
+    pub train: TrueTrain,
+    /// The line, declared and true.
+    pub line: Line,
+    /// The sensors.
+    pub sensors: Sensors,
+    /// The runs.
+    pub plans: Vec<RunPlan>,
+}
+
+impl World {
+    /// Draws a world.
+    ///
+    /// # Panics
+    ///
+    /// See [`simulate`].
+    pub fn of(settings: &SimulatorSettings) -> Self {
+        draw_world(settings)
+    }
+
+    /// What an effect may be drawn for.
+    pub fn scene(&self) -> EffectScene<'_> {
+        EffectScene { train: &self.train, line: &self.line, plans: &self.plans }
+    }
+
+    /// Drives and records a run with some effects.
+    pub fn run(&self, plan: RunPlan, effects: &[Effect]) -> SimulatedRun {
+        simulate_run(&self.settings, &self.train, &self.line, plan, effects, &self.sensors)
+    }
+}
+
+fn draw_world(settings: &SimulatorSettings) -> World {
     assert!(settings.runs >= 2, "expected at least 2 runs, got {}", settings.runs);
     let period_s = settings.sample_period_s;
     assert!((0.1..=1.0).contains(&period_s), "expected a period of 0.1 to 1 s, got {period_s} s");
@@ -126,17 +174,8 @@ pub fn simulate(settings: &SimulatorSettings) -> SimulatedDataset {
     let size = (train.declared.length_m, train.handling.speed_max_mps);
     let line = make_line(settings, train_type, size, has_tunnels, &mut of_line);
     let plans = make_plans(settings, &train, &line, &mut stream(Stream::Plans));
-    let effects =
-        draw_effects(settings, &EffectScene { train: &train, line: &line, plans: &plans });
     let sensors = make_sensors(&train, settings.sensor_noise, &mut stream(Stream::SensorTypes));
-    let runs: Vec<SimulatedRun> = plans
-        .into_iter()
-        .map(|plan| simulate_run(settings, &train, &line, plan, &effects, &sensors))
-        .collect();
-    let lengths_s: Vec<f64> =
-        runs.iter().map(|run| run.states[run.states.len() - 1].time_s).collect();
-    let effects = effects.into_iter().map(|effect| effect.ended_with_runs(&lengths_s)).collect();
-    SimulatedDataset { settings: settings.clone(), train, line, effects, sensors, runs }
+    World { settings: settings.clone(), train, line, sensors, plans }
 }
 
 /// Types of train on which all the effects show; all types when there is no such.

@@ -9,6 +9,7 @@
 //! - [`faults`]: kills, stops and restarts of daemon, controller and client
 //! - [`hostile`]: garbage written into shared memory
 //! - [`load`]: eight trains for hours, with faults
+//! - [`months`]: months of one train: learning, trying, adopting, taking back
 //! - [`state_kills`]: `kill -9` while a state file is written
 
 pub mod bad_samples;
@@ -16,6 +17,7 @@ pub mod day;
 pub mod faults;
 pub mod hostile;
 pub mod load;
+pub mod months;
 pub mod state_kills;
 
 use std::path::{Path, PathBuf};

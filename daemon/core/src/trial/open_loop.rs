@@ -15,6 +15,16 @@ pub const WINDOW_S: f64 = 60.0;
 /// A window holds at most so many samples.
 const SAMPLES_MAX: usize = (WINDOW_S / STEP_MIN_S) as usize + 2;
 
+/// What a model leaves of one window.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WindowError {
+    /// Of the speed, over the window's moving samples.
+    pub speed: SpeedError,
+    /// Of the way by the predicted speed against the way by position, over the window's length, in
+    /// m/s; what a wrong wheel diameter shows. 0 where no position is known.
+    pub way_mps: f64,
+}
+
 /// Predicts by one model what the samples of a window should show.
 pub struct OpenLoop {
     train: Arc<TrainModel>,
@@ -48,14 +58,30 @@ impl OpenLoop {
         }
     }
 
-    /// Ends the window: the error over its moving samples, none where nothing can be simulated.
-    pub fn close(&mut self) -> SpeedError {
+    /// Ends the window: what the model leaves of it, nothing where nothing can be simulated.
+    pub fn close(&mut self) -> WindowError {
         let samples = std::mem::replace(&mut self.samples, Vec::with_capacity(SAMPLES_MAX));
         let Ok(recording) = Recording::new(samples, BridgeLimits::default()) else {
-            return SpeedError::default();
+            return WindowError::default();
         };
         self.forces.set_declared(&recording, self.train.resistance);
         self.prediction.simulate(&recording, &self.forces, Restart::FullRun);
-        SpeedError::of(&recording, &self.prediction)
+        WindowError {
+            speed: SpeedError::of(&recording, &self.prediction),
+            way_mps: way_error_mps(&recording, self.prediction.speed_mps()).unwrap_or(0.0),
+        }
     }
+}
+
+/// The difference of the ways over the time that they took; `None` where they cannot be compared.
+fn way_error_mps(recording: &Recording, predicted_mps: &[f64]) -> Option<f64> {
+    let (samples, time_s) = (recording.samples(), recording.time_s());
+    let (first, last) = (samples.first()?, samples.last()?);
+    let driven_s = time_s.last().copied().filter(|&driven_s| driven_s > 0.0)?;
+    let is_whole = recording.restarts() == 0 && first.direction == last.direction;
+    let measured_m = first.direction * (last.position_m? - first.position_m?);
+    let steps = time_s.windows(2).zip(predicted_mps.windows(2));
+    let predicted_m: f64 =
+        steps.map(|(time_s, mps)| 0.5 * (time_s[1] - time_s[0]) * (mps[0] + mps[1])).sum();
+    is_whole.then_some((predicted_m - measured_m) / driven_s)
 }

@@ -80,6 +80,31 @@ fn a_rival_that_is_right_wins_and_the_day_and_the_place_of_the_errors_are_known(
 }
 
 #[test]
+fn a_rival_with_the_right_wheels_wins_by_the_way() {
+    let worn = |speed_scale: f64, a: f64| {
+        let mut train = train(a);
+        train.corrections.speed_scale = speed_scale;
+        train
+    };
+    let rival = |model: u64, train: TrainModel| {
+        let open_loop = OpenLoop::new(Arc::new(train), None);
+        Rival::new(model, open_loop, Vec::new(), (Evidence::new(0.1), Ledger::default()))
+    };
+    let rivals = vec![rival(2, worn(1.02, 3.0))];
+    let mut trials = Trials::new(TRAIN, MASS_KG, rival(1, train(3.0)), rivals);
+    let mut sequence = 0;
+    for run in 0..30 {
+        for mut sample in trip(run, 3.0, &mut sequence) {
+            let speed_mps = sample.speed_mps;
+            sample.set(SampleField::Speed, 1.02 * speed_mps);
+            trials.take(&sample, 0.0);
+        }
+    }
+    let [_, high] = trials.rivals[0].evidence.error_ratio().unwrap();
+    assert!(high < 0.6, "{high}");
+}
+
+#[test]
 fn a_rival_that_comes_in_mid_trip_is_compared_from_the_next_one_on() {
     let mut trials = Trials::new(TRAIN, MASS_KG, rival(1, 2.0), Vec::new());
     let mut sequence = 0;

@@ -4,7 +4,7 @@ use dynocar_shared::{SampleField, TrainId, TrainSample};
 
 use super::evidence::{Evidence, score};
 use super::ledger::Ledger;
-use super::open_loop::{OpenLoop, WINDOW_S};
+use super::open_loop::{OpenLoop, WINDOW_S, WindowError};
 use crate::pipeline::Pipeline;
 use crate::pipeline::motion::MOVING_MPS;
 use crate::simulate::SpeedError;
@@ -27,7 +27,7 @@ pub struct Rival {
     pub ledger: Ledger,
     open_loop: OpenLoop,
     /// Over the trip that goes on.
-    trip: SpeedError,
+    trip: TripError,
     /// Whether it was there when that trip began.
     is_whole: bool,
 }
@@ -40,7 +40,7 @@ impl Rival {
         pipelines: Vec<Pipeline>,
         (evidence, ledger): (Evidence, Ledger),
     ) -> Self {
-        let trip = SpeedError::default();
+        let trip = TripError::default();
         Rival { model, pipelines, evidence, ledger, open_loop, trip, is_whole: false }
     }
 
@@ -51,6 +51,28 @@ impl Rival {
         if let Some(valid) = valid {
             self.open_loop.take(valid);
         }
+    }
+}
+
+/// What a model leaves of the windows of a trip.
+#[derive(Clone, Copy, Debug, Default)]
+struct TripError {
+    speed: SpeedError,
+    way_squares: f64,
+    windows: f64,
+}
+
+impl TripError {
+    fn add(&mut self, window: WindowError) {
+        self.speed = self.speed + window.speed;
+        self.way_squares += window.way_mps * window.way_mps;
+        self.windows += 1.0;
+    }
+
+    /// In (m/s)², of speed and way together; `None` without a moving sample.
+    fn mean_square(self) -> Option<f64> {
+        let of_speed = self.speed.rmse_mps()?;
+        Some(of_speed * of_speed + self.way_squares / self.windows)
     }
 }
 
@@ -134,7 +156,7 @@ impl Trials {
     /// Every model that is there takes part in the trip from here on.
     fn begin_trip(&mut self) {
         for model in self.models() {
-            (model.trip, model.is_whole) = (SpeedError::default(), true);
+            (model.trip, model.is_whole) = (TripError::default(), true);
         }
         self.moved_s = 0.0;
     }
@@ -148,18 +170,15 @@ impl Trials {
         let middle_m = window.first_m.zip(window.last_m).map(|(first, last)| 0.5 * (first + last));
         for model in self.models() {
             let error = model.open_loop.close();
-            model.ledger.book(error, unix_s, middle_m);
-            model.trip = model.trip + error;
+            model.ledger.book(error.speed, unix_s, middle_m);
+            model.trip.add(error);
         }
     }
 
     fn compare(&mut self) {
-        let mean = |error: SpeedError| {
-            (error.count > 0).then(|| error.sum_of_squares / error.count as f64)
-        };
-        let in_force = mean(self.in_force.trip);
+        let in_force = self.in_force.trip.mean_square();
         for rival in self.rivals.iter_mut().filter(|rival| rival.is_whole) {
-            if let Some((in_force, own)) = in_force.zip(mean(rival.trip)) {
+            if let Some((in_force, own)) = in_force.zip(rival.trip.mean_square()) {
                 rival.evidence.take(score(in_force, own));
             }
         }

@@ -1,0 +1,18 @@
+//! Months of one train in accelerated time: what is undeclared appears and goes, and the loop of
+//! learning, trying, adopting and taking back has to follow.
+//!
+//! No processes and no clocks: the simulator drives the trips of each day; the models on trial and the
+//! residual monitor take every one of them, the learner what a recorder would have kept. A rule
+//! adopts. Everything follows from the seed.
+//!
+//! - [`story`]: what is undeclared on which day
+//! - [`life`]: the days
+//! - [`table`]: what came of it
+
+pub mod life;
+pub mod story;
+pub mod table;
+
+pub use life::{Life, LifeSettings};
+pub use story::Story;
+pub use table::Outcome;
