@@ -19,7 +19,7 @@ use super::pool::{self, Bounds, Pool};
 use super::source::{FoundRun, Places, runs_of, tell_unusable};
 use crate::models::{Action, ModelHash, ModelText, Moment, NewModel, Origin, Store, TrainModels};
 use crate::report::provenance::hex;
-use crate::storage::{Disk, Storage};
+use crate::storage::{Disk, Storage, StorageError};
 
 /// In the store's directory: what is the learner's own.
 const OWN_FOLDER: &str = "learn";
@@ -94,14 +94,16 @@ impl Learner {
     /// When another learner is at work, or the store's directory cannot be written.
     pub fn open(settings: LearnerSettings) -> Result<Self, LearnError> {
         let own = settings.store.directory().join(OWN_FOLDER);
-        let system = |path: &Path, source| LearnError::Runs { path: path.into(), source };
-        Disk.make_folder(&own).map_err(|source| system(&own, source))?;
+        let system = |path: &Path, action, source| {
+            LearnError::Storage(StorageError { path: path.into(), action, source })
+        };
+        Disk.make_folder(&own).map_err(|it| system(&own, "making the folder", it))?;
         let path = own.join(LOCK_FILE);
-        let lock = File::create(&path).map_err(|source| system(&path, source))?;
+        let lock = File::create(&path).map_err(|it| system(&path, "locking", it))?;
         match lock.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Err(LearnError::Taken { path }),
-            Err(TryLockError::Error(source)) => return Err(system(&path, source)),
+            Err(TryLockError::Error(source)) => return Err(system(&path, "locking", source)),
         }
         let memory = Memory::load(&own);
         Ok(Learner { settings, own, memory, _lock: lock })

@@ -12,7 +12,7 @@ use tracing::info;
 use super::error::LearnError;
 use super::memory::Memory;
 use crate::models::Moment;
-use crate::storage::{Disk, Storage, part_of};
+use crate::storage::{Disk, Storage, StorageError, part_of};
 use crate::unpacking::{UnpackError, unpack};
 
 /// How a finished recording ends.
@@ -69,7 +69,10 @@ pub fn take_up(
     if unpacked.exists() || memory.unusable.contains_key(&key) {
         return Ok(());
     }
-    Disk.make_folder(folder).map_err(|source| LearnError::Runs { path: folder.into(), source })?;
+    let failed = |action| {
+        move |source| LearnError::Storage(StorageError { path: folder.into(), action, source })
+    };
+    Disk.make_folder(folder).map_err(failed("making the folder"))?;
     let part = part_of(&unpacked);
     if let Err(error) = unpack(recording, &part, Some(train)) {
         let _ = std::fs::remove_dir_all(&part);
@@ -86,7 +89,7 @@ pub fn take_up(
     let source = toml::to_string(&Source { name, recorded }).unwrap_or_default();
     std::fs::write(part.join(SOURCE_FILE), source)
         .and_then(|()| Disk.rename_new(&part, &unpacked))
-        .map_err(|source| LearnError::Runs { path: unpacked, source })
+        .map_err(failed("unpacking a recording into the folder"))
 }
 
 /// The unpacked recordings in a folder, the oldest first. What is older than the horizon goes, and the
