@@ -61,28 +61,64 @@ pub fn write_grown(
     folder: &Path,
 ) -> Result<GrownFiles, GrownError> {
     let (source, head) = open(dataset)?;
-    let table = |path: &str| -> Result<Table, GrownError> {
-        let declared =
-            |problem: String| GrownError::Declared { label: source.label(path), problem };
-        let text =
-            source.read(path).map_err(|problem: FileProblem| declared(problem.to_string()))?;
-        text.parse().map_err(|error: toml::de::Error| declared(error.message().to_string()))
+    let read = |path: &str| {
+        source.read(path).map_err(|problem: FileProblem| GrownError::Declared {
+            label: source.label(path),
+            problem: problem.to_string(),
+        })
     };
-    let mut train = table(&head.manifest.train_file.path)?;
-    let mut track = head.manifest.track_file.as_ref().map(|file| table(&file.path)).transpose()?;
-    let not_expressed = grow(&explanation.grown, &mut train, track.as_mut());
-    let write = |name: &str, table: &Table, declared: &str| -> Result<PathBuf, GrownError> {
-        let note = format!(
-            "{GROWN_MARK}{declared} of {MANIFEST_FILE} by `dynocar explain`.\n# {}\n",
-            explanation.answer.statement
-        );
-        Ok(write_in_folder(folder, name, &format!("{note}{table}"))?)
-    };
-    let mut files = vec![write(GROWN_FILES[0], &train, &head.manifest.train_file.path)?];
-    if let (Some(track), Some(file)) = (&track, &head.manifest.track_file) {
-        files.push(write(GROWN_FILES[1], track, &file.path)?);
+    let (train, track) = (&head.manifest.train_file, head.manifest.track_file.as_ref());
+    let texts = (read(&train.path)?, track.map(|file| read(&file.path)).transpose()?);
+    let labels = (&train.path[..], track.map_or("", |file| &file.path));
+    let grown = grown_texts(explanation, (&texts.0, texts.1.as_deref()), labels, MANIFEST_FILE)?;
+    let mut files = vec![write_in_folder(folder, GROWN_FILES[0], &grown.train)?];
+    if let Some(track) = &grown.track {
+        files.push(write_in_folder(folder, GROWN_FILES[1], track)?);
     }
-    Ok(GrownFiles { files, not_expressed })
+    Ok(GrownFiles { files, not_expressed: grown.not_expressed })
+}
+
+/// A grown model as texts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GrownTexts {
+    /// Of the train.
+    pub train: String,
+    /// Of the line, when it is known.
+    pub track: Option<String>,
+    /// Kinds of effects that the formats cannot express.
+    pub not_expressed: Vec<String>,
+}
+
+/// The texts of a model that grew from declared ones of a train and a line; `labels` and `source` say in
+/// their first lines what they grew from.
+///
+/// # Errors
+///
+/// When a declared text is no TOML.
+pub fn grown_texts(
+    explanation: &Explanation,
+    (train, track): (&str, Option<&str>),
+    labels: (&str, &str),
+    source: &str,
+) -> Result<GrownTexts, GrownError> {
+    let table = |text: &str, label: &str| -> Result<Table, GrownError> {
+        text.parse().map_err(|error: toml::de::Error| GrownError::Declared {
+            label: label.into(),
+            problem: error.message().to_string(),
+        })
+    };
+    let mut train = table(train, labels.0)?;
+    let mut track = track.map(|text| table(text, labels.1)).transpose()?;
+    let not_expressed = grow(&explanation.grown, &mut train, track.as_mut());
+    let statement = &explanation.answer.statement;
+    let text = |label: &str, table: Table| {
+        format!("{GROWN_MARK}{label} of {source} by `dynocar explain`.\n# {statement}\n{table}")
+    };
+    Ok(GrownTexts {
+        train: text(labels.0, train),
+        track: track.map(|table| text(labels.1, table)),
+        not_expressed,
+    })
 }
 
 /// Changes the tables of a declared train and line to those of a fitted model; gives the kinds

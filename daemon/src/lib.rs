@@ -8,6 +8,7 @@
 //! - [`identify`]: the pipelines over recorded runs
 //! - [`fmu`]: the estimators as an FMU
 //! - [`annotation`]: an explanation beside the data that it explains
+//! - [`learn`]: recorded runs into candidates for the store
 //! - [`models`]: a store of models
 //! - [`grown`]: the model with its effects as train and track files
 //! - [`output`]: where results go
@@ -33,6 +34,7 @@ pub mod demo;
 pub mod fmu;
 pub mod grown;
 pub mod identify;
+pub mod learn;
 pub mod models;
 pub mod output;
 pub mod programs;

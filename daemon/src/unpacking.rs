@@ -7,6 +7,7 @@ use std::process::Output;
 use std::sync::Arc;
 
 use dynocar_core::dataset::ColumnMapping;
+use dynocar_shared::TrainId;
 use tempfile::TempDir;
 
 use crate::output::tell;
@@ -81,6 +82,38 @@ pub enum UnpackError {
     },
 }
 
+/// Unpacks what a recording holds of a train, its only one where none is named, into a new folder; what the
+/// program remarks on is told.
+///
+/// # Errors
+///
+/// See [`UnpackError`].
+pub fn unpack(recording: &Path, folder: &Path, train: Option<TrainId>) -> Result<(), UnpackError> {
+    let path = recording.to_path_buf();
+    let program = program_of(recording).unwrap_or(RECORDING);
+    let mut command = call(program);
+    command.args(["convert", "--quiet", "-o"]).arg(folder);
+    if let Some(train) = train {
+        command.arg("--train").arg(train.0.to_string());
+    }
+    let output = command.arg(recording).output().map_err(|error| UnpackError::Failed {
+        path: path.clone(),
+        problem: not_started(program, &error),
+    })?;
+    let problem = problem(&output);
+    match output.status.code() {
+        Some(0) => {
+            let words = String::from_utf8_lossy(&output.stderr);
+            if !words.trim().is_empty() {
+                tell(words.trim());
+            }
+            Ok(())
+        }
+        Some(2) => Err(UnpackError::Content { path, problem }),
+        _ => Err(UnpackError::Failed { path, problem }),
+    }
+}
+
 /// A recording that is unpacked; the folder goes with the last copy of this.
 #[derive(Clone, Debug)]
 pub struct Unpacked {
@@ -96,27 +129,13 @@ impl Unpacked {
     /// See [`UnpackError`].
     pub fn of(recording: &Path) -> Result<Self, UnpackError> {
         let path = recording.to_path_buf();
-        let failed = |problem| UnpackError::Failed { path: path.clone(), problem };
-        let folder = TempDir::with_prefix("dynocar-").map_err(|it| failed(it.to_string()))?;
-        let unpacked = Unpacked { recording: path.clone(), folder: folder.into() };
-        let program = program_of(recording).unwrap_or(RECORDING);
-        let output = call(program)
-            .args(["convert", "--quiet", "-o"])
-            .arg(unpacked.folder())
-            .arg(recording)
-            .output()
-            .map_err(|error| failed(not_started(program, &error)))?;
-        let words = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-        let problem = problem(&output);
-        match output.status.code() {
-            Some(0) if words.is_empty() => Ok(unpacked),
-            Some(0) => {
-                tell(&words);
-                Ok(unpacked)
-            }
-            Some(2) => Err(UnpackError::Content { path, problem }),
-            _ => Err(failed(problem)),
-        }
+        let folder = TempDir::with_prefix("dynocar-").map_err(|error| UnpackError::Failed {
+            path: path.clone(),
+            problem: error.to_string(),
+        })?;
+        let unpacked = Unpacked { recording: path, folder: folder.into() };
+        unpack(recording, &unpacked.folder(), None)?;
+        Ok(unpacked)
     }
 
     /// The dataset's folder.

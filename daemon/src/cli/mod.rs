@@ -15,7 +15,9 @@ mod health;
 pub mod identify;
 mod import;
 mod init;
+mod learn;
 mod man;
+mod models;
 mod replay;
 mod run;
 mod stops;
@@ -56,6 +58,8 @@ enum Command {
     Stops(stops::StopsArguments),
     Survey(survey::SurveyArguments),
     Fmu(fmu::FmuArguments),
+    Learn(learn::LearnArguments),
+    Models(models::ModelsArguments),
     /// Record what a controller and the daemon write, as MCAP
     Record(companion::Passed),
     /// Keep the last hours in a ring on disk, and for good what lies around a suspicion or a fault
@@ -88,6 +92,7 @@ impl Command {
             // `check` has an answer of its own for what is wrong.
             Command::Check(_) | Command::Run(_) | Command::Health(_) | Command::Replay(_) => None,
             Command::Init(_) | Command::Import(_) | Command::Fmu(_) => None,
+            Command::Learn(_) | Command::Models(_) => None,
             Command::FlightRecorder(_) | Command::Keep(_) => None,
             Command::Record(_) | Command::Recover(_) | Command::Convert(_) | Command::Watch(_) => {
                 None
@@ -117,6 +122,8 @@ pub fn main() -> ExitCode {
         Command::Stops(arguments) => stops::execute(arguments),
         Command::Survey(arguments) => survey::execute(arguments),
         Command::Fmu(arguments) => fmu::execute(arguments),
+        Command::Learn(arguments) => learn::execute(arguments),
+        Command::Models(arguments) => models::execute(arguments),
         Command::Record(passed) => companion::become_it(RECORDING, Some("record"), passed),
         Command::FlightRecorder(passed) => {
             companion::become_it(RECORDING, Some("flight-recorder"), passed)

@@ -34,7 +34,8 @@ pub fn execute(arguments: &RunArguments) -> Result<(), Failure> {
     })
 }
 
-fn start_log(config: &DaemonConfig) -> Result<(), Failure> {
+/// Starts the log as the configuration wants it.
+pub(super) fn start_log(config: &DaemonConfig) -> Result<(), Failure> {
     let filter = EnvFilter::try_new(&config.log).map_err(|error| {
         let log = &config.log;
         Failure::Input(format!("daemon.log = {log:?}: expected a level as info or debug: {error}"))

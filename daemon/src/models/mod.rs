@@ -20,10 +20,14 @@
 //! - [`decision`]: what was decided, and what follows from it
 //! - [`event`]: maintenance events
 //! - [`store`]: the directory
+//! - [`history`]: what each model is now
+//! - [`difference`]: in which keys two models differ
 
 pub mod decision;
+pub mod difference;
 mod error;
 pub mod event;
+pub mod history;
 pub mod moment;
 pub mod numbered;
 pub mod origin;
@@ -33,6 +37,7 @@ pub mod text;
 pub use decision::{Action, Decision, NewDecision};
 pub use error::ModelsError;
 pub use event::MaintenanceEvent;
+pub use history::{History, State};
 pub use moment::Moment;
 pub use origin::{Figure, FoundEffect, Origin};
 pub use store::{Listing, NewModel, Store, Stored, TrainModels};

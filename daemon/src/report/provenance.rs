@@ -43,17 +43,21 @@ impl Provenance {
     ///
     /// When a file of the dataset cannot be read.
     pub fn of(path: &Path, command: String) -> Result<Self, LoadError> {
-        let files = digests(path)?;
+        Ok(Provenance::of_files(digests(path)?, command, SystemTime::now()))
+    }
+
+    /// Of a report on these files made at an instant.
+    pub fn of_files(files: Vec<FileDigest>, command: String, made: SystemTime) -> Self {
         let lines: String =
             files.iter().map(|file| format!("{}  {}\n", file.sha256, file.path)).collect();
-        Ok(Provenance {
+        Provenance {
             command,
             version: env!("CARGO_PKG_VERSION"),
             machine: format!("{} on {}", std::env::consts::OS, std::env::consts::ARCH),
-            day: day(SystemTime::now()),
+            day: day(made),
             files,
             sha256: hex(lines.as_bytes()),
-        })
+        }
     }
 
     /// A shell command that gives the same hash in the dataset's folder.
@@ -77,7 +81,8 @@ fn digests(path: &Path) -> Result<Vec<FileDigest>, LoadError> {
     Ok(paths.into_iter().map(digest).collect())
 }
 
-fn hex(bytes: &[u8]) -> String {
+/// SHA-256 of some bytes, in hexadecimal digits.
+pub fn hex(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 

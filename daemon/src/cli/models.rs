@@ -1,0 +1,258 @@
+//! `dynocar models`: the store of models, and what is decided on them.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::time::SystemTime;
+
+use clap::{Args, Subcommand};
+use dynocar_shared::TrainId;
+
+use super::Failure;
+use crate::learn::finding::shown_figure;
+use crate::models::decision::Choice;
+use crate::models::difference::differences;
+use crate::models::history::{History, State};
+use crate::models::store::TRIALS_FILE;
+use crate::models::{
+    ModelHash, ModelText, ModelsError, Moment, NewDecision, Store, Stored, TrainModels,
+};
+use crate::output::{print, tell};
+
+/// See the models that were learned, and decide which is in force
+#[derive(Debug, Args)]
+pub struct ModelsArguments {
+    #[command(subcommand)]
+    command: ModelsCommand,
+    /// The store of models
+    #[arg(long, value_name = "DIR", global = true, default_value = "models")]
+    models: PathBuf,
+    /// The train; may be left out where the store holds one only
+    #[arg(long, value_name = "ID", global = true)]
+    train: Option<u64>,
+}
+
+/// A model is named by its hash or the beginning of it, or as `in-force` or `declared`.
+#[derive(Debug, Subcommand)]
+enum ModelsCommand {
+    /// All models of a train: when they were made, what they are, what they add
+    List,
+    /// Where a model came from and what it adds, with 95 % intervals
+    Show {
+        /// The model's hash, the beginning of it, in-force or declared
+        model: String,
+    },
+    /// The keys in which two models differ
+    Diff {
+        /// The one
+        one: String,
+        /// The other
+        other: String,
+    },
+    /// Put a model in force
+    Adopt {
+        /// The model's hash or the beginning of it
+        model: String,
+        #[command(flatten)]
+        signed: Signed,
+    },
+    /// Take the model in force back: the one before it is in force again
+    Rollback(Signed),
+    /// Strike a model off the candidates
+    Reject {
+        /// The model's hash or the beginning of it
+        model: String,
+        #[command(flatten)]
+        signed: Signed,
+    },
+}
+
+/// Who decides, and why.
+#[derive(Debug, Args)]
+struct Signed {
+    /// Who decides
+    #[arg(long, value_name = "NAME")]
+    by: String,
+    /// Why
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    reason: String,
+}
+
+/// Shows the store or takes a decision.
+///
+/// # Errors
+///
+/// A model or train that is not there is an input failure.
+pub fn execute(arguments: &ModelsArguments) -> Result<(), Failure> {
+    let models = chosen(arguments)?;
+    let history = History::of(&models).map_err(failure)?;
+    let find = |name: &str| found(&history, name);
+    let text = match &arguments.command {
+        ModelsCommand::List => {
+            for (path, problem) in &history.left_out {
+                tell(&format!("left out: {}: {problem}", path.display()));
+            }
+            list(&models, &history)
+        }
+        ModelsCommand::Show { model } => {
+            let (stored, state) = find(model)?;
+            show(&models, stored, *state)
+        }
+        ModelsCommand::Diff { one, other } => {
+            let [one, other] = [find(one)?, find(other)?].map(|(stored, _)| stored.hash);
+            let text = |hash| models.text(hash).map_err(failure);
+            diff((one, &text(one)?), (other, &text(other)?))
+        }
+        ModelsCommand::Adopt { model, signed } => {
+            decide(&models, Choice::Adopt(find(model)?.0.hash), signed)?
+        }
+        ModelsCommand::Rollback(signed) => decide(&models, Choice::RollBack, signed)?,
+        ModelsCommand::Reject { model, signed } => {
+            decide(&models, Choice::Reject(find(model)?.0.hash), signed)?
+        }
+    };
+    Ok(print(&text)?)
+}
+
+fn failure(error: ModelsError) -> Failure {
+    match error {
+        ModelsError::Storage(_) => Failure::Work(error.to_string()),
+        error => Failure::Input(error.to_string()),
+    }
+}
+
+/// The models of the train that is meant.
+fn chosen(arguments: &ModelsArguments) -> Result<TrainModels, Failure> {
+    let store = Store::at(&arguments.models);
+    let trains = store.trains().map_err(failure)?;
+    let shown = arguments.models.display();
+    let train = match (arguments.train.map(TrainId), trains.as_slice()) {
+        (Some(train), trains) if trains.contains(&train) => train,
+        (None, [only]) => *only,
+        (_, []) => return Err(Failure::Input(format!("{shown}: holds no models of any train"))),
+        (_, trains) => {
+            let known = trains.iter().map(TrainId::to_string).collect::<Vec<_>>().join(", ");
+            return Err(Failure::Input(format!(
+                "{shown}: holds models of trains {known}: choose one by --train"
+            )));
+        }
+    };
+    Ok(store.train(train))
+}
+
+/// The model that a name means.
+fn found<'h>(history: &'h History, name: &str) -> Result<&'h (Stored, State), Failure> {
+    let is_meant = |(stored, _): &&(Stored, State)| match name {
+        "in-force" => history.in_force == Some(stored.hash),
+        "declared" => stored.origin.parent.is_none(),
+        prefix => stored.hash.to_string().starts_with(&prefix.to_lowercase()),
+    };
+    let mut meant = history.models.iter().rev().filter(is_meant);
+    match (meant.next(), meant.next()) {
+        (Some(_), Some(_)) if name != "declared" => {
+            Err(Failure::Input(format!("{name}: several models begin so: give more of the hash")))
+        }
+        // Of what was declared the newest is meant.
+        (Some(model), _) => Ok(model),
+        (None, _) => {
+            Err(Failure::Input(format!("{name}: no such model; `dynocar models list` names them")))
+        }
+    }
+}
+
+fn list(models: &TrainModels, history: &History) -> String {
+    let mut text = format!(
+        "train {}\n{:16}  {:20}  {:9}  {:16}  adds\n",
+        models.train(),
+        "model",
+        "made",
+        "state",
+        "error held out"
+    );
+    for (stored, state) in &history.models {
+        let origin = &stored.origin;
+        let error = origin.error.map_or("–".into(), |error| {
+            format!("{:.3} → {:.3} m/s", error.before_mps, error.after_mps)
+        });
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "{}  {}  {:9}  {error:16}  {}",
+            stored.hash,
+            origin.made,
+            state.words(),
+            origin.adds()
+        );
+    }
+    text
+}
+
+fn show(models: &TrainModels, stored: &Stored, state: State) -> String {
+    let origin = &stored.origin;
+    let mut text =
+        format!("model {} of train {}: {}\n", stored.hash, models.train(), state.words());
+    let mut row = |name: &str, value: &str| {
+        let _ = writeln!(text, "{name:10} {value}");
+    };
+    row("made", &format!("{} by dynocar {}: {}", origin.made, origin.version, origin.command));
+    if let Some(parent) = origin.parent {
+        row("parent", &parent.to_string());
+    }
+    row("says", &origin.statement);
+    if let Some(error) = origin.error {
+        let words = "m/s, open loop on the runs held out";
+        row("error", &format!("{:.3} → {:.3} {words}", error.before_mps, error.after_mps));
+    }
+    for effect in &origin.effects {
+        let places: Vec<String> =
+            effect.intervals_m.iter().map(|[from, to]| format!("{from:.0}–{to:.0} m")).collect();
+        row(
+            "adds",
+            &[effect.kind.replace('_', " "), places.join(", ")].join(" ").trim_end().to_owned(),
+        );
+        for (name, figure) in &effect.parameters {
+            row("", &shown_figure(name, *figure));
+        }
+    }
+    if let Some(sha256) = &origin.dataset_sha256 {
+        row("learned", &format!("from {} files, SHA-256 {sha256}", origin.files.len()));
+    }
+    let entries = std::fs::read_dir(&stored.folder).into_iter().flatten().flatten();
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    files.sort();
+    for file in files {
+        row("file", &file.display().to_string());
+    }
+    text + &trials(models, stored.hash)
+}
+
+/// What the daemon measured of a model in its trial, as the daemon tells it; empty where it did not.
+fn trials(models: &TrainModels, hash: ModelHash) -> String {
+    let read = std::fs::read_to_string(models.folder().join(TRIALS_FILE)).ok();
+    let read: Option<serde_json::Value> = read.and_then(|text| serde_json::from_str(&text).ok());
+    let of_model = read.as_ref().and_then(|trials| trials.get(hash.to_string()));
+    of_model.map_or(String::new(), |trial| format!("trial      {trial}\n"))
+}
+
+fn diff(one: (ModelHash, &ModelText), other: (ModelHash, &ModelText)) -> String {
+    let mut text = format!("{:34}  {}  {}\n", "key", one.0, other.0);
+    for it in differences(one.1, other.1) {
+        let [before, after] = &it.values;
+        let key = format!("{}: {}", it.file, it.key);
+        let _ = writeln!(text, "{key:34}  {before:16}  {after}");
+    }
+    text
+}
+
+fn decide(models: &TrainModels, what: Choice, signed: &Signed) -> Result<String, Failure> {
+    let new = NewDecision {
+        what,
+        by: signed.by.clone(),
+        reason: signed.reason.clone(),
+        at: Moment::of(SystemTime::now()),
+    };
+    let number = models.decide(&new).map_err(failure)?;
+    let in_force = models.in_force().map_err(failure)?;
+    let shown =
+        in_force.map_or("what the configuration declares".into(), |it| format!("model {it}"));
+    Ok(format!("decision {number}: {shown} is in force for train {}\n", models.train()))
+}

@@ -1,0 +1,35 @@
+//! Learning from recorded runs: a companion of the daemon that collects runs, explains them against the
+//! model in force, and puts what it finds into the store of models. It is never in the control cycle.
+//!
+//! A [`Learner`] works in rounds; clock and folders come from outside, and a round neither sleeps nor
+//! waits. The process around it ([`mod@watch`]) starts a round when a suspicion is new, at an hour, or once.
+//!
+//! # Layout, in the order of the work
+//!
+//! - [`memory`]: what is remembered from round to round
+//! - [`recordings`]: recordings, unpacked once
+//! - [`source`]: the runs that there are
+//! - [`overlay`]: a dataset with the model in force as its train and line
+//! - [`pool`]: which runs are explained together
+//! - [`finding`]: what an explanation means: a candidate, events, an open question
+//! - [`conclusion`]: what of it goes into the store
+//! - [`learner`]: a round
+//! - [`mod@watch`]: when there is one
+//! - [`page`]: the history as a page
+
+pub mod conclusion;
+mod error;
+pub mod finding;
+pub mod learner;
+pub mod memory;
+pub mod overlay;
+pub mod page;
+pub mod pool;
+pub mod recordings;
+pub mod source;
+pub mod watch;
+
+pub use conclusion::Explained;
+pub use error::LearnError;
+pub use learner::{Learner, LearnerSettings, Outcome, Round, TrainRound};
+pub use pool::Bounds;

@@ -1,0 +1,143 @@
+//! When there is a round: on a new suspicion, at an hour, and at the start.
+
+use std::str::FromStr;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use dynocar_client::{SnapshotReader, monotonic_now_ns};
+use dynocar_shared::TrainId;
+use dynocar_shared::vocabulary::EffectKind;
+use tracing::{info, warn};
+
+use super::error::LearnError;
+use super::learner::{Learner, Round};
+
+/// How often the process looks whether to stop.
+const TURN: Duration = Duration::from_millis(100);
+/// How often it looks at the snapshots.
+const LOOK: Duration = Duration::from_secs(2);
+/// Seconds of a day.
+const DAY_S: u64 = 86_400;
+
+/// A time of each day, in UTC.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TimeOfDay {
+    /// Seconds since midnight.
+    second: u64,
+}
+
+impl FromStr for TimeOfDay {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let read = || {
+            let (hour, minute) = text.split_once(':')?;
+            let number = |digits: &str, below: u64| {
+                let is_plain = digits.len() == 2 && digits.bytes().all(|it| it.is_ascii_digit());
+                digits.parse().ok().filter(|&number: &u64| is_plain && number < below)
+            };
+            Some(TimeOfDay { second: 3600 * number(hour, 24)? + 60 * number(minute, 60)? })
+        };
+        read().ok_or_else(|| "expected a time of the day in UTC, as 03:30".into())
+    }
+}
+
+impl TimeOfDay {
+    /// The next instant at which it is that time.
+    fn after(self, instant: SystemTime) -> SystemTime {
+        let now_s = instant.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
+        let today_s = now_s / DAY_S * DAY_S + self.second;
+        UNIX_EPOCH + Duration::from_secs(if today_s > now_s { today_s } else { today_s + DAY_S })
+    }
+}
+
+/// What a train's snapshots suspect.
+pub struct Suspicions {
+    train: TrainId,
+    reader: SnapshotReader,
+    /// The newest effect that was suspected.
+    known: Option<EffectKind>,
+}
+
+impl Suspicions {
+    /// Those of a train.
+    pub fn new(train: TrainId, reader: SnapshotReader) -> Self {
+        Suspicions { train, reader, known: None }
+    }
+
+    /// True when another effect is suspected than before.
+    fn is_new(&mut self) -> bool {
+        self.reader.poll();
+        let suspected = self.reader.readings(monotonic_now_ns()).find_map(|reading| {
+            let kind = EffectKind::from_number(reading.snapshot.suspected_effect)?;
+            (kind != EffectKind::None).then_some(kind)
+        });
+        let is_new = suspected.is_some() && suspected != self.known;
+        self.known = suspected.or(self.known);
+        if let (true, Some(kind)) = (is_new, suspected) {
+            info!(train = self.train.0, "suspected: {}", kind.name());
+        }
+        is_new
+    }
+}
+
+/// Runs rounds until it is told to stop; `told` is called after each.
+///
+/// A round that fails is told of, and the next may not fail.
+///
+/// # Errors
+///
+/// Only those of `told`.
+pub fn watch<E>(
+    learner: &mut Learner,
+    suspicions: &mut [Suspicions],
+    at: Option<TimeOfDay>,
+    stop: &AtomicBool,
+    told: &mut dyn FnMut(&Learner, &Round) -> Result<(), E>,
+) -> Result<(), E> {
+    let is_stopped = || stop.load(Ordering::Relaxed);
+    let mut is_due = true;
+    let mut next = at.map(|at| at.after(SystemTime::now()));
+    let mut looked = Instant::now();
+    while !is_stopped() {
+        if looked.elapsed() >= LOOK {
+            looked = Instant::now();
+            // Every train is looked at, so that none of its suspicions is new twice.
+            is_due |= suspicions.iter_mut().filter_map(|it| it.is_new().then_some(())).count() > 0;
+        }
+        if next.is_some_and(|next| SystemTime::now() >= next) {
+            next = at.map(|at| at.after(SystemTime::now()));
+            is_due = true;
+        }
+        if is_due {
+            is_due = false;
+            match learner.round(SystemTime::now(), &is_stopped) {
+                Ok(round) => told(learner, &round)?,
+                Err(error) => tell_failure(&error),
+            }
+        }
+        std::thread::sleep(TURN);
+    }
+    Ok(())
+}
+
+fn tell_failure(error: &LearnError) {
+    warn!("a round of learning failed, the next may not: {error}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_of_the_day_comes_once_a_day() {
+        let at: TimeOfDay = "03:30".parse().unwrap();
+        let day = |seconds: u64| UNIX_EPOCH + Duration::from_secs(100 * DAY_S + seconds);
+        assert_eq!(at.after(day(0)), day(12_600));
+        assert_eq!(at.after(day(12_599)), day(12_600));
+        assert_eq!(at.after(day(12_600)), day(DAY_S + 12_600));
+        for wrong in ["", "3:30", "24:00", "03:60", "+3:30", "03:30:00"] {
+            assert!(wrong.parse::<TimeOfDay>().is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,328 @@
+//! `dynocar learn` and `dynocar models` as processes, on simulated runs whose truth is known.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
+
+use dynocar::learn::{Bounds, LearnError, Learner, LearnerSettings};
+use dynocar::models::{ModelText, Store, TrainModels};
+use dynocar_client::channel::Transport;
+use dynocar_client::peer::RoleLock;
+use dynocar_client::{Role, monotonic_now_ns};
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::{ParameterSnapshot, PipelineKind, Status, TrainId};
+use dynocar_tests::process::{Process, Site};
+use dynocar_tests::simulator::dataset_writer::dataset_files;
+use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
+use rustix::process::Signal;
+
+const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
+const SEED: u64 = 23;
+const TRAIN: TrainId = TrainId(1);
+/// An explanation takes seconds, and a busy machine many times that.
+const PATIENCE: Duration = Duration::from_secs(540);
+
+/// A site with simulated runs, a configuration that declares their train and line, and a store.
+struct Workplace {
+    site: Site,
+    files: Vec<(String, String)>,
+}
+
+impl Workplace {
+    /// No run lies there yet.
+    fn of(kinds: &[EffectKind]) -> Self {
+        let site = Site::new();
+        let simulated =
+            simulate(&SimulatorSettings::new(SEED, EffectRequest::Kinds(kinds.to_vec())));
+        let files = dataset_files(&simulated);
+        for name in ["train.toml", "track.toml"] {
+            site.write(name, text(&files, name));
+        }
+        let config = "[[trains]]\nid = 1\nfile = \"train.toml\"\ntrack = \"track.toml\"\n\
+                      [[pipelines]]\nkind = \"residual_monitor\"\n";
+        site.write("daemon.toml", config);
+        std::fs::create_dir(site.path().join("runs")).unwrap();
+        Workplace { site, files }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.site.path().join(name)
+    }
+
+    /// Puts some of the runs there as a dataset of this name, which appears as a whole.
+    fn record(&self, name: &str, runs: Range<usize>) {
+        let part = self.path("part");
+        std::fs::create_dir_all(part.join("runs")).unwrap();
+        let mut manifest: toml::Table = text(&self.files, "dataset.toml").parse().unwrap();
+        let own = manifest["runs"].as_array().unwrap()[runs].to_vec();
+        for (path, text) in &self.files {
+            if !path.ends_with(".csv") || own.iter().any(|run| run["file"].as_str() == Some(path)) {
+                std::fs::write(part.join(path), text).unwrap();
+            }
+        }
+        manifest.insert("runs".into(), own.into());
+        std::fs::write(part.join("dataset.toml"), manifest.to_string()).unwrap();
+        std::fs::rename(part, self.path("runs").join(name)).unwrap();
+    }
+
+    fn arguments(&self) -> Vec<String> {
+        let named = [("--config", "daemon.toml"), ("--runs", "runs"), ("--models", "models")];
+        let named =
+            named.map(|(option, name)| [option.into(), self.path(name).display().to_string()]);
+        std::iter::once("learn".to_owned()).chain(named.into_iter().flatten()).collect()
+    }
+
+    /// Learns once; gives what was said.
+    fn learn(&self, more: &[&str]) -> String {
+        let output = self.learn_once(more);
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{said}{errors}");
+        said + &errors
+    }
+
+    fn learn_once(&self, more: &[&str]) -> Output {
+        let mut command = Command::new(DYNOCAR);
+        command.args(self.arguments()).arg("--once").args(more).output().expect("the program")
+    }
+
+    /// A learner that goes on.
+    fn start(&self, more: &[&str]) -> Process {
+        let arguments = self.arguments();
+        let words: Vec<&str> =
+            arguments.iter().map(String::as_str).chain(more.iter().copied()).collect();
+        self.site.start(DYNOCAR, &words)
+    }
+
+    fn models(&self) -> TrainModels {
+        Store::at(&self.path("models")).train(TRAIN)
+    }
+
+    /// `dynocar models` with these words: exit status, standard output, standard error.
+    fn say(&self, words: &[&str]) -> (Option<i32>, String, String) {
+        let output = Command::new(DYNOCAR)
+            .arg("models")
+            .args(words)
+            .arg("--models")
+            .arg(self.path("models"))
+            .output()
+            .expect("the program");
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        (output.status.code(), text(&output.stdout), text(&output.stderr))
+    }
+}
+
+fn text<'f>(files: &'f [(String, String)], name: &str) -> &'f str {
+    &files.iter().find(|(path, _)| path == name).expect("a file").1
+}
+
+fn await_long(mut condition: impl FnMut() -> bool, what: impl Fn() -> String) {
+    let start = Instant::now();
+    while !condition() {
+        assert!(start.elapsed() < PATIENCE, "no {}", what());
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+/// Models that were learned, not declared.
+fn learned(models: &TrainModels) -> Vec<dynocar::models::Stored> {
+    let listing = models.list().unwrap();
+    listing.models.into_iter().filter(|it| it.origin.parent.is_some()).collect()
+}
+
+#[test]
+fn an_undeclared_tunnel_becomes_a_candidate_once_and_is_adopted_and_taken_back_by_name() {
+    let place = Workplace::of(&[EffectKind::TunnelDrag]);
+    assert!(place.learn(&[]).contains("too few runs"));
+    place.record("first", 0..7);
+    let said = place.learn(&[]);
+    assert!(said.contains("new candidate"), "{said}");
+    let models = place.models();
+    let [candidate] = &learned(&models)[..] else { panic!("one candidate: {said}") };
+    assert_eq!(candidate.origin.effects[0].kind, "tunnel_drag");
+    let error = candidate.origin.error.expect("an error on runs held out");
+    assert!(error.after_mps < error.before_mps, "{error:?}");
+    assert_eq!(candidate.origin.files.len(), 2 + 7, "train, line and seven runs");
+    let (train, track) = models.load(candidate.hash).unwrap();
+    assert!(train.tunnel_constant_n_per_kn_m > 0.0 || track.is_some());
+    for name in ["answer.json", "report.html"] {
+        assert!(candidate.folder.join(name).is_file(), "{name}");
+    }
+
+    assert!(place.learn(&[]).contains("nothing new"), "the same runs");
+    place.record("second", 7..8);
+    let said = place.learn(&[]);
+    assert!(said.contains(&format!("model {} says so already", candidate.hash)), "{said}");
+    assert_eq!(learned(&models).len(), 1, "told once");
+
+    let hash = candidate.hash.to_string();
+    let (status, shown, _) = place.say(&["show", &hash[..5]]);
+    assert!(status == Some(0) && shown.contains("tunnel drag") && shown.contains(" ± "), "{shown}");
+    let (_, differing, _) = place.say(&["diff", "declared", &hash]);
+    assert!(
+        differing.contains("resistance.c") && differing.contains("N/kN per (m/s)²"),
+        "{differing}"
+    );
+    let (status, _, refused) = place.say(&["adopt", "ffff", "--by", "Anna"]);
+    assert!(status == Some(2) && refused.contains("no such model"), "{refused}");
+    assert_eq!(place.say(&["adopt", &hash]).0, Some(2), "nobody signed");
+    let (_, decided, _) = place.say(&["adopt", &hash[..6], "--by", "Anna", "--reason", "summer"]);
+    assert!(decided.contains(&format!("model {hash} is in force")), "{decided}");
+    assert_eq!(models.in_force().unwrap(), Some(candidate.hash));
+    assert!(place.say(&["list"]).1.lines().any(|it| it.contains(&hash) && it.contains("in force")));
+    assert!(place.learn(&[]).contains("too few runs"), "none since it came in force");
+    let (_, back, _) = place.say(&["rollback", "--by", "Bert"]);
+    assert!(back.contains("what the configuration declares is in force"), "{back}");
+    let (status, _, refused) = place.say(&["rollback", "--by", "Bert"]);
+    assert!(status == Some(2) && refused.contains("nothing to roll back"), "{refused}");
+}
+
+#[test]
+fn a_dragging_brake_is_an_event_with_its_runs_and_no_model() {
+    let place = Workplace::of(&[EffectKind::DraggingBrake]);
+    place.record("runs", 0..8);
+    let said = place.learn(&[]);
+    assert!(said.contains("new maintenance events: 1"), "{said}");
+    let models = place.models();
+    assert!(learned(&models).is_empty(), "{said}");
+    let events = models.events().unwrap();
+    let [(1, event)] = &events[..] else { panic!("one event: {events:?}") };
+    assert_eq!(event.kind, "dragging_brake");
+    assert!(event.sentence.starts_with("dragging brake in ") && event.sentence.contains(" ± "));
+    assert!(
+        event.windows.iter().all(|it| it.run.starts_with("runs/") && it.t_end_s > it.t_start_s)
+    );
+    assert!(event.acted.is_some() && said.contains(&event.sentence), "{said}");
+    // What is learned from the same runs again is no other event.
+    std::fs::remove_file(place.path("models/learn/learn.state")).unwrap();
+    place.learn(&[]);
+    assert_eq!(models.events().unwrap(), events);
+}
+
+#[test]
+fn where_nothing_acts_nothing_is_put_into_the_store() {
+    let place = Workplace::of(&[]);
+    place.record("runs", 0..8);
+    let said = place.learn(&[]);
+    let models = place.models();
+    assert!(learned(&models).is_empty() && models.events().unwrap().is_empty(), "{said}");
+}
+
+#[test]
+fn a_learner_killed_at_any_moment_leaves_nothing_half_done_and_the_next_one_goes_on() {
+    let place = Workplace::of(&[EffectKind::TunnelDrag]);
+    place.record("runs", 0..8);
+    let models = place.models();
+    for delay_ms in [0, 100, 400, 1200, 2500, 4000] {
+        let learner = place.start(&["--once"]);
+        std::thread::sleep(Duration::from_millis(delay_ms));
+        learner.kill();
+        assert!(learned(&models).iter().all(|it| models.load(it.hash).is_ok()));
+    }
+    // One that stands just before the end: the candidate is there, the memory not yet.
+    let said = place.learn(&[]);
+    assert_eq!(learned(&models).len(), 1, "{said}");
+    std::fs::write(place.path("models/learn/learn.state"), "dynocar-state 1 99 0\nhalf").unwrap();
+    let said = place.learn(&[]);
+    assert!(said.contains("every run is looked at anew"), "{said}");
+    assert!(said.contains("says so already"), "{said}");
+    assert_eq!(learned(&models).len(), 1);
+    let of_hash = |path: &Path| !path.to_string_lossy().contains(".part");
+    let left_out = models.list().unwrap().left_out;
+    assert!(!left_out.iter().any(|(path, _)| of_hash(path)), "{left_out:?}");
+}
+
+#[test]
+fn a_new_suspicion_starts_a_round_and_a_signal_ends_the_learner() {
+    let place = Workplace::of(&[EffectKind::TunnelDrag]);
+    let host = place.site.host();
+    let _role = RoleLock::claim(&host, TRAIN, Role::Daemon).unwrap();
+    let transport = Transport::open(&host, "played-daemon").unwrap();
+    let sender = transport.sender::<ParameterSnapshot>(TRAIN).unwrap();
+    let page = place.path("history.html");
+    let mut learner = place.start(&["--at", "00:00", "--report", page.to_str().unwrap()]);
+    await_long(|| learner.errors().contains("too few runs"), || learner.errors());
+    place.record("runs", 0..8);
+    let mut snapshot = ParameterSnapshot::empty();
+    (snapshot.epoch, snapshot.train_id) = (1, TRAIN.0);
+    snapshot.pipeline_kind = PipelineKind::ResidualMonitor as u32;
+    snapshot.status = Status::Estimated as u32;
+    snapshot.suspected_effect = EffectKind::TunnelDrag as u32;
+    let models = place.models();
+    let mut send = || {
+        snapshot.sequence += 1;
+        snapshot.published_ns = monotonic_now_ns();
+        snapshot.vouched_ns = snapshot.published_ns;
+        sender.send(&snapshot).unwrap();
+    };
+    await_long(
+        || {
+            send();
+            !learned(&models).is_empty()
+        },
+        || format!("candidate:\n{}", learner.errors()),
+    );
+    assert!(learner.errors().contains("suspected: tunnel_drag"), "{}", learner.errors());
+    assert!(learner.end(Signal::TERM).success(), "{}", learner.errors());
+    assert!(std::fs::read_to_string(&page).unwrap().contains("tunnel drag"));
+}
+
+#[test]
+fn a_signal_ends_a_learner_in_the_middle_of_an_explanation_and_nothing_is_concluded() {
+    let place = Workplace::of(&[EffectKind::TunnelDrag]);
+    place.record("runs", 0..8);
+    let mut learner = place.start(&["--once"]);
+    // The runs are known: they are being read and explained.
+    let state = place.path("models/learn/learn.state");
+    await_long(|| state.exists(), || learner.errors());
+    let status = learner.end(Signal::TERM);
+    let said = learner.output();
+    assert!(status.success(), "{}", learner.errors());
+    let is_concluded = said.contains("new candidate");
+    assert_eq!(!learned(&place.models()).is_empty(), is_concluded, "{said}");
+    assert!(is_concluded || said.contains("stopped before the end"), "{said}");
+}
+
+#[test]
+fn a_store_has_one_learner() {
+    let place = Workplace::of(&[]);
+    let settings = || LearnerSettings {
+        store: Store::at(&place.path("models")),
+        runs: place.path("runs"),
+        trains: vec![(TRAIN, ModelText { train: "a".into(), track: None })],
+        bounds: Bounds::default(),
+        command: String::new(),
+    };
+    let learner = Learner::open(settings()).unwrap();
+    assert!(matches!(Learner::open(settings()), Err(LearnError::Taken { .. })));
+    let output = place.learn_once(&[]);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert!(errors.contains("another learner works on this store"), "{errors}");
+    drop(learner);
+    place.learn(&[]);
+}
+
+#[test]
+fn runs_and_names_that_cannot_be_are_refused_or_left_out_in_words() {
+    let place = Workplace::of(&[]);
+    let refused = |words: &[&str]| {
+        let output = place.learn_once(words);
+        assert_eq!(output.status.code(), Some(2), "{words:?}");
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    let train = place.path("train.toml").display().to_string();
+    assert!(refused(&["--report", &train]).contains("none of this command's results"));
+    assert!(refused(&["--at", "25:00"]).contains("expected a time of the day"));
+    std::fs::create_dir_all(place.path("runs/bad")).unwrap();
+    std::fs::write(place.path("runs/bad/dataset.toml"), "[dataset]\nname = 3\n").unwrap();
+    std::fs::write(place.path("runs/half.mcap"), b"\x89MCAP0\r\n and no end").unwrap();
+    let said = place.learn(&[]);
+    assert!(said.contains("left out: ") && said.contains("bad/dataset.toml"), "{said}");
+    assert!(!place.learn(&[]).contains("left out"), "told once");
+    let (status, _, empty) = place.say(&["list", "--train", "7"]);
+    assert!(status == Some(2) && empty.contains("choose one by --train"), "{empty}");
+    std::fs::remove_dir_all(place.path("runs")).unwrap();
+    assert!(refused(&[]).contains("expected the folder of recorded runs"));
+}
