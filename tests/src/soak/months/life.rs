@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use dynocar::config::{DaemonConfig, TrainConfig};
 use dynocar::learn::{Bounds, Learner, LearnerSettings};
-use dynocar::models::{ModelHash, ModelText, Store, TrainModels};
+use dynocar::models::{ModelHash, ModelText, NewModel, Origin, Store, TrainModels};
 use dynocar::report::provenance::day as day_name;
 use dynocar::run::build_pipeline;
 use dynocar::runtime::exchange::Exchange;
@@ -96,7 +96,10 @@ impl<'f> Life<'f> {
         let train = config.trains[0].clone();
         let store = Store::at(&folder.join("models"));
         let models = store.train(TRAIN);
-        put_declared(&models, &train).expect("the declared model is put");
+        let declared = put_declared(&models, &train).expect("the declared model is put");
+        if settings.story == Story::Nothing {
+            put_others(&models, &train, declared);
+        }
         let of_models = config.models.clone().expect("[models]");
         let exchange = Arc::new(Exchange::new(0));
         let shadow =
@@ -133,7 +136,8 @@ impl<'f> Life<'f> {
             self.live_day(day);
         }
         self.judge_adoptions();
-        self.outcome.events = self.models.events().expect("the events").len();
+        let events = self.models.events().expect("the events");
+        self.outcome.events = events.into_iter().map(|(_, event)| event.kind).collect();
         self.outcome
     }
 
@@ -220,6 +224,20 @@ impl<'f> Life<'f> {
                 error(adoption.before).zip(error(adoption.after)).map(|(old, new)| new < old);
         }
         self.outcome.adoptions = adoptions;
+    }
+}
+
+/// Puts two models on trial that nothing speaks for: resistances 2 % to either side.
+fn put_others(models: &TrainModels, train: &TrainConfig, declared: ModelHash) {
+    for factor in [0.98, 1.02] {
+        let mut table: toml::Table = train.text.train.parse().expect("the declared train");
+        let resistance = table["resistance"].as_table_mut().expect("[resistance]");
+        let a = factor * resistance["a"].as_float().expect("a number");
+        resistance.insert("a".into(), toml::Value::Float(a));
+        let text = ModelText { train: table.to_string(), track: train.text.track.clone() };
+        let origin = Origin::written("Of a measurement.", "dynocar-soak months", Some(declared));
+        let new = NewModel { text, origin, answer_json: None, report_html: None };
+        models.put(&new).expect("a model is put");
     }
 }
 

@@ -10,7 +10,7 @@ use crate::simulator::{Effect, World};
 /// What happens to a train over some months.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Story {
-    /// Nothing.
+    /// Nothing; two models that are no better are on trial.
     Nothing,
     /// From the onset on, one effect of a kind, as large as the simulator draws it.
     Appears(EffectKind),

@@ -32,15 +32,15 @@ pub struct Outcome {
     pub adoptions: Vec<Adoption>,
     /// Rounds of learning.
     pub rounds: usize,
-    /// Maintenance events.
-    pub events: usize,
+    /// Kinds of the maintenance events.
+    pub events: Vec<String>,
 }
 
 impl Outcome {
     /// Of a life that begins.
     pub fn of(settings: LifeSettings) -> Self {
         let (errors_mps, adoptions) = (Vec::new(), Vec::new());
-        Outcome { settings, errors_mps, adoptions, rounds: 0, events: 0 }
+        Outcome { settings, errors_mps, adoptions, rounds: 0, events: Vec::new() }
     }
 
     /// Mean over some days of the error of the model in force, in m/s.
@@ -72,7 +72,8 @@ pub fn line(outcome: &Outcome) -> String {
     let LifeSettings { story, span, seed, days, .. } = outcome.settings;
     let last = if story.ends() { span.end } else { days };
     let adopted = outcome.first_change(span.onset..last, false);
-    let days_of = |from: usize, to: Option<usize>| to.map_or("-".into(), |to| (to - from).to_string());
+    let days_of =
+        |from: usize, to: Option<usize>| to.map_or("-".into(), |to| (to - from).to_string());
     let figure = |value: Option<f64>| value.map_or("-".into(), |value| format!("{value:.3}"));
     let before = outcome.error_mps(span.onset..adopted.unwrap_or(last).max(span.onset + 1));
     let after = adopted.and_then(|day| outcome.error_mps(day + 1..last));
@@ -87,7 +88,7 @@ pub fn line(outcome: &Outcome) -> String {
         days_of(span.end, rollback),
         outcome.adoptions.len(),
         outcome.mistakes(),
-        outcome.events,
+        outcome.events.join(", "),
         outcome.rounds,
         found.join(" → "),
     )
