@@ -4,9 +4,14 @@
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+use std::path::Path;
+use std::sync::Arc;
 
+use dynocar::identify::published_samples;
+use dynocar::runtime::exchange::Exchange;
 use dynocar_client::channel::{Sender, Transport};
 use dynocar_client::{NoAnswer, SamplePublisher, SnapshotReader, monotonic_now_ns};
+use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
 use dynocar_shared::{
     ParameterSnapshot, PipelineKind, Quantity, SampleField, TrainId, TrainSample,
 };
@@ -48,6 +53,46 @@ fn allocations_of(work: impl FnOnce()) -> u64 {
 #[test]
 fn the_counter_sees_an_allocation() {
     assert!(allocations_of(|| drop(std::hint::black_box(vec![1_u8; 64]))) > 0);
+}
+
+#[test]
+fn another_models_pipelines_go_to_work_without_an_allocation() {
+    let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo");
+    let dataset = dynocar::dataset::load(&demo).expect("the demo's runs");
+    let samples = published_samples(&dataset, TrainId(1));
+    let kind = PipelineKind::TrajectoryKalman;
+    let settings = EstimatorSettings::default_of(kind).expect("a kind that can be built");
+    let made = || {
+        let (train, track) = (Arc::clone(&dataset.train), dataset.track.clone());
+        let estimator = settings.build(&train).expect("default settings");
+        Pipeline::new(TrainId(1), 0, train, track, estimator)
+    };
+    let (mut at_work, mut other) = (made(), made());
+    for sample in &samples[..2000] {
+        at_work.process(sample);
+        other.process(sample);
+    }
+    let before = *at_work.snapshot();
+    let exchange = Exchange::new(1);
+    exchange.hand_over(vec![vec![other]]);
+    let allocated = allocations_of(|| {
+        let mut set = exchange.take(0, before.sample_sequence, true).expect("it stands");
+        set[0].take_over(&mut at_work);
+        std::mem::swap(&mut set[0], &mut at_work);
+        exchange.give_back(0, set);
+    });
+    assert_eq!(allocated, 0);
+    let counts = |it: &ParameterSnapshot| {
+        (it.sequence, it.samples_used, it.samples_rejected, it.samples_lost, it.sample_sequence)
+    };
+    assert_eq!(counts(at_work.snapshot()), counts(&before));
+    let allocated = allocations_of(|| {
+        for sample in &samples[2000..] {
+            at_work.process(sample);
+        }
+    });
+    assert_eq!(allocated, 0);
+    assert_eq!(at_work.snapshot().samples_lost, 0);
 }
 
 #[test]

@@ -55,6 +55,8 @@ kinds! {
     KeepRequested = 12 "keep_requested";
     /// A pipeline reckons with another model of train and line than before.
     ModelChanged = 13 "model_changed";
+    /// A learner wrote down a maintenance event: a dragging brake, low adhesion, another load.
+    MaintenanceFound = 14 "maintenance_found";
 }
 
 /// Something that happened.

@@ -2,6 +2,7 @@
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
@@ -277,6 +278,13 @@ impl TrainModels {
             .filter(|it| it.origin.parent == Some(in_force) && !is_decided(it.hash))
             .map(|it| it.hash)
             .collect())
+    }
+
+    /// When models, decisions and events last came, for those who look often.
+    pub fn changed(&self) -> Vec<SystemTime> {
+        let folders = [self.folder.clone(), self.folder.join(DECISIONS), self.folder.join(EVENTS)];
+        let modified = |folder: &PathBuf| std::fs::metadata(folder).and_then(|it| it.modified());
+        folders.iter().filter_map(|folder| modified(folder).ok()).collect()
     }
 
     /// Writes a maintenance event down; gives its number.

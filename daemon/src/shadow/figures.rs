@@ -1,5 +1,6 @@
 //! What the trials show now, for those who watch the daemon: the metrics.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::models::ModelHash;
@@ -23,22 +24,45 @@ pub struct TrialFigures {
     pub capital: f64,
 }
 
+/// Maintenance events of a kind.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EventCount {
+    /// The train.
+    pub train: u64,
+    /// The kind.
+    pub kind: String,
+    /// How many the store holds.
+    pub count: u64,
+}
+
+/// What is pinned up.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Pinned {
+    /// The models of all trains.
+    pub models: Vec<TrialFigures>,
+    /// The maintenance events of all trains.
+    pub events: Vec<EventCount>,
+}
+
 /// Where the shadow's thread pins up its figures, and others read them.
 #[derive(Clone, Debug, Default)]
 pub struct Board {
-    figures: Arc<Mutex<Vec<TrialFigures>>>,
+    pinned: Arc<Mutex<Pinned>>,
 }
 
 impl Board {
-    /// Replaces the figures of a train.
-    pub fn pin(&self, train: u64, figures: Vec<TrialFigures>) {
-        let mut all = self.figures.lock().unwrap_or_else(PoisonError::into_inner);
-        all.retain(|it| it.train != train);
-        all.extend(figures);
+    /// Replaces what is pinned up of a train.
+    pub fn pin(&self, train: u64, models: Vec<TrialFigures>, events: &BTreeMap<String, u64>) {
+        let mut pinned = self.pinned.lock().unwrap_or_else(PoisonError::into_inner);
+        pinned.models.retain(|it| it.train != train);
+        pinned.models.extend(models);
+        pinned.events.retain(|it| it.train != train);
+        let counts = events.iter().map(|(kind, &count)| (kind.clone(), count));
+        pinned.events.extend(counts.map(|(kind, count)| EventCount { train, kind, count }));
     }
 
-    /// The figures of all trains.
-    pub fn read(&self) -> Vec<TrialFigures> {
-        self.figures.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    /// What is pinned up of all trains.
+    pub fn read(&self) -> Pinned {
+        self.pinned.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }

@@ -26,5 +26,5 @@ pub mod rule;
 pub mod thread;
 pub mod train;
 
-pub use figures::{Board, TrialFigures};
+pub use figures::{Board, Pinned, TrialFigures};
 pub use train::ShadowTrain;

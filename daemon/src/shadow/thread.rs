@@ -80,7 +80,7 @@ fn run(lanes: &mut [Lane], settings: &ModelsConfig, board: &Board, stop: &Atomic
             lane.hear();
             if is_time_to_look {
                 lane.train.look(SystemTime::now());
-                board.pin(lane.train.id(), lane.train.figures());
+                board.pin(lane.train.id(), lane.train.figures(), lane.train.events());
             }
             lane.train.go_on();
             if is_time_to_write {

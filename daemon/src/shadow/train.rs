@@ -1,6 +1,6 @@
 //! One train's trials, and its change from one model to another.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 use std::time::{Instant, SystemTime};
 
@@ -58,6 +58,10 @@ pub struct ShadowTrain {
     /// What the log has said, to say it once.
     told: HashSet<String>,
     newest_speed_mps: f64,
+    /// When the store was last changed, as far as it was looked at.
+    seen: Option<Vec<SystemTime>>,
+    /// Maintenance events by kind.
+    events: BTreeMap<String, u64>,
 }
 
 impl ShadowTrain {
@@ -88,6 +92,8 @@ impl ShadowTrain {
             changing: None,
             told: HashSet::new(),
             newest_speed_mps: 0.0,
+            seen: None,
+            events: BTreeMap::new(),
         }
     }
 
@@ -114,14 +120,26 @@ impl ShadowTrain {
 
     /// Looks into the store, judges the rivals and, where a rule is to do so, decides.
     pub fn look(&mut self, now: SystemTime) {
+        let changed = self.models.changed();
+        if self.seen.as_ref() != Some(&changed) {
+            self.read_store();
+            self.seen = Some(changed);
+        }
+        self.judge(now);
+    }
+
+    fn read_store(&mut self) {
         let named = (self.train.candidates.as_deref(), self.settings.candidates_max);
         match standing(&self.models, self.train.text.hash(), named) {
             Ok(standing) => {
                 self.standing = standing;
                 self.admit();
-                self.judge(now);
             }
             Err(error) => self.warn_once(format!("the models on trial stay as they are: {error}")),
+        }
+        self.events.clear();
+        for (_, event) in self.models.events().unwrap_or_default() {
+            *self.events.entry(event.kind).or_default() += 1;
         }
     }
 
@@ -138,6 +156,11 @@ impl ShadowTrain {
         } else if stands && self.standing.in_force != self.in_force() {
             self.begin(self.standing.in_force);
         }
+    }
+
+    /// Maintenance events by kind.
+    pub fn events(&self) -> &BTreeMap<String, u64> {
+        &self.events
     }
 
     /// What the trials show now.
@@ -257,7 +280,7 @@ impl ShadowTrain {
         info!(train = self.id(), model = %hash, "decided by rule: {reason}");
         let decision = NewDecision { what, by: RULE.into(), reason, at };
         match self.models.decide(&decision) {
-            Ok(_) => self.look(now),
+            Ok(_) => self.read_store(),
             Err(error) => self.warn_once(format!("the decision is not written: {error}")),
         }
     }
@@ -304,6 +327,8 @@ impl ShadowTrain {
         self.trials.rivals[place].pipelines = sets.into_iter().flatten().collect();
         info!(train = self.id(), model = %changing.to, before = %from, "in force from now on");
         self.told.clear();
+        // Other candidates grew from the model that is in force now.
+        self.seen = None;
     }
 
     fn estimates(&self, pipelines: &[Pipeline]) -> Vec<Estimate> {

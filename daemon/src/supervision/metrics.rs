@@ -9,7 +9,7 @@ use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::registry::Registry;
 use std::sync::atomic::AtomicU64;
 
-use crate::shadow::TrialFigures;
+use crate::shadow::{Pinned, TrialFigures};
 
 /// The content type of [`text`].
 pub const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
@@ -38,6 +38,7 @@ struct Families {
     trial_ratio: Gauges,
     trial_evidence: Gauges,
     trial_trips: Gauges,
+    maintenance: Counters,
 }
 
 impl Families {
@@ -48,6 +49,7 @@ impl Families {
             ("samples_lost", "Samples that never arrived", &self.lost),
             ("updates", "Windows or segments that updated the estimate", &self.updates),
             ("resets", "Resets of the estimate", &self.resets),
+            ("maintenance_events", "Maintenance events, by kind", &self.maintenance),
         ];
         for (name, help, family) in counters {
             registry.register(name, help, family.clone());
@@ -136,9 +138,13 @@ impl Families {
 
 /// The newest snapshots and what models on trial show, as OpenMetrics text; `names` are the
 /// pipelines' by their number.
-pub fn text(readers: &mut [SnapshotReader], names: &[String], trials: &[TrialFigures]) -> String {
+pub fn text(readers: &mut [SnapshotReader], names: &[String], pinned: &Pinned) -> String {
     let families = Families::default();
-    trials.iter().for_each(|it| families.take_trial(it));
+    pinned.models.iter().for_each(|it| families.take_trial(it));
+    for it in &pinned.events {
+        let labels: Labels = vec![("train", it.train.to_string()), ("kind", it.kind.clone())];
+        families.maintenance.get_or_create(&labels).inc_by(it.count);
+    }
     for reader in readers {
         reader.poll();
         for reading in reader.readings(monotonic_now_ns()) {

@@ -42,6 +42,12 @@ impl Configuration {
             .map_err(|problem| format!("the daemon's configuration is not attached: {problem}"))
     }
 
+    /// The directory of the store of models that it names.
+    pub fn store(&self) -> Option<PathBuf> {
+        let (_, text) = self.files.first()?;
+        Some(self.path.parent()?.join(store_of(&text.parse().ok()?)?))
+    }
+
     fn read(path: &Path) -> Result<Self, String> {
         let text = |path: &Path| read_text(path).map_err(|it| format!("{}: {it}", path.display()));
         let configuration = text(path)?;
@@ -69,11 +75,14 @@ impl Configuration {
 /// The model that the store of a configuration has put in force for a train; `None` where what the
 /// configuration declares is.
 fn adopted(table: &Table, folder: &Path, train: i64) -> Result<Option<ModelText>, String> {
-    let directory = table.get("models").and_then(|models| models.get("directory")?.as_str());
-    let Some(directory) = directory else { return Ok(None) };
+    let Some(directory) = store_of(table) else { return Ok(None) };
     let models = Store::at(&folder.join(directory)).train(TrainId(train as u64));
     let hash = models.in_force().map_err(|it| it.to_string())?;
     hash.map(|hash| models.text(hash).map_err(|it| it.to_string())).transpose()
+}
+
+fn store_of(configuration: &Table) -> Option<PathBuf> {
+    Some(configuration.get("models")?.get("directory")?.as_str()?.into())
 }
 
 /// The file behind `--config` in the command line of a process of this user.

@@ -4,6 +4,7 @@
 mod configuration;
 mod files;
 mod keeping;
+mod maintenance;
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,6 +19,7 @@ use mcap::McapError;
 use crate::event::{Event, EventKind};
 use crate::lanes::{Lanes, PAUSE, Sink, Wanted, event};
 use configuration::Configuration;
+use maintenance::Maintenance;
 
 pub use files::{Files, Rotation};
 pub use keeping::{KeepError, Keeper, Keeping, request as request_keeping};
@@ -98,13 +100,20 @@ pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, Record
     if let Some(keeper) = keeper {
         files.set_keeper(keeper);
     }
-    let mut recorder = Recorder { files, configuration: settings.configuration.clone() };
+    let mut recorder = Recorder {
+        files,
+        configuration: settings.configuration.clone(),
+        maintenance: Maintenance::default(),
+    };
     let mut lanes = Lanes::open(settings.wanted.clone(), "dynocar-recorder", &mut recorder)?;
     tell(&format!("recording into {}; Ctrl-C ends it", recorder.files.path().display()));
     let mut flushed = Instant::now();
     while !stop.load(Ordering::Relaxed) {
         lanes.take(&mut recorder)?;
         if flushed.elapsed() >= FLUSH {
+            for event in recorder.maintenance.news() {
+                recorder.event(&event)?;
+            }
             recorder.files.flush()?;
             flushed = Instant::now();
         }
@@ -122,6 +131,7 @@ struct Recorder {
     files: Files,
     /// The daemon's configuration, where it was named.
     configuration: Option<PathBuf>,
+    maintenance: Maintenance,
 }
 
 impl Sink for Recorder {
@@ -145,7 +155,10 @@ impl Sink for Recorder {
 
     fn daemon_came(&mut self, train: TrainId, process: u32) -> Result<(), RecordError> {
         match Configuration::of(self.configuration.as_deref(), process) {
-            Ok(configuration) => self.files.attach(configuration),
+            Ok(configuration) => {
+                self.maintenance.follow(train, &configuration);
+                self.files.attach(configuration)
+            }
             Err(problem) => {
                 tell(&format!("train {train}: {problem}"));
                 Ok(())
