@@ -1,4 +1,5 @@
-//! The estimators as an FMU: the archive that a simulator takes, and recorded runs as its inputs.
+//! The estimators, or the train itself, as an FMU: the archive that a simulator takes, and recorded
+//! runs as its inputs.
 
 use std::fmt::Write as _;
 use std::io::{Cursor, Write as _};
@@ -6,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use dynocar_core::dataset::Run;
 use dynocar_fmu::variables::{Meaning, ModelFile};
-use dynocar_fmu::{GUID, MODEL_IDENTIFIER, VARIABLES, documentation, model_description};
+use dynocar_fmu::{ESTIMATORS, INTERFACES, Interface, documentation, model_description};
 use dynocar_shared::TrainSample;
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use zip::result::ZipError;
@@ -68,17 +69,22 @@ pub fn find_library(program: &Path) -> Result<Vec<u8>, FmuError> {
 pub fn read_library(path: &Path) -> Result<Vec<u8>, FmuError> {
     let library =
         std::fs::read(path).map_err(|source| FmuError::Unreadable { path: path.into(), source })?;
-    let is_ours = library.starts_with(b"\x7fELF")
-        && library.windows(GUID.len()).any(|bytes| bytes == GUID.as_bytes());
+    let holds = |guid: &str| library.windows(guid.len()).any(|bytes| bytes == guid.as_bytes());
+    let is_ours =
+        library.starts_with(b"\x7fELF") && INTERFACES.iter().all(|model| holds(model.guid));
     if is_ours { Ok(library) } else { Err(FmuError::OtherLibrary(path.into())) }
 }
 
-/// The FMU: the same bytes for the same library and files.
+/// The FMU of a model: the same bytes for the same library and files.
 ///
 /// # Errors
 ///
 /// When it cannot be packed.
-pub fn archive(library: &[u8], files: &[(ModelFile, String)]) -> Result<Vec<u8>, FmuError> {
+pub fn archive(
+    model: &Interface,
+    library: &[u8],
+    files: &[(ModelFile, String)],
+) -> Result<Vec<u8>, FmuError> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .last_modified_time(DateTime::default());
@@ -87,9 +93,9 @@ pub fn archive(library: &[u8], files: &[(ModelFile, String)]) -> Result<Vec<u8>,
         archive.start_file(name, options)?;
         Ok(archive.write_all(content)?)
     };
-    put("modelDescription.xml".into(), model_description().as_bytes())?;
-    put("documentation/index.html".into(), documentation().as_bytes())?;
-    put(format!("binaries/{}/{MODEL_IDENTIFIER}.so", platform()), library)?;
+    put("modelDescription.xml".into(), model_description(model).as_bytes())?;
+    put("documentation/index.html".into(), documentation(model).as_bytes())?;
+    put(format!("binaries/{}/{}.so", platform(), model.identifier), library)?;
     for (file, text) in files {
         put(format!("resources/{}", file.own_name()), text.as_bytes())?;
     }
@@ -110,10 +116,11 @@ const TIME: &str = "time";
 /// How a file of inputs begins, so that one is known again.
 pub const INPUTS_MARK: &str = "time,position_m,speed_mps,";
 
-/// A recorded run as a CSV file of the FMU's inputs over time in s, `NaN` where missing.
+/// A recorded run as a CSV file of the inputs of the estimators' FMU over time in s, `NaN` where
+/// missing; the train's takes its own from there.
 pub fn inputs(run: &Run) -> String {
     let is_input = |meaning: &Meaning| meaning.causality() == "input";
-    let inputs = VARIABLES.iter().filter(|variable| is_input(&variable.meaning));
+    let inputs = ESTIMATORS.variables.iter().filter(|variable| is_input(&variable.meaning));
     let mut text = TIME.to_owned();
     for input in inputs.clone() {
         text += &format!(",{}", input.name);
@@ -134,6 +141,6 @@ fn cell(sample: &TrainSample, run: u32, input: Meaning) -> f64 {
         Meaning::Direction => sample.direction.into(),
         Meaning::WheelSlide => f64::from(u8::from(sample.flags & FLAG_WHEEL_SLIDE != 0)),
         Meaning::Run => run.into(),
-        Meaning::File(_) | Meaning::Estimate(..) => f64::NAN,
+        _ => f64::NAN,
     }
 }

@@ -8,6 +8,7 @@ use dynocar::dataset;
 use dynocar::identify::{identify, published_samples};
 use dynocar_core::dataset::Dataset;
 use dynocar_core::pipeline::EstimatorSettings;
+use dynocar_fmu::estimators::PIPELINES;
 use dynocar_fmu::ffi::Status;
 use dynocar_fmu::ffi::life::{
     fmi2EnterInitializationMode, fmi2ExitInitializationMode, fmi2Reset, fmi2SetupExperiment,
@@ -16,13 +17,15 @@ use dynocar_fmu::ffi::life::{
 use dynocar_fmu::ffi::types::CO_SIMULATION;
 use dynocar_fmu::ffi::unsupported::fmi2CancelStep;
 use dynocar_fmu::ffi::values::{fmi2GetReal, fmi2SetReal};
-use dynocar_fmu::variables::{Kind, Meaning, PIPELINES, Told};
-use dynocar_fmu::{GUID, VARIABLES};
+use dynocar_fmu::variables::{Kind, Meaning, Told};
+use dynocar_fmu::{ESTIMATORS, INTERFACES};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId};
 use dynocar_tests::process::Site;
 
 #[path = "init/commands.rs"]
 mod commands;
+#[path = "fmu/plant.rs"]
+mod plant;
 #[path = "fmu/simulator.rs"]
 mod simulator;
 use commands::{done, dynocar, said};
@@ -78,7 +81,7 @@ fn assert_as_identified(fmu: &Fmu, dataset: &Dataset, count: usize) {
         identify(dataset, samples, &EstimatorSettings::default_of(kind).unwrap()).unwrap()
     };
     let snapshots = PIPELINES.map(identified);
-    for (reference, variable) in VARIABLES.iter().enumerate() {
+    for (reference, variable) in ESTIMATORS.variables.iter().enumerate() {
         let Meaning::Estimate(of, told) = variable.meaning else { continue };
         let reference = reference as u32;
         let snapshot = &snapshots[PIPELINES.iter().position(|&kind| kind == of).unwrap()];
@@ -96,7 +99,7 @@ fn take_row(fmu: &Fmu, header: &[&str], row: &str) {
     let cells: Vec<f64> = row.split(',').map(|cell| cell.parse().unwrap()).collect();
     for (name, &cell) in header.iter().zip(&cells).skip(1) {
         let reference = reference(name);
-        let went = match VARIABLES[reference as usize].meaning.kind() {
+        let went = match ESTIMATORS.variables[reference as usize].meaning.kind() {
             Kind::Boolean => fmu.set_boolean(reference, cell as i32),
             Kind::Integer => fmu.set_integer(reference, cell as i32),
             _ => fmu.set_real(reference, cell),
@@ -158,7 +161,7 @@ fn the_fmu_holds_what_the_standard_asks_for_and_is_the_same_twice() {
     assert!(bytes("a.fmu") == bytes("b.fmu"), "nothing in it tells of the hour");
     let folder = unpacked(&site, "a.fmu");
     let description = read_to_string(folder.join("modelDescription.xml")).unwrap();
-    assert_eq!(description, dynocar_fmu::model_description());
+    assert_eq!(description, dynocar_fmu::model_description(&ESTIMATORS));
     let platform = if cfg!(target_arch = "x86_64") { "linux64" } else { "aarch64-linux" };
     let library = read(folder.join(format!("binaries/{platform}/dynocar.so"))).unwrap();
     assert!(library.starts_with(b"\x7fELF"));
@@ -243,8 +246,9 @@ fn another_kind_or_another_release_of_an_fmu_is_refused_in_words() {
         assert!(fmu.component.is_null());
         fmu.said()
     };
-    assert_eq!(refusal(0, GUID), "this FMU is for co-simulation only");
-    let words = format!("modelDescription.xml is of 1234, the library of {GUID}");
+    assert_eq!(refusal(0, ESTIMATORS.guid), "this FMU is for co-simulation only");
+    let [one, other] = INTERFACES.map(|model| model.guid);
+    let words = format!("modelDescription.xml is of 1234, the library of {one} and {other}");
     assert_eq!(refusal(CO_SIMULATION, "1234"), words);
 }
 

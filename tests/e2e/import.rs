@@ -13,6 +13,9 @@ use dynocar_tests::process::Site;
 #[path = "init/commands.rs"]
 mod commands;
 use commands::{done, dynocar, said};
+#[path = "init/guide.rs"]
+mod guide;
+use guide::{blocks, guide, install, run};
 
 const CORPUS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/corpus/import");
 
@@ -227,4 +230,33 @@ fn what_cannot_be_drawn_is_said() {
     site.write("file", "");
     let output = dynocar(&site, &["check", "track.toml", "--draw", "file"]);
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+}
+
+#[test]
+fn every_command_of_the_guide_of_imports_succeeds_on_files_of_that_kind() {
+    let site = Site::new();
+    install(&site);
+    for (name, source) in [
+        ("rolling_stock.yaml", "rolling_stock.yaml"),
+        ("path.yaml", "running_path_2024.yaml"),
+        ("CH_Track.json", "ttobench_track.json"),
+        ("CH_Train.json", "ttobench_train.json"),
+        ("tram.json", "osrd_whole.json"),
+        ("express.json", "osrd_each_kg.json"),
+    ] {
+        std::fs::copy(corpus(source), site.path().join(name)).unwrap();
+    }
+    let guide = guide("imports.md");
+    let commands = blocks(&guide, "sh");
+    assert_eq!(commands.len(), 8, "a command that is new needs its files: {commands:?}");
+    for line in &commands {
+        let told = run(&site, line);
+        assert!(!line.contains(" --draw ") || told.starts_with("drawn: "), "{line}: {told}");
+    }
+    for file in ["my_train/line.svg", "my_train/effort.svg", "metro/track.toml"] {
+        assert!(site.path().join(file).is_file(), "{file}");
+    }
+    for folder in ["my_train", "half_loaded", "metro", "tram", "express"] {
+        load_train(&site.path().join(folder).join("train.toml")).unwrap();
+    }
 }

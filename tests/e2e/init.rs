@@ -10,6 +10,8 @@ use dynocar_tests::simulator::dataset_writer::dataset_files;
 use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
 use serde_json::Value;
 
+#[path = "init/asked.rs"]
+mod asked;
 #[path = "init/commands.rs"]
 mod commands;
 use commands::{done, dynocar, run, said};

@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
 
 use dynocar::dataset::load;
 use dynocar_core::dataset::Run;
@@ -10,19 +9,9 @@ use dynocar_shared::SampleField;
 use dynocar_tests::process::{Process, Site};
 use rustix::process::Signal;
 
-const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
-const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
-
-fn guide() -> String {
-    std::fs::read_to_string(Path::new(ROOT).join("docs/guides/own_train.md")).expect("the guide")
-}
-
-/// The lines of the guide's code blocks in a language.
-fn blocks<'g>(guide: &'g str, language: &str) -> Vec<&'g str> {
-    let mark = format!("```{language}\n");
-    let blocks = guide.split(&mark).skip(1).filter_map(|rest| rest.split("```").next());
-    blocks.flat_map(str::lines).collect()
-}
+#[path = "init/guide.rs"]
+mod guide;
+use guide::{DYNOCAR, ROOT, blocks, guide, install, run};
 
 /// A run of the demo as a recorder with German habits would have written it.
 fn recording(run: &Run, header: &str) -> String {
@@ -56,18 +45,6 @@ fn gradient_permille(chainage_m: f64) -> f64 {
     before.unwrap_or(&line[0]).1
 }
 
-fn shell(site: &Site, line: &str) -> Output {
-    let path = std::env::var("PATH").unwrap_or_default();
-    Command::new("sh")
-        .args(["-c", line])
-        .current_dir(site.path())
-        .env("PATH", format!("{}:{path}", site.path().join("bin").display()))
-        .env("DYNOCAR_ROOT", site.host().root())
-        .stdin(Stdio::null())
-        .output()
-        .unwrap()
-}
-
 /// Starts the daemon of a command line that ends in `&`, from the site's folder.
 fn daemon(site: &Site, line: &str) -> Process {
     let config = line.split_whitespace().nth(3).expect("a configuration").to_owned();
@@ -79,10 +56,9 @@ fn daemon(site: &Site, line: &str) -> Process {
 
 #[test]
 fn every_command_of_the_guide_succeeds_in_an_empty_folder() {
-    let guide = guide();
+    let guide = guide("own_train.md");
     let site = Site::new();
-    std::fs::create_dir(site.path().join("bin")).unwrap();
-    std::os::unix::fs::symlink(DYNOCAR, site.path().join("bin/dynocar")).unwrap();
+    install(&site);
     let shown = blocks(&guide, "text");
     let demo = load(&Path::new(ROOT).join("config/demo")).unwrap();
     for (run, day) in demo.runs.iter().zip(["monday", "tuesday", "wednesday"]) {
@@ -102,10 +78,7 @@ fn every_command_of_the_guide_succeeds_in_an_empty_folder() {
             running.push(daemon(&site, line));
             continue;
         }
-        let output = shell(&site, line);
-        let words = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(0), "{line}: {words}");
-        assert!(!words.contains("panicked"), "{line}: {words}");
+        run(&site, line);
     }
     assert_eq!(running.len(), 1, "the guide starts a daemon");
     for mut process in running {

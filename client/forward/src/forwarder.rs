@@ -62,7 +62,7 @@ pub fn forward(settings: &Settings, must_end: &AtomicBool) -> Counts {
             // The farewell need not wait until many readers are closed.
             drop(told);
         });
-        connect_again_and_again(settings, &known, &is_all_made);
+        send(settings, &known, &is_all_made);
     });
     locked(&known).queue.counts()
 }
@@ -76,7 +76,8 @@ impl Drop for ToldAtEnd<'_> {
     }
 }
 
-fn connect_again_and_again(settings: &Settings, known: &Mutex<Known>, must_end: &AtomicBool) {
+/// Sends what is known over one connection after the other, until the flag is set and nothing waits.
+pub fn send(settings: &Settings, known: &Mutex<Known>, must_end: &AtomicBool) {
     let (mut attempts, mut connections) = (0, 0);
     let mut told = String::new();
     let mut retry = RETRY[0];

@@ -19,11 +19,13 @@
 //! - [`survey`]: a line and its gradient from recordings with GNSS
 //! - [`explain`]: which undeclared effect explains what the declared model leaves
 //! - [`trial`]: which of several models predicts better, told while a train runs
+//! - [`driven`]: the train itself, force in and speed out, by the law that `explain` predicts with
 //! - [`advice`]: what to drive next, so that the estimates become sharper
 //! - [`import`]: trains and lines from other projects' files
 
 pub mod advice;
 pub mod dataset;
+pub mod driven;
 pub mod explain;
 pub mod filter;
 pub mod force;

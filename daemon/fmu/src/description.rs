@@ -1,42 +1,54 @@
-//! The table of variables as `modelDescription.xml`, by the FMI standard 2.0, and as a page.
+//! A model's table of variables as `modelDescription.xml`, by the FMI standard 2.0, and as a page.
 
 use std::fmt::Write as _;
 
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Reason, Status};
 
-use crate::MODEL_IDENTIFIER;
+use crate::estimators::ESTIMATORS;
 use crate::units;
-use crate::variables::{GUID, Kind, MISSING, Meaning, VARIABLES, Variable, Vocabulary};
+use crate::variables::{Begins, Interface, Kind, MISSING, Meaning, Variable, Vocabulary};
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
-const ABOUT: &str = "Learns running resistance, mass, adhesion and brake friction of a train from \
-    what its controller measures";
 
-/// The text of `modelDescription.xml`: the same for every FMU of a release.
-pub fn model_description() -> String {
+/// The text of `modelDescription.xml`: the same for every FMU of this model in a release.
+pub fn model_description(interface: &Interface) -> String {
+    let Interface { identifier, name, about, guid, variables, takes_slopes, .. } = interface;
     let mut xml = format!(
         r#"<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName="Dynocar" guid="{GUID}" description="{ABOUT}"
+<fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="{guid}" description="{about}"
     version="{VERSION}" license="MIT OR Apache-2.0" generationTool="dynocar {VERSION}"
     variableNamingConvention="structured" numberOfEventIndicators="0">
-  <CoSimulation modelIdentifier="{MODEL_IDENTIFIER}"
+  <CoSimulation modelIdentifier="{identifier}" canInterpolateInputs="{takes_slopes}"
       canHandleVariableCommunicationStepSize="true" canNotUseMemoryManagementFunctions="true"/>
 "#
     );
     push_units(&mut xml);
-    push_types(&mut xml);
+    if has_vocabularies(interface) {
+        push_types(&mut xml);
+    }
     xml += "  <LogCategories>\n    <Category name=\"logStatusError\"/>\n  </LogCategories>\n";
     xml += "  <DefaultExperiment startTime=\"0\" stepSize=\"0.1\"/>\n  <ModelVariables>\n";
-    for (reference, variable) in VARIABLES.iter().enumerate() {
-        push_variable(&mut xml, reference, variable);
+    for (reference, variable) in variables.iter().enumerate() {
+        push_variable(&mut xml, reference, variable, *takes_slopes);
     }
     xml += "  </ModelVariables>\n  <ModelStructure>\n";
-    // What is got changes by a step alone, and at first hangs on the files alone.
-    push_unknowns(&mut xml, "Outputs", "");
-    let is_file = |variable: &Variable| matches!(variable.meaning, Meaning::File(_));
-    push_unknowns(&mut xml, "InitialUnknowns", &indices(is_file).join(" "));
+    if interface.guid == ESTIMATORS.guid {
+        // What is got changes by a step alone, and at first hangs on the files alone.
+        push_unknowns(&mut xml, interface, "Outputs", Some(""));
+        let is_file = |variable: &Variable| matches!(variable.meaning, Meaning::File(_));
+        let files = indices(interface, is_file).join(" ");
+        push_unknowns(&mut xml, interface, "InitialUnknowns", Some(&files));
+    } else {
+        // Forces hang on any input.
+        push_unknowns(&mut xml, interface, "Outputs", None);
+        push_unknowns(&mut xml, interface, "InitialUnknowns", None);
+    }
     xml + "  </ModelStructure>\n</fmiModelDescription>\n"
+}
+
+fn has_vocabularies(interface: &Interface) -> bool {
+    interface.variables.iter().any(|it| matches!(it.meaning.kind(), Kind::Enumeration(_)))
 }
 
 fn push_units(xml: &mut String) {
@@ -74,11 +86,14 @@ fn vocabularies() -> [Members; 3] {
     ]
 }
 
-fn push_variable(xml: &mut String, reference: usize, variable: &Variable) {
+fn push_variable(xml: &mut String, reference: usize, variable: &Variable, is_continuous: bool) {
     let Variable { name, meaning, unit, description } = variable;
     let nature = match meaning {
-        Meaning::File(_) => r#"variability="fixed" initial="exact""#,
+        Meaning::Driven(_) => r#"variability="continuous" initial="calculated""#,
+        Meaning::File(_) | Meaning::Begins(_) => r#"variability="fixed" initial="exact""#,
         Meaning::Estimate(..) => r#"variability="discrete" initial="calculated""#,
+        // An input with a slope is continuous.
+        Meaning::Measured(_) if is_continuous => r#"variability="continuous""#,
         _ => r#"variability="discrete""#,
     };
     let causality = meaning.causality();
@@ -111,38 +126,40 @@ fn start(meaning: Meaning) -> Option<String> {
         Meaning::Measured(_) => Some(format!("{MISSING:e}")),
         Meaning::Run | Meaning::Direction => Some("1".into()),
         Meaning::WheelSlide => Some("false".into()),
-        Meaning::Estimate(..) => None,
+        Meaning::Begins(Begins::HeldAtRest) => Some("true".into()),
+        Meaning::Begins(_) => Some("0".into()),
+        Meaning::Estimate(..) | Meaning::Driven(_) => None,
     }
 }
 
 /// Indices of variables as the standard counts them, from 1.
-fn indices(is_wanted: impl Fn(&Variable) -> bool) -> Vec<String> {
-    let numbered = VARIABLES.iter().zip(1..).filter(|(variable, _)| is_wanted(variable));
-    numbered.map(|(_, index): (_, u32)| index.to_string()).collect()
+fn indices(interface: &Interface, is_wanted: impl Fn(&Variable) -> bool) -> Vec<String> {
+    let numbered = interface.variables.iter().zip(1..);
+    let wanted = numbered.filter(|(variable, _)| is_wanted(variable));
+    wanted.map(|(_, index): (_, u32)| index.to_string()).collect()
 }
 
-fn push_unknowns(xml: &mut String, list: &str, dependencies: &str) {
+/// The outputs, with what they hang on where it is less than everything.
+fn push_unknowns(xml: &mut String, interface: &Interface, list: &str, on: Option<&str>) {
+    let on = on.map(|on| format!(" dependencies=\"{on}\"")).unwrap_or_default();
     push(xml, format_args!("    <{list}>"));
-    for index in indices(|variable| matches!(variable.meaning, Meaning::Estimate(..))) {
-        push(
-            xml,
-            format_args!("      <Unknown index=\"{index}\" dependencies=\"{dependencies}\"/>"),
-        );
+    for index in indices(interface, |variable| variable.meaning.causality() == "output") {
+        push(xml, format_args!("      <Unknown index=\"{index}\"{on}/>"));
     }
     push(xml, format_args!("    </{list}>"));
 }
 
 /// A page for people: what the FMU takes and gives.
-pub fn documentation() -> String {
+pub fn documentation(interface: &Interface) -> String {
+    let Interface { name, about, step, variables, .. } = interface;
     let mut page = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>Dynocar</title>\n\
-         <h1>Dynocar {VERSION}</h1>\n<p>{ABOUT}.</p>\n\
-         <p>Each step takes one sample: the inputs at the beginning of the step, stamped with its \
-         time. A measured input that is NaN or {MISSING:e} is missing. An output that nobody knows \
-         yet is NaN; use an estimate only while its status is 2, estimated.</p>\n<table>\n\
+        "<!DOCTYPE html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>{name}</title>\n\
+         <h1>{name} {VERSION}</h1>\n<p>{about}.</p>\n\
+         <p>{step} A measured input that is NaN or {MISSING:e} is missing. An output that nobody \
+         knows yet is NaN.</p>\n<table>\n\
          <tr><th>variable</th><th>causality</th><th>type</th><th>unit</th><th>meaning</th></tr>\n"
     );
-    for Variable { name, meaning, unit, description } in VARIABLES {
+    for Variable { name, meaning, unit, description } in *variables {
         let kind = match meaning.kind() {
             Kind::Enumeration(vocabulary) => vocabulary.name(),
             kind => kind.name(),
@@ -155,7 +172,8 @@ pub fn documentation() -> String {
         page += "</tr>\n";
     }
     page += "</table>\n";
-    for (vocabulary, members) in vocabularies() {
+    let vocabularies = if has_vocabularies(interface) { vocabularies().to_vec() } else { vec![] };
+    for (vocabulary, members) in vocabularies {
         page += &format!("<h2>{}</h2>\n<ul>\n", vocabulary.name());
         for (name, number) in members {
             page += &format!("<li>{number}: {name}</li>\n");
@@ -177,31 +195,37 @@ fn escaped(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::interfaces::INTERFACES;
 
     #[test]
     fn the_description_has_every_variable_under_its_reference() {
-        let xml = model_description();
-        assert_eq!(xml.matches("<ScalarVariable ").count(), VARIABLES.len());
-        for (reference, Variable { name, .. }) in VARIABLES.iter().enumerate() {
-            let place = format!("name=\"{name}\" valueReference=\"{reference}\" ");
-            assert_eq!(xml.matches(&place).count(), 1, "{name}");
+        for interface in INTERFACES {
+            let xml = model_description(interface);
+            assert_eq!(xml.matches("<ScalarVariable ").count(), interface.variables.len());
+            for (reference, Variable { name, .. }) in interface.variables.iter().enumerate() {
+                let place = format!("name=\"{name}\" valueReference=\"{reference}\" ");
+                assert_eq!(xml.matches(&place).count(), 1, "{name}");
+            }
+            assert!(xml.contains(interface.guid));
         }
-        assert!(xml.contains(GUID));
     }
 
     #[test]
     fn what_starts_with_a_value_is_what_is_set_before_the_first_step() {
-        let xml = model_description();
-        let starts = xml.matches(" start=\"").count();
-        let outputs = VARIABLES.iter().filter(|it| it.meaning.causality() == "output").count();
-        assert_eq!(starts, VARIABLES.len() - outputs);
-        assert_eq!(xml.matches(&format!("start=\"{MISSING:e}\"")).count(), 11);
-        assert_eq!(xml.matches("<Unknown ").count(), 2 * outputs);
+        for (interface, measured) in INTERFACES.into_iter().zip([11, 7]) {
+            let xml = model_description(interface);
+            let starts = xml.matches(" start=\"").count();
+            let is_output = |it: &&Variable| it.meaning.causality() == "output";
+            let outputs = interface.variables.iter().filter(is_output).count();
+            assert_eq!(starts, interface.variables.len() - outputs);
+            assert_eq!(xml.matches(&format!("start=\"{MISSING:e}\"")).count(), measured);
+            assert_eq!(xml.matches("<Unknown ").count(), 2 * outputs);
+        }
     }
 
     #[test]
     fn text_in_quotes_stays_text() {
         assert_eq!(escaped("a < b & \"c\""), "a &lt; b &amp; &quot;c&quot;");
-        assert!(documentation().contains("resistance.w0_std"));
+        assert!(documentation(&ESTIMATORS).contains("resistance.w0_std"));
     }
 }

@@ -35,6 +35,19 @@ pub enum ModelError {
         /// What was expected, in words.
         expected: &'static str,
     },
+    /// A step that the train cannot take.
+    #[error(
+        "communicationStepSize = {step_s}: expected {least_s} to {most_s} s; a dead time of the forces \
+         needs steps that are not too short"
+    )]
+    BadStep {
+        /// The step in s.
+        step_s: f64,
+        /// The shortest in s.
+        least_s: f64,
+        /// The longest in s.
+        most_s: f64,
+    },
     /// The call comes at the wrong time.
     #[error("{call} is not allowed {now}")]
     WrongOrder {

@@ -1,4 +1,4 @@
-//! The files that describe train and line, and the estimators for them.
+//! The files that describe train and line, and the models for them.
 
 use std::ffi::{CStr, CString};
 use std::io::ErrorKind;
@@ -6,14 +6,16 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use dynocar_core::dataset::{parse_track, parse_train};
+use dynocar_core::driven::{Beginning, DrivenTrain};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
 use dynocar_shared::{PipelineKind, TrainId};
 
 use crate::error::ModelError;
+use crate::estimators::{Estimators, PIPELINES};
 use crate::location::folder_of;
-use crate::variables::{ModelFile, PIPELINES};
+use crate::variables::ModelFile;
 
 /// The train of an instance; there is no other in it.
 pub const TRAIN: TrainId = TrainId(1);
@@ -69,15 +71,29 @@ impl Files {
     /// # Errors
     ///
     /// What is wrong with the files.
-    pub fn estimators(&self) -> Result<Vec<Pipeline>, ModelError> {
-        let train = Arc::new(self.read_train()?);
-        let track = self.read_track()?.map(Arc::new);
+    pub fn estimators(&self) -> Result<Estimators, ModelError> {
+        let (train, track) = self.read()?;
         let pipeline = |(index, &kind): (usize, &PipelineKind)| {
             let settings = EstimatorSettings::default_of(kind).expect("every kind can be built");
             let estimator = settings.build(&train)?;
             Ok(Pipeline::new(TRAIN, index as u32, Arc::clone(&train), track.clone(), estimator))
         };
-        PIPELINES.iter().enumerate().map(pipeline).collect()
+        let pipelines: Result<_, ModelError> = PIPELINES.iter().enumerate().map(pipeline).collect();
+        Ok(Estimators::new(pipelines?))
+    }
+
+    /// This train on this line, to be driven.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with the files.
+    pub fn driven(&self, beginning: Beginning) -> Result<DrivenTrain, ModelError> {
+        let (train, track) = self.read()?;
+        Ok(DrivenTrain::new(train, track, beginning))
+    }
+
+    fn read(&self) -> Result<(Arc<TrainModel>, Option<Arc<Track>>), ModelError> {
+        Ok((Arc::new(self.read_train()?), self.read_track()?.map(Arc::new)))
     }
 
     fn read_train(&self) -> Result<TrainModel, ModelError> {

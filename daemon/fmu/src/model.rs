@@ -1,20 +1,20 @@
-//! What stands behind an instance of the FMU: the sample that the inputs make, the estimators, and
-//! the order in which the standard lets calls come.
+//! What stands behind an instance of an FMU: its inputs, the model that takes them, and the order in
+//! which the standard lets calls come.
 
 use std::ffi::CStr;
 
-use dynocar_core::pipeline::Pipeline;
+use dynocar_core::driven::{Beginning, DrivenTrain};
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
-use dynocar_shared::{ParameterSnapshot, PipelineKind, SampleField, TrainSample};
 
 use crate::error::ModelError;
-use crate::files::{Files, TRAIN};
-use crate::variables::{Kind, MISSING, Meaning, PIPELINES, Told, VARIABLES, Variable};
+use crate::estimators::{ESTIMATORS, Estimators};
+use crate::files::Files;
+use crate::inputs::{Inputs, nanoseconds};
+use crate::plant::{BEGINNING, STEP_MAX_S, least_step_s, require_drivable, told, with_beginning};
+use crate::variables::{Begins, Interface, Kind, Meaning, Variable};
 
 /// Later times in s have no number of ns.
 const TIME_MAX_S: f64 = 9e9;
-/// What is told before the files are read.
-static NOTHING: ParameterSnapshot = ParameterSnapshot::empty();
 
 /// Where an instance stands between two calls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,29 +38,38 @@ impl Phase {
     }
 }
 
-/// An instance of the FMU.
+/// The model behind an instance.
+enum Behind {
+    /// The files are not read yet.
+    Nothing,
+    Estimators(Estimators),
+    Plant(Box<DrivenTrain>),
+}
+
+/// An instance of an FMU.
 pub struct Model {
+    interface: &'static Interface,
     phase: Phase,
     files: Files,
-    /// What the inputs make; its number is that of the newest step.
-    sample: TrainSample,
-    /// Speed in m/s of the newest step's sample; NaN before it.
-    speed_mps: f64,
-    /// By [`PIPELINES`]; none before the files are read.
-    pipelines: Vec<Pipeline>,
+    inputs: Inputs,
+    /// How the driven train begins, and when in s.
+    beginning: Beginning,
+    start_s: f64,
+    behind: Behind,
 }
 
 impl Model {
     /// An instance with the start value of every variable; `resources` is the location of the FMU's
     /// own files, as the simulator names it.
-    pub fn new(resources: String) -> Self {
-        let sample = TrainSample { run: 1, ..TrainSample::empty(TRAIN) };
+    pub fn new(interface: &'static Interface, resources: String) -> Self {
         Model {
+            interface,
             phase: Phase::Instantiated,
             files: Files::of(resources),
-            sample,
-            speed_mps: f64::NAN,
-            pipelines: Vec::new(),
+            inputs: Inputs::default(),
+            beginning: BEGINNING,
+            start_s: 0.0,
+            behind: Behind::Nothing,
         }
     }
 
@@ -72,66 +81,89 @@ impl Model {
         }
     }
 
-    /// Takes note of an experiment; which one, no estimator asks.
+    /// Takes note of when an experiment begins, in s.
     ///
     /// # Errors
     ///
-    /// In the wrong order.
-    pub fn set_up_experiment(&mut self) -> Result<(), ModelError> {
-        self.require(&[Phase::Instantiated], "fmi2SetupExperiment")
+    /// In the wrong order, or for a time that is no number.
+    pub fn set_up_experiment(&mut self, start_s: f64) -> Result<(), ModelError> {
+        self.require(&[Phase::Instantiated], "fmi2SetupExperiment")?;
+        self.start_s = require_time("startTime", start_s)?;
+        Ok(())
     }
 
-    /// Reads the files and builds the estimators.
+    /// Reads the files and builds the model.
     ///
     /// # Errors
     ///
     /// In the wrong order, or what is wrong with the files.
     pub fn enter_initialization(&mut self) -> Result<(), ModelError> {
         self.require(&[Phase::Instantiated], "fmi2EnterInitializationMode")?;
-        self.pipelines = self.files.estimators()?;
+        self.build()?;
         self.phase = Phase::Initializing;
         Ok(())
     }
 
-    /// Ends the initialization; files that were set in it are read.
+    /// Ends the initialization; files and beginnings that were set in it are taken.
     ///
     /// # Errors
     ///
     /// In the wrong order, or what is wrong with the files.
     pub fn exit_initialization(&mut self) -> Result<(), ModelError> {
         self.require(&[Phase::Initializing], "fmi2ExitInitializationMode")?;
-        if self.pipelines.is_empty() {
-            self.pipelines = self.files.estimators()?;
+        if matches!(self.behind, Behind::Nothing) {
+            self.build()?;
+        }
+        if let Behind::Plant(train) = &mut self.behind {
+            require_drivable(&self.inputs)?;
+            train.look(&self.inputs.at(self.start_s, 0.0));
         }
         self.phase = Phase::Stepping;
         Ok(())
     }
 
-    /// Takes the inputs as the sample of the moment at which the step begins.
+    fn build(&mut self) -> Result<(), ModelError> {
+        self.behind = if self.interface.guid == ESTIMATORS.guid {
+            Behind::Estimators(self.files.estimators()?)
+        } else {
+            Behind::Plant(Box::new(self.files.driven(self.beginning)?))
+        };
+        Ok(())
+    }
+
+    /// Takes the inputs as they are at the beginning of the step.
     ///
     /// # Errors
     ///
-    /// In the wrong order, or for times that are no numbers.
+    /// In the wrong order, for times that are no numbers, and for a step that the train cannot take.
     ///
     /// # Real-time
     ///
     /// Allocates nothing, locks nothing, reads no clock, unless it fails.
     pub fn step(&mut self, time_s: f64, step_s: f64) -> Result<(), ModelError> {
         self.require(&[Phase::Stepping], "fmi2DoStep")?;
-        if !(time_s.abs() <= TIME_MAX_S) {
-            let (name, expected) = ("currentCommunicationPoint", "a time in s from -9e9 to 9e9");
-            return Err(ModelError::BadValue { name, value: time_s, expected });
-        }
+        require_time("currentCommunicationPoint", time_s)?;
+        let name = "communicationStepSize";
         if !(0.0..=TIME_MAX_S).contains(&step_s) {
-            let (name, expected) = ("communicationStepSize", "a duration in s from 0 to 9e9");
+            let expected = "a duration in s from 0 to 9e9";
             return Err(ModelError::BadValue { name, value: step_s, expected });
         }
-        // As the reader of recorded runs makes a time of a cell.
-        self.sample.time_ns = (time_s * 1e9).round() as i64;
-        self.sample.sequence += 1;
-        self.speed_mps = self.sample.get(SampleField::Speed).unwrap_or(f64::NAN);
-        for pipeline in &mut self.pipelines {
-            pipeline.process(&self.sample);
+        match &mut self.behind {
+            Behind::Nothing => {}
+            Behind::Estimators(estimators) => {
+                self.inputs.sample.time_ns = nanoseconds(time_s);
+                self.inputs.sample.sequence += 1;
+                estimators.take(&self.inputs.sample);
+            }
+            Behind::Plant(train) => {
+                let least_s = least_step_s(train);
+                if step_s > STEP_MAX_S || (step_s > 0.0 && step_s < least_s) {
+                    return Err(ModelError::BadStep { step_s, least_s, most_s: STEP_MAX_S });
+                }
+                require_drivable(&self.inputs)?;
+                train.drive(step_s, |after_s| self.inputs.at(time_s, after_s));
+                self.inputs.end_step();
+            }
         }
         Ok(())
     }
@@ -149,7 +181,7 @@ impl Model {
 
     /// Forgets everything since the instance was made.
     pub fn reset(&mut self) {
-        *self = Model::new(self.files.resources());
+        *self = Model::new(self.interface, self.files.resources());
     }
 
     /// Refuses every later call but a reset: nobody knows what a fault left behind.
@@ -165,9 +197,15 @@ impl Model {
     pub fn real(&self, reference: u32) -> Result<f64, ModelError> {
         let variable = self.got(reference, Kind::Real)?;
         Ok(match variable.meaning {
-            Meaning::Measured(field) => self.sample.get(field).unwrap_or(MISSING),
-            Meaning::Estimate(of, told) => self.told_real(of, told).unwrap_or(f64::NAN),
-            _ => f64::NAN,
+            Meaning::Measured(field) => self.inputs.get(field),
+            Meaning::Begins(Begins::Speed) => self.beginning.speed_mps,
+            Meaning::Begins(Begins::Position) => self.beginning.position_m,
+            meaning => match (meaning, &self.behind) {
+                (Meaning::Estimate(of, told), Behind::Estimators(it)) => it.real(of, told),
+                (Meaning::Driven(what), Behind::Plant(train)) => Some(told(train, what)),
+                _ => None,
+            }
+            .unwrap_or(f64::NAN),
         })
     }
 
@@ -178,18 +216,10 @@ impl Model {
     /// When there is none of this type, or after a fault.
     pub fn integer(&self, reference: u32) -> Result<i32, ModelError> {
         let variable = self.got(reference, Kind::Integer)?;
-        let number: u64 = match variable.meaning {
-            Meaning::Direction => return Ok(self.sample.direction.into()),
-            Meaning::Run => self.sample.run.into(),
-            Meaning::Estimate(of, told) => {
-                let snapshot = self.snapshot(of);
-                match told {
-                    Told::Status => snapshot.status.into(),
-                    Told::Reason => snapshot.reason.into(),
-                    Told::SuspectedEffect => snapshot.suspected_effect.into(),
-                    _ => snapshot.samples_rejected,
-                }
-            }
+        let number: u64 = match (variable.meaning, &self.behind) {
+            (Meaning::Direction, _) => return Ok(self.inputs.sample.direction.into()),
+            (Meaning::Run, _) => self.inputs.sample.run.into(),
+            (Meaning::Estimate(of, told), Behind::Estimators(it)) => it.integer(of, told),
             _ => 0,
         };
         Ok(i32::try_from(number).unwrap_or(i32::MAX))
@@ -201,8 +231,10 @@ impl Model {
     ///
     /// When there is none of this type, or after a fault.
     pub fn boolean(&self, reference: u32) -> Result<bool, ModelError> {
-        self.got(reference, Kind::Boolean)?;
-        Ok(self.sample.flags & FLAG_WHEEL_SLIDE != 0)
+        Ok(match self.got(reference, Kind::Boolean)?.meaning {
+            Meaning::Begins(_) => self.beginning.is_held_at_rest,
+            _ => self.inputs.sample.flags & FLAG_WHEEL_SLIDE != 0,
+        })
     }
 
     /// A variable's text, valid until it is set.
@@ -216,18 +248,48 @@ impl Model {
         Ok(self.files.path(file))
     }
 
-    /// Sets a measured input; [`MISSING`] and NaN say that it was not measured.
+    /// Sets an input, where [`MISSING`](crate::MISSING) and NaN say that it was not measured, or how
+    /// the train begins.
     ///
     /// # Errors
     ///
-    /// When it is no input of this type, or in the wrong order.
+    /// When it is no input of this type, a beginning that no train has, or in the wrong order.
     pub fn set_real(&mut self, reference: u32, value: f64) -> Result<(), ModelError> {
-        if let Meaning::Measured(field) = self.to_be_set(reference, Kind::Real)?.meaning {
-            if value.is_nan() || value == MISSING {
-                self.sample.valid &= !field.bit();
-            } else {
-                self.sample.set(field, value);
+        let Variable { name, meaning, .. } = *self.to_be_set(reference, Kind::Real)?;
+        match meaning {
+            Meaning::Measured(field) => self.inputs.set(field, value),
+            Meaning::Begins(begins) => {
+                self.require_parameter()?;
+                let beginning = with_beginning(self.beginning, begins, value);
+                let expected = "a number, and no negative speed";
+                self.beginning = beginning.ok_or(ModelError::BadValue { name, value, expected })?;
+                self.behind = Behind::Nothing;
             }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Sets the slope of an input per s, for the next step.
+    ///
+    /// # Errors
+    ///
+    /// When the model takes none, or none of this order; when it is no input of this type, or in the
+    /// wrong order.
+    pub fn set_slope(
+        &mut self,
+        reference: u32,
+        (order, value): (i32, f64),
+    ) -> Result<(), ModelError> {
+        if !self.interface.takes_slopes {
+            return Err(ModelError::NotSupported("fmi2SetRealInputDerivatives"));
+        }
+        if order != 1 {
+            let (name, value) = ("order of a derivative", order.into());
+            return Err(ModelError::BadValue { name, value, expected: "1" });
+        }
+        if let Meaning::Measured(field) = self.to_be_set(reference, Kind::Real)?.meaning {
+            self.inputs.set_slope(field, value);
         }
         Ok(())
     }
@@ -242,24 +304,29 @@ impl Model {
         let bad = |expected| ModelError::BadValue { name, value: value.into(), expected };
         match meaning {
             Meaning::Run => {
-                self.sample.run = u32::try_from(value).map_err(|_| bad("0 or more"))?;
+                self.inputs.sample.run = u32::try_from(value).map_err(|_| bad("0 or more"))?;
             }
             Meaning::Direction => {
-                self.sample.direction = i8::try_from(value).map_err(|_| bad("1 or -1"))?;
+                self.inputs.sample.direction = i8::try_from(value).map_err(|_| bad("1 or -1"))?;
             }
             _ => {}
         }
         Ok(())
     }
 
-    /// Sets whether wheel-slide protection is active.
+    /// Sets whether wheel-slide protection is active, or whether a standing train is held.
     ///
     /// # Errors
     ///
     /// When it is no input of this type, or in the wrong order.
     pub fn set_boolean(&mut self, reference: u32, value: bool) -> Result<(), ModelError> {
-        self.to_be_set(reference, Kind::Boolean)?;
-        self.sample.flags = if value { FLAG_WHEEL_SLIDE } else { 0 };
+        if let Meaning::Begins(_) = self.to_be_set(reference, Kind::Boolean)?.meaning {
+            self.require_parameter()?;
+            self.beginning.is_held_at_rest = value;
+            self.behind = Behind::Nothing;
+        } else {
+            self.inputs.sample.flags = if value { FLAG_WHEEL_SLIDE } else { 0 };
+        }
         Ok(())
     }
 
@@ -270,63 +337,44 @@ impl Model {
     /// When it is no parameter of this type, or after the initialization.
     pub fn set_string(&mut self, reference: u32, value: &CStr) -> Result<(), ModelError> {
         let Variable { name, meaning, .. } = *self.to_be_set(reference, Kind::String)?;
-        self.require(&[Phase::Instantiated, Phase::Initializing], "to set a file")?;
+        self.require_parameter()?;
         if value.to_str().is_err() {
             return Err(ModelError::NotText(name));
         }
         if let Meaning::File(file) = meaning {
             self.files.set(file, value);
-            self.pipelines.clear();
+            self.behind = Behind::Nothing;
         }
         Ok(())
+    }
+
+    fn require_parameter(&self) -> Result<(), ModelError> {
+        self.require(&[Phase::Instantiated, Phase::Initializing], "to set a parameter")
     }
 
     fn got(&self, reference: u32, expected: Kind) -> Result<&'static Variable, ModelError> {
         let phases = [Phase::Instantiated, Phase::Initializing, Phase::Stepping, Phase::Terminated];
         self.require(&phases, "to get a variable")?;
-        variable(reference, expected)
+        self.interface.variable(reference, expected)
     }
 
     fn to_be_set(&self, reference: u32, expected: Kind) -> Result<&'static Variable, ModelError> {
         let phases = [Phase::Instantiated, Phase::Initializing, Phase::Stepping];
         self.require(&phases, "to set a variable")?;
-        let variable = variable(reference, expected)?;
+        let variable = self.interface.variable(reference, expected)?;
         match variable.meaning {
-            Meaning::Estimate(..) => Err(ModelError::NotAnInput(variable.name)),
+            Meaning::Estimate(..) | Meaning::Driven(_) => {
+                Err(ModelError::NotAnInput(variable.name))
+            }
             _ => Ok(variable),
-        }
-    }
-
-    fn snapshot(&self, of: PipelineKind) -> &ParameterSnapshot {
-        let place = PIPELINES.iter().position(|&kind| kind == of);
-        place.and_then(|place| self.pipelines.get(place)).map_or(&NOTHING, Pipeline::snapshot)
-    }
-
-    fn told_real(&self, of: PipelineKind, told: Told) -> Option<f64> {
-        let snapshot = self.snapshot(of);
-        match told {
-            Told::Value(parameter) => snapshot.value(parameter),
-            Told::Std(parameter) => snapshot.std(parameter),
-            Told::Resistance => Some(snapshot.resistance_at(self.speed_mps)?.w0_n_per_kn),
-            Told::ResistanceStd => Some(snapshot.resistance_at(self.speed_mps)?.w0_std_n_per_kn),
-            Told::UnexplainedForce => Some(snapshot.unexplained_force_n),
-            Told::UnexplainedForceStd => Some(snapshot.unexplained_force_std_n),
-            Told::SuspectedEffect | Told::Status | Told::Reason | Told::Rejected => None,
         }
     }
 }
 
-/// The variable of a reference and a type; enumerations are got and set as whole numbers.
-fn variable(reference: u32, expected: Kind) -> Result<&'static Variable, ModelError> {
-    let variable =
-        VARIABLES.get(reference as usize).ok_or(ModelError::UnknownReference(reference))?;
-    let is = match variable.meaning.kind() {
-        Kind::Enumeration(_) => Kind::Integer,
-        kind => kind,
-    };
-    if is == expected {
-        return Ok(variable);
+/// A time in s, where it is one.
+fn require_time(name: &'static str, time_s: f64) -> Result<f64, ModelError> {
+    if time_s.abs() <= TIME_MAX_S {
+        return Ok(time_s);
     }
-    let (name, expected) = (variable.name, expected.name());
-    Err(ModelError::WrongType { name, is: is.name(), expected })
+    Err(ModelError::BadValue { name, value: time_s, expected: "a time in s from -9e9 to 9e9" })
 }

@@ -1,20 +1,25 @@
-//! `dynocar fmu`: the estimators as an FMU.
+//! `dynocar fmu`: the estimators, or the train itself, as an FMU.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use dynocar_core::dataset::{DatasetError, DatasetFiles, FileProblem};
 use dynocar_fmu::variables::ModelFile;
+use dynocar_fmu::{ESTIMATORS, PLANT};
 
 use super::Failure;
 use crate::dataset;
 use crate::fmu::{FmuError, INPUTS_MARK, archive, find_library, inputs, read_library};
+use crate::grown::GROWN_FILES;
 use crate::output::{require_file, require_folder, tell, write_file, write_in_folder};
 
-/// Write the estimators as an FMU for co-simulation (FMI 2.0), for Simulink, OpenModelica, Dymola or
-/// FMPy.
+/// Write the estimators, or the train itself, as an FMU for co-simulation (FMI 2.0), for Simulink,
+/// OpenModelica, Dymola or FMPy.
 #[derive(Debug, Args)]
 pub struct FmuArguments {
+    /// The train itself instead of the estimators: traction and brake force in, speed out
+    #[arg(long)]
+    plant: bool,
     /// The FMU
     #[arg(short, long, value_name = "FILE.fmu")]
     out: PathBuf,
@@ -24,7 +29,10 @@ pub struct FmuArguments {
     /// The line that it brings along
     #[arg(long, value_name = "track.toml", conflicts_with = "dataset")]
     track: Option<PathBuf>,
-    /// Bring along the train and the line of this dataset
+    /// Bring along the train and the line that `explain --grown` wrote into this folder
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["train", "track"])]
+    grown: Option<PathBuf>,
+    /// Bring along the train and the line of this dataset, unless --grown names others
     #[arg(long, value_name = "FOLDER")]
     dataset: Option<PathBuf>,
     /// Write the dataset's runs as inputs of the FMU into this folder, a CSV file each
@@ -44,15 +52,17 @@ pub struct FmuArguments {
 pub fn execute(arguments: &FmuArguments) -> Result<(), Failure> {
     require_file(&arguments.out, "PK")?;
     arguments.inputs.as_deref().map_or(Ok(()), require_folder)?;
-    let files = match &arguments.dataset {
-        Some(dataset) => files_of_dataset(dataset)?,
-        None => named_files(arguments)?,
+    let files = match (&arguments.grown, &arguments.dataset) {
+        (Some(grown), _) => files_of_grown(grown)?,
+        (None, Some(dataset)) => files_of_dataset(dataset)?,
+        (None, None) => named_files(arguments.train.as_deref(), arguments.track.as_deref())?,
     };
+    let model = if arguments.plant { &PLANT } else { &ESTIMATORS };
     let library = match &arguments.library {
         Some(path) => read_library(path),
         None => find_library(&std::env::current_exe().unwrap_or_default()),
     };
-    let fmu = library.and_then(|library| archive(&library, &files)).map_err(failure)?;
+    let fmu = library.and_then(|library| archive(model, &library, &files)).map_err(failure)?;
     if let (Some(dataset), Some(folder)) = (&arguments.dataset, &arguments.inputs) {
         write_inputs(dataset, folder)?;
     }
@@ -71,21 +81,30 @@ fn failure(error: FmuError) -> Failure {
 }
 
 /// The texts of the files that were named, each understood before it is packed.
-fn named_files(arguments: &FmuArguments) -> Result<Vec<(ModelFile, String)>, Failure> {
+fn named_files(
+    train: Option<&Path>,
+    track: Option<&Path>,
+) -> Result<Vec<(ModelFile, String)>, Failure> {
     let text = |path: &Path| {
         dataset::read_text(path)
             .map_err(|problem| dataset::file_error(&path.display().to_string(), problem))
     };
     let mut files = Vec::new();
-    if let Some(path) = &arguments.train {
+    if let Some(path) = train {
         dataset::load_train(path)?;
         files.push((ModelFile::Train, text(path)?));
     }
-    if let Some(path) = &arguments.track {
+    if let Some(path) = track {
         dataset::load_track(path)?;
         files.push((ModelFile::Track, text(path)?));
     }
     Ok(files)
+}
+
+/// The texts of a grown train and, where it is known, its line.
+fn files_of_grown(folder: &Path) -> Result<Vec<(ModelFile, String)>, Failure> {
+    let [train, track] = GROWN_FILES.map(|name| folder.join(name));
+    named_files(Some(&train), track.exists().then_some(&*track))
 }
 
 /// The texts of a dataset's train and line.

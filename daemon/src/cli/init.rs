@@ -1,5 +1,7 @@
 //! `dynocar init`: the first description of a train and of its recordings.
 
+mod arguments;
+mod ask;
 mod daemon_text;
 mod dataset_text;
 mod described;
@@ -7,42 +9,25 @@ mod draft;
 mod paths;
 mod summary;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use clap::Args;
-use dynocar_core::dataset::guess::{Guess, GuessError, GuessProblem, Recording, Told, guess};
+use dynocar_core::dataset::guess::{Guess, GuessError, GuessProblem, Recording, guess};
 use dynocar_core::dataset::note::notes;
-use dynocar_core::dataset::units::Unit;
 use dynocar_core::dataset::{MANIFEST_FILE, Place, Quantity};
 use toml::Value;
 
 use super::Failure;
-use super::train_text::{Found, TRAIN_FILE, TrainArguments, TrainText};
+use super::train_text::{Found, TRAIN_FILE, TrainText};
 use crate::dataset::{file_error, read_text};
 use crate::output::{print, require_folder, require_new, write_new_in_folder};
 use crate::track_text::TRACK_FILE;
+pub use arguments::InitArguments;
 use described::{DAEMON_FILE, Described};
 use draft::Draft;
 
 const WRITER: &str = "dynocar init";
 /// Units that the values did not tell are set right so many times at most.
 const CORRECTIONS_MAX: usize = 4;
-
-/// Write a first train.toml and daemon.toml and, from recordings, a dataset.toml that says of every
-/// column what it was taken for and why. Nothing is overwritten.
-#[derive(Debug, Args)]
-pub struct InitArguments {
-    /// The folder for the files; it is made where there is none
-    folder: PathBuf,
-    /// Recorded runs of the train, laid out alike; of several the last one is held out
-    #[arg(long, value_name = "FILE", num_args = 1..)]
-    csv: Vec<PathBuf>,
-    /// Say what a column holds, as speed=v_ist:km/h; may be given several times
-    #[arg(long, value_name = "QUANTITY=COLUMN[:UNIT]", value_parser = told)]
-    column: Vec<Told>,
-    #[command(flatten)]
-    train: TrainArguments,
-}
 
 /// Writes the first description.
 ///
@@ -51,7 +36,8 @@ pub struct InitArguments {
 /// An input failure where a recording or a figure of the train is wrong, or a file is there already;
 /// a failure of the work where a file cannot be written.
 pub fn execute(arguments: &InitArguments) -> Result<(), Failure> {
-    let folder = &arguments.folder;
+    let arguments = &ask::complete(arguments)?;
+    let folder = arguments.folder();
     require_folder(folder)?;
     let with_dataset = !arguments.csv.is_empty();
     if !with_dataset && !arguments.column.is_empty() {
@@ -87,12 +73,12 @@ fn describe(
         let text = read_text(path).map_err(|problem| file_error(&label, problem))?;
         texts.push((label, text));
     }
-    let files = paths::from_folder(&arguments.folder, &arguments.csv)?;
+    let files = paths::from_folder(arguments.folder(), &arguments.csv)?;
     let recordings: Vec<Recording> =
         texts.iter().map(|(label, text)| Recording { label, text }).collect();
     let mut guess = guess(&recordings, &arguments.column).map_err(failure)?;
     let track = match has_track {
-        true => Some(read_track(&arguments.folder.join(TRACK_FILE))?),
+        true => Some(read_track(&arguments.folder().join(TRACK_FILE))?),
         false => None,
     };
     if let Some(mass_t) = recorded_mass_t(&guess) {
@@ -100,13 +86,13 @@ fn describe(
         let figures = vec![("mass_t", Value::Float(mass_t), from)];
         *train = arguments.train.text(WRITER, &Found { figures, traction: None })?;
     }
-    let name = dataset_text::name_of(&arguments.folder);
+    let name = dataset_text::name_of(arguments.folder());
     let mut corrections = 0;
     loop {
         let text = dataset_text::dataset(&guess, &name, &files, has_track);
         let csv = files.iter().map(String::as_str).zip(recordings.iter().copied());
         let draft = Draft {
-            folder: &arguments.folder,
+            folder: arguments.folder(),
             dataset: &text,
             train: &train.text,
             track: track.as_deref(),
@@ -144,42 +130,4 @@ fn failure(error: GuessError) -> Failure {
         _ => error.to_string(),
     };
     Failure::At(Place { file: error.place.file, line: error.place.line }, message)
-}
-
-/// What somebody says of a column: `QUANTITY=COLUMN` or `QUANTITY=COLUMN:UNIT`.
-fn told(text: &str) -> Result<Told, String> {
-    let expected = "expected QUANTITY=COLUMN or QUANTITY=COLUMN:UNIT, as speed=v_ist:km/h";
-    let (name, rest) = text.split_once('=').ok_or(expected)?;
-    let names = || Quantity::ALL.map(Quantity::name).join(", ");
-    let quantity = Quantity::from_name(name.trim())
-        .ok_or_else(|| format!("'{name}' is no quantity; the quantities: {}", names()))?;
-    // A name may hold colons itself: what follows the last one counts where it is a unit.
-    let unit_of = |unit: &str| Unit::find(quantity.dimension(), unit.trim());
-    let (column, unit) = match rest.rsplit_once(':') {
-        Some((column, unit)) if unit_of(unit).is_some() => (column, unit_of(unit)),
-        _ => (rest, None),
-    };
-    if column.trim().is_empty() {
-        return Err(expected.into());
-    }
-    Ok(Told { quantity, column: column.trim().into(), unit })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_column_is_told_with_or_without_its_unit() {
-        let kmh = Unit::find(Quantity::Speed.dimension(), "km/h");
-        let speed =
-            |column: &str, unit| Told { quantity: Quantity::Speed, column: column.into(), unit };
-        assert_eq!(told("speed=v_ist:km/h"), Ok(speed("v_ist", kmh)));
-        assert_eq!(told("speed=v_ist"), Ok(speed("v_ist", None)));
-        assert_eq!(told("speed=MVB:v=1:km/h"), Ok(speed("MVB:v=1", kmh)));
-        assert_eq!(told("speed=MVB:v"), Ok(speed("MVB:v", None)));
-        assert!(told("speed").unwrap_err().starts_with("expected QUANTITY=COLUMN"));
-        assert!(told("velocity=v").unwrap_err().contains("'velocity' is no quantity; the quant"));
-        assert!(told("speed= ").is_err());
-    }
 }

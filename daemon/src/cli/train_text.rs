@@ -51,6 +51,18 @@ pub struct TrainArguments {
     c: Option<f64>,
 }
 
+/// What may be asked of somebody who has not said it: the key, and the question with its unit.
+pub const QUESTIONS: [(&str, &str); 8] = [
+    ("name", "Name of the train"),
+    ("mass_t", "Gross mass with its load, t"),
+    ("length_m", "Length over the couplers, m"),
+    ("cars", "Number of cars, with the locomotive"),
+    ("rotating_mass_factor", "Inertia of wheels, axles and motors, share of the mass"),
+    ("a", "a of the resistance a + b v + c v² with v in m/s, N/kN"),
+    ("b", "b, N/kN per m/s"),
+    ("c", "c, N/kN per (m/s)²"),
+];
+
 /// What is known of the train from files.
 #[derive(Clone, Debug, Default)]
 pub struct Found {
@@ -83,6 +95,65 @@ impl TrainArguments {
     /// True where nothing is said.
     pub fn is_empty(&self) -> bool {
         *self == TrainArguments::default()
+    }
+
+    /// True where a key is said.
+    pub fn knows(&self, key: &str) -> bool {
+        match key {
+            "name" => self.name.is_some(),
+            "cars" => self.cars.is_some(),
+            key => self.clone().figure(key).is_some_and(|figure| figure.is_some()),
+        }
+    }
+
+    fn figure(&mut self, key: &str) -> Option<&mut Option<f64>> {
+        Some(match key {
+            "mass_t" => &mut self.mass_t,
+            "length_m" => &mut self.length_m,
+            "rotating_mass_factor" => &mut self.rotating_mass_factor,
+            "a" => &mut self.a,
+            "b" => &mut self.b,
+            "c" => &mut self.c,
+            _ => return None,
+        })
+    }
+
+    /// The default of a key beside what is said, as `train.toml` writes it.
+    ///
+    /// # Errors
+    ///
+    /// What is said is of no train.
+    pub fn default_of(&self, key: &str) -> Result<String, Failure> {
+        let defaults = self.text("", &Found::default())?.defaults;
+        let value = defaults.iter().find_map(|it| it.split_once(" = ").filter(|it| it.0 == key));
+        Ok(value.map(|(_, value)| value.trim_matches('"').to_owned()).unwrap_or_default())
+    }
+
+    /// The same with one key said in words.
+    ///
+    /// # Errors
+    ///
+    /// What no train has, in words.
+    pub fn told(&self, key: &str, answer: &str) -> Result<Self, String> {
+        let mut told = self.clone();
+        match key {
+            "name" => told.name = Some(answer.into()),
+            "cars" => {
+                let cars = answer.parse().map_err(|_| format!("{answer}: expected a number"))?;
+                told.cars = Some(cars);
+            }
+            key => {
+                let number = answer.replace(',', ".").parse();
+                let number = number.map_err(|_| format!("{answer}: expected a number"))?;
+                if let Some(figure) = told.figure(key) {
+                    *figure = Some(number);
+                }
+            }
+        }
+        match told.text("", &Found::default()) {
+            Ok(_) => Ok(told),
+            Err(failure) => Err(failure.answer().map(|it| it.message).unwrap_or_default()),
+        }
     }
 
     /// The `train.toml` by a command: what is said, else what was found, else a marked default.

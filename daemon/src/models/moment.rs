@@ -5,12 +5,8 @@ use std::str::FromStr;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
-use toml::value::Datetime;
-
-use crate::report::provenance::day;
-
-/// Seconds of a day.
-const DAY_S: u64 = 86_400;
+use time::format_description::well_known::Rfc3339;
+use time::{OffsetDateTime, PrimitiveDateTime};
 
 /// A second of UTC, written as RFC 3339 has it: `2026-11-23T05:20:00Z`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -35,12 +31,25 @@ impl Moment {
     pub fn instant(self) -> SystemTime {
         UNIX_EPOCH + Duration::from_secs(self.unix_s)
     }
+
+    /// Its day, as year-month-day.
+    pub fn day(self) -> String {
+        self.in_calendar().date().to_string()
+    }
+
+    /// The end of the year 9999 for what is later: a clock that is wrong is no fault of ours.
+    fn in_calendar(self) -> OffsetDateTime {
+        let unix_s = i64::try_from(self.unix_s).unwrap_or(i64::MAX);
+        let last = PrimitiveDateTime::MAX.assume_utc();
+        OffsetDateTime::from_unix_timestamp(unix_s).unwrap_or(last)
+    }
 }
 
 impl fmt::Display for Moment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (day, s) = (day(self.instant()), self.unix_s % DAY_S);
-        write!(f, "{day}T{:02}:{:02}:{:02}Z", s / 3600, s / 60 % 60, s % 60)
+        let at = self.in_calendar();
+        let (day, hour, minute, second) = (at.date(), at.hour(), at.minute(), at.second());
+        write!(f, "{day}T{hour:02}:{minute:02}:{second:02}Z")
     }
 }
 
@@ -49,19 +58,9 @@ impl FromStr for Moment {
 
     fn from_str(text: &str) -> Result<Self, NoMoment> {
         let none = || NoMoment(text.into());
-        let read: Datetime = text.parse().map_err(|_| none())?;
-        let (Some(date), Some(time)) = (read.date.filter(|it| it.year >= 1970), read.time) else {
-            return Err(none());
-        };
-        // Years that begin in March put the leap day last.
-        let (year, month) = (u64::from(date.year), u64::from(date.month));
-        let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
-        let days = 365 * year + year / 4 - year / 100 + year / 400 + (153 * month + 2) / 5;
-        let days = days + u64::from(date.day) - 1 - 719_468;
-        let minutes = 60 * u64::from(time.hour) + u64::from(time.minute);
-        let second = u64::from(time.second.unwrap_or(0));
-        let moment = Moment { unix_s: DAY_S * days + 60 * minutes + second };
-        // Another offset, or a day that is none, would read back as another text.
+        let at = OffsetDateTime::parse(text, &Rfc3339).map_err(|_| none())?;
+        let moment = Moment { unix_s: at.unix_timestamp().try_into().map_err(|_| none())? };
+        // Another offset, or a part of a second, would read back as another text.
         if moment.to_string() == text { Ok(moment) } else { Err(none()) }
     }
 }
@@ -92,6 +91,10 @@ mod tests {
         }
         let moment = Moment::of(UNIX_EPOCH + Duration::from_millis(1_772_323_199_999));
         assert_eq!(moment.to_string(), "2026-02-28T23:59:59Z");
+        assert_eq!(moment.day(), "2026-02-28");
+        let days = [0, 11_016, 11_017, 20_453].map(|day| Moment { unix_s: 86_400 * day }.day());
+        assert_eq!(days, ["1970-01-01", "2000-02-29", "2000-03-01", "2025-12-31"]);
+        assert_eq!(Moment { unix_s: u64::MAX }.to_string(), "9999-12-31T23:59:59Z");
         for wrong in
             ["", "2026-02-30T00:00:00Z", "2026-02-28T00:00:00+01:00", "0000-01-01T00:00:00Z"]
         {

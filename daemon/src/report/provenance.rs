@@ -1,12 +1,13 @@
 //! Where a report comes from: command, versions, content of the dataset.
 
 use std::path::Path;
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::SystemTime;
 
 use dynocar_core::dataset::MANIFEST_FILE;
 use sha2::{Digest, Sha256};
 
 use crate::dataset::{self, LoadError};
+use crate::models::moment::Moment;
 
 /// A file and what is in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -54,7 +55,7 @@ impl Provenance {
             command,
             version: env!("CARGO_PKG_VERSION"),
             machine: format!("{} on {}", std::env::consts::OS, std::env::consts::ARCH),
-            day: day(made),
+            day: Moment::of(made).day(),
             files,
             sha256: hex(lines.as_bytes()),
         }
@@ -83,7 +84,7 @@ fn digests(path: &Path) -> Result<Vec<FileDigest>, LoadError> {
 
 /// SHA-256 of some bytes, in hexadecimal digits.
 pub fn hex(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    format!("{:x}", Sha256::digest(bytes))
 }
 
 /// The command line of this process, as one would type it.
@@ -106,36 +107,9 @@ fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', r"'\''"))
 }
 
-/// The day of an instant in UTC, as year-month-day.
-pub fn day(instant: SystemTime) -> String {
-    let days = instant.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs() / 86_400);
-    // Years that start in March put the leap day last; the count starts on 0000-03-01.
-    let shifted = days + 719_468;
-    let (era, day_of_era) = (shifted / 146_097, shifted % 146_097);
-    let year_of_era =
-        (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let month_from_march = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * month_from_march + 2) / 5 + 1;
-    let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
-    let year = era * 400 + year_of_era + u64::from(month <= 2);
-    format!("{year:04}-{month:02}-{day:02}")
-}
-
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use super::*;
-
-    #[test]
-    fn days_follow_the_calendar() {
-        let at = |days: u64| day(UNIX_EPOCH + Duration::from_secs(86_400 * days));
-        assert_eq!(at(0), "1970-01-01");
-        assert_eq!(at(11_016), "2000-02-29");
-        assert_eq!(at(11_017), "2000-03-01");
-        assert_eq!(at(20_453), "2025-12-31");
-    }
 
     #[test]
     fn a_command_line_can_be_typed_again() {

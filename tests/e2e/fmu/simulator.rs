@@ -10,9 +10,10 @@ use dynocar_fmu::ffi::life::{
 };
 use dynocar_fmu::ffi::types::{CO_SIMULATION, CallbackFunctions, Component, Logger, Text};
 use dynocar_fmu::ffi::values::{
-    fmi2GetInteger, fmi2GetReal, fmi2SetBoolean, fmi2SetInteger, fmi2SetReal, fmi2SetString,
+    fmi2GetInteger, fmi2GetReal, fmi2SetBoolean, fmi2SetInteger, fmi2SetReal,
+    fmi2SetRealInputDerivatives, fmi2SetString,
 };
-use dynocar_fmu::{GUID, VARIABLES};
+use dynocar_fmu::{ESTIMATORS, Interface};
 
 /// What an FMU said, one message each.
 type Said = RefCell<Vec<String>>;
@@ -33,10 +34,15 @@ unsafe extern "C" fn take_down(
     said.borrow_mut().push(words.to_str().unwrap().into());
 }
 
-/// The value reference of a name.
-pub fn reference(name: &str) -> u32 {
-    let place = VARIABLES.iter().position(|variable| variable.name == name);
+/// The value reference of a name in a model.
+pub fn reference_in(model: &Interface, name: &str) -> u32 {
+    let place = model.variables.iter().position(|variable| variable.name == name);
     place.unwrap_or_else(|| panic!("no variable {name}")) as u32
+}
+
+/// The value reference of a name among the estimators'.
+pub fn reference(name: &str) -> u32 {
+    reference_in(&ESTIMATORS, name)
 }
 
 /// An instance, freed at the end.
@@ -72,9 +78,14 @@ impl Fmu {
         Fmu { component, said }
     }
 
-    /// An instance of the FMU that was unpacked beside this folder of resources.
+    /// An instance of the estimators that were unpacked beside this folder of resources.
     pub fn new(resources: &str) -> Fmu {
-        let fmu = Fmu::instantiate(CO_SIMULATION, GUID, resources);
+        Fmu::of(&ESTIMATORS, resources)
+    }
+
+    /// An instance of a model.
+    pub fn of(model: &Interface, resources: &str) -> Fmu {
+        let fmu = Fmu::instantiate(CO_SIMULATION, model.guid, resources);
         assert!(!fmu.component.is_null(), "{}", fmu.said());
         fmu
     }
@@ -97,10 +108,33 @@ impl Fmu {
         assert_eq!(went, [Status::Ok; 3], "{}", self.said());
     }
 
+    /// From instantiation into an initialization that does not end, for these words.
+    pub fn initialize_refused(&self, words: &str) {
+        // SAFETY: the component lives.
+        unsafe {
+            assert_eq!(fmi2SetupExperiment(self.component, 0, 0.0, 0.0, 0, 0.0), Status::Ok);
+            assert_eq!(fmi2EnterInitializationMode(self.component), Status::Ok, "{}", self.said());
+        }
+        assert_eq!(self.exit_initialization(), Status::Error);
+        let said = self.said();
+        assert!(said.contains(words), "{said:?} lacks {words:?}");
+    }
+
+    /// The end of the initialization.
+    pub fn exit_initialization(&self) -> Status {
+        // SAFETY: the component lives.
+        unsafe { fmi2ExitInitializationMode(self.component) }
+    }
+
     /// A step from a time.
     pub fn step(&self, time_s: f64) -> Status {
+        self.step_for(time_s, 0.1)
+    }
+
+    /// A step of a length in s from a time.
+    pub fn step_for(&self, time_s: f64, step_s: f64) -> Status {
         // SAFETY: the component lives.
-        unsafe { fmi2DoStep(self.component, time_s, 0.1, 1) }
+        unsafe { fmi2DoStep(self.component, time_s, step_s, 1) }
     }
 
     /// A number.
@@ -123,6 +157,12 @@ impl Fmu {
     pub fn set_real(&self, reference: u32, value: f64) -> Status {
         // SAFETY: the arrays hold one element each.
         unsafe { fmi2SetReal(self.component, &reference, 1, &value) }
+    }
+
+    /// Sets the slope of a number.
+    pub fn set_slope(&self, reference: u32, order: c_int, value: f64) -> Status {
+        // SAFETY: the arrays hold one element each.
+        unsafe { fmi2SetRealInputDerivatives(self.component, &reference, 1, &order, &value) }
     }
 
     /// Sets a whole number.

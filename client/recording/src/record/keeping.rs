@@ -11,8 +11,8 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
+use dynocar::models::moment::Moment;
 use dynocar::output::{OutputError, tell, write_file};
-use dynocar::report::provenance::day;
 use dynocar_shared::Status;
 use serde::{Deserialize, Serialize};
 
@@ -265,10 +265,8 @@ impl Reason {
 
 fn reason(event: &Event, now: SystemTime) -> Reason {
     let kind = EventKind::try_from(event.kind).unwrap_or(EventKind::Unknown);
-    let second = unix_s(now) % 86_400;
-    let (hour, minute, second) = (second / 3600, second / 60 % 60, second % 60);
     Reason {
-        at: format!("{}T{hour:02}:{minute:02}:{second:02}Z", day(now)),
+        at: Moment::of(now).to_string(),
         train: event.train_id,
         kind: kind.name().to_owned(),
         text: event.text.clone(),

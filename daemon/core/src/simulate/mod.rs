@@ -38,4 +38,4 @@ mod recording;
 pub use force_model::{ForceModel, QuadraticForces};
 pub use metric::{MOVING_SPEED_MPS, SpeedError};
 pub use prediction::{Prediction, Restart};
-pub use recording::{BridgeLimits, Recording, SimulateError};
+pub use recording::{BridgeLimits, Recording, SimulateError, is_pulled};

@@ -12,6 +12,8 @@ pub struct Motion {
 /// No train is faster, in m/s; a model with a negative resistance, as an optimiser may try it,
 /// stays finite.
 pub const SPEED_MAX_MPS: f64 = 250.0;
+/// A longer step in s is divided.
+pub const STEP_MAX_S: f64 = 1.0;
 
 /// Speed in m/s after `step_s` of an acceleration that changes linearly in time from `start` to
 /// `end` (m/s²), never below zero.

@@ -1,7 +1,7 @@
 //! The open-loop simulation of a recorded run.
 
 use super::force_model::ForceModel;
-use super::motion::{SPEED_MAX_MPS, speed_after};
+use super::motion::{SPEED_MAX_MPS, STEP_MAX_S, speed_after};
 use super::recording::{Recording, SampleRole};
 
 /// How long the simulation runs before it takes up a measured speed again.
@@ -27,8 +27,6 @@ impl Restart {
     }
 }
 
-/// A longer step in s is divided.
-const STEP_MAX_S: f64 = 1.0;
 /// Samples whose speeds together tell whether a starting speed is an outlier.
 const START_SAMPLES: usize = 5;
 /// They lie within this time in s: over a longer one the forces say too little.

@@ -213,9 +213,13 @@ fn roles(
 }
 
 fn is_held(sample: &ResolvedSample) -> bool {
+    sample.speed_mps < REST_SPEED_MPS && !is_pulled(sample)
+}
+
+/// False for a train that, standing, is held by a brake, reported or not.
+pub fn is_pulled(sample: &ResolvedSample) -> bool {
     let traction_n = sample.traction_force_n.unwrap_or(0.0);
-    sample.speed_mps < REST_SPEED_MPS
-        && traction_n < REST_TRACTION_MPS2 * sample.weight_kn * 1000.0 / STANDARD_GRAVITY_MPS2
+    !(traction_n < REST_TRACTION_MPS2 * sample.weight_kn * 1000.0 / STANDARD_GRAVITY_MPS2)
 }
 
 #[cfg(test)]

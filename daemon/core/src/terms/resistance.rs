@@ -73,13 +73,36 @@ impl Resistance {
     #[inline]
     pub fn extra_n_per_kn(&self, davis: Davis, speed_mps: f64) -> f64 {
         let square = speed_mps * speed_mps;
-        let ahead_mps = speed_mps + self.headwind_mps;
         self.constant_n_per_kn()
             + self.other_per_mps * speed_mps
             + self.c_share * davis.c * square
             + self.dc * square
-            + self.outside * davis.c * (ahead_mps * ahead_mps.abs() - square)
-            + (self.factor - 1.0) * davis.w0_n_per_kn(speed_mps)
+            + self.by_wind_n_per_kn(davis, speed_mps)
+            + self.by_factor_n_per_kn(davis, speed_mps)
+    }
+
+    /// What tunnels add, in N/kN: by their length, as share of c and beside it.
+    pub fn in_tunnels_n_per_kn(&self, davis: Davis, speed_mps: f64) -> f64 {
+        self.tunnel_n_per_kn + (self.c_share * davis.c + self.dc) * speed_mps * speed_mps
+    }
+
+    /// What the wind adds to the air resistance, in N/kN.
+    #[inline]
+    pub fn by_wind_n_per_kn(&self, davis: Davis, speed_mps: f64) -> f64 {
+        let square = speed_mps * speed_mps;
+        let ahead_mps = speed_mps + self.headwind_mps;
+        self.outside * davis.c * (ahead_mps * ahead_mps.abs() - square)
+    }
+
+    /// What the factor adds to the basic resistance, in N/kN.
+    #[inline]
+    pub fn by_factor_n_per_kn(&self, davis: Davis, speed_mps: f64) -> f64 {
+        (self.factor - 1.0) * davis.w0_n_per_kn(speed_mps)
+    }
+
+    /// Everything in no library, in N/kN, for speeds near that at which it was taken.
+    pub fn other_at_n_per_kn(&self, speed_mps: f64) -> f64 {
+        self.other_n_per_kn + self.other_per_mps * speed_mps
     }
 
     /// All resistance in N/kN as p0 + p1 v + p2 v², for speeds near `near_mps`: the sign of the

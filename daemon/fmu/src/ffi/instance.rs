@@ -117,6 +117,7 @@ pub(super) unsafe fn text<'a>(place: Text) -> Option<&'a CStr> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimators::ESTIMATORS;
 
     #[test]
     fn a_panic_becomes_an_error_after_which_only_a_reset_helps() {
@@ -127,13 +128,14 @@ mod tests {
             step_finished: None,
             component_environment: std::ptr::null_mut(),
         };
-        let component = Instance::hand_out(Model::new("".into()), Log::new(c"", &callbacks));
+        let component =
+            Instance::hand_out(Model::new(&ESTIMATORS, "".into()), Log::new(c"", &callbacks));
         let run = |work: fn(&mut Model) -> Result<(), ModelError>| {
             // SAFETY: the component lives until the end of the test, in this thread.
             unsafe { call(component, work) }
         };
         assert_eq!(run(|_| panic!("on purpose")), Status::Error);
-        assert_eq!(run(Model::set_up_experiment), Status::Error);
+        assert_eq!(run(|model| model.set_up_experiment(0.0)), Status::Error);
         assert_eq!(run(|model| model.set_real(3, 1.0)), Status::Error);
         assert_eq!(
             run(|model| {
@@ -142,7 +144,7 @@ mod tests {
             }),
             Status::Ok
         );
-        assert_eq!(run(Model::set_up_experiment), Status::Ok);
+        assert_eq!(run(|model| model.set_up_experiment(0.0)), Status::Ok);
         // SAFETY: it is not used any more.
         unsafe { take_back(component) };
     }

@@ -7,8 +7,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use super::instance::{Instance, Log, call, take_back, text};
 use super::types::{Boolean, CO_SIMULATION, CallbackFunctions, Component, Status, Text};
+use crate::interfaces::INTERFACES;
 use crate::model::Model;
-use crate::variables::GUID;
 
 /// The platform of the types.
 #[unsafe(no_mangle)]
@@ -49,12 +49,14 @@ pub unsafe extern "C" fn fmi2Instantiate(
         if kind != CO_SIMULATION {
             log.tell("this FMU is for co-simulation only");
             None
-        } else if guid != GUID {
-            log.tell(&format!("modelDescription.xml is of {guid}, the library of {GUID}"));
-            None
-        } else {
+        } else if let Some(interface) = INTERFACES.into_iter().find(|it| it.guid == guid) {
             let resources = resources.unwrap_or_default().to_string_lossy().into_owned();
-            Some(Instance::hand_out(Model::new(resources), log))
+            Some(Instance::hand_out(Model::new(interface, resources), log))
+        } else {
+            let [estimators, plant] = INTERFACES.map(|it| it.guid);
+            let own = format!("{estimators} and {plant}");
+            log.tell(&format!("modelDescription.xml is of {guid}, the library of {own}"));
+            None
         }
     };
     match catch_unwind(AssertUnwindSafe(make)) {
@@ -93,7 +95,7 @@ pub unsafe extern "C" fn fmi2SetDebugLogging(
     unsafe { call(component, |_| Ok(())) }
 }
 
-/// Takes note of an experiment; tolerance, start and stop matter to no estimator.
+/// Takes note of when an experiment begins; tolerance and stop matter to no model.
 ///
 /// # Safety
 ///
@@ -103,12 +105,12 @@ pub unsafe extern "C" fn fmi2SetupExperiment(
     component: Component,
     _tolerance_defined: Boolean,
     _tolerance: f64,
-    _start_time_s: f64,
+    start_time_s: f64,
     _stop_time_defined: Boolean,
     _stop_time_s: f64,
 ) -> Status {
     // SAFETY: promised by the caller.
-    unsafe { call(component, Model::set_up_experiment) }
+    unsafe { call(component, |model| model.set_up_experiment(start_time_s)) }
 }
 
 /// Reads the files of train and line.
@@ -133,7 +135,7 @@ pub unsafe extern "C" fn fmi2ExitInitializationMode(component: Component) -> Sta
     unsafe { call(component, Model::exit_initialization) }
 }
 
-/// Takes the inputs as the sample of the moment at which the step begins.
+/// Takes the inputs as they are at the beginning of the step.
 ///
 /// # Safety
 ///

@@ -35,9 +35,6 @@ unsupported! {
         _unknowns: *const u32, _unknown_count: usize, _knowns: *const u32, _known_count: usize,
         _known: *const f64, _unknown: *mut f64
     );
-    fmi2SetRealInputDerivatives(
-        _references: *const u32, _count: usize, _orders: *const c_int, _values: *const f64
-    );
     fmi2GetRealOutputDerivatives(
         _references: *const u32, _count: usize, _orders: *const c_int, _values: *mut f64
     );

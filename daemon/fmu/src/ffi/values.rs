@@ -146,6 +146,36 @@ pub unsafe extern "C" fn fmi2SetReal(
     unsafe { set(component, (references, count), values, Model::set_real) }
 }
 
+/// Sets the slopes of inputs during the next step, where the model takes them.
+///
+/// # Safety
+///
+/// See [the module](super#safety).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetRealInputDerivatives(
+    component: Component,
+    references: *const u32,
+    count: usize,
+    orders: *const c_int,
+    values: *const f64,
+) -> Status {
+    let all = |model: &mut Model| {
+        require(references, count, "the array of value references")?;
+        require(orders, count, "the array of orders")?;
+        require(values, count, "the array of values")?;
+        for place in 0..count {
+            // SAFETY: all arrays hold `count` elements, of which this is one.
+            let (reference, order, value) = unsafe {
+                (references.add(place).read(), orders.add(place).read(), values.add(place).read())
+            };
+            model.set_slope(reference, (order, value))?;
+        }
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { call(component, all) }
+}
+
 /// Sets the run and the direction.
 ///
 /// # Safety

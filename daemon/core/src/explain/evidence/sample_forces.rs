@@ -49,7 +49,7 @@ impl SampleForces {
 
     /// The acceleration p0 + p1 v + p2 v² in m/s² for speeds near `speed_mps`.
     #[inline]
-    pub(super) fn polynomial(&self, davis: Davis, speed_mps: f64) -> [f64; 3] {
+    pub fn polynomial(&self, davis: Davis, speed_mps: f64) -> [f64; 3] {
         let mass_kg = self.mass_kg * self.mass_factor;
         let per_kg = 1.0 / rotating::inertial_mass_kg(mass_kg, self.rotating_mass_factor);
         let weight_kn = TrainModel::weight_kn(mass_kg);

@@ -1,0 +1,210 @@
+//! The model that learns: the recommended estimators, and every variable of theirs.
+
+use dynocar_core::pipeline::Pipeline;
+use dynocar_core::pipeline::quantities::candidates;
+use dynocar_shared::{
+    Parameter, ParameterSnapshot, PipelineKind, Quantity, SampleField, TrainSample,
+};
+
+use crate::units::{self, Unit};
+use crate::variables::{
+    Interface, Meaning, ModelFile, Told, Variable, digits, guid, measured, row,
+};
+
+/// The recommended estimators, which a configuration of the daemon has by default; one for each
+/// quantity, and the monitor.
+pub const PIPELINES: [PipelineKind; 5] = [RESISTANCE, MASS, ADHESION, BRAKE, MONITOR];
+const RESISTANCE: PipelineKind = candidates(Quantity::Resistance)[0];
+const MASS: PipelineKind = candidates(Quantity::Mass)[0];
+const ADHESION: PipelineKind = candidates(Quantity::Adhesion)[0];
+const BRAKE: PipelineKind = candidates(Quantity::BrakeFriction)[0];
+const MONITOR: PipelineKind = PipelineKind::ResidualMonitor;
+
+/// The estimators.
+pub const ESTIMATORS: Interface = Interface {
+    identifier: "dynocar",
+    name: "Dynocar",
+    about: "Learns running resistance, mass, adhesion and brake friction of a train from what its \
+        controller measures",
+    step: "Each step takes one sample: the inputs at the beginning of the step, stamped with its \
+        time. Use an estimate only while its status is 2, estimated.",
+    guid: digits(&GUID_DIGITS),
+    variables: VARIABLES,
+    takes_slopes: false,
+};
+
+pub(crate) const GUID_DIGITS: [u8; 16] =
+    guid::<{ VARIABLES.len() }>(concat!("dynocar ", env!("CARGO_PKG_VERSION")), VARIABLES);
+
+const fn told(
+    name: &'static str,
+    of: PipelineKind,
+    told: Told,
+    unit: Unit,
+    description: &'static str,
+) -> Variable {
+    row(name, Meaning::Estimate(of, told), unit, description)
+}
+
+const STATUS: &str = "What may be done with it: 2 estimated, may be used";
+const REASON: &str = "Why the status is what it is";
+const REJECTED: &str = "Samples refused so far";
+const STD: &str = "Its standard deviation";
+
+/// Every variable, in the order of the value references.
+#[rustfmt::skip]
+const VARIABLES: &[Variable] = &[
+    row("train_file", Meaning::File(ModelFile::Train), units::NONE, "Path of the train's file; empty: the one inside the FMU"),
+    row("track_file", Meaning::File(ModelFile::Track), units::NONE, "Path of the line's file; empty: the one inside the FMU, if any"),
+
+    measured("position_m", SampleField::Position, units::METRE, "Chainage of the train's centre"),
+    measured("speed_mps", SampleField::Speed, units::METRE_PER_SECOND, "Speed, never negative"),
+    measured("traction_force_n", SampleField::TractionForce, units::NEWTON, "Traction force at the wheel rims, never negative"),
+    measured("brake_force_n", SampleField::BrakeForce, units::NEWTON, "Brake force, retarding, never negative"),
+    measured("brake_cylinder_pressure_pa", SampleField::BrakeCylinderPressure, units::PASCAL, "Brake-cylinder pressure"),
+    measured("acceleration_mps2", SampleField::Acceleration, units::METRE_PER_SECOND_2, "dv/dt as measured"),
+    measured("specific_force_mps2", SampleField::SpecificForce, units::METRE_PER_SECOND_2, "What an accelerometer reads along the track"),
+    measured("mass_kg", SampleField::Mass, units::KILOGRAM, "Gross mass without the rotating part"),
+    measured("ambient_temperature_degc", SampleField::AmbientTemperature, units::CELSIUS, "Outside temperature"),
+    measured("gradient_permille", SampleField::Gradient, units::PERMILLE, "Gradient, climbing positive as the chainage grows; for lines without a file"),
+    measured("curve_radius_m", SampleField::CurveRadius, units::METRE, "Curve radius, 0 on straight track; for lines without a file"),
+    row("direction", Meaning::Direction, units::NONE, "+1 while the chainage grows in the direction of travel, -1 while it falls"),
+    row("wheel_slide", Meaning::WheelSlide, units::NONE, "True while wheel-slide protection is active"),
+    row("run", Meaning::Run, units::NONE, "Number of the run (trip); no integral crosses its change"),
+
+    told("resistance.a", RESISTANCE, Told::Value(Parameter::DavisA), units::NEWTON_PER_KILONEWTON, "Davis a"),
+    told("resistance.a_std", RESISTANCE, Told::Std(Parameter::DavisA), units::NEWTON_PER_KILONEWTON, STD),
+    told("resistance.b", RESISTANCE, Told::Value(Parameter::DavisB), units::DAVIS_B, "Davis b"),
+    told("resistance.b_std", RESISTANCE, Told::Std(Parameter::DavisB), units::DAVIS_B, STD),
+    told("resistance.c", RESISTANCE, Told::Value(Parameter::DavisC), units::DAVIS_C, "Davis c"),
+    told("resistance.c_std", RESISTANCE, Told::Std(Parameter::DavisC), units::DAVIS_C, STD),
+    told("resistance.w0", RESISTANCE, Told::Resistance, units::NEWTON_PER_KILONEWTON, "Basic resistance at the speed of the sample"),
+    told("resistance.w0_std", RESISTANCE, Told::ResistanceStd, units::NEWTON_PER_KILONEWTON, "Its standard deviation, from the full covariance"),
+    told("resistance.status", RESISTANCE, Told::Status, units::NONE, STATUS),
+    told("resistance.reason", RESISTANCE, Told::Reason, units::NONE, REASON),
+    told("resistance.rejected", RESISTANCE, Told::Rejected, units::NONE, REJECTED),
+
+    told("mass.mass_t", MASS, Told::Value(Parameter::Mass), units::TONNE, "Gross mass"),
+    told("mass.mass_t_std", MASS, Told::Std(Parameter::Mass), units::TONNE, STD),
+    told("mass.status", MASS, Told::Status, units::NONE, STATUS),
+    told("mass.reason", MASS, Told::Reason, units::NONE, REASON),
+    told("mass.rejected", MASS, Told::Rejected, units::NONE, REJECTED),
+
+    told("adhesion.adhesion", ADHESION, Told::Value(Parameter::Adhesion), units::NONE, "Adhesion of wheel on rail, where the rail was the limit"),
+    told("adhesion.adhesion_std", ADHESION, Told::Std(Parameter::Adhesion), units::NONE, STD),
+    told("adhesion.adhesion_lower_bound", ADHESION, Told::Value(Parameter::AdhesionLowerBound), units::NONE, "What the rail carried at least, where the brake was the limit"),
+    told("adhesion.adhesion_lower_bound_std", ADHESION, Told::Std(Parameter::AdhesionLowerBound), units::NONE, STD),
+    told("adhesion.adhesion_law_scale", ADHESION, Told::Value(Parameter::AdhesionLawScale), units::NONE, "Scale of the known law of adhesion over speed"),
+    told("adhesion.adhesion_law_scale_std", ADHESION, Told::Std(Parameter::AdhesionLawScale), units::NONE, STD),
+    told("adhesion.status", ADHESION, Told::Status, units::NONE, STATUS),
+    told("adhesion.reason", ADHESION, Told::Reason, units::NONE, REASON),
+    told("adhesion.rejected", ADHESION, Told::Rejected, units::NONE, REJECTED),
+
+    told("brake_friction.disc_friction", BRAKE, Told::Value(Parameter::DiscFriction), units::NONE, "Friction of the brake discs; needs the pressure and the gear in the train's file"),
+    told("brake_friction.disc_friction_std", BRAKE, Told::Std(Parameter::DiscFriction), units::NONE, STD),
+    told("brake_friction.status", BRAKE, Told::Status, units::NONE, STATUS),
+    told("brake_friction.reason", BRAKE, Told::Reason, units::NONE, REASON),
+    told("brake_friction.rejected", BRAKE, Told::Rejected, units::NONE, REJECTED),
+
+    told("monitor.unexplained_force_n", MONITOR, Told::UnexplainedForce, units::NEWTON, "Force that the declared model does not explain, retarding positive"),
+    told("monitor.unexplained_force_n_std", MONITOR, Told::UnexplainedForceStd, units::NEWTON, STD),
+    told("monitor.suspected_effect", MONITOR, Told::SuspectedEffect, units::NONE, "The effect that the model may lack"),
+    told("monitor.status", MONITOR, Told::Status, units::NONE, STATUS),
+    told("monitor.reason", MONITOR, Told::Reason, units::NONE, REASON),
+    told("monitor.rejected", MONITOR, Told::Rejected, units::NONE, REJECTED),
+];
+
+/// What is told before the files are read.
+static NOTHING: ParameterSnapshot = ParameterSnapshot::empty();
+
+/// The estimators behind an instance.
+pub struct Estimators {
+    /// By [`PIPELINES`].
+    pipelines: Vec<Pipeline>,
+    /// Speed in m/s of the newest step's sample; NaN before it.
+    speed_mps: f64,
+}
+
+impl Estimators {
+    /// These, by [`PIPELINES`], before the first sample.
+    pub fn new(pipelines: Vec<Pipeline>) -> Self {
+        Estimators { pipelines, speed_mps: f64::NAN }
+    }
+
+    /// Takes a sample.
+    pub fn take(&mut self, sample: &TrainSample) {
+        self.speed_mps = sample.get(SampleField::Speed).unwrap_or(f64::NAN);
+        for pipeline in &mut self.pipelines {
+            pipeline.process(sample);
+        }
+    }
+
+    fn snapshot(&self, of: PipelineKind) -> &ParameterSnapshot {
+        let place = PIPELINES.iter().position(|&kind| kind == of);
+        place.and_then(|place| self.pipelines.get(place)).map_or(&NOTHING, Pipeline::snapshot)
+    }
+
+    /// A number, where it is known.
+    pub fn real(&self, of: PipelineKind, told: Told) -> Option<f64> {
+        let snapshot = self.snapshot(of);
+        match told {
+            Told::Value(parameter) => snapshot.value(parameter),
+            Told::Std(parameter) => snapshot.std(parameter),
+            Told::Resistance => Some(snapshot.resistance_at(self.speed_mps)?.w0_n_per_kn),
+            Told::ResistanceStd => Some(snapshot.resistance_at(self.speed_mps)?.w0_std_n_per_kn),
+            Told::UnexplainedForce => Some(snapshot.unexplained_force_n),
+            Told::UnexplainedForceStd => Some(snapshot.unexplained_force_std_n),
+            Told::SuspectedEffect | Told::Status | Told::Reason | Told::Rejected => None,
+        }
+    }
+
+    /// A whole number, or the number of a member of a vocabulary.
+    pub fn integer(&self, of: PipelineKind, told: Told) -> u64 {
+        let snapshot = self.snapshot(of);
+        match told {
+            Told::Status => snapshot.status.into(),
+            Told::Reason => snapshot.reason.into(),
+            Told::SuspectedEffect => snapshot.suspected_effect.into(),
+            _ => snapshot.samples_rejected,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_says_what_the_variable_stands_for() {
+        for variable in VARIABLES {
+            let name = variable.name;
+            let expected = match variable.meaning {
+                Meaning::Estimate(_, Told::Value(parameter)) => parameter.name().to_owned(),
+                Meaning::Estimate(_, Told::Std(parameter)) => format!("{}_std", parameter.name()),
+                _ => continue,
+            };
+            assert_eq!(name.split_once('.').map(|(_, name)| name), Some(expected.as_str()));
+        }
+        for field in SampleField::ALL {
+            let count =
+                VARIABLES.iter().filter(|it| it.meaning == Meaning::Measured(field)).count();
+            assert_eq!(count, 1, "{field:?}");
+        }
+    }
+
+    #[test]
+    fn every_recommended_estimator_tells_status_reason_and_refusals_under_one_name() {
+        for kind in PIPELINES {
+            let of_kind =
+                |it: &&Variable| matches!(it.meaning, Meaning::Estimate(of, _) if of == kind);
+            let names: Vec<_> = VARIABLES.iter().filter(of_kind).map(|it| it.name).collect();
+            let group = names[0].split('.').next().unwrap();
+            for name in &names {
+                assert_eq!(name.split('.').next(), Some(group));
+            }
+            for told in ["status", "reason", "rejected"] {
+                assert!(names.contains(&format!("{group}.{told}").as_str()), "{kind}: {told}");
+            }
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! The command line of `dynocar init`.
+
+use std::io::{IsTerminal, stderr, stdin};
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use dynocar_core::dataset::Quantity;
+use dynocar_core::dataset::guess::Told;
+use dynocar_core::dataset::units::Unit;
+
+use crate::cli::train_text::TrainArguments;
+
+/// The folder for the files where somebody who is asked says no other.
+pub const FOLDER_DEFAULT: &str = "my_train";
+
+/// Write a first train.toml and daemon.toml and, from recordings, a dataset.toml that says of every
+/// column what it was taken for and why. Nothing is overwritten. On a terminal, without a folder, it
+/// asks for all that is not said.
+#[derive(Clone, Debug, Args)]
+pub struct InitArguments {
+    /// The folder for the files; it is made where there is none
+    #[arg(required = nobody_is_there())]
+    pub folder: Option<PathBuf>,
+    /// Recorded runs of the train, laid out alike; of several the last one is held out
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub csv: Vec<PathBuf>,
+    /// Say what a column holds, as speed=v_ist:km/h; may be given several times
+    #[arg(long, value_name = "QUANTITY=COLUMN[:UNIT]", value_parser = told)]
+    pub column: Vec<Told>,
+    #[command(flatten)]
+    pub train: TrainArguments,
+}
+
+impl InitArguments {
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        self.folder.as_deref().unwrap_or(Path::new(FOLDER_DEFAULT))
+    }
+}
+
+/// True where nobody can be asked.
+fn nobody_is_there() -> bool {
+    !(stdin().is_terminal() && stderr().is_terminal())
+}
+
+/// What somebody says of a column: `QUANTITY=COLUMN` or `QUANTITY=COLUMN:UNIT`.
+fn told(text: &str) -> Result<Told, String> {
+    let expected = "expected QUANTITY=COLUMN or QUANTITY=COLUMN:UNIT, as speed=v_ist:km/h";
+    let (name, rest) = text.split_once('=').ok_or(expected)?;
+    let names = || Quantity::ALL.map(Quantity::name).join(", ");
+    let quantity = Quantity::from_name(name.trim())
+        .ok_or_else(|| format!("'{name}' is no quantity; the quantities: {}", names()))?;
+    // A name may hold colons itself: what follows the last one counts where it is a unit.
+    let unit_of = |unit: &str| Unit::find(quantity.dimension(), unit.trim());
+    let (column, unit) = match rest.rsplit_once(':') {
+        Some((column, unit)) if unit_of(unit).is_some() => (column, unit_of(unit)),
+        _ => (rest, None),
+    };
+    if column.trim().is_empty() {
+        return Err(expected.into());
+    }
+    Ok(Told { quantity, column: column.trim().into(), unit })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_column_is_told_with_or_without_its_unit() {
+        let kmh = Unit::find(Quantity::Speed.dimension(), "km/h");
+        let speed =
+            |column: &str, unit| Told { quantity: Quantity::Speed, column: column.into(), unit };
+        assert_eq!(told("speed=v_ist:km/h"), Ok(speed("v_ist", kmh)));
+        assert_eq!(told("speed=v_ist"), Ok(speed("v_ist", None)));
+        assert_eq!(told("speed=MVB:v=1:km/h"), Ok(speed("MVB:v=1", kmh)));
+        assert_eq!(told("speed=MVB:v"), Ok(speed("MVB:v", None)));
+        assert!(told("speed").unwrap_err().starts_with("expected QUANTITY=COLUMN"));
+        assert!(told("velocity=v").unwrap_err().contains("'velocity' is no quantity; the quant"));
+        assert!(told("speed= ").is_err());
+    }
+}
