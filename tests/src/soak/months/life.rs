@@ -6,8 +6,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use dynocar::config::{DaemonConfig, TrainConfig};
 use dynocar::learn::{Bounds, Learner, LearnerSettings};
-use dynocar::models::{ModelHash, ModelText, NewModel, Origin, Store, TrainModels};
-use dynocar::report::provenance::day as day_name;
+use dynocar::models::{ModelHash, ModelText, Moment, NewModel, Origin, Store, TrainModels};
 use dynocar::run::build_pipeline;
 use dynocar::runtime::exchange::Exchange;
 use dynocar::shadow::in_force::{put_declared, with_model};
@@ -199,7 +198,7 @@ impl<'f> Life<'f> {
         if runs.is_empty() {
             return;
         }
-        let folder = self.folder.join("runs").join(day_name(night));
+        let folder = self.folder.join("runs").join(Moment::of(night).day());
         write_dataset(&dataset_of(&self.world, runs), &folder).expect("a day's runs");
     }
 
