@@ -214,6 +214,16 @@ fn a_model_out_of_bounds_is_not_adopted_by_the_rule_and_nothing_is_by_asking() {
         daemon.await_error(expected);
         assert!(daemon.errors().contains(&better.to_string()));
         assert_eq!(cast.models().in_force().unwrap(), None);
+        if rule.contains("bounds") {
+            // Nor by a person.
+            cast.decide(Choice::Adopt(better));
+            daemon.await_error("what was decided is not done");
+            stop(daemon);
+            let daemon = cast.daemon(&format!("trips_between_mistakes = 20\n{rule}"));
+            daemon.await_error("the declared model stays in force");
+            stop(daemon);
+            continue;
+        }
         stop(daemon);
     }
 }

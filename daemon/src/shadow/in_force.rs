@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use tracing::{info, warn};
 
+use super::rule::Rule;
 use crate::config::{DaemonConfig, TrainConfig};
 use crate::models::{ModelHash, ModelsError, NewModel, Origin, Store, TrainModels};
 
@@ -14,15 +15,20 @@ pub fn settle(config: &mut DaemonConfig) {
     let Some(models) = &config.models else { return };
     let store = Store::at(&models.directory);
     for train in &mut config.trains {
-        if let Err(error) = settle_train(&store.train(train.id), train) {
+        if let Err(error) = settle_train(&store.train(train.id), train, &models.rule) {
             warn!(train = train.id.0, "the declared model stays in force: {error}");
         }
     }
 }
 
-fn settle_train(models: &TrainModels, train: &mut TrainConfig) -> Result<(), ModelsError> {
+fn settle_train(
+    models: &TrainModels,
+    train: &mut TrainConfig,
+    rule: &Rule,
+) -> Result<(), NotInForce> {
     put_declared(models, train)?;
     let Some(hash) = models.in_force()? else { return Ok(()) };
+    permitted(models, rule, hash)?;
     *train = with_model(models, train, hash)?;
     let declared = train.text.hash();
     let mut origin = models.stored(hash)?.origin;
@@ -36,6 +42,34 @@ fn settle_train(models: &TrainModels, train: &mut TrainConfig) -> Result<(), Mod
     }
     info!(train = train.id.0, model = %hash, "in force, as decided: {added}");
     Ok(())
+}
+
+/// Why a model that was decided on does not come in force.
+#[derive(Debug, thiserror::Error)]
+pub enum NotInForce {
+    /// The store does not give it.
+    #[error(transparent)]
+    Models(#[from] ModelsError),
+    /// It lies outside the configuration's bounds.
+    #[error("model {hash} is out of bounds: {outside}")]
+    OutOfBounds {
+        /// The model.
+        hash: ModelHash,
+        /// Key, value and bounds.
+        outside: String,
+    },
+}
+
+/// Whether a model may come in force, whoever decided so.
+///
+/// # Errors
+///
+/// When the store does not give it, or it lies outside the bounds.
+pub fn permitted(models: &TrainModels, rule: &Rule, hash: ModelHash) -> Result<(), NotInForce> {
+    match rule.outside(&models.text(hash)?) {
+        None => Ok(()),
+        Some(outside) => Err(NotInForce::OutOfBounds { hash, outside }),
+    }
 }
 
 /// What the configuration declares, as a model of the store.

@@ -27,16 +27,17 @@ pub struct Rule {
     pub adopt: Adopt,
     /// Share of the open-loop error that a rival must take away to count as better.
     pub least_gain: f64,
-    /// While no rival is better, one is taken for better after no fewer trips on average.
+    /// While no rival is better, none is taken for better before so many trips on average, however many
+    /// are on trial.
     pub trips_between_mistakes: f64,
     /// Keys of a train's file as `resistance.a`, with the least and the greatest value.
     pub bounds: BTreeMap<String, [f64; 2]>,
 }
 
 impl Rule {
-    /// True where a rival has shown that it is better.
-    pub fn is_better(&self, rival: &Rival) -> bool {
-        rival.evidence.capital() >= self.trips_between_mistakes
+    /// True where one of so many rivals has shown that it is better.
+    pub fn is_better(&self, rival: &Rival, rivals: usize) -> bool {
+        rival.evidence.capital() >= self.trips_between_mistakes * rivals as f64
     }
 
     /// What to decide when a rival is better: to take back what is in force, if the rival was

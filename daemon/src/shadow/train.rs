@@ -13,7 +13,7 @@ use dynocar_shared::{Parameter, ParameterSnapshot, TrainSample};
 use tracing::{info, warn};
 
 use super::figures::TrialFigures;
-use super::in_force::with_model;
+use super::in_force::{self, with_model};
 use super::record::{self, Estimate, Tried};
 use super::rivals::{Standing, standing};
 use super::rule::{Adopt, Rule};
@@ -154,7 +154,10 @@ impl ShadowTrain {
                 self.withdraw();
             }
         } else if stands && self.standing.in_force != self.in_force() {
-            self.begin(self.standing.in_force);
+            match in_force::permitted(&self.models, &self.settings.rule, self.standing.in_force) {
+                Ok(()) => self.begin(self.standing.in_force),
+                Err(error) => self.warn_once(format!("what was decided is not done: {error}")),
+            }
         }
     }
 
@@ -255,7 +258,7 @@ impl ShadowTrain {
             .trials
             .rivals
             .iter()
-            .filter(|rival| rule.is_better(rival))
+            .filter(|rival| rule.is_better(rival, self.trials.rivals.len()))
             .map(|rival| (ModelHash(rival.model), self.reason(rival)))
             .collect();
         for (hash, reason) in better {

@@ -1,6 +1,7 @@
 //! Seeded faults for as long as one likes.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::builder::PossibleValuesParser;
@@ -66,6 +67,9 @@ enum Command {
         /// Trips of a day
         #[arg(long, default_value_t = 24)]
         trips: usize,
+        /// Keep each life's files, runs and store, in a folder of its own in this one
+        #[arg(long, value_name = "DIR")]
+        keep: Option<PathBuf>,
         /// How many lives of each story
         #[arg(long, default_value_t = 1)]
         lives: u64,
@@ -124,7 +128,7 @@ fn main() -> ExitCode {
             say(format!("{:#?}", load::run(&programs, seconds, seed)));
         }
         Command::Day { hours, seed } => say(day::hours::table(&day::run(&programs, hours, seed))),
-        Command::Months { story, days, onset, end, trips, lives, seed } => {
+        Command::Months { story, days, onset, end, trips, keep, lives, seed } => {
             let stories = match story.as_deref().map(|name| (name, Story::from_name(name))) {
                 None => Story::all(),
                 Some((_, Some(story))) => vec![story],
@@ -148,8 +152,11 @@ fn main() -> ExitCode {
                         recorded,
                         trips_between_mistakes,
                     };
-                    let folder = tempfile::tempdir().expect("a temporary folder");
-                    let outcome = Life::begin(settings, folder.path()).live();
+                    let passing = tempfile::tempdir().expect("a temporary folder");
+                    let name = format!("{}-{seed}", story.name());
+                    let kept = keep.as_ref().map(|folder| folder.join(name));
+                    let folder = kept.as_deref().unwrap_or(passing.path());
+                    let outcome = Life::begin(settings, folder).live();
                     print(&months::table::line(&outcome)).unwrap_or_else(|error| give_up(&error));
                 }
             }
