@@ -15,7 +15,7 @@ use dynocar_tests::sensor_failures::SensorFailure;
 use dynocar_tests::simulator::TrainType;
 use dynocar_tests::soak::bad_samples::{Scene, Tally};
 use dynocar_tests::soak::months::story::Span;
-use dynocar_tests::soak::months::{self, Life, LifeSettings, Story};
+use dynocar_tests::soak::months::{self, Life, LifeSettings, Story, mistakes};
 use dynocar_tests::soak::{Programs, day, faults, hostile, load, state_kills};
 
 /// Seeded faults, load and bad input for as long as one likes; exit status 101 when a promise breaks.
@@ -76,6 +76,21 @@ enum Command {
         /// The seed of the first
         #[arg(long, default_value_t = 1)]
         seed: u64,
+    },
+    /// How often a model that is no better is adopted: years made of simulated trips, drawn with replacement
+    Mistakes {
+        /// Trains
+        #[arg(long, default_value_t = 20)]
+        trains: u64,
+        /// Years of each
+        #[arg(long, default_value_t = 20)]
+        years: usize,
+        /// The first seed
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// As in the configuration
+        #[arg(long, default_value_t = 200_000.0)]
+        trips_between_mistakes: f64,
     },
     /// Garbage into each kind of segment; prints who survives
     Hostile(Rounds),
@@ -160,6 +175,9 @@ fn main() -> ExitCode {
                     print(&months::table::line(&outcome)).unwrap_or_else(|error| give_up(&error));
                 }
             }
+        }
+        Command::Mistakes { trains, years, seed, trips_between_mistakes } => {
+            say(format!("{:?}", mistakes::measure(trains, years, seed, trips_between_mistakes)));
         }
         Command::Hostile(Rounds { rounds, seed }) => {
             hostile::measure(&programs, rounds, seed).iter().for_each(|it| say(format!("{it:?}")));

@@ -25,6 +25,8 @@ pub struct Rival {
     pub evidence: Evidence,
     /// Its errors.
     pub ledger: Ledger,
+    /// The score of the newest trip that was compared.
+    pub newest_score: Option<f64>,
     open_loop: OpenLoop,
     /// Over the trip that goes on.
     trip: TripError,
@@ -41,7 +43,16 @@ impl Rival {
         (evidence, ledger): (Evidence, Ledger),
     ) -> Self {
         let trip = TripError::default();
-        Rival { model, pipelines, evidence, ledger, open_loop, trip, is_whole: false }
+        Rival {
+            model,
+            pipelines,
+            evidence,
+            ledger,
+            newest_score: None,
+            open_loop,
+            trip,
+            is_whole: false,
+        }
     }
 
     fn take(&mut self, sample: &TrainSample, valid: Option<&ValidSample>) {
@@ -179,7 +190,9 @@ impl Trials {
         let in_force = self.in_force.trip.mean_square();
         for rival in self.rivals.iter_mut().filter(|rival| rival.is_whole) {
             if let Some((in_force, own)) = in_force.zip(rival.trip.mean_square()) {
-                rival.evidence.take(score(in_force, own));
+                let score = score(in_force, own);
+                rival.evidence.take(score);
+                rival.newest_score = Some(score);
             }
         }
         self.begin_trip();

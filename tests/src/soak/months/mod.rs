@@ -7,9 +7,11 @@
 //!
 //! - [`story`]: what is undeclared on which day
 //! - [`life`]: the days
+//! - [`mistakes`]: how often a model that is no better is adopted, over hundreds of years
 //! - [`table`]: what came of it
 
 pub mod life;
+pub mod mistakes;
 pub mod story;
 pub mod table;
 

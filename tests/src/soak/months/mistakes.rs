@@ -1,0 +1,113 @@
+//! How often a model that is no better is adopted, over hundreds of train years.
+//!
+//! For each of many simulated trains without an effect, some hundred trips are driven and predicted by
+//! the declared model and by rivals that nothing speaks for. Years are then made of these trips, drawn
+//! with replacement: what is measured is the judgement on scores as trips give them.
+
+use std::sync::Arc;
+
+use dynocar_core::train::TrainModel;
+use dynocar_core::trial::evidence::Evidence;
+use dynocar_core::trial::ledger::Ledger;
+use dynocar_core::trial::open_loop::OpenLoop;
+use dynocar_core::trial::{Rival, Trials};
+use dynocar_shared::{TrainId, TrainSample};
+
+use crate::simulator::random::{Random, Stream};
+use crate::simulator::{EffectRequest, SimulatorSettings, TrainType, World};
+
+const TRAIN: TrainId = TrainId(1);
+/// As in the configuration by default.
+const LEAST_GAIN: f64 = 0.1;
+/// Trips that are driven of each train.
+const DRIVEN: usize = 150;
+/// Trips of a year.
+const TRIPS_A_YEAR: usize = 10_000;
+
+/// What came of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Mistakes {
+    /// Years of all trains together.
+    pub train_years: f64,
+    /// Rivals that take away less than the least gain, whose adoption is a mistake.
+    pub rivals: usize,
+    /// Rivals that take away more, by chance of what was declared; they are left out.
+    pub better: usize,
+    /// Adoptions of rivals that are no better.
+    pub adopted: usize,
+}
+
+/// Trains of seeds from `seed` on, each for some years, while no rival is taken for better before
+/// `trips_between_mistakes` trips on average.
+pub fn measure(trains: u64, years: usize, seed: u64, trips_between_mistakes: f64) -> Mistakes {
+    let mut found = Mistakes::default();
+    for seed in seed..seed + trains {
+        let all = scores(seed);
+        let mean = |scores: &[f64]| scores.iter().sum::<f64>() / scores.len() as f64;
+        let asked = dynocar_core::trial::evidence::score(1.0, (1.0 - LEAST_GAIN).powi(2));
+        let (worse, better): (Vec<_>, Vec<_>) = all.iter().partition(|it| mean(it) < asked);
+        found.better += better.len();
+        found.rivals += worse.len();
+        found.train_years += years as f64;
+        let mut random = Random::new(seed, Stream::Effects);
+        let level = trips_between_mistakes * all.len() as f64;
+        let mut evidence = vec![Evidence::new(LEAST_GAIN); worse.len()];
+        for _ in 0..years * TRIPS_A_YEAR {
+            let trip = random.integer(0, DRIVEN - 2);
+            for (evidence, scores) in evidence.iter_mut().zip(&worse) {
+                evidence.take(scores[trip]);
+                if evidence.capital() >= level {
+                    found.adopted += 1;
+                    *evidence = Evidence::new(LEAST_GAIN);
+                }
+            }
+        }
+    }
+    found
+}
+
+/// The scores of each rival, trip by trip.
+fn scores(seed: u64) -> Vec<Vec<f64>> {
+    let settings = SimulatorSettings {
+        runs: DRIVEN,
+        holdout_runs: 0,
+        duration_s: 600.0,
+        train_type: Some(TrainType::ALL[seed as usize % TrainType::ALL.len()]),
+        ..SimulatorSettings::new(seed, EffectRequest::none())
+    };
+    let world = World::of(&settings);
+    let declared = &world.train.declared;
+    let track = Arc::new(world.line.track.clone());
+    let rival = |change: &dyn Fn(&mut TrainModel)| {
+        let mut train = declared.clone();
+        change(&mut train);
+        let open_loop = OpenLoop::new(Arc::new(train), Some(Arc::clone(&track)));
+        Rival::new(0, open_loop, Vec::new(), (Evidence::new(LEAST_GAIN), Ledger::default()))
+    };
+    let rivals = vec![
+        rival(&|it| it.resistance.a *= 1.02),
+        rival(&|it| it.resistance.a *= 0.98),
+        rival(&|it| it.corrections.traction_gain *= 1.005),
+        rival(&|it| it.corrections.wind_plus_mps += 0.5),
+    ];
+    let mut trials = Trials::new(TRAIN, declared.mass_kg, rival(&|_| {}), rivals);
+    let mut scores = vec![Vec::new(); trials.rivals.len()];
+    let mut sequence = 0;
+    for plan in &world.plans {
+        let run = world.run(plan.clone(), &[]);
+        for sample in &run.samples {
+            sequence += 1;
+            let run = run.plan.number as u32;
+            let sample = TrainSample { sequence, run, train_id: TRAIN.0, ..*sample };
+            if trials.take(&sample, 0.0) {
+                for (scores, rival) in scores.iter_mut().zip(&trials.rivals) {
+                    scores.extend(rival.newest_score);
+                }
+            }
+        }
+    }
+    for scores in &scores {
+        assert!(scores.len() >= DRIVEN - 1, "{} trips compared", scores.len());
+    }
+    scores
+}
