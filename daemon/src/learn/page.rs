@@ -6,21 +6,24 @@ use std::time::SystemTime;
 
 use dynocar_shared::TrainId;
 
+use super::error::LearnError;
+use super::errors_by_day;
 use super::learner::Learner;
 use super::memory::OpenQuestion;
 use crate::models::history::{History, State};
 use crate::models::numbered::Numbered;
-use crate::models::{Decision, MaintenanceEvent, ModelHash, ModelsError, Stored};
+use crate::models::{Decision, MaintenanceEvent, ModelHash, Stored};
 use crate::report::document::document;
 use crate::report::html::{Column, Table, escape};
 use crate::report::provenance::Provenance;
+use crate::shadow::record::Trials;
 
 /// The page on what a learner's store holds.
 ///
 /// # Errors
 ///
-/// When the store cannot be read.
-pub fn html(learner: &Learner, now: SystemTime) -> Result<String, ModelsError> {
+/// When the store cannot be read, or the plot not be drawn.
+pub fn html(learner: &Learner, now: SystemTime) -> Result<String, LearnError> {
     let settings = learner.settings();
     let made = Provenance::of_files(Vec::new(), settings.command.clone(), now);
     let store = settings.store.directory().display().to_string();
@@ -37,7 +40,9 @@ pub fn html(learner: &Learner, now: SystemTime) -> Result<String, ModelsError> {
         let models = settings.store.train(train);
         let (history, events) = (History::of(&models)?, models.events()?);
         let open: Vec<&OpenQuestion> = learner.memory().open_of(train).collect();
-        main += &of_train(train, &history, &events, &open);
+        let errors = errors_by_day::html(&history, &Trials::read(models.folder()))
+            .map_err(|error| LearnError::Report(error.to_string()))?;
+        main += &of_train(train, &history, (&events, &open, errors));
     }
     Ok(document("History of the models", &header, &main, &made))
 }
@@ -49,8 +54,7 @@ fn counted(count: usize, what: &str) -> String {
 fn of_train(
     train: TrainId,
     history: &History,
-    events: &[Numbered<MaintenanceEvent>],
-    open: &[&OpenQuestion],
+    (events, open, errors): (&[Numbered<MaintenanceEvent>], &[&OpenQuestion], String),
 ) -> String {
     let mut html = String::new();
     let mut section = |name: &str, title: &str, body: String| {
@@ -63,6 +67,9 @@ fn of_train(
         );
     };
     section("models", &format!("Train {train}: models"), models(history));
+    if !errors.is_empty() {
+        section("errors", "Error by day", errors);
+    }
     section("decisions", "Decisions", decisions(&history.decisions));
     section("events", "Maintenance events", of_events(events));
     section("open", "Open questions", of_questions(open));
