@@ -170,9 +170,9 @@ fn the_page_of_what_was_learned_shows_models_decisions_and_events_on_wide_and_na
         // Each stands below the one that it grew from, and deeper.
         let expected = [
             (declared.clone(), "declared"),
-            (format!("└ {adopted}"), "in force"),
-            (format!("\u{2003}└ {candidate}"), "candidate"),
-            (format!("└ {rejected}"), "rejected"),
+            (format!("└\u{a0}{adopted}"), "in force"),
+            (format!("\u{2003}└\u{a0}{candidate}"), "candidate"),
+            (format!("└\u{a0}{rejected}"), "rejected"),
         ];
         assert_eq!(shown, expected);
         for (row, (_, state)) in expected.iter().enumerate() {

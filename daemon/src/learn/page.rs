@@ -12,7 +12,7 @@ use super::learner::Learner;
 use super::memory::OpenQuestion;
 use crate::models::history::{History, State};
 use crate::models::numbered::Numbered;
-use crate::models::{Decision, MaintenanceEvent, ModelHash, Stored};
+use crate::models::{Decision, MaintenanceEvent, ModelHash, Moment, Stored};
 use crate::report::document::document;
 use crate::report::html::{Column, Table, escape};
 use crate::report::provenance::Provenance;
@@ -95,7 +95,7 @@ fn models(history: &History) -> String {
         "Each model below the one that it grew from; error of free prediction on runs held out",
         &[
             ("Model", Column::Words),
-            ("Made", Column::Words),
+            ("Made, UTC", Column::Words),
             ("State", Column::Words),
             ("Adds", Column::Words),
             ("Before, m/s", Column::Numbers),
@@ -120,13 +120,13 @@ fn push_tree(
     depth: usize,
 ) {
     let origin = &stored.origin;
-    let indent = if depth == 0 { String::new() } else { "\u{2003}".repeat(depth - 1) + "└ " };
+    let indent = if depth == 0 { String::new() } else { "\u{2003}".repeat(depth - 1) + "└\u{a0}" };
     let error = |pick: fn(&crate::models::origin::HeldOutError) -> f64| {
         origin.error.as_ref().map_or("–".into(), |error| format!("{:.3}", pick(error)))
     };
     let cells = vec![
         format!("{indent}<code>{}</code>", stored.hash),
-        origin.made.to_string(),
+        minute(origin.made),
         state.words().into(),
         format!("<span title=\"{}\">{}</span>", escape(&origin.statement), escape(&origin.adds())),
         error(|it| it.before_mps),
@@ -144,6 +144,11 @@ fn push_tree(
     }
 }
 
+/// A time to the minute.
+fn minute(moment: Moment) -> String {
+    moment.to_string()[..16].replace('T', " ")
+}
+
 fn model(hash: Option<ModelHash>) -> String {
     hash.map_or("as configured".into(), |hash| format!("<code>{hash}</code>"))
 }
@@ -155,7 +160,7 @@ fn decisions(decisions: &[Numbered<Decision>]) -> String {
     let mut table = Table::new(
         "Who decided what",
         &[
-            ("At", Column::Words),
+            ("At, UTC", Column::Words),
             ("Decision", Column::Words),
             ("Model", Column::Words),
             ("In force before", Column::Words),
@@ -165,7 +170,7 @@ fn decisions(decisions: &[Numbered<Decision>]) -> String {
     );
     for (_, it) in decisions {
         table.push(vec![
-            it.at.to_string(),
+            minute(it.at),
             it.action.name().replace('_', " "),
             model(it.model),
             model(it.from),
@@ -183,7 +188,7 @@ fn of_events(events: &[Numbered<MaintenanceEvent>]) -> String {
     let mut table = Table::new(
         "What acted in certain runs, and is no property of the train or the line",
         &[
-            ("Recorded", Column::Words),
+            ("Recorded, UTC", Column::Words),
             ("Kind", Column::Words),
             ("What", Column::Words),
             ("Chance where nothing acts", Column::Numbers),
@@ -193,7 +198,7 @@ fn of_events(events: &[Numbered<MaintenanceEvent>]) -> String {
         let chance =
             if it.p_value < 1e-6 { "&lt; 10⁻⁶".into() } else { format!("{:.1e}", it.p_value) };
         table.push(vec![
-            it.acted.map_or("–".into(), |[first, _]| first.to_string()),
+            it.acted.map_or("–".into(), |[first, _]| minute(first)),
             escape(&it.kind.replace('_', " ")),
             escape(&it.sentence),
             chance,
