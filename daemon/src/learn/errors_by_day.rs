@@ -4,11 +4,10 @@ use std::collections::BTreeSet;
 
 use crate::models::decision::in_force_after;
 use crate::models::history::History;
-use crate::models::{Action, ModelHash};
+use crate::models::{Action, ModelHash, Moment};
 use crate::report::plots::days::{self, Day};
 use crate::report::plots::speeds::Width;
 use crate::report::plots::{PlotError, figure};
-use crate::report::provenance::day;
 use crate::report::sections::legend;
 use crate::shadow::record::Trials;
 
@@ -45,7 +44,7 @@ pub fn html(history: &History, trials: &Trials) -> Result<String, PlotError> {
         .map(|(_, it)| it.at.unix_s as f64 / DAY_S as f64 - first as f64)
         .filter(|at| (-1.0..=(last - first) as f64).contains(at))
         .collect();
-    let name = day(std::time::UNIX_EPOCH + std::time::Duration::from_secs(first as u64 * DAY_S));
+    let name = Moment { unix_s: first as u64 * DAY_S }.day();
     let [wide, narrow] =
         [Width::Wide, Width::Narrow].map(|width| days::draw(&days, &changes, &name, width));
     let key = legend(&[("dot after", "in force"), ("ring before", "declared")]);

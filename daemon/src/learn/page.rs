@@ -120,7 +120,8 @@ fn push_tree(
     depth: usize,
 ) {
     let origin = &stored.origin;
-    let indent = if depth == 0 { String::new() } else { "\u{2003}".repeat(depth - 1) + "└\u{a0}" };
+    let indent =
+        if depth == 0 { String::new() } else { "\u{2003}".repeat(depth - 1) + "└\u{a0}" };
     let error = |pick: fn(&crate::models::origin::HeldOutError) -> f64| {
         origin.error.as_ref().map_or("–".into(), |error| format!("{:.3}", pick(error)))
     };
