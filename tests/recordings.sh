@@ -46,6 +46,17 @@ for command in check "identify --estimator mass_kalman" "replay --verify"; do
 done
 "$place/venv/bin/python" tests/recordings.py "$place"
 
+# A learner takes a finished recording up once, and has it when the ring has forgotten it; one whose recorder died it leaves.
+mkdir "$place/ring"
+cp "$place/ended.mcap" "$place/killed.mcap" "$place/ring"
+learn() { # WORDS: what the learner says
+  "$dynocar" learn --config config/daemon.toml --runs "$place/ring" --models "$place/models" --once >"$place/learned"
+  grep -q "$1" "$place/learned" || { cat "$place/learned"; exit 1; }
+}
+learn "train 1: 1 run, .* too few runs"
+rm "$place/ring/"*
+learn "train 1: 1 run, .* nothing new"
+
 # Parquet: to be read by pyarrow; read by our own commands as the recording is; and back.
 "$dynocar" convert "$place/ended.mcap" -o "$place/ended.parquet"
 "$dynocar" convert "$place/ended.parquet" -o "$place/back.mcap"

@@ -323,6 +323,23 @@ fn runs_and_names_that_cannot_be_are_refused_or_left_out_in_words() {
     assert!(!place.learn(&[]).contains("left out"), "told once");
     let (status, _, empty) = place.say(&["list", "--train", "7"]);
     assert!(status == Some(2) && empty.contains("choose one by --train"), "{empty}");
+    let nowhere = ["learn", "--once", "--config"];
+    let learn = |config: PathBuf| {
+        let output = Command::new(DYNOCAR)
+            .args(nowhere)
+            .arg(config)
+            .arg("--runs")
+            .arg(place.path("runs"))
+            .output()
+            .expect("the program");
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let (status, errors) = learn(place.path("daemon.toml"));
+    assert!(status == Some(2) && errors.contains("no store of models"), "{errors}");
+    let declared = std::fs::read_to_string(place.path("daemon.toml")).unwrap();
+    let named =
+        place.site.write("named.toml", &format!("[models]\ndirectory = \"models\"\n{declared}"));
+    assert_eq!(learn(named).0, Some(0), "the store of the configuration");
     std::fs::remove_dir_all(place.path("runs")).unwrap();
     assert!(refused(&[]).contains("expected the folder of recorded runs"));
 }

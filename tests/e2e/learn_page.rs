@@ -10,6 +10,10 @@ use dynocar::models::{
     Figure, FoundEffect, MaintenanceEvent, ModelHash, ModelText, Moment, NewDecision, NewModel,
     Origin, Store, TrainModels,
 };
+use dynocar::shadow::record::{Trials, Tried};
+use dynocar_core::simulate::SpeedError;
+use dynocar_core::trial::evidence::Evidence;
+use dynocar_core::trial::ledger::Ledger;
 use dynocar_shared::TrainId;
 use dynocar_tests::browser::Browser;
 use dynocar_tests::process::Site;
@@ -36,6 +40,8 @@ const LOOK: &str = r##"(() => {
         marked: all("#train-1-models tr.marked").length,
         decisions: cells("decisions"),
         events: cells("events"),
+        plots: all("svg.plot").filter(plot => plot.getClientRects().length > 0)
+            .map(plot => plot.getAttribute("aria-label")),
         open: document.querySelector("#train-1-open").innerText,
         is_odd: /NaN|undefined|inf\b/.test(document.body.innerText),
     };
@@ -97,6 +103,22 @@ fn history(site: &Site) -> (PathBuf, [ModelHash; 4]) {
         windows: vec![window],
     };
     models.put_event(&event).unwrap();
+    let tried = |model, error_mps: f64| {
+        let mut ledger = Ledger::default();
+        for day in 0..12 {
+            let sum_of_squares = 100.0 * error_mps.powi(2) * (1.0 + 0.05 * f64::from(day % 3));
+            let error = SpeedError { sum_of_squares, count: 100 };
+            ledger.book(error, f64::from(1_767_225_600 + 86_400 * day), None);
+        }
+        let last = Moment { unix_s: 1_767_225_600 + 86_400 * 12 };
+        let (error_ratio, estimates) = (Some([0.35, 0.44]), Vec::new());
+        let (evidence, against) = (Evidence::new(0.1), Some(adopted));
+        let error_mps = Some(error_mps);
+        Tried { model, last, against, error_mps, error_ratio, evidence, ledger, estimates }
+    };
+    let models_tried = vec![tried(declared, 0.61), tried(adopted, 0.24)];
+    let trials = Trials { in_force: Some(adopted), models: models_tried };
+    trials.write(models.folder()).unwrap();
     std::fs::create_dir(site.path().join("runs")).unwrap();
     let page = site.path().join("history.html");
     let status = Command::new(DYNOCAR)
@@ -132,7 +154,13 @@ fn the_page_of_what_was_learned_shows_models_decisions_and_events_on_wide_and_na
         assert_eq!(seen["sticking_out"], json!([]));
         assert_eq!(seen["is_odd"], false);
         assert_eq!(seen["heading"], "History of the models");
-        let sections = ["Train 1: models", "Decisions", "Maintenance events", "Open questions"];
+        let sections = [
+            "Train 1: models",
+            "Error by day",
+            "Decisions",
+            "Maintenance events",
+            "Open questions",
+        ];
         assert_eq!(seen["sections"], json!(sections));
         let told = |row: usize| seen["models"][row].as_array().expect("a row").clone();
         let shown: Vec<(String, &str)> =
@@ -142,9 +170,9 @@ fn the_page_of_what_was_learned_shows_models_decisions_and_events_on_wide_and_na
         // Each stands below the one that it grew from, and deeper.
         let expected = [
             (declared.clone(), "declared"),
-            (format!("└ {adopted}"), "in force"),
-            (format!("\u{2003}└ {candidate}"), "candidate"),
-            (format!("└ {rejected}"), "rejected"),
+            (format!("└\u{a0}{adopted}"), "in force"),
+            (format!("\u{2003}└\u{a0}{candidate}"), "candidate"),
+            (format!("└\u{a0}{rejected}"), "rejected"),
         ];
         assert_eq!(shown, expected);
         for (row, (_, state)) in expected.iter().enumerate() {
@@ -153,6 +181,11 @@ fn the_page_of_what_was_learned_shows_models_decisions_and_events_on_wide_and_na
         assert_eq!(told(1)[3], "tunnel drag at 12400–13650 m");
         assert_eq!((&told(1)[4], &told(1)[5]), (&json!("0.842"), &json!("0.317")));
         assert_eq!(seen["marked"], 1);
+        let plots = seen["plots"].as_array().expect("plots");
+        assert_eq!(plots.len(), 1, "one for each width: {plots:?}");
+        let label = plots[0].as_str().expect("a label");
+        assert!(label.contains("since 2026-01-01, 12 days"), "{label}");
+        assert!(label.contains("another came in force 1 times"), "{label}");
         assert_eq!(seen["decisions"][0][1], "adopted");
         assert_eq!(
             (&seen["decisions"][0][4], &seen["decisions"][0][5]),
@@ -161,6 +194,13 @@ fn the_page_of_what_was_learned_shows_models_decisions_and_events_on_wide_and_na
         assert_eq!(seen["events"].as_array().map(Vec::len), Some(1));
         assert!(seen["open"].as_str().unwrap().contains("None"));
     }
+    let shown = Command::new(DYNOCAR)
+        .args(["models", "list", "--models"])
+        .arg(site.path().join("models"))
+        .output()
+        .expect("the program");
+    let shown = String::from_utf8_lossy(&shown.stdout).into_owned();
+    assert!(shown.contains("on trial: error × 0.35 to 0.44"), "{shown}");
     if let Some(kept) = std::env::var_os("DYNOCAR_KEEP_PAGE") {
         std::fs::copy(&page, kept).unwrap();
     }

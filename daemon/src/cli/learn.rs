@@ -13,7 +13,6 @@ use crate::config::DaemonConfig;
 use crate::learn::watch::{Suspicions, TimeOfDay, watch};
 use crate::learn::{Bounds, page};
 use crate::learn::{LearnError, Learner, LearnerSettings, Outcome, Round, TrainRound};
-use crate::models::Store;
 use crate::output::{OutputError, print, require_file, write_file};
 use crate::report::provenance::own_command_line;
 use crate::run::stop_on_signals;
@@ -29,9 +28,9 @@ pub struct LearnArguments {
     /// The folder of recorded runs: datasets and recordings at any depth, a flight recorder's ring too
     #[arg(long, value_name = "DIR")]
     runs: PathBuf,
-    /// The store of models, made when it is not there
+    /// The store of models, made when it is not there; else that of the configuration
     #[arg(long, value_name = "DIR")]
-    models: PathBuf,
+    models: Option<PathBuf>,
     /// Learn once and end
     #[arg(long)]
     once: bool,
@@ -58,11 +57,12 @@ pub fn execute(arguments: &LearnArguments) -> Result<(), Failure> {
         let runs = arguments.runs.display();
         return Err(Failure::Input(format!("{runs}: expected the folder of recorded runs")));
     }
+    let store = super::models::store(arguments.models.as_deref(), Some(&config))?;
     start_log(&config)?;
     let work = |error: &dyn std::fmt::Display| Failure::Work(error.to_string());
     let stop = stop_on_signals().map_err(|error| work(&error))?;
     let settings = LearnerSettings {
-        store: Store::at(&arguments.models),
+        store,
         runs: arguments.runs.clone(),
         trains: config.trains.iter().map(|train| (train.id, train.text.clone())).collect(),
         bounds: Bounds::default(),
@@ -87,7 +87,11 @@ pub fn execute(arguments: &LearnArguments) -> Result<(), Failure> {
     });
     let mut suspicions = suspicions.collect::<Result<Vec<_>, Failure>>()?;
     watch(&mut learner, &mut suspicions, arguments.at, &stop, &mut |learner, round| {
-        tracing::info!("{}", told(round).trim_end().replace('\n', "; "));
+        // That there was nothing new is no news to a log.
+        let is_new = |it: &TrainRound| it.outcome != Outcome::NothingNew;
+        for line in round.trains.iter().filter(|it| is_new(it)).map(of_train) {
+            tracing::info!("{}", line.trim_end());
+        }
         write_report(report, learner)
     })
 }
@@ -119,7 +123,8 @@ fn told(round: &Round) -> String {
 
 fn of_train(round: &TrainRound) -> String {
     let TrainRound { train, runs, in_force, outcome } = round;
-    let head = format!("train {train}: {runs} runs, model {in_force} in force: ");
+    let plural = if *runs == 1 { "" } else { "s" };
+    let head = format!("train {train}: {runs} run{plural}, model {in_force} in force: ");
     let found = match outcome {
         Outcome::NothingNew => "nothing new since the last time".into(),
         Outcome::TooFewRuns => "too few runs to learn from".into(),

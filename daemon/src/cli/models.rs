@@ -1,31 +1,38 @@
 //! `dynocar models`: the store of models, and what is decided on them.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use clap::{Args, Subcommand};
 use dynocar_shared::TrainId;
 
 use super::Failure;
+use crate::config::DaemonConfig;
 use crate::learn::finding::shown_figure;
 use crate::models::decision::Choice;
 use crate::models::difference::differences;
 use crate::models::history::{History, State};
-use crate::models::store::TRIALS_FILE;
 use crate::models::{
-    ModelHash, ModelText, ModelsError, Moment, NewDecision, Store, Stored, TrainModels,
+    Figure, ModelHash, ModelText, ModelsError, Moment, NewDecision, Store, Stored, TrainModels,
 };
 use crate::output::{print, tell};
+use crate::shadow::record::{Trials, Tried};
+
+/// The store where none is named.
+const DEFAULT_STORE: &str = "models";
 
 /// See the models that were learned, and decide which is in force
 #[derive(Debug, Args)]
 pub struct ModelsArguments {
     #[command(subcommand)]
     command: ModelsCommand,
-    /// The store of models
-    #[arg(long, value_name = "DIR", global = true, default_value = "models")]
-    models: PathBuf,
+    /// The store of models; `models` where neither this nor --config names one
+    #[arg(long, value_name = "DIR", global = true)]
+    models: Option<PathBuf>,
+    /// The daemon's configuration, which names the store
+    #[arg(long, value_name = "FILE", global = true)]
+    config: Option<PathBuf>,
     /// The train; may be left out where the store holds one only
     #[arg(long, value_name = "ID", global = true)]
     train: Option<u64>,
@@ -120,11 +127,28 @@ fn failure(error: ModelsError) -> Failure {
     }
 }
 
+/// The store that is named, else that of the configuration; `models` where there is none.
+///
+/// # Errors
+///
+/// When the configuration names none.
+pub(super) fn store(named: Option<&Path>, config: Option<&DaemonConfig>) -> Result<Store, Failure> {
+    let of_config = config.map(|config| config.models.as_ref().map(|it| it.directory.as_path()));
+    match (named, of_config) {
+        (Some(directory), _) | (None, Some(Some(directory))) => Ok(Store::at(directory)),
+        (None, None) => Ok(Store::at(Path::new(DEFAULT_STORE))),
+        (None, Some(None)) => Err(Failure::Input(
+            "no store of models: give --models DIR, or [models] in the configuration".into(),
+        )),
+    }
+}
+
 /// The models of the train that is meant.
 fn chosen(arguments: &ModelsArguments) -> Result<TrainModels, Failure> {
-    let store = Store::at(&arguments.models);
+    let config = arguments.config.as_deref().map(DaemonConfig::load).transpose()?;
+    let store = store(arguments.models.as_deref(), config.as_ref())?;
     let trains = store.trains().map_err(failure)?;
-    let shown = arguments.models.display();
+    let shown = store.directory().display();
     let train = match (arguments.train.map(TrainId), trains.as_slice()) {
         (Some(train), trains) if trains.contains(&train) => train,
         (None, [only]) => *only,
@@ -168,8 +192,10 @@ fn list(models: &TrainModels, history: &History) -> String {
         "state",
         "error held out"
     );
+    let trials = Trials::read(models.folder());
     for (stored, state) in &history.models {
         let origin = &stored.origin;
+        let on_trial = trials.of(stored.hash).filter(|tried| tried.against.is_some());
         let error = origin.error.map_or("–".into(), |error| {
             format!("{:.3} → {:.3} m/s", error.before_mps, error.after_mps)
         });
@@ -182,6 +208,9 @@ fn list(models: &TrainModels, history: &History) -> String {
             state.words(),
             origin.adds()
         );
+        if let Some(tried) = on_trial {
+            let _ = writeln!(text, "{:16}  on trial: {}", "", compared(tried));
+        }
     }
     text
 }
@@ -222,15 +251,46 @@ fn show(models: &TrainModels, stored: &Stored, state: State) -> String {
     for file in files {
         row("file", &file.display().to_string());
     }
-    text + &trials(models, stored.hash)
+    text + &trial(&Trials::read(models.folder()), stored.hash)
 }
 
-/// What the daemon measured of a model in its trial, as the daemon tells it; empty where it did not.
-fn trials(models: &TrainModels, hash: ModelHash) -> String {
-    let read = std::fs::read_to_string(models.folder().join(TRIALS_FILE)).ok();
-    let read: Option<serde_json::Value> = read.and_then(|text| serde_json::from_str(&text).ok());
-    let of_model = read.as_ref().and_then(|trials| trials.get(hash.to_string()));
-    of_model.map_or(String::new(), |trial| format!("trial      {trial}\n"))
+/// What the daemon measured of a model in its trial; empty where it did not.
+fn trial(trials: &Trials, hash: ModelHash) -> String {
+    let Some(tried) = trials.of(hash) else { return String::new() };
+    let mut text = String::new();
+    let mut row = |name: &str, value: String| {
+        let _ = writeln!(text, "{name:10} {value}");
+    };
+    let error = tried.error_mps.map_or("–".into(), |error| format!("{error:.3} m/s over 60 s"));
+    row("driven", format!("error {error}, last on {}", tried.last));
+    if let Some(against) = tried.against {
+        row("trial", format!("{} against model {against}", compared(tried)));
+    }
+    for estimate in &tried.estimates {
+        let values = estimate
+            .values
+            .iter()
+            .map(|(name, value, std)| shown_figure(name, Figure { value: *value, std: *std }));
+        let values = values.collect::<Vec<_>>().join(", ");
+        let suspects = match estimate.suspects.as_str() {
+            "" => String::new(),
+            kind => format!(" suspects {kind}"),
+        };
+        row("", format!("{} {}{suspects} {values}", estimate.pipeline, estimate.status));
+    }
+    text
+}
+
+/// A model's error over that of the one in force, with what speaks for it.
+fn compared(tried: &Tried) -> String {
+    let [trips, evidence] =
+        [tried.evidence.trips().to_string(), format!("{:.1e}", tried.evidence.capital())];
+    match tried.error_ratio {
+        Some([low, high]) => {
+            format!("error × {low:.2} to {high:.2}, {trips} trips, evidence {evidence}")
+        }
+        None => format!("{trips} trips"),
+    }
 }
 
 fn diff(one: (ModelHash, &ModelText), other: (ModelHash, &ModelText)) -> String {

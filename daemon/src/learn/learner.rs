@@ -181,18 +181,9 @@ impl Learner {
         if let Some(hash) = models.in_force()? {
             return Ok(hash);
         }
-        let origin = Origin {
-            made: now,
-            version: env!("CARGO_PKG_VERSION").into(),
-            command: self.settings.command.clone(),
-            parent: None,
-            verdict: None,
-            statement: "What the configuration declares.".into(),
-            dataset_sha256: None,
-            error: None,
-            effects: Vec::new(),
-            files: Vec::new(),
-        };
+        let statement = "Declared by the daemon's configuration.";
+        let origin =
+            Origin { made: now, ..Origin::written(statement, &self.settings.command, None) };
         let text = declared.clone();
         Ok(models.put(&NewModel { text, origin, answer_json: None, report_html: None })?)
     }

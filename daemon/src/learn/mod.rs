@@ -15,10 +15,11 @@
 //! - [`conclusion`]: what of it goes into the store
 //! - [`learner`]: a round
 //! - [`mod@watch`]: when there is one
-//! - [`page`]: the history as a page
+//! - [`page`]: the history as a page, with the errors that the daemon's trials measured ([`errors_by_day`])
 
 pub mod conclusion;
 mod error;
+pub mod errors_by_day;
 pub mod finding;
 pub mod learner;
 pub mod memory;

@@ -6,21 +6,24 @@ use std::time::SystemTime;
 
 use dynocar_shared::TrainId;
 
+use super::error::LearnError;
+use super::errors_by_day;
 use super::learner::Learner;
 use super::memory::OpenQuestion;
 use crate::models::history::{History, State};
 use crate::models::numbered::Numbered;
-use crate::models::{Decision, MaintenanceEvent, ModelHash, ModelsError, Stored};
+use crate::models::{Decision, MaintenanceEvent, ModelHash, Moment, Stored};
 use crate::report::document::document;
 use crate::report::html::{Column, Table, escape};
 use crate::report::provenance::Provenance;
+use crate::shadow::record::Trials;
 
 /// The page on what a learner's store holds.
 ///
 /// # Errors
 ///
-/// When the store cannot be read.
-pub fn html(learner: &Learner, now: SystemTime) -> Result<String, ModelsError> {
+/// When the store cannot be read, or the plot not be drawn.
+pub fn html(learner: &Learner, now: SystemTime) -> Result<String, LearnError> {
     let settings = learner.settings();
     let made = Provenance::of_files(Vec::new(), settings.command.clone(), now);
     let store = settings.store.directory().display().to_string();
@@ -37,7 +40,9 @@ pub fn html(learner: &Learner, now: SystemTime) -> Result<String, ModelsError> {
         let models = settings.store.train(train);
         let (history, events) = (History::of(&models)?, models.events()?);
         let open: Vec<&OpenQuestion> = learner.memory().open_of(train).collect();
-        main += &of_train(train, &history, &events, &open);
+        let errors = errors_by_day::html(&history, &Trials::read(models.folder()))
+            .map_err(|error| LearnError::Report(error.to_string()))?;
+        main += &of_train(train, &history, (&events, &open, errors));
     }
     Ok(document("History of the models", &header, &main, &made))
 }
@@ -49,8 +54,7 @@ fn counted(count: usize, what: &str) -> String {
 fn of_train(
     train: TrainId,
     history: &History,
-    events: &[Numbered<MaintenanceEvent>],
-    open: &[&OpenQuestion],
+    (events, open, errors): (&[Numbered<MaintenanceEvent>], &[&OpenQuestion], String),
 ) -> String {
     let mut html = String::new();
     let mut section = |name: &str, title: &str, body: String| {
@@ -63,6 +67,9 @@ fn of_train(
         );
     };
     section("models", &format!("Train {train}: models"), models(history));
+    if !errors.is_empty() {
+        section("errors", "Error by day", errors);
+    }
     section("decisions", "Decisions", decisions(&history.decisions));
     section("events", "Maintenance events", of_events(events));
     section("open", "Open questions", of_questions(open));
@@ -88,7 +95,7 @@ fn models(history: &History) -> String {
         "Each model below the one that it grew from; error of free prediction on runs held out",
         &[
             ("Model", Column::Words),
-            ("Made", Column::Words),
+            ("Made, UTC", Column::Words),
             ("State", Column::Words),
             ("Adds", Column::Words),
             ("Before, m/s", Column::Numbers),
@@ -113,13 +120,14 @@ fn push_tree(
     depth: usize,
 ) {
     let origin = &stored.origin;
-    let indent = if depth == 0 { String::new() } else { "\u{2003}".repeat(depth - 1) + "└ " };
+    let indent =
+        if depth == 0 { String::new() } else { "\u{2003}".repeat(depth - 1) + "└\u{a0}" };
     let error = |pick: fn(&crate::models::origin::HeldOutError) -> f64| {
         origin.error.as_ref().map_or("–".into(), |error| format!("{:.3}", pick(error)))
     };
     let cells = vec![
         format!("{indent}<code>{}</code>", stored.hash),
-        origin.made.to_string(),
+        minute(origin.made),
         state.words().into(),
         format!("<span title=\"{}\">{}</span>", escape(&origin.statement), escape(&origin.adds())),
         error(|it| it.before_mps),
@@ -137,6 +145,11 @@ fn push_tree(
     }
 }
 
+/// A time to the minute.
+fn minute(moment: Moment) -> String {
+    moment.to_string()[..16].replace('T', " ")
+}
+
 fn model(hash: Option<ModelHash>) -> String {
     hash.map_or("as configured".into(), |hash| format!("<code>{hash}</code>"))
 }
@@ -148,7 +161,7 @@ fn decisions(decisions: &[Numbered<Decision>]) -> String {
     let mut table = Table::new(
         "Who decided what",
         &[
-            ("At", Column::Words),
+            ("At, UTC", Column::Words),
             ("Decision", Column::Words),
             ("Model", Column::Words),
             ("In force before", Column::Words),
@@ -158,7 +171,7 @@ fn decisions(decisions: &[Numbered<Decision>]) -> String {
     );
     for (_, it) in decisions {
         table.push(vec![
-            it.at.to_string(),
+            minute(it.at),
             it.action.name().replace('_', " "),
             model(it.model),
             model(it.from),
@@ -176,7 +189,7 @@ fn of_events(events: &[Numbered<MaintenanceEvent>]) -> String {
     let mut table = Table::new(
         "What acted in certain runs, and is no property of the train or the line",
         &[
-            ("Recorded", Column::Words),
+            ("Recorded, UTC", Column::Words),
             ("Kind", Column::Words),
             ("What", Column::Words),
             ("Chance where nothing acts", Column::Numbers),
@@ -186,7 +199,7 @@ fn of_events(events: &[Numbered<MaintenanceEvent>]) -> String {
         let chance =
             if it.p_value < 1e-6 { "&lt; 10⁻⁶".into() } else { format!("{:.1e}", it.p_value) };
         table.push(vec![
-            it.acted.map_or("–".into(), |[first, _]| first.to_string()),
+            it.acted.map_or("–".into(), |[first, _]| minute(first)),
             escape(&it.kind.replace('_', " ")),
             escape(&it.sentence),
             chance,

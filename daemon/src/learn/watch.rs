@@ -9,13 +9,17 @@ use dynocar_shared::TrainId;
 use dynocar_shared::vocabulary::EffectKind;
 use tracing::{info, warn};
 
-use super::error::LearnError;
 use super::learner::{Learner, Round};
 
 /// How often the process looks whether to stop.
 const TURN: Duration = Duration::from_millis(100);
 /// How often it looks at the snapshots.
 const LOOK: Duration = Duration::from_secs(2);
+/// So long after a suspicion the runs are looked at again and again: the one that raised it is still being
+/// recorded then.
+const AFTERMATH: Duration = Duration::from_secs(3600);
+/// How often.
+const AGAIN: Duration = Duration::from_secs(60);
 /// Seconds of a day.
 const DAY_S: u64 = 86_400;
 
@@ -99,30 +103,33 @@ pub fn watch<E>(
     let mut is_due = true;
     let mut next = at.map(|at| at.after(SystemTime::now()));
     let mut looked = Instant::now();
+    let (mut suspected, mut learned) = (None::<Instant>, Instant::now());
     while !is_stopped() {
         if looked.elapsed() >= LOOK {
             looked = Instant::now();
             // Every train is looked at, so that none of its suspicions is new twice.
-            is_due |= suspicions.iter_mut().filter_map(|it| it.is_new().then_some(())).count() > 0;
+            if suspicions.iter_mut().filter_map(|it| it.is_new().then_some(())).count() > 0 {
+                (is_due, suspected) = (true, Some(looked));
+            }
         }
+        let is_fresh = suspected.is_some_and(|at| at.elapsed() < AFTERMATH);
+        is_due |= is_fresh && learned.elapsed() >= AGAIN;
         if next.is_some_and(|next| SystemTime::now() >= next) {
             next = at.map(|at| at.after(SystemTime::now()));
             is_due = true;
         }
         if is_due {
             is_due = false;
-            match learner.round(SystemTime::now(), &is_stopped) {
+            let round = learner.round(SystemTime::now(), &is_stopped);
+            learned = Instant::now();
+            match round {
                 Ok(round) => told(learner, &round)?,
-                Err(error) => tell_failure(&error),
+                Err(error) => warn!("a round of learning failed, the next may not: {error}"),
             }
         }
         std::thread::sleep(TURN);
     }
     Ok(())
-}
-
-fn tell_failure(error: &LearnError) {
-    warn!("a round of learning failed, the next may not: {error}");
 }
 
 #[cfg(test)]

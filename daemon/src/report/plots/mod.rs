@@ -5,6 +5,7 @@
 //! replaces each by a variable ([`colour_rules`]), so that they follow the reader's scheme.
 
 mod axes;
+pub mod days;
 pub mod effort;
 pub mod gradient;
 pub mod line;

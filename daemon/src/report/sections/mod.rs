@@ -21,7 +21,7 @@ pub struct Section {
 }
 
 /// The key to the colours of a plot.
-fn legend(entries: &[(&str, &str)]) -> String {
+pub fn legend(entries: &[(&str, &str)]) -> String {
     let items: String = entries
         .iter()
         .map(|(class, words)| format!("<li><i class=\"key {class}\"></i>{words}</li>"))

@@ -1,0 +1,106 @@
+//! The error of a train's models, day by day, with the days on which another came in force.
+
+use plotters::backend::SVGBackend;
+use plotters::drawing::IntoDrawingArea;
+use plotters::element::{Circle, PathElement};
+use plotters::style::{Color, RGBColor};
+
+use super::axes::{Axis, Chart, chart, frame, padded, range_with_zero, stroke};
+use super::reading::Reading;
+use super::speeds::Width;
+use super::{AFTER, AXIS, BEFORE, Plot, PlotError, SCALE, for_page};
+
+/// The errors of a day in m/s, where they are known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Day {
+    /// Days since the first.
+    pub day: f64,
+    /// Of the model that was declared.
+    pub declared_mps: Option<f64>,
+    /// Of the model in force on that day.
+    pub in_force_mps: Option<f64>,
+}
+
+/// The days as SVG; `changes` are the days on which another model came in force, `first` names the
+/// first day.
+///
+/// # Errors
+///
+/// When the drawing fails.
+pub fn draw(days: &[Day], changes: &[f64], first: &str, width: Width) -> Result<Plot, PlotError> {
+    let (nominal, height, _) = width.size();
+    let size = (nominal * SCALE, (height + 30) * SCALE);
+    let (mut drawing, mut frames) = (String::new(), Vec::new());
+    let title = format!("Days since {first}");
+    {
+        let area = SVGBackend::with_string(&mut drawing, size).into_drawing_area();
+        let x = padded(days.iter().map(|day| day.day), 0.02);
+        let errors = days.iter().flat_map(|day| [day.declared_mps, day.in_force_mps]).flatten();
+        let y = [0.0, range_with_zero(errors)[1]];
+        let labels = if width == Width::Wide { 10 } else { 5 };
+        let x_axis = Axis { range: x, title: &title, labels, is_whole: true };
+        let y_axis = Axis { range: y, title: "Error over 60 s, m/s", labels: 5, is_whole: false };
+        let mut chart = chart(&area, &x_axis, &y_axis)?;
+        let change = |&at: &f64| PathElement::new(vec![(at, y[0]), (at, y[1])], stroke(AXIS, 1.2));
+        chart.draw_series(changes.iter().map(change))?;
+        line(&mut chart, days, |day| day.declared_mps, (BEFORE, false))?;
+        line(&mut chart, days, |day| day.in_force_mps, (AFTER, true))?;
+        frames.push(frame(&chart));
+        area.present()?;
+    }
+    let values = |pick: fn(&Day) -> Option<f64>| {
+        days.iter().map(|day| pick(day).unwrap_or(f64::NAN)).collect::<Vec<f64>>()
+    };
+    let at = days.iter().map(|day| day.day).collect();
+    let reading = Reading::new("Day", "", true, at)
+        .with("in force", "m/s", values(|day| day.in_force_mps), Vec::new())
+        .with("declared", "m/s", values(|day| day.declared_mps), Vec::new());
+    let label = format!(
+        "Error over 60 s by day since {first}, {} days, of the model in force and of the one that was \
+         declared; another came in force {} times",
+        days.len(),
+        changes.len()
+    );
+    let svg = for_page(&drawing, &label, width.class(), size, &frames);
+    Ok(Plot { svg, readings: vec![reading] })
+}
+
+/// A line from day to day, broken where one is missing, with its points.
+fn line(
+    chart: &mut Chart,
+    days: &[Day],
+    pick: fn(&Day) -> Option<f64>,
+    (colour, is_filled): (RGBColor, bool),
+) -> Result<(), PlotError> {
+    let parts = days.chunk_by(|one, next| {
+        pick(one).is_some() && pick(next).is_some() && next.day - one.day < 1.5
+    });
+    for part in parts {
+        let points: Vec<(f64, f64)> =
+            part.iter().filter_map(|day| Some((day.day, pick(day)?))).collect();
+        chart.draw_series([PathElement::new(points.clone(), stroke(colour, 1.2))])?;
+        let style = if is_filled { colour.filled() } else { stroke(colour, 1.6) };
+        let radius = (5 * SCALE) as i32 / 2;
+        chart.draw_series(points.iter().map(|&point| Circle::new(point, radius, style)))?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_known_day_has_its_points_and_each_change_its_line() {
+        let day = |day: f64| Day {
+            day,
+            declared_mps: Some(0.8),
+            in_force_mps: (day != 3.0).then_some(0.3 + 0.01 * day),
+        };
+        let days: Vec<Day> = (0..6).map(|k| day(f64::from(k))).collect();
+        let plot = draw(&days, &[2.0], "2026-01-01", Width::Wide).unwrap();
+        assert_eq!(plot.svg.matches("<circle").count(), 6 + 5);
+        assert!(plot.svg.contains("Days since 2026-01-01") && plot.svg.contains("1 times"));
+        assert!(plot.readings[0].series[0].values[3].is_nan());
+    }
+}
