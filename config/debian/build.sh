@@ -113,6 +113,7 @@ unit_of() { # PROGRAM SOURCE
     sed -i 's|^ExecStart=/usr/local/bin/|ExecStart=/usr/bin/|' "$root/$unit"
 }
 unit_of dynocar-recording config/dynocar-flight-recorder.service
+unit_of dynocar-recording config/dynocar-learn.service
 unit_of dynocar-forward config/forward/dynocar-forward.service
 if [ -f "$root/usr/bin/dynocar-forward" ]; then
     put "$project/config/forward/mosquitto.conf" usr/share/doc/dynocar/mosquitto.conf

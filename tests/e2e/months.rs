@@ -1,0 +1,62 @@
+//! Days of one train in accelerated time: what is undeclared is found, tried, adopted, and taken back.
+
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_tests::soak::months::story::Span;
+use dynocar_tests::soak::months::table::{HEADER, line};
+use dynocar_tests::soak::months::{Life, LifeSettings, Outcome, Story, mistakes};
+
+/// A life of some days of twelve trips; a mistake in a thousand trips is let pass, so that a day or
+/// two of them are evidence enough.
+fn lived(story: Story, span: Span, days: usize) -> Outcome {
+    let settings = LifeSettings {
+        story,
+        span,
+        seed: 7,
+        days,
+        trips: 12,
+        recorded: 6,
+        trips_between_mistakes: 1000.0,
+    };
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    Life::begin(settings, folder.path()).live()
+}
+
+#[test]
+fn an_undeclared_tunnel_is_adopted_within_days_and_the_error_falls() {
+    let span = Span { onset: 2, end: 12 };
+    let outcome = lived(Story::Appears(EffectKind::TunnelDrag), span, 12);
+    let told = format!("{HEADER}{}", line(&outcome));
+    let adopted = outcome.first_change(span.onset..span.end, false);
+    assert!(adopted.is_some_and(|day| day <= 10), "{told}");
+    assert!(outcome.adoptions[0].adds.contains("tunnel drag"), "{told}");
+    assert_eq!(outcome.mistakes(), 0, "{told}");
+    let before = outcome.error_mps(span.onset..span.onset + 2).unwrap();
+    assert!(outcome.error_mps(11..12).unwrap() < 0.6 * before, "{told}");
+}
+
+#[test]
+fn what_is_over_is_taken_back() {
+    let span = Span { onset: 2, end: 10 };
+    let outcome = lived(Story::Winter, span, 16);
+    let told = format!("{HEADER}{}", line(&outcome));
+    assert!(outcome.first_change(span.onset..span.end, false).is_some(), "{told}");
+    assert!(outcome.first_change(span.end..16, true).is_some(), "{told}");
+    assert_eq!(outcome.mistakes(), 0, "{told}");
+}
+
+#[test]
+fn a_brake_that_drags_for_a_day_is_a_maintenance_event_and_no_model() {
+    let outcome = lived(Story::BrakeDrags, Span { onset: 2, end: 3 }, 6);
+    let told = format!("{HEADER}{}", line(&outcome));
+    assert!(outcome.events.iter().any(|kind| kind == "dragging_brake"), "{told}");
+    assert!(outcome.adoptions.is_empty(), "{told}");
+}
+
+#[test]
+fn a_model_that_is_no_better_is_adopted_no_oftener_than_configured() {
+    let (trains, years, between) = (4, 20, 20_000.0);
+    let found = mistakes::measure(trains, years, 400, between);
+    assert!(found.rivals >= 8, "{found:?}");
+    // Ten thousand trips a year: one in two years of each train is what the configuration allows.
+    assert!((found.adopted as f64) <= found.train_years / 2.0, "{found:?}");
+}
