@@ -188,6 +188,8 @@ impl Broker {
     }
 
     fn act(&mut self, events: Vec<Event>) -> Result<(), BrokerError> {
+        // Why a connection is to be closed comes after that it is.
+        let mut is_closed = false;
         for event in events {
             match event {
                 Event::RequestSendPacket { packet, .. } => {
@@ -195,14 +197,14 @@ impl Broker {
                 }
                 Event::NotifyPacketReceived(packet) => self.take(packet)?,
                 Event::NotifyError(error) => return Err(error.into()),
-                Event::RequestClose => return Err(BrokerError::Closed(String::new())),
+                Event::RequestClose => is_closed = true,
                 // Pings are sent more often than any timer asks for.
                 Event::NotifyPacketIdReleased(_)
                 | Event::RequestTimerReset { .. }
                 | Event::RequestTimerCancel(_) => {}
             }
         }
-        Ok(())
+        if is_closed { Err(BrokerError::Closed(String::new())) } else { Ok(()) }
     }
 
     fn take(&mut self, packet: Packet) -> Result<(), BrokerError> {

@@ -53,9 +53,10 @@ pub unsafe extern "C" fn fmi2Instantiate(
             let resources = resources.unwrap_or_default().to_string_lossy().into_owned();
             Some(Instance::hand_out(Model::new(interface, resources), log))
         } else {
-            let [estimators, plant] = INTERFACES.map(|it| it.guid);
-            let own = format!("{estimators} and {plant}");
-            log.tell(&format!("modelDescription.xml is of {guid}, the library of {own}"));
+            let [one, other] = INTERFACES.map(|it| it.guid);
+            log.tell(&format!(
+                "modelDescription.xml is of {guid}, the library of {one} and {other}"
+            ));
             None
         }
     };
