@@ -234,10 +234,7 @@ fn show(models: &TrainModels, stored: &Stored, state: State) -> String {
     for effect in &origin.effects {
         let places: Vec<String> =
             effect.intervals_m.iter().map(|[from, to]| format!("{from:.0}–{to:.0} m")).collect();
-        row(
-            "adds",
-            &[effect.kind.replace('_', " "), places.join(", ")].join(" ").trim_end().to_owned(),
-        );
+        row("adds", [effect.kind.replace('_', " "), places.join(", ")].join(" ").trim_end());
         for (name, figure) in &effect.parameters {
             row("", &shown_figure(name, *figure));
         }
