@@ -185,7 +185,7 @@ fn found<'h>(history: &'h History, name: &str) -> Result<&'h (Stored, State), Fa
 
 fn list(models: &TrainModels, history: &History) -> String {
     let mut text = format!(
-        "train {}\n{:16}  {:20}  {:9}  {:16}  adds\n",
+        "train {}\n{:16}  {:20}  {:9}  {:17}  adds\n",
         models.train(),
         "model",
         "made",
@@ -202,7 +202,7 @@ fn list(models: &TrainModels, history: &History) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "{}  {}  {:9}  {error:16}  {}",
+            "{}  {}  {:9}  {error:17}  {}",
             stored.hash,
             origin.made,
             state.words(),
@@ -234,10 +234,7 @@ fn show(models: &TrainModels, stored: &Stored, state: State) -> String {
     for effect in &origin.effects {
         let places: Vec<String> =
             effect.intervals_m.iter().map(|[from, to]| format!("{from:.0}–{to:.0} m")).collect();
-        row(
-            "adds",
-            &[effect.kind.replace('_', " "), places.join(", ")].join(" ").trim_end().to_owned(),
-        );
+        row("adds", [effect.kind.replace('_', " "), places.join(", ")].join(" ").trim_end());
         for (name, figure) in &effect.parameters {
             row("", &shown_figure(name, *figure));
         }
@@ -294,13 +291,14 @@ fn compared(tried: &Tried) -> String {
 }
 
 fn diff(one: (ModelHash, &ModelText), other: (ModelHash, &ModelText)) -> String {
-    let mut text = format!("{:34}  {}  {}\n", "key", one.0, other.0);
-    for it in differences(one.1, other.1) {
-        let [before, after] = &it.values;
-        let key = format!("{}: {}", it.file, it.key);
-        let _ = writeln!(text, "{key:34}  {before:16}  {after}");
-    }
-    text
+    let mut rows = vec![["key".to_owned(), one.0.to_string(), other.0.to_string()]];
+    rows.extend(differences(one.1, other.1).into_iter().map(|it| {
+        let [before, after] = it.values;
+        [format!("{}: {}", it.file, it.key), before, after]
+    }));
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max();
+    let [key, before] = [0, 1].map(|column| width(column).unwrap_or(0));
+    rows.iter().map(|row| format!("{:key$}  {:before$}  {}\n", row[0], row[1], row[2])).collect()
 }
 
 fn decide(models: &TrainModels, what: Choice, signed: &Signed) -> Result<String, Failure> {

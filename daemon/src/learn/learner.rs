@@ -80,7 +80,7 @@ pub enum Outcome {
     /// Fewer than two runs.
     TooFewRuns,
     /// The runs were explained.
-    Explained(Explained),
+    Explained(Box<Explained>),
 }
 
 /// Ends an explanation from within.
@@ -223,13 +223,14 @@ impl Learner {
             let explained = conclusion.draw(&self.memory)?;
             // The first words on what is open stand; more runs may only settle it.
             if verdict == Verdict::Effect || outcome == Outcome::TooFewRuns {
-                outcome = Outcome::Explained(explained);
+                outcome = Outcome::Explained(Box::new(explained));
             }
             if verdict == Verdict::Effect {
                 break;
             }
         }
-        if let Outcome::Explained(Explained { question: Some(question), .. }) = &outcome
+        if let Outcome::Explained(explained) = &outcome
+            && let Some(question) = &explained.question
             && self.memory.ask(question)
         {
             let experiment = question.experiment.as_deref().unwrap_or("more runs");
@@ -276,8 +277,8 @@ fn explain_pool(
 /// runs that it was meant for.
 fn since_adopted(models: &TrainModels) -> Result<Option<Moment>, LearnError> {
     let decisions = models.decisions()?;
-    let changes = decisions.iter().filter(|(_, it)| it.action != Action::Rejected);
-    Ok(changes.last().map(|(_, decision)| decision.at))
+    let mut changes = decisions.iter().filter(|(_, it)| it.action != Action::Rejected);
+    Ok(changes.next_back().map(|(_, decision)| decision.at))
 }
 
 /// What is explained, as a hash: the model and the runs.

@@ -76,7 +76,13 @@ fn flatten(prefix: &str, table: &Table, flat: &mut BTreeMap<String, Value>) {
 }
 
 fn shown(key: &str, value: &Value) -> String {
-    let text = value.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+    let text = match value {
+        // As exact as anybody reads it; the files have every digit.
+        Value::Float(number) => {
+            format!("{number:.5e}").parse::<f64>().unwrap_or(*number).to_string()
+        }
+        value => value.to_string().split_whitespace().collect::<Vec<_>>().join(" "),
+    };
     let unit = match value {
         Value::Integer(_) | Value::Float(_) => match key {
             "resistance.a" => " N/kN",
@@ -108,13 +114,13 @@ mod tests {
         };
         let one = model("[train]\nmass_t = 100\nlength_m = 80\n[resistance]\na = 1.5\n", None);
         let other = model(
-            "# grown\n[train]\nmass_t = 101.5\nlength_m = 80\n[resistance]\na = 1.5\nc = 2e-4\n",
+            "# grown\n[train]\nmass_t = 101.5\nlength_m = 80\n[resistance]\na = 1.5\nc = 2.123456789e-4\n",
             Some("[track]\ntunnels = [[1000.0, 2000.0]]\n"),
         );
         let found: Vec<(String, [String; 2])> =
             differences(&one, &other).into_iter().map(|it| (it.key, it.values)).collect();
         let expected = [
-            ("resistance.c", ["–", "0.0002 N/kN per (m/s)²"]),
+            ("resistance.c", ["–", "0.000212346 N/kN per (m/s)²"]),
             ("train.mass_t", ["100 t", "101.5 t"]),
             ("track.tunnels", ["–", "[[1000.0, 2000.0]]"]),
         ];

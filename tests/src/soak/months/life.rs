@@ -247,7 +247,7 @@ fn dataset_of(world: &World, runs: Vec<crate::simulator::SimulatedRun>) -> Simul
         train: world.train.clone(),
         line: world.line.clone(),
         effects: Vec::new(),
-        sensors: world.sensors.clone(),
+        sensors: world.sensors,
         runs,
     }
 }
