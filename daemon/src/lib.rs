@@ -12,6 +12,7 @@
 //! - [`models`]: a store of models
 //! - [`grown`]: the model with its effects as train and track files
 //! - [`output`]: where results go
+//! - [`pipelines`]: the pipelines that a configuration asks for
 //! - [`programs`]: commands that are programs of their own
 //! - [`report`]: an explanation as a page of HTML
 //! - [`demo`]: the main job as a show
@@ -37,6 +38,7 @@ pub mod identify;
 pub mod learn;
 pub mod models;
 pub mod output;
+pub mod pipelines;
 pub mod programs;
 pub mod replay;
 pub mod report;

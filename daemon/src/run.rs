@@ -15,14 +15,12 @@ use crossbeam::channel::{Sender, bounded};
 use dynocar_client::channel::SampleCount;
 use dynocar_client::peer::RoleLock;
 use dynocar_client::{ChannelError, Host, Role, SnapshotReader, monotonic_now_ns};
-use dynocar_core::pipeline::{Pipeline, SettingError};
 use dynocar_shared::{Quantity, TrainId};
 use tracing::{info, warn};
 
-use crate::config::{
-    DaemonConfig, IdleStrategy, ModelsConfig, PipelineConfig, ThreadConfig, TrainConfig,
-};
+use crate::config::{DaemonConfig, IdleStrategy, ModelsConfig, ThreadConfig};
 use crate::models::Store;
+use crate::pipelines::{SettingRefused, build_pipeline};
 use crate::runtime::affinity::pin_to_core;
 use crate::runtime::exchange::Exchange;
 use crate::runtime::memory::{STACK_BYTES, lock_all_memory, prefault_stack};
@@ -43,13 +41,8 @@ pub enum RunError {
     #[error(transparent)]
     Channel(#[from] ChannelError),
     /// A setting of a pipeline is out of range.
-    #[error("pipelines.{pipeline}.settings.{source}")]
-    Setting {
-        /// The pipeline's name.
-        pipeline: String,
-        /// Key, value and range.
-        source: SettingError,
-    },
+    #[error(transparent)]
+    Setting(#[from] SettingRefused),
     /// The system gives no thread or no signal handler.
     #[error("{what}: {source}")]
     System {
@@ -100,7 +93,8 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
         .map(|(trains, models)| {
             shadow::thread::start(trains, models, host.clone(), board.clone(), Arc::clone(&stop))
         })
-        .transpose()?;
+        .transpose()
+        .map_err(|source| RunError::System { what: "thread of models on trial", source })?;
     let keeper = state.map(|state| start_keeper(config, &host, state, &stop)).transpose()?;
     tell_who_answers(config);
     info!(epoch, trains = trains.len(), pipelines = config.pipelines.len(), "serving");
@@ -260,30 +254,6 @@ fn number_lanes(plans: &mut [WorkerPlan], train: TrainId, count: &SampleCount) {
         pipelines += lane.pipelines.len();
     }
     count.serve(threads, pipelines);
-}
-
-/// A pipeline of the configuration for one of its trains, before its first sample; `index` is its
-/// number in the configuration.
-///
-/// # Errors
-///
-/// When a setting is out of range.
-pub fn build_pipeline(
-    settings: &PipelineConfig,
-    index: u32,
-    train: &TrainConfig,
-) -> Result<Pipeline, RunError> {
-    let estimator = settings
-        .estimator
-        .build(&train.model)
-        .map_err(|source| RunError::Setting { pipeline: settings.name.clone(), source })?;
-    let (model, track) = (Arc::clone(&train.model), train.track.clone());
-    let mut pipeline = Pipeline::new(train.id, index, model, track, estimator);
-    let snapshot = pipeline.snapshot_mut();
-    snapshot.quantities = train.answers.bits_of(index as usize);
-    snapshot.train_quantities = train.answers.all_bits();
-    snapshot.model_hash = train.model_hash.0;
-    Ok(pipeline)
 }
 
 /// Starts one thread for each plan and waits until all of them have their ports open.

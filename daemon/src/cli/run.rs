@@ -27,9 +27,7 @@ pub fn execute(arguments: &RunArguments) -> Result<(), Failure> {
     let config = DaemonConfig::load(&arguments.config)?;
     start_log(&config)?;
     run(&config).map_err(|error| match error {
-        RunError::Setting { .. } => {
-            Failure::Input(format!("{}: {error}", arguments.config.display()))
-        }
+        RunError::Setting(_) => Failure::Input(format!("{}: {error}", arguments.config.display())),
         error => Failure::Work(error.to_string()),
     })
 }

@@ -13,7 +13,6 @@ use tracing::{info, warn};
 use super::figures::Board;
 use super::train::ShadowTrain;
 use crate::config::ModelsConfig;
-use crate::run::RunError;
 use crate::runtime::affinity::pin_to_core;
 use crate::runtime::scheduling::stand_back;
 
@@ -41,7 +40,7 @@ pub fn start(
     host: Host,
     board: Board,
     stop: Arc<AtomicBool>,
-) -> Result<JoinHandle<()>, RunError> {
+) -> std::io::Result<JoinHandle<()>> {
     let work = move || {
         stand_back();
         if let Some(core) = settings.core
@@ -54,10 +53,7 @@ pub fn start(
             Err(error) => warn!("no models are on trial: {error}"),
         }
     };
-    std::thread::Builder::new()
-        .name("shadow".into())
-        .spawn(work)
-        .map_err(|source| RunError::System { what: "thread of models on trial", source })
+    std::thread::Builder::new().name("shadow".into()).spawn(work)
 }
 
 fn open(host: &Host, trains: Vec<ShadowTrain>) -> Result<Vec<Lane>, ChannelError> {

@@ -19,7 +19,7 @@ use super::rivals::{Standing, standing};
 use super::rule::{Adopt, Rule};
 use crate::config::{ModelsConfig, PipelineConfig, TrainConfig};
 use crate::models::{ModelHash, ModelsError, Moment, NewDecision, TrainModels};
-use crate::run::build_pipeline;
+use crate::pipelines::{SettingRefused, build_pipeline};
 use crate::runtime::exchange::{Exchange, Set};
 
 /// A pipeline of the configuration, and which of the threads that serve the train runs it.
@@ -234,8 +234,7 @@ impl ShadowTrain {
             .placed
             .iter()
             .map(|it| build_pipeline(&it.settings, it.index, &train))
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(|error| NotTried::Pipeline(error.to_string()))?;
+            .collect::<Result<Vec<_>, _>>()?;
         let open_loop = OpenLoop::new(Arc::clone(&train.model), train.track.clone());
         let known = self.record.of(hash);
         let least_gain = self.settings.rule.least_gain;
@@ -364,8 +363,8 @@ pub const RULE: &str = "rule";
 enum NotTried {
     #[error(transparent)]
     Models(#[from] ModelsError),
-    #[error("{0}")]
-    Pipeline(String),
+    #[error(transparent)]
+    Pipeline(#[from] SettingRefused),
 }
 
 fn estimate_of(pipeline: &str, snapshot: &ParameterSnapshot) -> Estimate {

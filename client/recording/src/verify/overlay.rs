@@ -1,7 +1,7 @@
 //! What another configuration would have told of the same samples.
 
 use dynocar::config::DaemonConfig;
-use dynocar::run::build_pipeline;
+use dynocar::pipelines::build_pipeline;
 use dynocar_shared::{ParameterSnapshot, Quantity, TrainId, TrainSample};
 
 /// What a configuration's pipeline tells of a quantity.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use dynocar::config::{DaemonConfig, TrainConfig};
-use dynocar::run::build_pipeline;
+use dynocar::pipelines::build_pipeline;
 use dynocar_core::pipeline::Pipeline;
 use dynocar_shared::{ParameterSnapshot, TrainSample};
 

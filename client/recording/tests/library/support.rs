@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use dynocar::config::DaemonConfig;
 use dynocar::dataset;
 use dynocar::identify::published_samples;
-use dynocar::run::build_pipeline;
+use dynocar::pipelines::build_pipeline;
 use dynocar_recording::writing::{
     CONFIGURATION, RecordingWriter, WallClock, folder_of_configuration,
 };

@@ -7,7 +7,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use dynocar::config::{DaemonConfig, TrainConfig};
 use dynocar::learn::{Bounds, Learner, LearnerSettings};
 use dynocar::models::{ModelHash, ModelText, Moment, NewModel, Origin, Store, TrainModels};
-use dynocar::run::build_pipeline;
+use dynocar::pipelines::build_pipeline;
 use dynocar::runtime::exchange::Exchange;
 use dynocar::shadow::in_force::{put_declared, with_model};
 use dynocar::shadow::{ShadowTrain, record};
