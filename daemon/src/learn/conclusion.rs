@@ -7,7 +7,9 @@ use dynocar_core::explain::answer::Verdict;
 use tracing::{info, warn};
 
 use super::error::LearnError;
-use super::finding::{event, found_effect, improvement, is_event, question, sentence};
+use super::finding::{
+    event, found_effect, improvement, is_event, is_to_be_told, question, sentence,
+};
 use super::memory::{Memory, OpenQuestion};
 use super::pool::Pool;
 use crate::grown::{GrownTexts, grown_texts};
@@ -86,7 +88,9 @@ impl Conclusion<'_> {
             .map_err(|error| LearnError::Report(error.to_string()))?;
         for effect in answer.effects.iter().filter(|it| is_event(it, &grown.not_expressed)) {
             let event = event(effect, pool, explanation, (in_force, now));
-            explained.events.extend(put_event(models, event)?);
+            if is_to_be_told(&event, explanation) {
+                explained.events.extend(put_event(models, event)?);
+            }
         }
         let Some(new) = self.candidate(grown)? else {
             return Ok(explained);

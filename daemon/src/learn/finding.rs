@@ -71,6 +71,14 @@ pub fn is_event(effect: &EffectAnswer, not_expressed: &[String]) -> bool {
             || effect.parameters.values().any(by_run))
 }
 
+/// True for an event that is told at once or is over: other kinds that act in the newest of the fit runs
+/// may be about to last, and are looked at again when there are newer ones.
+pub fn is_to_be_told(event: &MaintenanceEvent, explanation: &Explanation) -> bool {
+    let newest = explanation.problem.runs.last().map(|run| run.file.as_str());
+    let acts_in_newest = event.windows.iter().any(|window| Some(window.run.as_str()) == newest);
+    PASSING.contains(&event.kind.as_str()) || !acts_in_newest
+}
+
 /// The errors on the runs held out, where the model is better on them.
 pub fn improvement(answer: &Answer) -> Option<HeldOutError> {
     let (before_mps, after_mps) = (answer.rmse_before?, answer.rmse_after?);

@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 
 use dynocar_core::trial::evidence::Evidence;
 use dynocar_core::trial::ledger::Ledger;
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::{Parameter, ParameterSnapshot};
 use serde::{Deserialize, Serialize};
 use tracing::warn;
 
@@ -30,6 +32,26 @@ pub struct Estimate {
     /// The effect that a residual monitor suspects with this model; empty for none.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub suspects: String,
+}
+
+impl Estimate {
+    /// What a snapshot of a pipeline says.
+    pub fn of(pipeline: &str, snapshot: &ParameterSnapshot) -> Self {
+        let count = snapshot.parameter_count as usize;
+        let values = snapshot.parameters.iter().take(count).enumerate().map(|(place, &number)| {
+            let name = Parameter::from_number(number).map_or("unknown", Parameter::name);
+            let std = snapshot.covariance_at(place, place).max(0.0).sqrt();
+            (name.to_owned(), snapshot.values[place], std)
+        });
+        let suspect = EffectKind::from_number(snapshot.suspected_effect);
+        let suspect = suspect.filter(|&kind| kind != EffectKind::None);
+        Estimate {
+            pipeline: pipeline.into(),
+            status: snapshot.status().to_string(),
+            values: values.collect(),
+            suspects: suspect.map_or(String::new(), |kind| kind.to_string()),
+        }
+    }
 }
 
 /// A model that is or was on trial.

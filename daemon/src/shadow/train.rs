@@ -9,7 +9,7 @@ use dynocar_core::pipeline::motion::STANDING_MPS;
 use dynocar_core::trial::evidence::Evidence;
 use dynocar_core::trial::open_loop::OpenLoop;
 use dynocar_core::trial::{Rival, Trials};
-use dynocar_shared::{Parameter, ParameterSnapshot, TrainSample};
+use dynocar_shared::TrainSample;
 use tracing::{info, warn};
 
 use super::figures::TrialFigures;
@@ -335,7 +335,7 @@ impl ShadowTrain {
 
     fn estimates(&self, pipelines: &[Pipeline]) -> Vec<Estimate> {
         let estimate = |(placed, pipeline): (&Placed, &Pipeline)| {
-            estimate_of(&placed.settings.name, pipeline.snapshot())
+            Estimate::of(&placed.settings.name, pipeline.snapshot())
         };
         self.placed.iter().zip(pipelines).map(estimate).collect()
     }
@@ -365,21 +365,4 @@ enum NotTried {
     Models(#[from] ModelsError),
     #[error(transparent)]
     Pipeline(#[from] SettingRefused),
-}
-
-fn estimate_of(pipeline: &str, snapshot: &ParameterSnapshot) -> Estimate {
-    let count = snapshot.parameter_count as usize;
-    let values = snapshot.parameters.iter().take(count).enumerate().map(|(place, &number)| {
-        let name = Parameter::from_number(number).map_or("unknown", Parameter::name);
-        let std = snapshot.covariance_at(place, place).max(0.0).sqrt();
-        (name.to_owned(), snapshot.values[place], std)
-    });
-    let suspect = dynocar_shared::vocabulary::EffectKind::from_number(snapshot.suspected_effect);
-    let is_suspect = snapshot.suspected_effect != 0;
-    Estimate {
-        pipeline: pipeline.into(),
-        status: snapshot.status().to_string(),
-        values: values.collect(),
-        suspects: suspect.filter(|_| is_suspect).map_or(String::new(), |it| it.to_string()),
-    }
 }

@@ -101,7 +101,7 @@ fn a_rival_with_the_right_wheels_wins_by_the_way() {
         }
     }
     let [_, high] = trials.rivals[0].evidence.error_ratio().unwrap();
-    assert!(high < 0.6, "{high}");
+    assert!(high < 0.7, "{high}");
 }
 
 #[test]

@@ -11,6 +11,7 @@ use super::Understood;
 use crate::cli::Failure;
 use crate::cli::text::{TextTable, line, short};
 use crate::config::{DaemonConfig, TrainConfig};
+use crate::shadow::rule::Adopt;
 
 /// Reads a configuration with the train and track files it names, and builds every estimator, so
 /// that a setting out of range is found here and not when the daemon starts.
@@ -37,6 +38,22 @@ pub(super) fn report(config: &DaemonConfig) -> String {
     text += &line("heartbeat", &format!("every {} ms", config.heartbeat_ms));
     let memory = if config.lock_memory { "locked" } else { "may be paged" };
     text += &line("memory", memory);
+    if let Some(models) = &config.models {
+        let rule = &models.rule;
+        let by = match rule.adopt {
+            Adopt::Ask => "adopted by hand",
+            Adopt::WhenBetter => "adopted by the rule",
+        };
+        let gain = short(100.0 * rule.least_gain, 3);
+        let trips = short(rule.trips_between_mistakes, 6);
+        text += &line("models", &models.directory.display().to_string());
+        text += &line(
+            "",
+            &format!(
+                "{by}, where {gain} % of the error are gained; one mistake in {trips} trips or fewer"
+            ),
+        );
+    }
 
     let mut trains = TextTable::new(&["train", "name", "mass t", "line"], &[1, 3]);
     for train in &config.trains {
