@@ -62,7 +62,7 @@ impl Outcome {
     }
 }
 
-/// The header of [`line`].
+/// The header of [`line()`].
 pub const HEADER: &str = "| story | seed | onset to adoption, days | error before, m/s | after, m/s \
     | end to rollback, days | changes | mistakes | events | rounds | found |\n\
     | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
