@@ -76,7 +76,7 @@ impl Cast {
     fn put(&self, declared: &str, a: &str) -> ModelHash {
         let text = |train: String| ModelText { train, track: Some(self.track.clone()) };
         let parent = Some(text(self.train.clone()).hash());
-        let origin = Origin::written("Another a.", "test", parent);
+        let origin = Origin::written("Another a.", parent, Moment::of(SystemTime::now()));
         let text = text(self.train.replace(declared, a));
         let new = NewModel { text, origin, answer_json: None, report_html: None };
         self.models().put(&new).expect("a model is put")

@@ -2,9 +2,10 @@
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use dynocar::config::IdleStrategy;
-use dynocar::models::{ModelText, NewModel, Origin, Store};
+use dynocar::models::{ModelText, Moment, NewModel, Origin, Store};
 use dynocar_client::Host;
 use dynocar_shared::{PipelineKind, TrainId};
 use tempfile::TempDir;
@@ -142,7 +143,8 @@ impl Site {
         for number in 1..=count {
             let a = format!("[resistance]\na = 2.{number}");
             let text = ModelText { train: TRAIN.replace("[resistance]\na = 1.9", &a), track: None };
-            let origin = Origin::written("Of a measurement.", "dynocar-bench", parent);
+            let origin =
+                Origin::written("Of a measurement.", parent, Moment::of(SystemTime::now()));
             let new = NewModel { text, origin, answer_json: None, report_html: None };
             Store::at(&store).train(train).put(&new)?;
         }

@@ -222,7 +222,11 @@ fn show(models: &TrainModels, stored: &Stored, state: State) -> String {
     let mut row = |name: &str, value: &str| {
         let _ = writeln!(text, "{name:10} {value}");
     };
-    row("made", &format!("{} by dynocar {}: {}", origin.made, origin.version, origin.command));
+    let command = match origin.command.as_str() {
+        "" => String::new(),
+        command => format!(": {command}"),
+    };
+    row("made", &format!("{} by dynocar {}{command}", origin.made, origin.version));
     if let Some(parent) = origin.parent {
         row("parent", &parent.to_string());
     }

@@ -17,7 +17,7 @@ use super::error::LearnError;
 use super::memory::Memory;
 use super::pool::{self, Bounds, Pool};
 use super::source::{FoundRun, Places, runs_of, tell_unusable};
-use crate::models::{Action, ModelHash, ModelText, Moment, NewModel, Origin, Store, TrainModels};
+use crate::models::{Action, ModelHash, ModelText, Moment, Store, TrainModels};
 use crate::report::provenance::hex;
 use crate::storage::{Disk, Storage, StorageError};
 
@@ -181,11 +181,7 @@ impl Learner {
         if let Some(hash) = models.in_force()? {
             return Ok(hash);
         }
-        let statement = "Declared by the daemon's configuration.";
-        let origin =
-            Origin { made: now, ..Origin::written(statement, &self.settings.command, None) };
-        let text = declared.clone();
-        Ok(models.put(&NewModel { text, origin, answer_json: None, report_html: None })?)
+        Ok(models.put_declared(declared, now)?)
     }
 
     /// Explains one choice of runs after the other until one tells an effect.

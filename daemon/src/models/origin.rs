@@ -1,7 +1,6 @@
 //! Where a model came from, and what it adds to the model before it.
 
 use std::collections::BTreeMap;
-use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
 
@@ -86,7 +85,7 @@ pub struct Origin {
     pub made: Moment,
     /// Version of the program that made it.
     pub version: String,
-    /// The command that made it.
+    /// The command that made it; empty for one that somebody wrote.
     pub command: String,
     /// The model that it grew from; absent for one that somebody declared.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -112,11 +111,11 @@ pub struct Origin {
 
 impl Origin {
     /// Of a model that somebody wrote, perhaps from another: nothing was learned.
-    pub fn written(statement: &str, command: &str, parent: Option<ModelHash>) -> Self {
+    pub fn written(statement: &str, parent: Option<ModelHash>, made: Moment) -> Self {
         Origin {
-            made: Moment::of(SystemTime::now()),
+            made,
             version: env!("CARGO_PKG_VERSION").into(),
-            command: command.into(),
+            command: String::new(),
             parent,
             verdict: None,
             statement: statement.into(),

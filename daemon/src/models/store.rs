@@ -11,6 +11,7 @@ use dynocar_shared::TrainId;
 use super::decision::{Action, Choice, Decision, NewDecision, in_force_after};
 use super::error::ModelsError;
 use super::event::MaintenanceEvent;
+use super::moment::Moment;
 use super::numbered::{self, Numbered, names_in, read_record, text_of};
 use super::origin::Origin;
 use super::text::{ModelHash, ModelText, TRACK_FILE, TRAIN_FILE};
@@ -135,6 +136,16 @@ impl TrainModels {
             }
             written => written.map(|()| hash),
         }
+    }
+
+    /// Puts what a configuration declares into the store, so that what grows from it has a parent there.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be written.
+    pub fn put_declared(&self, text: &ModelText, made: Moment) -> Result<ModelHash, ModelsError> {
+        let origin = Origin::written("What the configuration declares.", None, made);
+        self.put(&NewModel { text: text.clone(), origin, answer_json: None, report_html: None })
     }
 
     /// The models, the oldest first, with what lies among them and is none.

@@ -1,12 +1,16 @@
 //! Which model a train has when the daemon starts.
 
 use std::sync::Arc;
+use std::time::SystemTime;
 
 use tracing::{info, warn};
 
 use super::rule::Rule;
 use crate::config::{DaemonConfig, TrainConfig};
-use crate::models::{ModelHash, ModelsError, NewModel, Origin, Store, TrainModels};
+use crate::models::{ModelHash, ModelsError, Moment, Store, TrainModels};
+
+/// How far back it is looked what a model grew from.
+const ANCESTORS_MAX: usize = 10_000;
 
 /// Puts what the configuration declares of each train into the store, and gives each train the model
 /// that the store's decisions put in force. Where the store cannot be read, what is declared stays
@@ -26,22 +30,23 @@ fn settle_train(
     train: &mut TrainConfig,
     rule: &Rule,
 ) -> Result<(), NotInForce> {
-    put_declared(models, train)?;
+    let declared = models.put_declared(&train.text, Moment::of(SystemTime::now()))?;
     let Some(hash) = models.in_force()? else { return Ok(()) };
     permitted(models, rule, hash)?;
+    let (id, added) = (train.id.0, models.stored(hash)?.origin.adds());
     *train = with_model(models, train, hash)?;
-    let declared = train.text.hash();
-    let mut origin = models.stored(hash)?.origin;
-    let added = origin.adds();
-    while let Some(parent) = origin.parent.filter(|&parent| parent != declared) {
-        origin = models.stored(parent)?.origin;
-    }
-    if origin.parent.is_none() && hash != declared {
-        let id = train.id.0;
+    info!(train = id, model = %hash, "in force, as decided: {added}");
+    if !grew_from(models, hash, declared) {
         warn!(train = id, "model {hash} grew from other files than those that are declared now");
     }
-    info!(train = train.id.0, model = %hash, "in force, as decided: {added}");
     Ok(())
+}
+
+/// Whether a model is another, or grew from it; false where the store does not tell.
+fn grew_from(models: &TrainModels, model: ModelHash, root: ModelHash) -> bool {
+    let parent = |hash: &ModelHash| models.stored(*hash).ok()?.origin.parent;
+    // No history is so long, unless somebody wrote one that leads in a circle.
+    std::iter::successors(Some(model), parent).take(ANCESTORS_MAX).any(|hash| hash == root)
 }
 
 /// Why a model that was decided on does not come in force.
@@ -70,18 +75,6 @@ pub fn permitted(models: &TrainModels, rule: &Rule, hash: ModelHash) -> Result<(
         None => Ok(()),
         Some(outside) => Err(NotInForce::OutOfBounds { hash, outside }),
     }
-}
-
-/// What the configuration declares, as a model of the store.
-///
-/// # Errors
-///
-/// When it cannot be written.
-pub fn put_declared(models: &TrainModels, train: &TrainConfig) -> Result<ModelHash, ModelsError> {
-    let statement = "Declared by the daemon's configuration.";
-    let origin = Origin::written(statement, "dynocar run", None);
-    let text = train.text.clone();
-    models.put(&NewModel { text, origin, answer_json: None, report_html: None })
 }
 
 /// The train's configuration with another model of the store in place of what is declared.

@@ -14,8 +14,10 @@ pub enum Restart {
 }
 
 impl Restart {
+    /// Length in s of the windows of the metric `window60`.
+    pub const WINDOW_S: f64 = 60.0;
     /// The metric `window60`.
-    pub const WINDOW_60: Restart = Restart::EverySeconds(60.0);
+    pub const WINDOW_60: Restart = Restart::EverySeconds(Restart::WINDOW_S);
 
     /// Number of the window at a time in ns from the run's first sample.
     #[inline]

@@ -10,10 +10,8 @@ use crate::validation::ValidSample;
 
 /// Samples nearer in time, in s, to the last that was kept are not: 20 a second tell a motion.
 const STEP_MIN_S: f64 = 0.05;
-/// Length of a window in s, as that of [`Restart::WINDOW_60`].
-pub const WINDOW_S: f64 = 60.0;
 /// A window holds at most so many samples.
-const SAMPLES_MAX: usize = (WINDOW_S / STEP_MIN_S) as usize + 2;
+const SAMPLES_MAX: usize = (Restart::WINDOW_S / STEP_MIN_S) as usize + 2;
 
 /// What a model leaves of one window.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

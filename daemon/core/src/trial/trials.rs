@@ -4,10 +4,10 @@ use dynocar_shared::{SampleField, TrainId, TrainSample};
 
 use super::evidence::{Evidence, score};
 use super::ledger::Ledger;
-use super::open_loop::{OpenLoop, WINDOW_S, WindowError};
+use super::open_loop::{OpenLoop, WindowError};
 use crate::pipeline::Pipeline;
 use crate::pipeline::motion::MOVING_MPS;
-use crate::simulate::SpeedError;
+use crate::simulate::{Restart, SpeedError};
 use crate::validation::{ValidSample, ValidationLimits, Validator};
 
 /// Moving time in s of which a trip is made that compares models; shorter ones join the next.
@@ -127,7 +127,7 @@ impl Trials {
         if let Some(valid) = &valid {
             let ends = self.window.is_some_and(|window| {
                 let length_ns = valid.sample.time_ns.saturating_sub(window.begin_ns);
-                window.stretch != valid.stretch || length_ns as f64 * 1e-9 >= WINDOW_S
+                window.stretch != valid.stretch || length_ns as f64 * 1e-9 >= Restart::WINDOW_S
             });
             if ends {
                 self.close_window(unix_s);

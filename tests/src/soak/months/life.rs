@@ -9,7 +9,7 @@ use dynocar::learn::{Bounds, Learner, LearnerSettings};
 use dynocar::models::{ModelHash, ModelText, Moment, NewModel, Origin, Store, TrainModels};
 use dynocar::pipelines::build_pipeline;
 use dynocar::runtime::exchange::Exchange;
-use dynocar::shadow::in_force::{put_declared, with_model};
+use dynocar::shadow::in_force::with_model;
 use dynocar::shadow::{ShadowTrain, record};
 use dynocar_core::pipeline::Pipeline;
 use dynocar_shared::{TrainId, TrainSample};
@@ -25,6 +25,8 @@ const TRAIN: TrainId = TrainId(1);
 /// The first day, 2027-01-01, in s since 1970.
 const FIRST_DAY_S: u64 = 1_798_761_600;
 const DAY_S: u64 = 86_400;
+/// When the models are made that a life begins with.
+const MADE: Moment = Moment { unix_s: FIRST_DAY_S };
 /// The learner looks at least so often, in days.
 const LEARNS_EVERY: usize = 7;
 /// Days after an adoption over which both models' errors tell whether it was right.
@@ -95,7 +97,7 @@ impl<'f> Life<'f> {
         let train = config.trains[0].clone();
         let store = Store::at(&folder.join("models"));
         let models = store.train(TRAIN);
-        let declared = put_declared(&models, &train).expect("the declared model is put");
+        let declared = models.put_declared(&train.text, MADE).expect("the declared model is put");
         if settings.story == Story::Nothing {
             put_others(&models, &train, declared);
         }
@@ -234,7 +236,7 @@ fn put_others(models: &TrainModels, train: &TrainConfig, declared: ModelHash) {
         let a = factor * resistance["a"].as_float().expect("a number");
         resistance.insert("a".into(), toml::Value::Float(a));
         let text = ModelText { train: table.to_string(), track: train.text.track.clone() };
-        let origin = Origin::written("Of a measurement.", "dynocar-soak months", Some(declared));
+        let origin = Origin::written("Of a measurement.", Some(declared), MADE);
         let new = NewModel { text, origin, answer_json: None, report_html: None };
         models.put(&new).expect("a model is put");
     }
