@@ -200,7 +200,7 @@ fn the_page_of_what_was_learned_shows_models_decisions_and_events_on_wide_and_na
         .output()
         .expect("the program");
     let shown = String::from_utf8_lossy(&shown.stdout).into_owned();
-    assert!(shown.contains("on trial: error × 0.35 to 0.44"), "{shown}");
+    assert!(shown.contains("on trial: 0.35 to 0.44 times the error"), "{shown}");
     if let Some(kept) = std::env::var_os("DYNOCAR_KEEP_PAGE") {
         std::fs::copy(&page, kept).unwrap();
     }

@@ -17,7 +17,7 @@ use crate::models::{
     Figure, ModelHash, ModelText, ModelsError, Moment, NewDecision, Store, Stored, TrainModels,
 };
 use crate::output::{print, tell};
-use crate::shadow::record::{Trials, Tried};
+use crate::shadow::record::{Trials, Tried, ratio_in_words};
 
 /// The store where none is named.
 const DEFAULT_STORE: &str = "models";
@@ -265,7 +265,7 @@ fn trial(trials: &Trials, hash: ModelHash) -> String {
     let error = tried.error_mps.map_or("–".into(), |error| format!("{error:.3} m/s over 60 s"));
     row("driven", format!("error {error}, last on {}", tried.last));
     if let Some(against) = tried.against {
-        row("trial", format!("{} against model {against}", compared(tried)));
+        row("trial", format!("against model {against}: {}", compared(tried)));
     }
     for estimate in &tried.estimates {
         let values = estimate
@@ -287,8 +287,9 @@ fn compared(tried: &Tried) -> String {
     let [trips, evidence] =
         [tried.evidence.trips().to_string(), format!("{:.1e}", tried.evidence.capital())];
     match tried.error_ratio {
-        Some([low, high]) => {
-            format!("error × {low:.2} to {high:.2}, {trips} trips, evidence {evidence}")
+        Some(ratio) => {
+            let ratio = ratio_in_words(ratio);
+            format!("{ratio} the error of the model in force, {trips} trips, evidence {evidence}")
         }
         None => format!("{trips} trips"),
     }

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use dynocar_core::trial::evidence::Evidence;
+use dynocar_core::trial::evidence::{Evidence, RATIO_MAX};
 use dynocar_core::trial::ledger::Ledger;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Parameter, ParameterSnapshot};
@@ -77,6 +77,16 @@ pub struct Tried {
     pub estimates: Vec<Estimate>,
 }
 
+/// An interval of [`Evidence::error_ratio`] in words that go before "the error of …".
+pub fn ratio_in_words([low, high]: [f64; 2]) -> String {
+    match (low < 0.005, high >= RATIO_MAX) {
+        (false, false) => format!("{low:.2} to {high:.2} times"),
+        (true, false) => format!("at most {high:.2} times"),
+        (false, true) => format!("at least {low:.2} times"),
+        (true, true) => "nobody knows yet how many times".into(),
+    }
+}
+
 /// The trials of a train.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Trials {
@@ -135,5 +145,18 @@ impl Trials {
             let oldest = (0..self.models.len()).min_by_key(|&place| self.models[place].last);
             oldest.map(|place| self.models.remove(place));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_end_that_tells_nothing_is_not_shown_as_a_number() {
+        assert_eq!(ratio_in_words([0.42, 0.55]), "0.42 to 0.55 times");
+        assert_eq!(ratio_in_words([0.0, 0.55]), "at most 0.55 times");
+        assert_eq!(ratio_in_words([1.2, RATIO_MAX]), "at least 1.20 times");
+        assert!(!ratio_in_words([0.0, RATIO_MAX]).contains(char::is_numeric));
     }
 }

@@ -14,7 +14,7 @@ use tracing::{info, warn};
 
 use super::figures::TrialFigures;
 use super::in_force::{self, with_model};
-use super::record::{self, Estimate, Tried};
+use super::record::{self, Estimate, Tried, ratio_in_words};
 use super::rivals::{Standing, standing};
 use super::rule::{Adopt, Rule};
 use crate::config::{ModelsConfig, PipelineConfig, TrainConfig};
@@ -290,10 +290,10 @@ impl ShadowTrain {
     /// What speaks for a rival, in words.
     fn reason(&self, rival: &Rival) -> String {
         let error = |it: &Rival| it.ledger.all.rmse_mps().unwrap_or(f64::NAN);
-        let [low, high] = rival.evidence.error_ratio().unwrap_or([f64::NAN; 2]);
+        let ratio = rival.evidence.error_ratio().map_or("unknown".into(), ratio_in_words);
         format!(
-            "open loop over 60 s {:.3} m/s, the model in force {:.3} m/s; in a typical trip {low:.2} \
-             to {high:.2} of its error (95 %, at all times), {} trips",
+            "open loop over 60 s {:.3} m/s, the model in force {:.3} m/s; in a typical trip {ratio} \
+             its error (95 %, at all times), {} trips",
             error(rival),
             error(&self.trials.in_force),
             rival.evidence.trips()

@@ -23,6 +23,9 @@ const MISS: f64 = 0.05;
 /// The largest weight of a trip in the confidence sequence.
 const WEIGHT_MAX: f64 = 0.5;
 
+/// A greater ratio of two errors says no more than that nothing bounds it.
+pub const RATIO_MAX: f64 = 100.0;
+
 /// The score of a trip: 1 when the rival leaves nothing of the error, -1 when the model in force
 /// leaves nothing of the rival's, 0 when they are alike. Arguments are mean squares.
 pub fn score(in_force: f64, rival: f64) -> f64 {
@@ -35,9 +38,9 @@ fn score_of_ratio(ratio: f64) -> f64 {
     score(1.0, ratio * ratio)
 }
 
-/// The error of the rival over that of the model in force, at a score.
+/// The error of the rival over that of the model in force, at a score; at most [`RATIO_MAX`].
 fn ratio_of_score(score: f64) -> f64 {
-    ((1.0 - score).max(0.0) / (1.0 + score).max(f64::MIN_POSITIVE)).sqrt()
+    ((1.0 - score).max(0.0) / (1.0 + score).max(f64::MIN_POSITIVE)).sqrt().min(RATIO_MAX)
 }
 
 /// What the trips so far say for a rival.
@@ -118,7 +121,8 @@ impl Evidence {
     }
 
     /// The rival's error over that of the model in force in a typical trip: lower and upper end of
-    /// an interval that holds the truth at all times at once with 95 %; `None` before the first trip.
+    /// an interval that holds the truth at all times at once with 95 %; [`RATIO_MAX`] where nothing
+    /// bounds it above, `None` before the first trip.
     pub fn error_ratio(&self) -> Option<[f64; 2]> {
         if self.trips == 0 {
             return None;
@@ -205,6 +209,8 @@ mod tests {
     fn the_interval_narrows() {
         let mut evidence = Evidence::new(0.1);
         assert_eq!(evidence.error_ratio(), None);
+        evidence.take(score_of_ratio(0.6));
+        assert_eq!(evidence.error_ratio(), Some([0.0, RATIO_MAX]), "one trip tells nothing");
         for trip in 0..400 {
             evidence.take(score_of_ratio(0.6) + if trip % 2 == 0 { 0.1 } else { -0.1 });
         }

@@ -50,7 +50,7 @@ pub(super) fn report(config: &DaemonConfig) -> String {
         text += &line(
             "",
             &format!(
-                "{by}, where {gain} % of the error are gained; one mistake in {trips} trips or fewer"
+                "{by} where {gain} % of the error or more are gained; at most one mistake in {trips} trips"
             ),
         );
     }
