@@ -8,6 +8,7 @@ use clap::{Args, Subcommand};
 use dynocar_shared::TrainId;
 
 use super::Failure;
+use super::text::short;
 use crate::config::DaemonConfig;
 use crate::learn::finding::shown_figure;
 use crate::models::decision::Choice;
@@ -284,8 +285,8 @@ fn trial(trials: &Trials, hash: ModelHash) -> String {
 
 /// A model's error over that of the one in force, with what speaks for it.
 fn compared(tried: &Tried) -> String {
-    let [trips, evidence] =
-        [tried.evidence.trips().to_string(), format!("{:.1e}", tried.evidence.capital())];
+    let (trips, capital) = (tried.evidence.trips(), tried.evidence.capital());
+    let evidence = if capital < 1e4 { short(capital, 1) } else { format!("{capital:.0e}") };
     match tried.error_ratio {
         Some(ratio) => {
             let ratio = ratio_in_words(ratio);

@@ -149,10 +149,17 @@ fn main() -> ExitCode {
                 Some((_, Some(story))) => vec![story],
                 Some((name, None)) => {
                     let names: Vec<String> = Story::all().into_iter().map(Story::name).collect();
-                    tell(&format!("--story {name}: expected one of {}", names.join(", ")));
+                    tell(&format!(
+                        "dynocar-soak: --story {name}: expected one of {}",
+                        names.join(", ")
+                    ));
                     return ExitCode::from(2);
                 }
             };
+            if days * trips < 2 {
+                tell("dynocar-soak: --days and --trips: expected two trips or more in all");
+                return ExitCode::from(2);
+            }
             print(months::table::HEADER).unwrap_or_else(|error| give_up(&error));
             for story in stories {
                 for seed in seed..seed + lives {
