@@ -49,6 +49,7 @@ fn drive(train: &TrainModel) -> Arc<Drive> {
             force_n,
             declared_kg: 1e5,
             known_n_per_kn: 2.0 * (0.01 * index as f64).sin(),
+            gradient_std_permille: 0.0,
             curvature_per_m: 0.0,
             tunnel_share: 0.0,
         };

@@ -25,6 +25,7 @@ pub fn resolved(train: &TrainModel, moment: &Moment, is_first: bool) -> Resolved
         traction_force_n: None,
         brake_force_n: None,
         gradient_permille: Some(0.0),
+        gradient_std_permille: 0.0,
         curvature_per_m: None,
         resistance: Resistance::BASIC,
         extra_n_per_kn: 0.0,

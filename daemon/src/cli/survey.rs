@@ -69,7 +69,11 @@ fn summary(answer: &Answer) -> String {
         answer.not_used.len()
     );
     if let Some(std) = answer.line.gradient_std_permille {
-        text += &format!("gradient from {} passes, ± {:.2} ‰\n", answer.line.passes, 1.96 * std);
+        text += &format!(
+            "gradient from {} passes, ± {:.2} ‰ over 100 m\n",
+            answer.line.passes,
+            1.96 * std
+        );
     }
     if let Some(learned) = &answer.learned {
         let mut row = |name: &str, it: &crate::survey::answer::Value, unit: &str| {

@@ -30,7 +30,7 @@ pub struct Line {
     pub length_m: f64,
     /// Its stops.
     pub stops: Vec<StopAnswer>,
-    /// Median standard deviation of the gradient in ‰; absent on a known line.
+    /// Median standard deviation in ‰ of the mean gradient over 100 m; absent on a known line.
     pub gradient_std_permille: Option<f64>,
     /// Passes that it was learned from.
     pub passes: usize,

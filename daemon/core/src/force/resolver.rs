@@ -45,6 +45,8 @@ pub struct ResolvedSample {
     pub brake_force_n: Option<f64>,
     /// Mean gradient under the train in ‰ along the direction of travel.
     pub gradient_permille: Option<f64>,
+    /// Standard deviation in ‰ of that gradient at one place, as a survey states it; 0 where none does.
+    pub gradient_std_permille: f64,
     /// Mean of 1/R along the train in 1/m, when curves are known.
     pub curvature_per_m: Option<f64>,
     /// What resists beyond the declared basic resistance, part by part.
@@ -114,6 +116,7 @@ impl ResolvedSample {
             traction_force_n: Some(0.0),
             brake_force_n: Some(0.0),
             gradient_permille: Some(0.0),
+            gradient_std_permille: 0.0,
             curvature_per_m: None,
             resistance: Resistance::BASIC,
             extra_n_per_kn: 0.0,
@@ -199,6 +202,7 @@ impl ForceResolver {
             traction_force_n: traction_n.map(|n| traction::true_force_n(n, known.traction_gain)),
             brake_force_n: sample.get(SampleField::BrakeForce),
             gradient_permille,
+            gradient_std_permille: on_track(Track::gradient_std_here_permille).unwrap_or(0.0),
             curvature_per_m,
             resistance: Resistance::BASIC,
             extra_n_per_kn: 0.0,

@@ -9,6 +9,9 @@ pub const HEIGHT_STEP_M: f64 = 10.0;
 /// Heights reach beyond a way by half a vehicle and so many m.
 const MARGIN_M: f64 = 60.0;
 
+/// Steps between heights over which the uncertainty of a gradient is stated: 100 m.
+const STATED_STEPS: usize = 10;
+
 /// Where heights lie in the system.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
@@ -55,10 +58,11 @@ impl Layout {
         self.blocks.iter().map(|block| block.1).sum()
     }
 
-    /// Diagonals beside the main one: a vehicle, and the reach of a block of time.
+    /// Diagonals beside the main one: a vehicle, the reach of a block of time, and what an
+    /// uncertainty is stated over.
     pub fn width(&self, reach_max_m: f64) -> usize {
-        ((self.vehicle_m.max(HEIGHT_STEP_M) + 2.0 * reach_max_m) / HEIGHT_STEP_M).ceil() as usize
-            + 3
+        let reach = (self.vehicle_m.max(HEIGHT_STEP_M) + 2.0 * reach_max_m) / HEIGHT_STEP_M;
+        (reach.ceil() as usize + 3).max(STATED_STEPS)
     }
 
     /// Adds a height with a weight to a sparse row.
@@ -97,7 +101,8 @@ impl Layout {
         }
     }
 
-    /// Variance of the gradient between neighbouring heights.
+    /// Variance of the mean gradient over [`STATED_STEPS`] around each piece between neighbouring
+    /// heights: between two heights alone the forces tell little, and nobody feels it.
     pub fn gradient_variances(
         &self,
         factor: &Factor,
@@ -105,16 +110,21 @@ impl Layout {
         common: &CommonCovariance,
     ) -> Vec<Vec<f64>> {
         let inverse = factor.inverse_band();
-        let per_m = 1.0 / HEIGHT_STEP_M;
-        let of_node = |node: usize| {
-            let row = [(node, -per_m), (node + 1, per_m)];
+        let of_stretch = |from: usize, to: usize| {
+            let per_m = 1.0 / ((to - from) as f64 * HEIGHT_STEP_M);
+            let row = [(from, -per_m), (to, per_m)];
             let slopes = nalgebra::SVector::<f64, { Common::COUNT }>::from_fn(|index, _| {
-                per_m * (columns[node + 1][index] - columns[node][index])
+                per_m * (columns[to][index] - columns[from][index])
             });
             inverse.variance_of(&row).max(0.0) + slopes.dot(&(common * slopes)).max(0.0)
         };
-        let block =
-            |&(first, count): &(usize, usize)| (first..first + count - 1).map(of_node).collect();
+        let block = |&(first, count): &(usize, usize)| {
+            let around = |node: usize| {
+                let from = (node + 1).saturating_sub(STATED_STEPS / 2).max(first);
+                of_stretch(from, (from + STATED_STEPS).min(first + count - 1))
+            };
+            (first..first + count - 1).map(around).collect()
+        };
         self.blocks.iter().map(block).collect()
     }
 }

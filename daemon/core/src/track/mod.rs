@@ -10,6 +10,15 @@ mod profile;
 pub use entries::{Curve, MassSection, Tunnel};
 pub use profile::{GradientError, LinearProfile, ProfileError, StepProfile};
 
+/// Errors of a surveyed gradient further apart than this in m are their own: the integral scale of a
+/// process along the chainage.
+pub const GRADIENT_ERROR_FREE_M: f64 = 200.0;
+
+/// Share of a surveyed gradient's error that is still there after a way in m.
+pub fn gradient_error_kept(way_m: f64) -> f64 {
+    (-2.0 * way_m.abs() / GRADIENT_ERROR_FREE_M).exp()
+}
+
 /// What is known of a line beside its profile: by a survey, or from another project's files.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrackSurvey {
@@ -219,14 +228,21 @@ impl Track {
         })
     }
 
+    /// Standard deviation in ‰ of the gradient under a train, as a survey states it; `None` when it is
+    /// not stated. How it goes with the way: [`gradient_error_kept`].
+    pub fn gradient_std_here_permille(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
+        let half_m = 0.5 * train_length_m;
+        self.gradient_std_permille(centre_m - half_m, centre_m + half_m)
+    }
+
     /// Standard deviation in ‰ of the mean gradient over a stretch, as a survey states it: errors
-    /// of stretches further apart than `FREE_M` are their own. `None` when it is not stated.
+    /// of stretches further apart than [`GRADIENT_ERROR_FREE_M`] are their own. `None` when it is not
+    /// stated.
     pub fn gradient_std_permille(&self, from_m: f64, to_m: f64) -> Option<f64> {
-        const FREE_M: f64 = 200.0;
         let length_m = to_m - from_m;
         let profile = self.survey.gradient_std_permille.as_ref()?;
         let std = profile.mean_around(0.5 * (from_m + to_m), length_m);
-        Some(std * (FREE_M / length_m.max(FREE_M)).sqrt())
+        Some(std * (GRADIENT_ERROR_FREE_M / length_m.max(GRADIENT_ERROR_FREE_M)).sqrt())
     }
 
     /// True when both directions have one gradient profile.

@@ -146,6 +146,7 @@ impl Simulation {
             traction_force_n: Some(force_n.max(0.0)),
             brake_force_n: Some((-force_n).max(0.0)),
             gradient_permille: Some(0.0),
+            gradient_std_permille: 0.0,
             curvature_per_m: Some(0.0),
             resistance: Resistance::BASIC,
             extra_n_per_kn: 0.0,

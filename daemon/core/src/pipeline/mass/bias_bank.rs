@@ -9,7 +9,7 @@
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
-use super::bias_model::BiasModel;
+use super::bias_model::{BiasModel, MapError};
 use super::line_resistance::LineResistance;
 use super::motion::Motion;
 use crate::filter::mixture::{Mixture, likeliest, to_shares};
@@ -138,6 +138,15 @@ impl BiasBank {
         }
     }
 
+    /// Lets the error of the map at a place into every bias of which nothing is known yet.
+    pub fn begin_on_map(&mut self, motion: &Motion) {
+        let map = MapError::over(motion, 0.0, self.dynamics.mps2_per_n_per_kn());
+        for (filter, model) in self.filters.iter_mut().zip(&self.models) {
+            let std_mps2 = model.std_beside_mps2(map.std_mps2, motion.speed_mps);
+            filter.replace(BIAS, 0.0, std_mps2 * std_mps2);
+        }
+    }
+
     /// Moves on by a step between two samples, with the force linear between them (Heun).
     pub fn predict(&mut self, from: &Motion, to: &Motion, step_s: f64) {
         let dynamics = &self.dynamics;
@@ -147,8 +156,10 @@ impl BiasBank {
         if self.keeps.1 != step_s {
             self.keeps = (self.models.map(|model| model.keep(step_s)), step_s);
         }
+        let map = MapError::over(from, step_s, dynamics.mps2_per_n_per_kn());
         let filters = self.filters.iter_mut().zip(&self.models).zip(self.keeps.0);
         for ((filter, model), keep) in filters {
+            let (keep, bias_variance) = model.drift(keep, &map, from.speed_mps);
             let [speed, inverse_mass, bias] = filter.mean.into();
             let shape = model.shape(speed);
             let start = push_from * inverse_mass - dynamics.drag_mps2(from, speed) + shape * bias;
@@ -165,7 +176,7 @@ impl BiasBank {
             let next =
                 Vector3::new(speed + 0.5 * step_s * (start + end), inverse_mass, keep * bias);
             let jump_variance = model.jump_variance(change.0 * inverse_mass - change.1, step_s);
-            let noise = Vector3::new(jump_variance, 0.0, model.noise_variance(keep));
+            let noise = Vector3::new(jump_variance, 0.0, bias_variance);
             filter.predict(next, &transition, &Matrix3::from_diagonal(&noise));
         }
     }
@@ -307,6 +318,7 @@ mod tests {
             force_n,
             declared_kg: 1e5,
             known_n_per_kn: 3.0,
+            gradient_std_permille: 0.0,
             curvature_per_m: 0.0,
             tunnel_share: 0.0,
         }

@@ -1,6 +1,6 @@
 //! A regression under one assumption on the unexplained acceleration.
 
-use super::bias_model::BiasModel;
+use super::bias_model::{BiasModel, MapError};
 use super::integrals::{Row, UNKNOWNS};
 use crate::filter::DriftingLevel;
 use crate::filter::drifting_level::DriftStep;
@@ -14,6 +14,8 @@ pub struct Step {
     pub speed_mps: f64,
     /// Change of the force's acceleration over it in m/s².
     pub push_change_mps2: f64,
+    /// What the map's error does over it.
+    pub map: MapError,
     /// Variance in (m/s)² of what comes to the level under any assumption.
     pub noise_variance: f64,
 }
@@ -74,14 +76,20 @@ impl Hypothesis {
         self.regression.widen_first_parameter(variance, self.model.std_mps2);
     }
 
+    /// Begins on a map whose gradient errs, with a bias of which nothing is known.
+    pub fn begin_on_map(&mut self, map: &MapError, speed_mps: f64) {
+        self.regression.restart_bias(self.model.std_beside_mps2(map.std_mps2, speed_mps));
+    }
+
     /// Moves on by a step of time.
     pub fn propagate(&mut self, step: &Step) {
         let keep = self.model.keep(step.step_s);
+        let (keep, noise_variance) = self.model.drift(keep, &step.map, step.speed_mps);
         let jump_variance = self.model.jump_variance(step.push_change_mps2, step.step_s);
         self.regression.propagate(&DriftStep {
             gain: step.step_s * self.model.shape(step.speed_mps),
             keep,
-            noise_variance: self.model.noise_variance(keep),
+            noise_variance,
             level_noise_variance: step.noise_variance + jump_variance,
         });
     }

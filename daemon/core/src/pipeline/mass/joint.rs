@@ -5,6 +5,7 @@ use std::sync::Arc;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason};
 use nalgebra::{Matrix3, SMatrix};
 
+use super::bias_model::MapError;
 use super::hypothesis::{Hypothesis, Step};
 use super::integrals::{INVERSE_MASS, Integrals, POLYNOMIALS, Regressors, Row, UNKNOWNS};
 use super::joint_settings::{JOINT_MODELS, JointLeastSquaresSettings};
@@ -43,6 +44,8 @@ pub struct JointLeastSquares {
     tied_change: f64,
     /// The resistance a while ago, for its slope.
     latest: LineResistance,
+    /// True until a motion begins after the mass was opened: nothing is known of the bias.
+    is_opened: bool,
     updates_since_refresh: u32,
     noise: SpeedNoise,
     outliers: OutlierRow,
@@ -85,6 +88,7 @@ impl JointLeastSquares {
             integrals: Integrals::zero(),
             tied_change: 0.0,
             latest: LineResistance::declared(train),
+            is_opened: true,
             updates_since_refresh: 0,
             noise: SpeedNoise::new(settings.speed_noise_mps),
             outliers: OutlierRow::default(),
@@ -152,7 +156,12 @@ impl JointLeastSquares {
         self.integrals = Integrals::zero();
         self.tied_change = 0.0;
         let (row, value) = self.integrals.equation(motion.speed_mps);
+        let is_opened = std::mem::take(&mut self.is_opened);
+        let map = MapError::over(&motion, 0.0, self.regressors.mps2_per_n_per_kn());
         for hypothesis in &mut self.hypotheses {
+            if is_opened && map.std_mps2 > 0.0 {
+                hypothesis.begin_on_map(&map, motion.speed_mps);
+            }
             hypothesis.free_level();
             hypothesis.absorb(&row, value, 1.0 / self.noise.variance());
         }
@@ -228,6 +237,7 @@ impl JointLeastSquares {
             step_s,
             speed_mps: last.0.speed_mps,
             push_change_mps2: push,
+            map: MapError::over(&last.0, step_s, self.regressors.mps2_per_n_per_kn()),
             noise_variance: kink_variance(tied - tied_before, step_s) + walk_mps * walk_mps,
         }
     }
@@ -265,6 +275,7 @@ impl JointLeastSquares {
         self.hypotheses.clone_from(&self.initial);
         self.best = 0;
         self.noise.reset();
+        self.is_opened = true;
         self.is_fresh_reset = true;
         self.generation += 1;
     }
@@ -280,6 +291,7 @@ impl Estimator for JointLeastSquares {
             for hypothesis in &mut self.hypotheses {
                 hypothesis.reopen(0.01 * self.settings.mass_change_std_percent);
             }
+            self.is_opened = true;
             self.last = None;
         }
         let motion = match Motion::seen(sample, self.settings.speed_min_mps, &mut self.last) {

@@ -55,6 +55,8 @@ pub struct MassKalman {
     moments: Moments,
     declared_mass_kg: f64,
     is_warm_started: bool,
+    /// True until a motion begins after the mass was opened: nothing is known of the bias.
+    is_opened: bool,
     noise: SpeedNoise,
     settling: Settling,
     monitor: InnovationMonitor,
@@ -95,6 +97,7 @@ impl MassKalman {
             moments: bank.moments(),
             declared_mass_kg: train.mass_kg,
             is_warm_started: false,
+            is_opened: true,
             noise: SpeedNoise::new(settings.speed_noise_mps),
             settling: Settling::default(),
             monitor: InnovationMonitor::new(500),
@@ -130,6 +133,7 @@ impl MassKalman {
         let change = relative_std * self.moments.inverse_mass;
         self.moments.inverse_mass_variance += change * change;
         self.bank.reopen(self.moments.inverse_mass, self.moments.inverse_mass_variance);
+        self.is_opened = true;
     }
 
     /// Takes over the mass that the first sample declares, if it declares another.
@@ -147,6 +151,9 @@ impl MassKalman {
     }
 
     fn begin(&mut self, motion: Motion) -> Outcome {
+        if std::mem::take(&mut self.is_opened) && motion.gradient_std_permille > 0.0 {
+            self.bank.begin_on_map(&motion);
+        }
         let noise_variance = self.noise.variance_of_sample(f64::INFINITY);
         self.bank.restart_speed(motion.speed_mps, noise_variance);
         self.monitor.break_here();
@@ -205,6 +212,7 @@ impl MassKalman {
         self.bank = self.initial_bank;
         self.moments = self.bank.moments();
         self.noise.reset();
+        self.is_opened = true;
         self.was_known = false;
         self.is_fresh_reset = true;
         self.generation += 1;

@@ -22,6 +22,8 @@ pub struct Motion {
     /// Everything known that retards in proportion to the weight, in N/kN: see
     /// [`ResolvedSample::known_n_per_kn`].
     pub known_n_per_kn: f64,
+    /// Standard deviation in ‰ of the gradient in it; 0 where nobody states one.
+    pub gradient_std_permille: f64,
     /// Mean of 1/R along the train in 1/m; 0 where no curves are known.
     pub curvature_per_m: f64,
     /// Share of the train inside tunnels; 0 where no tunnels are known.
@@ -48,6 +50,7 @@ impl Motion {
             force_n,
             declared_kg: sample.mass_kg,
             known_n_per_kn,
+            gradient_std_permille: sample.gradient_std_permille,
             curvature_per_m: sample.curvature_per_m.unwrap_or(0.0),
             tunnel_share: sample.tunnel_share.unwrap_or(0.0),
         };
@@ -56,6 +59,7 @@ impl Motion {
             (motion.force_n, -1e8, 1e8),
             (motion.declared_kg, 1.0, 1e9),
             (motion.known_n_per_kn, -500.0, 500.0),
+            (motion.gradient_std_permille, 0.0, 500.0),
             (motion.curvature_per_m, 0.0, 1.0),
             (motion.tunnel_share, 0.0, 1.0 + 1e-9),
         ];
@@ -192,6 +196,7 @@ mod tests {
             force_n: 0.0,
             declared_kg: 1e5,
             known_n_per_kn: 0.0,
+            gradient_std_permille: 0.0,
             curvature_per_m: 0.0,
             tunnel_share: 0.0,
         };

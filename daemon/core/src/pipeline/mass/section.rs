@@ -59,6 +59,7 @@ mod tests {
             force_n: 0.0,
             declared_kg: 1e5,
             known_n_per_kn: 0.0,
+            gradient_std_permille: 0.0,
             curvature_per_m,
             tunnel_share,
         }

@@ -120,6 +120,7 @@ pub(super) mod tests {
             traction_force_n: Some(control_force_n.max(0.0)),
             brake_force_n: Some((-control_force_n).max(0.0)),
             gradient_permille: Some(0.0),
+            gradient_std_permille: 0.0,
             curvature_per_m: None,
             resistance: Resistance::BASIC,
             extra_n_per_kn: 0.0,

@@ -1,0 +1,84 @@
+//! Masses on a line whose gradient was learned from the forces of six passes.
+
+use std::path::Path;
+
+use dynocar::dataset;
+use dynocar::identify::identify;
+use dynocar::survey::survey_folder;
+use dynocar_core::dataset::{Dataset, Role, Run};
+use dynocar_core::pipeline::EstimatorSettings;
+use dynocar_shared::{Parameter, PipelineKind, SampleField, TrainSample};
+use dynocar_tests::simulator::dataset_writer::write_dataset;
+use dynocar_tests::simulator::{
+    EffectRequest, GnssReceiver, SimulatorSettings, TrainType, simulate,
+};
+
+/// Samples of a piece of a run, at 5 Hz.
+const PIECE: usize = 600;
+/// Lines.
+const SEEDS: std::ops::Range<u64> = 31..35;
+
+/// Masses of the pieces of runs held out less the true one, in standard deviations as told, with the
+/// gradient's uncertainty and as if nobody had stated it.
+fn errors(kind: PipelineKind) -> [Vec<f64>; 2] {
+    let mut both = [Vec::new(), Vec::new()];
+    for seed in SEEDS {
+        let settings = SimulatorSettings {
+            train_type: Some(TrainType::Regional),
+            duration_s: 1800.0,
+            gnss: Some(GnssReceiver::USUAL),
+            ..SimulatorSettings::new(seed, EffectRequest::none())
+        };
+        let truth = simulate(&settings);
+        let folder = tempfile::tempdir().unwrap();
+        let (raw, out) = (folder.path().join("raw"), folder.path().join("surveyed"));
+        write_dataset(&truth, &raw).unwrap();
+        survey_folder(&raw, None, &out).unwrap();
+        for errors in &mut both {
+            let surveyed = dataset::load(&out).unwrap();
+            for (run, simulated) in surveyed.runs.iter().zip(&truth.runs) {
+                if run.role == Role::Holdout {
+                    errors.extend(of_run(&surveyed, run, kind, simulated.plan.mass_kg));
+                }
+            }
+            forget_uncertainty(&out.join("track.toml"));
+        }
+    }
+    both
+}
+
+/// Takes what is stated of the gradient's uncertainty out of a line's file.
+fn forget_uncertainty(file: &Path) {
+    let mut document: toml::Table = std::fs::read_to_string(file).unwrap().parse().unwrap();
+    document["track"].as_table_mut().unwrap().remove("gradient_std");
+    std::fs::write(file, document.to_string()).unwrap();
+}
+
+fn of_run(dataset: &Dataset, run: &Run, kind: PipelineKind, true_kg: f64) -> Vec<f64> {
+    let settings = EstimatorSettings::default_of(kind).unwrap();
+    let piece = |own: &[TrainSample]| {
+        let samples: Vec<TrainSample> = own
+            .iter()
+            .map(|sample| TrainSample { valid: sample.valid & !SampleField::Mass.bit(), ..*sample })
+            .collect();
+        let said = identify(dataset, &samples, &settings).unwrap();
+        let std_t = said.std(Parameter::Mass)?;
+        Some((said.value(Parameter::Mass)? - 1e-3 * true_kg) / std_t)
+    };
+    run.samples.chunks_exact(PIECE).filter_map(piece).collect()
+}
+
+fn rms(errors: &[f64]) -> f64 {
+    (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()
+}
+
+#[test]
+fn masses_on_a_surveyed_line_are_as_sure_as_they_say() {
+    for kind in [PipelineKind::MassKalman, PipelineKind::JointLeastSquares] {
+        let [stated, unstated] = errors(kind);
+        let (stated, count, unstated) = (rms(&stated), stated.len(), rms(&unstated));
+        eprintln!("{kind:?}: {count} pieces, {stated:.2}, {unstated:.2} where nothing is stated");
+        assert!((0.7..1.3).contains(&stated), "{kind:?}: {stated} of its own deviations");
+        assert!(unstated > 1.1 * stated, "{kind:?}: the line's uncertainty changes nothing");
+    }
+}
