@@ -1,4 +1,4 @@
-//! Masses on a line whose gradient was learned from the forces of six passes.
+//! Masses on a line whose gradient was learned from the forces of two passes.
 
 use std::path::Path;
 
@@ -26,6 +26,8 @@ fn errors(kind: PipelineKind) -> [Vec<f64>; 2] {
         let settings = SimulatorSettings {
             train_type: Some(TrainType::Regional),
             duration_s: 1800.0,
+            runs: 4,
+            holdout_runs: 2,
             gnss: Some(GnssReceiver::USUAL),
             ..SimulatorSettings::new(seed, EffectRequest::none())
         };

@@ -2,6 +2,7 @@
 
 use super::banded::Banded;
 use super::recording::Recording;
+use super::silence::GAP_MAX_M;
 use super::tracking::{Placed, follow};
 use super::way::Way;
 
@@ -16,8 +17,6 @@ const FIX_WHITE_M: f64 = 0.3;
 const BEND_M: f64 = 0.02;
 /// Rounds of placing the fixes and moving the way.
 const ROUNDS: usize = 4;
-/// Fixes further apart along the way than this many m leave it open in between.
-const GAP_MAX_M: f64 = 150.0;
 
 /// Rows of a recording that run along a way in its direction.
 #[derive(Clone, Debug, PartialEq)]

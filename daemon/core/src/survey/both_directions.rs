@@ -11,6 +11,10 @@ const SAME_TRACK_M: f64 = 25.0;
 const SAME_CHAINAGE_M: f64 = 15.0;
 /// Lengths of one track as two directions measure them differ by less than this share.
 const DRIFT_SHARE: f64 = 0.005;
+/// The same, for each m of the line: lengths drift unevenly.
+const UNEVEN_SHARE: f64 = 0.0005;
+/// Where a line crosses itself, there and back differ by more than so many m.
+const CROSSING_MIN_M: f64 = 300.0;
 /// Where each goes on alone for so many m at the same end, they fork there.
 const FORK_M: f64 = 100.0;
 
@@ -28,7 +32,8 @@ pub fn compare(growing: &Way, falling: &Way) -> Option<Compared> {
     let twin = |at: &[f64; 2]| {
         growing.nodes_near(*at, SAME_WAY_M).min_by(|one, other| one.1.total_cmp(&other.1))
     };
-    let twins: Vec<Option<(usize, f64)>> = falling.nodes_m().iter().map(twin).collect();
+    let mut twins: Vec<Option<(usize, f64)>> = falling.nodes_m().iter().map(twin).collect();
+    forget_crossings(&mut twins, growing, falling);
     let first = twins.iter().position(Option::is_some)?;
     let last = twins.iter().rposition(Option::is_some)?;
     let both = &twins[first..=last];
@@ -38,9 +43,7 @@ pub fn compare(growing: &Way, falling: &Way) -> Option<Compared> {
     let mut sums_m: Vec<f64> = twins
         .iter()
         .enumerate()
-        .filter_map(|(node, twin)| {
-            Some(twin.as_ref()?.0 as f64 * growing.step_m() + node as f64 * falling.step_m())
-        })
+        .filter_map(|(node, twin)| Some(there_and_back_m(growing, twin.as_ref()?.0, falling, node)))
         .collect();
     let start_chainage_m = share_of(&sums_m, 0.5);
     let (one, other) = sums_m.split_at(sums_m.len() / 2);
@@ -58,7 +61,8 @@ pub fn compare(growing: &Way, falling: &Way) -> Option<Compared> {
     let is_same = start < end
         && (apart as f64) < (1.0 - SAME_TRACK_SHARE) * both.len() as f64
         && drift_m.abs() < DRIFT_SHARE * growing.length_m()
-        && share_of(&sums_m, 0.97) - share_of(&sums_m, 0.03) < SAME_CHAINAGE_M
+        && share_of(&sums_m, 0.97) - share_of(&sums_m, 0.03)
+            < SAME_CHAINAGE_M + UNEVEN_SHARE * growing.length_m()
         && !forks(start, back.len() - 1 - last)
         && !forks(ahead.len() - 1 - end, first);
     let joined = || {
@@ -71,6 +75,27 @@ pub fn compare(growing: &Way, falling: &Way) -> Option<Compared> {
     };
     let joined = is_same.then(joined).flatten();
     Some(Compared { start_chainage_m, joined })
+}
+
+/// Way in m along the growing way to a node and on along the falling one from its node to its start: the
+/// same wherever both take one track.
+fn there_and_back_m(growing: &Way, ahead: usize, falling: &Way, back: usize) -> f64 {
+    ahead as f64 * growing.step_m() + back as f64 * falling.step_m()
+}
+
+/// Forgets twins where a line only crosses itself: there and back is another way there.
+fn forget_crossings(twins: &mut [Option<(usize, f64)>], growing: &Way, falling: &Way) {
+    let sum_m = |(back, twin): (usize, &Option<(usize, f64)>)| {
+        twin.map(|(ahead, _)| there_and_back_m(growing, ahead, falling, back))
+    };
+    let sums_m: Vec<f64> = twins.iter().enumerate().filter_map(sum_m).collect();
+    let middle_m = share_of(&sums_m, 0.5);
+    let far_m = CROSSING_MIN_M.max(2.0 * DRIFT_SHARE * growing.length_m());
+    for (back, twin) in twins.iter_mut().enumerate() {
+        if sum_m((back, &*twin)).is_some_and(|sum_m| (sum_m - middle_m).abs() > far_m) {
+            *twin = None;
+        }
+    }
 }
 
 /// The value below which a share of some values lies; 0 of none.
@@ -99,6 +124,23 @@ mod tests {
         assert!((joined.length_m() - 4100.0).abs() < 1.0, "{}", joined.length_m());
         assert!((joined.nodes_m()[0][0] + 500.0).abs() < 1.0);
         assert!((compared.start_chainage_m - 3600.0).abs() < 41.0);
+    }
+
+    #[test]
+    fn a_line_that_crosses_itself_is_one_track_as_far_as_both_drive_it() {
+        // Two kilometres east, a loop to the left, and north across the beginning.
+        let mut points: Vec<[f64; 2]> = (0..200).map(|k| [10.0 * f64::from(k), 0.0]).collect();
+        for k in 0..=150 {
+            let angle = f64::from(k) * 1.5 * std::f64::consts::PI / 150.0;
+            points.push([2000.0 + 500.0 * angle.sin(), 500.0 - 500.0 * angle.cos()]);
+        }
+        points.extend((1..200).map(|k| [1500.0, 500.0 - 10.0 * f64::from(k)]));
+        let whole = Way::through(&points).unwrap();
+        let upper: Vec<[f64; 2]> =
+            points.iter().skip(220).rev().map(|it| [it[0] + 3.0, it[1]]).collect();
+        let compared = compare(&whole, &Way::through(&upper).unwrap()).unwrap();
+        let joined = compared.joined.expect("one track");
+        assert!((joined.length_m() - whole.length_m()).abs() < 15.0, "{}", joined.length_m());
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use super::alignment::{PassRows, align};
 use super::both_directions::{Compared, compare};
 use super::recording::Recording;
+use super::silence::{TracePoint, filled, trace};
 use super::stretches::{SAME_WAY_M, Stretch, distance_squared};
 use super::tracking::follow;
 use super::way::Way;
@@ -163,15 +164,9 @@ fn template(stretches: &[Stretch], recordings: &[Recording]) -> Option<Way> {
         let step = long.len().div_ceil(TRIED_MAX).max(1);
         long.into_iter().step_by(step).collect()
     };
-    let points: Vec<Vec<[f64; 2]>> = thinned
-        .iter()
-        .map(|stretch| {
-            let points = recordings[stretch.recording].points(POINT_STEP_M);
-            let within =
-                |point: &&(f64, [f64; 2])| (stretch.from_m..=stretch.to_m).contains(&point.0);
-            points.iter().filter(within).map(|point| point.1).collect()
-        })
-        .collect();
+    let traces: Vec<Vec<TracePoint>> =
+        thinned.iter().map(|stretch| trace(stretch, recordings, POINT_STEP_M)).collect();
+    let points: Vec<Vec<[f64; 2]>> = (0..traces.len()).map(|one| filled(one, &traces)).collect();
     let tried = points.iter().enumerate().filter_map(|(one, nodes)| {
         let way = Way::through(nodes)?;
         let counts = covered(&way, one, &points);

@@ -8,7 +8,8 @@
 //! # Layout, in the order of reading
 //!
 //! - [`recording`], [`geodesy`]: what was recorded, on a plane in metres
-//! - `stretches`, [`way`], `tracking`, `alignment`, `both_directions`, [`mod@line`]: the line that is driven repeatedly
+//! - `stretches`, [`way`], `silence`, `tracking`, `alignment`, `both_directions`, [`mod@line`]: the line that
+//!   is driven repeatedly
 //! - [`chainage`]: a chainage for every row; [`stops`], [`curves`]: what it shows
 //! - [`balance`], [`common`], [`profile`], [`friction`], [`learn`]: gradient, resistance, mass,
 //!   time offset and friction brake from the balance of forces; [`layout`]: its unknown heights;
@@ -30,6 +31,7 @@ pub mod learn;
 pub mod line;
 pub mod profile;
 pub mod recording;
+mod silence;
 pub mod stops;
 mod stretches;
 mod surveying;

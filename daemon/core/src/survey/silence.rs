@@ -1,0 +1,146 @@
+//! Where a receiver was silent, the way of one pass is that of another.
+
+use super::recording::Recording;
+use super::stretches::{SAME_WAY_M, Stretch, distance_squared};
+
+/// Fixes further apart along the way than this many m leave it open in between.
+pub const GAP_MAX_M: f64 = 150.0;
+/// A way around is at most so many times as long as the straight line between its ends.
+const DETOUR_MAX: f64 = 3.0;
+
+/// A point on the way of a stretch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TracePoint {
+    /// East and north in m.
+    pub at_m: [f64; 2],
+    /// True where no fix says so, only a straight line over a silence.
+    pub is_open: bool,
+}
+
+/// Points every `step_m` along a stretch.
+pub fn trace(stretch: &Stretch, recordings: &[Recording], step_m: f64) -> Vec<TracePoint> {
+    let recording = &recordings[stretch.recording];
+    let silences: Vec<(f64, f64)> = recording
+        .fixes
+        .windows(2)
+        .map(|pair| (recording.way_m[pair[0].row], recording.way_m[pair[1].row]))
+        .filter(|(from_m, to_m)| to_m - from_m > GAP_MAX_M)
+        .collect();
+    let is_open = |way_m: f64| {
+        let next = silences.partition_point(|silence| silence.1 <= way_m);
+        silences.get(next).is_some_and(|silence| silence.0 < way_m)
+    };
+    let points = recording.points(step_m).into_iter();
+    let within = points.filter(|point| (stretch.from_m..=stretch.to_m).contains(&point.0));
+    within.map(|(way_m, at_m)| TracePoint { at_m, is_open: is_open(way_m) }).collect()
+}
+
+/// The way of one trace, with what it leaves open taken from others, whichever is the shortest way
+/// between the ends of the silence. Where no other knows, the straight line stays.
+pub fn filled(one: usize, traces: &[Vec<TracePoint>]) -> Vec<[f64; 2]> {
+    let own = &traces[one];
+    let mut way: Vec<[f64; 2]> = Vec::with_capacity(own.len());
+    let mut next = 0;
+    while next < own.len() {
+        let end = (next..own.len()).find(|&at| !own[at].is_open).unwrap_or(own.len());
+        if end > next && next > 0 && end < own.len() {
+            let ends = [own[next - 1].at_m, own[end].at_m];
+            let others = traces.iter().enumerate().filter(|(other, _)| *other != one);
+            let ways = others.filter_map(|(_, trace)| between(ends, trace));
+            let shortest = ways.min_by(|one, other| one.0.total_cmp(&other.0));
+            match shortest {
+                Some((_, inside)) => way.extend(inside),
+                None => way.extend(own[next..end].iter().map(|point| point.at_m)),
+            }
+        } else {
+            way.extend(own[next..end].iter().map(|point| point.at_m));
+        }
+        way.extend(own.get(end).map(|point| point.at_m));
+        next = end + 1;
+    }
+    way
+}
+
+/// Length in m and points of the way of a trace between two places, in whichever direction it drives;
+/// `None` where it does not know it itself.
+fn between(ends: [[f64; 2]; 2], trace: &[TracePoint]) -> Option<(f64, Vec<[f64; 2]>)> {
+    let nearest = |place: [f64; 2]| {
+        let distances =
+            trace.iter().enumerate().map(|(at, it)| (at, distance_squared(it.at_m, place)));
+        let (at, squared) = distances.min_by(|one, other| one.1.total_cmp(&other.1))?;
+        (squared < SAME_WAY_M * SAME_WAY_M).then_some(at)
+    };
+    let (from, to) = (nearest(ends[0])?, nearest(ends[1])?);
+    let inside = &trace[from.min(to)..=from.max(to)];
+    if inside.iter().any(|point| point.is_open) {
+        return None;
+    }
+    let mut points: Vec<[f64; 2]> = inside.iter().map(|point| point.at_m).collect();
+    if to < from {
+        points.reverse();
+    }
+    let length_m: f64 =
+        points.windows(2).map(|pair| distance_squared(pair[0], pair[1]).sqrt()).sum();
+    let straight_m = distance_squared(ends[0], ends[1]).sqrt();
+    (length_m < DETOUR_MAX * straight_m).then_some((length_m, points))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A quarter of a circle of 1 km, 20 m from point to point, `left_m` beside it.
+    fn quarter(left_m: f64, open: std::ops::Range<usize>) -> Vec<TracePoint> {
+        let point = |k: usize| {
+            let angle = 0.02 * k as f64;
+            let radius_m = 1000.0 - left_m;
+            let at_m = [radius_m * angle.sin(), radius_m * (1.0 - angle.cos())];
+            TracePoint { at_m, is_open: open.contains(&k) }
+        };
+        (0..79).map(point).collect()
+    }
+
+    /// The same with a straight line over what is open.
+    fn silent(open: std::ops::Range<usize>) -> Vec<TracePoint> {
+        let mut trace = quarter(0.0, open.clone());
+        let (from, to) = (trace[open.start - 1].at_m, trace[open.end].at_m);
+        for k in open.clone() {
+            let share = (k + 1 - open.start) as f64 / (open.len() + 1) as f64;
+            trace[k].at_m = [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]));
+        }
+        trace
+    }
+
+    fn farthest_from_circle_m(way: &[[f64; 2]]) -> f64 {
+        let off = |at: &[f64; 2]| (at[0].hypot(1000.0 - at[1]) - 1000.0).abs();
+        way.iter().map(off).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_silence_is_filled_from_a_pass_of_either_direction_that_heard_more() {
+        let mut back = quarter(4.0, 60..70);
+        back.reverse();
+        let traces = [silent(20..50), quarter(2.0, 40..45), back];
+        assert!(farthest_from_circle_m(&silent(20..50).map_at()) > 40.0);
+        let way = filled(0, &traces);
+        assert!(farthest_from_circle_m(&way) < 5.0, "{}", farthest_from_circle_m(&way));
+        let steps = way.windows(2).map(|pair| distance_squared(pair[0], pair[1]).sqrt());
+        assert!(steps.fold(0.0, f64::max) < 45.0, "no jump");
+    }
+
+    #[test]
+    fn where_nobody_heard_the_straight_line_stays() {
+        let traces = [silent(20..50), quarter(0.0, 30..35)];
+        assert_eq!(filled(0, &traces), traces[0].map_at());
+    }
+
+    trait MapAt {
+        fn map_at(&self) -> Vec<[f64; 2]>;
+    }
+
+    impl MapAt for Vec<TracePoint> {
+        fn map_at(&self) -> Vec<[f64; 2]> {
+            self.iter().map(|point| point.at_m).collect()
+        }
+    }
+}
