@@ -5,14 +5,14 @@ use std::path::PathBuf;
 
 use mcap::records::Metadata;
 
-use crate::reading::{Ending, Item, Raw, ReadError, Visitor, read};
+use crate::reading::{Ending, Item, Raw, ReadError, Visitor, read_among};
 
 /// Reads the files of a recording that rotated, in order, as if they were one: what each repeats is told
 /// once. Gives how each ends.
 ///
 /// # Errors
 ///
-/// As [`read`], and when they are not the files of one recording in its order.
+/// As [`read_among`], and when they are not the files of one recording in its order.
 pub fn read_all(paths: &[PathBuf], visitor: &mut impl Visitor) -> Result<Vec<Ending>, ReadError> {
     let mut joined =
         Joined { visitor, attached: HashMap::new(), seen: vec![], begins: None, other: None };
@@ -20,7 +20,7 @@ pub fn read_all(paths: &[PathBuf], visitor: &mut impl Visitor) -> Result<Vec<End
     let mut newest: Option<(&PathBuf, u64)> = None;
     for (place, path) in paths.iter().enumerate() {
         (joined.begins, joined.other) = (None, None);
-        endings.push(read(path, &mut joined)?);
+        endings.push(read_among(paths.len(), path, &mut joined)?);
         if let Some(name) = joined.other.take() {
             let (path, before) = (path.clone(), paths[place - 1].clone());
             return Err(ReadError::OtherRecording { path, before, name });
