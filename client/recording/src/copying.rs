@@ -9,7 +9,8 @@ use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 use mcap::{Attachment, McapError, WriteOptions, Writer};
 
-use crate::reading::{ChannelInfo, Ending, Item, Raw, ReadError, Visitor, read_among};
+use crate::joining::read_among;
+use crate::reading::{ChannelInfo, Ending, Item, Raw, ReadError, Visitor};
 
 type Output = BufWriter<Box<dyn Write + Send>>;
 

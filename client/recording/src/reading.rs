@@ -227,37 +227,6 @@ pub fn read(path: &Path, visitor: &mut impl Visitor) -> Result<Ending, ReadError
     Ok(Ending::Broken { read_bytes: good, file_bytes, reason })
 }
 
-/// Reads one of so many files of a recording. A power cut may leave nothing of the newest but its name, and
-/// zeros: among others that is a file that breaks off at its beginning.
-///
-/// # Errors
-///
-/// As [`read`].
-pub fn read_among(
-    count: usize,
-    path: &Path,
-    visitor: &mut impl Visitor,
-) -> Result<Ending, ReadError> {
-    match read(path, visitor) {
-        Err(ReadError::NotMcap { .. }) if count > 1 && is_nothing(path) => {
-            let file_bytes = std::fs::metadata(path).map_or(0, |it| it.len());
-            let reason = "nothing of it was brought to the disk".to_owned();
-            Ok(Ending::Broken { read_bytes: 0, file_bytes, reason })
-        }
-        read => read,
-    }
-}
-
-/// True for a file without a byte other than 0, and for one that ends within the first bytes of MCAP.
-fn is_nothing(path: &Path) -> bool {
-    let Ok(file) = File::open(path) else { return false };
-    let mut start = Vec::new();
-    let mut bytes = std::io::BufReader::new(file).bytes().map_while(Result::ok);
-    start.extend(bytes.by_ref().take(mcap::MAGIC.len()));
-    start.len() < mcap::MAGIC.len() && mcap::MAGIC.starts_with(&start)
-        || start.iter().all(|&byte| byte == 0) && bytes.all(|byte| byte == 0)
-}
-
 /// Why reading stops.
 enum Stop {
     /// The file is damaged from here on.
