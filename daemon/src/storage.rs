@@ -34,6 +34,28 @@ pub trait Storage {
     /// The system's answer; a file that was made and not written is removed.
     fn write_new(&self, path: &Path, content: &[u8], rights: &Rights) -> io::Result<()>;
 
+    /// Makes a file that was not there and is to grow: what is written to it is brought to the disk by
+    /// [`Storage::sync_file`], its name by [`Storage::sync_directory`].
+    ///
+    /// # Errors
+    ///
+    /// The system's answer: `AlreadyExists` where the name is taken.
+    fn create(&self, path: &Path) -> io::Result<Box<dyn Write + Send>>;
+
+    /// Brings all that was written to a file to the disk.
+    ///
+    /// # Errors
+    ///
+    /// The system's answer.
+    fn sync_file(&self, path: &Path) -> io::Result<()>;
+
+    /// Gives a file a second name, which has to be free.
+    ///
+    /// # Errors
+    ///
+    /// The system's answer.
+    fn link(&self, from: &Path, to: &Path) -> io::Result<()>;
+
     /// Gives a file another name, in place of the file of that name.
     ///
     /// # Errors
@@ -88,6 +110,19 @@ impl Storage for Disk {
             let _ = std::fs::remove_file(path);
         }
         written
+    }
+
+    fn create(&self, path: &Path) -> io::Result<Box<dyn Write + Send>> {
+        Ok(Box::new(File::create_new(path)?))
+    }
+
+    // The system brings to the disk what was written by any handle of the file.
+    fn sync_file(&self, path: &Path) -> io::Result<()> {
+        File::open(path)?.sync_data()
+    }
+
+    fn link(&self, from: &Path, to: &Path) -> io::Result<()> {
+        std::fs::hard_link(from, to)
     }
 
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
@@ -148,7 +183,7 @@ impl StorageError {
 /// The system's answer; the file there was stays as it is, unless only its directory could not be
 /// brought to the disk.
 pub fn replace(
-    storage: &impl Storage,
+    storage: &(impl Storage + ?Sized),
     path: &Path,
     beside: &Path,
     (content, rights): (&[u8], &Rights),
@@ -169,7 +204,7 @@ pub fn replace(
 ///
 /// The system's answer; `AlreadyExists` where the name is taken, and then nothing is changed.
 pub fn write_once(
-    storage: &impl Storage,
+    storage: &(impl Storage + ?Sized),
     path: &Path,
     beside: &Path,
     content: &[u8],
@@ -190,7 +225,7 @@ pub fn write_once(
 ///
 /// The system's answer; `AlreadyExists` where the name is taken, and then nothing is changed.
 pub fn make_once(
-    storage: &impl Storage,
+    storage: &(impl Storage + ?Sized),
     folder: &Path,
     beside: &Path,
     files: &[(&str, &[u8])],
@@ -205,6 +240,20 @@ pub fn make_once(
     storage.sync_directory(around).map_err(failed(around, TO_THE_DISK))
 }
 
+/// Brings a new file that was written bit by bit to the disk, with its name.
+///
+/// # Errors
+///
+/// The system's answer; a folder that one may write in but not read cannot be brought to the disk, and
+/// is none.
+pub fn settle(storage: &(impl Storage + ?Sized), path: &Path) -> io::Result<()> {
+    storage.sync_file(path)?;
+    match storage.sync_directory(folder_of(path)) {
+        Err(error) if error.kind() != ErrorKind::PermissionDenied => Err(error),
+        _ => Ok(()),
+    }
+}
+
 /// A name beside another that no other writer uses, of this process or any that lives.
 pub fn part_of(path: &Path) -> PathBuf {
     static COUNT: AtomicU64 = AtomicU64::new(0);
@@ -215,7 +264,7 @@ pub fn part_of(path: &Path) -> PathBuf {
 
 /// Writes a file under a name that only one writer uses.
 fn write_beside(
-    storage: &impl Storage,
+    storage: &(impl Storage + ?Sized),
     beside: &Path,
     content: &[u8],
     rights: &Rights,

@@ -8,7 +8,8 @@ use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
 use dynocar_tests::simulator::sensors::SIMULATED_TRAIN;
 use dynocar_tests::simulator::{
-    Defects, Effect, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate,
+    Defects, Effect, EffectRequest, Law, SimulatedDataset, SimulatorSettings, TrainType, Unlisted,
+    simulate,
 };
 
 fn dataset(seed: u64, train_type: Option<TrainType>, effects: EffectRequest) -> SimulatedDataset {
@@ -89,6 +90,25 @@ fn what_no_force_or_a_scale_of_forces_tells_is_named_too() {
         let mut named = 0;
         watch(&data, |_, _, snapshot| named += usize::from(suspect(snapshot) == kind));
         assert!(named > 100, "{kind}, seed {seed}: for {named} samples");
+    }
+}
+
+#[test]
+fn a_force_by_a_law_of_the_speed_that_no_term_follows_is_told_to_be_unknown() {
+    for (seed, law) in [
+        (330, Law::Slow { below_mps: 15.0, least_mps: 3.0 }),
+        (331, Law::Band { centre_mps: 14.0, width_mps: 3.0 }),
+    ] {
+        let unlisted = Effect::Unlisted(Unlisted { law, n_per_kn: 1.0 });
+        let data = dataset(seed, None, EffectRequest::Exactly(vec![unlisted]));
+        let (mut unknown, mut others) = (0, 0);
+        watch(&data, |_, _, snapshot| match suspect(snapshot) {
+            EffectKind::None => {}
+            EffectKind::Unknown => unknown += 1,
+            _ if snapshot.alternatives().any(|it| it == EffectKind::Unknown) => unknown += 1,
+            _ => others += 1,
+        });
+        assert!(unknown > 1000 && unknown > 20 * others, "seed {seed}: {unknown}, others {others}");
     }
 }
 

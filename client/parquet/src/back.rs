@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
+use dynocar::storage::{Disk, settle};
 use dynocar_recording::columns::Row;
 use dynocar_recording::writing::{McapError, RecordingWriter};
 
@@ -25,7 +26,7 @@ pub struct BackError {
 pub fn write_mcap(content: &Content, path: &Path) -> Result<(), BackError> {
     let failed = |source| BackError { path: path.into(), source };
     let file = File::create_new(path).map_err(|error| failed(error.into()))?;
-    let done = write(content, file);
+    let done = write(content, file).and_then(|()| Ok(settle(&Disk, path)?));
     if done.is_err() {
         let _ = std::fs::remove_file(path);
     }
@@ -50,6 +51,6 @@ fn write(content: &Content, file: File) -> Result<(), McapError> {
             Row::Event(it) => writer.event(it)?,
         }
     }
-    writer.finish()?.into_inner().map_err(|error| error.into_error())?.sync_all()?;
+    writer.finish()?.into_inner().map_err(|error| error.into_error())?;
     Ok(())
 }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use arrow_array::RecordBatch;
 use arrow_schema::SchemaRef;
+use dynocar::storage::{Disk, Storage, folder_of, settle};
 use dynocar_recording::columns::{Column, EVENTS, Row, SAMPLES, SNAPSHOTS, Source};
 use dynocar_recording::joining::read_all;
 use dynocar_recording::reading::{Ending, Item, Raw, ReadError, Visitor};
@@ -68,7 +69,10 @@ pub fn write_folder(paths: &[PathBuf], folder: &Path) -> Result<Written, WriteEr
         source: ParquetError::General(source.to_string()),
     };
     std::fs::create_dir(folder).map_err(failed)?;
-    let done = written(paths, folder);
+    let done = written(paths, folder).and_then(|done| {
+        Disk.sync_directory(folder_of(folder)).map_err(failed)?;
+        Ok(done)
+    });
     if done.is_err() {
         // It holds nothing that the recording does not.
         let _ = std::fs::remove_dir_all(folder);
@@ -185,7 +189,8 @@ impl Tables<'_> {
             let mut writer = create(&path)
                 .and_then(|it| ArrowWriter::try_new(it, batch.schema(), Some(properties.build())))
                 .map_err(failed)?;
-            writer.write(&batch).and_then(|()| writer.close()).map_err(failed)?;
+            let done = writer.write(&batch).and_then(|()| writer.close());
+            done.and_then(|_| Ok(settle(&Disk, &path)?)).map_err(failed)?;
         }
         Ok(written)
     }
@@ -280,8 +285,8 @@ impl Table {
             self.writer.append_key_value_metadata(KeyValue::new(name.clone(), text));
         }
         let Table { path, writer, .. } = self;
-        writer.close().map_err(|source| WriteError::Write { path, source })?;
-        Ok(())
+        let done = writer.close().and_then(|_| Ok(settle(&Disk, &path)?));
+        done.map_err(|source| WriteError::Write { path, source })
     }
 }
 

@@ -1,17 +1,21 @@
 //! Copies of recordings: everything that can be read, with an index and an end.
 
 use std::collections::{HashMap, HashSet};
-use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use dynocar::storage::{Storage, settle};
 use mcap::records::MessageHeader;
+use mcap::write::NoSeek;
 use mcap::{Attachment, McapError, WriteOptions, Writer};
 
-use crate::reading::{ChannelInfo, Ending, Item, Raw, ReadError, Visitor, read};
+use crate::joining::read_among;
+use crate::reading::{ChannelInfo, Ending, Item, Raw, ReadError, Visitor};
+
+type Output = BufWriter<Box<dyn Write + Send>>;
 
 /// The writer of a copy.
-pub type CopyWriter = Writer<BufWriter<File>>;
+pub type CopyWriter = Writer<NoSeek<Output>>;
 
 /// Why a file is not copied.
 #[derive(Debug)]
@@ -34,34 +38,39 @@ pub struct Copied {
 }
 
 /// Copies what can be read of files, in their order, into a new one, ours or not; `watcher` is told what
-/// they hold, and `add` writes what is to follow. A file that is attached to several is so once.
+/// they hold, and `add` writes what is to follow. A file that is attached to several is so once. When it has
+/// returned, the new one is on the disk.
 ///
 /// # Errors
 ///
 /// When one is no MCAP file, or the new one cannot be written; then there is none.
 pub fn copy<V: Visitor>(
+    storage: &dyn Storage,
     from: &[PathBuf],
     to: &Path,
     watcher: &mut V,
     add: impl FnOnce(&mut CopyWriter, &mut V) -> Result<(), McapError>,
 ) -> Result<Copied, CopyError> {
-    let file = File::create_new(to).map_err(|error| CopyError::Write(error.into()))?;
-    let done = copy_into(from, file, watcher, add);
+    let file = storage.create(to).map_err(|error| CopyError::Write(error.into()))?;
+    let done = copy_into(from, BufWriter::new(file), watcher, add).and_then(|copied| {
+        settle(storage, to).map_err(|error| CopyError::Write(error.into()))?;
+        Ok(copied)
+    });
     if done.is_err() {
         // It holds nothing that the first does not.
-        let _ = std::fs::remove_file(to);
+        let _ = storage.remove(to);
     }
     done
 }
 
 fn copy_into<V: Visitor>(
     from: &[PathBuf],
-    file: File,
+    file: Output,
     watcher: &mut V,
     add: impl FnOnce(&mut CopyWriter, &mut V) -> Result<(), McapError>,
 ) -> Result<Copied, CopyError> {
-    let options = WriteOptions::new().profile("dynocar");
-    let writer = options.create(BufWriter::new(file)).map_err(CopyError::Write)?;
+    let options = WriteOptions::new().profile("dynocar").disable_seeking(true);
+    let writer = options.create(NoSeek::new(file)).map_err(CopyError::Write)?;
     let mut copier = Copier {
         writer,
         channels: HashMap::new(),
@@ -72,7 +81,7 @@ fn copy_into<V: Visitor>(
         watcher,
     };
     let read: Result<Vec<Ending>, ReadError> =
-        from.iter().map(|path| read(path, &mut copier)).collect();
+        from.iter().map(|path| read_among(from.len(), path, &mut copier)).collect();
     let Copier { mut writer, messages, attachments, mut failed, watcher, .. } = copier;
     if read.is_ok() && failed.is_none() {
         failed = add(&mut writer, watcher).err();
@@ -89,7 +98,7 @@ fn copy_into<V: Visitor>(
         }
         (Ok(endings), None) => {
             writer.finish().map_err(CopyError::Write)?;
-            let written = writer.into_inner().into_inner();
+            let written = writer.into_inner().into_inner().into_inner();
             written.map_err(|error| CopyError::Write(error.into_error().into()))?;
             Ok(Copied { messages, attachments, endings })
         }

@@ -1,7 +1,9 @@
 //! The files of a recording that rotated, read as one.
 
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::{Path, PathBuf};
 
 use mcap::records::Metadata;
 
@@ -12,7 +14,7 @@ use crate::reading::{Ending, Item, Raw, ReadError, Visitor, read};
 ///
 /// # Errors
 ///
-/// As [`read`], and when they are not the files of one recording in its order.
+/// As [`read_among`], and when they are not the files of one recording in its order.
 pub fn read_all(paths: &[PathBuf], visitor: &mut impl Visitor) -> Result<Vec<Ending>, ReadError> {
     let mut joined =
         Joined { visitor, attached: HashMap::new(), seen: vec![], begins: None, other: None };
@@ -20,7 +22,7 @@ pub fn read_all(paths: &[PathBuf], visitor: &mut impl Visitor) -> Result<Vec<End
     let mut newest: Option<(&PathBuf, u64)> = None;
     for (place, path) in paths.iter().enumerate() {
         (joined.begins, joined.other) = (None, None);
-        endings.push(read(path, &mut joined)?);
+        endings.push(read_among(paths.len(), path, &mut joined)?);
         if let Some(name) = joined.other.take() {
             let (path, before) = (path.clone(), paths[place - 1].clone());
             return Err(ReadError::OtherRecording { path, before, name });
@@ -32,6 +34,37 @@ pub fn read_all(paths: &[PathBuf], visitor: &mut impl Visitor) -> Result<Vec<End
         newest = Some((path, begins));
     }
     Ok(endings)
+}
+
+/// Reads one of so many files of a recording. A power cut may leave nothing of the newest but its name, and
+/// zeros: among others that is a file that breaks off at its beginning.
+///
+/// # Errors
+///
+/// As [`read`].
+pub fn read_among(
+    count: usize,
+    path: &Path,
+    visitor: &mut impl Visitor,
+) -> Result<Ending, ReadError> {
+    match read(path, visitor) {
+        Err(ReadError::NotMcap { .. }) if count > 1 && is_nothing(path) => {
+            let file_bytes = std::fs::metadata(path).map_or(0, |it| it.len());
+            let reason = "nothing of it was brought to the disk".to_owned();
+            Ok(Ending::Broken { read_bytes: 0, file_bytes, reason })
+        }
+        read => read,
+    }
+}
+
+/// True for a file without a byte other than 0, and for one that ends within the first bytes of MCAP.
+fn is_nothing(path: &Path) -> bool {
+    let Ok(file) = File::open(path) else { return false };
+    let mut start = Vec::new();
+    let mut bytes = BufReader::new(file).bytes().map_while(Result::ok);
+    start.extend(bytes.by_ref().take(mcap::MAGIC.len()));
+    start.len() < mcap::MAGIC.len() && mcap::MAGIC.starts_with(&start)
+        || start.iter().all(|&byte| byte == 0) && bytes.all(|byte| byte == 0)
 }
 
 /// Several files as one.

@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use dynocar::storage::{Disk, Storage};
 use mcap::McapError;
 
 use crate::copying::{CopyError, copy};
@@ -35,13 +36,27 @@ pub struct Recovered {
     pub endings: Vec<Ending>,
 }
 
-/// Copies what can be read of files, in their order, into a new one, ours or not.
+/// Copies what can be read of files, in their order, into a new one, ours or not, and brings it to the disk.
+/// One of several of which a power cut left nothing takes nothing from the others.
 ///
 /// # Errors
 ///
 /// When it is no MCAP file, or the new one cannot be written; then there is none.
 pub fn recover(from: &[PathBuf], to: &Path) -> Result<Recovered, RecoverError> {
-    let copied = copy(from, to, &mut (), |_, ()| Ok(())).map_err(|error| match error {
+    recover_on(&Disk, from, to)
+}
+
+/// The same on any storage.
+///
+/// # Errors
+///
+/// As [`recover`].
+pub fn recover_on(
+    storage: &dyn Storage,
+    from: &[PathBuf],
+    to: &Path,
+) -> Result<Recovered, RecoverError> {
+    let copied = copy(storage, from, to, &mut (), |_, ()| Ok(())).map_err(|error| match error {
         CopyError::Read(error) => RecoverError::Read(error),
         CopyError::Write(source) => RecoverError::Write { path: to.into(), source },
     })?;

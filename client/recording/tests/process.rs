@@ -268,7 +268,8 @@ fn a_flight_recorder_keeps_what_it_is_asked_to_whatever_ends_it() {
     assert!(asked().status.success());
     let stretch = || {
         let folders = std::fs::read_dir(ring.join("kept")).into_iter().flatten().flatten();
-        folders.map(|it| it.path()).find(|it| it.join("ring-000001.mcap").exists())
+        let named = folders.filter(|it| !it.file_name().to_string_lossy().starts_with('.'));
+        named.map(|it| it.path()).find(|it| it.join("ring-000001.mcap").exists())
     };
     await_true("a stretch that is kept", || stretch().is_some());
     let kept = stretch().unwrap().join("ring-000001.mcap");

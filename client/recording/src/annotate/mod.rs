@@ -8,6 +8,7 @@ pub mod schema;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use dynocar::storage::Disk;
 use dynocar_core::explain::report::timeline::{RunTimeline, Timeline};
 use mcap::McapError;
 use mcap::records::MessageHeader;
@@ -74,19 +75,18 @@ pub struct Annotated {
 pub fn annotate(from: &Path, timeline: &Timeline, to: &Path) -> Result<Annotated, AnnotateError> {
     let mut added = Annotated::default();
     let mut refused = None;
-    let copied =
-        copy(&[from.into()], to, &mut Moments::default(), |writer, moments| {
-            match runs_of(moments, timeline) {
-                Ok((train, runs)) => {
-                    added = Annotations::new(writer, train)?.write(timeline, &runs)?;
-                    Ok(())
-                }
-                Err((trains, runs)) => {
-                    refused = Some((trains, runs));
-                    Err(McapError::UnexpectedEof)
-                }
+    let copied = copy(&Disk, &[from.into()], to, &mut Moments::default(), |writer, moments| {
+        match runs_of(moments, timeline) {
+            Ok((train, runs)) => {
+                added = Annotations::new(writer, train)?.write(timeline, &runs)?;
+                Ok(())
             }
-        });
+            Err((trains, runs)) => {
+                refused = Some((trains, runs));
+                Err(McapError::UnexpectedEof)
+            }
+        }
+    });
     if let Some((trains, runs)) = refused {
         let explained = timeline.runs.last().map_or(0, |it| it.number as usize);
         return Err(AnnotateError::OtherRuns { path: from.into(), trains, runs, explained });

@@ -7,7 +7,7 @@ use clap::Args;
 use dynocar::cli::Failure;
 use dynocar::output::tell;
 
-use super::record::{MIB, WantedArguments, run};
+use super::record::{MIB, SyncArguments, WantedArguments, run};
 use crate::record::{Keeping, Rotation, Settings, request_keeping};
 
 /// The name by which the ring's files begin.
@@ -41,6 +41,8 @@ pub struct FlightRecorderArguments {
     #[arg(long, value_name = "S", default_value_t = 300,
           value_parser = clap::value_parser!(u64).range(1..=86_400))]
     after_s: u64,
+    #[command(flatten)]
+    sync: SyncArguments,
     #[command(flatten)]
     wanted: WantedArguments,
     /// The daemon's configuration to attach; by default the one that its command line names
@@ -80,6 +82,7 @@ pub fn execute(arguments: &FlightRecorderArguments) -> Result<(), Failure> {
             keep_bytes: Some(bytes),
             keep_age: Some(age),
         },
+        sync: arguments.sync.every(),
         configuration: arguments.config.clone(),
         keeping: Some(Keeping {
             before: Duration::from_secs(arguments.before_s),

@@ -11,7 +11,7 @@ use dynocar_client::Host;
 use dynocar_shared::TrainId;
 
 use crate::lanes::Wanted;
-use crate::record::{KeepError, RecordError, Rotation, Settings, record};
+use crate::record::{KeepError, RecordError, Rotation, SYNC, Settings, record};
 
 /// Record what a controller and the daemon write, as MCAP.
 #[derive(Debug, Args)]
@@ -35,6 +35,8 @@ pub struct RecordArguments {
     #[arg(long, value_name = "N", requires = "rotation",
           value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
     keep_mib: Option<u64>,
+    #[command(flatten)]
+    sync: SyncArguments,
 }
 
 /// What a recorder or a live view reads.
@@ -70,6 +72,22 @@ impl WantedArguments {
     }
 }
 
+/// What a power cut may cost.
+#[derive(Debug, Args)]
+pub struct SyncArguments {
+    /// Bring the files to the disk every so many ms: what a power cut costs; 0 leaves it to the system
+    #[arg(long, value_name = "MS", default_value_t = SYNC.as_millis() as u64,
+          value_parser = clap::value_parser!(u64).range(0..=3_600_000))]
+    sync_ms: u64,
+}
+
+impl SyncArguments {
+    /// How often; `None` for never.
+    pub fn every(&self) -> Option<Duration> {
+        (self.sync_ms > 0).then(|| Duration::from_millis(self.sync_ms))
+    }
+}
+
 /// Bytes of a MiB.
 pub const MIB: u64 = 1 << 20;
 
@@ -88,6 +106,7 @@ pub fn execute(arguments: &RecordArguments) -> Result<(), Failure> {
             keep_bytes: arguments.keep_mib.map(|it| it * MIB),
             keep_age: None,
         },
+        sync: arguments.sync.every(),
         configuration: arguments.config.clone(),
         keeping: None,
     };

@@ -6,6 +6,7 @@ use std::path::{Component, Path, PathBuf};
 
 use dynocar::dataset::{self, LoadError};
 use dynocar::identify::published_samples;
+use dynocar::storage::{Disk, settle};
 use dynocar_core::dataset::{Dataset, DatasetFiles, MANIFEST_FILE};
 use dynocar_shared::{TrainId, TrainSample};
 use mcap::McapError;
@@ -112,6 +113,6 @@ fn write(
         newest_ns = at_ns.max(newest_ns);
         writer.sample(sample, at_ns)?;
     }
-    writer.finish()?.into_inner().map_err(|error| error.into_error())?.sync_all()?;
-    Ok(())
+    writer.finish()?.into_inner().map_err(|error| error.into_error())?;
+    Ok(settle(&Disk, path)?)
 }

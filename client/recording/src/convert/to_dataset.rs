@@ -3,7 +3,7 @@
 use std::path::{Component, Path, PathBuf};
 
 use dynocar::output::{OutputError, require_new, write_file};
-use dynocar::storage::folder_of;
+use dynocar::storage::{Disk, Storage, folder_of};
 use dynocar_core::dataset::{MANIFEST_FILE, Quantity};
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainSample};
@@ -208,7 +208,7 @@ fn models(
 
 fn write(folder: &Path, name: &str, content: &[u8]) -> Result<(), OutputError> {
     let path = folder.join(name);
-    std::fs::create_dir_all(folder_of(&path))
+    Disk.make_folder(folder_of(&path))
         .map_err(|source| OutputError::File { path: path.clone(), source })?;
     write_file(&path, content)
 }

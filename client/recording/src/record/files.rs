@@ -1,46 +1,29 @@
 //! The files of a recording: one, or many of which the oldest go.
 
 use std::cell::Cell;
-use std::fs::File;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
-use std::time::{Duration, Instant, SystemTime};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
-use dynocar::output::tell;
+use dynocar::storage::{Disk, folder_of};
 use dynocar_client::monotonic_now_ns;
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 use mcap::McapError;
 
 use super::configuration::Configuration;
-use super::keeping::{self, KeepError, Keeper};
-use super::{RecordError, Recorded};
+use super::housekeeping::{Housekeeper, SharedStorage, Task};
+use super::keeping::{self, Keeper};
+use super::rotation::{Rotation, next};
+use super::{RecordError, Recorded, SYNC};
 use crate::event::{Event, EventKind};
 use crate::lanes::event;
 use crate::writing::{CONFIGURATION, RecordingWriter, WallClock, folder_of_configuration};
 
-/// When a file is full, and how much of them is kept.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Rotation {
-    /// Bytes after which a new file is begun.
-    pub bytes: Option<u64>,
-    /// Time after which a new file is begun.
-    pub age: Option<Duration>,
-    /// The most bytes that all files of the recording take; the oldest are removed.
-    pub keep_bytes: Option<u64>,
-    /// The age after which a file is removed.
-    pub keep_age: Option<Duration>,
-}
-
-impl Rotation {
-    fn is_on(self) -> bool {
-        self.bytes.is_some() || self.age.is_some()
-    }
-}
-
 /// A file, with the bytes that were handed to the system.
 struct Counted {
-    file: File,
+    file: Box<dyn Write + Send>,
     bytes: Rc<Cell<u64>>,
 }
 
@@ -58,17 +41,23 @@ impl Write for Counted {
 
 /// The file that is written, and what every new one has to begin with.
 pub struct Files {
+    storage: SharedStorage,
     output: PathBuf,
     rotation: Rotation,
     path: PathBuf,
     writer: RecordingWriter<Counted>,
     bytes: Rc<Cell<u64>>,
     begun: Instant,
+    /// How often files are brought to the disk; `None` for never.
+    sync: Option<Duration>,
+    /// When that was asked for.
+    synced: Instant,
     /// The newest configuration, its number and when it was seen.
     configuration: Option<(Configuration, u32, i64)>,
     recorded: Recorded,
-    /// What is kept for good, for a flight recorder.
-    keeper: Option<Keeper>,
+    housekeeper: Housekeeper,
+    /// The folder in which a flight recorder is asked to keep a moment.
+    ring: Option<PathBuf>,
 }
 
 impl Files {
@@ -79,34 +68,58 @@ impl Files {
     ///
     /// When the name is taken or the file cannot be written.
     pub fn begin(output: &Path, rotation: Rotation) -> Result<Self, RecordError> {
+        Files::begin_on(Arc::new(Disk), output, rotation, Some(SYNC))
+    }
+
+    /// The same on any storage; files are brought to the disk no more often than every `sync`.
+    ///
+    /// # Errors
+    ///
+    /// As [`Files::begin`].
+    pub fn begin_on(
+        storage: SharedStorage,
+        output: &Path,
+        rotation: Rotation,
+        sync: Option<Duration>,
+    ) -> Result<Self, RecordError> {
         let path = if rotation.is_on() { next(output) } else { output.to_path_buf() };
-        let (writer, bytes) = open(&path)?;
+        let (writer, bytes) = open(&storage, &path)?;
         Ok(Files {
+            housekeeper: Housekeeper::new(Arc::clone(&storage), output, rotation),
+            storage,
             output: output.into(),
             rotation,
             path,
             writer,
             bytes,
             begun: Instant::now(),
+            sync,
+            synced: Instant::now(),
             configuration: None,
             recorded: Recorded::default(),
-            keeper: None,
+            ring: None,
         })
     }
 
     /// Keeps for good what lies around the events that are reasons to.
     pub fn set_keeper(&mut self, keeper: Keeper) {
-        self.keeper = Some(keeper);
-        self.tell_keeper(|keeper, files| keeper.begun(files));
+        self.housekeeper.set_keeper(keeper);
+        self.ring = Some(folder_of(&self.output).into());
+        self.housekeeper.ask(Task::Begun { file: self.path.clone() });
     }
 
-    /// A problem of keeping is told, and stops nothing.
-    fn tell_keeper(&mut self, work: impl FnOnce(&mut Keeper, &[PathBuf]) -> Result<(), KeepError>) {
-        let Some(keeper) = &mut self.keeper else { return };
-        let files: Vec<PathBuf> = numbered(&self.output).into_iter().map(|it| it.1).collect();
-        if let Err(problem) = work(keeper, &files) {
-            tell(&problem.to_string());
-        }
+    /// From now on a thread of its own brings files to the disk, keeps and removes them.
+    ///
+    /// # Errors
+    ///
+    /// When the system gives no thread.
+    pub fn keep_house_beside(&mut self) -> Result<(), RecordError> {
+        self.housekeeper.go_beside().map_err(RecordError::Thread)
+    }
+
+    /// Samples, snapshots and events that no power cut takes any more.
+    pub fn lasting(&self) -> u64 {
+        self.housekeeper.lasting()
     }
 
     /// The file that is written.
@@ -149,7 +162,7 @@ impl Files {
         let written = self.writer.event(event);
         self.told(written)?;
         if keeping::is_reason(event) {
-            self.tell_keeper(|keeper, files| keeper.keep(event, files));
+            self.housekeeper.ask(Task::Keep { event: event.clone() });
         }
         Ok(())
     }
@@ -175,13 +188,14 @@ impl Files {
         self.told(written)
     }
 
-    /// Hands everything to the system, and begins a new file where this one is full.
+    /// Hands everything to the system, has it brought to the disk when it is time to, and begins a new file
+    /// where this one is full.
     ///
     /// # Errors
     ///
     /// As above.
     pub fn flush(&mut self) -> Result<(), RecordError> {
-        if let Some(text) = self.keeper.as_ref().and_then(Keeper::request) {
+        if let Some(text) = self.ring.as_deref().and_then(keeping::requested) {
             self.event(&event(TrainId(0), EventKind::KeepRequested, text))?;
         }
         self.writer.set_clock(WallClock::now());
@@ -189,33 +203,52 @@ impl Files {
         self.told(written)?;
         let is_full = self.rotation.bytes.is_some_and(|most| self.bytes.get() >= most)
             || self.rotation.age.is_some_and(|most| self.begun.elapsed() >= most);
-        if is_full { self.rotate() } else { Ok(()) }
+        if is_full {
+            return self.rotate();
+        }
+        let is_time = self.sync.is_some_and(|every| self.synced.elapsed() >= every);
+        if is_time && !self.housekeeper.is_settling() {
+            self.settle();
+        }
+        Ok(())
+    }
+
+    /// Has the file brought to the disk, unless that is not wanted.
+    fn settle(&mut self) {
+        if self.sync.is_some() {
+            self.synced = Instant::now();
+            let (file, items) = (self.path.clone(), self.recorded.items());
+            self.housekeeper.ask(Task::Settle { file, items });
+        }
     }
 
     fn rotate(&mut self) -> Result<(), RecordError> {
         let path = next(&self.output);
-        let (writer, bytes) = open(&path)?;
+        let (writer, bytes) = open(&self.storage, &path)?;
         let full = std::mem::replace(&mut self.writer, writer);
         let written = full.finish().map(|_| ());
         self.told(written)?;
-        (self.path, self.bytes, self.begun) = (path, bytes, Instant::now());
+        self.settle();
+        (self.path, self.bytes, self.begun) = (path.clone(), bytes, Instant::now());
         self.attach_newest()?;
-        self.tell_keeper(|keeper, files| keeper.begun(files));
-        remove_oldest(&self.output, &self.path, self.rotation);
+        self.housekeeper.ask(Task::Begun { file: path.clone() });
+        self.housekeeper.ask(Task::RemoveOldest { written: path });
         Ok(())
     }
 
-    /// Writes index and end of the file.
+    /// Writes index and end of the file, and waits until it is on the disk.
     ///
     /// # Errors
     ///
     /// As above.
-    pub fn finish(self) -> Result<Recorded, RecordError> {
-        let path = self.path;
-        match self.writer.finish() {
-            Ok(_) => Ok(self.recorded),
-            Err(source) => Err(RecordError::Write { path, source }),
+    pub fn finish(mut self) -> Result<Recorded, RecordError> {
+        let Files { writer, path, .. } = self;
+        writer.finish().map_err(|source| RecordError::Write { path: path.clone(), source })?;
+        if self.sync.is_some() {
+            self.housekeeper.ask(Task::Settle { file: path, items: self.recorded.items() });
         }
+        self.housekeeper.finish();
+        Ok(self.recorded)
     }
 
     fn told(&self, written: Result<(), McapError>) -> Result<(), RecordError> {
@@ -243,8 +276,11 @@ fn attach(
     )
 }
 
-fn open(path: &Path) -> Result<(RecordingWriter<Counted>, Rc<Cell<u64>>), RecordError> {
-    let file = File::create_new(path).map_err(|error| match error.kind() {
+fn open(
+    storage: &SharedStorage,
+    path: &Path,
+) -> Result<(RecordingWriter<Counted>, Rc<Cell<u64>>), RecordError> {
+    let file = storage.create(path).map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists => RecordError::Taken { path: path.into() },
         _ => RecordError::Write { path: path.into(), source: error.into() },
     })?;
@@ -253,50 +289,4 @@ fn open(path: &Path) -> Result<(RecordingWriter<Counted>, Rc<Cell<u64>>), Record
     let writer = RecordingWriter::new(counted, WallClock::now())
         .map_err(|source| RecordError::Write { path: path.into(), source })?;
     Ok((writer, bytes))
-}
-
-/// The files of a rotating recording with their numbers, the oldest first.
-fn numbered(output: &Path) -> Vec<(u64, PathBuf)> {
-    let stem = output.file_stem().unwrap_or_default().to_string_lossy().into_owned() + "-";
-    let number_of = |path: &Path| {
-        let name = path.file_name()?.to_str()?.strip_prefix(&stem)?.strip_suffix(".mcap")?;
-        (name.len() == DIGITS).then(|| name.parse().ok())?
-    };
-    let folder = dynocar::storage::folder_of(output);
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut files: Vec<(u64, PathBuf)> =
-        entries.filter_map(|it| Some((number_of(&it.path())?, it.path()))).collect();
-    files.sort();
-    files
-}
-
-/// Digits of a file's number.
-const DIGITS: usize = 6;
-
-/// The name of the next file: `run-000007.mcap` for `run.mcap`.
-fn next(output: &Path) -> PathBuf {
-    let number = numbered(output).last().map_or(1, |newest| newest.0 + 1);
-    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
-    output.with_file_name(format!("{stem}-{number:0DIGITS$}.mcap"))
-}
-
-/// Removes the files that are too old, and the oldest until the rest takes no more than it may; never the
-/// one that is written.
-fn remove_oldest(output: &Path, written: &Path, rotation: Rotation) {
-    let most = rotation.keep_bytes.unwrap_or(u64::MAX);
-    let oldest = rotation.keep_age.and_then(|age| SystemTime::now().checked_sub(age));
-    let found = |(_, path): (u64, PathBuf)| {
-        let known = std::fs::metadata(&path).ok()?;
-        Some((known.modified().ok()?, known.len(), path))
-    };
-    let files: Vec<_> = numbered(output).into_iter().filter_map(found).collect();
-    let mut total: u64 = files.iter().map(|it| it.1).sum();
-    for (modified, length, path) in files.iter().filter(|it| it.2 != written) {
-        let is_too_old = oldest.is_some_and(|oldest| *modified < oldest);
-        if total > most || is_too_old {
-            total -= length;
-            // One that cannot be removed is told of when the disk is full.
-            let _ = std::fs::remove_file(path);
-        }
-    }
 }

@@ -2,26 +2,25 @@
 //!
 //! A file is kept by giving it a second name (a hard link) in the folder of the stretch. So it is kept from
 //! that moment on, whatever happens to the recorder: the ring removes only the first name, and the file that
-//! is being written goes on growing under both.
+//! is being written goes on growing under both. A stretch takes its name when its files and their names are on the
+//! disk, so that a power cut leaves it whole or not at all.
 
-use std::collections::HashMap;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind};
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use dynocar::models::moment::Moment;
-use dynocar::output::{OutputError, tell, write_file};
+use dynocar::output::{tell, write_file};
+use dynocar::storage::{Disk, StorageError};
 use dynocar_shared::Status;
-use serde::{Deserialize, Serialize};
 
+use super::housekeeping::SharedStorage;
+use super::stretch::{self, Reason, Stretch, beside, forget_unfinished, kept_bytes, unix_s};
 use crate::event::{Event, EventKind};
 
 /// Beside the ring: what is kept.
 const KEPT_FOLDER: &str = "kept";
-/// In the folder of a stretch: why it is kept.
-const STRETCH_FILE: &str = "stretch.toml";
 /// In the ring's folder: that this moment is to be kept, and why.
 const REQUEST_FILE: &str = "keep.request";
 /// In the ring's folder: held by the recorder that writes there.
@@ -63,14 +62,17 @@ pub enum KeepError {
         /// Its answer.
         source: io::Error,
     },
-    /// The account of the stretch is not written.
-    #[error(transparent)]
-    Account(#[from] OutputError),
+}
+
+impl From<StorageError> for KeepError {
+    fn from(StorageError { path, source, .. }: StorageError) -> Self {
+        KeepError::System { path, source }
+    }
 }
 
 /// Keeps what lies around a moment.
-#[derive(Debug)]
 pub struct Keeper {
+    storage: SharedStorage,
     ring: PathBuf,
     keeping: Keeping,
     /// The newest stretch, which goes on until its end.
@@ -80,20 +82,13 @@ pub struct Keeper {
     _lock: File,
 }
 
-/// Why and until when a stretch is kept.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-struct Stretch {
-    /// Files that are begun before belong to it, in s since 1970.
-    until_unix_s: u64,
-    reasons: Vec<Reason>,
-}
-
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-struct Reason {
-    at: String,
-    train: u64,
-    kind: String,
-    text: String,
+impl std::fmt::Debug for Keeper {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Keeper")
+            .field("ring", &self.ring)
+            .field("open", &self.open)
+            .finish_non_exhaustive()
+    }
 }
 
 /// True for an event around which a flight recorder keeps what it has: a suspicion, a fault, a request.
@@ -109,6 +104,15 @@ pub fn is_reason(event: &Event) -> bool {
         Ok(EventKind::StatusChanged) => event.status == Some(Status::Invalid as i32),
         _ => false,
     }
+}
+
+/// The request that was made in a ring's folder since the last look, in words.
+pub fn requested(ring: &Path) -> Option<String> {
+    let path = ring.join(REQUEST_FILE);
+    let text = fs::read_to_string(&path).ok()?;
+    // One that cannot be removed would ask again and again.
+    fs::remove_file(&path).ok()?;
+    Some(text.trim().to_owned())
 }
 
 /// Asks the recorder that writes into a ring to keep this moment; false when there is none.
@@ -138,24 +142,29 @@ impl Keeper {
     ///
     /// When another recorder writes there, or the folder cannot be made.
     pub fn begin(ring: &Path, keeping: Keeping) -> Result<Self, KeepError> {
-        fs::create_dir_all(ring.join(KEPT_FOLDER)).map_err(refused(ring))?;
+        Keeper::begin_on(Arc::new(Disk), ring, keeping)
+    }
+
+    /// The same on any storage.
+    ///
+    /// # Errors
+    ///
+    /// As [`Keeper::begin`].
+    pub fn begin_on(
+        storage: SharedStorage,
+        ring: &Path,
+        keeping: Keeping,
+    ) -> Result<Self, KeepError> {
+        storage.make_folder(&ring.join(KEPT_FOLDER)).map_err(refused(ring))?;
         let lock = File::options().create(true).append(true).open(ring.join(LOCK_FILE));
         let lock = lock.map_err(refused(ring))?;
         lock.try_lock().map_err(|error| match error {
             TryLockError::WouldBlock => KeepError::Taken { ring: ring.into() },
             TryLockError::Error(error) => refused(ring)(error),
         })?;
-        let open = newest_stretch(&ring.join(KEPT_FOLDER));
-        Ok(Keeper { ring: ring.into(), keeping, open, is_full_told: false, _lock: lock })
-    }
-
-    /// The request that was made since the last look, in words.
-    pub fn request(&self) -> Option<String> {
-        let path = self.ring.join(REQUEST_FILE);
-        let text = fs::read_to_string(&path).ok()?;
-        // One that cannot be removed would ask again and again.
-        fs::remove_file(&path).ok()?;
-        Some(text.trim().to_owned())
+        forget_unfinished(&ring.join(KEPT_FOLDER));
+        let open = stretch::newest(&ring.join(KEPT_FOLDER));
+        Ok(Keeper { storage, ring: ring.into(), keeping, open, is_full_told: false, _lock: lock })
     }
 
     /// Keeps the files that reach back from now by no more than is kept before a moment; `files` are all of
@@ -166,53 +175,77 @@ impl Keeper {
     /// When a file cannot be kept.
     pub fn keep(&mut self, event: &Event, files: &[PathBuf]) -> Result<(), KeepError> {
         let now = SystemTime::now();
-        let reason = reason(event, now);
-        let (folder, mut stretch) = match self.open.take().filter(|it| it.1.is_open(now)) {
-            Some(open) => open,
-            None => (self.new_folder(&reason), Stretch::default()),
-        };
-        fs::create_dir_all(&folder).map_err(refused(&folder))?;
+        let reason = Reason::of(event, now);
+        let open = self.open.take().filter(|it| it.1.is_open(now));
+        let is_new = open.is_none();
+        let (folder, mut stretch) =
+            open.unwrap_or_else(|| (self.new_folder(&reason), Stretch::default()));
         let is_news = stretch.reasons.last().is_none_or(|last| !last.is_like(&reason));
-        stretch.until_unix_s = unix_s(now + self.keeping.after);
+        let told =
+            format!("kept for good: {}: {} ({})", folder.display(), reason.kind, reason.text);
         if is_news {
-            tell(&format!(
-                "kept for good: {}: {} ({})",
-                folder.display(),
-                reason.kind,
-                reason.text
-            ));
             stretch.reasons.push(reason);
         }
-        let kept = stretch.write(&folder).and_then(|()| {
-            let from = now.checked_sub(self.keeping.before).unwrap_or(UNIX_EPOCH);
-            let is_near = |path: &&PathBuf| {
-                let modified = fs::metadata(path).and_then(|it| it.modified());
-                modified.is_ok_and(|it| it >= from)
-            };
-            // The newest is being written, whenever that was last.
-            let newest = files.last().into_iter();
-            files.iter().filter(is_near).chain(newest).try_for_each(|it| self.link(it, &folder))
-        });
-        self.open = Some((folder, stretch));
+        let until_unix_s = unix_s(now + self.keeping.after);
+        let is_longer = std::mem::replace(&mut stretch.until_unix_s, until_unix_s) != until_unix_s;
+        let kept = match is_new {
+            true => self.make(&folder, &stretch, &self.near(now, files)),
+            false if is_news || is_longer => Ok(stretch.write(&self.storage, &folder)?),
+            false => Ok(()),
+        };
+        if is_news && kept.is_ok() {
+            tell(&told);
+        }
+        // One that was not made is not there to go on with.
+        self.open = (folder.exists()).then_some((folder, stretch));
         kept
     }
 
-    /// A new file was begun, the last of these: it belongs to a stretch that is not yet at its end.
+    /// The files that reach back from now by no more than is kept before a moment, and the newest: it is being
+    /// written, whenever that was last.
+    fn near(&self, now: SystemTime, files: &[PathBuf]) -> Vec<PathBuf> {
+        let from = now.checked_sub(self.keeping.before).unwrap_or(UNIX_EPOCH);
+        let is_near = |path: &&PathBuf| {
+            let modified = fs::metadata(path).and_then(|it| it.modified());
+            modified.is_ok_and(|it| it >= from)
+        };
+        let newest = files.len().saturating_sub(1);
+        let (older, newest) = files.split_at(newest);
+        older.iter().filter(is_near).chain(newest).cloned().collect()
+    }
+
+    /// Makes a stretch: it takes its name when all of it is on the disk.
+    fn make(
+        &mut self,
+        folder: &Path,
+        stretch: &Stretch,
+        files: &[PathBuf],
+    ) -> Result<(), KeepError> {
+        let beside = beside(folder);
+        self.storage.make_folder(&beside).map_err(refused(&beside))?;
+        let linked = files.iter().try_for_each(|file| {
+            self.link(file, &beside)?;
+            self.storage.sync_file(file).map_err(refused(file))
+        });
+        // What could be kept is, even where the rest could not.
+        stretch.write(&self.storage, &beside)?;
+        self.storage.rename_new(&beside, folder).map_err(refused(folder))?;
+        let kept = self.ring.join(KEPT_FOLDER);
+        self.storage.sync_directory(&kept).map_err(refused(&kept))?;
+        linked
+    }
+
+    /// A new file was begun: it belongs to a stretch that is not yet at its end.
     ///
     /// # Errors
     ///
     /// When it cannot be kept.
-    pub fn begun(&mut self, files: &[PathBuf]) -> Result<(), KeepError> {
-        let open = self.open.take().filter(|it| it.1.is_open(SystemTime::now()));
-        let kept = match (&open, files.last()) {
-            (Some((folder, _)), Some(newest)) => {
-                let folder = folder.clone();
-                self.link(newest, &folder)
-            }
-            _ => Ok(()),
-        };
-        self.open = open;
-        kept
+    pub fn begun(&mut self, file: &Path) -> Result<(), KeepError> {
+        self.open = self.open.take().filter(|it| it.1.is_open(SystemTime::now()));
+        let Some((folder, _)) = &self.open else { return Ok(()) };
+        let folder = folder.clone();
+        self.link(file, &folder)?;
+        self.storage.sync_directory(&folder).map_err(refused(&folder))
     }
 
     fn new_folder(&self, reason: &Reason) -> PathBuf {
@@ -239,62 +272,10 @@ impl Keeper {
             return Err(KeepError::Full { kept, most_mib: most >> 20 });
         }
         self.is_full_told = false;
-        fs::hard_link(file, &to).map_err(refused(&to))
+        self.storage.link(file, &to).map_err(refused(&to))
     }
-}
-
-impl Stretch {
-    fn is_open(&self, now: SystemTime) -> bool {
-        unix_s(now) <= self.until_unix_s
-    }
-
-    fn write(&self, folder: &Path) -> Result<(), KeepError> {
-        // Numbers and texts always have a text in TOML.
-        let text = toml::to_string(self).unwrap_or_default();
-        Ok(write_file(&folder.join(STRETCH_FILE), &text)?)
-    }
-}
-
-impl Reason {
-    /// True for the same over again, whose words differ at most by a number.
-    fn is_like(&self, other: &Reason) -> bool {
-        (self.train, &self.kind) == (other.train, &other.kind)
-            && (self.text == other.text || self.kind == EventKind::SamplesLost.name())
-    }
-}
-
-fn reason(event: &Event, now: SystemTime) -> Reason {
-    let kind = EventKind::try_from(event.kind).unwrap_or(EventKind::Unknown);
-    Reason {
-        at: Moment::of(now).to_string(),
-        train: event.train_id,
-        kind: kind.name().to_owned(),
-        text: event.text.clone(),
-    }
-}
-
-fn unix_s(at: SystemTime) -> u64 {
-    at.duration_since(UNIX_EPOCH).map_or(0, |it| it.as_secs())
 }
 
 fn refused(path: &Path) -> impl FnOnce(io::Error) -> KeepError {
     move |source| KeepError::System { path: path.into(), source }
-}
-
-/// The stretch with the latest end, by what its folder says.
-fn newest_stretch(kept: &Path) -> Option<(PathBuf, Stretch)> {
-    let folders = fs::read_dir(kept).ok()?.flatten().map(|it| it.path());
-    let known = folders.filter_map(|folder| {
-        let text = fs::read_to_string(folder.join(STRETCH_FILE)).ok()?;
-        Some((folder, toml::from_str::<Stretch>(&text).ok()?))
-    });
-    known.max_by_key(|it| it.1.until_unix_s)
-}
-
-/// Bytes of all files that are kept, each once.
-fn kept_bytes(kept: &Path) -> u64 {
-    let folders = fs::read_dir(kept).into_iter().flatten().flatten();
-    let files = folders.filter_map(|it| fs::read_dir(it.path()).ok()).flatten().flatten();
-    let known = files.filter_map(|it| it.metadata().ok()).map(|it| (it.ino(), it.len()));
-    known.collect::<HashMap<u64, u64>>().values().sum()
 }

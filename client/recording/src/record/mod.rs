@@ -3,15 +3,19 @@
 
 mod configuration;
 mod files;
+mod housekeeping;
 mod keeping;
 mod maintenance;
+mod rotation;
+mod stretch;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use dynocar::output::tell;
-use dynocar::storage::folder_of;
+use dynocar::storage::{Disk, folder_of};
 use dynocar_client::ChannelError;
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 use mcap::McapError;
@@ -21,11 +25,16 @@ use crate::lanes::{Lanes, PAUSE, Sink, Wanted, event};
 use configuration::Configuration;
 use maintenance::Maintenance;
 
-pub use files::{Files, Rotation};
+pub use files::Files;
+pub use housekeeping::SharedStorage;
 pub use keeping::{KeepError, Keeper, Keeping, request as request_keeping};
+pub use rotation::Rotation;
 
 /// How often what was taken is handed to the system: what a kill costs at most.
 const FLUSH: Duration = Duration::from_millis(400);
+/// How often that is brought to the disk, unless somebody wants it otherwise: what a power cut costs is
+/// this, a flush, and the time that the disk takes.
+pub const SYNC: Duration = Duration::from_secs(1);
 
 /// What is to be recorded, and where to.
 #[derive(Clone, Debug)]
@@ -36,6 +45,8 @@ pub struct Settings {
     pub output: PathBuf,
     /// When a file is full.
     pub rotation: Rotation,
+    /// How often files are brought to the disk; `None` for never.
+    pub sync: Option<Duration>,
     /// The daemon's configuration; by default the file that its command line names.
     pub configuration: Option<PathBuf>,
     /// What is kept for good in the folder of the files, for a flight recorder.
@@ -54,6 +65,9 @@ pub enum RecordError {
         /// The file.
         path: PathBuf,
     },
+    /// The system gives no thread for what a disk takes its time for.
+    #[error("no thread can be started that brings files to the disk: {0}")]
+    Thread(std::io::Error),
     /// A flight recorder cannot have its ring.
     #[error(transparent)]
     Ring(#[from] KeepError),
@@ -88,6 +102,13 @@ pub struct Recorded {
     pub lost: u64,
 }
 
+impl Recorded {
+    /// All that was written.
+    pub fn items(&self) -> u64 {
+        self.samples + self.snapshots + self.events
+    }
+}
+
 /// Records until the flag is set.
 ///
 /// # Errors
@@ -96,10 +117,12 @@ pub struct Recorded {
 pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, RecordError> {
     let folder = folder_of(&settings.output);
     let keeper = settings.keeping.map(|keeping| Keeper::begin(folder, keeping)).transpose()?;
-    let mut files = Files::begin(&settings.output, settings.rotation)?;
+    let Settings { output, rotation, sync, .. } = settings;
+    let mut files = Files::begin_on(Arc::new(Disk), output, *rotation, *sync)?;
     if let Some(keeper) = keeper {
         files.set_keeper(keeper);
     }
+    files.keep_house_beside()?;
     let mut recorder = Recorder {
         files,
         configuration: settings.configuration.clone(),

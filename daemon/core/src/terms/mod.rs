@@ -19,6 +19,7 @@ pub mod masses;
 pub mod place;
 mod resistance;
 pub mod rotating;
+pub mod speed_band;
 mod suspect;
 pub mod traction;
 pub mod tunnel;

@@ -3,10 +3,10 @@
 use nalgebra::SVector;
 
 use super::place_memory::PlaceMemory;
-use super::suspects::SUSPECTS;
+use super::suspects::{BANK, SUSPECTS};
 use crate::force::ResolvedSample;
 use crate::pipeline::resistance::sample::UnitSample;
-use crate::terms::{SUSPECTS as BANK, Seen};
+use crate::terms::Seen;
 use crate::train::Davis;
 
 /// One value for each suspect of the bank.

@@ -11,7 +11,7 @@ use super::place_memory::PlaceMemory;
 use super::pressure::ReleasedPressure;
 use super::rows::{Parameters, Row, Rows};
 use super::settings::MonitorSettings;
-use super::suspects::{BASE, FIRST_ONSET, ONSETS, SUSPECTS, suspect_of};
+use super::suspects::{BANK, BASE, FIRST_ONSET, ONSETS, SUSPECTS, suspect_of};
 use super::verdict::{Evidence, Verdict};
 use super::wheel_scale::WheelScale;
 use crate::force::ResolvedSample;
@@ -25,7 +25,6 @@ use crate::pipeline::resistance::regression::{
 use crate::pipeline::resistance::sample::UnitSample;
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
-use crate::terms::SUSPECTS as BANK;
 use crate::train::{Davis, TrainModel};
 
 /// Rows before anything is called estimated.

@@ -157,6 +157,33 @@ impl Information {
         }
     }
 
+    /// A suspect beside the base model and another suspect, both as free as their priors let them be.
+    pub fn beyond_another(
+        &self,
+        base: &BaseSolution,
+        (other, other_std): (usize, f64),
+        (parameter, prior_std): (usize, f64),
+    ) -> Alternative {
+        let none = Alternative { value: 0.0, precision: 0.0, cost: 0.0 };
+        let reduced = |place: usize| {
+            let column: BaseVector = self.matrix.fixed_view::<BASE, 1>(0, place).into_owned();
+            base.factor.l_dirty().solve_lower_triangular(&column)
+        };
+        let (Some(taken), Some(own)) = (reduced(other), reduced(parameter)) else { return none };
+        let pivot = (self.matrix[(other, other)] - taken.norm_squared()).max(0.0)
+            + 1.0 / (other_std * other_std);
+        let share = (self.matrix[(parameter, other)] - own.dot(&taken)) / pivot;
+        let left =
+            (self.matrix[(parameter, parameter)] - own.norm_squared() - share * share * pivot)
+                .max(0.0);
+        let rest = self.side[parameter]
+            - own.dot(&base.reduced)
+            - share * (self.side[other] - taken.dot(&base.reduced));
+        let precision = left + 1.0 / (prior_std * prior_std);
+        let cost = (left * prior_std * prior_std).ln_1p();
+        Alternative { value: rest / precision, precision, cost }
+    }
+
     /// A suspect that the base model holds in part, with that part: against the base model alone, a
     /// small scale is free, so that a scale of any size would have little to speak for it.
     pub fn together(&self, base: (usize, f64), suspect: (usize, f64)) -> Alternative {
@@ -207,6 +234,32 @@ impl Information {
 mod tests {
     use super::*;
     use crate::pipeline::resistance::regression::TRACTION_SCALE;
+
+    #[test]
+    fn what_another_suspect_explains_is_not_found_beside_it_and_what_it_does_not_is() {
+        let [one, two] = [BASE, BASE + 1];
+        let mut information = Information::new(&BaseVector::repeat(1.0));
+        for row in 0..400 {
+            let at = |period: f64| (f64::from(row) / period).sin();
+            let mut features = Parameters::zeros();
+            (features[0], features[one], features[two]) = (at(3.0), at(5.0), at(5.0) + at(7.0));
+            let observed = 2.0 * features[one] + 0.7 * at(9.0);
+            information.push(&Row { features, observed, weight: 1.0 }, 1.0);
+        }
+        let base = information.base().unwrap();
+        let alone = information.alternative(&base, two, 1.0);
+        let beside = information.beyond_another(&base, (one, 1.0), (two, 1.0));
+        assert!(alone.beyond(0.0) > 100.0, "{alone:?}");
+        assert!(beside.beyond(0.0) < 0.05 * alone.beyond(0.0), "{beside:?}");
+        // The same by solving both at once.
+        let matrix = nalgebra::Matrix3::from_fn(|i, j| {
+            let place = [0, one, two];
+            information.matrix[(place[i], place[j])] + if i == j { 1.0 } else { 0.0 }
+        });
+        let side = nalgebra::Vector3::from_fn(|i, _| information.side[[0, one, two][i]]);
+        let both = matrix.try_inverse().unwrap() * side;
+        assert!((both[2] - beside.value).abs() < 1e-9, "{both} {beside:?}");
+    }
 
     #[test]
     fn a_scale_that_is_another_in_each_run_keeps_its_value_and_is_no_surer_than_runs_differ() {

@@ -58,6 +58,8 @@ pub struct Standing<'a> {
     pub net: &'a [f64; CANDIDATES],
     /// Evidence for each by all that was seen, by which they are compared.
     pub rank: &'a [f64; CANDIDATES],
+    /// Evidence for a law of the speed beside the effect that is named.
+    pub left_by_name: f64,
     /// Statistics of the innovations without outliers.
     pub cut_innovations: &'a InnovationMonitor,
     /// Since when brakes may drag.
@@ -174,7 +176,8 @@ impl Naming {
         let onset = candidate.checked_sub(FIRST_ONSET).filter(|_| is_a_brake);
         let age = onset.and_then(|place| standing.onsets.age(place));
         let is_short = age.is_some_and(|age| age < CONSTANT_BLOCKS);
-        if is_short || self.unexplained(standing).is_some() {
+        let is_more = standing.left_by_name > self.evidence_min;
+        if is_short || is_more || self.unexplained(standing).is_some() {
             bits |= EffectKind::Unknown.bit();
         }
         // Brakes that let go again and again while the train drives are something else.
@@ -188,7 +191,7 @@ impl Naming {
                 evidence,
                 alternatives: (bits & !EffectKind::Unknown.bit()) | effect.bit() | PLACES,
             },
-            false => Named { effect, candidate, evidence, alternatives: bits },
+            false => Named { effect, candidate, evidence, alternatives: bits & !effect.bit() },
         }
     }
 
@@ -257,6 +260,7 @@ mod tests {
             naming.take(&Standing {
                 net: &net,
                 rank: &net,
+                left_by_name: 0.0,
                 cut_innovations: &cut_innovations,
                 onsets,
                 is_new_place: false,

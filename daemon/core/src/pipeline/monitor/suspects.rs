@@ -6,12 +6,25 @@
 use dynocar_shared::vocabulary::EffectKind;
 
 use crate::pipeline::resistance::regression::UNKNOWNS;
-use crate::terms::{SUSPECTS as BANK, Suspect, brake};
+use crate::terms::speed_band::BANDS;
+use crate::terms::{SUSPECTS as TERMS, Suspect, brake};
 
 /// Columns of the base model: a, b, c, two force scales, the delay.
 pub const BASE: usize = UNKNOWNS;
 /// Suspects with a column of their own.
-pub const SUSPECTS: usize = BANK.len();
+pub const SUSPECTS: usize = TERMS.len() + BANDS.len();
+/// These: the terms, and laws of the speed that none of them follows.
+pub const BANK: [Suspect; SUSPECTS] = {
+    let mut bank = [BANDS[0]; SUSPECTS];
+    let mut place = 0;
+    while place < SUSPECTS {
+        bank[place] = if place < TERMS.len() { TERMS[place] } else { BANDS[place - TERMS.len()] };
+        place += 1;
+    }
+    bank
+};
+/// Place of the first band of speed among the parameters.
+pub const FIRST_BAND: usize = BASE + TERMS.len();
 /// Onsets of a dragging brake that are kept side by side.
 pub const ONSETS: usize = 12;
 /// Place of the first onset among the parameters.

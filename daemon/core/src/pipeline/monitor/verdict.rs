@@ -8,7 +8,7 @@ use super::onsets::Onsets;
 use super::rows::Parameters;
 use super::settings::MonitorSettings;
 use super::suspects::{
-    BASE, CANDIDATES, DELAY, FIRST_ONSET, PARAMETERS, SUSPECTS, WHEEL, suspect_of,
+    BASE, CANDIDATES, DELAY, FIRST_BAND, FIRST_ONSET, PARAMETERS, SUSPECTS, WHEEL, suspect_of,
 };
 use crate::pipeline::InnovationMonitor;
 use crate::pipeline::resistance::regression::{FORCE_DELAY, TRACTION_SCALE};
@@ -209,6 +209,22 @@ impl Verdict {
         self.name(evidence);
     }
 
+    /// What speaks for a law of the speed beside the suspect that is named: what the name leaves.
+    fn left_by_name(&self, evidence: &Evidence) -> f64 {
+        let Some(named) = self.naming.parameter() else { return 0.0 };
+        let named = (named, suspect_of(named).prior_std);
+        let bands = (FIRST_BAND..FIRST_ONSET).filter(|&band| band != named.0);
+        let left = bands.map(|band| {
+            let law = (band, suspect_of(band).prior_std);
+            let found = evidence.information.beyond_another(evidence.base, named, law);
+            let least = self.least(band);
+            let is_large = found.value.abs() >= least;
+            let ratio = if is_large { found.beyond(TOLERATED_SHARE * least) } else { 0.0 };
+            ratio / self.scale - found.cost - searched()
+        });
+        left.fold(0.0, f64::max)
+    }
+
     fn name(&mut self, evidence: &Evidence) {
         let mut net = self.own;
         let mut rank = self.beside;
@@ -222,6 +238,7 @@ impl Verdict {
         self.naming.take(&Standing {
             net: &net,
             rank: &rank,
+            left_by_name: self.left_by_name(evidence),
             cut_innovations: evidence.cut_innovations,
             onsets: evidence.onsets,
             is_new_place: evidence.is_new_place,

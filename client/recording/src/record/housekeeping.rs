@@ -1,0 +1,213 @@
+//! What a recorder does with its files beside writing: it brings them to the disk, keeps them and removes them.
+//!
+//! A disk may take seconds for each of these. They are done in the order in which they were asked for, in a
+//! thread of their own while a recorder runs, so that nobody who records waits for them.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+
+use dynocar::output::tell;
+use dynocar::storage::{Storage, settle};
+
+use super::keeping::{KeepError, Keeper};
+use super::rotation::{Rotation, numbered, remove_oldest};
+use crate::event::Event;
+
+/// A file system that several threads use.
+pub type SharedStorage = Arc<dyn Storage + Send + Sync>;
+
+/// What is to be done.
+#[derive(Debug)]
+pub enum Task {
+    /// Bring a file to the disk, into which this many items were written, files before it included.
+    Settle {
+        /// The file.
+        file: PathBuf,
+        /// Samples, snapshots and events.
+        items: u64,
+    },
+    /// A file was begun: it belongs to a stretch that is not yet at its end.
+    Begun {
+        /// The file.
+        file: PathBuf,
+    },
+    /// Keep what lies around an event.
+    Keep {
+        /// The reason.
+        event: Event,
+    },
+    /// Remove what is too old or too much, but never this file.
+    RemoveOldest {
+        /// The file that is written.
+        written: PathBuf,
+    },
+}
+
+/// How far the disk has come.
+#[derive(Debug, Default)]
+struct Progress {
+    /// Items that no power cut takes any more.
+    lasting: AtomicU64,
+    /// True while a file waits to be brought to the disk.
+    is_settling: AtomicBool,
+}
+
+/// What came to nothing: it stops no recording.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: cannot be brought to the disk: {source}; a power cut may take what was recorded since", file.display())]
+struct SettleError {
+    file: PathBuf,
+    source: std::io::Error,
+}
+
+/// Does it.
+struct Housekeeping {
+    storage: SharedStorage,
+    output: PathBuf,
+    rotation: Rotation,
+    keeper: Option<Keeper>,
+    progress: Arc<Progress>,
+    /// The file whose name is on the disk.
+    named: PathBuf,
+    is_failure_told: bool,
+}
+
+impl Housekeeping {
+    fn take(&mut self, task: Task) {
+        match task {
+            Task::Settle { file, items } => {
+                match self.settle(&file) {
+                    Ok(()) => {
+                        self.progress.lasting.store(items, Ordering::Release);
+                        self.is_failure_told = false;
+                    }
+                    Err(source) if !std::mem::replace(&mut self.is_failure_told, true) => {
+                        tell(&SettleError { file, source }.to_string());
+                    }
+                    Err(_) => {}
+                }
+                self.progress.is_settling.store(false, Ordering::Release);
+            }
+            Task::Begun { file } => self.keep(|keeper, _| keeper.begun(&file)),
+            Task::Keep { event } => self.keep(|keeper, files| keeper.keep(&event, files)),
+            Task::RemoveOldest { written } => {
+                remove_oldest(&*self.storage, &self.output, &written, self.rotation);
+            }
+        }
+    }
+
+    fn settle(&mut self, file: &Path) -> std::io::Result<()> {
+        if self.named == file {
+            return self.storage.sync_file(file);
+        }
+        settle(&*self.storage, file)?;
+        self.named = file.into();
+        Ok(())
+    }
+
+    /// A problem of keeping is told, and stops nothing.
+    fn keep(&mut self, work: impl FnOnce(&mut Keeper, &[PathBuf]) -> Result<(), KeepError>) {
+        let Some(keeper) = &mut self.keeper else { return };
+        let files: Vec<PathBuf> = numbered(&self.output).into_iter().map(|it| it.1).collect();
+        if let Err(problem) = work(keeper, &files) {
+            tell(&problem.to_string());
+        }
+    }
+}
+
+/// Where it is done.
+enum Place {
+    /// At once, by whoever asks.
+    Here(Box<Housekeeping>),
+    /// In a thread of its own, which ends when nobody can ask any more.
+    Beside(Sender<Task>, JoinHandle<()>),
+}
+
+/// Has things done with the files of a recording.
+pub struct Housekeeper {
+    place: Place,
+    progress: Arc<Progress>,
+}
+
+impl Housekeeper {
+    /// Does everything at once.
+    pub fn new(storage: SharedStorage, output: &Path, rotation: Rotation) -> Self {
+        let progress = Arc::<Progress>::default();
+        let housekeeping = Housekeeping {
+            storage,
+            output: output.into(),
+            rotation,
+            keeper: None,
+            progress: Arc::clone(&progress),
+            named: PathBuf::new(),
+            is_failure_told: false,
+        };
+        Housekeeper { place: Place::Here(Box::new(housekeeping)), progress }
+    }
+
+    /// Does everything in a thread of its own from now on; with a keeper, keeps.
+    ///
+    /// # Errors
+    ///
+    /// When the system gives no thread.
+    pub fn go_beside(&mut self) -> std::io::Result<()> {
+        if let Place::Here(_) = self.place {
+            let (tasks, asked) = channel();
+            let (hand_over, taken) = channel::<Box<Housekeeping>>();
+            let thread = std::thread::Builder::new().name("housekeeping".into());
+            let thread = thread.spawn(move || work(&taken, &asked))?;
+            let here = std::mem::replace(&mut self.place, Place::Beside(tasks, thread));
+            if let Place::Here(housekeeping) = here {
+                // The thread waits for it.
+                let _ = hand_over.send(housekeeping);
+            }
+        }
+        Ok(())
+    }
+
+    /// Keeps from now on; before it works beside.
+    pub fn set_keeper(&mut self, keeper: Keeper) {
+        if let Place::Here(housekeeping) = &mut self.place {
+            housekeeping.keeper = Some(keeper);
+        }
+    }
+
+    /// Asks for something.
+    pub fn ask(&mut self, task: Task) {
+        if matches!(task, Task::Settle { .. }) {
+            self.progress.is_settling.store(true, Ordering::Release);
+        }
+        match &mut self.place {
+            Place::Here(housekeeping) => housekeeping.take(task),
+            // The thread ends after the sender only.
+            Place::Beside(tasks, _) => drop(tasks.send(task)),
+        }
+    }
+
+    /// True while a file waits to be brought to the disk: it need not be asked for again.
+    pub fn is_settling(&self) -> bool {
+        self.progress.is_settling.load(Ordering::Acquire)
+    }
+
+    /// Samples, snapshots and events that no power cut takes any more.
+    pub fn lasting(&self) -> u64 {
+        self.progress.lasting.load(Ordering::Acquire)
+    }
+
+    /// Ends when everything is done.
+    pub fn finish(self) {
+        if let Place::Beside(tasks, thread) = self.place {
+            drop(tasks);
+            // A thread that panicked has told so.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn work(taken: &Receiver<Box<Housekeeping>>, asked: &Receiver<Task>) {
+    let Ok(mut housekeeping) = taken.recv() else { return };
+    asked.iter().for_each(|task| housekeeping.take(task));
+}

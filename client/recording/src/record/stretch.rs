@@ -1,0 +1,119 @@
+//! A stretch that is kept: its folder, and the account of why it is.
+
+use std::collections::HashMap;
+use std::fs;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use dynocar::models::moment::Moment;
+use dynocar::storage::{Rights, StorageError, replace};
+use serde::{Deserialize, Serialize};
+
+use super::housekeeping::SharedStorage;
+use crate::event::{Event, EventKind};
+
+/// In the folder of a stretch: why it is kept.
+const STRETCH_FILE: &str = "stretch.toml";
+
+/// Why and until when a stretch is kept.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Stretch {
+    /// Files that are begun before belong to it, in s since 1970.
+    pub until_unix_s: u64,
+    /// Why.
+    pub reasons: Vec<Reason>,
+}
+
+/// One reason to keep.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Reason {
+    /// When.
+    pub at: String,
+    /// Which train, 0 for none.
+    pub train: u64,
+    /// The event's kind.
+    pub kind: String,
+    /// What it says.
+    pub text: String,
+}
+
+impl Stretch {
+    /// True until its end.
+    pub fn is_open(&self, now: SystemTime) -> bool {
+        unix_s(now) <= self.until_unix_s
+    }
+
+    /// Brings the account to the disk, with all names in the folder.
+    ///
+    /// # Errors
+    ///
+    /// The system's answer.
+    pub fn write(&self, storage: &SharedStorage, folder: &Path) -> Result<(), StorageError> {
+        // Numbers and texts always have a text in TOML.
+        let text = toml::to_string(self).unwrap_or_default();
+        let path = folder.join(STRETCH_FILE);
+        replace(&**storage, &path, &beside(&path), (text.as_bytes(), &Rights::Usual))
+    }
+}
+
+impl Reason {
+    /// The reason that an event is.
+    pub fn of(event: &Event, now: SystemTime) -> Self {
+        let kind = EventKind::try_from(event.kind).unwrap_or(EventKind::Unknown);
+        Reason {
+            at: Moment::of(now).to_string(),
+            train: event.train_id,
+            kind: kind.name().to_owned(),
+            text: event.text.clone(),
+        }
+    }
+
+    /// True for the same over again, whose words differ at most by a number.
+    pub fn is_like(&self, other: &Reason) -> bool {
+        (self.train, &self.kind) == (other.train, &other.kind)
+            && (self.text == other.text || self.kind == EventKind::SamplesLost.name())
+    }
+}
+
+/// Whole s since 1970.
+pub fn unix_s(at: SystemTime) -> u64 {
+    at.duration_since(UNIX_EPOCH).map_or(0, |it| it.as_secs())
+}
+
+/// The name under which a stretch or an account comes into being: a ring has one keeper.
+pub fn beside(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!(".{name}.part"))
+}
+
+/// Removes what a recorder that died did not finish: the files have their names in the ring.
+pub fn forget_unfinished(kept: &Path) {
+    let folders = fs::read_dir(kept).into_iter().flatten().flatten().map(|it| it.path());
+    let is_unfinished = |path: &PathBuf| {
+        let name = path.file_name().and_then(|it| it.to_str()).unwrap_or("");
+        name.starts_with('.') && name.ends_with(".part")
+    };
+    for folder in folders.filter(is_unfinished) {
+        // One that stays takes room, and nothing else.
+        let _ = fs::remove_dir_all(folder);
+    }
+}
+
+/// The stretch with the latest end, by what its folder says.
+pub fn newest(kept: &Path) -> Option<(PathBuf, Stretch)> {
+    let folders = fs::read_dir(kept).ok()?.flatten().map(|it| it.path());
+    let known = folders.filter_map(|folder| {
+        let text = fs::read_to_string(folder.join(STRETCH_FILE)).ok()?;
+        Some((folder, toml::from_str::<Stretch>(&text).ok()?))
+    });
+    known.max_by_key(|it| it.1.until_unix_s)
+}
+
+/// Bytes of all files that are kept, each once.
+pub fn kept_bytes(kept: &Path) -> u64 {
+    let folders = fs::read_dir(kept).into_iter().flatten().flatten();
+    let files = folders.filter_map(|it| fs::read_dir(it.path()).ok()).flatten().flatten();
+    let known = files.filter_map(|it| it.metadata().ok()).map(|it| (it.ino(), it.len()));
+    known.collect::<HashMap<u64, u64>>().values().sum()
+}

@@ -1,0 +1,53 @@
+//! A force by a law of the speed that no term follows: bands of speed, in each of which it may be another.
+//!
+//! Whatever the law is, if it depends on the speed and a, b, c do not follow it, then some band holds more or
+//! less of it than its neighbours. One band alone is no law, but it is a better account of such a force than a
+//! wind or a brake: what it explains best has no name.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Least, Seen, Suspect};
+
+/// Speed in m/s from the middle of a band to those of its neighbours, where it ends.
+const WIDTH_MPS: f64 = 7.5;
+
+/// Share of a band that a speed lies in; bands add up to 1 everywhere, the last has no end.
+fn share(band: usize, speed_mps: f64) -> f64 {
+    let place = speed_mps / WIDTH_MPS - band as f64;
+    if band + 1 == BANDS.len() && place > 0.0 { 1.0 } else { (1.0 - place.abs()).max(0.0) }
+}
+
+/// 1 N/kN in a band.
+const fn of(unit: fn(&Seen) -> f64) -> Suspect {
+    Suspect {
+        effect: EffectKind::Unknown,
+        prior_std: 1.0,
+        is_positive: false,
+        least: Least::Share(1.0),
+        changes_at_stops: false,
+        unit,
+    }
+}
+
+/// From standing to fast.
+pub const BANDS: [Suspect; 5] = [
+    of(|seen| share(0, seen.speed_mps)),
+    of(|seen| share(1, seen.speed_mps)),
+    of(|seen| share(2, seen.speed_mps)),
+    of(|seen| share(3, seen.speed_mps)),
+    of(|seen| share(4, seen.speed_mps)),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_add_up_to_one_at_every_speed() {
+        for tenths in 0..1000 {
+            let speed_mps = 0.1 * f64::from(tenths);
+            let sum: f64 = (0..BANDS.len()).map(|band| share(band, speed_mps)).sum();
+            assert!((sum - 1.0).abs() < 1e-12, "{speed_mps} m/s: {sum}");
+        }
+    }
+}

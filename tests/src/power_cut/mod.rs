@@ -1,0 +1,191 @@
+//! A disk that loses what was not brought to it: every state in which a power cut may leave it.
+//!
+//! The disk is asked what [`Storage`] asks of one, and notes each step. After a cut there are, in
+//! any combination: names whose change was not brought to the disk, changed or not, each on its
+//! own; and of the bytes of a file that were not, none, half, all, or as many zeros. A renaming is
+//! whole or not at all, as on every journalling file system.
+//!
+//! [`NotedDisk`] does the same beside a real folder, for whoever also reads what is there.
+
+mod noted;
+mod steps;
+
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use dynocar::storage::{Rights, Storage};
+
+pub use noted::NotedDisk;
+use steps::{AfterSteps, Step, apply};
+
+/// Which of its duties a disk neglects, to show that the tests notice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Neglect {
+    /// None.
+    Nothing,
+    /// Bytes are never brought to the disk.
+    Bytes,
+    /// Names are never brought to the disk.
+    Names,
+}
+
+/// What a disk was asked for.
+#[derive(Debug)]
+struct Asked {
+    neglect: Neglect,
+    steps: Vec<Step>,
+    /// Files by name as the running system sees them.
+    names: BTreeMap<PathBuf, usize>,
+    files: usize,
+}
+
+impl Asked {
+    fn note(&mut self, step: Step) {
+        let is_neglected = match step {
+            Step::SyncBytes { .. } => self.neglect == Neglect::Bytes,
+            Step::SyncNames { .. } => self.neglect == Neglect::Names,
+            _ => false,
+        };
+        if !is_neglected {
+            self.steps.push(step);
+        }
+    }
+
+    fn make(&mut self, path: &Path) -> io::Result<usize> {
+        if self.names.contains_key(path) {
+            return Err(io::ErrorKind::AlreadyExists.into());
+        }
+        let file = self.files;
+        self.files += 1;
+        self.names.insert(path.into(), file);
+        self.note(Step::Make { path: path.into(), file });
+        Ok(file)
+    }
+
+    fn file(&self, path: &Path) -> io::Result<usize> {
+        Ok(self.names.get(path).copied().ok_or(io::ErrorKind::NotFound)?)
+    }
+}
+
+/// The disk, with all that was asked of it.
+#[derive(Clone, Debug)]
+pub struct LossyDisk {
+    asked: Arc<Mutex<Asked>>,
+}
+
+/// What is on the disk after a cut: content by name.
+pub type Left = BTreeMap<PathBuf, Vec<u8>>;
+
+impl LossyDisk {
+    /// An empty disk.
+    pub fn new(neglect: Neglect) -> Self {
+        let names = BTreeMap::new();
+        let asked = Asked { neglect, steps: Vec::new(), names, files: 0 };
+        LossyDisk { asked: Arc::new(Mutex::new(asked)) }
+    }
+
+    fn asked(&self) -> MutexGuard<'_, Asked> {
+        self.asked.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Steps so far: power may be cut after any number of them.
+    pub fn steps(&self) -> usize {
+        self.asked().steps.len()
+    }
+
+    /// Everything that a cut after so many steps may leave.
+    pub fn left_after(&self, count: usize) -> Vec<Left> {
+        let mut disk = AfterSteps::default();
+        self.asked().steps[..count].iter().for_each(|step| disk.take(step));
+        disk.left()
+    }
+}
+
+impl Storage for LossyDisk {
+    fn write_new(&self, path: &Path, content: &[u8], _: &Rights) -> io::Result<()> {
+        let mut asked = self.asked();
+        let file = asked.make(path)?;
+        asked.note(Step::Write { file, bytes: content.into() });
+        asked.note(Step::SyncBytes { file });
+        Ok(())
+    }
+
+    fn create(&self, path: &Path) -> io::Result<Box<dyn Write + Send>> {
+        let file = self.asked().make(path)?;
+        Ok(Box::new(Growing { disk: self.clone(), file }))
+    }
+
+    fn sync_file(&self, path: &Path) -> io::Result<()> {
+        let mut asked = self.asked();
+        let file = asked.file(path)?;
+        asked.note(Step::SyncBytes { file });
+        Ok(())
+    }
+
+    fn link(&self, from: &Path, to: &Path) -> io::Result<()> {
+        let mut asked = self.asked();
+        let file = asked.file(from)?;
+        asked.names.insert(to.into(), file);
+        asked.note(Step::Link { to: to.into(), file });
+        Ok(())
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        let mut asked = self.asked();
+        let file = asked.names.remove(from).ok_or(io::ErrorKind::NotFound)?;
+        asked.names.insert(to.into(), file);
+        asked.note(Step::Rename { from: from.into(), to: to.into(), file });
+        Ok(())
+    }
+
+    fn rename_new(&self, from: &Path, to: &Path) -> io::Result<()> {
+        let mut asked = self.asked();
+        if asked.names.keys().any(|name| name.starts_with(to)) {
+            return Err(io::ErrorKind::AlreadyExists.into());
+        }
+        if asked.names.contains_key(from) {
+            drop(asked);
+            return self.rename(from, to);
+        }
+        let step = Step::RenameFolder { from: from.into(), to: to.into() };
+        apply(&step, &mut asked.names);
+        asked.note(step);
+        Ok(())
+    }
+
+    // A folder is there with the files in it.
+    fn make_folder(&self, _: &Path) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn remove(&self, path: &Path) -> io::Result<()> {
+        let mut asked = self.asked();
+        asked.names.remove(path).ok_or(io::ErrorKind::NotFound)?;
+        asked.note(Step::Remove { path: path.into() });
+        Ok(())
+    }
+
+    fn sync_directory(&self, path: &Path) -> io::Result<()> {
+        self.asked().note(Step::SyncNames { folder: path.into() });
+        Ok(())
+    }
+}
+
+/// A file of the disk that is written bit by bit.
+struct Growing {
+    disk: LossyDisk,
+    file: usize,
+}
+
+impl Write for Growing {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.disk.asked().note(Step::Write { file: self.file, bytes: bytes.into() });
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}

@@ -1,0 +1,174 @@
+//! What was asked of a disk, step by step, and what a power cut leaves of it.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use dynocar::storage::folder_of;
+
+use super::Left;
+
+/// Changes of names that are taken in any combination; older ones are taken as done.
+const NAMES_MAX: usize = 8;
+
+/// One thing that was asked for.
+#[derive(Clone, Debug)]
+pub enum Step {
+    /// A new file.
+    Make { path: PathBuf, file: usize },
+    /// At the end of a file.
+    Write { file: usize, bytes: Vec<u8> },
+    /// What was written is there for good.
+    SyncBytes { file: usize },
+    /// A second name.
+    Link { to: PathBuf, file: usize },
+    /// Of a file.
+    Rename { from: PathBuf, to: PathBuf, file: usize },
+    /// Of a folder: all its files at once.
+    RenameFolder { from: PathBuf, to: PathBuf },
+    /// Of a name.
+    Remove { path: PathBuf },
+    /// The names in a folder are there for good.
+    SyncNames { folder: PathBuf },
+}
+
+impl Step {
+    /// The folder in which a step changes names.
+    fn folder(&self) -> Option<&Path> {
+        match self {
+            Step::Make { path, .. } | Step::Remove { path } => Some(folder_of(path)),
+            Step::Link { to, .. } | Step::Rename { to, .. } | Step::RenameFolder { to, .. } => {
+                Some(folder_of(to))
+            }
+            Step::Write { .. } | Step::SyncBytes { .. } | Step::SyncNames { .. } => None,
+        }
+    }
+}
+
+/// Bytes of a file: all, and how many of them are there for good.
+#[derive(Clone, Debug, Default)]
+struct Bytes {
+    written: Vec<u8>,
+    lasting: usize,
+}
+
+/// The disk after some steps.
+#[derive(Debug, Default)]
+pub struct AfterSteps {
+    lasting_names: BTreeMap<PathBuf, usize>,
+    changes: Vec<Step>,
+    files: BTreeMap<usize, Bytes>,
+}
+
+impl AfterSteps {
+    /// One step more.
+    pub fn take(&mut self, step: &Step) {
+        match step {
+            Step::Write { file, bytes } => {
+                self.files.entry(*file).or_default().written.extend_from_slice(bytes);
+            }
+            Step::SyncBytes { file } => {
+                let bytes = self.files.entry(*file).or_default();
+                bytes.lasting = bytes.written.len();
+            }
+            Step::SyncNames { folder } => {
+                let changes = std::mem::take(&mut self.changes);
+                let (done, open): (Vec<Step>, Vec<Step>) =
+                    changes.into_iter().partition(|it| it.folder() == Some(folder));
+                done.iter().for_each(|change| apply(change, &mut self.lasting_names));
+                self.changes = open;
+            }
+            Step::Make { .. }
+            | Step::Link { .. }
+            | Step::Rename { .. }
+            | Step::RenameFolder { .. }
+            | Step::Remove { .. } => {
+                self.changes.push(step.clone());
+            }
+        }
+    }
+
+    /// Everything that a cut now may leave.
+    pub fn left(&self) -> Vec<Left> {
+        let done = self.changes.len().saturating_sub(NAMES_MAX);
+        let (old, open) = self.changes.split_at(done);
+        let mut all = Vec::new();
+        for chosen in 0..1_u32 << open.len() {
+            let mut names = self.lasting_names.clone();
+            old.iter().for_each(|change| apply(change, &mut names));
+            for (place, change) in open.iter().enumerate() {
+                if chosen >> place & 1 == 1 {
+                    apply(change, &mut names);
+                }
+            }
+            all.extend(self.with_bytes(&names));
+        }
+        all
+    }
+
+    /// Every combination of the contents that the named files may have; two names of a file have the same.
+    fn with_bytes(&self, names: &BTreeMap<PathBuf, usize>) -> Vec<Left> {
+        let mut names_of: BTreeMap<usize, Vec<&PathBuf>> = BTreeMap::new();
+        for (path, file) in names {
+            names_of.entry(*file).or_default().push(path);
+        }
+        let mut all = vec![Left::new()];
+        for (file, paths) in names_of {
+            let contents = self.files.get(&file).map_or(vec![Vec::new()], Bytes::contents);
+            all = all
+                .iter()
+                .flat_map(|left| {
+                    contents.iter().map(|content| {
+                        let mut left = left.clone();
+                        left.extend(paths.iter().map(|&path| (path.clone(), content.clone())));
+                        left
+                    })
+                })
+                .collect();
+        }
+        all
+    }
+}
+
+impl Bytes {
+    fn contents(&self) -> Vec<Vec<u8>> {
+        let (lasting, open) = self.written.split_at(self.lasting);
+        if open.is_empty() {
+            return vec![lasting.into()];
+        }
+        let half = &open[..open.len() / 2];
+        let zeros = vec![0; open.len()];
+        vec![
+            lasting.into(),
+            [lasting, half].concat(),
+            [lasting, &zeros].concat(),
+            self.written.clone(),
+        ]
+    }
+}
+
+/// A change of names takes place.
+pub fn apply(change: &Step, names: &mut BTreeMap<PathBuf, usize>) {
+    match change {
+        Step::Make { path, file } => {
+            names.insert(path.clone(), *file);
+        }
+        Step::Link { to, file } => {
+            names.insert(to.clone(), *file);
+        }
+        Step::Rename { from, to, file } => {
+            names.remove(from);
+            names.insert(to.clone(), *file);
+        }
+        Step::RenameFolder { from, to } => {
+            let inside = |name: &PathBuf| Some(to.join(name.strip_prefix(from).ok()?));
+            *names = std::mem::take(names)
+                .into_iter()
+                .map(|(name, file)| (inside(&name).unwrap_or(name), file))
+                .collect();
+        }
+        Step::Remove { path } => {
+            names.remove(path);
+        }
+        Step::Write { .. } | Step::SyncBytes { .. } | Step::SyncNames { .. } => {}
+    }
+}
