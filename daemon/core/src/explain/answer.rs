@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::stop_to_stop::StopToStop;
 use crate::dataset::Note;
 use crate::plausibility::Severity;
 
@@ -271,6 +272,10 @@ pub struct Answer {
     pub error_reduction_interval: Option<[f64; 2]>,
     /// The same errors restarted every 60 s: before and after.
     pub window60: Option<[f64; 2]>,
+    /// Errors of the holdout runs from stop to stop, each from its departure; absent where they do
+    /// not stop twice.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stop_to_stop: Option<StopToStop>,
     /// The same errors on the fit runs: before and after.
     pub fit_runs: Option<[f64; 2]>,
     /// What stays unexplained and is taken for noise: a force of this standard deviation in N/kN

@@ -8,7 +8,7 @@
 //! - [`scan`], [`places`], [`residual_pressure`]: what a force of some shape, at some place or
 //!   time, would explain
 //! - [`selection`]: the search for effects, its significance, evidence by run
-//! - [`score`]: open-loop prediction of fit and holdout runs
+//! - [`score`], [`stop_to_stop`]: open-loop prediction of fit and holdout runs
 //! - [`unexplained`], [`told`], [`rivals`], [`runners_up`], [`verdict`], [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
 //!
@@ -25,6 +25,7 @@ pub mod runners_up;
 pub mod scan;
 pub mod score;
 pub mod selection;
+pub mod stop_to_stop;
 pub mod told;
 pub mod unexplained;
 pub mod verdict;

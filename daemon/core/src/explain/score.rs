@@ -1,6 +1,7 @@
 //! Open-loop prediction: the judge of a finished model.
 
 use super::evidence::{Fit, FitProblem, GrownForces, RunData};
+use super::stop_to_stop::StopToStop;
 use crate::simulate::{Prediction, Restart, SpeedError};
 
 /// Errors of the model without and with the effects.
@@ -10,6 +11,8 @@ pub struct Score {
     pub holdout_runs: Vec<[SpeedError; 2]>,
     /// Holdout runs restarted every 60 s: before and after.
     pub holdout_window60: [SpeedError; 2],
+    /// Holdout runs from stop to stop; `None` where they do not stop twice.
+    pub holdout_stop_to_stop: Option<StopToStop>,
     /// Whole fit runs: before and after.
     pub fit_runs: [SpeedError; 2],
 }
@@ -110,6 +113,7 @@ impl Score {
         Score {
             holdout_runs: holdout.iter().map(|run| both(run, Restart::FullRun)).collect(),
             holdout_window60: summed(holdout, Restart::WINDOW_60),
+            holdout_stop_to_stop: StopToStop::of(holdout, before, after),
             fit_runs: summed(&problem.runs, Restart::FullRun),
         }
     }

@@ -81,6 +81,7 @@ pub fn answer(
         rmse_after,
         error_reduction_interval: score.reduction_interval(),
         window60: pair(score.holdout_window60),
+        stop_to_stop: score.holdout_stop_to_stop.clone(),
         fit_runs: pair(score.fit_runs),
         unexplained_n_per_kn: left.map(|left| left.n_per_kn),
         considered: considered(search, outcome, &rivals),
