@@ -212,6 +212,31 @@ pub struct Considered {
     pub remark: String,
 }
 
+/// A value with its standard deviation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Told {
+    /// The value.
+    pub value: f64,
+    /// Its standard deviation.
+    pub std: f64,
+}
+
+/// A drive whose force comes from its electric power.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DriveAnswer {
+    /// Share of the power that reaches the rims, for the declared mass: both scale alike.
+    pub efficiency: Told,
+    /// Power in kW that is fed beside the drive; absent where the drive's own power is recorded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub auxiliary_power_kw: Option<Told>,
+    /// The declared efficiency, with which forces were read; absent where the usual one was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub declared_efficiency: Option<f64>,
+    /// What lies at a bound of what is looked for: it is not told, and the declared drive stays.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_bound: Option<&'static str>,
+}
+
 /// Davis coefficients with their standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BaseAnswer {
@@ -278,6 +303,9 @@ pub struct Answer {
     pub stop_to_stop: Option<StopToStop>,
     /// The same errors on the fit runs: before and after.
     pub fit_runs: Option<[f64; 2]>,
+    /// The drive, where the force comes from its power.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drive: Option<DriveAnswer>,
     /// What stays unexplained and is taken for noise: a force of this standard deviation in N/kN
     /// on average over a minute; absent without motion.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -4,6 +4,7 @@
 //! # Layout, in the order of the work
 //!
 //! - [`evidence`]: observations, noise, the joint fit of a, b, c and effects
+//! - [`drive`]: the efficiency of a drive of which only the power is recorded
 //! - [`effects`]: the library, one file for each kind
 //! - [`scan`], [`places`], [`residual_pressure`]: what a force of some shape, at some place or
 //!   time, would explain
@@ -15,6 +16,7 @@
 //! [`explain`] runs it all.
 
 pub mod answer;
+pub mod drive;
 pub mod effects;
 pub mod evidence;
 pub mod places;
@@ -69,6 +71,9 @@ pub struct Explanation {
 /// When a run has no usable sample.
 pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, RunDataError> {
     progress(0.0, "reading the runs");
+    let told_drive = drive::told(dataset)?;
+    let retaken = told_drive.as_ref().map(|told| dataset.with_drive(told.drive));
+    let dataset = retaken.as_ref().unwrap_or(dataset);
     let (fit_runs, holdout): (Vec<RunData>, Vec<RunData>) =
         evidence::prepare(dataset)?.into_iter().partition(|run| run.role == Role::Fit);
     let problem = FitProblem::new(fit_runs, dataset.train.resistance);
@@ -90,7 +95,11 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
     progress(0.95, "scoring the holdout runs");
     let score = Score::of(&problem, &holdout, &outcome.base, &outcome.fit);
     let predictions = score::predictions(&problem, &holdout, &outcome.fit);
-    let answer = verdict::answer(&search, &outcome, &known, &score, notes);
+    let mut answer = verdict::answer(&search, &outcome, &known, &score, notes);
+    if let Some(told) = told_drive {
+        answer.statement += &told.answer.sentence();
+        answer.drive = Some(told.answer);
+    }
     let strength = search.greatest_strength(&outcome);
     progress(1.0, "done");
     let (base, grown) = (outcome.base.clone(), outcome.fit.clone());

@@ -2,7 +2,7 @@
 
 use super::evidence::{Fit, FitProblem, GrownForces, RunData};
 use super::stop_to_stop::StopToStop;
-use crate::simulate::{Prediction, Restart, SpeedError};
+use crate::simulate::{Prediction, Restart, SpeedError, stop_runs};
 
 /// Errors of the model without and with the effects.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,6 +34,23 @@ pub fn run_error(fit: &Fit, run: &RunData, restart: Restart) -> SpeedError {
     fit.model.forces(run, &fit.theta, &mut forces);
     prediction.simulate(&run.recording, &forces, restart);
     SpeedError::of(&run.recording, &prediction)
+}
+
+/// Errors of recorded runs from stop to stop, by the models without and with the effects; `None`
+/// where none of them goes from stop to stop.
+pub fn stop_to_stop(runs: &[RunData], before: &Fit, after: &Fit) -> Option<StopToStop> {
+    let errors_mps = |fit: &Fit, run: &RunData| {
+        let (mut forces, mut prediction) = (GrownForces::default(), Prediction::new());
+        fit.model.forces(run, &fit.theta, &mut forces);
+        prediction.simulate(&run.recording, &forces, Restart::AtDepartures);
+        let within = |part| SpeedError::within(&run.recording, &prediction, part).rmse_mps();
+        stop_runs(&run.recording).into_iter().filter_map(within).collect::<Vec<f64>>()
+    };
+    let of_run = |run: &RunData| {
+        let pairs = errors_mps(before, run).into_iter().zip(errors_mps(after, run));
+        pairs.map(|(before, after)| [before, after]).collect()
+    };
+    StopToStop::from_errors(runs.iter().map(of_run).collect())
 }
 
 /// Open-loop errors of the fit runs.
@@ -113,7 +130,7 @@ impl Score {
         Score {
             holdout_runs: holdout.iter().map(|run| both(run, Restart::FullRun)).collect(),
             holdout_window60: summed(holdout, Restart::WINDOW_60),
-            holdout_stop_to_stop: StopToStop::of(holdout, before, after),
+            holdout_stop_to_stop: stop_to_stop(holdout, before, after),
             fit_runs: summed(&problem.runs, Restart::FullRun),
         }
     }

@@ -3,9 +3,7 @@
 
 use serde::Serialize;
 
-use super::evidence::{Fit, GrownForces, RunData};
 use crate::filter::random::Random;
-use crate::simulate::{Prediction, Restart, stop_run_errors_mps};
 
 /// Bootstrap draws.
 const DRAWS: usize = 2000;
@@ -28,26 +26,8 @@ pub struct StopToStop {
     pub errors_mps: Vec<Vec<[f64; 2]>>,
 }
 
-/// Errors in m/s of a model from stop to stop in a run, each restarted at its departure from rest.
-fn errors_mps(fit: &Fit, run: &RunData) -> Vec<f64> {
-    let (mut forces, mut prediction) = (GrownForces::default(), Prediction::new());
-    fit.model.forces(run, &fit.theta, &mut forces);
-    prediction.simulate(&run.recording, &forces, Restart::AtDepartures);
-    stop_run_errors_mps(&run.recording, &prediction)
-}
-
 impl StopToStop {
-    /// Of some recorded runs by the models without and with the effects; `None` where none of them
-    /// goes from stop to stop.
-    pub fn of(runs: &[RunData], before: &Fit, after: &Fit) -> Option<Self> {
-        let of_run = |run: &RunData| {
-            let pairs = errors_mps(before, run).into_iter().zip(errors_mps(after, run));
-            pairs.map(|(before, after)| [before, after]).collect()
-        };
-        StopToStop::from_errors(runs.iter().map(of_run).collect())
-    }
-
-    /// Of errors in m/s before and after, by recorded run.
+    /// Of errors in m/s before and after, by recorded run; `None` without any.
     pub fn from_errors(errors_mps: Vec<Vec<[f64; 2]>>) -> Option<Self> {
         let mut by_run = errors_mps.clone();
         by_run.retain(|errors| !errors.is_empty());

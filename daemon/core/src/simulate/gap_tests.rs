@@ -191,7 +191,9 @@ fn a_run_from_stop_to_stop_is_predicted_from_its_departure() {
         assert!(true_mps[run.start] <= 0.3 && true_mps[run.start + 1] > 0.3);
         assert!(true_mps[run.end - 1] <= 0.3 && true_mps[run.end - 2] > 0.3);
     }
-    let errors_mps = stop_run_errors_mps(&wrong, &predict(&wrong, Restart::AtDepartures));
+    let prediction = predict(&wrong, Restart::AtDepartures);
+    let error = |run| SpeedError::within(&wrong, &prediction, run).rmse_mps().unwrap();
+    let errors_mps: Vec<f64> = runs.into_iter().map(error).collect();
     assert!(errors_mps[0] < 0.01 && errors_mps[1] > 0.3, "{errors_mps:?}");
     // A run that starts in motion or ends in it is none, nor is one with a gap of the forces.
     let mut gap: Vec<_> = with(1.0).samples().to_vec();

@@ -40,4 +40,4 @@ pub use force_model::{ForceModel, QuadraticForces};
 pub use metric::{MOVING_SPEED_MPS, SpeedError};
 pub use prediction::{Prediction, Restart};
 pub use recording::{BridgeLimits, Recording, SimulateError, is_pulled};
-pub use stop_runs::{stop_run_errors_mps, stop_runs};
+pub use stop_runs::stop_runs;

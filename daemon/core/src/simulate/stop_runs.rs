@@ -2,8 +2,6 @@
 
 use std::ops::Range;
 
-use super::metric::{MOVING_SPEED_MPS, SpeedError};
-use super::prediction::Prediction;
 use super::recording::Recording;
 use crate::force::ResolvedSample;
 
@@ -32,7 +30,7 @@ pub fn stop_runs(recording: &Recording) -> Vec<Range<usize>> {
         } else if let Some(start) = from
             && samples[index].speed_mps <= STANDING_MPS
         {
-            let moving = |at: &usize| samples[*at].speed_mps > MOVING_SPEED_MPS;
+            let moving = |at: &usize| samples[*at].speed_mps > STANDING_MPS;
             let moving_s: f64 =
                 (start + 1..=index).filter(moving).map(|at| time_s[at] - time_s[at - 1]).sum();
             if moving_s >= MOVING_MIN_S {
@@ -45,15 +43,4 @@ pub fn stop_runs(recording: &Recording) -> Vec<Range<usize>> {
         }
     }
     runs
-}
-
-/// Root mean square in m/s of a prediction that starts anew at every departure, for each run from
-/// stop to stop.
-///
-/// # Panics
-///
-/// When the prediction belongs to another run.
-pub fn stop_run_errors_mps(recording: &Recording, prediction: &Prediction) -> Vec<f64> {
-    let within = stop_runs(recording).into_iter();
-    within.filter_map(|run| SpeedError::within(recording, prediction, run).rmse_mps()).collect()
 }

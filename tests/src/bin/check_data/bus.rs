@@ -12,6 +12,7 @@ use dynocar_core::explain::explain;
 use dynocar_core::explain::stop_to_stop::StopToStop;
 use dynocar_shared::PipelineKind;
 
+use super::bus_variants::{self, ByPower, OtherDay};
 use super::report::Report;
 use super::stop_masses::{self, Masses};
 
@@ -41,6 +42,16 @@ pub fn check(report: &mut Report, folder: &Path) {
     report.note("bus: 60 s in open loop, trips left out two by two", error);
     let stops = outcome.as_ref().map_err(Clone::clone).and_then(LeftOut::from_stop_to_stop);
     report.note("bus: from stop to stop in open loop, trips left out two by two", stops);
+    let days = outcome.as_ref().map_err(Clone::clone);
+    report.note(
+        "bus: 60 s in open loop, trips mapped as another day's",
+        days.and_then(|it| bus_variants::other_days(&it.another_day)),
+    );
+    let powers = outcome.as_ref().map_err(Clone::clone);
+    report.note(
+        "bus: its force from power, trips left out two by two",
+        powers.and_then(|it| bus_variants::powers(&it.power)),
+    );
     let climbs = outcome.as_ref().map_err(Clone::clone).and_then(|it| told_to_climb(&it.level));
     report.note("bus: its line declared level", climbs);
     for (place, (told, ..)) in WAYS.iter().enumerate() {
@@ -70,6 +81,10 @@ struct LeftOut {
     /// From stop to stop, before and after effects, by trip.
     stop_errors_mps: Vec<Vec<[f64; 2]>>,
     masses: [Masses; WAYS.len()],
+    /// The trips mapped as another day's, by pair.
+    another_day: Vec<OtherDay>,
+    /// Their force from power, by pair.
+    power: Vec<ByPower>,
     /// What is found when the first of these lines is declared level.
     level: Option<ExplainAnswer>,
 }
@@ -135,6 +150,9 @@ fn left_out(folder: &Path, whole: &Answer) -> Result<LeftOut, String> {
         all.errors_mps.push(score.rmse_mps().ok_or("no trip is held out")?);
         let stops = explained.score.holdout_stop_to_stop.ok_or("no trip stops twice")?;
         all.stop_errors_mps.extend(stops.errors_mps);
+        let trips = [first, first + 1];
+        all.another_day.push(bus_variants::of_another_day(raw.path(), out.path(), trips)?);
+        all.power.push(bus_variants::by_power(out.path())?);
         if first == 0 {
             let level = declared_level(out.path())?;
             let explained = explain(&level, &|_, _| {}).map_err(|error| error.to_string())?;
@@ -186,6 +204,7 @@ fn cut(
         Some((head, runs)) => (head.to_string(), runs),
         None => (described.clone(), ""),
     };
+    manifest += "line_power = { column = \"electric_powerDemand\", unit = \"W\" }\n";
     let file = runs.split('"').nth(1).unwrap_or_default();
     let text = std::fs::read_to_string(folder.join(file))?;
     let (head, rows) = text.split_once('\n').unwrap_or((&text, ""));

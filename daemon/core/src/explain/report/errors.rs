@@ -4,7 +4,7 @@ use super::Estimate;
 use crate::dataset::Role;
 use crate::explain::Explanation;
 use crate::explain::evidence::{Fit, GrownForces, RunData};
-use crate::explain::score::run_error;
+use crate::explain::score::{run_error, stop_to_stop};
 use crate::explain::stop_to_stop::StopToStop;
 use crate::filter::random::Random;
 use crate::simulate::{Prediction, Restart, SpeedError};
@@ -89,7 +89,7 @@ impl Errors {
             fit_window60: pair(fit, Restart::WINDOW_60),
             holdout_window60: pair(holdout, Restart::WINDOW_60),
             holdout_stop_to_stop: explanation.score.holdout_stop_to_stop.clone(),
-            fit_stop_to_stop: StopToStop::of(fit, before, after),
+            fit_stop_to_stop: stop_to_stop(fit, before, after),
             by_run: fit.iter().chain(holdout).map(|run| run_errors(run, before, after)).collect(),
         }
     }

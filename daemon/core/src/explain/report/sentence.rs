@@ -259,6 +259,7 @@ mod tests {
             window60: None,
             stop_to_stop: None,
             fit_runs: None,
+            drive: None,
             unexplained_n_per_kn: None,
             considered: Vec::new(),
             predictions: std::collections::BTreeMap::new(),
