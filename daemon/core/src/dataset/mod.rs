@@ -136,6 +136,13 @@ pub struct Dataset {
 }
 
 impl Dataset {
+    /// The same with forces that act `late_s` before their stamps taken where they act.
+    pub fn with_forces_moved(&self, late_s: f64) -> Dataset {
+        let mut dataset = self.clone();
+        dataset.runs.iter_mut().for_each(|run| run.move_forces(late_s));
+        dataset
+    }
+
     /// The same with the forces that come from power taken from another drive.
     pub fn with_drive(&self, drive: Drive) -> Dataset {
         let mut dataset = self.clone();

@@ -16,6 +16,7 @@ use super::remark::{self, Remark};
 use super::resolved::{Context, GradientSource, Resolved};
 use super::table::Table;
 use crate::plausibility;
+use crate::terms::delay;
 use crate::train::Drive;
 
 /// Quantities that a sample does not carry, one value for each sample, `None` where missing.
@@ -94,6 +95,28 @@ impl Run {
         match filled(&extras.traction_power_w) {
             true => Some((extras.traction_power_w.as_ref()?, false)),
             false => Some((extras.line_power_w.as_ref()?, true)),
+        }
+    }
+
+    /// Takes forces that act `late_s` before their stamps where they act.
+    pub(super) fn move_forces(&mut self, late_s: f64) {
+        let mut rows: Vec<usize> = (0..self.samples.len()).collect();
+        let mut last_ns = i64::MIN;
+        // Rows out of order are refused later on.
+        rows.retain(|&row| {
+            let is_next = self.samples[row].time_ns > last_ns;
+            last_ns = last_ns.max(self.samples[row].time_ns);
+            is_next
+        });
+        for pair in rows.windows(2) {
+            let ahead = self.samples[pair[1]];
+            let sample = &mut self.samples[pair[0]];
+            let step_s = (ahead.time_ns - sample.time_ns) as f64 * 1e-9;
+            for field in [SampleField::TractionForce, SampleField::BrakeForce] {
+                if let Some((here_n, ahead_n)) = sample.get(field).zip(ahead.get(field)) {
+                    sample.set(field, delay::stamped_late(here_n, ahead_n, step_s, late_s));
+                }
+            }
         }
     }
 

@@ -306,6 +306,10 @@ pub struct Answer {
     /// The drive, where the force comes from its power.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drive: Option<DriveAnswer>,
+    /// Seconds by which forces act before their stamps; absent where samples are dense or it is not
+    /// told.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_late_s: Option<Told>,
     /// What stays unexplained and is taken for noise: a force of this standard deviation in N/kN
     /// on average over a minute; absent without motion.
     #[serde(skip_serializing_if = "Option::is_none")]

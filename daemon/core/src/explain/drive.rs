@@ -182,8 +182,7 @@ pub fn told(dataset: &Dataset) -> Result<Option<ToldDrive>, RunDataError> {
     let declared = dataset.train.drive;
     let drive = declared.unwrap_or(Drive::USUAL);
     let holds_more = |run: &&RunData| run.power.as_ref().is_some_and(|it| it.has_auxiliaries);
-    let resting =
-        powered.iter().any(|run| holds_more(run)).then(|| Auxiliaries::of(&powered, drive));
+    let resting = powered.iter().any(holds_more).then(|| Auxiliaries::of(&powered, drive));
     let open = OpenDrive::new(drive, resting);
     let problem = FitProblem::new(runs, dataset.train.resistance);
     Ok(told_by(&problem, open, declared))

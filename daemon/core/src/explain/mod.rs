@@ -5,6 +5,7 @@
 //!
 //! - [`evidence`]: observations, noise, the joint fit of a, b, c and effects
 //! - [`drive`]: the efficiency of a drive of which only the power is recorded
+//! - [`force_time`]: forces that act before their stamps
 //! - [`effects`]: the library, one file for each kind
 //! - [`scan`], [`places`], [`residual_pressure`]: what a force of some shape, at some place or
 //!   time, would explain
@@ -19,6 +20,7 @@ pub mod answer;
 pub mod drive;
 pub mod effects;
 pub mod evidence;
+pub mod force_time;
 pub mod places;
 pub mod report;
 pub mod residual_pressure;
@@ -74,6 +76,9 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
     let told_drive = drive::told(dataset)?;
     let retaken = told_drive.as_ref().map(|told| dataset.with_drive(told.drive));
     let dataset = retaken.as_ref().unwrap_or(dataset);
+    let late = force_time::told(dataset)?;
+    let moved = late.map(|late| dataset.with_forces_moved(late.value));
+    let dataset = moved.as_ref().unwrap_or(dataset);
     let (fit_runs, holdout): (Vec<RunData>, Vec<RunData>) =
         evidence::prepare(dataset)?.into_iter().partition(|run| run.role == Role::Fit);
     let problem = FitProblem::new(fit_runs, dataset.train.resistance);
@@ -99,6 +104,10 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
     if let Some(told) = told_drive {
         answer.statement += &told.answer.sentence();
         answer.drive = Some(told.answer);
+    }
+    if let Some(late) = late {
+        answer.statement += &force_time::sentence(late);
+        answer.force_late_s = Some(late);
     }
     let strength = search.greatest_strength(&outcome);
     progress(1.0, "done");

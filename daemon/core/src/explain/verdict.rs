@@ -84,6 +84,7 @@ pub fn answer(
         stop_to_stop: score.holdout_stop_to_stop.clone(),
         fit_runs: pair(score.fit_runs),
         drive: None,
+        force_late_s: None,
         unexplained_n_per_kn: left.map(|left| left.n_per_kn),
         considered: considered(search, outcome, &rivals),
         predictions: BTreeMap::new(),

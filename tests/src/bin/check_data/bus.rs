@@ -40,7 +40,7 @@ pub fn check(report: &mut Report, folder: &Path) {
     let outcome = whole.and_then(|answer| left_out(folder, &answer));
     let error = outcome.as_ref().map_err(Clone::clone).and_then(LeftOut::error);
     report.note("bus: 60 s in open loop, trips left out two by two", error);
-    let stops = outcome.as_ref().map_err(Clone::clone).and_then(LeftOut::from_stop_to_stop);
+    let stops = outcome.as_ref().map_err(Clone::clone).and_then(LeftOut::stop_to_stop);
     report.note("bus: from stop to stop in open loop, trips left out two by two", stops);
     let days = outcome.as_ref().map_err(Clone::clone);
     report.note(
@@ -99,7 +99,7 @@ impl LeftOut {
 }
 
 impl LeftOut {
-    fn from_stop_to_stop(&self) -> Result<String, String> {
+    fn stop_to_stop(&self) -> Result<String, String> {
         let found = StopToStop::from_errors(self.stop_errors_mps.clone()).ok_or("no stops")?;
         let median_mps = found.median_mps[0];
         let [low, high] = found.interval_95_mps.ok_or("one trip only")?[0];

@@ -260,6 +260,7 @@ mod tests {
             stop_to_stop: None,
             fit_runs: None,
             drive: None,
+            force_late_s: None,
             unexplained_n_per_kn: None,
             considered: Vec::new(),
             predictions: std::collections::BTreeMap::new(),
