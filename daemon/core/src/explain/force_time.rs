@@ -18,6 +18,8 @@ use crate::terms::delay;
 
 /// Samples nearer in time than this in s leave a late stamp to each run's own small delay.
 const STEP_MIN_S: f64 = 0.5;
+/// The same for a late stamp of less than this share of the step between samples.
+const LATE_SHARE_MIN: f64 = 0.1;
 
 const PARAMETERS: [Parameter; 1] = [Parameter::new("force_late_s", (-1.0, 1.0), 0.02)];
 
@@ -55,7 +57,8 @@ impl Hypothesis for LateStamps {
 ///
 /// When a run has no usable sample.
 pub fn told(dataset: &Dataset) -> Result<Option<Told>, RunDataError> {
-    if dataset.runs.iter().all(|run| run.quality.order.step_s < STEP_MIN_S) {
+    let step_s = dataset.runs.iter().map(|run| run.quality.order.step_s).fold(0.0, f64::max);
+    if step_s < STEP_MIN_S {
         return Ok(None);
     }
     let mut runs = prepare(dataset)?;
@@ -70,7 +73,8 @@ pub fn told(dataset: &Dataset) -> Result<Option<Told>, RunDataError> {
     let (deviation, _) = deviations(&fit);
     let late = Told { value: fit.effect_parameters(0)[0], std: deviation[3] };
     let is_inside = LateStamps.at_bound(&[late.value]).is_none();
-    Ok((is_inside && delay::is_stamped_late(late.value, late.std)).then_some(late))
+    let counts = late.value > LATE_SHARE_MIN * step_s && is_inside;
+    Ok((counts && delay::is_stamped_late(late.value, late.std)).then_some(late))
 }
 
 /// What is told of it, as a sentence to follow another.
