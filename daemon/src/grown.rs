@@ -110,6 +110,12 @@ pub fn grown_texts(
     let mut train = table(train, labels.0)?;
     let mut track = track.map(|text| table(text, labels.1)).transpose()?;
     let not_expressed = grow(&explanation.grown, &mut train, track.as_mut());
+    if let Some(drive) = explanation.answer.drive.as_ref().filter(|it| it.at_bound.is_none()) {
+        set(&mut train, "traction", "efficiency", drive.efficiency.value);
+        if let Some(told) = drive.auxiliary_power_kw {
+            set(&mut train, "traction", "auxiliary_power_kw", told.value);
+        }
+    }
     let statement = &explanation.answer.statement;
     let text = |label: &str, table: Table| {
         format!("{GROWN_MARK}{label} of {source} by `dynocar explain`.\n# {statement}\n{table}")

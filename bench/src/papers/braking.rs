@@ -34,6 +34,7 @@ pub fn train() -> TrainModel {
     TrainModel {
         length_m: 200.0,
         cars: 8,
+        drive: None,
         brake_gear: BrakeGear {
             cylinder_diameter_mm: Some(203.0),
             disc_radius_mm: Some(297.6),

@@ -48,6 +48,7 @@ fn train() -> Arc<TrainModel> {
         tunnel_constant_n_per_kn_m: 0.00013,
         traction: EffortCurve::new(vec![(0.0, 60_000.0), (40.0, 30_000.0)]),
         brake: EffortCurve::new(vec![(0.0, 150_000.0)]),
+        drive: None,
         brake_gear: BrakeGear {
             cylinder_diameter_mm: Some(254.0),
             disc_radius_mm: Some(240.0),

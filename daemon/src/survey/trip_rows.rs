@@ -4,15 +4,11 @@ use std::fmt::Write as _;
 
 use dynocar_core::dataset::{Dataset, ForceSource, Quantity, Run};
 use dynocar_core::survey::{Survey, Trip};
+use dynocar_core::terms::delay::{is_stamped_late, stamped_late};
 use dynocar_shared::{SampleField, TrainSample};
 
 use super::material::Material;
 use super::read::rows_in_order;
-
-/// Forces stamped late by less than so many s, or standard deviations, stay as they are.
-const LATE_MIN: (f64, f64) = (0.01, 3.0);
-/// A force is not taken across a longer step in s.
-const STEP_MAX_S: f64 = 2.5;
 
 /// Seconds by which forces are stamped late and are moved, 0 for none.
 pub fn late_s(survey: &Survey) -> f64 {
@@ -20,7 +16,7 @@ pub fn late_s(survey: &Survey) -> f64 {
     let (late_s, std_s) =
         (profile.learned.profile.common.delay_s(), profile.learned.profile.common_std.delay_s());
     // A force that acts after its stamp is an actuator's delay, which is explained, not mended.
-    if late_s > LATE_MIN.0 && late_s > LATE_MIN.1 * std_s { late_s } else { 0.0 }
+    if is_stamped_late(late_s, std_s) { late_s } else { 0.0 }
 }
 
 /// A column of the trips' files.
@@ -47,6 +43,8 @@ pub fn columns(dataset: &Dataset) -> Vec<Column> {
         (Quantity::TractionForce, "N", 1, !is_signed && has(SampleField::TractionForce)),
         (Quantity::BrakeForce, "N", 1, !is_signed && any(has_own_brake)),
         (Quantity::BrakeCylinderPressure, "Pa", 1, has(SampleField::BrakeCylinderPressure)),
+        (Quantity::TractionPower, "W", 0, any(|run| run.extras.traction_power_w.is_some())),
+        (Quantity::LinePower, "W", 0, any(|run| run.extras.line_power_w.is_some())),
         (Quantity::Acceleration, "m/s2", 5, has(SampleField::Acceleration)),
         (Quantity::SpecificForce, "m/s2", 5, has(SampleField::SpecificForce)),
         (Quantity::TrainMass, "kg", 1, has(SampleField::Mass)),
@@ -128,8 +126,7 @@ fn value(
         let here = force(sample)?;
         let Some(next) = next.filter(|_| late_s > 0.0) else { return Some(here) };
         let step_s = (next.time_ns - sample.time_ns) as f64 * 1e-9;
-        let ahead = force(next).filter(|_| step_s <= STEP_MAX_S).unwrap_or(here);
-        Some(here + (late_s / step_s).min(1.0) * (ahead - here))
+        Some(stamped_late(here, force(next).unwrap_or(here), step_s, late_s))
     };
     let traction = |sample: &TrainSample| sample.get(SampleField::TractionForce);
     let own_brake = |sample: &TrainSample| {
@@ -150,6 +147,8 @@ fn value(
         Quantity::SpecificForce => sample.get(SampleField::SpecificForce),
         Quantity::AmbientTemperature => sample.get(SampleField::AmbientTemperature),
         Quantity::Passengers => extra(&run.extras.passengers),
+        Quantity::TractionPower => extra(&run.extras.traction_power_w),
+        Quantity::LinePower => extra(&run.extras.line_power_w),
         Quantity::Altitude => extra(&run.extras.altitude_m),
         Quantity::Latitude => extra(&run.extras.latitude_deg),
         Quantity::Longitude => extra(&run.extras.longitude_deg),

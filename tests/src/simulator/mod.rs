@@ -31,6 +31,7 @@ pub mod gnss;
 pub mod line_maker;
 pub mod oracle;
 pub mod permitted_speed;
+pub mod power;
 pub mod random;
 pub mod run_maker;
 pub mod sensors;
@@ -45,7 +46,9 @@ use dynocar_core::train::TrainModel;
 use dynocar_shared::TrainSample;
 
 pub use effects::Effect;
-pub use settings::{Defects, EffectRequest, GnssReceiver, SimulatorSettings, TrainType};
+pub use settings::{
+    Defects, EffectRequest, ForceSampling, GnssReceiver, SimulatorSettings, TrainType,
+};
 pub use unlisted::{Law, Unlisted};
 
 use dynocar_shared::vocabulary::EffectKind;

@@ -7,7 +7,7 @@ use super::disturbances::Disturbances;
 use super::line_maker::Line;
 use super::random::Random;
 use super::run_maker::RunPlan;
-use super::settings::SimulatorSettings;
+use super::settings::{ForceSampling, SimulatorSettings};
 use super::train_maker::TrueTrain;
 use super::true_run::{TRUE_STEP_S, TrueState};
 
@@ -126,8 +126,20 @@ pub fn measure_run(
                 sensors.speed.read_positive(wheel_mps, random)
             };
             let reading = disturbances.force_reading_factor;
-            let traction_n = reading * between(|state| state.reported.traction_force_n);
-            let brake_n = reading * between(|state| state.reported.brake_force_n);
+            // What was averaged is the mean of the true steps since the stamp before.
+            let averaged = match settings.force_sampling {
+                ForceSampling::Averaged => (period_s / TRUE_STEP_S).round() as usize,
+                _ => 0,
+            };
+            let force_n = |value: fn(&TrueState) -> f64| {
+                let from = index.saturating_sub(averaged);
+                match averaged.min(index) {
+                    0 => between(value),
+                    steps => states[from..index].iter().map(value).sum::<f64>() / steps as f64,
+                }
+            };
+            let traction_n = reading * force_n(|state| state.reported.traction_force_n);
+            let brake_n = reading * force_n(|state| state.reported.brake_force_n);
             let pressure_pa = between(|state| state.cylinder_pressure_pa);
             let pressure_pa = sensors.pressure.read(pressure_pa, random).max(0.0);
             let temperature_degc = between(|state| state.temperature_degc);

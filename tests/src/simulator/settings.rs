@@ -143,6 +143,19 @@ pub struct SimulatorSettings {
     pub gnss: Option<GnssReceiver>,
     /// True when all runs go the same way.
     pub is_one_direction: bool,
+    /// What a recorded force is of the time around its stamp.
+    pub force_sampling: ForceSampling,
+}
+
+/// What a recorded force is of the time around its stamp.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ForceSampling {
+    /// The force at the stamp.
+    Instant,
+    /// The force that acts from the stamp to the next one: the drive holds it.
+    Held,
+    /// The mean of the time since the stamp before.
+    Averaged,
 }
 
 /// A GNSS receiver on the train.
@@ -186,6 +199,7 @@ impl SimulatorSettings {
             defects: Defects::NONE,
             gnss: None,
             is_one_direction: false,
+            force_sampling: ForceSampling::Instant,
         }
     }
 

@@ -201,6 +201,7 @@ pub fn make_train(train_type: TrainType, resistance_spread: f64, random: &mut Ra
         tunnel_constant_n_per_kn_m: 0.0,
         traction: EffortCurve::new(traction),
         brake: EffortCurve::new(vec![(0.0, brake_max_n)]),
+        drive: None,
         brake_gear: BrakeGear::default(),
         corrections: Default::default(),
         extra: Vec::new(),

@@ -8,7 +8,7 @@ use super::driver::TrainDriver;
 use super::driving::{Controls, Driver};
 use super::dynamics::{Instant, Resistance, TruePhysics};
 use super::random::{Random, Stream};
-use super::settings::SimulatorSettings;
+use super::settings::{ForceSampling, SimulatorSettings};
 
 /// Step in s of the true motion.
 pub const TRUE_STEP_S: f64 = 0.05;
@@ -60,6 +60,8 @@ pub fn drive_run(physics: &TruePhysics<'_>, settings: &SimulatorSettings) -> Vec
     let mut slip = WheelSlip::new(settings, stream(Stream::Slip(plan.number)));
     let mut weather = Weather::new(physics, stream(Stream::Gusts(plan.number)));
     let mut motion = Motion { distance_m: 0.0, speed_mps: 0.0 };
+    let held_steps = (settings.sample_period_s / TRUE_STEP_S).round().max(1.0) as usize;
+    let mut held_on = held;
     let steps_max = (DURATION_FACTOR_MAX * settings.duration_s / TRUE_STEP_S) as usize;
     let mut states = Vec::with_capacity(steps_max);
     for step in 0..steps_max {
@@ -67,6 +69,12 @@ pub fn drive_run(physics: &TruePhysics<'_>, settings: &SimulatorSettings) -> Vec
         let Some(wanted) = driver.controls(time_s, motion) else { break };
         let mut forces = actuators.advance(train, wanted, motion.speed_mps);
         let slip_mps = slip.advance(&mut forces, train.traction_max_n(0.0), motion.speed_mps);
+        if settings.force_sampling == ForceSampling::Held {
+            if step % held_steps == 0 {
+                held_on = forces;
+            }
+            forces = held_on;
+        }
         let position_m = plan.start_m + plan.direction * motion.distance_m;
         let (headwind_mps, temperature_degc) = weather.advance();
         let mass_kg = plan.mass_kg * disturbances.mass_factor(time_s, position_m);

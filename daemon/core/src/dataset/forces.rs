@@ -3,10 +3,11 @@
 use serde::Serialize;
 
 use super::order::{TimeOrder, quantile};
+use super::power;
 use super::quantity::Quantity;
 use super::spikes::spikes;
 use super::table::Table;
-use crate::train::{EffortCurve, TrainModel};
+use crate::train::{Drive, EffortCurve, TrainModel};
 
 /// A force below zero by no more than this share of the greatest force is noise around zero.
 const NOISE_SHARE: f64 = 0.02;
@@ -31,6 +32,8 @@ pub enum ForceSource {
     Handle,
     /// The declared friction brake at the recorded pressure.
     Pressure,
+    /// The electric power of the drive over the speed.
+    Power,
     /// It is not recorded.
     None,
 }
@@ -72,22 +75,12 @@ impl Forces {
     /// zero.
     pub fn of(table: &Table, speed_mps: &[f64], train: &TrainModel, order: &TimeOrder) -> Self {
         let (mut traction, mut brake) = match table.column(Quantity::ControlForce) {
-            Some(control) => split(control),
-            None => (
-                Force::read(
-                    table.column(Quantity::TractionForce),
-                    table.column(Quantity::TractionHandle),
-                    train.traction.as_ref(),
-                    speed_mps,
-                ),
-                Force::read(
-                    table.column(Quantity::BrakeForce),
-                    table.column(Quantity::BrakeHandle),
-                    train.brake.as_ref(),
-                    speed_mps,
-                ),
-            ),
+            Some(control) => split(control, ForceSource::ControlForce),
+            None => recorded(table, speed_mps, train),
         };
+        if traction.source == ForceSource::None {
+            by_power(table, speed_mps, train, (&mut traction, &mut brake));
+        }
         add_friction(&mut brake, table.column(Quantity::BrakeCylinderPressure), train);
         let greatest_n = [(&traction, &train.traction), (&brake, &train.brake)]
             .map(|(force, curve)| force.greatest_n(curve.as_ref()))
@@ -150,11 +143,48 @@ impl Force {
     }
 }
 
+/// Both forces by their own columns or handles.
+fn recorded(table: &Table, speed_mps: &[f64], train: &TrainModel) -> (Force, Force) {
+    let traction = Force::read(
+        table.column(Quantity::TractionForce),
+        table.column(Quantity::TractionHandle),
+        train.traction.as_ref(),
+        speed_mps,
+    );
+    let brake = Force::read(
+        table.column(Quantity::BrakeForce),
+        table.column(Quantity::BrakeHandle),
+        train.brake.as_ref(),
+        speed_mps,
+    );
+    (traction, brake)
+}
+
+/// Where power is recorded: traction by the power that the drive takes, and the brake force, unless
+/// it is recorded itself, by the power that the drive feeds back.
+fn by_power(
+    table: &Table,
+    speed_mps: &[f64],
+    train: &TrainModel,
+    (traction, brake): (&mut Force, &mut Force),
+) {
+    let Some(power_w) = power::recorded_w(table) else { return };
+    let drive = train.drive.unwrap_or(Drive::USUAL);
+    let control = power_w.iter().zip(speed_mps);
+    let control: Vec<f64> =
+        control.map(|(&w, &mps)| drive.force_n(w, mps).unwrap_or(f64::NAN)).collect();
+    let (pulls, feeds_back) = split(&control, ForceSource::Power);
+    *traction = pulls;
+    if brake.source == ForceSource::None {
+        *brake = feeds_back;
+    }
+}
+
 /// Traction and brake from their difference.
-fn split(control: &[f64]) -> (Force, Force) {
+fn split(control: &[f64], source: ForceSource) -> (Force, Force) {
     let part = |sign: f64| {
         let part = |&force: &f64| if force.is_nan() { f64::NAN } else { (sign * force).max(0.0) };
-        Force::new(control.iter().map(part).collect(), ForceSource::ControlForce)
+        Force::new(control.iter().map(part).collect(), source)
     };
     (part(1.0), part(-1.0))
 }
@@ -284,6 +314,38 @@ mod tests {
         assert_eq!(forces.brake.force_n[..2], [0.0, 50e3]);
         let out_of_range = (forces.traction.handle_out_of_range, forces.brake.handle_out_of_range);
         assert_eq!((out_of_range, forces.brake.source), ((1, 1), ForceSource::Handle));
+    }
+
+    #[test]
+    fn power_over_speed_is_the_force_where_none_is_recorded() {
+        let train = format!("{TRAIN}force_per_pressure_n_per_pa=0.5\nrelease_pressure_pa=20000\n")
+            .replace("[brake]", "efficiency=0.8\nauxiliary_power_kw=10\n[brake]");
+        let power = "line_power={column='P',unit='kW'}";
+        let rows = "t,v,P,p\n0,10,110,10\n1,10,-70,10\n2,1,110,10\n3,0,10,400\n4,10,10,40\n";
+        let pressure = "\nbrake_cylinder_pressure={column='p',unit='kPa'}";
+        let found = forces_of(&train, &format!("{power}{pressure}"), rows);
+        assert_eq!(
+            (found.traction.source, found.brake.source),
+            (ForceSource::Power, ForceSource::Power)
+        );
+        assert_eq!(found.traction.force_n[..2], [8000.0, 0.0]);
+        assert!(
+            (found.brake.force_n[1] - 10e3).abs() < 1e-9,
+            "what comes back was lost on the way"
+        );
+        assert!(found.traction.force_n[2].is_nan() && found.brake.force_n[2].is_nan());
+        assert_eq!(found.brake.force_n[4], 10e3, "the friction brake beside it");
+        let by_voltage = "line_voltage={column='U',unit='V'}\nline_current={column='I',unit='A'}";
+        let found = forces_of(&train, by_voltage, "t,v,U,I\n0,10,500,220\n1,10,500,-140\n");
+        assert_eq!(found.traction.force_n, [8000.0, 0.0]);
+        let brake = "\nbrake_force={column='B',unit='kN'}";
+        let found =
+            forces_of(&train, &format!("{power}{brake}"), "t,v,P,B\n0,10,110,0\n1,10,-70,30\n");
+        assert_eq!(found.brake.source, ForceSource::Column);
+        assert_eq!((found.traction.force_n[1], found.brake.force_n[1]), (0.0, 30e3));
+        let beside = "\ntraction_force={column='F',unit='kN'}";
+        let found = forces_of(&train, &format!("{power}{beside}"), "t,v,P,F\n0,10,110,7\n");
+        assert_eq!(found.traction.force_n, [7e3], "a force that is recorded is the force");
     }
 
     #[test]

@@ -14,7 +14,7 @@
 //! - [`manifest`], [`train_file`], [`track_file`]: the three TOML files
 //! - [`quantity`], [`units`]: what a column may hold
 //! - `table`: a CSV file as columns of numbers
-//! - `order`, `spikes`, `motion`, `forces`, `altitude`: from columns to time, speed, position,
+//! - `order`, `spikes`, `motion`, `power`, `forces`, `altitude`: from columns to time, speed, position,
 //!   forces and gradient
 //! - `resolved`, [`run`], [`quality`], [`remark`], [`note`]: samples, counts and warnings
 //! - [`guess`]: a description of files that nobody has described yet
@@ -32,6 +32,7 @@ mod motion;
 mod names;
 pub mod note;
 mod order;
+mod power;
 pub mod quality;
 pub mod quantity;
 pub mod remark;
@@ -68,7 +69,7 @@ use std::sync::Arc;
 use dynocar_shared::SampleField;
 
 use crate::track::Track;
-use crate::train::TrainModel;
+use crate::train::{Drive, TrainModel};
 
 /// Name of the file that makes a folder a dataset.
 pub const MANIFEST_FILE: &str = "dataset.toml";
@@ -135,6 +136,24 @@ pub struct Dataset {
 }
 
 impl Dataset {
+    /// The same with forces that act `late_s` before their stamps taken where they act.
+    pub fn with_forces_moved(&self, late_s: f64) -> Dataset {
+        let mut dataset = self.clone();
+        dataset.runs.iter_mut().for_each(|run| run.move_forces(late_s));
+        dataset
+    }
+
+    /// The same with the forces that come from power taken from another drive.
+    pub fn with_drive(&self, drive: Drive) -> Dataset {
+        let mut dataset = self.clone();
+        let before = self.train.drive.unwrap_or(Drive::USUAL);
+        for run in &mut dataset.runs {
+            run.retake_forces(before, drive);
+        }
+        dataset.train = Arc::new(TrainModel { drive: Some(drive), ..(*self.train).clone() });
+        dataset
+    }
+
     /// Forgets the forces of all samples without traction, for a train whose friction brake is not
     /// recorded: there the true force is unknown.
     pub fn keep_traction_only(&mut self) {

@@ -62,11 +62,15 @@ pub enum Quantity {
     TractionPower,
     /// Power taken from the line, regeneration negative.
     LinePower,
+    /// Voltage of the line.
+    LineVoltage,
+    /// Current taken from the line, regeneration negative.
+    LineCurrent,
 }
 
 impl Quantity {
     /// Every quantity, in the order of the documentation.
-    pub const ALL: [Quantity; 27] = {
+    pub const ALL: [Quantity; 29] = {
         use Quantity::*;
         [
             Time,
@@ -96,6 +100,8 @@ impl Quantity {
             DoorOpen,
             TractionPower,
             LinePower,
+            LineVoltage,
+            LineCurrent,
         ]
     };
 
@@ -129,6 +135,8 @@ impl Quantity {
             Quantity::DoorOpen => "door_open",
             Quantity::TractionPower => "traction_power",
             Quantity::LinePower => "line_power",
+            Quantity::LineVoltage => "line_voltage",
+            Quantity::LineCurrent => "line_current",
         }
     }
 
@@ -158,6 +166,8 @@ impl Quantity {
             Quantity::Latitude | Quantity::Longitude | Quantity::Course => Dimension::Angle,
             Quantity::Curvature => Dimension::Curvature,
             Quantity::TractionPower | Quantity::LinePower => Dimension::Power,
+            Quantity::LineVoltage => Dimension::Voltage,
+            Quantity::LineCurrent => Dimension::Current,
         }
     }
 

@@ -9,6 +9,7 @@ use super::quality::RunQuality;
 use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};
 use crate::plausibility::{Finding, Findings, Severity, Slip};
+use crate::train::Drive;
 
 /// Below this distance in m, comparisons of position and speed say nothing.
 const DISTANCE_MIN_M: f64 = 200.0;
@@ -124,6 +125,28 @@ pub enum Remark {
         /// The quantity.
         quantity: Quantity,
     },
+    /// The force comes from power.
+    #[error(
+        "no traction_force is mapped: above {speed_min_mps} m/s it is the power of the drive over the \
+         speed, {efficiency} of it{}; explain tells the efficiency{}",
+        if *is_declared { "" } else { " as usual, since no efficiency is declared" },
+        if *is_brake {
+            "; the brake force is what the drive feeds back, so that --traction-only is needed where \
+             a friction brake acts beside it"
+        } else {
+            ""
+        }
+    )]
+    ForceByPower {
+        /// The efficiency that is reckoned with.
+        efficiency: f64,
+        /// Whether it is declared.
+        is_declared: bool,
+        /// Speed in m/s below which no force is told.
+        speed_min_mps: f64,
+        /// Whether the brake force comes from power too, and from nothing else.
+        is_brake: bool,
+    },
     /// Nothing tells the gradient.
     #[error(
         "the gradient is unknown: there is no gradient in the track, no gradient, specific_force \
@@ -211,6 +234,7 @@ impl Remark {
             Remark::HandleOutOfRange { .. } => ("handle_out_of_range", Warning),
             Remark::UnusedHandle { .. } => ("unused_handle", Info),
             Remark::ForceNotRecorded { .. } => ("force_not_recorded", Info),
+            Remark::ForceByPower { .. } => ("force_by_power", Info),
             Remark::GradientUnknown => ("gradient_unknown", Info),
             Remark::UnusualStep { .. } => ("unusual_step", Warning),
             Remark::NoValues { .. } => ("no_values", Info),
@@ -241,6 +265,18 @@ pub(super) fn remarks(
     let handles = (Quantity::TractionHandle, Quantity::BrakeHandle);
     of_force(run, &run.forces.traction, Quantity::TractionForce, handles.0, &mut remarks);
     of_force(run, &run.forces.brake, Quantity::BrakeForce, handles.1, &mut remarks);
+    if run.forces.traction.source == ForceSource::Power {
+        let declared = context.train.drive;
+        let drive = declared.unwrap_or(Drive::USUAL);
+        let has_friction = context.train.brake_gear.friction_brake.is_some()
+            && run.table.filled(Quantity::BrakeCylinderPressure).is_some();
+        remarks.push(Remark::ForceByPower {
+            efficiency: drive.efficiency,
+            is_declared: declared.is_some(),
+            speed_min_mps: drive.speed_min_mps,
+            is_brake: run.forces.brake.source == ForceSource::Power && !has_friction,
+        });
+    }
     if run.gradient_source == GradientSource::Unknown {
         remarks.push(Remark::GradientUnknown);
     }

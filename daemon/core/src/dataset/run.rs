@@ -2,19 +2,22 @@
 
 use std::borrow::Cow;
 
-use dynocar_shared::TrainSample;
+use dynocar_shared::{SampleField, TrainSample};
 
 use super::error::{DatasetError, Place, Problem};
 use super::forces::ForceSource;
 use super::is_parquet;
 use super::manifest::{Role, RunEntry};
 use super::motion::PositionSource;
+use super::power;
 use super::quality::{self, RunQuality};
 use super::quantity::Quantity;
 use super::remark::{self, Remark};
 use super::resolved::{Context, GradientSource, Resolved};
 use super::table::Table;
 use crate::plausibility;
+use crate::terms::delay;
+use crate::train::Drive;
 
 /// Quantities that a sample does not carry, one value for each sample, `None` where missing.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -39,7 +42,7 @@ pub struct Extras {
     pub door_open: Option<Vec<Option<f64>>>,
     /// Power of the drive in W.
     pub traction_power_w: Option<Vec<Option<f64>>>,
-    /// Power from the line in W.
+    /// Power from the line in W, by its own column or by voltage and current.
     pub line_power_w: Option<Vec<Option<f64>>>,
 }
 
@@ -76,6 +79,65 @@ pub struct Run {
     pub quality: RunQuality,
     /// What looks like a mistake, or should be known.
     pub remarks: Vec<Remark>,
+}
+
+impl Run {
+    /// The power in W that the traction force comes from, one value for each sample, and whether it
+    /// holds what is fed beside the drive; `None` where the force comes from elsewhere.
+    pub fn power(&self) -> Option<(&[Option<f64>], bool)> {
+        if self.traction_source != ForceSource::Power {
+            return None;
+        }
+        let filled = |values: &'_ Option<Vec<Option<f64>>>| {
+            values.as_ref().is_some_and(|values| values.iter().any(Option::is_some))
+        };
+        let extras = &self.extras;
+        match filled(&extras.traction_power_w) {
+            true => Some((extras.traction_power_w.as_ref()?, false)),
+            false => Some((extras.line_power_w.as_ref()?, true)),
+        }
+    }
+
+    /// Takes forces that act `late_s` before their stamps where they act.
+    pub(super) fn move_forces(&mut self, late_s: f64) {
+        let mut rows: Vec<usize> = (0..self.samples.len()).collect();
+        let mut last_ns = i64::MIN;
+        // Rows out of order are refused later on.
+        rows.retain(|&row| {
+            let is_next = self.samples[row].time_ns > last_ns;
+            last_ns = last_ns.max(self.samples[row].time_ns);
+            is_next
+        });
+        for pair in rows.windows(2) {
+            let ahead = self.samples[pair[1]];
+            let sample = &mut self.samples[pair[0]];
+            let step_s = (ahead.time_ns - sample.time_ns) as f64 * 1e-9;
+            for field in [SampleField::TractionForce, SampleField::BrakeForce] {
+                if let Some((here_n, ahead_n)) = sample.get(field).zip(ahead.get(field)) {
+                    sample.set(field, delay::stamped_late(here_n, ahead_n, step_s, late_s));
+                }
+            }
+        }
+    }
+
+    /// Takes a force that comes from power anew: by another drive than it was read with.
+    pub(super) fn retake_forces(&mut self, before: Drive, after: Drive) {
+        let Some((power_w, _)) = self.power() else { return };
+        let power_w = power_w.to_vec();
+        let is_brake = self.brake_source == ForceSource::Power;
+        for (sample, power_w) in self.samples.iter_mut().zip(power_w) {
+            let at = |drive: Drive| drive.force_n(power_w?, sample.speed_mps);
+            let Some((before_n, after_n)) = at(before).zip(at(after)) else { continue };
+            if let Some(traction_n) = sample.get(SampleField::TractionForce) {
+                let traction_n = traction_n + after_n.max(0.0) - before_n.max(0.0);
+                sample.set(SampleField::TractionForce, traction_n.max(0.0));
+            }
+            if let Some(brake_n) = sample.get(SampleField::BrakeForce).filter(|_| is_brake) {
+                let brake_n = brake_n + before_n.min(0.0) - after_n.min(0.0);
+                sample.set(SampleField::BrakeForce, brake_n.max(0.0));
+            }
+        }
+    }
 }
 
 /// Reads one run from the text of its file; `number` is its place in the manifest, from 1.
@@ -149,6 +211,7 @@ fn extras(table: &Table) -> Extras {
         curvature_per_m: column(Quantity::Curvature),
         door_open: column(Quantity::DoorOpen),
         traction_power_w: column(Quantity::TractionPower),
-        line_power_w: column(Quantity::LinePower),
+        line_power_w: power::line_power_w(table)
+            .map(|values| values.iter().map(|&it| (!it.is_nan()).then_some(it)).collect()),
     }
 }

@@ -5,7 +5,7 @@ use super::document::{Document, Section};
 use super::error::{DatasetError, Problem};
 use super::extra::read_extra;
 use crate::terms::{Key, curve, extra, rotating, tunnel};
-use crate::train::{BrakeGear, Corrections, Davis, EffortCurve, FrictionBrake, TrainModel};
+use crate::train::{BrakeGear, Corrections, Davis, Drive, EffortCurve, FrictionBrake, TrainModel};
 
 /// k in the declared curve resistance k/R in N/kN, R in m, unless a train says otherwise.
 pub const CURVE_CONSTANT_DEFAULT_N_PER_KN_M: f64 = 600.0;
@@ -33,12 +33,17 @@ pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> 
         "passenger_mass_kg",
     ])?;
     let resistance = root.required_table("resistance")?;
-    let traction = match root.table("traction")? {
+    let (traction, drive) = match root.table("traction")? {
         Some(section) => {
-            section.allow(&["effort"])?;
-            effort(&section)?
+            section.allow(&[
+                "effort",
+                "efficiency",
+                "auxiliary_power_kw",
+                "power_speed_min_mps",
+            ])?;
+            (effort(&section)?, drive(&section)?)
         }
-        None => None,
+        None => (None, None),
     };
     let (brake, brake_gear) = match root.table("brake")? {
         Some(section) => brake(&section)?,
@@ -74,6 +79,7 @@ pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> 
         tunnel_constant_n_per_kn_m,
         traction,
         brake,
+        drive,
         brake_gear,
         corrections: Corrections::NONE,
         extra: read_extra(&root)?,
@@ -97,6 +103,30 @@ fn declared(section: &Section) -> Result<(Davis, f64, f64), DatasetError> {
     let number = |key: &Key| section.number(key.name, key.allowed, |value| key.allows(value));
     let (curve, tunnel) = (number(&curve::CONSTANT)?, number(&tunnel::CONSTANT)?);
     Ok((davis, curve.unwrap_or(CURVE_CONSTANT_DEFAULT_N_PER_KN_M), tunnel.unwrap_or(0.0)))
+}
+
+/// The drive that is known by its electric power; `None` where nothing is declared of it.
+fn drive(section: &Section) -> Result<Option<Drive>, DatasetError> {
+    let efficiency = section.number("efficiency", "a share from 0.3 to 1", |share| {
+        Drive::EFFICIENCIES.contains(&share)
+    })?;
+    let auxiliary_kw =
+        section.number("auxiliary_power_kw", "a power in kW from 0 to 2000", |kw| {
+            Drive::AUXILIARIES_KW.contains(&kw)
+        })?;
+    let speed_min =
+        section.number("power_speed_min_mps", "a speed in m/s from 0.5 to 20", |mps| {
+            (0.5..=20.0).contains(&mps)
+        })?;
+    if efficiency.or(auxiliary_kw).or(speed_min).is_none() {
+        return Ok(None);
+    }
+    let usual = Drive::USUAL;
+    Ok(Some(Drive {
+        efficiency: efficiency.unwrap_or(usual.efficiency),
+        auxiliary_power_w: auxiliary_kw.map_or(usual.auxiliary_power_w, |kw| 1e3 * kw),
+        speed_min_mps: speed_min.unwrap_or(usual.speed_min_mps),
+    }))
 }
 
 /// The friction brake that is known by its pressure.

@@ -30,6 +30,10 @@ pub enum Dimension {
     Curvature,
     /// Base unit W.
     Power,
+    /// Base unit V.
+    Voltage,
+    /// Base unit A.
+    Current,
     /// Things counted, and yes or no; base unit 1.
     Count,
 }
@@ -52,7 +56,7 @@ const POUND_FORCE_N: f64 = 4.4482216152605;
 /// Metres per second in a mile per hour: 1609.344 m in 3600 s.
 const MILE_PER_HOUR_MPS: f64 = 0.44704;
 
-const UNITS: [Unit; 34] = {
+const UNITS: [Unit; 38] = {
     use Dimension::*;
     [
         unit("s", Time, 1.0, 1.0),
@@ -88,6 +92,10 @@ const UNITS: [Unit; 34] = {
         unit("1/m", Curvature, 1.0, 1.0),
         unit("W", Power, 1.0, 1.0),
         unit("kW", Power, 1e3, 1.0),
+        unit("V", Voltage, 1.0, 1.0),
+        unit("kV", Voltage, 1e3, 1.0),
+        unit("A", Current, 1.0, 1.0),
+        unit("kA", Current, 1e3, 1.0),
         unit("1", Count, 1.0, 1.0),
     ]
 };
@@ -194,6 +202,10 @@ mod tests {
             (Curvature, "1/m", -0.01, -0.01),
             (Power, "W", 5.0, 5.0),
             (Power, "kW", 1.5, 1500.0),
+            (Voltage, "V", 750.0, 750.0),
+            (Voltage, "kV", 1.5, 1500.0),
+            (Current, "A", -40.0, -40.0),
+            (Current, "kA", 0.5, 500.0),
             (Count, "1", 250.0, 250.0),
         ];
         assert_eq!(cases.len(), UNITS.len(), "one case for every unit");

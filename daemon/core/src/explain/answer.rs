@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::stop_to_stop::StopToStop;
 use crate::dataset::Note;
 use crate::plausibility::Severity;
 
@@ -211,6 +212,31 @@ pub struct Considered {
     pub remark: String,
 }
 
+/// A value with its standard deviation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Told {
+    /// The value.
+    pub value: f64,
+    /// Its standard deviation.
+    pub std: f64,
+}
+
+/// A drive whose force comes from its electric power.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DriveAnswer {
+    /// Share of the power that reaches the rims, for the declared mass: both scale alike.
+    pub efficiency: Told,
+    /// Power in kW that is fed beside the drive; absent where the drive's own power is recorded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub auxiliary_power_kw: Option<Told>,
+    /// The declared efficiency, with which forces were read; absent where the usual one was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub declared_efficiency: Option<f64>,
+    /// What lies at a bound of what is looked for: it is not told, and the declared drive stays.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_bound: Option<&'static str>,
+}
+
 /// Davis coefficients with their standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BaseAnswer {
@@ -271,8 +297,19 @@ pub struct Answer {
     pub error_reduction_interval: Option<[f64; 2]>,
     /// The same errors restarted every 60 s: before and after.
     pub window60: Option<[f64; 2]>,
+    /// Errors of the holdout runs from stop to stop, each from its departure; absent where they do
+    /// not stop twice.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stop_to_stop: Option<StopToStop>,
     /// The same errors on the fit runs: before and after.
     pub fit_runs: Option<[f64; 2]>,
+    /// The drive, where the force comes from its power.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drive: Option<DriveAnswer>,
+    /// Seconds by which forces act before their stamps; absent where samples are dense or it is not
+    /// told.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_late_s: Option<Told>,
     /// What stays unexplained and is taken for noise: a force of this standard deviation in N/kN
     /// on average over a minute; absent without motion.
     #[serde(skip_serializing_if = "Option::is_none")]

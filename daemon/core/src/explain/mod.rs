@@ -4,19 +4,23 @@
 //! # Layout, in the order of the work
 //!
 //! - [`evidence`]: observations, noise, the joint fit of a, b, c and effects
+//! - [`drive`]: the efficiency of a drive of which only the power is recorded
+//! - [`force_time`]: forces that act before their stamps
 //! - [`effects`]: the library, one file for each kind
 //! - [`scan`], [`places`], [`residual_pressure`]: what a force of some shape, at some place or
 //!   time, would explain
 //! - [`selection`]: the search for effects, its significance, evidence by run
-//! - [`score`]: open-loop prediction of fit and holdout runs
+//! - [`score`], [`stop_to_stop`]: open-loop prediction of fit and holdout runs
 //! - [`unexplained`], [`told`], [`rivals`], [`runners_up`], [`verdict`], [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
 //!
 //! [`explain`] runs it all.
 
 pub mod answer;
+pub mod drive;
 pub mod effects;
 pub mod evidence;
+pub mod force_time;
 pub mod places;
 pub mod report;
 pub mod residual_pressure;
@@ -25,6 +29,7 @@ pub mod runners_up;
 pub mod scan;
 pub mod score;
 pub mod selection;
+pub mod stop_to_stop;
 pub mod told;
 pub mod unexplained;
 pub mod verdict;
@@ -68,6 +73,12 @@ pub struct Explanation {
 /// When a run has no usable sample.
 pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, RunDataError> {
     progress(0.0, "reading the runs");
+    let told_drive = drive::told(dataset)?;
+    let retaken = told_drive.as_ref().map(|told| dataset.with_drive(told.drive));
+    let dataset = retaken.as_ref().unwrap_or(dataset);
+    let late = force_time::told(dataset)?;
+    let moved = late.map(|late| dataset.with_forces_moved(late.value));
+    let dataset = moved.as_ref().unwrap_or(dataset);
     let (fit_runs, holdout): (Vec<RunData>, Vec<RunData>) =
         evidence::prepare(dataset)?.into_iter().partition(|run| run.role == Role::Fit);
     let problem = FitProblem::new(fit_runs, dataset.train.resistance);
@@ -89,7 +100,15 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
     progress(0.95, "scoring the holdout runs");
     let score = Score::of(&problem, &holdout, &outcome.base, &outcome.fit);
     let predictions = score::predictions(&problem, &holdout, &outcome.fit);
-    let answer = verdict::answer(&search, &outcome, &known, &score, notes);
+    let mut answer = verdict::answer(&search, &outcome, &known, &score, notes);
+    if let Some(told) = told_drive {
+        answer.statement += &told.answer.sentence();
+        answer.drive = Some(told.answer);
+    }
+    if let Some(late) = late {
+        answer.statement += &force_time::sentence(late);
+        answer.force_late_s = Some(late);
+    }
     let strength = search.greatest_strength(&outcome);
     progress(1.0, "done");
     let (base, grown) = (outcome.base.clone(), outcome.fit.clone());

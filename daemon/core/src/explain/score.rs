@@ -1,7 +1,8 @@
 //! Open-loop prediction: the judge of a finished model.
 
 use super::evidence::{Fit, FitProblem, GrownForces, RunData};
-use crate::simulate::{Prediction, Restart, SpeedError};
+use super::stop_to_stop::StopToStop;
+use crate::simulate::{Prediction, Restart, SpeedError, stop_runs};
 
 /// Errors of the model without and with the effects.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -10,6 +11,8 @@ pub struct Score {
     pub holdout_runs: Vec<[SpeedError; 2]>,
     /// Holdout runs restarted every 60 s: before and after.
     pub holdout_window60: [SpeedError; 2],
+    /// Holdout runs from stop to stop; `None` where they do not stop twice.
+    pub holdout_stop_to_stop: Option<StopToStop>,
     /// Whole fit runs: before and after.
     pub fit_runs: [SpeedError; 2],
 }
@@ -31,6 +34,23 @@ pub fn run_error(fit: &Fit, run: &RunData, restart: Restart) -> SpeedError {
     fit.model.forces(run, &fit.theta, &mut forces);
     prediction.simulate(&run.recording, &forces, restart);
     SpeedError::of(&run.recording, &prediction)
+}
+
+/// Errors of recorded runs from stop to stop, by the models without and with the effects; `None`
+/// where none of them goes from stop to stop.
+pub fn stop_to_stop(runs: &[RunData], before: &Fit, after: &Fit) -> Option<StopToStop> {
+    let errors_mps = |fit: &Fit, run: &RunData| {
+        let (mut forces, mut prediction) = (GrownForces::default(), Prediction::new());
+        fit.model.forces(run, &fit.theta, &mut forces);
+        prediction.simulate(&run.recording, &forces, Restart::AtDepartures);
+        let within = |part| SpeedError::within(&run.recording, &prediction, part).rmse_mps();
+        stop_runs(&run.recording).into_iter().filter_map(within).collect::<Vec<f64>>()
+    };
+    let of_run = |run: &RunData| {
+        let pairs = errors_mps(before, run).into_iter().zip(errors_mps(after, run));
+        pairs.map(|(before, after)| [before, after]).collect()
+    };
+    StopToStop::from_errors(runs.iter().map(of_run).collect())
 }
 
 /// Open-loop errors of the fit runs.
@@ -110,6 +130,7 @@ impl Score {
         Score {
             holdout_runs: holdout.iter().map(|run| both(run, Restart::FullRun)).collect(),
             holdout_window60: summed(holdout, Restart::WINDOW_60),
+            holdout_stop_to_stop: stop_to_stop(holdout, before, after),
             fit_runs: summed(&problem.runs, Restart::FullRun),
         }
     }

@@ -102,6 +102,7 @@ mod tests {
             tunnel_constant_n_per_kn_m: 0.0,
             traction: EffortCurve::new(vec![(0.0, 200e3), (40.0, 60e3)]),
             brake: EffortCurve::new(vec![(0.0, 220e3)]),
+            drive: None,
             brake_gear: BrakeGear::default(),
             corrections: Default::default(),
             extra: Vec::new(),

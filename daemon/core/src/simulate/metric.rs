@@ -1,5 +1,7 @@
 //! The error of a predicted speed.
 
+use std::ops::Range;
+
 use super::prediction::Prediction;
 use super::recording::Recording;
 
@@ -23,9 +25,19 @@ impl SpeedError {
     ///
     /// When the prediction belongs to another run.
     pub fn of(recording: &Recording, prediction: &Prediction) -> Self {
+        SpeedError::within(recording, prediction, 0..recording.samples().len())
+    }
+
+    /// The same over some samples of the run.
+    ///
+    /// # Panics
+    ///
+    /// When the prediction belongs to another run, or the run has not these samples.
+    pub fn within(recording: &Recording, prediction: &Prediction, samples: Range<usize>) -> Self {
         assert_eq!(recording.samples().len(), prediction.speed_mps().len());
         let mut error = SpeedError::default();
-        for (i, sample) in recording.samples().iter().enumerate() {
+        for i in samples {
+            let sample = &recording.samples()[i];
             if sample.speed_mps > MOVING_SPEED_MPS && recording.is_simulated(i) {
                 let difference = prediction.speed_mps()[i] - sample.speed_mps;
                 error.sum_of_squares += difference * difference;

@@ -34,8 +34,10 @@ mod metric;
 pub mod motion;
 mod prediction;
 mod recording;
+mod stop_runs;
 
 pub use force_model::{ForceModel, QuadraticForces};
 pub use metric::{MOVING_SPEED_MPS, SpeedError};
 pub use prediction::{Prediction, Restart};
 pub use recording::{BridgeLimits, Recording, SimulateError, is_pulled};
+pub use stop_runs::stop_runs;

@@ -3,6 +3,8 @@
 use super::force_model::ForceModel;
 use super::motion::{SPEED_MAX_MPS, STEP_MAX_S, speed_after};
 use super::recording::{Recording, SampleRole};
+use super::stop_runs::departs;
+use crate::force::ResolvedSample;
 
 /// How long the simulation runs before it takes up a measured speed again.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,6 +13,8 @@ pub enum Restart {
     FullRun,
     /// Every so many seconds from the run's first sample. The metric `window60` is 60 s.
     EverySeconds(f64),
+    /// At every departure, from rest: errors from stop to stop.
+    AtDepartures,
 }
 
 impl Restart {
@@ -19,12 +23,19 @@ impl Restart {
     /// The metric `window60`.
     pub const WINDOW_60: Restart = Restart::EverySeconds(Restart::WINDOW_S);
 
-    /// Number of the window at a time in ns from the run's first sample.
+    /// True where a measured speed is taken up again.
     #[inline]
-    fn window(self, time_ns: i64) -> i64 {
+    fn restarts(self, samples: &[ResolvedSample], index: usize) -> bool {
         match self {
-            Restart::FullRun => 0,
-            Restart::EverySeconds(seconds) => time_ns / ((seconds * 1e9) as i64).max(1),
+            Restart::FullRun => false,
+            Restart::AtDepartures => departs(samples, index),
+            Restart::EverySeconds(seconds) => {
+                let window = |at: usize| {
+                    let since_ns = samples[at].time_ns - samples[0].time_ns;
+                    since_ns / ((seconds * 1e9) as i64).max(1)
+                };
+                window(index) != window(index.saturating_sub(1))
+            }
         }
     }
 }
@@ -61,20 +72,16 @@ impl Prediction {
     pub fn simulate(&mut self, recording: &Recording, model: &impl ForceModel, restart: Restart) {
         let (samples, time_s, roles) = (recording.samples(), recording.time_s(), recording.roles());
         let scale = model.speed_scale();
-        let mut last_window = 0;
         let mut speed_mps = 0.0;
         self.speed_mps.clear();
         for (i, role) in roles.iter().enumerate() {
-            let window = restart.window(samples[i].time_ns - samples[0].time_ns);
-            let is_new_window = window != last_window;
-            last_window = window;
             match role {
                 SampleRole::Unknown => {
                     self.speed_mps.push(samples[i].speed_mps);
                     continue;
                 }
                 SampleRole::Starts => speed_mps = start_speed(recording, model, i),
-                _ if is_new_window => speed_mps = start_speed(recording, model, i),
+                _ if restart.restarts(samples, i) => speed_mps = start_speed(recording, model, i),
                 SampleRole::HeldAtRest if speed_mps == 0.0 => {}
                 SampleRole::HeldAtRest | SampleRole::Follows => {
                     speed_mps = step(model, i - 1, speed_mps, time_s[i] - time_s[i - 1]);

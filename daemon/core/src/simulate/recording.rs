@@ -147,6 +147,11 @@ impl Recording {
         self.roles[index] != SampleRole::Unknown
     }
 
+    /// True where the simulation takes up the measured speed because nothing was known before.
+    pub(super) fn starts(&self, index: usize) -> bool {
+        self.roles[index] == SampleRole::Starts
+    }
+
     pub(super) fn roles(&self) -> &[SampleRole] {
         &self.roles
     }

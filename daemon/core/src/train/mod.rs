@@ -1,8 +1,10 @@
 //! What is declared of a train.
 
 mod corrections;
+mod drive;
 
 pub use corrections::Corrections;
+pub use drive::Drive;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
 use crate::terms::extra::Extra;
@@ -124,6 +126,8 @@ pub struct TrainModel {
     pub traction: Option<EffortCurve>,
     /// Greatest brake force over speed.
     pub brake: Option<EffortCurve>,
+    /// The drive, where it is declared by its electric power.
+    pub drive: Option<Drive>,
     /// Brake gear, as far as declared.
     pub brake_gear: BrakeGear,
     /// What measured runs have added.
@@ -148,6 +152,7 @@ impl TrainModel {
             tunnel_constant_n_per_kn_m: 0.0,
             traction: None,
             brake: None,
+            drive: None,
             brake_gear: BrakeGear::default(),
             corrections: Corrections::default(),
             extra: Vec::new(),

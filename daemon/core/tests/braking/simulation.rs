@@ -26,6 +26,7 @@ pub fn train() -> TrainModel {
         tunnel_constant_n_per_kn_m: 0.0,
         traction: None,
         brake: None,
+        drive: None,
         brake_gear: BrakeGear {
             cylinder_diameter_mm: Some(203.0),
             disc_radius_mm: Some(297.6),

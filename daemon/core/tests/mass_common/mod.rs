@@ -31,6 +31,7 @@ pub fn train() -> Arc<TrainModel> {
         tunnel_constant_n_per_kn_m: 0.0,
         traction: EffortCurve::new(vec![(0.0, 90_000.0), (30.0, 40_000.0)]),
         brake: None,
+        drive: None,
         brake_gear: BrakeGear::default(),
         corrections: Default::default(),
         extra: Vec::new(),

@@ -100,6 +100,7 @@ pub fn train() -> Arc<TrainModel> {
         tunnel_constant_n_per_kn_m: 0.0,
         traction: EffortCurve::new(vec![(0.0, 310_000.0), (22.0, 110_000.0)]),
         brake: None,
+        drive: None,
         brake_gear: gear,
         corrections: Default::default(),
         extra: Vec::new(),

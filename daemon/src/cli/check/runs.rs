@@ -132,6 +132,7 @@ fn sources(runs: &[Read]) -> String {
         ForceSource::ControlForce => "from the signed control_force",
         ForceSource::Handle => "from the handle's share of the effort curve",
         ForceSource::Pressure => "from the friction brake's pressure",
+        ForceSource::Power => "from the drive's power over the speed",
         ForceSource::None => "not recorded",
     };
     let mut text = String::from("sources\n");

@@ -3,8 +3,10 @@
 use std::fmt::Write as _;
 
 use dynocar_core::dataset::Role;
+use dynocar_core::explain::report::Estimate;
 use dynocar_core::explain::report::errors::{ErrorPair, Resampling, RunErrors};
 use dynocar_core::explain::report::traces::Trace;
+use dynocar_core::explain::stop_to_stop::StopToStop;
 
 use super::{Section, legend};
 use crate::report::html::{Column, Table, escape, estimate, percent};
@@ -67,9 +69,33 @@ fn summary(subject: &Subject) -> String {
         cells.truncate(columns);
         if k == 0 { table.push_marked(cells) } else { table.push(cells) }
     }
+    for (name, found) in
+        [("Holdout", &errors.holdout_stop_to_stop), ("Fit", &errors.fit_stop_to_stop)]
+    {
+        let Some(found) = found else { continue };
+        let mut cells = stop_to_stop(name, found);
+        cells.truncate(columns);
+        table.push(cells);
+    }
     let mut html = table.html();
     let _ = writeln!(html, "<p class=\"note\">{}</p>", intervals(errors.holdout, errors.fit));
     html
+}
+
+/// The row of the errors from stop to stop.
+fn stop_to_stop(name: &str, found: &StopToStop) -> Vec<String> {
+    let side = |side: usize| {
+        let interval = found.interval_95_mps.map(|both| both[side]);
+        estimate(&Estimate { value: found.median_mps[side], interval })
+    };
+    let [before, after] = found.median_mps;
+    let reduction = if before > 0.0 { 1.0 - after / before } else { 0.0 };
+    vec![
+        format!("{name}, from stop to stop, median of {}", found.runs),
+        side(0),
+        side(1),
+        percent(&Estimate { value: reduction, interval: None }),
+    ]
 }
 
 /// How the intervals were found.

@@ -141,6 +141,7 @@ fn sources(subject: &Subject) -> String {
         ForceSource::ControlForce => "from the signed control force",
         ForceSource::Handle => "from the handle's share of the effort curve",
         ForceSource::Pressure => "from the friction brake's pressure",
+        ForceSource::Power => "from the drive's power over the speed",
         ForceSource::None => "not recorded",
     };
     let position = |run: &Run| match run.position_source {

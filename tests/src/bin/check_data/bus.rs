@@ -9,12 +9,15 @@ use dynocar::survey::survey_folder;
 use dynocar_core::dataset::Dataset;
 use dynocar_core::explain::answer::Answer as ExplainAnswer;
 use dynocar_core::explain::explain;
+use dynocar_core::explain::stop_to_stop::StopToStop;
 use dynocar_shared::PipelineKind;
 
+use super::bus_variants::{self, ByPower, OtherDay};
 use super::report::Report;
 use super::stop_masses::{self, Masses};
 
-/// Largest error in m/s over 60 s in open loop on trips left out, over all of them.
+/// Largest error in m/s in open loop on trips left out: over 60 s, over all of them, and the median
+/// of those from stop to stop.
 const ERROR_MAX_MPS: f64 = 0.30;
 /// Largest scatter in t of the mass from stop to stop, and its least correlation with the counted one.
 const STOP_MASS_T: f64 = 0.38;
@@ -37,6 +40,18 @@ pub fn check(report: &mut Report, folder: &Path) {
     let outcome = whole.and_then(|answer| left_out(folder, &answer));
     let error = outcome.as_ref().map_err(Clone::clone).and_then(LeftOut::error);
     report.note("bus: 60 s in open loop, trips left out two by two", error);
+    let stops = outcome.as_ref().map_err(Clone::clone).and_then(LeftOut::stop_to_stop);
+    report.note("bus: from stop to stop in open loop, trips left out two by two", stops);
+    let days = outcome.as_ref().map_err(Clone::clone);
+    report.note(
+        "bus: 60 s in open loop, trips mapped as another day's",
+        days.and_then(|it| bus_variants::other_days(&it.another_day)),
+    );
+    let powers = outcome.as_ref().map_err(Clone::clone);
+    report.note(
+        "bus: its force from power, trips left out two by two",
+        powers.and_then(|it| bus_variants::powers(&it.power)),
+    );
     let climbs = outcome.as_ref().map_err(Clone::clone).and_then(|it| told_to_climb(&it.level));
     report.note("bus: its line declared level", climbs);
     for (place, (told, ..)) in WAYS.iter().enumerate() {
@@ -63,7 +78,13 @@ fn held(masses: &Masses) -> Result<String, String> {
 #[derive(Default)]
 struct LeftOut {
     errors_mps: Vec<f64>,
+    /// From stop to stop, before and after effects, by trip.
+    stop_errors_mps: Vec<Vec<[f64; 2]>>,
     masses: [Masses; WAYS.len()],
+    /// The trips mapped as another day's, by pair.
+    another_day: Vec<OtherDay>,
+    /// Their force from power, by pair.
+    power: Vec<ByPower>,
     /// What is found when the first of these lines is declared level.
     level: Option<ExplainAnswer>,
 }
@@ -74,6 +95,17 @@ impl LeftOut {
         let all_mps = (squares / self.errors_mps.len() as f64).sqrt();
         let words = format!("{all_mps:.3} m/s, by pair {:.3?}", self.errors_mps);
         if all_mps <= ERROR_MAX_MPS { Ok(words) } else { Err(words) }
+    }
+}
+
+impl LeftOut {
+    fn stop_to_stop(&self) -> Result<String, String> {
+        let found = StopToStop::from_errors(self.stop_errors_mps.clone()).ok_or("no stops")?;
+        let median_mps = found.median_mps[0];
+        let [low, high] = found.interval_95_mps.ok_or("one trip only")?[0];
+        let runs = found.runs;
+        let words = format!("median {median_mps:.3} m/s ({low:.3} to {high:.3}) of {runs} runs");
+        if median_mps <= ERROR_MAX_MPS { Ok(words) } else { Err(words) }
     }
 }
 
@@ -116,6 +148,11 @@ fn left_out(folder: &Path, whole: &Answer) -> Result<LeftOut, String> {
         let explained = explain(&mapped, &|_, _| {}).map_err(|error| error.to_string())?;
         let score = &explained.score.holdout_window60[0];
         all.errors_mps.push(score.rmse_mps().ok_or("no trip is held out")?);
+        let stops = explained.score.holdout_stop_to_stop.ok_or("no trip stops twice")?;
+        all.stop_errors_mps.extend(stops.errors_mps);
+        let trips = [first, first + 1];
+        all.another_day.push(bus_variants::of_another_day(raw.path(), out.path(), trips)?);
+        all.power.push(bus_variants::by_power(out.path())?);
         if first == 0 {
             let level = declared_level(out.path())?;
             let explained = explain(&level, &|_, _| {}).map_err(|error| error.to_string())?;
@@ -167,6 +204,7 @@ fn cut(
         Some((head, runs)) => (head.to_string(), runs),
         None => (described.clone(), ""),
     };
+    manifest += "line_power = { column = \"electric_powerDemand\", unit = \"W\" }\n";
     let file = runs.split('"').nth(1).unwrap_or_default();
     let text = std::fs::read_to_string(folder.join(file))?;
     let (head, rows) = text.split_once('\n').unwrap_or((&text, ""));

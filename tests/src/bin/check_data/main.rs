@@ -8,6 +8,7 @@
 //! `measured` and `imports` in it. Exit status 1 when a check fails.
 
 mod bus;
+mod bus_variants;
 mod explaining;
 mod imports;
 mod monitor;

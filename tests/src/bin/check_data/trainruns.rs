@@ -121,6 +121,7 @@ fn running_time_s(train: &TheirTrain, effort: &[Vec<f64>], sections: &[Vec<f64>]
         tunnel_constant_n_per_kn_m: 0.0,
         traction: None,
         brake: None,
+        drive: None,
         brake_gear: BrakeGear::default(),
         corrections: Default::default(),
         extra: Vec::new(),

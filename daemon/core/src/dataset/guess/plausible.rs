@@ -63,6 +63,8 @@ fn usual(quantity: Quantity) -> Option<Usual> {
         Quantity::TractionHandle | Quantity::BrakeHandle => usual(Top, 0.02, 1.05, &["1", "%"]),
         Quantity::RelativeHumidity => usual(Top, 0.05, 1.05, &["%", "1"]),
         Quantity::TractionPower | Quantity::LinePower => usual(Top, 2e4, 3e7, &["kW", "W"]),
+        Quantity::LineVoltage => usual(Middle, 300.0, 3e4, &["V", "kV"]),
+        Quantity::LineCurrent => usual(Top, 20.0, 1e4, &["A", "kA"]),
         Quantity::Altitude
         | Quantity::CurveRadius
         | Quantity::Passengers

@@ -157,7 +157,7 @@ fn what_was_wanted_and_other_things_are_not_taken_for_what_was_measured() {
         "row",
         "",
         "F_id",
-        "line voltage [kV]",
+        "battery voltage [V]",
     ] {
         assert_eq!(taken_for(name, [1.0, 2.0, 3.0]), None, "{name}");
     }

@@ -173,6 +173,17 @@ pub const fn terms(quantity: Quantity) -> &'static [Terms] {
             ),
             (Alone, "p line, p panto"),
         ],
+        Quantity::LineVoltage => &[
+            (
+                Named,
+                "pantograph voltage, catenary voltage, oberleitungsspannung, fahrdrahtspannung, netzspannung",
+            ),
+            (Alone, "u line, u panto"),
+        ],
+        Quantity::LineCurrent => &[
+            (Named, "pantograph current, catenary current, oberleitungsstrom, netzstrom"),
+            (Alone, "i line, i panto"),
+        ],
     }
 }
 

@@ -22,7 +22,7 @@ pub use fade::Fade;
 pub use fit::{Fit, FitProblem, Nearby, RunNormal};
 pub use model::{GrownForces, GrownModel, SharedHypothesis};
 pub use noise::{Noise, RunScatter};
-pub use run_data::{Bin, RunData, RunDataError, prepare};
+pub use run_data::{Bin, RunData, RunDataError, RunPower, prepare};
 pub use run_scatter::WeightedFilter;
 pub use sample_forces::SampleForces;
 pub use whitener::Whitener;

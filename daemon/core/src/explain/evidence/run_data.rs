@@ -2,7 +2,7 @@
 
 use dynocar_shared::TrainSample;
 
-use crate::dataset::{Dataset, PositionSource, Role, Run};
+use crate::dataset::{Dataset, ForceSource, PositionSource, Role, Run};
 use crate::force::{ForceResolver, ResolvedSample};
 use crate::simulate::{BridgeLimits, Recording, SimulateError};
 use crate::train::TrainModel;
@@ -66,10 +66,39 @@ pub struct RunData {
     /// Way by position over way by integrated speed, with its standard deviation, where
     /// positions are measured.
     pub way_ratio: Option<(f64, f64)>,
+    /// The power from which the force comes.
+    pub power: Option<RunPower>,
     /// Samples that validation refused.
     pub rejected: usize,
     /// Values replaced as outliers.
     pub replaced: usize,
+}
+
+/// The power that a run's force comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunPower {
+    /// Power in W at each sample, `NaN` where missing; what is fed back is negative.
+    pub power_w: Vec<f64>,
+    /// True where it holds what is fed beside the drive.
+    pub has_auxiliaries: bool,
+    /// True where the brake force comes from it too.
+    pub is_brake: bool,
+}
+
+impl RunPower {
+    /// Of a run, at the times of samples.
+    fn of(run: &Run, samples: &[ResolvedSample]) -> Option<Self> {
+        let (recorded, has_auxiliaries) = run.power()?;
+        let mut rows = run.samples.iter().zip(recorded);
+        let at = |sample: &ResolvedSample| {
+            // Refused rows are left out, none is added.
+            let row = rows.find(|(row, _)| row.time_ns == sample.time_ns);
+            row.and_then(|(_, power_w)| *power_w).unwrap_or(f64::NAN)
+        };
+        let power_w = samples.iter().map(at).collect();
+        let is_brake = run.brake_source == ForceSource::Power;
+        Some(RunPower { power_w, has_auxiliaries, is_brake })
+    }
 }
 
 /// Why a run cannot be used.
@@ -144,6 +173,7 @@ fn prepare_run(
         PositionSource::IntegratedSpeed => None,
         _ => way_ratio(&recording),
     };
+    let power = RunPower::of(run, recording.samples());
     Ok(RunData {
         file: run.file.clone(),
         role: run.role,
@@ -154,6 +184,7 @@ fn prepare_run(
         smooth_mps,
         bins,
         way_ratio,
+        power,
         rejected,
         replaced,
     })

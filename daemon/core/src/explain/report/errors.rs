@@ -4,7 +4,8 @@ use super::Estimate;
 use crate::dataset::Role;
 use crate::explain::Explanation;
 use crate::explain::evidence::{Fit, GrownForces, RunData};
-use crate::explain::score::run_error;
+use crate::explain::score::{run_error, stop_to_stop};
+use crate::explain::stop_to_stop::StopToStop;
 use crate::filter::random::Random;
 use crate::simulate::{Prediction, Restart, SpeedError};
 
@@ -61,6 +62,10 @@ pub struct Errors {
     pub fit_window60: Option<ErrorPair>,
     /// Holdout runs restarted every 60 s.
     pub holdout_window60: Option<ErrorPair>,
+    /// Holdout runs from stop to stop.
+    pub holdout_stop_to_stop: Option<StopToStop>,
+    /// Fit runs from stop to stop.
+    pub fit_stop_to_stop: Option<StopToStop>,
     /// Run by run, fit runs first.
     pub by_run: Vec<RunErrors>,
 }
@@ -83,6 +88,8 @@ impl Errors {
             holdout: scored,
             fit_window60: pair(fit, Restart::WINDOW_60),
             holdout_window60: pair(holdout, Restart::WINDOW_60),
+            holdout_stop_to_stop: explanation.score.holdout_stop_to_stop.clone(),
+            fit_stop_to_stop: stop_to_stop(fit, before, after),
             by_run: fit.iter().chain(holdout).map(|run| run_errors(run, before, after)).collect(),
         }
     }

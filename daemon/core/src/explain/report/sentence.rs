@@ -257,7 +257,10 @@ mod tests {
             rmse_after: None,
             error_reduction_interval: None,
             window60: None,
+            stop_to_stop: None,
             fit_runs: None,
+            drive: None,
+            force_late_s: None,
             unexplained_n_per_kn: None,
             considered: Vec::new(),
             predictions: std::collections::BTreeMap::new(),
@@ -274,6 +277,8 @@ mod tests {
             holdout: Some(pair),
             fit_window60: None,
             holdout_window60: None,
+            holdout_stop_to_stop: None,
+            fit_stop_to_stop: None,
             by_run: Vec::new(),
         };
         let size = "from km 5.20 to 6.90 – extra resistance 2.50 N/kN (95 % interval 2.30 to 2.70)";

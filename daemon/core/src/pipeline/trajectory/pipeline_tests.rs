@@ -28,6 +28,7 @@ fn train() -> Arc<TrainModel> {
         tunnel_constant_n_per_kn_m: 0.0,
         traction: None,
         brake: None,
+        drive: None,
         brake_gear: BrakeGear::default(),
         corrections: Default::default(),
         extra: Vec::new(),

@@ -1,0 +1,107 @@
+//! Simulated trains of which the drive's power is recorded and no force: the efficiency that is
+//! told, its interval, and what is explained with it.
+
+use dynocar_core::dataset::{Dataset, ForceSource};
+use dynocar_core::explain::{drive, explain};
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_tests::simulator::power::{TrueDrive, power_files};
+use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, TrainType, simulate};
+
+/// Seeds of the measurement; none of them took part in a choice.
+const SEEDS: std::ops::Range<u64> = 61_000..61_030;
+/// 95 % intervals hold the truth in 24 or more of 30 cases but for one time in a thousand.
+const HELD_MIN: usize = 24;
+/// Largest error of an efficiency: what masses, gradients and a, b, c of the declaration leave.
+const ERROR_MAX: f64 = 0.02;
+
+/// Half a 95 % interval is no wider than this.
+const HALF_WIDTH_MAX: f64 = 0.025;
+/// Seeds that are explained, and how many of them must be named rightly.
+const EXPLAINED: std::ops::Range<u64> = 61_100..61_106;
+const RIGHT_MIN: usize = 5;
+/// Largest error in m/s over 60 s on runs held out.
+const WINDOW_MAX_MPS: f64 = 0.3;
+
+fn dataset(seed: u64, drive: &TrueDrive, effects: EffectRequest) -> Dataset {
+    let settings = SimulatorSettings {
+        train_type: Some([TrainType::Metro, TrainType::Regional][seed as usize % 2]),
+        ..SimulatorSettings::new(seed, effects)
+    };
+    let files = power_files(&simulate(&settings), drive);
+    let texts: Vec<(&str, &str)> =
+        files.iter().map(|(name, text)| (&name[..], &text[..])).collect();
+    Dataset::load(&texts[..]).unwrap()
+}
+
+/// The drive of a seed: from 0.76 to 0.95, with auxiliaries of 40 to 100 kW on every other line.
+fn true_drive(seed: u64, has_auxiliaries: bool) -> TrueDrive {
+    let share = (seed % 10) as f64 / 9.0;
+    let auxiliary_power_w = has_auxiliaries.then_some(40e3 + 60e3 * share);
+    TrueDrive { efficiency: 0.76 + 0.19 * share, auxiliary_power_w, noise: 0.01 }
+}
+
+fn held_and_errors(has_auxiliaries: bool) -> (usize, Vec<f64>) {
+    let (mut held, mut errors) = (0, Vec::new());
+    for seed in SEEDS {
+        let truth = true_drive(seed, has_auxiliaries);
+        let told = drive::told(&dataset(seed, &truth, EffectRequest::none())).unwrap().unwrap();
+        let found = told.answer.efficiency;
+        let error = found.value - truth.efficiency;
+        eprintln!(
+            "seed {seed}: {:.3} told as {:.4} ± {:.4}, auxiliaries {:?} told as {:?} kW",
+            truth.efficiency,
+            found.value,
+            1.96 * found.std,
+            truth.auxiliary_power_w,
+            told.answer.auxiliary_power_kw
+        );
+        held += usize::from(error.abs() <= 1.96 * found.std);
+        assert!(1.96 * found.std < HALF_WIDTH_MAX, "seed {seed}");
+        errors.push(error);
+    }
+    let squares: f64 = errors.iter().map(|error| error * error).sum();
+    let rms = (squares / errors.len() as f64).sqrt();
+    eprintln!("{held} of {} held, root mean square error {rms:.4}", errors.len());
+    (held, errors)
+}
+
+#[test]
+fn the_efficiency_is_told_within_its_interval_from_the_drives_power() {
+    let (held, errors) = held_and_errors(false);
+    assert!(held >= HELD_MIN, "{held} of {}", errors.len());
+    assert!(errors.iter().all(|error| error.abs() < ERROR_MAX), "{errors:?}");
+}
+
+#[test]
+fn the_efficiency_is_told_within_its_interval_from_the_lines_power() {
+    let (held, errors) = held_and_errors(true);
+    assert!(held >= HELD_MIN, "{held} of {}", errors.len());
+    assert!(errors.iter().all(|error| error.abs() < ERROR_MAX), "{errors:?}");
+}
+
+/// What `explain` finds in the dataset of a seed, as the names of its effects.
+fn found(seed: u64, effects: EffectRequest) -> Vec<&'static str> {
+    let truth = true_drive(seed, true);
+    let dataset = dataset(seed, &truth, effects);
+    assert!(dataset.runs.iter().all(|run| run.traction_source == ForceSource::Power));
+    let answer = explain(&dataset, &|_, _| ()).unwrap().answer;
+    eprintln!("seed {seed}: {:?} m/s, {}", answer.window60, answer.statement);
+    assert!(answer.statement.contains("The force comes from power, at an efficiency of 0."));
+    assert!(answer.window60.is_some_and(|[_, after]| after < WINDOW_MAX_MPS), "seed {seed}");
+    answer.effects.iter().map(|effect| effect.kind).collect()
+}
+
+#[test]
+fn a_train_known_by_its_power_is_a_null_and_its_effects_are_found() {
+    for seed in EXPLAINED {
+        let kinds = found(seed, EffectRequest::none());
+        assert_eq!(kinds, [""; 0], "seed {seed}");
+    }
+    let kinds = [EffectKind::Wind, EffectKind::GradientShift, EffectKind::BearingTemperature];
+    let mut right = 0;
+    for (seed, kind) in EXPLAINED.zip(kinds.into_iter().cycle()) {
+        right += usize::from(found(seed, EffectRequest::Kinds(vec![kind])) == [kind.name()]);
+    }
+    eprintln!("{right} of {} right", EXPLAINED.count());
+    assert!(right >= RIGHT_MIN, "{right}");
+}
