@@ -16,7 +16,7 @@
 //! - `table`: a CSV file as columns of numbers
 //! - `order`, `spikes`, `motion`, `power`, `forces`, `altitude`: from columns to time, speed, position,
 //!   forces and gradient
-//! - `resolved`, [`run`], [`quality`], [`remark`], [`note`]: samples, counts and warnings
+//! - `resolved`, [`run`], [`quality`], [`remark`], `remarking`, [`note`]: samples, counts and warnings
 //! - [`guess`]: a description of files that nobody has described yet
 
 mod altitude;
@@ -36,6 +36,7 @@ mod power;
 pub mod quality;
 pub mod quantity;
 pub mod remark;
+mod remarking;
 mod resolved;
 pub mod run;
 mod spikes;

@@ -12,7 +12,8 @@ use super::motion::PositionSource;
 use super::power;
 use super::quality::{self, RunQuality};
 use super::quantity::Quantity;
-use super::remark::{self, Remark};
+use super::remark::Remark;
+use super::remarking::remarks;
 use super::resolved::{Context, GradientSource, Resolved};
 use super::table::Table;
 use crate::plausibility;
@@ -177,7 +178,7 @@ pub(super) fn read(
     let is_position_recorded = resolved.position_source == PositionSource::Column;
     let findings =
         plausibility::of_samples(context.train, context.track, &samples, is_position_recorded);
-    let remarks = remark::remarks(context, &resolved, &quality, &findings);
+    let remarks = remarks(context, &resolved, &quality, &findings);
     Ok(Run {
         file: entry.file.clone(),
         number,
