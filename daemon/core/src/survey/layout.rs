@@ -101,7 +101,7 @@ impl Layout {
         }
     }
 
-    /// Variance of the mean gradient over [`STATED_STEPS`] around each piece between neighbouring
+    /// Variance of the mean gradient over 100 m around each piece between neighbouring
     /// heights: between two heights alone the forces tell little, and nobody feels it.
     pub fn gradient_variances(
         &self,
