@@ -127,15 +127,13 @@ impl Run {
         let power_w = power_w.to_vec();
         let is_brake = self.brake_source == ForceSource::Power;
         for (sample, power_w) in self.samples.iter_mut().zip(power_w) {
-            let at = |drive: Drive| drive.force_n(power_w?, sample.speed_mps);
-            let Some((before_n, after_n)) = at(before).zip(at(after)) else { continue };
-            if let Some(traction_n) = sample.get(SampleField::TractionForce) {
-                let traction_n = traction_n + after_n.max(0.0) - before_n.max(0.0);
-                sample.set(SampleField::TractionForce, traction_n.max(0.0));
+            let more = power_w.and_then(|w| after.beyond_n(before, w, sample.speed_mps));
+            let Some([traction_n, brake_n]) = more else { continue };
+            if let Some(before_n) = sample.get(SampleField::TractionForce) {
+                sample.set(SampleField::TractionForce, (before_n + traction_n).max(0.0));
             }
-            if let Some(brake_n) = sample.get(SampleField::BrakeForce).filter(|_| is_brake) {
-                let brake_n = brake_n + before_n.min(0.0) - after_n.min(0.0);
-                sample.set(SampleField::BrakeForce, brake_n.max(0.0));
+            if let Some(before_n) = sample.get(SampleField::BrakeForce).filter(|_| is_brake) {
+                sample.set(SampleField::BrakeForce, (before_n + brake_n).max(0.0));
             }
         }
     }

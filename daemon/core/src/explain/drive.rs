@@ -143,12 +143,11 @@ impl Hypothesis for OpenDrive {
         let drive = self.at(parameters);
         let rows = power.power_w.iter().zip(run.samples());
         for (force, (&power_w, sample)) in forces.iter_mut().zip(rows) {
-            let at = |drive: Drive| drive.force_n(power_w, sample.speed_mps);
-            if let Some((found_n, declared_n)) = at(drive).zip(at(self.declared)) {
-                force.traction_n += found_n.max(0.0) - declared_n.max(0.0);
-                if power.is_brake {
-                    force.brake_n += declared_n.min(0.0) - found_n.min(0.0);
-                }
+            let more = drive.beyond_n(self.declared, power_w, sample.speed_mps);
+            let Some([traction_n, brake_n]) = more else { continue };
+            force.traction_n += traction_n;
+            if power.is_brake {
+                force.brake_n += brake_n;
             }
         }
     }

@@ -47,6 +47,14 @@ impl Drive {
         let is_told = recorded_w.is_finite() && speed_mps >= self.speed_min_mps;
         is_told.then(|| self.mechanical_w(recorded_w) / speed_mps)
     }
+
+    /// What a recorded power in W at a speed in m/s says more of the traction and of the brake force in N
+    /// by this drive than by another; `None` where either tells none.
+    pub fn beyond_n(&self, other: Drive, recorded_w: f64, speed_mps: f64) -> Option<[f64; 2]> {
+        let at = |drive: &Drive| drive.force_n(recorded_w, speed_mps);
+        let (own_n, other_n) = at(self).zip(at(&other))?;
+        Some([own_n.max(0.0) - other_n.max(0.0), other_n.min(0.0) - own_n.min(0.0)])
+    }
 }
 
 #[cfg(test)]
@@ -62,6 +70,15 @@ mod tests {
         // 80 kW come back of 100 kW that the wheels feed.
         assert!((DRIVE.force_n(-70e3, 10.0).unwrap() + 10e3).abs() < 1e-9);
         assert_eq!(DRIVE.force_n(10e3, 10.0), Some(0.0), "auxiliaries alone pull nothing");
+    }
+
+    #[test]
+    fn a_better_drive_pulls_more_and_brakes_less_for_the_same_power() {
+        let better = Drive { efficiency: 1.0, ..DRIVE };
+        assert_eq!(better.beyond_n(DRIVE, 110e3, 10.0), Some([2000.0, 0.0]));
+        let [traction_n, brake_n] = better.beyond_n(DRIVE, -70e3, 10.0).unwrap();
+        assert!(traction_n == 0.0 && (brake_n + 2000.0).abs() < 1e-9, "{brake_n}");
+        assert_eq!(better.beyond_n(DRIVE, 110e3, 1.0), None);
     }
 
     #[test]
