@@ -298,7 +298,7 @@ pub struct Answer {
     /// The same errors restarted every 60 s: before and after.
     pub window60: Option<[f64; 2]>,
     /// Errors of the holdout runs from stop to stop, each from its departure; absent where they do
-    /// not stop twice.
+    /// not stop twice, and where forces are unknown near every stop, as forces from power are.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stop_to_stop: Option<StopToStop>,
     /// The same errors on the fit runs: before and after.
