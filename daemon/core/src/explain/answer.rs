@@ -121,6 +121,12 @@ impl Place {
     pub fn of_intervals(intervals_m: Vec<[f64; 2]>) -> Self {
         Place { intervals_m: (!intervals_m.is_empty()).then_some(intervals_m), ..Place::default() }
     }
+
+    /// Whether the place may be in a run, by its file.
+    pub fn may_be_in(&self, file: &str) -> bool {
+        self.runs.as_ref().is_none_or(|runs| runs.iter().any(|run| run == file))
+            && self.windows.as_ref().is_none_or(|all| all.iter().any(|own| own.run == file))
+    }
 }
 
 /// A mass that holds between two places.
@@ -197,6 +203,32 @@ pub struct RunnerUp {
     pub formula: String,
     /// By how much its evidence is less, in units of -2 log likelihood.
     pub evidence_less: f64,
+}
+
+/// Half of a 95 % interval in standard deviations.
+pub const HALF_95: f64 = 1.96;
+
+/// What the data say of one number at no effect.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Identifiability {
+    /// The kind of effect.
+    pub kind: &'static str,
+    /// Its parameter, with the unit.
+    pub parameter: &'static str,
+    /// Standard deviation, a, b, c and what was found fitted beside it; `None` where the data say
+    /// nothing.
+    pub std: Option<f64>,
+    /// Whether an effect that is large enough to matter would show.
+    pub told: bool,
+    /// Other kinds beside which it would not: either could stand for the other.
+    pub alike: Vec<&'static str>,
+}
+
+impl Identifiability {
+    /// What would show, in the unit of the parameter: half of the 95 % interval.
+    pub fn hidden_up_to(&self) -> Option<f64> {
+        self.std.map(|std| HALF_95 * std)
+    }
 }
 
 /// An effect that was considered.
@@ -316,6 +348,8 @@ pub struct Answer {
     pub unexplained_n_per_kn: Option<f64>,
     /// What else was considered.
     pub considered: Vec<Considered>,
+    /// What the data say of the numbers of train and line that were not found.
+    pub identifiability: Vec<Identifiability>,
     /// Prediction files by run.
     pub predictions: BTreeMap<String, String>,
 }

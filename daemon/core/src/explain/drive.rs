@@ -9,7 +9,7 @@ use std::sync::Arc;
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 
-use super::answer::{DriveAnswer, Told};
+use super::answer::{DriveAnswer, HALF_95, Told};
 use super::effects::{AtBound, Hypothesis, Parameter};
 use super::evidence::{
     FitProblem, GrownModel, Noise, RunData, RunDataError, SampleForces, prepare,
@@ -229,12 +229,16 @@ impl DriveAnswer {
             );
         }
         let auxiliaries = self.auxiliary_power_kw.map_or(String::new(), |told| {
-            format!(" and {:.1} ± {:.1} kW for what is fed beside it", told.value, 1.96 * told.std)
+            format!(
+                " and {:.1} ± {:.1} kW for what is fed beside it",
+                told.value,
+                HALF_95 * told.std
+            )
         });
         format!(
             " The force comes from power, at an efficiency of {value:.3} ± {:.3} ({read}){auxiliaries}, \
              for the declared mass: of a mass that is 1 % off, so is the efficiency.",
-            1.96 * std
+            HALF_95 * std
         )
     }
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::answer::Told;
+use super::answer::{HALF_95, Told};
 use super::effects::{Hypothesis, Parameter};
 use super::evidence::{
     FitProblem, GrownModel, Noise, RunData, RunDataError, SampleForces, prepare,
@@ -82,6 +82,6 @@ pub fn sentence(late: Told) -> String {
     format!(
         " Forces act {:.2} ± {:.2} s before their stamps and were taken where they act.",
         late.value,
-        1.96 * late.std
+        HALF_95 * late.std
     )
 }

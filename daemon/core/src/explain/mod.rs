@@ -10,17 +10,19 @@
 //! - [`scan`], [`places`], [`residual_pressure`]: what a force of some shape, at some place or
 //!   time, would explain
 //! - [`selection`]: the search for effects, its significance, evidence by run
-//! - [`score`], [`stop_to_stop`]: open-loop prediction of fit and holdout runs
-//! - [`unexplained`], [`told`], [`rivals`], [`runners_up`], [`verdict`], [`answer`]: the statement
+//! - [`score`], [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
+//! - [`unexplained`], [`told`], [`identifiability`], [`rivals`], [`runners_up`], [`verdict`], [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
 //!
 //! [`explain`] runs it all.
 
 pub mod answer;
+mod bootstrap;
 pub mod drive;
 pub mod effects;
 pub mod evidence;
 pub mod force_time;
+pub mod identifiability;
 pub mod places;
 pub mod report;
 pub mod residual_pressure;
@@ -109,7 +111,7 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
         answer.statement += &force_time::sentence(late);
         answer.force_late_s = Some(late);
     }
-    let strength = search.greatest_strength(&outcome);
+    let strength = Search::greatest_strength(&outcome);
     progress(1.0, "done");
     let (base, grown) = (outcome.base.clone(), outcome.fit.clone());
     Ok(Explanation { strength, answer, base, grown, score, predictions, outcome, problem, holdout })

@@ -2,57 +2,63 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::evidence::Fit;
-use super::selection::{AMBIGUOUS, EVIDENCE_MIN, Outcome, Trial};
+use super::evidence::{EQUAL, Fit};
+use super::selection::{Outcome, Trial};
 
 /// A rival takes away this share of what the accepted effect does of the open-loop error.
 const REDUCTION_SHARE: f64 = 0.7;
 
-/// Kinds that could stand in the place of the effect accepted last.
+/// An accepted effect and the kinds that could stand in its place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rivals {
+    /// The kind that was accepted.
+    pub accepted: EffectKind,
+    /// The others.
+    pub kinds: Vec<EffectKind>,
+}
+
+/// For each accepted effect that has some, the kinds that could stand in its place.
 ///
-/// Beside those that the runs could not tell from it whatever they showed, a rival explains the data as well, takes away about as much of the open-loop error, and has
-/// nothing left to explain once the effect is in: what keeps its evidence acts beside the effect
-/// and not in its place.
-pub fn rivals(outcome: &Outcome) -> Vec<EffectKind> {
-    let Some(accepted) = accepted_round(outcome) else { return Vec::new() };
-    let Some(best) = accepted.iter().find(|trial| is_in(&outcome.fit, trial.kind)) else {
-        return Vec::new();
-    };
-    let left = |kind: EffectKind| {
-        let last = outcome.rounds.last().into_iter().flatten().find(|trial| trial.kind == kind);
-        last.map_or(0.0, |trial| trial.evidence)
-    };
-    let twins = outcome.fit.model.effects.iter().flat_map(|effect| effect.twins());
-    let mut kinds: Vec<EffectKind> =
-        twins.copied().filter(|&twin| !is_in(&outcome.fit, twin)).collect();
-    let close = accepted
-        .iter()
-        .filter(|trial| {
-            !is_in(&outcome.fit, trial.kind)
-                && trial.kind != EffectKind::Unknown
-                && trial.evidence > EVIDENCE_MIN
-                && trial.reduction > REDUCTION_SHARE * best.reduction
-                && left(trial.kind) < 0.5 * trial.evidence
-                && trial.advantage > best.advantage - AMBIGUOUS
-        })
-        .map(|trial| trial.kind);
-    for kind in close {
-        if !kinds.contains(&kind) {
-            kinds.push(kind);
+/// Beside those that the runs could not tell from it whatever they showed, a rival explains the data as
+/// well, takes away about as much of the open-loop error, and has nothing left to explain once the effect
+/// is in: what keeps its evidence acts beside the effect and not in its place.
+pub fn rivals(outcome: &Outcome) -> Vec<Rivals> {
+    let effects = &outcome.fit.model.effects;
+    let of = |accepted: EffectKind, tried: &[Trial], twins: &[EffectKind]| {
+        let own = tried.iter().find(|trial| trial.kind == accepted);
+        let close =
+            tried.iter().filter(|trial| own.is_some_and(|own| comes_close(trial, own, outcome)));
+        let mut kinds: Vec<EffectKind> = Vec::new();
+        for kind in twins.iter().copied().chain(close.map(|trial| trial.kind)) {
+            if !is_in(&outcome.fit, kind) && !kinds.contains(&kind) {
+                kinds.push(kind);
+            }
         }
-    }
-    kinds
+        Rivals { accepted, kinds }
+    };
+    let each = effects.iter().map(|effect| {
+        let kind = effect.kind();
+        let instead =
+            outcome.instead.iter().find(|(stands, _)| effects.len() > 1 && *stands == kind);
+        let first = outcome.rounds.first().map_or(&[][..], |round| &round[..]);
+        of(kind, instead.map_or(first, |(_, tried)| tried), effect.twins())
+    });
+    each.filter(|rivals| !rivals.kinds.is_empty()).collect()
+}
+
+/// Whether a trial could stand in the place of the accepted one.
+fn comes_close(trial: &Trial, accepted: &Trial, outcome: &Outcome) -> bool {
+    let last = outcome.rounds.last().into_iter().flatten();
+    let left = last.clone().find(|left| left.kind == trial.kind).map_or(0.0, |left| left.evidence);
+    trial.kind != EffectKind::Unknown
+        && trial.advantage > accepted.advantage - EQUAL
+        && trial.reduction > REDUCTION_SHARE * accepted.reduction
+        && left < 0.5 * trial.evidence
 }
 
 /// Whether a model has an effect of a kind.
 pub fn is_in(fit: &Fit, kind: EffectKind) -> bool {
     fit.model.effects.iter().any(|effect| effect.kind() == kind)
-}
-
-/// The last round that added an effect.
-fn accepted_round(outcome: &Outcome) -> Option<&Vec<Trial>> {
-    let count = outcome.fit.model.effects.len();
-    count.checked_sub(1).and_then(|index| outcome.rounds.get(index))
 }
 
 /// What is known to separate the kinds that are easily confused.

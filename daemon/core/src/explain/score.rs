@@ -1,6 +1,8 @@
 //! Open-loop prediction: the judge of a finished model.
 
+use super::bootstrap::intervals_95;
 use super::evidence::{Fit, FitProblem, GrownForces, RunData};
+use super::selection::without_each_run;
 use super::stop_to_stop::StopToStop;
 use crate::simulate::{Prediction, Restart, SpeedError, stop_runs};
 
@@ -30,8 +32,13 @@ pub struct PredictedRun {
 
 /// Error of a model over one run.
 pub fn run_error(fit: &Fit, run: &RunData, restart: Restart) -> SpeedError {
+    error_at(fit, &fit.theta, run, restart)
+}
+
+/// The same with other parameters.
+fn error_at(fit: &Fit, theta: &[f64], run: &RunData, restart: Restart) -> SpeedError {
     let (mut forces, mut prediction) = (GrownForces::default(), Prediction::new());
-    fit.model.forces(run, &fit.theta, &mut forces);
+    fit.model.forces(run, theta, &mut forces);
     prediction.simulate(&run.recording, &forces, restart);
     SpeedError::of(&run.recording, &prediction)
 }
@@ -53,11 +60,12 @@ pub fn stop_to_stop(runs: &[RunData], before: &Fit, after: &Fit) -> Option<StopT
     StopToStop::from_errors(runs.iter().map(of_run).collect())
 }
 
-/// Open-loop errors of the fit runs.
+/// Open-loop errors of the fit runs: as fitted, and each run by what the others say of it.
 #[derive(Clone, Copy, Debug)]
 pub struct FitErrors {
-    /// Root mean square in m/s over whole runs, and with restarts every 60 s.
-    speed_mps: [f64; 2],
+    /// Root mean squares in m/s as fitted and left out, each over whole runs and with restarts
+    /// every 60 s.
+    speed_mps: [[f64; 2]; 2],
     /// Share by which the integrated speed misses the measured way, with what that is known to.
     way: f64,
     /// Whether the model looks for the scale of the speeds: nothing else is judged by the way.
@@ -67,9 +75,13 @@ pub struct FitErrors {
 impl FitErrors {
     /// Those of a fitted model.
     pub fn of(problem: &FitProblem, fit: &Fit) -> Self {
-        let speed_mps = [Restart::FullRun, Restart::WINDOW_60].map(|restart| {
-            let each = problem.runs.iter().map(|run| run_error(fit, run, restart));
-            each.sum::<SpeedError>().rmse_mps().unwrap_or(0.0)
+        let fitted = vec![fit.theta.clone(); problem.runs.len()];
+        let speed_mps = [fitted, without_each_run(problem, fit)].map(|theta| {
+            [Restart::FullRun, Restart::WINDOW_60].map(|restart| {
+                let each = problem.runs.iter().zip(&theta);
+                let each = each.map(|(run, theta)| error_at(fit, theta, run, restart));
+                each.sum::<SpeedError>().rmse_mps().unwrap_or(0.0)
+            })
         });
         let missed =
             |(ratio, deviation): (f64, f64)| (ratio - 1.0 / fit.speed_scale()).hypot(deviation);
@@ -78,21 +90,26 @@ impl FitErrors {
     }
 
     /// Share of the error that a model with these errors takes away from another: over whole runs,
-    /// with restarts or, for the scale of the speeds, of the way, whichever is most.
+    /// with restarts or, for the scale of the speeds, of the way, whichever is most; of runs that were
+    /// fitted or of runs left out, whichever is less.
     pub fn reduction_from(&self, before: &Self) -> f64 {
         let share = |before: f64, after: f64| if before > 0.0 { 1.0 - after / before } else { 0.0 };
-        let of_speed = [0, 1].map(|k| share(before.speed_mps[k], self.speed_mps[k]));
         let of_way = if self.has_speed_scale == before.has_speed_scale {
             f64::NEG_INFINITY
         } else {
             share(before.way, self.way)
         };
-        of_speed.into_iter().fold(of_way, f64::max)
+        let most = |before: &[f64; 2], after: &[f64; 2]| {
+            let of_speed = before.iter().zip(after).map(|(before, after)| share(*before, *after));
+            of_speed.fold(of_way, f64::max)
+        };
+        let each = before.speed_mps.iter().zip(&self.speed_mps);
+        each.map(|(before, after)| most(before, after)).fold(f64::INFINITY, f64::min)
     }
 }
 
-/// Share of the error of the fit runs that the larger model takes away.
-pub fn reduction_on_fit_runs(problem: &FitProblem, smaller: &Fit, larger: &Fit) -> f64 {
+/// Share of the open-loop error of the fit runs that the larger model takes away.
+pub fn reduction(problem: &FitProblem, smaller: &Fit, larger: &Fit) -> f64 {
     FitErrors::of(problem, larger).reduction_from(&FitErrors::of(problem, smaller))
 }
 
@@ -145,31 +162,13 @@ impl Score {
     /// 95 % interval of 1 - after / before by bootstrap over the holdout runs; `None` with fewer
     /// than two.
     pub fn reduction_interval(&self) -> Option<[f64; 2]> {
-        const DRAWS: usize = 2000;
-        let runs = self.holdout_runs.len();
-        if runs < 2 {
-            return None;
-        }
-        let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-        let mut draw = || {
-            // Knuth's linear congruential generator: a fixed sequence, so that results repeat.
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) as usize % runs
-        };
-        let mut reductions: Vec<f64> = (0..DRAWS)
-            .filter_map(|_| {
-                let mut sums = [SpeedError::default(); 2];
-                for _ in 0..runs {
-                    let run = self.holdout_runs[draw()];
-                    sums = [sums[0] + run[0], sums[1] + run[1]];
-                }
-                Some(1.0 - sums[1].rmse_mps()? / sums[0].rmse_mps().filter(|&rmse| rmse > 0.0)?)
-            })
-            .collect();
-        reductions.sort_unstable_by(f64::total_cmp);
-        let at = |share: f64| reductions[((reductions.len() - 1) as f64 * share) as usize];
-        (!reductions.is_empty()).then(|| [at(0.025), at(0.975)])
+        let [interval] = intervals_95(&self.holdout_runs, |drawn| {
+            let sum = drawn
+                .iter()
+                .fold([SpeedError::default(); 2], |sum, run| [sum[0] + run[0], sum[1] + run[1]]);
+            let [before, after] = [sum[0].rmse_mps()?, sum[1].rmse_mps()?];
+            (before > 0.0).then(|| [1.0 - after / before])
+        })?;
+        Some(interval)
     }
 }

@@ -3,12 +3,7 @@
 
 use serde::Serialize;
 
-use crate::filter::random::Random;
-
-/// Bootstrap draws.
-const DRAWS: usize = 2000;
-/// The draws repeat from one answer to the next.
-const SEED: u64 = 11;
+use super::bootstrap::intervals_95;
 
 /// The middle of the errors of the runs from stop to stop, without and with the effects.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -42,22 +37,7 @@ impl StopToStop {
         let all: Vec<&Vec<[f64; 2]>> = by_run.iter().collect();
         let median_mps = medians_of(&all);
         let runs = all.iter().map(|errors| errors.len()).sum();
-        let count = all.len();
-        let mut random = Random::new(SEED);
-        let mut draws: [Vec<f64>; 2] = Default::default();
-        for _ in 0..if count > 1 { DRAWS } else { 0 } {
-            let mut draw = || all[((random.uniform() * count as f64) as usize).min(count - 1)];
-            let drawn: Vec<&Vec<[f64; 2]>> = (0..count).map(|_| draw()).collect();
-            for (list, median) in draws.iter_mut().zip(medians_of(&drawn)) {
-                list.push(median);
-            }
-        }
-        let interval = |mut list: Vec<f64>| {
-            list.sort_unstable_by(f64::total_cmp);
-            let at = |share: f64| list[((list.len() - 1) as f64 * share).round() as usize];
-            [at(0.025), at(0.975)]
-        };
-        let interval_95_mps = (count > 1).then(|| draws.map(interval));
+        let interval_95_mps = intervals_95(&by_run, |drawn| Some(medians_of(drawn)));
         (runs > 0).then_some(StopToStop { runs, median_mps, interval_95_mps, errors_mps })
     }
 }

@@ -43,7 +43,7 @@ impl<'o> Unexplained<'o> {
         let last = outcome.rounds.last().into_iter().flatten();
         let refused = last
             .clone()
-            .filter_map(|trial| Some((trial, search.refusal(&outcome.fit, trial)?)))
+            .filter_map(|trial| Some((trial, Search::refusal(trial)?)))
             .filter(|(_, refusal)| refusal.leaves_a_residual())
             .collect();
         let outside = last.clone().find(|trial| trial.kind == EffectKind::Unknown);

@@ -6,14 +6,16 @@ use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 
 use super::answer::{
-    Answer, BaseAnswer, Considered, DavisDeviations, EffectAnswer, ParameterValue, Place,
+    Answer, BaseAnswer, Considered, DavisDeviations, EffectAnswer, HALF_95, ParameterValue, Place,
     PlaceUncertainty, Verdict,
 };
 use super::effects::ReportContext;
-use super::rivals::{is_in, rivals, separating_run};
+use super::evidence::{p_value, strength};
+use super::identifiability::{identifiability, not_held};
+use super::rivals::{Rivals, is_in, rivals, separating_run};
 use super::runners_up::runners_up;
 use super::score::{self, Score};
-use super::selection::{Outcome, Search, deviations, discounted, p_value, penalty};
+use super::selection::{Outcome, Search, deviations, discounted, penalty};
 use super::told::{not_told, told_by_data};
 use super::unexplained::Unexplained;
 use crate::dataset::Note;
@@ -41,6 +43,10 @@ pub fn answer(
     let rivals = if is_unknown { Vec::new() } else { rivals(outcome) };
     let left = Unexplained::of(search, outcome);
     let verdict = verdict(search, outcome, &rivals, left.as_ref());
+    let identifiability = match verdict {
+        Verdict::InsufficientData => Vec::new(),
+        _ => identifiability(search, outcome),
+    };
     let [rmse_before, rmse_after] = score.holdout_rmse_mps();
     let pair = |errors: [SpeedError; 2]| Some([errors[0].rmse_mps()?, errors[1].rmse_mps()?]);
     let impossible: Vec<String> = notes
@@ -53,7 +59,7 @@ pub fn answer(
             statement(search, outcome, verdict, &effects, &rivals, left.as_ref());
         let not_told = match verdict {
             Verdict::InsufficientData => String::new(),
-            _ => not_told(search.problem, fit, &deviation),
+            _ => not_told(search.problem, fit, &deviation) + &not_held(&identifiability),
         };
         (text + &worse_held_out(&effects, score) + &not_told, experiment)
     } else {
@@ -65,7 +71,7 @@ pub fn answer(
         statement,
         notes,
         effects,
-        ambiguous_with: rivals.iter().map(|kind| kind.name()).collect(),
+        ambiguous_with: rivals.iter().flat_map(|it| &it.kinds).map(|kind| kind.name()).collect(),
         experiment,
         base: BaseAnswer {
             a: fit.theta[0],
@@ -86,7 +92,8 @@ pub fn answer(
         drive: None,
         force_late_s: None,
         unexplained_n_per_kn: left.map(|left| left.n_per_kn),
-        considered: considered(search, outcome, &rivals),
+        considered: considered(outcome, &rivals),
+        identifiability,
         predictions: BTreeMap::new(),
     }
 }
@@ -146,7 +153,7 @@ fn effect_answers(
         .map(|(index, (effect, range))| {
             let rest = search.without(fit, index);
             let decrease = discounted(fit, index, rest.cost - fit.cost);
-            let reduction = score::reduction_on_fit_runs(search.problem, &rest, fit);
+            let reduction = score::reduction(search.problem, &rest, fit);
             let weights = search.problem.runs.iter().filter_map(|run| run.samples().first());
             let weight_kn = weights.map(|sample| sample.weight_kn).sum::<f64>()
                 / search.problem.runs.len().max(1) as f64;
@@ -163,7 +170,7 @@ fn effect_answers(
                 place: Place { uncertainty_95: known[index].clone(), ..effect.place() },
                 parameters: reported.values,
                 std: reported.deviations,
-                p_value: p_value((decrease - penalty(fit, index)) * reduction),
+                p_value: p_value(strength(decrease - penalty(fit, index), reduction)),
                 error_reduction: reduction,
                 runners_up: if effect.kind() == EffectKind::Unknown {
                     runners_up(search, outcome)
@@ -181,7 +188,7 @@ fn effect_answers(
 fn verdict(
     search: &Search,
     outcome: &Outcome,
-    rivals: &[EffectKind],
+    rivals: &[Rivals],
     left: Option<&Unexplained>,
 ) -> Verdict {
     if outcome.rounds.is_empty() || moving_s(search) < MOVING_MIN_S {
@@ -192,7 +199,9 @@ fn verdict(
         return Verdict::Unknown;
     }
     if effects.is_empty() {
-        return Verdict::None;
+        // What speaks for a number at a bound speaks for something, if not for that.
+        let is_left = left.is_some_and(|left| !left.refused.is_empty());
+        return if is_left { Verdict::Unknown } else { Verdict::None };
     }
     if is_in(&outcome.fit, EffectKind::Unknown) {
         let total = outcome.base.cost - outcome.fit.cost;
@@ -206,16 +215,16 @@ fn verdict(
     if rivals.is_empty() { Verdict::Effect } else { Verdict::Ambiguous }
 }
 
-fn considered(search: &Search, outcome: &Outcome, rivals: &[EffectKind]) -> Vec<Considered> {
+fn considered(outcome: &Outcome, rivals: &[Rivals]) -> Vec<Considered> {
     let mut list: Vec<Considered> = Vec::new();
     if let Some(last) = outcome.rounds.last() {
         for trial in last {
             let remark = if is_in(&outcome.fit, trial.kind) {
                 "found".into()
-            } else if rivals.contains(&trial.kind) {
+            } else if rivals.iter().any(|it| it.kinds.contains(&trial.kind)) {
                 "explains the data as well".into()
             } else {
-                search.refusal(&outcome.fit, trial).map_or_else(
+                Search::refusal(trial).map_or_else(
                     || "explains the data, but less well than what was found".into(),
                     |refusal| refusal.to_string(),
                 )
@@ -238,7 +247,7 @@ fn statement(
     outcome: &Outcome,
     verdict: Verdict,
     effects: &[EffectAnswer],
-    rivals: &[EffectKind],
+    rivals: &[Rivals],
     left: Option<&Unexplained>,
 ) -> (String, Option<String>) {
     let described: Vec<String> = effects.iter().map(describe).collect();
@@ -277,14 +286,19 @@ fn statement(
             (text, Some(experiment.into()))
         }
         Verdict::Ambiguous => {
-            let names: Vec<&str> = rivals.iter().map(|kind| kind.name()).collect();
-            let first = effects.first().map_or("", |effect| effect.kind);
+            let one = |Rivals { accepted, kinds }: &Rivals| {
+                let names: Vec<&str> = kinds.iter().map(|kind| kind.name()).collect();
+                format!("{} and {}", accepted.name(), names.join(", "))
+            };
+            let each: Vec<String> = rivals.iter().map(one).collect();
             let text = format!(
-                "An effect acts, but {first} and {} explain it equally well on these runs ({described}).",
-                names.join(", ")
+                "An effect acts, but {} explain it equally well on these runs ({described}).",
+                each.join(", as well as ")
             );
-            let kind = effects.first().and_then(|effect| EffectKind::from_name(effect.kind));
-            let experiment = kind.map(|kind| separating_run(kind, rivals));
+            let runs = rivals.iter().map(|it| separating_run(it.accepted, &it.kinds));
+            let mut experiments: Vec<String> = runs.collect();
+            experiments.dedup();
+            let experiment = (!experiments.is_empty()).then(|| experiments.join(" "));
             (text, experiment)
         }
     }
@@ -314,7 +328,7 @@ fn describe(effect: &EffectAnswer) -> String {
         if let (ParameterValue::Number(value), Some(ParameterValue::Number(deviation))) =
             (value, effect.std.get(name))
         {
-            parts.push(match 1.96 * deviation {
+            parts.push(match HALF_95 * deviation {
                 // A reference that was chosen and not estimated.
                 0.0 => format!("{name} = {value}"),
                 half_width => format!("{name} = {value:.4} ± {half_width:.4}"),

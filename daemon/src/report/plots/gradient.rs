@@ -8,9 +8,7 @@ use super::axes::{Axis, band, chart, frame, padded, range_with_zero, stroke, zer
 use super::reading::Reading;
 use super::speeds::Width;
 use super::{AFTER, Plot, PlotError, SCALE, for_page};
-
-/// Half width of the 95 % interval in standard deviations.
-const HALF_95: f64 = 1.96;
+use dynocar_core::explain::answer::HALF_95;
 
 /// A profile of (chainage in m, gradient in ‰, its standard deviation in ‰) as SVG.
 ///

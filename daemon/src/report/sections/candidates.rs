@@ -1,6 +1,6 @@
 //! What else was considered, and why it lost.
 
-use dynocar_core::explain::selection::{EVIDENCE_MIN, STRENGTH_MIN};
+use dynocar_core::explain::evidence::STRENGTH_MIN;
 
 use super::Section;
 use crate::report::Subject;
@@ -38,10 +38,9 @@ pub fn section(subject: &Subject) -> Section {
     let mut body = format!(
         "<p>Every kind of the library was fitted together with a, b and c. Evidence is the \
          decrease of −2 log likelihood less the price of the parameters and of the structures \
-         that were tried; it must exceed {EVIDENCE_MIN:.0}, and times the share of the error that it takes away \
-         {STRENGTH_MIN:.0}; the effect must also be large enough to matter and hold on runs left \
-         out of the fit. ‘Alone’ is \
-         on top of a, b and c only; errors are those of the fit runs.</p>\n"
+         that were tried; times the square of the share of the error that it takes away, of runs \
+         that were fitted and of runs left out of the fit, it must exceed {STRENGTH_MIN:.0}, and the effect \
+         must be large enough to matter. ‘Alone’ is on top of a, b and c only.</p>\n"
     );
     if subject.data.candidates.is_empty() {
         body += "<p>The runs hold too little motion for any of them.</p>\n";

@@ -8,6 +8,7 @@
 //! least-squares problem whatever the noise.
 
 mod cleaning;
+mod criterion;
 mod fade;
 mod fit;
 mod model;
@@ -18,6 +19,7 @@ mod run_scatter;
 mod sample_forces;
 mod whitener;
 
+pub use criterion::{EQUAL, NULL_STRENGTH, NullStrength, STRENGTH_MIN, p_value, strength};
 pub use fade::Fade;
 pub use fit::{Fit, FitProblem, Nearby, RunNormal};
 pub use model::{GrownForces, GrownModel, SharedHypothesis};
@@ -26,6 +28,3 @@ pub use run_data::{Bin, RunData, RunDataError, RunPower, prepare};
 pub use run_scatter::WeightedFilter;
 pub use sample_forces::SampleForces;
 pub use whitener::Whitener;
-
-/// Evidence that an effect must have: decrease of -2 log likelihood beyond the penalty.
-pub const EVIDENCE_MIN: f64 = 9.0;

@@ -1,10 +1,8 @@
 //! In which runs a force acts.
 
 use super::found::Found;
+use crate::explain::evidence::EQUAL;
 use crate::explain::scan::{Scan, Tuple};
-
-/// A chosen run must show the force by itself.
-const RUN_GAIN_MIN: f64 = 6.0;
 
 /// The runs, as a set of numbers, whose common factor explains most after the cost of choosing.
 pub(super) fn best_runs(
@@ -32,7 +30,8 @@ pub(super) fn best_runs(
     for &sign in signs {
         let mut sum = Tuple::zero(scan.fit.theta.len());
         let mut chosen = Vec::new();
-        let tells = |own: &&(usize, f64, f64)| own.1 > RUN_GAIN_MIN && own.2 * sign > 0.0;
+        // A chosen run shows the force by itself.
+        let tells = |own: &&(usize, f64, f64)| own.1 > EQUAL && own.2 * sign > 0.0;
         for &(index, _, _) in order.iter().filter(tells) {
             sum.add(&tuples[index]);
             chosen.push(index);

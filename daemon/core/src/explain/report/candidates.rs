@@ -4,8 +4,9 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::words;
 use crate::explain::Explanation;
-use crate::explain::score::reduction_on_fit_runs;
-use crate::explain::selection::{EVIDENCE_MIN, Trial};
+use crate::explain::evidence::STRENGTH_MIN;
+use crate::explain::score::reduction;
+use crate::explain::selection::Trial;
 
 /// A kind of the library.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,7 +19,8 @@ pub struct CandidateRow {
     pub is_found: bool,
     /// Evidence of it alone on top of a, b, c; `None` when it could not be tested.
     pub alone: Option<f64>,
-    /// Share of the open-loop error of the fit runs that it alone takes away.
+    /// Share of the open-loop error that it alone takes away, of the fit runs and of each by what the
+    /// others say of it, whichever is less.
     pub reduction: Option<f64>,
     /// Evidence beside everything found; `None` for what was found or could not be tested.
     pub beside: Option<f64>,
@@ -43,7 +45,7 @@ pub fn rows(explanation: &Explanation) -> Vec<CandidateRow> {
             let kind = trial.kind.name();
             let is_found = found.contains(&kind);
             let beside = of(last, trial.kind).filter(|_| !is_found);
-            let reduction = reduction_on_fit_runs(&explanation.problem, &outcome.base, &trial.fit);
+            let reduction = reduction(&explanation.problem, &outcome.base, &trial.fit);
             let mut row = CandidateRow {
                 kind,
                 title: words::kind(trial.kind),
@@ -90,7 +92,7 @@ fn reason(explanation: &Explanation, row: &CandidateRow, is_rival: bool) -> Stri
         return format!("explains the runs as well as {found}: not told apart");
     }
     match row.beside {
-        Some(beside) if alone > EVIDENCE_MIN && beside <= EVIDENCE_MIN => {
+        Some(beside) if alone > STRENGTH_MIN && beside <= STRENGTH_MIN => {
             format!("borrows from the same residual: adds nothing beside {found}")
         }
         _ => remark(),

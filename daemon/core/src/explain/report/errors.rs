@@ -3,18 +3,14 @@
 use super::Estimate;
 use crate::dataset::Role;
 use crate::explain::Explanation;
+use crate::explain::bootstrap::intervals_95;
 use crate::explain::evidence::{Fit, GrownForces, RunData};
 use crate::explain::score::{run_error, stop_to_stop};
 use crate::explain::stop_to_stop::StopToStop;
-use crate::filter::random::Random;
 use crate::simulate::{Prediction, Restart, SpeedError};
 
-/// Bootstrap draws.
-const DRAWS: usize = 2000;
 /// Length in s of the blocks of a single run.
 const BLOCK_S: f64 = 60.0;
-/// The draws repeat from one report to the next.
-const SEED: u64 = 7;
 
 /// What was drawn with replacement for the intervals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -163,19 +159,10 @@ fn pooled(units: impl Iterator<Item = [SpeedError; 2]>) -> Option<[f64; 3]> {
 /// Percentile bootstrap over units; the two models are always judged on the same draw.
 fn bootstrap(units: &[[SpeedError; 2]], resampling: Resampling) -> Option<ErrorPair> {
     let values = pooled(units.iter().copied())?;
-    let mut random = Random::new(SEED);
-    let count = units.len();
-    let mut draws: Vec<[f64; 3]> = (0..DRAWS)
-        .filter_map(|_| {
-            let mut draw = || units[((random.uniform() * count as f64) as usize).min(count - 1)];
-            pooled((0..count).map(|_| draw()))
-        })
-        .collect();
-    let mut estimate = |which: usize| {
-        draws.sort_unstable_by(|one, other| one[which].total_cmp(&other[which]));
-        let at = |share: f64| draws[((draws.len() - 1) as f64 * share).round() as usize][which];
-        let interval = (count > 1 && !draws.is_empty()).then(|| [at(0.025), at(0.975)]);
-        Estimate { value: values[which], interval }
+    let intervals = intervals_95(units, |drawn| pooled(drawn.iter().map(|unit| **unit)));
+    let estimate = |which: usize| Estimate {
+        value: values[which],
+        interval: intervals.map(|intervals| intervals[which]),
     };
     Some(ErrorPair {
         before_mps: estimate(0),
@@ -188,6 +175,7 @@ fn bootstrap(units: &[[SpeedError; 2]], resampling: Resampling) -> Option<ErrorP
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::filter::random::Random;
 
     fn unit(before_mps: f64, after_mps: f64) -> [SpeedError; 2] {
         [before_mps, after_mps]

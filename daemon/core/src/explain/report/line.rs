@@ -8,7 +8,7 @@ use super::panels::{PanelBin, bins, covariance};
 use super::windows::Window;
 use super::words;
 use crate::explain::Explanation;
-use crate::explain::answer::{EffectAnswer, ParameterValue, RunWindow, WindowUncertainty};
+use crate::explain::answer::{EffectAnswer, HALF_95, ParameterValue, RunWindow, WindowUncertainty};
 use crate::explain::evidence::RunData;
 
 /// A stretch of the line where an effect was found.
@@ -126,5 +126,5 @@ fn gradient_error(effect: &EffectAnswer) -> Vec<[f64; 3]> {
     let (values, deviations) =
         (list(effect.parameters.get("profile")), list(effect.std.get("profile")));
     let both = values.iter().zip(&deviations);
-    both.map(|([at_m, value], [_, std])| [*at_m, *value, 1.96 * std]).collect()
+    both.map(|([at_m, value], [_, std])| [*at_m, *value, HALF_95 * std]).collect()
 }

@@ -7,7 +7,7 @@ use super::covariates::Covariate;
 use super::windows::Window;
 use crate::dataset::{Dataset, Role};
 use crate::explain::Explanation;
-use crate::explain::answer::{EffectAnswer, ParameterValue, RunWindow};
+use crate::explain::answer::{EffectAnswer, HALF_95, ParameterValue, RunWindow};
 use crate::explain::evidence::RunData;
 use crate::explain::selection::deviations;
 use crate::force::ResolvedSample;
@@ -297,7 +297,7 @@ fn panel_bin(
         let mean = mean(value);
         let square = group.iter().map(|(_, w)| (value(w) - mean).powi(2)).sum::<f64>();
         let error = if count > 1.0 { (square / (count - 1.0) / count).sqrt() } else { 0.0 };
-        (mean, 1.96 * error)
+        (mean, HALF_95 * error)
     };
     let slopes = DVector::from_fn(covariance.nrows(), |i, _| mean(&|window| window.slopes[i]));
     let variance = slopes.dot(&(covariance * &slopes));
@@ -308,7 +308,7 @@ fn panel_bin(
         after_n_per_kn: with_error(&|window| window.after_n_per_kn),
         effect_n_per_kn: (
             mean(&|window| window.before_n_per_kn - window.after_n_per_kn),
-            1.96 * variance.max(0.0).sqrt(),
+            HALF_95 * variance.max(0.0).sqrt(),
         ),
     }
 }

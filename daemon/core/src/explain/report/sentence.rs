@@ -3,7 +3,7 @@
 use super::errors::{ErrorPair, Errors};
 use super::words::{self, joined, kind_name, number};
 use crate::dataset::Role;
-use crate::explain::answer::{Answer, EffectAnswer, ParameterValue, Place, Verdict};
+use crate::explain::answer::{Answer, EffectAnswer, HALF_95, ParameterValue, Place, Verdict};
 
 /// Places named in a sentence at most.
 const PLACES_MAX: usize = 4;
@@ -88,7 +88,7 @@ fn sizes(effect: &EffectAnswer) -> Vec<String> {
         let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
         match value {
             ParameterValue::Number(value) => {
-                let half = 1.96 * number_of(effect.std.get(name)).unwrap_or(0.0);
+                let half = HALF_95 * number_of(effect.std.get(name)).unwrap_or(0.0);
                 // What is a convention has no uncertainty.
                 if half > 0.0 {
                     let [low, high] = [value - half, value + half].map(|it| number(it, Some(half)));
@@ -263,6 +263,7 @@ mod tests {
             force_late_s: None,
             unexplained_n_per_kn: None,
             considered: Vec::new(),
+            identifiability: Vec::new(),
             predictions: std::collections::BTreeMap::new(),
         };
         let value = |value| Estimate { value, interval: None };

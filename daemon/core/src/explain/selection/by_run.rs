@@ -3,18 +3,11 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::explain::evidence::{Fit, RunNormal};
+use crate::explain::answer::HALF_95;
+use crate::explain::evidence::{Fit, FitProblem, RunData, RunNormal};
 
-/// What an effect does for runs that did not take part in its fit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Held {
-    /// Decrease of -2 log likelihood on the runs left out, summed.
-    pub gain: f64,
-    /// Runs on which it helps.
-    pub better: usize,
-    /// Runs in all.
-    pub runs: usize,
-}
+/// Less runs than these tell nothing of each other.
+const RUNS_MIN: usize = 2;
 
 /// By how much the parameters move when each run is left out, to second order; `None` for a run
 /// without which they are not determined.
@@ -27,29 +20,43 @@ fn moves_without_each_run(fit: &Fit) -> Vec<Option<DVector<f64>>> {
     fit.runs.iter().map(moved).collect()
 }
 
-/// Cost of each run under the parameters fitted without it, to second order.
-fn held_out_costs(fit: &Fit) -> Vec<f64> {
-    fit.runs
-        .iter()
-        .zip(moves_without_each_run(fit))
-        .map(|(run, moved)| match moved {
-            Some(away) => {
-                run.cost - 2.0 * run.score.dot(&away) + away.dot(&(&run.information * &away))
-            }
-            None => run.cost,
+/// The parameters fitted without each run, to second order and within their bounds: what the other
+/// runs say of it. What they do not tell is at none, but a parameter of a single run (its wind, a load
+/// in it) stays as it was fitted: it says nothing of other runs. With fewer than three runs all stay.
+pub fn without_each_run(problem: &FitProblem, fit: &Fit) -> Vec<Vec<f64>> {
+    let count = fit.theta.len();
+    if fit.runs.len() < RUNS_MIN {
+        return vec![fit.theta.clone(); fit.runs.len()];
+    }
+    let (mut information, mut pull) = (fit.information(), DVector::zeros(count));
+    let mut bounds = vec![Some((f64::NEG_INFINITY, f64::INFINITY)); count];
+    for (effect, range) in fit.model.effects.iter().zip(fit.model.ranges()) {
+        let place = effect.place();
+        let acts = |parameter: usize| {
+            let in_run =
+                |run: &&RunData| place.may_be_in(&run.file) && effect.touches(parameter, run);
+            problem.runs.iter().filter(in_run).count()
+        };
+        for (parameter, (i, spec)) in range.zip(effect.parameters()).enumerate() {
+            bounds[i] = (acts(parameter) > 1).then_some((spec.lower, spec.upper));
+            // As wide as what is looked for: a flat prior's variance.
+            let weight = 12.0 / (spec.upper - spec.lower).powi(2);
+            information[(i, i)] += weight;
+            pull[i] = weight * (effect.none() - fit.theta[i]);
+        }
+    }
+    let moved = |run: &RunNormal| {
+        let Some(rest) = Cholesky::new(&information - &run.information) else {
+            return fit.theta.clone();
+        };
+        let away = rest.solve(&(&pull - &run.score));
+        let each = fit.theta.iter().zip(&bounds).enumerate();
+        each.map(|(i, (value, bounds))| {
+            bounds.map_or(*value, |(lower, upper)| (value + away[i]).clamp(lower, upper))
         })
         .collect()
-}
-
-/// Leaves one run out at a time: what the larger model gains on it.
-pub fn leave_one_run_out(smaller: &Fit, larger: &Fit) -> Held {
-    let (before, after) = (held_out_costs(smaller), held_out_costs(larger));
-    let gains = before.iter().zip(&after).map(|(before, after)| before - after);
-    Held {
-        gain: gains.clone().sum(),
-        better: gains.filter(|&gain| gain > 0.0).count(),
-        runs: before.len(),
-    }
+    };
+    fit.runs.iter().map(moved).collect()
 }
 
 /// The form of an effect (a train of one piece, averages over bins) is itself good to this share
@@ -60,7 +67,7 @@ const FORM_SHARE: f64 = 0.015;
 /// 1.96 standard deviations make a 95 % interval.
 fn few_runs_factor(runs: usize) -> f64 {
     let freedom = (runs as f64 - 1.0).max(2.0);
-    StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |student| student.inverse_cdf(0.975) / 1.96)
+    StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |student| student.inverse_cdf(0.975) / HALF_95)
 }
 
 /// Standard deviations of all parameters, and their covariance.

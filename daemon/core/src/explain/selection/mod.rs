@@ -2,13 +2,10 @@
 
 mod acceptance;
 mod by_run;
+mod price;
 mod search;
-mod significance;
 
 pub use acceptance::Refusal;
-pub use by_run::{Held, deviations, leave_one_run_out};
+pub use by_run::{deviations, without_each_run};
+pub use price::{discounted, model_penalty, penalty};
 pub use search::{OBSERVATIONS_MIN, Outcome, Progress, Search, Trial};
-pub use significance::{
-    AMBIGUOUS, EVIDENCE_MIN, NULL_STRENGTH, NullStrength, STRENGTH_MIN, discounted, model_penalty,
-    p_value, penalty,
-};

@@ -4,14 +4,13 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::significance::{
-    AMBIGUOUS, EVIDENCE_MIN, REDUCTION_MIN, STRENGTH_MIN, at_bound, discounted, model_penalty,
-    penalty,
-};
+use super::price::{at_bound, discounted, model_penalty, penalty};
 use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal, UNKNOWN, leaves_a_force};
-use crate::explain::evidence::{Fit, FitProblem, GrownModel, Noise, RunData};
+use crate::explain::evidence::{
+    EQUAL, Fit, FitProblem, GrownModel, Noise, RunData, STRENGTH_MIN, strength,
+};
 use crate::explain::scan::Scan;
-use crate::explain::score::{self, FitErrors};
+use crate::explain::score::{FitErrors, reduction};
 use crate::track::Track;
 use crate::train::TrainModel;
 
@@ -26,9 +25,7 @@ const FINALISTS: usize = 5;
 /// A finalist's advantage: not far below none, and no less than this share of the greatest.
 const FINALIST_MIN: f64 = -20.0;
 const FINALIST_SHARE: f64 = 0.1;
-/// Beyond this number of observations, where small things are significant, a finalist takes away
-/// at least this share of the open-loop error, a sixth of what an effect needs.
-const MANY_OBSERVATIONS: usize = 5_000;
+/// A finalist takes away at least this share of the open-loop error.
 const FINALIST_REDUCTION: f64 = 0.02;
 /// Shares of the slow part of a noise under which a kind looks again.
 const STIFF: [f64; 2] = [0.01, 1e-4];
@@ -46,8 +43,8 @@ pub struct Trial {
     pub advantage: f64,
     /// The same after the discount for errors that all runs share: what must be more than chance.
     pub evidence: f64,
-    /// Share of the open-loop error of the fit runs that it takes away; 0 where the evidence does
-    /// not ask for it.
+    /// Share of the open-loop error that it takes away, of the fit runs and of each by what the others
+    /// say of it, whichever is less; 0 where the evidence does not ask for it.
     pub reduction: f64,
 }
 
@@ -57,9 +54,9 @@ impl Trial {
         self.fit.model.effects.len() - 1
     }
 
-    /// Evidence times the share of the open-loop error that it takes away.
+    /// What decides.
     pub fn strength(&self) -> f64 {
-        self.evidence.max(0.0) * self.reduction.max(0.0)
+        strength(self.evidence, self.reduction)
     }
 }
 
@@ -73,6 +70,8 @@ pub struct Outcome {
     /// The best trial of each kind in each round, the strongest first; the last round is the one
     /// in which nothing more was accepted.
     pub rounds: Vec<Vec<Trial>>,
+    /// Where several effects were found, what was tried in the place of each.
+    pub instead: Vec<(EffectKind, Vec<Trial>)>,
     /// Kinds that the data do not allow to test, and why.
     pub not_testable: Vec<(EffectKind, String)>,
 }
@@ -99,7 +98,13 @@ impl Search<'_> {
         let start = self.problem.start(&[]);
         let first = self.problem.fit_with_noise(&declared, start, Noise::START);
         let base = self.problem.fit_with_noise(&declared, first.theta, first.noise);
-        Outcome { base: base.clone(), fit: base, rounds: Vec::new(), not_testable: Vec::new() }
+        Outcome {
+            base: base.clone(),
+            fit: base,
+            rounds: Vec::new(),
+            instead: Vec::new(),
+            not_testable: Vec::new(),
+        }
     }
 
     /// Searches.
@@ -112,13 +117,13 @@ impl Search<'_> {
             let round = outcome.rounds.len() as f64;
             (self.progress)((0.1 + 0.25 * round).min(0.8), "trying effects");
             let trials = self.round(&outcome.fit, &mut outcome.not_testable);
-            let next = self.best(&outcome.fit, &trials).map(|trial| trial.fit.clone());
+            let next = self.best(&trials).map(|trial| trial.fit.clone());
             outcome.rounds.push(trials);
             let Some(next) = next else { break };
             outcome.fit = next;
             if outcome.fit.model.effects.len() > 1 {
                 (self.progress)((0.2 + 0.25 * round).min(0.85), "swapping effects");
-                self.swap(&mut outcome.fit);
+                outcome.instead = self.swap(&mut outcome.fit);
                 self.prune(&mut outcome.fit);
             }
         }
@@ -128,13 +133,13 @@ impl Search<'_> {
     /// The trial to accept: the one with the strongest evidence, or one with about the same that
     /// takes away more of the open-loop error. What is outside the library must explain more than
     /// anything in it.
-    fn best<'t>(&self, base: &Fit, trials: &'t [Trial]) -> Option<&'t Trial> {
+    fn best<'t>(&self, trials: &'t [Trial]) -> Option<&'t Trial> {
         let accepted: Vec<&Trial> =
-            trials.iter().filter(|trial| self.refusal(base, trial).is_none()).collect();
+            trials.iter().filter(|trial| Self::refusal(trial).is_none()).collect();
         let strongest = accepted.first()?;
         accepted
             .iter()
-            .take_while(|trial| trial.advantage > strongest.advantage - AMBIGUOUS)
+            .take_while(|trial| trial.advantage > strongest.advantage - EQUAL)
             .filter(|trial| trial.kind != EffectKind::Unknown)
             .max_by(|one, other| one.reduction.total_cmp(&other.reduction))
             .or(Some(strongest))
@@ -171,28 +176,35 @@ impl Search<'_> {
             }
         }
         let by_advantage = |one: &Trial, other: &Trial| other.advantage.total_cmp(&one.advantage);
-        trials.sort_by(|one, other| by_advantage(&one.0, &other.0));
-        let greatest = trials.first().map_or(0.0, |(trial, _)| trial.advantage);
-        let least = FINALIST_MIN.max(FINALIST_SHARE * greatest);
         let before = FitErrors::of(self.problem, base);
         let reduction = |fit: &Fit| FitErrors::of(self.problem, fit).reduction_from(&before);
-        let has_many = base.observations() > MANY_OBSERVATIONS;
+        for (trial, _) in trials.iter_mut().filter(|(trial, _)| trial.advantage > FINALIST_MIN) {
+            trial.reduction = reduction(&trial.fit);
+        }
+        // What takes nothing from the error is no measure for the others.
+        let helps = |trial: &Trial| trial.reduction > FINALIST_REDUCTION;
+        let key = |trial: &Trial| (helps(trial), trial.advantage);
+        trials.sort_by(|(one, _), (other, _)| {
+            let (one, other) = (key(one), key(other));
+            other.0.cmp(&one.0).then(other.1.total_cmp(&one.1))
+        });
+        let greatest = trials.first().map_or(0.0, |(trial, _)| trial.advantage);
+        let least = FINALIST_MIN.max(FINALIST_SHARE * greatest);
         let mut finished: Vec<Trial> = trials
             .into_iter()
             .enumerate()
             .map(|(rank, (trial, effect))| {
-                let is_finalist = rank < FINALISTS
-                    && trial.advantage > least
-                    && (!has_many || reduction(&trial.fit) > FINALIST_REDUCTION);
+                let is_finalist = rank < FINALISTS && trial.advantage > least && helps(&trial);
                 let share = base.model.effects.len() as f64
                     + (rank.min(FINALISTS) + 2) as f64 / (FINALISTS + 2) as f64;
                 (self.progress)((0.1 + 0.25 * share).min(0.85), trial.kind.name());
-                if is_finalist { self.finalist(base, trial, effect) } else { trial }
+                if !is_finalist {
+                    return trial;
+                }
+                let trial = self.finalist(base, trial, effect);
+                Trial { reduction: reduction(&trial.fit), ..trial }
             })
             .collect();
-        for trial in finished.iter_mut().filter(|trial| trial.evidence > EVIDENCE_MIN) {
-            trial.reduction = reduction(&trial.fit);
-        }
         finished.sort_by(by_advantage);
         finished
     }
@@ -286,18 +298,12 @@ impl Search<'_> {
                 let noise = base.noise.stiff(share);
                 let Some(mut trial) = self.look_again(base, noise, UNKNOWN) else { continue };
                 trial.reduction = FitErrors::of(self.problem, &trial.fit).reduction_from(&before);
-                let is_better = Self::total(&trial.fit) < Self::total(&outcome.fit) - EVIDENCE_MIN;
-                if is_better && self.refusal(base, &trial).is_none() {
+                let is_better = Self::total(&trial.fit) < Self::total(&outcome.fit) - EQUAL;
+                if is_better && Self::refusal(&trial).is_none() {
                     outcome.fit = trial.fit;
                 }
             }
         }
-    }
-
-    /// Share of the open-loop error of the fit runs that the larger model takes away, over whole
-    /// runs or minutes, whichever is more.
-    fn reduction(&self, smaller: &Fit, larger: &Fit) -> f64 {
-        score::reduction_on_fit_runs(self.problem, smaller, larger)
     }
 
     /// Total cost of a model: fit and price.
@@ -305,17 +311,23 @@ impl Search<'_> {
         fit.cost + model_penalty(fit)
     }
 
-    /// Takes each effect out in turn and looks whether another kind does better in its place.
-    fn swap(&self, fit: &mut Fit) {
+    /// Takes each effect out in turn and looks whether another kind does better in its place; what was
+    /// tried in the place of each kind that stands after it.
+    fn swap(&self, fit: &mut Fit) -> Vec<(EffectKind, Vec<Trial>)> {
+        let mut tried = Vec::new();
         for index in 0..fit.model.effects.len() {
             let rest = self.without(fit, index);
             let trials = self.round(&rest, &mut Vec::new());
-            if let Some(best) = self.best(&rest, &trials)
-                && Self::total(&best.fit) < Self::total(fit) - 4.0
+            let mut stands = fit.model.effects[index].kind();
+            if let Some(best) = self.best(&trials)
+                && Self::total(&best.fit) < Self::total(fit) - EQUAL
             {
                 *fit = best.fit.clone();
+                stands = best.kind;
             }
+            tried.push((stands, trials));
         }
+        tried
     }
 
     /// Drops effects that the others have made needless.
@@ -324,12 +336,8 @@ impl Search<'_> {
         while index < fit.model.effects.len() && fit.model.effects.len() > 1 {
             let rest = self.without(fit, index);
             let evidence = Self::total(&rest) - Self::total(fit);
-            let reduction = self.reduction(&rest, fit);
-            let needless = evidence < EVIDENCE_MIN
-                || reduction < REDUCTION_MIN
-                || evidence * reduction < STRENGTH_MIN
-                || at_bound(fit, index).is_some();
-            if needless {
+            let reduction = reduction(self.problem, &rest, fit);
+            if strength(evidence, reduction) < STRENGTH_MIN || at_bound(fit, index).is_some() {
                 *fit = rest;
             } else {
                 index += 1;

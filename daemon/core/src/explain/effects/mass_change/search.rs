@@ -5,15 +5,13 @@ use std::sync::Arc;
 use super::Masses;
 use super::parts::{Part, STATION_M, STOP_MIN_S, stations, stops};
 use crate::explain::effects::Candidate;
-use crate::explain::evidence::RunData;
+use crate::explain::evidence::{EQUAL, RunData};
 use crate::explain::places::span_m;
 use crate::explain::scan::{Scan, Tuple};
 use crate::terms::masses::{LEAST_SHARE, PARAMETER};
 
 /// Sections or windows at most.
 const PARTS_MAX: usize = 5;
-/// What another section must explain beyond its choice.
-const GAIN_MIN: f64 = 8.0;
 
 /// What a mass factor slightly above 1 does: traction and brake force move more mass, while all
 /// that goes with the weight stays.
@@ -22,8 +20,12 @@ fn shape(run: &RunData, index: usize) -> f64 {
     -sample.control_force_n().unwrap_or(0.0) / sample.inertial_mass_kg
 }
 
-/// Every stretch between two stations in one direction, with its tuple.
+/// Every stretch between two stations in one direction, with its tuple; none where positions are not
+/// measured, for then the runs share no places.
 pub fn all_sections(scan: &Scan) -> Vec<(Part, Tuple)> {
+    if scan.problem.way_ratio.is_none() {
+        return Vec::new();
+    }
     let stations = stations(scan);
     let mut sections = Vec::new();
     for direction in [Some(1.0), Some(-1.0)] {
@@ -132,7 +134,7 @@ pub fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Option<Candidate> {
         });
         match best(&next, &mut fresh) {
             Some((gain, estimate, part))
-                if gain > part_cost + GAIN_MIN && estimate.abs() > LEAST_SHARE =>
+                if gain > part_cost + EQUAL && estimate.abs() > LEAST_SHARE =>
             {
                 masses.edges.push(edges(&part));
                 masses.parts.push(part);

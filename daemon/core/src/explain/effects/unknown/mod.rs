@@ -13,7 +13,7 @@ mod grammar;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Proposal};
-use crate::explain::evidence::EVIDENCE_MIN;
+use crate::explain::evidence::STRENGTH_MIN;
 use crate::explain::scan::Scan;
 
 /// The library comes first: what is outside must explain more than a known kind.
@@ -34,10 +34,10 @@ pub fn leaves_a_force(scan: &Scan) -> bool {
     band::bands(scan).first().is_some_and(|best| counts(scan, best))
 }
 
-/// Whether a band explains its price, and as much more as an effect needs.
+/// Whether a band explains its price, and as much more as an effect needs at least.
 fn counts(scan: &Scan, (gain, band): &(f64, Candidate)) -> bool {
     let size = (scan.fit.observations().max(2) as f64).ln();
-    *gain > band.hypothesis.choice_cost() + size + EVIDENCE_MIN
+    *gain > band.hypothesis.choice_cost() + size + STRENGTH_MIN
 }
 
 impl Effect for Bands {

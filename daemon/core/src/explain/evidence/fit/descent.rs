@@ -33,6 +33,11 @@ impl FitProblem {
         fit
     }
 
+    /// A model at given parameters, not fitted.
+    pub fn at(&self, model: &GrownModel, theta: Vec<f64>, noise: Noise) -> Fit {
+        self.linearised(model, theta, noise, &self.filters(noise), &mut Scratch::default())
+    }
+
     /// Fits a model, the noise that its residuals show, and the model again.
     ///
     /// One turn only: under an undeclared force further turns would take ever more of it for noise.

@@ -1,23 +1,9 @@
-//! When an effect is more than chance.
+//! What an effect costs, and what its evidence is worth.
 
 use nalgebra::{Cholesky, DMatrix};
 
 use crate::explain::effects::AtBound;
 use crate::explain::evidence::Fit;
-
-pub use crate::explain::evidence::EVIDENCE_MIN;
-/// The first effect must take away this share of the open-loop error of the fit runs.
-pub const REDUCTION_MIN: f64 = 0.12;
-/// Strength that an effect must have: its evidence times the share of the open-loop error that it
-/// takes away. Either alone is easily had: thousands of samples make anything significant, and a
-/// flexible form takes away some of any error. Its distribution on nulls is [`NULL_STRENGTH`].
-pub const STRENGTH_MIN: f64 = 5.0;
-/// Strength of the strongest candidate of a search where nothing acts: a share of the searches
-/// reaches the first number, and one in e of these another so much more.
-/// `dynocar-bench explain --kind none --seeds 400` prints the quantiles that it is fitted to.
-pub const NULL_STRENGTH: NullStrength = NullStrength { share: 0.05, at: 2.0, per_e: 1.5 };
-/// Two kinds whose evidence differs by less than this explain the data equally well.
-pub const AMBIGUOUS: f64 = 6.0;
 
 /// Price of an effect of a fitted model in -2 log likelihood: each parameter costs the logarithm of
 /// the number of observations (Schwarz 1978), each choice of a structure twice the logarithm of the
@@ -68,33 +54,4 @@ pub fn at_bound(fit: &Fit, index: usize) -> Option<AtBound> {
 /// The price of all effects of a model.
 pub fn model_penalty(fit: &Fit) -> f64 {
     (0..fit.model.effects.len()).map(|index| penalty(fit, index)).sum()
-}
-
-/// The tail of a distribution of strengths.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NullStrength {
-    /// Share of the searches that reach `at`.
-    pub share: f64,
-    /// A strength.
-    pub at: f64,
-    /// Further strength by which the share falls to 1/e.
-    pub per_e: f64,
-}
-
-/// Probability that a search over the whole library finds this strength where nothing acts.
-pub fn p_value(strength: f64) -> f64 {
-    let NullStrength { share, at, per_e } = NULL_STRENGTH;
-    (share * (-(strength - at) / per_e).exp()).clamp(f64::MIN_POSITIVE, 1.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_is_accepted_is_rare_on_nulls() {
-        assert!(p_value(STRENGTH_MIN) <= 0.05);
-        assert_eq!(p_value(-1e3), 1.0);
-        assert!(p_value(1e6) > 0.0);
-    }
 }

@@ -1,0 +1,109 @@
+//! Which numbers of train and line the data hold at all, beside those that were looked at as effects.
+//!
+//! Every kind of the library that is one number of the whole train or line is put beside the finished
+//! model, at no effect, and what the data say of it there is read from the information matrix: how
+//! surely it is none, and whether it can be told from each of the others.
+
+use dynocar_shared::vocabulary::EffectKind;
+use nalgebra::{Cholesky, DMatrix};
+
+use super::answer::{HALF_95, Identifiability};
+use super::effects::{Candidate, LIBRARY, Proposal};
+use super::rivals::{is_in, separating_run};
+use super::selection::{Outcome, Search};
+
+/// The kinds that are one number of the whole train or line, and not found, each at no effect.
+fn whole_kinds(search: &Search, outcome: &Outcome) -> Vec<Candidate> {
+    let Some(scan) = search.scan(&outcome.fit) else { return Vec::new() };
+    let is_whole = |candidate: &Candidate| {
+        let hypothesis = &candidate.hypothesis;
+        hypothesis.parameters().len() == 1
+            && hypothesis.ends().is_empty()
+            && !hypothesis.is_event()
+            && hypothesis.formula(&candidate.start).is_none()
+    };
+    LIBRARY
+        .iter()
+        .filter(|effect| {
+            effect.kind() != EffectKind::Unknown && !is_in(&outcome.fit, effect.kind())
+        })
+        .filter_map(|effect| match effect.propose(&scan) {
+            Proposal::Candidates(candidates) => candidates.into_iter().find(is_whole),
+            Proposal::NotTestable(_) => None,
+        })
+        .collect()
+}
+
+/// What the data say of each number that was not found.
+pub fn identifiability(search: &Search, outcome: &Outcome) -> Vec<Identifiability> {
+    let kinds = whole_kinds(search, outcome);
+    let fitted = outcome.fit.theta.len();
+    let mut model = outcome.fit.model.clone();
+    let mut theta = outcome.fit.theta.clone();
+    for candidate in &kinds {
+        model = model.with(candidate.hypothesis.clone());
+        theta.push(candidate.hypothesis.none());
+    }
+    let information = search.problem.at(&model, theta, outcome.fit.noise).information();
+    // Standard deviation of one with some others beside the fitted parameters.
+    let std = |own: usize, beside: Option<usize>| {
+        let free: Vec<usize> =
+            (0..fitted).chain(beside.map(|k| fitted + k)).chain([fitted + own]).collect();
+        let part = DMatrix::from_fn(free.len(), free.len(), |i, j| information[(free[i], free[j])]);
+        let covariance = Cholesky::new(part)?.inverse();
+        let last = free.len() - 1;
+        Some(covariance[(last, last)].sqrt()).filter(|std| std.is_finite())
+    };
+    let is_told = |own: usize, std: Option<f64>| {
+        let hypothesis = &kinds[own].hypothesis;
+        let counts =
+            |size: f64| hypothesis.is_material(&[hypothesis.none() + size], outcome.fit.theta[2]);
+        std.is_some_and(|std| !counts(HALF_95 * std) && !counts(-HALF_95 * std))
+    };
+    let one = |own: usize| {
+        let alone = std(own, None);
+        let told = is_told(own, alone);
+        let is_alike =
+            |&other: &usize| other != own && told && !is_told(own, std(own, Some(other)));
+        let alike = (0..kinds.len()).filter(is_alike);
+        let hypothesis = &kinds[own].hypothesis;
+        Identifiability {
+            kind: hypothesis.kind().name(),
+            parameter: hypothesis.parameters()[0].name,
+            std: alone,
+            told,
+            alike: alike.map(|other| kinds[other].hypothesis.kind().name()).collect(),
+        }
+    };
+    (0..kinds.len()).map(one).collect()
+}
+
+/// In words what the data would not show, which kinds they cannot tell apart, and what would; empty where
+/// they hold all.
+pub fn not_held(all: &[Identifiability]) -> String {
+    let hidden: Vec<String> = all
+        .iter()
+        .filter(|own| !own.told)
+        .map(|own| match own.hidden_up_to() {
+            Some(most) => format!("{} ({} is known to ± {most:.3} only)", own.kind, own.parameter),
+            None => own.kind.to_owned(),
+        })
+        .collect();
+    let mut text = String::new();
+    if !hidden.is_empty() {
+        text +=
+            &format!(" An effect that matters could hide in these data: {}.", hidden.join(", "));
+    }
+    for (index, own) in all.iter().enumerate() {
+        let pair = |other: &&Identifiability| own.alike.contains(&other.kind);
+        for other in all[index + 1..].iter().filter(pair) {
+            let kinds = [own.kind, other.kind].map(EffectKind::from_name);
+            let run = match kinds {
+                [Some(one), Some(other)] => separating_run(one, &[other]),
+                _ => String::new(),
+            };
+            text += &format!(" {} and {} look alike in them. {run}", own.kind, other.kind);
+        }
+    }
+    text
+}
