@@ -241,7 +241,7 @@ fn mass_factors(effect: &Effect, own: &Value) -> Vec<Option<ParameterGrade>> {
         Effect::MassChangeWindows(windows) => windows
             .iter()
             .map(|(window, factor)| {
-                let file = dynocar_tests::simulator::run_maker::run_file(window.run);
+                let file = dynocar_tests::simulator::run_file::run_file(window.run);
                 graded("windows", *factor, &|entry| {
                     let range = (window.start_s, window.end_s);
                     let same = entry["run"] == file.as_str();

@@ -20,7 +20,7 @@ mod whitener;
 
 pub use fade::Fade;
 pub use fit::{Fit, FitProblem, Nearby, RunNormal};
-pub use model::{GrownForces, GrownModel, SharedHypothesis};
+pub use model::{GrownForces, GrownModel};
 pub use noise::{Noise, RunScatter};
 pub use run_data::{Bin, RunData, RunDataError, RunPower, prepare};
 pub use run_scatter::WeightedFilter;

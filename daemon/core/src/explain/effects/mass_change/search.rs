@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use super::Masses;
+use super::masses::Masses;
 use super::parts::{Part, STATION_M, STOP_MIN_S, stations, stops};
 use crate::explain::effects::Candidate;
 use crate::explain::evidence::RunData;
 use crate::explain::places::span_m;
 use crate::explain::scan::{Scan, Tuple};
-use crate::terms::masses::{LEAST_SHARE, PARAMETER};
+use crate::terms::masses::LEAST_SHARE;
 
 /// Sections or windows at most.
 const PARTS_MAX: usize = 5;
@@ -113,7 +113,7 @@ pub fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Option<Candidate> {
     let edges = |part: &Part| part.edges(parts.iter().map(|(other, _)| other));
     let mut masses = Masses::new(part.clone(), edges(&part), part_cost);
     let mut start = vec![(1.0 + estimate).clamp(0.7, 1.5)];
-    while masses.parts.len() < PARTS_MAX {
+    while masses.parts().len() < PARTS_MAX {
         let hypothesis = Arc::new(masses.clone());
         let model = scan.fit.model.with(hypothesis);
         let theta = scan.fit.theta.iter().chain(&start).copied().collect();
@@ -123,7 +123,7 @@ pub fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Option<Candidate> {
             break;
         };
         let free =
-            parts.iter().filter(|(part, _)| masses.parts.iter().all(|own| own.is_apart(part)));
+            parts.iter().filter(|(part, _)| masses.parts().iter().all(|own| own.is_apart(part)));
         let mut fresh = free.map(|(part, _)| {
             let masked = |run: &RunData, i: usize| {
                 if part.holds(run, i) { shape(run, i) } else { 0.0 }
@@ -134,10 +134,8 @@ pub fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Option<Candidate> {
             Some((gain, estimate, part))
                 if gain > part_cost + GAIN_MIN && estimate.abs() > LEAST_SHARE =>
             {
-                masses.edges.push(edges(&part));
-                masses.parts.push(part);
-                masses.parameters.push(PARAMETER);
-                masses.choice_cost += part_cost;
+                let edges = edges(&part);
+                masses.push(part, edges, part_cost);
                 start.push((1.0 + estimate).clamp(0.7, 1.5));
             }
             _ => break,
