@@ -27,6 +27,15 @@ pub struct Sighting<const S: usize, const C: usize> {
     pub variance: f64,
 }
 
+/// A sighting less what was known before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnitRow<const C: usize> {
+    /// The innovation by column, of unit variance.
+    pub columns: SVector<f64, C>,
+    /// The variance taken off.
+    pub variance: f64,
+}
+
 /// A Kalman filter whose states are affine in unknown parameters: the generalised least squares
 /// of a regression with correlated errors (Rosenberg 1973; de Jong 1991).
 ///
@@ -92,6 +101,14 @@ impl<const S: usize, const C: usize> Whitener<S, C> {
         (sighting.observed - predicted, variance)
     }
 
+    /// The innovation as a row with an error of unit variance, before [`Whitener::correct`]; `None`
+    /// when its variance is not positive and finite.
+    pub fn row(&self, sighting: &Sighting<S, C>) -> Option<UnitRow<C>> {
+        let (columns, variance) = self.innovation(sighting);
+        let is_sound = variance > 0.0 && variance.is_finite();
+        is_sound.then(|| UnitRow { columns: columns / variance.sqrt(), variance })
+    }
+
     /// Takes a sighting into the states; their covariance stays symmetric and positive.
     ///
     /// # Errors
@@ -144,9 +161,8 @@ mod tests {
                 observed: Vector3::new(seen[k], 0.0, 0.0),
                 variance: noise,
             };
-            let (row, variance) = whitener.innovation(&sighting);
-            let features = SVector::<f64, 2>::new(row[1], row[2]) / variance.sqrt();
-            information.update(&features, row[0] / variance.sqrt());
+            let row = whitener.row(&sighting).unwrap().columns;
+            information.update(&SVector::<f64, 2>::new(row[1], row[2]), row[0]);
             whitener.correct(&sighting).unwrap();
         }
 
@@ -177,6 +193,7 @@ mod tests {
             observed: SVector::<f64, 2>::zeros(),
             variance: 0.0,
         };
+        assert_eq!(whitener.row(&sighting), None);
         assert_eq!(whitener.correct(&sighting), Err(NotPositiveDefinite));
     }
 }

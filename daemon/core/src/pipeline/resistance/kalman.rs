@@ -9,10 +9,10 @@ use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason};
 use nalgebra::{SMatrix, SVector};
 
 use super::least_squares::ResistanceLeastSquares;
+use super::momentum_error::Disturbance;
 use super::noise_bank::LikeliestNoise;
 use super::regression::{
-    BRAKE_SCALE, Disturbance, FORCE_DELAY, Motion, PARAMETERS, Solution, TRACTION_SCALE, UNKNOWNS,
-    regressors,
+    BRAKE_SCALE, FORCE_DELAY, Motion, PARAMETERS, Solution, TRACTION_SCALE, UNKNOWNS, regressors,
 };
 use super::report::Report;
 use super::sample::UnitSample;
