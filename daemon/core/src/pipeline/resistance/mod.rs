@@ -2,7 +2,7 @@
 //!
 //! # Layout, in the order a sample takes
 //!
-//! - `sample`, `speed`: forces per weight; spikes refused, noise of the speed learned
+//! - `sample`: forces per weight; spikes refused, noise of the speed learned
 //! - `momentum`: samples to observations of the regression in `regression`, as coasting segments are
 //! - `momentum_error`, `noise_model`, `noise_bank`: observations to independent rows, and how noisy they are
 //! - `solver` and `coasting` of [`super::papers::liu`]: the paper's recursions and data
@@ -21,7 +21,6 @@ mod report;
 pub(super) mod sample;
 pub mod settings;
 mod source;
-pub(super) mod speed;
 #[cfg(test)]
 pub(super) mod test_runs;
 #[cfg(test)]
