@@ -108,11 +108,8 @@ impl ResistanceKalman {
     fn decay(&mut self, duration_s: f64) {
         let Disturbance { std_n_per_kn, time_s } = self.noise.disturbance;
         let kept = (-duration_s / time_s).exp();
-        let mut gradient = State::zeros();
-        gradient[DISTURBANCE] = kept;
-        let value = kept * self.filter.mean[DISTURBANCE];
         let renewed = std_n_per_kn.powi(2) * (1.0 - kept * kept);
-        self.filter.rewrite(DISTURBANCE, value, &gradient, renewed);
+        self.filter.fade(DISTURBANCE, kept, renewed);
     }
 
     /// The speed by the forces over a step, by Heun's rule, and the states' noise.
