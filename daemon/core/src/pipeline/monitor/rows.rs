@@ -76,7 +76,7 @@ impl Rows {
         let small = self.small_forces(block);
         if block.is_first {
             let (momentum, variance) = (block.momentum, block.momentum_variance);
-            self.whitener.propagate(&small.to_first_block(gap_s, momentum, variance));
+            self.whitener.propagate(&small.across_gap(gap_s, momentum, variance));
             return None;
         }
         let duration_s = block.impulse[1];

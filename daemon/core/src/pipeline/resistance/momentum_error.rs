@@ -37,7 +37,7 @@ impl Disturbance {
 
     /// Over a gap, unknown for how long when `None`, to the first block of a chain: its momentum and
     /// the variance of that are new. The block is used up by it.
-    pub fn to_first_block<const C: usize>(
+    pub fn across_gap<const C: usize>(
         &self,
         gap_s: Option<f64>,
         momentum: f64,

@@ -158,7 +158,7 @@ impl Observation {
     ) -> Propagation<STATES, COLUMNS> {
         match self {
             Observation::Block(block) => {
-                disturbance.to_first_block(gap_s, block.momentum, block.momentum_variance)
+                disturbance.across_gap(gap_s, block.momentum, block.momentum_variance)
             }
             Observation::Segment(_) => disturbance.decay(gap_s.unwrap_or(f64::INFINITY)),
         }

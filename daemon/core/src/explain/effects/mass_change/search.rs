@@ -27,25 +27,38 @@ pub fn all_sections(scan: &Scan) -> Vec<(Part, Tuple)> {
     let stations = stations(scan);
     let mut sections = Vec::new();
     for direction in [Some(1.0), Some(-1.0)] {
-        let elementary: Vec<Tuple> = stations
-            .windows(2)
-            .map(|pair| {
-                let part = Part::Section { from_m: pair[0], to_m: pair[1], direction };
+        let part = |from: usize, to: usize| Part::Section {
+            from_m: stations[from],
+            to_m: stations[to],
+            direction,
+        };
+        let elementary: Vec<Tuple> = (0..stations.len().saturating_sub(1))
+            .map(|k| {
+                let part = part(k, k + 1);
                 scan.tuple(|run, i| if part.holds(run, i) { shape(run, i) } else { 0.0 })
             })
             .collect();
-        for from in 0..elementary.len() {
-            let mut sum = Tuple::zero(scan.fit.theta.len());
-            for to in from..elementary.len() {
-                sum.add(&elementary[to]);
-                if elementary[to].square > 0.0 && elementary[from].square > 0.0 {
-                    let (from_m, to_m) = (stations[from], stations[to + 1]);
-                    sections.push((Part::Section { from_m, to_m, direction }, sum.clone()));
-                }
-            }
-        }
+        sections.extend(joined(&elementary, part));
     }
     sections
+}
+
+/// Every row of neighbouring parts whose ends carry a force, with the sum of their tuples.
+fn joined(
+    elementary: &[Tuple],
+    part: impl Fn(usize, usize) -> Part,
+) -> impl Iterator<Item = (Part, Tuple)> {
+    (0..elementary.len()).flat_map(move |from| {
+        let mut sum = Tuple::zero(elementary[from].cross.len());
+        let mut rows = Vec::new();
+        for to in from..elementary.len() {
+            sum.add(&elementary[to]);
+            if elementary[to].square > 0.0 && elementary[from].square > 0.0 {
+                rows.push((part(from, to + 1), sum.clone()));
+            }
+        }
+        rows
+    })
 }
 
 /// One factor in all runs: nothing to choose but whether there are parts at all.
@@ -84,15 +97,7 @@ pub fn all_windows(scan: &Scan) -> Vec<(Part, Tuple)> {
                 scan.run_tuple(index, masked)
             })
             .collect();
-        for from in 0..elementary.len() {
-            let mut sum = Tuple::zero(scan.fit.theta.len());
-            for to in from..elementary.len() {
-                sum.add(&elementary[to]);
-                if elementary[to].square > 0.0 && elementary[from].square > 0.0 {
-                    windows.push((part(from, to + 1), sum.clone()));
-                }
-            }
-        }
+        windows.extend(joined(&elementary, part));
     }
     windows
 }
