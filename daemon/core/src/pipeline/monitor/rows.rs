@@ -96,10 +96,9 @@ impl Rows {
         predicted: impl Fn(&Parameters) -> f64,
     ) -> Option<Row> {
         let sighting = momentum_seen(block.momentum, block.momentum_variance);
-        let row = self.whitener.row(&sighting)?.columns;
+        let row = self.whitener.take(&sighting).ok()?.columns;
         let (observed, features) = (row[0], row.fixed_rows::<PARAMETERS>(1).into_owned());
         let weight = (HUBER / (observed - predicted(&features)).abs()).min(1.0);
-        self.whitener.correct(&sighting).ok()?;
         Some(Row { features, observed, weight })
     }
 

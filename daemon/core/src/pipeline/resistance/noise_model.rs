@@ -80,13 +80,11 @@ impl NoiseModel {
 
     /// Takes in an observation that the model has moved to.
     pub fn accept(&mut self, observation: &Observation, forgetting: f64) {
-        let Some(row) = self.whitener.row(&observation.sighting()) else { return };
+        let Ok(row) = self.whitener.take(&observation.sighting()) else { return };
         self.information.forget(forgetting);
         self.log_variances = forgetting * self.log_variances + row.variance.ln();
         let features = row.columns.fixed_rows::<UNKNOWNS>(1).into_owned();
         self.information.update(&features, row.columns[0]);
-        let corrected = self.whitener.correct(&observation.sighting());
-        debug_assert!(corrected.is_ok(), "the row's variance was positive");
     }
 
     /// Makes up for what forgetting took off the penalty.
