@@ -6,7 +6,7 @@ use dynocar_core::explain::report::timeline::Timeline;
 use tempfile::NamedTempFile;
 
 use crate::output::tell;
-use crate::programs::{RECORDING, call, not_started};
+use crate::programs::{Complaint, RECORDING, call, output_of};
 
 /// Why a recording is not annotated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -33,23 +33,12 @@ pub fn annotate(from: &Path, timeline: &Timeline, to: &Path) -> Result<(), Annot
     let failed = |problem: String| AnnotationError::Failed { path: to.into(), problem };
     let mut file = NamedTempFile::with_prefix("dynocar-").map_err(|it| failed(it.to_string()))?;
     serde_json::to_writer(&mut file, timeline).map_err(|it| failed(it.to_string()))?;
-    let output = call(RECORDING)
-        .arg("annotate")
-        .arg(from)
-        .arg("--timeline")
-        .arg(file.path())
-        .arg("--output")
-        .arg(to)
-        .output()
-        .map_err(|error| failed(not_started(RECORDING, &error)))?;
-    let words = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-    let problem = || words.strip_prefix("dynocar: ").unwrap_or(&words).to_owned();
-    match output.status.code() {
-        Some(0) => {
-            tell(&words);
-            Ok(())
-        }
-        Some(2) => Err(AnnotationError::Input(problem())),
-        _ => Err(failed(problem())),
-    }
+    let mut command = call(RECORDING);
+    command.arg("annotate").arg(from).arg("--timeline").arg(file.path()).arg("--output").arg(to);
+    let (_, words) = output_of(RECORDING, &mut command).map_err(|complaint| match complaint {
+        Complaint::Input(problem) => AnnotationError::Input(problem),
+        Complaint::Work(problem) => failed(problem),
+    })?;
+    tell(&words);
+    Ok(())
 }

@@ -31,6 +31,39 @@ pub fn called_as(package: &'static str) -> &'static str {
     if is_usual { USUAL } else { package }
 }
 
+/// Why a program that was called did not do its work.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Complaint {
+    /// It found something wrong with what it was given: its words, without its name.
+    Input(String),
+    /// It did not start, or the work failed.
+    Work(String),
+}
+
+impl Complaint {
+    /// The words.
+    pub fn words(self) -> String {
+        let (Complaint::Input(words) | Complaint::Work(words)) = self;
+        words
+    }
+}
+
+/// Calls a program and waits for its end; gives its standard output and what it remarked on.
+///
+/// # Errors
+///
+/// In words when it does not start or does not end with 0.
+pub fn output_of(package: &str, command: &mut Command) -> Result<(Vec<u8>, String), Complaint> {
+    let output = command.output().map_err(|error| Complaint::Work(not_started(package, &error)))?;
+    let words = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+    let problem = || words.strip_prefix("dynocar: ").unwrap_or(&words).to_owned();
+    match output.status.code() {
+        Some(0) => Ok((output.stdout, words)),
+        Some(2) => Err(Complaint::Input(problem())),
+        _ => Err(Complaint::Work(problem())),
+    }
+}
+
 fn beside_this(package: &str) -> Option<OsString> {
     let this: PathBuf = std::env::current_exe().ok()?;
     let program = this.parent()?.join(package);

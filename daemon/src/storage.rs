@@ -10,6 +10,7 @@ use std::fs::{File, OpenOptions, Permissions};
 use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use rustix::fs::{CWD, RenameFlags, renameat_with};
@@ -91,6 +92,9 @@ pub trait Storage {
     /// The system's answer.
     fn sync_directory(&self, path: &Path) -> io::Result<()>;
 }
+
+/// A file system that several threads use.
+pub type SharedStorage = Arc<dyn Storage + Send + Sync>;
 
 /// The file system.
 #[derive(Clone, Copy, Debug, Default)]

@@ -3,7 +3,6 @@
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use std::process::Output;
 use std::sync::Arc;
 
 use dynocar_core::dataset::ColumnMapping;
@@ -11,7 +10,7 @@ use dynocar_shared::TrainId;
 use tempfile::TempDir;
 
 use crate::output::tell;
-use crate::programs::{PARQUET, RECORDING, call, not_started};
+use crate::programs::{Complaint, PARQUET, RECORDING, call, output_of};
 
 /// The program that knows a recording's format, by the recording's name; `None` for what is none: a file of
 /// MCAP, and a folder or a file of Parquet.
@@ -46,19 +45,11 @@ pub fn rows_of(file: &Path, columns: &[ColumnMapping]) -> Result<String, String>
     for it in columns {
         command.arg("--column").arg(&it.column).arg(it.unit.name());
     }
-    let output = command.output().map_err(|error| not_started(PARQUET, &error))?;
-    if output.status.success() {
-        return String::from_utf8(output.stdout).map_err(|error| error.to_string());
-    }
-    let words = problem(&output);
-    Err(words.strip_prefix(&format!("{}: ", file.display())).unwrap_or(&words).to_owned())
-}
-
-/// What a program said, without its name.
-fn problem(output: &Output) -> String {
-    let words = String::from_utf8_lossy(&output.stderr);
-    let words = words.trim();
-    words.strip_prefix("dynocar: ").unwrap_or(words).to_owned()
+    let (rows, _) = output_of(PARQUET, &mut command).map_err(|complaint| {
+        let words = complaint.words();
+        words.strip_prefix(&format!("{}: ", file.display())).unwrap_or(&words).to_owned()
+    })?;
+    String::from_utf8(rows).map_err(|error| error.to_string())
 }
 
 /// Why a recording is not unpacked.
@@ -96,22 +87,15 @@ pub fn unpack(recording: &Path, folder: &Path, train: Option<TrainId>) -> Result
     if let Some(train) = train {
         command.arg("--train").arg(train.0.to_string());
     }
-    let output = command.arg(recording).output().map_err(|error| UnpackError::Failed {
-        path: path.clone(),
-        problem: not_started(program, &error),
+    command.arg(recording);
+    let (_, words) = output_of(program, &mut command).map_err(|complaint| match complaint {
+        Complaint::Input(problem) => UnpackError::Content { path: path.clone(), problem },
+        Complaint::Work(problem) => UnpackError::Failed { path: path.clone(), problem },
     })?;
-    let problem = problem(&output);
-    match output.status.code() {
-        Some(0) => {
-            let words = String::from_utf8_lossy(&output.stderr);
-            if !words.trim().is_empty() {
-                tell(words.trim());
-            }
-            Ok(())
-        }
-        Some(2) => Err(UnpackError::Content { path, problem }),
-        _ => Err(UnpackError::Failed { path, problem }),
+    if !words.is_empty() {
+        tell(&words);
     }
+    Ok(())
 }
 
 /// A recording that is unpacked; the folder goes with the last copy of this.

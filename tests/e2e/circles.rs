@@ -3,45 +3,18 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use dynocar_tests::sources::{FOLDERS, is_of_tests, without_tests, workspace};
+
 /// A module by its path from the crate's root.
 type Module = Vec<String>;
 
-/// Circles that are known to stand; a new one fails the test, and so does one that is gone.
-const STANDING: &[(&str, &[&str])] = &[
-    (
-        "daemon/core/src",
-        &[
-            "explain::effects",
-            "explain::evidence::fit",
-            "explain::evidence::model",
-            "explain::scan",
-        ],
-    ),
-    (
-        "daemon/core/src",
-        &["explain::effects::mass_change", "explain::effects::mass_change::search"],
-    ),
-];
-
 /// The source without tests and comments.
 fn product(text: &str) -> String {
-    let mut kept = String::new();
-    let mut lines = text.lines();
-    while let Some(line) = lines.next() {
-        if line.trim() == "#[cfg(test)]" {
-            // The item: to its semicolon, or to the brace that closes it at the same indentation.
-            let indent = line.len() - line.trim_start().len();
-            let close = format!("{}}}", " ".repeat(indent));
-            let head = lines.next().unwrap_or_default();
-            if !head.trim_end().ends_with(';') {
-                lines.by_ref().find(|line| *line == close);
-            }
-        } else if !line.trim_start().starts_with("//") {
-            kept += line;
-            kept.push('\n');
-        }
-    }
-    kept
+    let lines = without_tests(text).into_iter();
+    lines
+        .filter(|line| !line.trim_start().starts_with("//"))
+        .flat_map(|line| [line, "\n"])
+        .collect()
 }
 
 /// The paths of a `use` tree: `a::{b, c::d}` is `a::b` and `a::c::d`.
@@ -86,7 +59,7 @@ impl Package {
                 module.push(name);
                 self.read_folder(&path, module);
                 module.pop();
-            } else if !(name.ends_with("tests") || name == "test_runs" || name == "main") {
+            } else if !is_of_tests(&path) && name != "main" {
                 let mut of_file = module.clone();
                 if name != "mod" && name != "lib" {
                     of_file.push(name);
@@ -193,32 +166,11 @@ impl Package {
 
 #[test]
 fn imports_between_files_run_one_way() {
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let roots = [
-        "shared/src",
-        "client/src",
-        "daemon/core/src",
-        "daemon/fmu/src",
-        "daemon/src",
-        "bench/src",
-    ];
-    for root in roots {
-        let package = Package::read(&workspace.join(root));
-        assert!(package.imports.len() > 5, "the sources of {root} were found");
-        let known: Vec<&[&str]> =
-            STANDING.iter().filter(|(of, _)| *of == root).map(|(_, circle)| *circle).collect();
-        let is_known = |circle: &BTreeSet<String>, known: &[&str]| {
-            known.iter().all(|module| circle.contains(*module))
-        };
+    for folder in FOLDERS {
+        let package = Package::read(&workspace().join(folder));
+        assert!(package.imports.len() > 5, "the sources of {folder} were found");
         let circles = package.circles();
-        for circle in &circles {
-            let is_standing = known.iter().any(|known| is_known(circle, known));
-            assert!(is_standing, "{root}: a circle of imports: {circle:?}");
-        }
-        for known in known {
-            let stands = circles.iter().any(|circle| is_known(circle, known));
-            assert!(stands, "{root}: {known:?} is no circle any more; strike it off the list");
-        }
+        assert!(circles.is_empty(), "{folder}: circles of imports: {circles:?}");
     }
 }
 

@@ -1,11 +1,8 @@
 //! The invariants of `ARCHITECTURE.md` that can be read off the dependency tree and the sources.
 
-use std::path::{Path, PathBuf};
 use std::process::Command;
 
-fn workspace() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
+use dynocar_tests::sources::{rust_files, workspace};
 
 /// Names of all packages that a package is built from.
 fn dependencies(package: &str) -> Vec<String> {
@@ -87,21 +84,9 @@ fn the_contract_depends_on_nothing() {
     assert_eq!(dependencies("dynocar-shared"), ["dynocar-shared"]);
 }
 
-fn rust_files(folder: &Path, files: &mut Vec<PathBuf>) {
-    for entry in std::fs::read_dir(folder).expect("a source folder") {
-        let path = entry.expect("a folder entry").path();
-        if path.is_dir() {
-            rust_files(&path, files);
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
-            files.push(path);
-        }
-    }
-}
-
 #[test]
 fn the_core_touches_no_file_thread_clock_or_terminal() {
-    let mut files = Vec::new();
-    rust_files(&workspace().join("daemon/core/src"), &mut files);
+    let files = rust_files("daemon/core/src");
     assert!(files.len() > 10, "the core's sources were found");
     let forbidden =
         ["std::fs", "std::thread", "std::net", "Instant::now", "SystemTime", "println!("];

@@ -2,27 +2,13 @@
 //! justified, every licence allowed, every dependency of a controller reviewed.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 use std::process::Command;
 
-fn workspace() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
+use dynocar_tests::sources::{rust_files, workspace};
 
 fn read(path: &str) -> String {
     std::fs::read_to_string(workspace().join(path))
         .unwrap_or_else(|error| panic!("{path}: {error}"))
-}
-
-fn rust_files(folder: &Path, files: &mut Vec<PathBuf>) {
-    for entry in std::fs::read_dir(folder).expect("a source folder") {
-        let path = entry.expect("a folder entry").path();
-        if path.is_dir() {
-            rust_files(&path, files);
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
-            files.push(path);
-        }
-    }
 }
 
 /// Pairs (file, test) in a document: `` `path/file.rs::name` ``, or a file of Python.
@@ -142,7 +128,6 @@ fn what_the_reading_guide_recommends_is_the_default_and_what_is_shipped() {
 
 #[test]
 fn every_unsafe_block_is_counted_and_justified() {
-    let mut files = Vec::new();
     let folders = [
         "shared/src",
         "client/src",
@@ -151,11 +136,8 @@ fn every_unsafe_block_is_counted_and_justified() {
         "daemon/core/src",
         "daemon/fmu/src",
     ];
-    for folder in folders {
-        rust_files(&workspace().join(folder), &mut files);
-    }
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
-    for file in files {
+    for file in folders.into_iter().flat_map(rust_files) {
         let text = std::fs::read_to_string(&file).expect("a source file");
         let lines: Vec<&str> = text.lines().collect();
         for (index, line) in lines.iter().enumerate() {

@@ -1,7 +1,8 @@
 //! The page of troubles has a line for each message that a user can meet, and none that is not there.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+
+use dynocar_tests::sources::workspace;
 
 /// Where messages are raised.
 const FOLDERS: [&str; 12] = [
@@ -46,10 +47,6 @@ struct Source {
     path: String,
     code: String,
     literals: Vec<String>,
-}
-
-fn workspace() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
 fn sources_in(folder: &str, sources: &mut Vec<Source>) {

@@ -10,6 +10,7 @@
 //! - [`sensor_failures`]: how sensors and channels fail
 //! - [`simulator`]: recorded runs of random trains with known, undeclared effects
 //! - [`soak`]: seeded faults, for seconds in the tests and for hours by `dynocar-soak`
+//! - [`sources`]: the project's own sources
 
 pub mod browser;
 pub mod fuzz;
@@ -19,3 +20,4 @@ pub mod process;
 pub mod sensor_failures;
 pub mod simulator;
 pub mod soak;
+pub mod sources;

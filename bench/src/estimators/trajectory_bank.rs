@@ -119,7 +119,7 @@ fn step_of_one(drive: &Arc<Drive>) -> Case {
             let model = noise(false);
             let mut filter = first_hypothesis(drive, &model);
             for (step, measured_mps) in &drive.samples {
-                filter.predict(StepRule::Time, step, STEP_S);
+                filter.predict(StepRule::Time, step, STEP_S, 0.0);
                 filter.measure(*measured_mps, &model, &NO_OUTLIERS);
             }
             filter.state.as_slice().to_vec()

@@ -1,6 +1,7 @@
 //! An answer against the truth.
 
 use dynocar_core::explain::Explanation;
+use dynocar_core::explain::answer::Answer;
 use dynocar_core::track::LinearProfile;
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};
@@ -68,6 +69,7 @@ pub fn grade(
     let is_right = verdict == right && (right == "unknown" || expected == found);
     let attained = attained(simulated, explanation);
     let json = serde_json::to_value(answer).unwrap_or(Value::Null);
+    let details = details(simulated, answer, attained);
     let (mut iou, mut ends_held, mut parameters) = (None, Vec::new(), Vec::new());
     for effect in &simulated.effects {
         let own = json["effects"].as_array().into_iter().flatten();
@@ -78,6 +80,26 @@ pub fn grade(
             parameters.extend(graded(effect, own, simulated));
         }
     }
+    Grade {
+        details,
+        named,
+        verdict: verdict.into(),
+        is_right,
+        iou,
+        ends_held,
+        parameters,
+        share: attained.and_then(|attained| attained.share),
+        left_ratio: attained.map(|attained| attained.left_ratio),
+        strength: explanation.strength,
+    }
+}
+
+/// What the answer says, for people, and what it was if that is in no library.
+fn details(
+    simulated: &SimulatedDataset,
+    answer: &Answer,
+    attained: Option<Attained>,
+) -> Vec<String> {
     let mut details: Vec<String> = answer
         .effects
         .iter()
@@ -111,18 +133,7 @@ pub fn grade(
     if !answer.ambiguous_with.is_empty() {
         details.push(format!("or {}", answer.ambiguous_with.join(", ")));
     }
-    Grade {
-        details,
-        named,
-        verdict: verdict.into(),
-        is_right,
-        iou,
-        ends_held,
-        parameters,
-        share: attained.and_then(|attained| attained.share),
-        left_ratio: attained.map(|attained| attained.left_ratio),
-        strength: explanation.strength,
-    }
+    details
 }
 
 /// An answer against the true model, on the holdout runs.
@@ -241,7 +252,7 @@ fn mass_factors(effect: &Effect, own: &Value) -> Vec<Option<ParameterGrade>> {
         Effect::MassChangeWindows(windows) => windows
             .iter()
             .map(|(window, factor)| {
-                let file = dynocar_tests::simulator::run_maker::run_file(window.run);
+                let file = dynocar_tests::simulator::run_file::run_file(window.run);
                 graded("windows", *factor, &|entry| {
                     let range = (window.start_s, window.end_s);
                     let same = entry["run"] == file.as_str();

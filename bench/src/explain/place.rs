@@ -1,6 +1,6 @@
 //! The place of an answer against the truth.
 
-use dynocar_tests::simulator::run_maker::run_file;
+use dynocar_tests::simulator::run_file::run_file;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};
 use serde_json::Value;
 

@@ -118,6 +118,17 @@ fn line((case, outcomes): &(Case, Vec<Outcome>), all: &[(Case, Vec<Outcome>)]) -
 
 /// The result for people.
 pub fn table(report: &Report) -> String {
+    let mut text = cases_table(report);
+    add_stages(&mut text, report);
+    add_costs(&mut text, report);
+    if cfg!(not(feature = "zeromq")) {
+        text += "ZeroMQ was not measured: build with --features zeromq and a C++ compiler\n";
+    }
+    text
+}
+
+/// A line for each case.
+fn cases_table(report: &Report) -> String {
     let mut text = format!(
         "Sample → snapshot polled, open loop at {} Hz, {} rounds, controller on core {}, daemon on \
          core {}\n{:<34} {:>8} {:>10} {:>10} {:>10} {:>10} {:>10} {:>9} {:>9}\n",
@@ -150,6 +161,11 @@ pub fn table(report: &Report) -> String {
             line.floor_ratio_p99,
         );
     }
+    text
+}
+
+/// Where the time goes, where that was measured.
+fn add_stages(text: &mut String, report: &Report) {
     for line in &report.cases {
         if let Some(stages) = line.stages_p50_ns {
             let [leaving, answering, polling] = stages.map(|ns| for_people(ns as f64));
@@ -161,6 +177,10 @@ pub fn table(report: &Report) -> String {
             );
         }
     }
+}
+
+/// What a poll, a publish and a rest cost, and what the threads suffered.
+fn add_costs(text: &mut String, report: &Report) {
     let costs = &report.costs;
     let _ = writeln!(
         text,
@@ -187,8 +207,4 @@ pub fn table(report: &Report) -> String {
     if unanswered > 0 {
         let _ = writeln!(text, "{unanswered} samples were not answered");
     }
-    if cfg!(not(feature = "zeromq")) {
-        text += "ZeroMQ was not measured: build with --features zeromq and a C++ compiler\n";
-    }
-    text
 }

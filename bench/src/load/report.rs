@@ -92,6 +92,14 @@ const MEBIBYTE: f64 = 1024.0 * 1024.0;
 
 /// The result for people.
 pub fn table(report: &Report) -> String {
+    let mut text = pipelines_table(report);
+    add_host(&mut text, report);
+    add_limits(&mut text, report);
+    text
+}
+
+/// A line for each pipeline, and one for its answers counted from where the sample left.
+fn pipelines_table(report: &Report) -> String {
     let mut text = format!(
         "{} trains at {} Hz for {} s\n{:<22} {:>10} {:>10} {:>9} {:>9} {:>10} {:>10} {:>10} {:>10}\n",
         report.trains,
@@ -125,6 +133,11 @@ pub fn table(report: &Report) -> String {
         let name = format!("  {} since leaving", line.name);
         let _ = writeln!(text, "{name:<64} {p50:>10} {p99:>10} {p999:>10} {max:>10}");
     }
+    text
+}
+
+/// What daemon and machine had to do for it.
+fn add_host(text: &mut String, report: &Report) {
     let _ = writeln!(
         text,
         "daemon: {:.0} % of a core, {:.1} MiB resident ({:.1} MiB at first); samples left at most \
@@ -154,6 +167,10 @@ pub fn table(report: &Report) -> String {
         for_people(host.p99_ns as f64),
         for_people(host.p999_ns as f64)
     );
+}
+
+/// The highest rate and how the load grows, where that was looked for.
+fn add_limits(text: &mut String, report: &Report) {
     if let Some(found) = &report.search {
         let limit = if found.limited_by_publishers { "the publishers'" } else { "the daemon's" };
         let _ = writeln!(
@@ -176,5 +193,4 @@ pub fn table(report: &Report) -> String {
             size.rss_bytes as f64 / MEBIBYTE
         );
     }
-    text
 }

@@ -1,7 +1,7 @@
 //! Connections to the broker one after the other, until told to end.
 
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use dynocar::output::tell;
@@ -9,7 +9,7 @@ use dynocar_client::Host;
 use dynocar_shared::TrainId;
 
 use crate::broker::{Broker, BrokerError, Login, PATIENCE, Told};
-use crate::node::{Known, Message, NodeName, Session, is_rebirth};
+use crate::node::{Known, Message, NodeName, Session, is_rebirth, locked};
 use crate::payload::utc_ms;
 use crate::queue::Counts;
 use crate::watcher::Watcher;
@@ -42,11 +42,6 @@ pub struct Settings {
     pub every: Duration,
     /// The most publications that wait.
     pub queue: usize,
-}
-
-/// What reading and sending share; a thread that has died left it whole.
-pub fn locked(known: &Mutex<Known>) -> MutexGuard<'_, Known> {
-    known.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Forwards until the flag is set; gives what has become of the publications.

@@ -4,6 +4,7 @@
 //! as a device before any of its data, and each message carries the number after the one before.
 
 use std::collections::BTreeMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use dynocar_shared::TrainId;
 use prost::Message as _;
@@ -70,6 +71,11 @@ impl Known {
             train.tell_all();
         }
     }
+}
+
+/// What reading and sending share, for oneself; a thread that has died left it whole.
+pub fn locked(known: &Mutex<Known>) -> MutexGuard<'_, Known> {
+    known.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A connection's state as Sparkplug has it.

@@ -13,8 +13,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Reason, Status, TrainId};
 
 use crate::fields::folder;
-use crate::forwarder::locked;
-use crate::node::Known;
+use crate::node::{Known, locked};
 use crate::payload::utc_ms;
 use crate::train::Train;
 

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 
 use dynocar_client::Host;
 use dynocar_forward::broker::{Broker, BrokerError, Login, Told};
-use dynocar_forward::forwarder::{Settings, forward, locked, send};
-use dynocar_forward::node::{Known, Message, NodeName};
+use dynocar_forward::forwarder::{Settings, forward, send};
+use dynocar_forward::node::{Known, Message, NodeName, locked};
 use dynocar_forward::queue::Publication;
 use dynocar_shared::TrainId;
 

@@ -30,6 +30,7 @@ pub mod explain;
 pub mod filter;
 pub mod force;
 pub mod import;
+mod named;
 pub mod pipeline;
 pub mod plausibility;
 pub mod simulate;

@@ -131,7 +131,7 @@ impl From<ImportError> for Failure {
 
 fn format(name: &str) -> Result<Format, String> {
     let all = Format::ALL.map(Format::name).join(", ");
-    let found = Format::ALL.into_iter().find(|format| format.name() == name);
+    let found = Format::from_name(name);
     found.ok_or_else(|| format!("expected one of {all}"))
 }
 

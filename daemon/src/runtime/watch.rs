@@ -126,7 +126,7 @@ impl Watch {
                 && !told.contains(&(train, finding.slip))
             {
                 told.push((train, finding.slip));
-                let code = finding.slip.code();
+                let code = finding.slip.name();
                 warn!(train, code, "the samples cannot be true: {finding}");
             }
             if reading.lost > last.lost {

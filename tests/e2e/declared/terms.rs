@@ -130,85 +130,121 @@ const fn correction(line: &'static str) -> (&'static str, &'static str) {
 pub fn declarations(kind: EffectKind) -> Vec<Declaration> {
     match kind {
         EffectKind::None | EffectKind::DraggingBrake | EffectKind::LowAdhesion => Vec::new(),
-        EffectKind::Unknown => vec![Declaration {
-            name: "extra",
-            train: correction(
-                "[[extra]]\nn_per_kn = 1.2\n[[extra.factor]]\nof = \"speed_mps\"\n\
+        EffectKind::Unknown => unknown(),
+        EffectKind::TunnelDrag => tunnel_drag(),
+        EffectKind::CurveResistance => curve_resistance(),
+        EffectKind::Wind => wind(),
+        EffectKind::WheelDiameter => wheel_diameter(),
+        EffectKind::GradientShift => gradient_shift(),
+        EffectKind::GradientError => gradient_error(),
+        EffectKind::MassChange => mass_change(),
+        EffectKind::TractionGain => traction_gain(),
+        EffectKind::ActuatorDelay => actuator_delay(),
+        EffectKind::RotatingMass => rotating_mass(),
+        EffectKind::BearingTemperature => bearing_temperature(),
+        EffectKind::AmbientTemperature => ambient_temperature(),
+        EffectKind::LocalResistance => local_resistance(),
+    }
+}
+
+fn unknown() -> Vec<Declaration> {
+    vec![Declaration {
+        name: "extra",
+        train: correction(
+            "[[extra]]\nn_per_kn = 1.2\n[[extra.factor]]\nof = \"speed_mps\"\n\
                  form = \"hyperbola\"\nbelow = 18\nleast = 4\n[[extra.factor]]\n\
                  of = \"ambient_temperature_degc\"\nform = \"above\"\nfrom = -30\nspan = 40\n\
                  [corrections]\n",
-            ),
-            extra_n_per_kn: |_, at| {
-                let slow = (18.0 / at.speed_mps.max(4.0) - 1.0).max(0.0);
-                1.2 * slow * (at.degc + 30.0) / 40.0
-            },
-            ..NOTHING
-        }],
-        EffectKind::TunnelDrag => vec![
-            Declaration {
-                name: "tunnel_c_factor",
-                train: correction("[corrections]\ntunnel_c_factor = 3.0\n"),
-                extra_n_per_kn: |world, at| {
-                    let air = world.train.resistance.c * at.speed_mps.powi(2);
-                    2.0 * world.tunnel_share(at) * air
-                },
-                ..NOTHING
-            },
-            Declaration {
-                name: "tunnel_constant",
-                train: ("tunnel_constant_n_per_kn_m = 0\n", "tunnel_constant_n_per_kn_m = 0.002\n"),
-                extra_n_per_kn: |world, at| {
-                    let length_m = world.train.length_m;
-                    0.002 * world.track.tunnel_length_m(at.position_m, length_m).unwrap()
-                },
-                ..NOTHING
-            },
-        ],
-        EffectKind::CurveResistance => vec![Declaration {
-            name: "curve_constant",
-            train: ("curve_constant_n_per_kn_m = 0\n", "curve_constant_n_per_kn_m = 900\n"),
+        ),
+        extra_n_per_kn: |_, at| {
+            let slow = (18.0 / at.speed_mps.max(4.0) - 1.0).max(0.0);
+            1.2 * slow * (at.degc + 30.0) / 40.0
+        },
+        ..NOTHING
+    }]
+}
+
+fn tunnel_drag() -> Vec<Declaration> {
+    vec![
+        Declaration {
+            name: "tunnel_c_factor",
+            train: correction("[corrections]\ntunnel_c_factor = 3.0\n"),
             extra_n_per_kn: |world, at| {
-                900.0 * world.track.curvature_per_m(at.position_m, world.train.length_m).unwrap()
+                let air = world.train.resistance.c * at.speed_mps.powi(2);
+                2.0 * world.tunnel_share(at) * air
             },
             ..NOTHING
-        }],
-        EffectKind::Wind => vec![Declaration {
-            name: "wind_plus",
-            train: correction("[corrections]\nwind_plus_mps = 7.0\n"),
+        },
+        Declaration {
+            name: "tunnel_constant",
+            train: ("tunnel_constant_n_per_kn_m = 0\n", "tunnel_constant_n_per_kn_m = 0.002\n"),
             extra_n_per_kn: |world, at| {
-                let ahead_mps = at.speed_mps + 7.0 * at.direction;
-                let air = ahead_mps * ahead_mps.abs() - at.speed_mps.powi(2);
-                (1.0 - world.tunnel_share(at)) * world.train.resistance.c * air
+                let length_m = world.train.length_m;
+                0.002 * world.track.tunnel_length_m(at.position_m, length_m).unwrap()
             },
             ..NOTHING
-        }],
-        EffectKind::WheelDiameter => vec![Declaration {
-            name: "speed_scale",
-            train: correction("[corrections]\nspeed_scale = 1.03\n"),
-            sample: |sample, _| sample.speed_mps *= 1.03,
-            ..NOTHING
-        }],
-        EffectKind::GradientShift => vec![Declaration {
-            name: "gradient",
-            track: GRADIENT,
-            sample: |sample, _| sample.valid &= !SampleField::Gradient.bit(),
-            ..NOTHING
-        }],
-        // The survey, 2 ‰ less steep, and that it lacks them; then the same for each direction.
-        EffectKind::GradientError => vec![
-            Declaration {
-                name: "gradient_error",
-                track: "
+        },
+    ]
+}
+
+fn curve_resistance() -> Vec<Declaration> {
+    vec![Declaration {
+        name: "curve_constant",
+        train: ("curve_constant_n_per_kn_m = 0\n", "curve_constant_n_per_kn_m = 900\n"),
+        extra_n_per_kn: |world, at| {
+            900.0 * world.track.curvature_per_m(at.position_m, world.train.length_m).unwrap()
+        },
+        ..NOTHING
+    }]
+}
+
+fn wind() -> Vec<Declaration> {
+    vec![Declaration {
+        name: "wind_plus",
+        train: correction("[corrections]\nwind_plus_mps = 7.0\n"),
+        extra_n_per_kn: |world, at| {
+            let ahead_mps = at.speed_mps + 7.0 * at.direction;
+            let air = ahead_mps * ahead_mps.abs() - at.speed_mps.powi(2);
+            (1.0 - world.tunnel_share(at)) * world.train.resistance.c * air
+        },
+        ..NOTHING
+    }]
+}
+
+fn wheel_diameter() -> Vec<Declaration> {
+    vec![Declaration {
+        name: "speed_scale",
+        train: correction("[corrections]\nspeed_scale = 1.03\n"),
+        sample: |sample, _| sample.speed_mps *= 1.03,
+        ..NOTHING
+    }]
+}
+
+fn gradient_shift() -> Vec<Declaration> {
+    vec![Declaration {
+        name: "gradient",
+        track: GRADIENT,
+        sample: |sample, _| sample.valid &= !SampleField::Gradient.bit(),
+        ..NOTHING
+    }]
+}
+
+/// The survey, 2 ‰ less steep, and that it lacks them; then the same for each direction.
+fn gradient_error() -> Vec<Declaration> {
+    vec![
+        Declaration {
+            name: "gradient_error",
+            track: "
                 gradient = [[0.0, 0.0], [1200.0, -5.0], [2500.0, 2.5], [4100.0, -3.0],
                             [5600.0, -7.0], [7300.0, 1.0], [9000.0, -4.0], [11000.0, -1.0]]
                 gradient_error = [[0.0, 2.0], [5000.0, 2.0], [12000.0, 2.0]]
             ",
-                sample: |sample, _| sample.valid &= !SampleField::Gradient.bit(),
-                ..NOTHING
-            },
-            Declaration {
-                name: "gradient_error_falling",
-                track: "
+            sample: |sample, _| sample.valid &= !SampleField::Gradient.bit(),
+            ..NOTHING
+        },
+        Declaration {
+            name: "gradient_error_falling",
+            track: "
                 gradient = [[0.0, 0.0], [1200.0, -5.0], [2500.0, 2.5], [4100.0, -3.0],
                             [5600.0, -7.0], [7300.0, 1.0], [9000.0, -4.0], [11000.0, -1.0]]
                 gradient_falling = [[0.0, 1.0], [1200.0, -4.0], [2500.0, 3.5], [4100.0, -2.0],
@@ -216,68 +252,84 @@ pub fn declarations(kind: EffectKind) -> Vec<Declaration> {
                 gradient_error = [[0.0, 2.0], [12000.0, 2.0]]
                 gradient_error_falling = [[0.0, 1.0], [12000.0, 1.0]]
             ",
-                sample: |sample, _| sample.valid &= !SampleField::Gradient.bit(),
-                ..NOTHING
-            },
-        ],
-        EffectKind::MassChange => vec![Declaration {
-            name: "masses",
-            track: "masses = [[-1e6, 1e6, 1.0, 1.08], [-1e6, 1e6, -1.0, 1.08]]",
-            sample: |sample, _| {
-                sample.traction_force_n *= 1.08;
-                sample.brake_force_n *= 1.08;
-                sample.brake_cylinder_pressure_pa *= 1.08;
-            },
-            mass_factor: 1.08,
+            sample: |sample, _| sample.valid &= !SampleField::Gradient.bit(),
             ..NOTHING
-        }],
-        EffectKind::TractionGain => vec![Declaration {
-            name: "traction_gain",
-            train: correction("[corrections]\ntraction_gain = 1.07\n"),
-            sample: |sample, _| sample.traction_force_n *= 1.07,
-            ..NOTHING
-        }],
-        EffectKind::ActuatorDelay => {
-            assert_eq!((DELAY_S, LAG_S), (1.0, 0.6));
-            vec![Declaration {
-                name: "actuator_delay",
-                train: correction("[corrections]\nactuator_delay_s = 1.0\nactuator_lag_s = 0.6\n"),
-                sample: |sample, at| {
-                    sample.traction_force_n = at.commanded_n.max(0.0);
-                    sample.brake_force_n = (-at.commanded_n).max(0.0);
-                },
-                ..NOTHING
-            }]
-        }
-        EffectKind::RotatingMass => vec![Declaration {
-            name: "rotating_mass_factor",
-            train: ("rotating_mass_factor = 0.08\n", "rotating_mass_factor = 0.16\n"),
-            extra_n_per_kn: |_, at| 0.08 * at.acceleration_mps2 / 9.81e-3,
-            ..NOTHING
-        }],
-        EffectKind::BearingTemperature => vec![Declaration {
-            name: "bearing_delta_a",
-            train: correction(
-                "[corrections]\nbearing_delta_a_n_per_kn = 1.5\nbearing_tau_s = 250.0\n",
-            ),
-            extra_n_per_kn: |_, at| 1.5 * (-at.time_s / 250.0).exp(),
-            ..NOTHING
-        }],
-        EffectKind::AmbientTemperature => vec![Declaration {
-            name: "ambient_w0",
-            train: correction(
-                "[corrections]\nambient_w0_per_k = -0.03\nambient_reference_k = 293.15\n",
-            ),
-            extra_n_per_kn: |world, at| {
-                -0.03 * (at.degc - 20.0) * world.train.resistance.w0_n_per_kn(at.speed_mps)
-            },
-            ..NOTHING
-        }],
-        EffectKind::LocalResistance => vec![Declaration {
-            name: "resistance",
-            track: "resistance = [[-100000.0, 100000.0, 1.0]]",
-            extra_n_per_kn: |_, _| 1.0,
-            ..NOTHING
-        }],
-    }
+        },
+    ]
+}
+
+fn mass_change() -> Vec<Declaration> {
+    vec![Declaration {
+        name: "masses",
+        track: "masses = [[-1e6, 1e6, 1.0, 1.08], [-1e6, 1e6, -1.0, 1.08]]",
+        sample: |sample, _| {
+            sample.traction_force_n *= 1.08;
+            sample.brake_force_n *= 1.08;
+            sample.brake_cylinder_pressure_pa *= 1.08;
+        },
+        mass_factor: 1.08,
+        ..NOTHING
+    }]
+}
+
+fn traction_gain() -> Vec<Declaration> {
+    vec![Declaration {
+        name: "traction_gain",
+        train: correction("[corrections]\ntraction_gain = 1.07\n"),
+        sample: |sample, _| sample.traction_force_n *= 1.07,
+        ..NOTHING
+    }]
+}
+
+fn actuator_delay() -> Vec<Declaration> {
+    assert_eq!((DELAY_S, LAG_S), (1.0, 0.6));
+    vec![Declaration {
+        name: "actuator_delay",
+        train: correction("[corrections]\nactuator_delay_s = 1.0\nactuator_lag_s = 0.6\n"),
+        sample: |sample, at| {
+            sample.traction_force_n = at.commanded_n.max(0.0);
+            sample.brake_force_n = (-at.commanded_n).max(0.0);
+        },
+        ..NOTHING
+    }]
+}
+
+fn rotating_mass() -> Vec<Declaration> {
+    vec![Declaration {
+        name: "rotating_mass_factor",
+        train: ("rotating_mass_factor = 0.08\n", "rotating_mass_factor = 0.16\n"),
+        extra_n_per_kn: |_, at| 0.08 * at.acceleration_mps2 / 9.81e-3,
+        ..NOTHING
+    }]
+}
+
+fn bearing_temperature() -> Vec<Declaration> {
+    vec![Declaration {
+        name: "bearing_delta_a",
+        train: correction("[corrections]\nbearing_delta_a_n_per_kn = 1.5\nbearing_tau_s = 250.0\n"),
+        extra_n_per_kn: |_, at| 1.5 * (-at.time_s / 250.0).exp(),
+        ..NOTHING
+    }]
+}
+
+fn ambient_temperature() -> Vec<Declaration> {
+    vec![Declaration {
+        name: "ambient_w0",
+        train: correction(
+            "[corrections]\nambient_w0_per_k = -0.03\nambient_reference_k = 293.15\n",
+        ),
+        extra_n_per_kn: |world, at| {
+            -0.03 * (at.degc - 20.0) * world.train.resistance.w0_n_per_kn(at.speed_mps)
+        },
+        ..NOTHING
+    }]
+}
+
+fn local_resistance() -> Vec<Declaration> {
+    vec![Declaration {
+        name: "resistance",
+        track: "resistance = [[-100000.0, 100000.0, 1.0]]",
+        extra_n_per_kn: |_, _| 1.0,
+        ..NOTHING
+    }]
 }

@@ -50,33 +50,7 @@ enum Command {
     },
     /// Months of one train: something undeclared appears or goes, and the loop of learning, trying, adopting
     /// and taking back has to follow; a table
-    Months {
-        /// What happens: `nothing`, `wheels_wear`, `winter`, `brake_drags_for_a_day` or a kind of effect; all when
-        /// absent
-        #[arg(long)]
-        story: Option<String>,
-        /// Days
-        #[arg(long, default_value_t = 50)]
-        days: usize,
-        /// The first day on which something is undeclared
-        #[arg(long, default_value_t = 12)]
-        onset: usize,
-        /// The first day on which nothing is any more, in stories that end
-        #[arg(long, default_value_t = 32)]
-        end: usize,
-        /// Trips of a day
-        #[arg(long, default_value_t = 24)]
-        trips: usize,
-        /// Keep each life's files, runs and store, in a folder of its own in this one
-        #[arg(long, value_name = "DIR")]
-        keep: Option<PathBuf>,
-        /// How many lives of each story
-        #[arg(long, default_value_t = 1)]
-        lives: u64,
-        /// The seed of the first
-        #[arg(long, default_value_t = 1)]
-        seed: u64,
-    },
+    Months(Months),
     /// How often a model that is no better is adopted: years made of simulated trips, drawn with replacement
     Mistakes {
         /// Trains
@@ -112,6 +86,35 @@ enum Command {
 }
 
 #[derive(Debug, Args)]
+struct Months {
+    /// What happens: `nothing`, `wheels_wear`, `winter`, `brake_drags_for_a_day` or a kind of effect; all when
+    /// absent
+    #[arg(long)]
+    story: Option<String>,
+    /// Days
+    #[arg(long, default_value_t = 50)]
+    days: usize,
+    /// The first day on which something is undeclared
+    #[arg(long, default_value_t = 12)]
+    onset: usize,
+    /// The first day on which nothing is any more, in stories that end
+    #[arg(long, default_value_t = 32)]
+    end: usize,
+    /// Trips of a day
+    #[arg(long, default_value_t = 24)]
+    trips: usize,
+    /// Keep each life's files, runs and store, in a folder of its own in this one
+    #[arg(long, value_name = "DIR")]
+    keep: Option<PathBuf>,
+    /// How many lives of each story
+    #[arg(long, default_value_t = 1)]
+    lives: u64,
+    /// The seed of the first
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+#[derive(Debug, Args)]
 struct Rounds {
     /// How many
     #[arg(long, default_value_t = 1000)]
@@ -143,44 +146,10 @@ fn main() -> ExitCode {
             say(format!("{:#?}", load::run(&programs, seconds, seed)));
         }
         Command::Day { hours, seed } => say(day::hours::table(&day::run(&programs, hours, seed))),
-        Command::Months { story, days, onset, end, trips, keep, lives, seed } => {
-            let stories = match story.as_deref().map(|name| (name, Story::from_name(name))) {
-                None => Story::all(),
-                Some((_, Some(story))) => vec![story],
-                Some((name, None)) => {
-                    let names: Vec<String> = Story::all().into_iter().map(Story::name).collect();
-                    tell(&format!(
-                        "dynocar-soak: --story {name}: expected one of {}",
-                        names.join(", ")
-                    ));
-                    return ExitCode::from(2);
-                }
-            };
-            if days * trips < 2 {
-                tell("dynocar-soak: --days and --trips: expected two trips or more in all");
+        Command::Months(months) => {
+            if let Err(message) = live(&months) {
+                tell(&format!("dynocar-soak: {message}"));
                 return ExitCode::from(2);
-            }
-            print(months::table::HEADER).unwrap_or_else(|error| give_up(&error));
-            for story in stories {
-                for seed in seed..seed + lives {
-                    let span = Span { onset, end };
-                    let (recorded, trips_between_mistakes) = (6, 200_000.0);
-                    let settings = LifeSettings {
-                        story,
-                        span,
-                        seed,
-                        days,
-                        trips,
-                        recorded,
-                        trips_between_mistakes,
-                    };
-                    let passing = tempfile::tempdir().expect("a temporary folder");
-                    let name = format!("{}-{seed}", story.name());
-                    let kept = keep.as_ref().map(|folder| folder.join(name));
-                    let folder = kept.as_deref().unwrap_or(passing.path());
-                    let outcome = Life::begin(settings, folder).live();
-                    print(&months::table::line(&outcome)).unwrap_or_else(|error| give_up(&error));
-                }
             }
         }
         Command::Mistakes { trains, years, seed, trips_between_mistakes } => {
@@ -212,6 +181,42 @@ fn main() -> ExitCode {
         }
     }
     ExitCode::SUCCESS
+}
+
+/// Lives the months; an error says what is wrong with what was asked for.
+fn live(months: &Months) -> Result<(), String> {
+    let stories = match months.story.as_deref().map(|name| (name, Story::from_name(name))) {
+        None => Story::all(),
+        Some((_, Some(story))) => vec![story],
+        Some((name, None)) => {
+            let names: Vec<String> = Story::all().into_iter().map(Story::name).collect();
+            return Err(format!("--story {name}: expected one of {}", names.join(", ")));
+        }
+    };
+    if months.days * months.trips < 2 {
+        return Err("--days and --trips: expected two trips or more in all".into());
+    }
+    print(months::table::HEADER).unwrap_or_else(|error| give_up(&error));
+    for story in stories {
+        for seed in months.seed..months.seed + months.lives {
+            let settings = LifeSettings {
+                story,
+                span: Span { onset: months.onset, end: months.end },
+                seed,
+                days: months.days,
+                trips: months.trips,
+                recorded: 6,
+                trips_between_mistakes: 200_000.0,
+            };
+            let passing = tempfile::tempdir().expect("a temporary folder");
+            let name = format!("{}-{seed}", story.name());
+            let kept = months.keep.as_ref().map(|folder| folder.join(name));
+            let folder = kept.as_deref().unwrap_or(passing.path());
+            let outcome = Life::begin(settings, folder).live();
+            print(&months::table::line(&outcome)).unwrap_or_else(|error| give_up(&error));
+        }
+    }
+    Ok(())
 }
 
 /// A line of the result on standard output.

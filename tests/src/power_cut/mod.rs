@@ -18,6 +18,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use dynocar::storage::{Rights, Storage};
 
 pub use noted::NotedDisk;
+pub use steps::Left;
 use steps::{AfterSteps, Step, apply};
 
 /// Which of its duties a disk neglects, to show that the tests notice.
@@ -74,9 +75,6 @@ impl Asked {
 pub struct LossyDisk {
     asked: Arc<Mutex<Asked>>,
 }
-
-/// What is on the disk after a cut: content by name.
-pub type Left = BTreeMap<PathBuf, Vec<u8>>;
 
 impl LossyDisk {
     /// An empty disk.

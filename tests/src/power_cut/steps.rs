@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use dynocar::storage::folder_of;
 
-use super::Left;
+/// What is on the disk after a cut: content by name.
+pub type Left = BTreeMap<PathBuf, Vec<u8>>;
 
 /// Changes of names that are taken in any combination; older ones are taken as done.
 const NAMES_MAX: usize = 8;

@@ -3,7 +3,7 @@
 use dynocar_shared::vocabulary::EffectKind;
 use serde_json::{Map, Value, json};
 
-use super::run_maker::run_file;
+use super::run_file::run_file;
 use super::unlisted::Unlisted;
 
 /// A stretch of time in one run.

@@ -2,6 +2,7 @@
 
 use super::line_maker::Line;
 use super::random::Random;
+use super::run_file::run_file;
 use super::settings::{SimulatorSettings, TrainType};
 use super::train_maker::{TrueTrain, rounded};
 
@@ -41,11 +42,6 @@ pub struct RunPlan {
     pub temperature_degc: f64,
     /// Manner of driving.
     pub style: DrivingStyle,
-}
-
-/// Name of a run's file within a dataset, by the run's number from 0.
-pub fn run_file(number: usize) -> String {
-    format!("runs/{:02}.csv", number + 1)
 }
 
 impl RunPlan {

@@ -91,6 +91,30 @@ pub fn make_sensors(train: &TrueTrain, factor: f64, random: &mut Random) -> Sens
     }
 }
 
+/// An instant between two true states.
+struct Instant<'a> {
+    states: &'a [TrueState],
+    index: usize,
+    /// From the state to the next.
+    share: f64,
+}
+
+impl Instant<'_> {
+    fn of(&self, value: fn(&TrueState) -> f64) -> f64 {
+        let (here, next) = (value(&self.states[self.index]), value(&self.states[self.index + 1]));
+        here + self.share * (next - here)
+    }
+
+    /// The mean over so many true steps before; the instant's own value for none.
+    fn mean_of(&self, steps: usize, value: fn(&TrueState) -> f64) -> f64 {
+        let from = self.index.saturating_sub(steps);
+        match steps.min(self.index) {
+            0 => self.of(value),
+            steps => self.states[from..self.index].iter().map(value).sum::<f64>() / steps as f64,
+        }
+    }
+}
+
 /// Measures a run: one sample per period, each at its own instant.
 pub fn measure_run(
     states: &[TrueState],
@@ -104,6 +128,12 @@ pub fn measure_run(
     let end_s = states[states.len() - 1].time_s;
     let period_s = settings.sample_period_s;
     let count = (end_s / period_s).floor() as usize;
+    let reading = disturbances.force_reading_factor;
+    // What was averaged is the mean of the true steps since the stamp before.
+    let averaged = match settings.force_sampling {
+        ForceSampling::Averaged => (period_s / TRUE_STEP_S).round() as usize,
+        _ => 0,
+    };
     (0..count)
         .map(|k| {
             let jitter_s = settings.defects.jitter * period_s * random.gaussian();
@@ -113,33 +143,19 @@ pub fn measure_run(
             // A sample at a true instant reads that instant, whatever the rounding.
             let place = (1e6 * time_s / TRUE_STEP_S).round() / 1e6;
             let index = (place as usize).min(states.len() - 2);
-            let share = place - index as f64;
-            let between = |value: fn(&TrueState) -> f64| {
-                let (here, next) = (value(&states[index]), value(&states[index + 1]));
-                here + share * (next - here)
-            };
-            let odometer_m = odometer[index] + share * (odometer[index + 1] - odometer[index]);
+            let instant = Instant { states, index, share: place - index as f64 };
+            let between = |value: fn(&TrueState) -> f64| instant.of(value);
+            let odometer_m =
+                odometer[index] + instant.share * (odometer[index + 1] - odometer[index]);
             let wheel_mps = disturbances.speed_scale * between(|state| state.wheel_speed_mps);
             let speed_mps = if wheel_mps <= sensors.speed_threshold_mps {
                 0.0
             } else {
                 sensors.speed.read_positive(wheel_mps, random)
             };
-            let reading = disturbances.force_reading_factor;
-            // What was averaged is the mean of the true steps since the stamp before.
-            let averaged = match settings.force_sampling {
-                ForceSampling::Averaged => (period_s / TRUE_STEP_S).round() as usize,
-                _ => 0,
-            };
-            let force_n = |value: fn(&TrueState) -> f64| {
-                let from = index.saturating_sub(averaged);
-                match averaged.min(index) {
-                    0 => between(value),
-                    steps => states[from..index].iter().map(value).sum::<f64>() / steps as f64,
-                }
-            };
-            let traction_n = reading * force_n(|state| state.reported.traction_force_n);
-            let brake_n = reading * force_n(|state| state.reported.brake_force_n);
+            let traction_n =
+                reading * instant.mean_of(averaged, |state| state.reported.traction_force_n);
+            let brake_n = reading * instant.mean_of(averaged, |state| state.reported.brake_force_n);
             let pressure_pa = between(|state| state.cylinder_pressure_pa);
             let pressure_pa = sensors.pressure.read(pressure_pa, random).max(0.0);
             let temperature_degc = between(|state| state.temperature_degc);

@@ -41,6 +41,20 @@ pub struct Report {
     pub latency_p99_ns: [u64; 4],
 }
 
+impl Report {
+    fn set_latencies(&mut self, by_quarter: [Vec<u64>; 4]) {
+        for (quarter, mut latencies_ns) in by_quarter.into_iter().enumerate() {
+            latencies_ns.sort_unstable();
+            let at = |share: f64| {
+                let place = (latencies_ns.len() as f64 * share) as usize;
+                latencies_ns.get(place).copied().unwrap_or(0)
+            };
+            self.latency_p50_ns[quarter] = at(0.5);
+            self.latency_p99_ns[quarter] = at(0.99);
+        }
+    }
+}
+
 /// One train's controller.
 struct Controller {
     train: TrainId,
@@ -147,16 +161,8 @@ pub fn run(programs: &Programs, seconds: u64, seed: u64) -> Report {
             next_fault = Instant::now() + Duration::from_millis(random.random_range(500..4_000));
             match random.random_range(0..3) {
                 0 => {
-                    daemon.stop();
-                    let stopped_ms = random.random_range(0..STOPPED_MAX_MS.min(100 * seconds));
-                    // The controllers go on: what the buffers cannot hold is lost, and counted.
-                    // By number, not by time: a slow machine is to lose some as well.
-                    for _ in 0..stopped_ms / 4 {
-                        let cycle = |it: &mut Controller| it.cycle(&mut random, &mut Vec::new());
-                        controllers.iter_mut().for_each(cycle);
-                        std::thread::sleep(PERIOD);
-                    }
-                    daemon.signal(Signal::CONT);
+                    let stopped_ms_max = STOPPED_MAX_MS.min(100 * seconds);
+                    stop_for_a_while(&daemon, stopped_ms_max, &mut controllers, &mut random);
                     due = Instant::now();
                 }
                 1 => {
@@ -167,14 +173,8 @@ pub fn run(programs: &Programs, seconds: u64, seed: u64) -> Report {
                         before.kill();
                     }
                 }
-                _ => {
-                    // A burst of four hundred samples at once.
-                    for _ in 0..50 {
-                        controllers
-                            .iter_mut()
-                            .for_each(|it| it.cycle(&mut random, &mut Vec::new()));
-                    }
-                }
+                // A burst of four hundred samples at once.
+                _ => (0..50).for_each(|_| cycle_uncounted(&mut controllers, &mut random)),
             }
         }
         report.resident_kib[quarter] = report.resident_kib[quarter].max(resident_kib(&daemon));
@@ -182,18 +182,31 @@ pub fn run(programs: &Programs, seconds: u64, seed: u64) -> Report {
         std::thread::sleep(due.saturating_duration_since(Instant::now()));
     }
     check_accounts(&mut controllers, &daemon, &mut report);
-    for (quarter, latencies_ns) in latencies_ns.iter_mut().enumerate() {
-        latencies_ns.sort_unstable();
-        let at = |share: f64| {
-            let place = (latencies_ns.len() as f64 * share) as usize;
-            latencies_ns.get(place).copied().unwrap_or(0)
-        };
-        report.latency_p50_ns[quarter] = at(0.5);
-        report.latency_p99_ns[quarter] = at(0.99);
-    }
+    report.set_latencies(latencies_ns);
     let growth = report.resident_kib[3].saturating_sub(report.resident_kib[1]);
     assert!(growth <= GROWTH_MAX_KIB, "seed {seed}: memory grows: {report:?}");
     report
+}
+
+/// A cycle of every controller, whose latency does not count.
+fn cycle_uncounted(controllers: &mut [Controller], random: &mut ChaCha8Rng) {
+    controllers.iter_mut().for_each(|it| it.cycle(random, &mut Vec::new()));
+}
+
+/// Stops the daemon while the controllers go on: what the buffers cannot hold is lost, and counted.
+fn stop_for_a_while(
+    daemon: &Process,
+    stopped_ms_max: u64,
+    controllers: &mut [Controller],
+    random: &mut ChaCha8Rng,
+) {
+    daemon.stop();
+    // By number, not by time: a slow machine is to lose some as well.
+    for _ in 0..random.random_range(0..stopped_ms_max) / 4 {
+        cycle_uncounted(controllers, random);
+        std::thread::sleep(PERIOD);
+    }
+    daemon.signal(Signal::CONT);
 }
 
 /// Every pipeline of every train has taken, refused or missed every sample, exactly.

@@ -116,7 +116,7 @@ fn informed(
             }
             let step = &run.steps[i];
             filter.noise.speed_variance = noise_mps(i + 1).powi(2);
-            filter.predict(StepRule::Distance, step, step.size / run.speeds_mps[i]);
+            filter.predict(StepRule::Distance, step, step.size / run.speeds_mps[i], 0.0);
             filter.measure(speeds_mps[i + 1], &model, &no_outliers);
             (filter.davis(), Some(filter.davis_covariance()))
         })

@@ -1,5 +1,7 @@
 //! The live view as a process beside a controller and a daemon, with viewers that come, stall and go.
 
+#[path = "../../../recording/tests/beside/mod.rs"]
+mod beside;
 mod support;
 mod viewer;
 
@@ -9,7 +11,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use dynocar_recording::codec::{decode_sample, decode_snapshot, encode_sample};
 use dynocar_shared::PipelineKind;
 
-use support::{Controller, PROGRAM, Place};
+use beside::{Controller, Place};
+use support::{Live, PROGRAM, published_sample};
 use viewer::Viewer;
 
 const SAMPLES: &str = "/train/1/samples";
@@ -17,8 +20,8 @@ const MASS: &str = "/train/1/0_mass_kalman";
 
 #[test]
 fn a_viewer_gets_what_was_published_bit_by_bit_in_order_and_at_wall_time() {
-    let place = Place::new();
-    let live = place.live(&["--samples-hz", "0"]);
+    let place = Place::new(&["mass_kalman"]);
+    let live = Live::beside(&place, &["--samples-hz", "0"]);
     let controller = Controller::start(&place, 1);
     let mut viewer = Viewer::connect(live.port);
     viewer.subscribe(SAMPLES);
@@ -27,7 +30,7 @@ fn a_viewer_gets_what_was_published_bit_by_bit_in_order_and_at_wall_time() {
         let seen = viewer.await_seen("a sample", |it| it.topic == SAMPLES);
         let sample = decode_sample(&seen.message).unwrap();
         let mut expected = Vec::new();
-        encode_sample(&controller.sample(sample.sequence), &mut expected);
+        encode_sample(&published_sample(&controller, sample.sequence), &mut expected);
         assert_eq!(seen.message, expected, "sample {}", sample.sequence);
         assert!(sample.sequence > newest);
         newest = sample.sequence;
@@ -38,8 +41,8 @@ fn a_viewer_gets_what_was_published_bit_by_bit_in_order_and_at_wall_time() {
 
 #[test]
 fn of_five_hundred_samples_a_second_viewers_get_what_was_asked_for() {
-    let place = Place::new();
-    let live = place.live(&["--samples-hz", "20"]);
+    let place = Place::new(&["mass_kalman"]);
+    let live = Live::beside(&place, &["--samples-hz", "20"]);
     let _controller = Controller::start(&place, 1);
     let mut viewer = Viewer::connect(live.port);
     viewer.subscribe(SAMPLES);
@@ -53,8 +56,8 @@ fn of_five_hundred_samples_a_second_viewers_get_what_was_asked_for() {
 
 #[test]
 fn channels_come_and_go_with_those_who_write_them() {
-    let place = Place::new();
-    let live = place.live(&[]);
+    let place = Place::new(&["mass_kalman"]);
+    let live = Live::beside(&place, &[]);
     let mut viewer = Viewer::connect(live.port);
     viewer.await_topics(&["/events"]);
     for _ in 0..2 {
@@ -67,8 +70,8 @@ fn channels_come_and_go_with_those_who_write_them() {
 
 #[test]
 fn a_viewer_that_comes_late_gets_the_newest_snapshot() {
-    let place = Place::new();
-    let live = place.live(&["--train", "1"]);
+    let place = Place::new(&["mass_kalman"]);
+    let live = Live::beside(&place, &["--train", "1"]);
     place.daemon();
     let mut first = Viewer::connect(live.port);
     let controller = Controller::start(&place, 1);
@@ -89,8 +92,8 @@ fn a_viewer_that_comes_late_gets_the_newest_snapshot() {
 
 #[test]
 fn a_viewer_that_reads_nothing_is_told_of_and_holds_nobody_up() {
-    let place = Place::new();
-    let mut live = place.live(&["--samples-hz", "0"]);
+    let place = Place::new(&["mass_kalman"]);
+    let mut live = Live::beside(&place, &["--samples-hz", "0"]);
     let controller = Controller::start(&place, 40);
     let mut stalled = Viewer::connect(live.port);
     stalled.subscribe(SAMPLES);
@@ -110,16 +113,16 @@ fn a_viewer_that_reads_nothing_is_told_of_and_holds_nobody_up() {
 
 #[test]
 fn a_viewer_of_the_older_protocol_is_refused_in_words() {
-    let place = Place::new();
-    let live = place.live(&[]);
+    let place = Place::new(&["mass_kalman"]);
+    let live = Live::beside(&place, &[]);
     assert!(Viewer::offer(live.port, "foxglove.websocket.v1").is_none());
     live.await_told("is refused: it does not offer foxglove.sdk.v1");
 }
 
 #[test]
 fn a_taken_port_and_a_wrong_address_are_told() {
-    let place = Place::new();
-    let live = place.live(&[]);
+    let place = Place::new(&["mass_kalman"]);
+    let live = Live::beside(&place, &[]);
     let port = live.port.to_string();
     let run = |options: &[&str]| {
         let root = place.at("root");

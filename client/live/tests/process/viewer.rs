@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::{Error, Message, WebSocket};
 
-use crate::support::WATCHDOG;
+use crate::beside::WATCHDOG;
 
 /// A message on a channel that was subscribed to.
 pub struct Seen {

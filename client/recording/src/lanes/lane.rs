@@ -9,7 +9,7 @@ use dynocar_shared::services::{PIPELINES_MAX, SAMPLE_BUFFER};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, Status, TrainId, TrainSample};
 
-use super::{Sink, event};
+use super::sink::{Sink, event};
 use crate::event::{Event, EventKind};
 
 /// The most samples taken in a row, before the other trains have their turn.

@@ -5,65 +5,21 @@
 //! is passed over is counted and told.
 
 mod lane;
+mod sink;
 
 use std::time::{Duration, Instant};
 
-use dynocar_client::{ChannelError, Host, Peer, Role, monotonic_now_ns};
-use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
+use dynocar_client::{Host, Peer, Role};
+use dynocar_shared::TrainId;
 
-use crate::event::{Event, EventKind};
 use lane::Lane;
+pub use sink::{Sink, event};
 
 /// How long a reader sleeps between two looks at the channels: at 1 kHz a buffer of 512 samples
 /// leaves it a hundred times as long.
 pub const PAUSE: Duration = Duration::from_millis(5);
 /// How often it looks who is there.
 const LOOK: Duration = Duration::from_millis(200);
-
-/// Where that goes what is read: into a recording, to viewers.
-pub trait Sink {
-    /// Why nothing more is taken.
-    type Error: From<ChannelError>;
-
-    /// Takes a sample.
-    ///
-    /// # Errors
-    ///
-    /// When nothing more is taken; so for every other item.
-    fn sample(&mut self, sample: &TrainSample) -> Result<(), Self::Error>;
-
-    /// Takes a snapshot.
-    ///
-    /// # Errors
-    ///
-    /// As above.
-    fn snapshot(&mut self, snapshot: &ParameterSnapshot) -> Result<(), Self::Error>;
-
-    /// Takes an event.
-    ///
-    /// # Errors
-    ///
-    /// As above.
-    fn event(&mut self, event: &Event) -> Result<(), Self::Error>;
-
-    /// The channels of a train are open.
-    ///
-    /// # Errors
-    ///
-    /// As above.
-    fn opened(&mut self, _train: TrainId) -> Result<(), Self::Error> {
-        Ok(())
-    }
-
-    /// A daemon of this process has come; the event follows.
-    ///
-    /// # Errors
-    ///
-    /// As above.
-    fn daemon_came(&mut self, _train: TrainId, _process: u32) -> Result<(), Self::Error> {
-        Ok(())
-    }
-}
 
 /// What is to be read.
 #[derive(Clone, Debug)]
@@ -141,16 +97,5 @@ impl Lanes {
         let Wanted { host, snapshot_interval, .. } = &self.wanted;
         self.lanes.push(Lane::open(host, train, *snapshot_interval, self.name)?);
         sink.opened(train)
-    }
-}
-
-/// An event of a train, seen now.
-pub fn event(train: TrainId, kind: EventKind, text: String) -> Event {
-    Event {
-        monotonic_ns: monotonic_now_ns(),
-        train_id: train.0,
-        kind: kind as i32,
-        text,
-        ..Default::default()
     }
 }

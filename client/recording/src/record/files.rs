@@ -7,13 +7,13 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use dynocar::storage::{Disk, folder_of};
+use dynocar::storage::{Disk, SharedStorage, folder_of};
 use dynocar_client::monotonic_now_ns;
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 use mcap::McapError;
 
 use super::configuration::Configuration;
-use super::housekeeping::{Housekeeper, SharedStorage, Task};
+use super::housekeeping::{Housekeeper, Task};
 use super::keeping::{self, Keeper};
 use super::rotation::{Rotation, next};
 use super::{RecordError, Recorded, SYNC};

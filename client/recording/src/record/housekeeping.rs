@@ -10,14 +10,11 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
 use dynocar::output::tell;
-use dynocar::storage::{Storage, settle};
+use dynocar::storage::{SharedStorage, settle};
 
 use super::keeping::{KeepError, Keeper};
 use super::rotation::{Rotation, numbered, remove_oldest};
 use crate::event::Event;
-
-/// A file system that several threads use.
-pub type SharedStorage = Arc<dyn Storage + Send + Sync>;
 
 /// What is to be done.
 #[derive(Debug)]

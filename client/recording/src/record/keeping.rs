@@ -12,10 +12,9 @@ use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use dynocar::output::{tell, write_file};
-use dynocar::storage::{Disk, StorageError};
+use dynocar::storage::{Disk, SharedStorage, StorageError};
 use dynocar_shared::Status;
 
-use super::housekeeping::SharedStorage;
 use super::stretch::{self, Reason, Stretch, beside, forget_unfinished, kept_bytes, unix_s};
 use crate::event::{Event, EventKind};
 

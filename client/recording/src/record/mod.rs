@@ -26,7 +26,6 @@ use configuration::Configuration;
 use maintenance::Maintenance;
 
 pub use files::Files;
-pub use housekeeping::SharedStorage;
 pub use keeping::{KeepError, Keeper, Keeping, request as request_keeping};
 pub use rotation::Rotation;
 

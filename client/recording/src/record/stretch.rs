@@ -7,10 +7,9 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use dynocar::models::moment::Moment;
-use dynocar::storage::{Rights, StorageError, replace};
+use dynocar::storage::{Rights, SharedStorage, StorageError, replace};
 use serde::{Deserialize, Serialize};
 
-use super::housekeeping::SharedStorage;
 use crate::event::{Event, EventKind};
 
 /// In the folder of a stretch: why it is kept.

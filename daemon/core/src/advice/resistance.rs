@@ -62,7 +62,7 @@ pub fn forecast(
         let Some(force_n) = driver.force_n(scene, filter.state[SPEED]) else { break };
         let drive_mps2 = force_n / scene.inertial_mass_kg();
         let step = Step { size: step_s, drive_mps2, resistance_gain: gain };
-        filter.predict(StepRule::Time, &step, step_s);
+        filter.predict(StepRule::Time, &step, step_s, 0.0);
         filter.measure(filter.state[SPEED], &model, &OUTLIERS);
         lasts_s += step_s;
     }

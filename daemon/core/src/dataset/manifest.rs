@@ -7,6 +7,7 @@ use super::error::{DatasetError, Place, Problem};
 use super::names::Choices;
 use super::quantity::Quantity;
 use super::units::Unit;
+use crate::named::named;
 
 /// Which point of the train the recorded position is of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,23 +18,15 @@ pub enum PositionReference {
     Head,
 }
 
-/// What a run is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Role {
-    /// Models are fitted to it.
-    Fit,
-    /// Read only to score a finished model.
-    Holdout,
-}
-
-impl Role {
-    /// The name in a dataset.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Role::Fit => "fit",
-            Role::Holdout => "holdout",
-        }
+named! {
+    /// What a run is for.
+    #[derive(serde::Serialize)]
+    #[serde(rename_all = "snake_case")]
+    Role ("in a dataset") {
+        /// Models are fitted to it.
+        Fit "fit";
+        /// Read only to score a finished model.
+        Holdout "holdout";
     }
 }
 
@@ -269,9 +262,9 @@ fn is_same_path(one: &str, other: &str) -> bool {
 fn run(section: &Section) -> Result<RunEntry, DatasetError> {
     section.allow(&["file", "role", "direction", "mass_t", "start_m"])?;
     let role = match section.text("role")? {
-        None | Some("fit") => Role::Fit,
-        Some("holdout") => Role::Holdout,
-        Some(word) => return Err(section.unknown("role", "role", word, &["fit", "holdout"])),
+        None => Role::Fit,
+        Some(word) => Role::from_name(word)
+            .ok_or_else(|| section.unknown("role", "role", word, &Role::ALL.map(Role::name)))?,
     };
     let direction = section.number("direction", "1 or -1", |direction| direction.abs() == 1.0)?;
     let mass_t = section.number("mass_t", "a mass in t above 0, at most 100000", |mass| {

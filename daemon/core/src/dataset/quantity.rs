@@ -3,174 +3,89 @@
 use serde::Serialize;
 
 use super::units::{Dimension, Unit};
+use crate::named::named;
 
-/// What a column of a run may hold.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Quantity {
+/// Declares the quantities: what each is, its name in a dataset, what its units measure.
+macro_rules! quantities {
+    ($( #[doc = $doc:literal] $item:ident $name:literal $dimension:ident; )*) => {
+        named! {
+            /// What a column of a run may hold; in the order of the documentation.
+            #[derive(Hash, PartialOrd, Ord, Serialize)]
+            #[serde(rename_all = "snake_case")]
+            Quantity ("in a dataset's `[columns]`") { $( #[doc = $doc] $item $name; )* }
+        }
+
+        impl Quantity {
+            /// What its units measure.
+            pub const fn dimension(self) -> Dimension {
+                match self { $( Quantity::$item => Dimension::$dimension ),* }
+            }
+        }
+    };
+}
+
+quantities! {
     /// Time of the measurement, from any origin.
-    Time,
+    Time "time" Time;
     /// Chainage of the train.
-    Position,
+    Position "position" Length;
     /// Speed in the direction of travel, never negative.
-    Speed,
+    Speed "speed" Speed;
     /// dv/dt.
-    Acceleration,
+    Acceleration "acceleration" Acceleration;
     /// What an accelerometer reads along the track: dv/dt + g * gradient.
-    SpecificForce,
+    SpecificForce "specific_force" Acceleration;
     /// Traction force, never negative.
-    TractionForce,
+    TractionForce "traction_force" Force;
     /// Retarding force of the brakes, never negative.
-    BrakeForce,
+    BrakeForce "brake_force" Force;
     /// Traction minus brake force.
-    ControlForce,
+    ControlForce "control_force" Force;
     /// Share of the traction effort curve, 0 to 1.
-    TractionHandle,
+    TractionHandle "traction_handle" Ratio;
     /// Share of the brake effort curve, 0 to 1.
-    BrakeHandle,
+    BrakeHandle "brake_handle" Ratio;
     /// Brake-cylinder pressure.
-    BrakeCylinderPressure,
+    BrakeCylinderPressure "brake_cylinder_pressure" Pressure;
     /// The train's gross mass.
-    TrainMass,
+    TrainMass "train_mass" Mass;
     /// Number of passengers.
-    Passengers,
+    Passengers "passengers" Count;
     /// Outside temperature.
-    AmbientTemperature,
+    AmbientTemperature "ambient_temperature" Temperature;
     /// Relative humidity of the air.
-    RelativeHumidity,
+    RelativeHumidity "relative_humidity" Ratio;
     /// Gradient, climbing positive as the chainage grows.
-    Gradient,
+    Gradient "gradient" Ratio;
     /// Height of the track.
-    Altitude,
+    Altitude "altitude" Length;
     /// Radius of the curve; 0 or infinite on straight track, the sign does not count.
-    CurveRadius,
+    CurveRadius "curve_radius" Length;
     /// Speed of the wind.
-    WindSpeed,
+    WindSpeed "wind_speed" Speed;
     /// 1 while the wheel-slide protection is active, else 0.
-    WheelSlide,
+    WheelSlide "wheel_slide" Count;
     /// Geographical latitude by GNSS (WGS 84).
-    Latitude,
+    Latitude "latitude" Angle;
     /// Geographical longitude by GNSS (WGS 84).
-    Longitude,
+    Longitude "longitude" Angle;
     /// Course over ground by GNSS, clockwise from north.
-    Course,
+    Course "course" Angle;
     /// Curvature of the way as measured by a yaw gyro or the steering; turning left is positive.
-    Curvature,
+    Curvature "curvature" Curvature;
     /// 1 while a door is open, else 0.
-    DoorOpen,
+    DoorOpen "door_open" Count;
     /// Power of the traction drive, regeneration negative.
-    TractionPower,
+    TractionPower "traction_power" Power;
     /// Power taken from the line, regeneration negative.
-    LinePower,
+    LinePower "line_power" Power;
     /// Voltage of the line.
-    LineVoltage,
+    LineVoltage "line_voltage" Voltage;
     /// Current taken from the line, regeneration negative.
-    LineCurrent,
+    LineCurrent "line_current" Current;
 }
 
 impl Quantity {
-    /// Every quantity, in the order of the documentation.
-    pub const ALL: [Quantity; 29] = {
-        use Quantity::*;
-        [
-            Time,
-            Position,
-            Speed,
-            Acceleration,
-            SpecificForce,
-            TractionForce,
-            BrakeForce,
-            ControlForce,
-            TractionHandle,
-            BrakeHandle,
-            BrakeCylinderPressure,
-            TrainMass,
-            Passengers,
-            AmbientTemperature,
-            RelativeHumidity,
-            Gradient,
-            Altitude,
-            CurveRadius,
-            WindSpeed,
-            WheelSlide,
-            Latitude,
-            Longitude,
-            Course,
-            Curvature,
-            DoorOpen,
-            TractionPower,
-            LinePower,
-            LineVoltage,
-            LineCurrent,
-        ]
-    };
-
-    /// The name in a dataset's `[columns]`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Quantity::Time => "time",
-            Quantity::Position => "position",
-            Quantity::Speed => "speed",
-            Quantity::Acceleration => "acceleration",
-            Quantity::SpecificForce => "specific_force",
-            Quantity::TractionForce => "traction_force",
-            Quantity::BrakeForce => "brake_force",
-            Quantity::ControlForce => "control_force",
-            Quantity::TractionHandle => "traction_handle",
-            Quantity::BrakeHandle => "brake_handle",
-            Quantity::BrakeCylinderPressure => "brake_cylinder_pressure",
-            Quantity::TrainMass => "train_mass",
-            Quantity::Passengers => "passengers",
-            Quantity::AmbientTemperature => "ambient_temperature",
-            Quantity::RelativeHumidity => "relative_humidity",
-            Quantity::Gradient => "gradient",
-            Quantity::Altitude => "altitude",
-            Quantity::CurveRadius => "curve_radius",
-            Quantity::WindSpeed => "wind_speed",
-            Quantity::WheelSlide => "wheel_slide",
-            Quantity::Latitude => "latitude",
-            Quantity::Longitude => "longitude",
-            Quantity::Course => "course",
-            Quantity::Curvature => "curvature",
-            Quantity::DoorOpen => "door_open",
-            Quantity::TractionPower => "traction_power",
-            Quantity::LinePower => "line_power",
-            Quantity::LineVoltage => "line_voltage",
-            Quantity::LineCurrent => "line_current",
-        }
-    }
-
-    /// The quantity with this name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|quantity| quantity.name() == name)
-    }
-
-    /// What its units measure.
-    pub const fn dimension(self) -> Dimension {
-        match self {
-            Quantity::Time => Dimension::Time,
-            Quantity::Position | Quantity::Altitude | Quantity::CurveRadius => Dimension::Length,
-            Quantity::Speed | Quantity::WindSpeed => Dimension::Speed,
-            Quantity::Acceleration | Quantity::SpecificForce => Dimension::Acceleration,
-            Quantity::TractionForce | Quantity::BrakeForce | Quantity::ControlForce => {
-                Dimension::Force
-            }
-            Quantity::TractionHandle
-            | Quantity::BrakeHandle
-            | Quantity::RelativeHumidity
-            | Quantity::Gradient => Dimension::Ratio,
-            Quantity::BrakeCylinderPressure => Dimension::Pressure,
-            Quantity::TrainMass => Dimension::Mass,
-            Quantity::AmbientTemperature => Dimension::Temperature,
-            Quantity::Passengers | Quantity::WheelSlide | Quantity::DoorOpen => Dimension::Count,
-            Quantity::Latitude | Quantity::Longitude | Quantity::Course => Dimension::Angle,
-            Quantity::Curvature => Dimension::Curvature,
-            Quantity::TractionPower | Quantity::LinePower => Dimension::Power,
-            Quantity::LineVoltage => Dimension::Voltage,
-            Quantity::LineCurrent => Dimension::Current,
-        }
-    }
-
     /// The unit in which it is held once read: the base unit of its dimension, but ‰ for the
     /// gradient.
     pub fn unit(self) -> Unit {

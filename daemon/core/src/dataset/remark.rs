@@ -203,7 +203,7 @@ impl Remark {
     const fn code_and_severity(&self) -> (&'static str, Severity) {
         use Severity::{Fundamental, Info, Warning};
         match self {
-            Remark::Slip { finding, .. } => (finding.slip.code(), finding.slip.severity()),
+            Remark::Slip { finding, .. } => (finding.slip.name(), finding.slip.severity()),
             Remark::AgainstDirection { .. } => ("against_direction", Fundamental),
             Remark::DistanceMismatch { .. } => ("distance_mismatch", Warning),
             Remark::OffTheLine { .. } => ("off_the_line", Warning),

@@ -6,34 +6,24 @@ use serde::{Deserialize, Serialize};
 
 use super::stop_to_stop::StopToStop;
 use crate::dataset::Note;
+use crate::named::named;
 use crate::plausibility::Severity;
 
-/// What the data say, in a word.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Verdict {
-    /// Nothing undeclared acts, as far as the data tell.
-    None,
-    /// One or more effects of the library act.
-    Effect,
-    /// Several effects explain the data equally well.
-    Ambiguous,
-    /// The residual is real, but no effect of the library explains it.
-    Unknown,
-    /// The data do not suffice for a statement.
-    InsufficientData,
-}
-
-impl Verdict {
-    /// Its name, as in answers for machines.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Verdict::None => "none",
-            Verdict::Effect => "effect",
-            Verdict::Ambiguous => "ambiguous",
-            Verdict::Unknown => "unknown",
-            Verdict::InsufficientData => "insufficient_data",
-        }
+named! {
+    /// What the data say, in a word.
+    #[derive(Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    Verdict ("as in answers for machines") {
+        /// Nothing undeclared acts, as far as the data tell.
+        None "none";
+        /// One or more effects of the library act.
+        Effect "effect";
+        /// Several effects explain the data equally well.
+        Ambiguous "ambiguous";
+        /// The residual is real, but no effect of the library explains it.
+        Unknown "unknown";
+        /// The data do not suffice for a statement.
+        InsufficientData "insufficient_data";
     }
 }
 

@@ -6,7 +6,7 @@
 //! - [`evidence`]: observations, noise, the joint fit of a, b, c and effects
 //! - [`drive`]: the efficiency of a drive of which only the power is recorded
 //! - [`force_time`]: forces that act before their stamps
-//! - [`effects`]: the library, one file for each kind
+//! - [`hypothesis`], [`effects`]: what an effect is to the others; the library, one file for each kind
 //! - [`scan`], [`places`], [`residual_pressure`]: what a force of some shape, at some place or
 //!   time, would explain
 //! - [`selection`]: the search for effects, its significance, evidence by run
@@ -22,6 +22,7 @@ pub mod drive;
 pub mod effects;
 pub mod evidence;
 pub mod force_time;
+pub mod hypothesis;
 pub mod identifiability;
 pub mod places;
 pub mod report;

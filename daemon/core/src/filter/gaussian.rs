@@ -90,12 +90,23 @@ impl<const N: usize> Gaussian<N> {
 
     /// Makes component `i` a function of all: its value, its gradient by the state before, and the
     /// variance of the noise that comes in. The work grows with N², not N³.
+    #[inline]
     pub fn rewrite(&mut self, i: usize, value: f64, gradient: &SVector<f64, N>, variance: f64) {
         let mixed = self.covariance * gradient;
         self.covariance.set_column(i, &mixed);
         self.covariance.set_row(i, &mixed.transpose());
         self.covariance[(i, i)] = gradient.dot(&mixed) + variance;
         self.mean[i] = value;
+    }
+
+    /// Component `i` keeps a share of itself, and noise of a variance comes in. The work grows with N.
+    #[inline]
+    pub fn fade(&mut self, i: usize, keep: f64, variance: f64) {
+        let column = self.covariance.column(i) * keep;
+        self.covariance.set_column(i, &column);
+        self.covariance.set_row(i, &column.transpose());
+        self.covariance[(i, i)] = keep * column[i] + variance;
+        self.mean[i] *= keep;
     }
 
     /// Adds noise of a variance to component `i`.
@@ -267,6 +278,17 @@ mod tests {
         assert!((filter.mean[0] - gathered.dot(&estimate)).abs() < 1e-9);
         let block = filter.covariance.fixed_view::<2, 2>(1, 1);
         assert!((block - covariance.fixed_view::<2, 2>(1, 1)).norm() < 1e-9);
+    }
+
+    #[test]
+    fn fading_is_rewriting_by_a_share_of_itself() {
+        let covariance = Matrix3::new(2.0, 0.5, 0.1, 0.5, 3.0, 0.2, 0.1, 0.2, 1.0);
+        let mut faded = Gaussian { mean: Vector3::new(1.0, 2.0, 3.0), covariance };
+        let mut rewritten = faded;
+        faded.fade(1, 0.8, 0.3);
+        rewritten.rewrite(1, 1.6, &Vector3::new(0.0, 0.8, 0.0), 0.3);
+        assert!((faded.mean - rewritten.mean).norm() < 1e-15);
+        assert!((faded.covariance - rewritten.covariance).norm() < 1e-15);
     }
 
     #[test]

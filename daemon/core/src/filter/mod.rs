@@ -47,7 +47,7 @@ pub use line::Line;
 pub use median::RunningMedian;
 pub use mils::{Mils, Penalty};
 pub use rls::{Forgetting, Rls};
-pub use whitening::{Propagation, Sighting, Whitener};
+pub use whitening::{Propagation, Sighting, UnitRow, Whitener};
 
 /// A belief or a measurement is not sound: a matrix that should be positive definite is not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

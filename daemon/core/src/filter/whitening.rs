@@ -27,6 +27,15 @@ pub struct Sighting<const S: usize, const C: usize> {
     pub variance: f64,
 }
 
+/// A sighting less what was known before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnitRow<const C: usize> {
+    /// The innovation by column, of unit variance.
+    pub columns: SVector<f64, C>,
+    /// The variance taken off.
+    pub variance: f64,
+}
+
 /// A Kalman filter whose states are affine in unknown parameters: the generalised least squares
 /// of a regression with correlated errors (Rosenberg 1973; de Jong 1991).
 ///
@@ -84,15 +93,15 @@ impl<const S: usize, const C: usize> Whitener<S, C> {
         self.state.column_mut(column).fill(0.0);
     }
 
-    /// The innovation's columns and its variance, before [`Whitener::correct`].
-    pub fn innovation(&self, sighting: &Sighting<S, C>) -> (SVector<f64, C>, f64) {
-        let predicted = self.state.transpose() * sighting.direction;
-        let spread = self.covariance * sighting.direction;
-        let variance = sighting.direction.dot(&spread) + sighting.variance;
-        (sighting.observed - predicted, variance)
+    /// What a sighting says beyond what was known, as a row with an error of unit variance; `None` when
+    /// its variance is not positive and finite.
+    pub fn row(&self, sighting: &Sighting<S, C>) -> Option<UnitRow<C>> {
+        let variance = sighting.direction.dot(&self.spread(sighting)) + sighting.variance;
+        let is_sound = variance > 0.0 && variance.is_finite();
+        is_sound.then(|| UnitRow { columns: self.innovation(sighting) / variance.sqrt(), variance })
     }
 
-    /// Takes a sighting into the states; their covariance stays symmetric and positive.
+    /// Takes a sighting into the states, whose covariance stays symmetric and positive; gives its row.
     ///
     /// # Errors
     ///
@@ -101,16 +110,26 @@ impl<const S: usize, const C: usize> Whitener<S, C> {
     /// # Real-time
     ///
     /// Bounded work, no allocation.
-    pub fn correct(&mut self, sighting: &Sighting<S, C>) -> Result<(), NotPositiveDefinite> {
-        let (innovation, variance) = self.innovation(sighting);
+    pub fn take(&mut self, sighting: &Sighting<S, C>) -> Result<UnitRow<C>, NotPositiveDefinite> {
+        let Sighting { direction, variance: noise_variance, .. } = sighting;
+        let spread = self.spread(sighting);
+        let variance = direction.dot(&spread) + noise_variance;
         if !(variance > 0.0 && variance.is_finite()) {
             return Err(NotPositiveDefinite);
         }
-        let Sighting { direction, variance: noise_variance, .. } = sighting;
-        let (spread, inverse_variance) = (self.covariance * direction, 1.0 / variance);
+        let innovation = self.innovation(sighting);
+        let inverse_variance = 1.0 / variance;
         self.state += spread * innovation.transpose() * inverse_variance;
         measured(&mut self.covariance, direction, &spread, inverse_variance, *noise_variance);
-        Ok(())
+        Ok(UnitRow { columns: innovation / variance.sqrt(), variance })
+    }
+
+    fn innovation(&self, sighting: &Sighting<S, C>) -> SVector<f64, C> {
+        sighting.observed - self.state.transpose() * sighting.direction
+    }
+
+    fn spread(&self, sighting: &Sighting<S, C>) -> SVector<f64, S> {
+        self.covariance * sighting.direction
     }
 }
 
@@ -144,10 +163,10 @@ mod tests {
                 observed: Vector3::new(seen[k], 0.0, 0.0),
                 variance: noise,
             };
-            let (row, variance) = whitener.innovation(&sighting);
-            let features = SVector::<f64, 2>::new(row[1], row[2]) / variance.sqrt();
-            information.update(&features, row[0] / variance.sqrt());
-            whitener.correct(&sighting).unwrap();
+            let seen = whitener.row(&sighting).unwrap();
+            assert_eq!(whitener.take(&sighting), Ok(seen));
+            let row = seen.columns;
+            information.update(&SVector::<f64, 2>::new(row[1], row[2]), row[0]);
         }
 
         // Differences of neighbours: covariance walk + 2 noise on the diagonal, -noise beside.
@@ -177,6 +196,7 @@ mod tests {
             observed: SVector::<f64, 2>::zeros(),
             variance: 0.0,
         };
-        assert_eq!(whitener.correct(&sighting), Err(NotPositiveDefinite));
+        assert_eq!(whitener.row(&sighting), None);
+        assert_eq!(whitener.take(&sighting), Err(NotPositiveDefinite));
     }
 }

@@ -3,29 +3,17 @@
 use super::error::{ImportError, ImportProblem};
 use super::item::Item;
 use crate::dataset::Place;
+use crate::named::named;
 
-/// A project whose files are read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// Rolling stock and running paths of railtoolkit's schema.
-    Railtoolkit,
-    /// Trains and tracks of TTOBench.
-    Ttobench,
-    /// Rolling stock of OSRD.
-    Osrd,
-}
-
-impl Format {
-    /// All of them.
-    pub const ALL: [Format; 3] = [Format::Railtoolkit, Format::Ttobench, Format::Osrd];
-
-    /// The name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Format::Railtoolkit => "railtoolkit",
-            Format::Ttobench => "ttobench",
-            Format::Osrd => "osrd",
-        }
+named! {
+    /// A project whose files are read.
+    Format ("on the command line") {
+        /// Rolling stock and running paths of railtoolkit's schema.
+        Railtoolkit "railtoolkit";
+        /// Trains and tracks of TTOBench.
+        Ttobench "ttobench";
+        /// Rolling stock of OSRD.
+        Osrd "osrd";
     }
 }
 

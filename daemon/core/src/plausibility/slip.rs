@@ -4,6 +4,7 @@ use dynocar_shared::{PipelineKind, Reason};
 use serde::Serialize;
 
 use crate::dataset::units::{Dimension, Unit};
+use crate::named::named;
 
 /// A unit is named when its factor and the one found differ by no more than this share.
 const UNIT_TOLERANCE: f64 = 0.2;
@@ -20,78 +21,43 @@ pub enum Severity {
     Fundamental,
 }
 
-/// A slip of the pen or of the wiring.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-#[repr(u8)]
-pub enum Slip {
-    /// Time in another unit.
-    TimeScale = 1,
-    /// Speed in another unit.
-    SpeedScale = 2,
-    /// Position in another unit.
-    PositionScale = 3,
-    /// The chainage runs against the stated direction.
-    DirectionReversed = 4,
-    /// Mass in another unit.
-    MassScale = 5,
-    /// Traction and brake exchanged, or the sign of their difference reversed.
-    ForcesSwapped = 6,
-    /// Both forces in another unit.
-    ForcesScale = 7,
-    /// The traction force alone in another unit, or against the motion (factor below zero).
-    TractionScale = 8,
-    /// The brake force alone, likewise.
-    BrakeScale = 9,
-    /// The gradient falls where it should climb.
-    GradientSign = 10,
-    /// Gradient in another unit.
-    GradientScale = 11,
-    /// Brake-cylinder pressure in another unit.
-    PressureScale = 12,
+named! {
+    /// A slip of the pen or of the wiring; in the order in which they are told.
+    #[derive(PartialOrd, Ord, Serialize)]
+    #[serde(rename_all = "snake_case")]
+    #[repr(u8)]
+    Slip ("for machines") {
+        /// Time in another unit.
+        TimeScale = 1 "time_scale";
+        /// Speed in another unit.
+        SpeedScale = 2 "speed_scale";
+        /// Position in another unit.
+        PositionScale = 3 "position_scale";
+        /// The chainage runs against the stated direction.
+        DirectionReversed = 4 "direction_reversed";
+        /// Mass in another unit.
+        MassScale = 5 "mass_scale";
+        /// Traction and brake exchanged, or the sign of their difference reversed.
+        ForcesSwapped = 6 "forces_swapped";
+        /// Both forces in another unit.
+        ForcesScale = 7 "forces_scale";
+        /// The traction force alone in another unit, or against the motion (factor below zero).
+        TractionScale = 8 "traction_scale";
+        /// The brake force alone, likewise.
+        BrakeScale = 9 "brake_scale";
+        /// The gradient falls where it should climb.
+        GradientSign = 10 "gradient_sign";
+        /// Gradient in another unit.
+        GradientScale = 11 "gradient_scale";
+        /// Brake-cylinder pressure in another unit.
+        PressureScale = 12 "pressure_scale";
+    }
 }
 
 impl Slip {
-    /// Every member, in the order in which they are told.
-    pub const ALL: [Slip; 12] = {
-        use Slip::*;
-        [
-            TimeScale,
-            SpeedScale,
-            PositionScale,
-            DirectionReversed,
-            MassScale,
-            ForcesSwapped,
-            ForcesScale,
-            TractionScale,
-            BrakeScale,
-            GradientSign,
-            GradientScale,
-            PressureScale,
-        ]
-    };
-
     /// The member with this number.
     pub fn from_number(number: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|slip| *slip as u8 == number)
-    }
-
-    /// The name for machines.
-    pub const fn code(self) -> &'static str {
-        match self {
-            Slip::TimeScale => "time_scale",
-            Slip::SpeedScale => "speed_scale",
-            Slip::PositionScale => "position_scale",
-            Slip::DirectionReversed => "direction_reversed",
-            Slip::MassScale => "mass_scale",
-            Slip::ForcesSwapped => "forces_swapped",
-            Slip::ForcesScale => "forces_scale",
-            Slip::TractionScale => "traction_scale",
-            Slip::BrakeScale => "brake_scale",
-            Slip::GradientSign => "gradient_sign",
-            Slip::GradientScale => "gradient_scale",
-            Slip::PressureScale => "pressure_scale",
-        }
     }
 
     /// How much it matters: the pressure enters no balance of forces.
@@ -192,7 +158,7 @@ mod tests {
     fn numbers_lead_back_to_the_slip_and_names_are_unique() {
         for slip in Slip::ALL {
             assert_eq!(Slip::from_number(slip as u8), Some(slip));
-            assert_eq!(Slip::ALL.iter().filter(|other| other.code() == slip.code()).count(), 1);
+            assert_eq!(Slip::ALL.iter().filter(|other| other.name() == slip.name()).count(), 1);
         }
         assert_eq!(Slip::from_number(0), None);
     }

@@ -199,48 +199,9 @@ fn track(track: &Track) -> String {
     let mut text = format!("track    {}\n", track.name);
     let length = track.length_m.map(|length| format!("{} km", short(length / 1000.0, 3)));
     text += &line("length", length.as_deref().unwrap_or("not declared"));
-    text += &line(
-        "gradient",
-        &match track.gradient() {
-            None => "not known".into(),
-            Some(profile) => {
-                let (low, high) = range(profile.entries().map(|(_, permille)| permille));
-                let from_km = profile.entries().next().map_or(0.0, |entry| entry.0) / 1000.0;
-                let to_km = profile.entries().last().map_or(0.0, |entry| entry.0) / 1000.0;
-                let (low, high) = (short(low, 2), short(high, 2));
-                let (from, to) = (short(from_km, 3), short(to_km, 3));
-                format!("{low} to {high} ‰, {} entries, km {from} to {to}", profile.entries().len())
-            }
-        },
-    );
-    text += &line(
-        "curves",
-        &match (track.knows_curves(), track.curves()) {
-            (false, _) => "not known".into(),
-            (true, []) => "none".into(),
-            (true, curves) => {
-                let (low, high) = range(curves.iter().map(|curve| curve.radius_m));
-                let length_m: f64 = curves.iter().map(|curve| curve.end_m - curve.start_m).sum();
-                let (low, high, km) = (short(low, 1), short(high, 1), short(length_m / 1000.0, 2));
-                format!("{}, {km} km in all, radius {low} to {high} m", curves.len())
-            }
-        },
-    );
-    text += &line(
-        "tunnels",
-        &match (track.knows_tunnels(), track.tunnels()) {
-            (false, _) => "not known".into(),
-            (true, []) => "none".into(),
-            (true, tunnels) => {
-                let (_, longest) =
-                    range(tunnels.iter().map(|tunnel| tunnel.end_m - tunnel.start_m));
-                let length_m: f64 =
-                    tunnels.iter().map(|tunnel| tunnel.end_m - tunnel.start_m).sum();
-                let (longest, km) = (short(longest, 1), short(length_m / 1000.0, 2));
-                format!("{}, {km} km in all, the longest {longest} m", tunnels.len())
-            }
-        },
-    );
+    text += &line("gradient", &gradient(track));
+    text += &line("curves", &curves(track));
+    text += &line("tunnels", &tunnels(track));
     let survey = track.survey();
     if !survey.stops.is_empty() {
         text += &line("stops", &survey.stops.len().to_string());
@@ -249,6 +210,49 @@ fn track(track: &Track) -> String {
         let (low, high) = range(permitted.entries().map(|(_, speed_mps)| 3.6 * speed_mps));
         text += &line("permitted", &format!("{} to {} km/h", short(low, 1), short(high, 1)));
     }
+    text + &found(track)
+}
+
+fn gradient(track: &Track) -> String {
+    let Some(profile) = track.gradient() else { return "not known".into() };
+    let (low, high) = range(profile.entries().map(|(_, permille)| permille));
+    let from_km = profile.entries().next().map_or(0.0, |entry| entry.0) / 1000.0;
+    let to_km = profile.entries().last().map_or(0.0, |entry| entry.0) / 1000.0;
+    let (low, high) = (short(low, 2), short(high, 2));
+    let (from, to) = (short(from_km, 3), short(to_km, 3));
+    format!("{low} to {high} ‰, {} entries, km {from} to {to}", profile.entries().len())
+}
+
+fn curves(track: &Track) -> String {
+    match (track.knows_curves(), track.curves()) {
+        (false, _) => "not known".into(),
+        (true, []) => "none".into(),
+        (true, curves) => {
+            let (low, high) = range(curves.iter().map(|curve| curve.radius_m));
+            let length_m: f64 = curves.iter().map(|curve| curve.end_m - curve.start_m).sum();
+            let (low, high, km) = (short(low, 1), short(high, 1), short(length_m / 1000.0, 2));
+            format!("{}, {km} km in all, radius {low} to {high} m", curves.len())
+        }
+    }
+}
+
+fn tunnels(track: &Track) -> String {
+    match (track.knows_tunnels(), track.tunnels()) {
+        (false, _) => "not known".into(),
+        (true, []) => "none".into(),
+        (true, tunnels) => {
+            let lengths_m = tunnels.iter().map(|tunnel| tunnel.end_m - tunnel.start_m);
+            let (_, longest) = range(lengths_m.clone());
+            let length_m: f64 = lengths_m.sum();
+            let (longest, km) = (short(longest, 1), short(length_m / 1000.0, 2));
+            format!("{}, {km} km in all, the longest {longest} m", tunnels.len())
+        }
+    }
+}
+
+/// What was found of the line beside its survey.
+fn found(track: &Track) -> String {
+    let mut text = String::new();
     if track.gradient_shift_m() != 0.0 {
         let shift = short(track.gradient_shift_m(), 1);
         text += &line("shift", &format!("the gradient lies {shift} m further"));

@@ -170,7 +170,7 @@ fn notes(runs: &[Read], of_dataset: &[Note]) -> String {
         let run = runs.iter().flatten().find(|run| run.file == *file);
         run.map_or_else(String::new, |run| run.number.to_string())
     };
-    let is_slip = |note: &&Note| Slip::ALL.iter().any(|slip| slip.code() == note.code);
+    let is_slip = |note: &&Note| Slip::ALL.iter().any(|slip| slip.name() == note.code);
     let told_first = of_dataset.iter().filter(|note| note.runs.is_empty() || is_slip(note));
     let mut notes: Vec<(String, Vec<String>)> = told_first
         .map(|note| (note.text.clone(), note.runs.iter().map(number).collect()))

@@ -14,7 +14,7 @@ use dynocar::shadow::{ShadowTrain, record};
 use dynocar_core::pipeline::Pipeline;
 use dynocar_shared::{TrainId, TrainSample};
 
-use super::story::{Span, Story};
+use super::story::{LifeSettings, Story};
 use super::table::{Adoption, Outcome};
 use crate::simulator::dataset_writer::write_dataset;
 use crate::simulator::run_maker::RunPlan;
@@ -31,25 +31,6 @@ const MADE: Moment = Moment { unix_s: FIRST_DAY_S };
 const LEARNS_EVERY: usize = 7;
 /// Days after an adoption over which both models' errors tell whether it was right.
 const JUDGED_DAYS: i64 = 5;
-
-/// How a life is lived.
-#[derive(Clone, Copy, Debug)]
-pub struct LifeSettings {
-    /// What happens.
-    pub story: Story,
-    /// When.
-    pub span: Span,
-    /// The same seed gives the same life.
-    pub seed: u64,
-    /// Its days.
-    pub days: usize,
-    /// Trips of a day.
-    pub trips: usize,
-    /// Trips of a day that a recorder keeps.
-    pub recorded: usize,
-    /// See `trips_between_mistakes` of the configuration.
-    pub trips_between_mistakes: f64,
-}
 
 /// One train with its world, its store and its learner.
 pub struct Life<'f> {

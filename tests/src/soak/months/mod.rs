@@ -15,6 +15,6 @@ pub mod mistakes;
 pub mod story;
 pub mod table;
 
-pub use life::{Life, LifeSettings};
-pub use story::Story;
+pub use life::Life;
+pub use story::{LifeSettings, Story};
 pub use table::Outcome;

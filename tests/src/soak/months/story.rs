@@ -31,6 +31,25 @@ pub struct Span {
     pub end: usize,
 }
 
+/// How a life is lived.
+#[derive(Clone, Copy, Debug)]
+pub struct LifeSettings {
+    /// What happens.
+    pub story: Story,
+    /// When.
+    pub span: Span,
+    /// The same seed gives the same life.
+    pub seed: u64,
+    /// Its days.
+    pub days: usize,
+    /// Trips of a day.
+    pub trips: usize,
+    /// Trips of a day that a recorder keeps.
+    pub recorded: usize,
+    /// See `trips_between_mistakes` of the configuration.
+    pub trips_between_mistakes: f64,
+}
+
 /// What wheels lose until they are turned, as a share of the diameter.
 const WEAR: f64 = 0.015;
 

@@ -2,7 +2,7 @@
 
 use dynocar::models::ModelHash;
 
-use super::life::LifeSettings;
+use super::story::LifeSettings;
 
 /// A change of models.
 #[derive(Clone, Debug, PartialEq)]

@@ -141,15 +141,13 @@ fn readings(name: &Name, quantity: Quantity) -> Vec<(&[String], Option<Spelled>)
 /// What the words say of a quantity.
 fn by_words(words: &[String], quantity: Quantity) -> Option<(i32, String)> {
     let own = quantity.name().replace('_', " ");
-    let listed = terms(quantity)
-        .iter()
-        .flat_map(|(strength, list)| list.split(", ").map(move |term| (*strength, term)));
-    let is_listed = listed.clone().any(|(_, term)| term == own);
-    let own = (!is_listed).then_some((Strength::Named, own.as_str()));
-    let matches = own.into_iter().chain(listed).filter_map(|(strength, term)| {
+    let is_listed = terms(quantity).any(|(_, term)| term == own);
+    let score = |(strength, term): (Strength, &str)| {
         let score = by_term(words, strength, term)?;
         Some((score, format!("'{term}' in the name")))
-    });
+    };
+    let by_own = Some((Strength::Named, own.as_str())).filter(|_| !is_listed).and_then(score);
+    let matches = by_own.into_iter().chain(terms(quantity).filter_map(score));
     let best = matches.max_by_key(|(score, _)| *score);
     best.or_else(|| by_likeness(words, quantity))
 }
@@ -197,15 +195,15 @@ fn within(words: &[String], strength: Strength, joined: &str) -> Option<i32> {
 fn by_likeness(words: &[String], quantity: Quantity) -> Option<(i32, String)> {
     let joined = words.concat();
     let is_known = |it: &Quantity| {
-        let listed = terms(*it).iter().flat_map(|(_, list)| list.split(", "));
+        let listed = terms(*it).map(|(_, term)| term);
         listed.chain([it.name()]).any(|term| joined == term.replace([' ', '_'], ""))
     };
     if joined.chars().count() < WITHIN_MIN || Quantity::ALL.iter().any(is_known) {
         return None;
     }
     let named = |it: Quantity| {
-        let listed = terms(it).iter().filter(|(strength, _)| *strength == Strength::Named);
-        let listed = listed.flat_map(|(_, list)| list.split(", "));
+        let listed = terms(it).filter(|(strength, _)| *strength == Strength::Named);
+        let listed = listed.map(|(_, term)| term);
         let own = std::iter::once(it.name());
         own.chain(listed)
             .filter(|term| term.len() >= WITHIN_MIN - 1)
@@ -238,9 +236,7 @@ fn by_unit_alone(name: &Name, quantity: Quantity) -> Option<Match> {
 /// What in a name speaks against what was measured of the train.
 fn contradiction(words: &[String], quantity: Quantity) -> Option<String> {
     let own: Vec<&str> = terms(quantity)
-        .iter()
-        .flat_map(|(_, list)| list.split(", "))
-        .flat_map(|term| term.split(' '))
+        .flat_map(|(_, term)| term.split(' '))
         .chain(quantity.name().split('_'))
         .collect();
     let lists: [(&[&str], &str); 3] = [

@@ -7,9 +7,9 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
+use super::{Candidate, Effect, Hypothesis, Parameter, Proposal, SharedHypothesis};
 use crate::explain::answer::{Place, RunWindow};
-use crate::explain::evidence::{RunData, SampleForces, SharedHypothesis};
+use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{Axis, End, Reach};
 use crate::explain::residual_pressure;
 use crate::explain::scan::{Scan, Tuple};

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal};
+use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal, SharedHypothesis};
 use crate::explain::answer::{Place, RunWindow};
-use crate::explain::evidence::{RunData, SampleForces, SharedHypothesis};
+use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{End, Inside, Stretches, find};
 use crate::explain::scan::Scan;
 use crate::terms::place;

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Parameter, Proposal};
+use super::{Candidate, Effect, Hypothesis, Parameter, Proposal, SharedHypothesis};
 use crate::explain::answer::Place;
-use crate::explain::evidence::{RunData, SampleForces, SharedHypothesis};
+use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{End, Found, Inside, Stretches, best_of_runs, find};
 use crate::explain::scan::{Scan, Tuple};
 use crate::force::ResolvedSample;

@@ -8,9 +8,12 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal, ReportContext, Reported};
+use super::{
+    Candidate, Effect, Entry, Hypothesis, Parameter, Proposal, ReportContext, Reported,
+    SharedHypothesis,
+};
 use crate::explain::answer::Place;
-use crate::explain::evidence::{RunData, SampleForces, SharedHypothesis};
+use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{End, Inside, Stretches, find};
 use crate::explain::scan::Scan;
 use crate::terms::{place, tunnel};

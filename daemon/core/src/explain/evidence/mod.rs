@@ -22,7 +22,7 @@ mod whitener;
 pub use criterion::{EQUAL, NULL_STRENGTH, NullStrength, STRENGTH_MIN, p_value, strength};
 pub use fade::Fade;
 pub use fit::{Fit, FitProblem, Nearby, RunNormal};
-pub use model::{GrownForces, GrownModel, SharedHypothesis};
+pub use model::{GrownForces, GrownModel};
 pub use noise::{Noise, RunScatter};
 pub use run_data::{Bin, RunData, RunDataError, RunPower, prepare};
 pub use run_scatter::WeightedFilter;

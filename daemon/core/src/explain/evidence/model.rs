@@ -1,16 +1,11 @@
 //! The declared model with effects added, as acceleration at each sample.
 
-use std::sync::Arc;
-
 use super::run_data::RunData;
 use super::sample_forces::SampleForces;
-use crate::explain::effects::Hypothesis;
+use crate::explain::hypothesis::SharedHypothesis;
 use crate::simulate::ForceModel;
 use crate::terms::wheel;
 use crate::train::Davis;
-
-/// An effect with its structure (places, windows, runs) fixed, shared by models.
-pub type SharedHypothesis = Arc<dyn Hypothesis>;
 
 /// The declared model with Davis coefficients and effects as parameters.
 #[derive(Clone, Default)]

@@ -9,7 +9,8 @@ use std::collections::BTreeMap;
 
 use super::ends::{Axis, End, Reach};
 use crate::explain::answer::{PlaceUncertainty, WindowUncertainty};
-use crate::explain::evidence::{Fit, FitProblem, GrownModel, Nearby, SharedHypothesis};
+use crate::explain::evidence::{Fit, FitProblem, GrownModel, Nearby};
+use crate::explain::hypothesis::SharedHypothesis;
 
 /// A cost above the least by this is out of the question.
 const FAR: f64 = 14.0;

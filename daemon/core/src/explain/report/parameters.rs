@@ -52,78 +52,73 @@ pub fn rows(dataset: &Dataset, explanation: &Explanation) -> Vec<ParameterRow> {
     of_base.chain(of_effects).collect()
 }
 
+/// A number of an effect: what it means, its value, its standard deviation.
+type Figure = (String, f64, Option<f64>);
+
 fn effect_rows(dataset: &Dataset, effect: &EffectAnswer) -> Vec<ParameterRow> {
-    let mut rows = Vec::new();
-    for (name, value) in &effect.parameters {
+    let row = |name: &str, unit: &'static str, (meaning, value, deviation): Figure| ParameterRow {
+        group: words::kind_name(effect.kind).into(),
+        name: name.into(),
+        meaning,
+        unit,
+        declared: declared(dataset, name),
+        before: None,
+        after: Estimate::normal(value, deviation.unwrap_or(0.0)),
+    };
+    let rows = effect.parameters.iter().flat_map(|(name, value)| {
         let (meaning, unit) = words::parameter(name);
-        let mut push = |which: String, value: f64, deviation: Option<f64>| {
-            let meaning = if which.is_empty() { meaning.into() } else { which };
-            rows.push(ParameterRow {
-                group: words::kind_name(effect.kind).into(),
-                name: name.clone(),
-                meaning,
-                unit,
-                declared: declared(dataset, name),
-                before: None,
-                after: Estimate::normal(value, deviation.unwrap_or(0.0)),
-            });
-        };
         let std = effect.std.get(name).or_else(|| effect.std.get("mass_factor"));
-        let listed = |index: usize| match std {
-            Some(ParameterValue::List(list)) => list.get(index).copied(),
-            Some(ParameterValue::Number(value)) => Some(*value),
-            _ => None,
-        };
-        match value {
-            ParameterValue::Number(value) => push(String::new(), *value, listed(0)),
-            ParameterValue::ByRun(values) => {
-                for (run, value) in values {
-                    let deviation = match std {
-                        Some(ParameterValue::ByRun(by_run)) => by_run.get(run).copied(),
-                        _ => None,
-                    };
-                    push(format!("{meaning} in {run}"), *value, deviation);
-                }
-            }
-            ParameterValue::Sections(sections) => {
-                for (i, s) in sections.iter().enumerate() {
-                    let (from, to) = (s.from_m / 1000.0, s.to_m / 1000.0);
-                    let which = format!(
-                        "mass factor, km {from:.2} to {to:.2}, direction {:+}",
-                        s.direction
-                    );
-                    push(which, s.mass_factor, listed(i));
-                }
-            }
-            ParameterValue::Windows(windows) => {
-                for (i, w) in windows.iter().enumerate() {
-                    let (run, from, to) = (&w.run, w.t_start_s, w.t_end_s);
-                    push(
-                        format!("mass factor in {run}, {from:.0} to {to:.0} s"),
-                        w.mass_factor,
-                        listed(i),
-                    );
-                }
-            }
-            // The formula is told with the effect; its numbers stand here.
-            ParameterValue::Formula(_) => {}
-            ParameterValue::Profile(entries) => {
-                for (i, [at_m, value]) in entries.iter().enumerate() {
-                    let deviation = match std {
-                        Some(ParameterValue::Profile(std)) => std.get(i).map(|entry| entry[1]),
-                        _ => None,
-                    };
-                    push(format!("{meaning} at km {:.2}", at_m / 1000.0), *value, deviation);
-                }
-            }
-            ParameterValue::List(values) => {
-                for (i, value) in values.iter().enumerate() {
-                    push(format!("{meaning}, number {}", i + 1), *value, listed(i));
-                }
-            }
+        figures(meaning, value, std).into_iter().map(move |figure| row(name, unit, figure))
+    });
+    rows.collect()
+}
+
+/// The numbers of a parameter, each with what it means.
+fn figures(meaning: &str, value: &ParameterValue, std: Option<&ParameterValue>) -> Vec<Figure> {
+    let listed = |index: usize| match std {
+        Some(ParameterValue::List(list)) => list.get(index).copied(),
+        Some(ParameterValue::Number(value)) => Some(*value),
+        Some(ParameterValue::Profile(profile)) => profile.get(index).map(|entry| entry[1]),
+        _ => None,
+    };
+    let of_run = |run: &String| match std {
+        Some(ParameterValue::ByRun(by_run)) => by_run.get(run).copied(),
+        _ => None,
+    };
+    let each = |figures: &mut dyn Iterator<Item = (String, f64)>| -> Vec<Figure> {
+        figures.enumerate().map(|(i, (meaning, value))| (meaning, value, listed(i))).collect()
+    };
+    match value {
+        ParameterValue::Number(value) => vec![(meaning.into(), *value, listed(0))],
+        ParameterValue::ByRun(values) => {
+            let by_run = values.iter();
+            by_run
+                .map(|(run, value)| (format!("{meaning} in {run}"), *value, of_run(run)))
+                .collect()
+        }
+        ParameterValue::Sections(sections) => each(&mut sections.iter().map(|s| {
+            let (from, to) = (s.from_m / 1000.0, s.to_m / 1000.0);
+            let direction = s.direction;
+            let which = format!("mass factor, km {from:.2} to {to:.2}, direction {direction:+}");
+            (which, s.mass_factor)
+        })),
+        ParameterValue::Windows(windows) => each(&mut windows.iter().map(|w| {
+            let (run, from, to) = (&w.run, w.t_start_s, w.t_end_s);
+            (format!("mass factor in {run}, {from:.0} to {to:.0} s"), w.mass_factor)
+        })),
+        // The formula is told with the effect; its numbers stand here.
+        ParameterValue::Formula(_) => Vec::new(),
+        ParameterValue::Profile(entries) => each(
+            &mut entries
+                .iter()
+                .map(|[at_m, value]| (format!("{meaning} at km {:.2}", at_m / 1000.0), *value)),
+        ),
+        ParameterValue::List(values) => {
+            let number =
+                |(i, value): (usize, &f64)| (format!("{meaning}, number {}", i + 1), *value);
+            each(&mut values.iter().enumerate().map(number))
         }
     }
-    rows
 }
 
 /// What the declared model says of an effect's parameter.

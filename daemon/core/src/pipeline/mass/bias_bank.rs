@@ -7,7 +7,7 @@
 //! Kirubarajan 2001, section 11.6.2).
 
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::bias_model::{BiasModel, MapError};
 use super::line_resistance::LineResistance;
@@ -51,16 +51,19 @@ impl Dynamics {
     }
 
     /// Acceleration in m/s² of the force on the reference mass.
+    #[inline]
     pub fn push_mps2(&self, motion: &Motion) -> f64 {
         motion.force_n / (self.reference_mass_kg * self.inertia_factor)
     }
 
     /// m/s² of one N/kN.
+    #[inline]
     pub fn mps2_per_n_per_kn(&self) -> f64 {
         1e-3 * STANDARD_GRAVITY_MPS2 / self.inertia_factor
     }
 
     /// Deceleration in m/s² by resistance and gradient, which does not depend on the mass.
+    #[inline]
     pub fn drag_mps2(&self, motion: &Motion, speed_mps: f64) -> f64 {
         self.mps2_per_n_per_kn() * self.resistance.w_n_per_kn(motion, speed_mps)
     }
@@ -167,17 +170,11 @@ impl BiasBank {
             let end = push_to * inverse_mass - dynamics.drag_mps2(to, ahead) + shape * bias;
             let damping = dynamics.mps2_per_n_per_kn() * dynamics.resistance.slope(from, speed);
             let mean_push = 0.5 * (push_from + push_to);
-            #[rustfmt::skip]
-            let transition = Matrix3::new(
-                1.0 - step_s * damping, step_s * mean_push, step_s * shape,
-                0.0, 1.0, 0.0,
-                0.0, 0.0, keep,
-            );
-            let next =
-                Vector3::new(speed + 0.5 * step_s * (start + end), inverse_mass, keep * bias);
+            let gradient = Vector3::new(1.0 - step_s * damping, step_s * mean_push, step_s * shape);
             let jump_variance = model.jump_variance(change.0 * inverse_mass - change.1, step_s);
-            let noise = Vector3::new(jump_variance, 0.0, bias_variance);
-            filter.predict(next, &transition, &Matrix3::from_diagonal(&noise));
+            let next_mps = speed + 0.5 * step_s * (start + end);
+            filter.rewrite(SPEED, next_mps, &gradient, jump_variance);
+            filter.fade(BIAS, keep, bias_variance);
         }
     }
 
@@ -207,15 +204,18 @@ impl BiasBank {
         let mut judged = [Trust::of(0.0); MODELS];
         for (index, filter) in self.filters.iter_mut().enumerate() {
             let innovation = filter.innovation(SPEED, speed_mps, noise_variance)?;
-            judged[index] = Trust::of(innovation.normalised());
-            let is_believed = self.outliers[index].push(judged[index].is_outlier());
-            if !judged[index].is_outlier() {
-                filter.measure(SPEED, speed_mps, noise_variance / judged[index].weight)?;
+            let trust = Trust::of(innovation.normalised());
+            let is_believed = self.outliers[index].push(trust.is_outlier());
+            if trust.is_full() {
+                filter.take(SPEED, &innovation, noise_variance);
+            } else if !trust.is_outlier() {
+                filter.measure(SPEED, speed_mps, noise_variance / trust.weight)?;
             } else if is_believed {
                 filter.replace(SPEED, speed_mps, noise_variance);
             }
+            judged[index] = trust;
             let log_weight = &mut self.log_weights[index];
-            let evidence = -judged[index].surprise() - 0.5 * innovation.variance.ln();
+            let evidence = -trust.surprise() - 0.5 * innovation.variance.ln();
             *log_weight = self.forgetting * *log_weight + evidence;
         }
         let best = self.best_index();

@@ -12,12 +12,11 @@ use super::joint_settings::{JOINT_MODELS, JointLeastSquaresSettings};
 use super::line_resistance::LineResistance;
 use super::motion::{Motion, StopWatch};
 use super::section::Section;
-use super::speed_noise::SpeedNoise;
 use crate::filter::drifting_level::BIAS;
 use crate::filter::mixture::likeliest;
 use crate::force::ResolvedSample;
 use crate::pipeline::judge::{InputHealth, LackOfFit};
-use crate::pipeline::motion::{OutlierRow, SpeedRange, Trust, kink_variance};
+use crate::pipeline::motion::{OutlierRow, SpeedNoise, SpeedRange, Trust, kink_variance};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 use crate::train::{Davis, TrainModel};
@@ -90,7 +89,7 @@ impl JointLeastSquares {
             latest: LineResistance::declared(train),
             is_opened: true,
             updates_since_refresh: 0,
-            noise: SpeedNoise::new(settings.speed_noise_mps),
+            noise: SpeedNoise::guessed(settings.speed_noise_mps),
             outliers: OutlierRow::default(),
             monitor: InnovationMonitor::new(500),
             health: InputHealth::default(),
@@ -208,7 +207,7 @@ impl JointLeastSquares {
         for hypothesis in &mut self.hypotheses {
             hypothesis.absorb(&row, value, trust.weight / variance);
         }
-        self.noise.learn(expected.residual_mps, expected.filtered_variance, trust.weight);
+        self.noise.take_residual(expected.residual_mps, expected.filtered_variance, trust.weight);
         self.choose();
         self.refresh();
         self.speeds.push(motion.speed_mps);

@@ -11,10 +11,9 @@ use super::bias_bank::{BiasBank, Dynamics, Moments, SPEED};
 use super::kalman_settings::MassKalmanSettings;
 use super::motion::{Motion, StopWatch};
 use super::settling::Settling;
-use super::speed_noise::SpeedNoise;
 use crate::force::ResolvedSample;
 use crate::pipeline::judge::{Case, InputHealth};
-use crate::pipeline::motion::SpeedRange;
+use crate::pipeline::motion::{SpeedNoise, SpeedRange};
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::SettingError;
@@ -98,7 +97,7 @@ impl MassKalman {
             declared_mass_kg: train.mass_kg,
             is_warm_started: false,
             is_opened: true,
-            noise: SpeedNoise::new(settings.speed_noise_mps),
+            noise: SpeedNoise::guessed(settings.speed_noise_mps),
             settling: Settling::default(),
             monitor: InnovationMonitor::new(500),
             health: InputHealth::default(),
@@ -183,7 +182,7 @@ impl MassKalman {
         self.monitor.push(measured.normalised);
         let filter = self.bank.best();
         let residual_mps = motion.speed_mps - filter.mean[SPEED];
-        self.noise.learn(residual_mps, filter.covariance[(SPEED, SPEED)], measured.weight);
+        self.noise.take_residual(residual_mps, filter.covariance[(SPEED, SPEED)], measured.weight);
         self.last = Some(motion);
         self.speeds.push(motion.speed_mps);
         self.moved_s += step_s;

@@ -34,6 +34,7 @@ impl LineResistance {
     }
 
     /// All that retards in N/kN at a speed in m/s: this resistance beside what is known.
+    #[inline]
     pub fn w_n_per_kn(&self, motion: &Motion, speed_mps: f64) -> f64 {
         let curve = self.curve.map_or(0.0, |curve| {
             self.reference_radius_m * motion.curvature_per_m * curve.w0_n_per_kn(speed_mps)
@@ -44,6 +45,7 @@ impl LineResistance {
     }
 
     /// Derivative of the resistance after speed, in N/kN per m/s.
+    #[inline]
     pub fn slope(&self, motion: &Motion, speed_mps: f64) -> f64 {
         let slope = |davis: Davis| davis.b + 2.0 * davis.c * speed_mps;
         let curve = self

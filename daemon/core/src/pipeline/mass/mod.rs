@@ -22,7 +22,6 @@ pub mod motion;
 pub mod section;
 mod settling;
 pub mod speed_basis;
-mod speed_noise;
 
 pub use joint::JointLeastSquares;
 pub use joint_settings::JointLeastSquaresSettings;

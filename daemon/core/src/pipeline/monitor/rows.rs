@@ -1,18 +1,18 @@
 //! Blocks of momentum to independent rows of unit variance, with a column for each suspect.
 
-use nalgebra::{SMatrix, SVector, Vector2};
+use nalgebra::{SMatrix, SVector};
 
 use super::covariates::Covariates;
 use super::onsets::Onsets;
 use super::settings::MonitorSettings;
 use super::suspects::{BASE, FIRST_ONSET, ONSETS, PARAMETERS, SUSPECTS};
-use crate::filter::{Propagation, Sighting, Whitener};
+use crate::filter::Whitener;
+use crate::pipeline::resistance::momentum_error::{
+    DISTURBANCE, Disturbance, STATES, momentum_seen,
+};
 use crate::pipeline::resistance::regression::MomentumBlock;
 use crate::train::Davis;
 
-const MOMENTUM: usize = 0;
-const DISTURBANCE: usize = 1;
-const STATES: usize = 2;
 const COLUMNS: usize = 1 + PARAMETERS;
 /// Innovations beyond so many standard deviations count for less (Huber).
 const HUBER: f64 = 4.0;
@@ -73,28 +73,20 @@ impl Rows {
             .replace(block.time_ns)
             .map(|last_ns| block.time_ns.saturating_sub(last_ns) as f64 * 1e-9)
             .filter(|&gap_s| gap_s > 0.0);
+        let small = self.small_forces(block);
         if block.is_first {
-            let mut step = self.decay(block, gap_s.unwrap_or(f64::INFINITY));
-            step.input[(MOMENTUM, 0)] = block.momentum;
-            step.noise[(MOMENTUM, MOMENTUM)] = block.momentum_variance;
-            self.whitener.propagate(&step);
+            let (momentum, variance) = (block.momentum, block.momentum_variance);
+            self.whitener.propagate(&small.across_gap(gap_s, momentum, variance));
             return None;
         }
         let duration_s = block.impulse[1];
-        let mut step = self.decay(block, duration_s);
-        step.transition[(MOMENTUM, MOMENTUM)] = 1.0;
-        step.transition[(MOMENTUM, DISTURBANCE)] = -duration_s;
-        for i in 0..=BASE {
-            step.input[(MOMENTUM, i)] = block.impulse[i];
-        }
-        for i in 0..SUSPECTS {
-            step.input[(MOMENTUM, 1 + BASE + i)] = suspects[i];
-        }
+        let mut impulse = SVector::<f64, COLUMNS>::zeros();
+        impulse.fixed_rows_mut::<{ 1 + BASE }>(0).copy_from(&block.impulse);
+        impulse.fixed_rows_mut::<SUSPECTS>(1 + BASE).copy_from(suspects);
         for place in (0..ONSETS).filter(|&place| onsets.age(place).is_some()) {
-            step.input[(MOMENTUM, 1 + FIRST_ONSET + place)] = duration_s;
+            impulse[1 + FIRST_ONSET + place] = duration_s;
         }
-        step.noise[(MOMENTUM, MOMENTUM)] = block.impulse_variance;
-        self.whitener.propagate(&step);
+        self.whitener.propagate(&small.over_impulse(duration_s, &impulse, block.impulse_variance));
         self.see(block, predicted)
     }
 
@@ -103,35 +95,18 @@ impl Rows {
         block: &MomentumBlock,
         predicted: impl Fn(&Parameters) -> f64,
     ) -> Option<Row> {
-        let mut observed = SVector::<f64, COLUMNS>::zeros();
-        observed[0] = block.momentum;
-        let sighting =
-            |variance: f64| Sighting { direction: Vector2::new(1.0, 0.0), observed, variance };
-        let (columns, variance) = self.whitener.innovation(&sighting(block.momentum_variance));
-        if !(variance > 0.0 && variance.is_finite()) {
-            return None;
-        }
-        let root = variance.sqrt();
-        let features = columns.fixed_rows::<PARAMETERS>(1) / root;
-        let observed = columns[0] / root;
+        let sighting = momentum_seen(block.momentum, block.momentum_variance);
+        let row = self.whitener.take(&sighting).ok()?.columns;
+        let (observed, features) = (row[0], row.fixed_rows::<PARAMETERS>(1).into_owned());
         let weight = (HUBER / (observed - predicted(&features)).abs()).min(1.0);
-        self.whitener.correct(&sighting(block.momentum_variance)).ok()?;
         Some(Row { features, observed, weight })
     }
 
-    /// The small forces that are no effect, over a time.
-    fn decay(&self, block: &MomentumBlock, duration_s: f64) -> Propagation<STATES, COLUMNS> {
-        let mut step = Propagation {
-            transition: SMatrix::<f64, STATES, STATES>::zeros(),
-            input: SMatrix::zeros(),
-            noise: SMatrix::zeros(),
-        };
-        let kept = (-duration_s / self.time_s).exp();
-        let std =
-            self.floor_n_per_kn.hypot(self.share * self.declared.w0_n_per_kn(block.speed_mps));
-        step.transition[(DISTURBANCE, DISTURBANCE)] = kept;
-        step.noise[(DISTURBANCE, DISTURBANCE)] = std * std * (1.0 - kept * kept);
-        step
+    /// The small forces that are no effect.
+    fn small_forces(&self, block: &MomentumBlock) -> Disturbance {
+        let w0_n_per_kn = self.declared.w0_n_per_kn(block.speed_mps);
+        let std_n_per_kn = self.floor_n_per_kn.hypot(self.share * w0_n_per_kn);
+        Disturbance { std_n_per_kn, time_s: self.time_s }
     }
 
     /// Forgets a parameter: its place is taken by another.

@@ -3,17 +3,19 @@
 //! - [`STANDING_MPS`], [`MOVING_MPS`], [`BRIDGED_MAX_S`]: when a train stands, moves, and is lost sight of
 //! - [`Trust`], [`OutlierRow`]: how far a measured speed is believed
 //! - [`jump_variance`], [`kink_variance`]: what a trapezoid over a step misses
-//! - [`Rounding`]: the steps that a speed is told in
+//! - [`Rounding`], [`SpeedNoise`]: the steps that a speed is told in, and its noise
 //! - [`SpeedRange`]: the speeds driven
 
 mod missed;
 mod outlier;
 mod rounding;
+mod speed_noise;
 mod speed_range;
 
 pub use missed::{jump_variance, kink_variance};
 pub use outlier::{OutlierRow, Trust};
 pub use rounding::Rounding;
+pub use speed_noise::SpeedNoise;
 pub use speed_range::SpeedRange;
 
 /// Speed in m/s up to which a train counts as standing; below it a wheel sensor sees nothing.

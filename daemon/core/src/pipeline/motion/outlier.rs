@@ -18,19 +18,32 @@ pub struct Trust {
 
 impl Trust {
     /// Judges a normalised innovation (Huber 1964).
+    #[inline]
     pub fn of(normalised: f64) -> Self {
         let size = normalised.abs();
-        let weight = if size > OUTLIER { 0.0 } else { (HUBER / size).min(1.0) };
+        let weight = match size > HUBER {
+            true if size > OUTLIER => 0.0,
+            true => HUBER / size,
+            false => 1.0,
+        };
         Trust { normalised, weight }
     }
 
+    /// True when the speed is believed as the filter's noise has it.
+    #[inline]
+    pub fn is_full(&self) -> bool {
+        self.weight == 1.0
+    }
+
     /// True when the speed is not believed.
+    #[inline]
     pub fn is_outlier(&self) -> bool {
         self.weight == 0.0
     }
 
     /// Minus the logarithm of its likelihood, up to that of the spread: Huber's, and bounded, so
     /// that no single speed outweighs all before it.
+    #[inline]
     pub fn surprise(&self) -> f64 {
         let size = self.normalised.abs().min(OUTLIER);
         if size <= HUBER { 0.5 * size * size } else { HUBER * (size - 0.5 * HUBER) }
@@ -44,6 +57,7 @@ pub struct OutlierRow(u32);
 impl OutlierRow {
     /// Takes in whether the newest measurement is an outlier; true when it ends a row so long that the
     /// measurements are right.
+    #[inline]
     pub fn push(&mut self, is_outlier: bool) -> bool {
         self.0 = if is_outlier { self.0 + 1 } else { 0 };
         let is_believed = self.0 >= ROW_BELIEVED;

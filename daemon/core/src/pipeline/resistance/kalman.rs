@@ -9,10 +9,10 @@ use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason};
 use nalgebra::{SMatrix, SVector};
 
 use super::least_squares::ResistanceLeastSquares;
+use super::momentum_error::Disturbance;
 use super::noise_bank::LikeliestNoise;
 use super::regression::{
-    BRAKE_SCALE, Disturbance, FORCE_DELAY, Motion, PARAMETERS, Solution, TRACTION_SCALE, UNKNOWNS,
-    regressors,
+    BRAKE_SCALE, FORCE_DELAY, Motion, PARAMETERS, Solution, TRACTION_SCALE, UNKNOWNS, regressors,
 };
 use super::report::Report;
 use super::sample::UnitSample;
@@ -108,11 +108,8 @@ impl ResistanceKalman {
     fn decay(&mut self, duration_s: f64) {
         let Disturbance { std_n_per_kn, time_s } = self.noise.disturbance;
         let kept = (-duration_s / time_s).exp();
-        let mut gradient = State::zeros();
-        gradient[DISTURBANCE] = kept;
-        let value = kept * self.filter.mean[DISTURBANCE];
         let renewed = std_n_per_kn.powi(2) * (1.0 - kept * kept);
-        self.filter.rewrite(DISTURBANCE, value, &gradient, renewed);
+        self.filter.fade(DISTURBANCE, kept, renewed);
     }
 
     /// The speed by the forces over a step, by Heun's rule, and the states' noise.

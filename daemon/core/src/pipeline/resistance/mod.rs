@@ -2,9 +2,9 @@
 //!
 //! # Layout, in the order a sample takes
 //!
-//! - `sample`, `speed`: forces per weight; spikes refused, noise of the speed learned
+//! - `sample`: forces per weight; spikes refused, noise of the speed learned
 //! - `momentum`: samples to observations of the regression in `regression`, as coasting segments are
-//! - `noise_model`, `noise_bank`: observations to independent rows, and how noisy they are
+//! - `momentum_error`, `noise_model`, `noise_bank`: observations to independent rows, and how noisy they are
 //! - `solver` and `coasting` of [`super::papers::liu`]: the paper's recursions and data
 //! - `report`: bounds, excitation, status
 //! - `least_squares`: the pipeline around all of it
@@ -13,6 +13,7 @@
 mod kalman;
 mod least_squares;
 pub(super) mod momentum;
+pub(super) mod momentum_error;
 pub(super) mod noise_bank;
 pub(super) mod noise_model;
 pub(super) mod regression;
@@ -20,7 +21,6 @@ mod report;
 pub(super) mod sample;
 pub mod settings;
 mod source;
-pub(super) mod speed;
 #[cfg(test)]
 pub(super) mod test_runs;
 #[cfg(test)]

@@ -13,9 +13,8 @@ use super::regression::{
 };
 use super::sample::{SpeedWatch, UnitSample, resistance_integral, trapezoids};
 use super::settings::DataSettings;
-use super::speed::SpeedNoise;
 use crate::filter::Line;
-use crate::pipeline::motion::jump_variance;
+use crate::pipeline::motion::{SpeedNoise, jump_variance};
 use crate::train::Davis;
 
 /// Fewest samples in a block: the scatter about a line needs three.
@@ -118,7 +117,7 @@ impl MomentumBlocks {
             return Ok(None);
         }
         let rest = &chain.block.rest;
-        self.watch.noise.take(rest.scatter(), rest.count() - 2.0);
+        self.watch.noise.take_scatter(rest.scatter(), rest.count() - 2.0);
         let range_mps = chain.block.speed_max_mps - chain.block.speed_min_mps;
         let speed_variance = self.watch.noise.variance_of_mean(rest.count(), range_mps);
         Ok(Some(chain.close(speed_variance, &self.settings)))

@@ -5,10 +5,9 @@
 //! the estimate is worth. A small bank of noise models runs side by side, and their solutions
 //! are mixed by their likelihood.
 
+use super::momentum_error::Disturbance;
 use super::noise_model::{NoiseModel, PRIOR_ROWS, WhiteRow};
-use super::regression::{
-    Disturbance, Motion, Observation, PARAMETERS, SinceBlock, Solution, Unknowns,
-};
+use super::regression::{Motion, Observation, PARAMETERS, SinceBlock, Solution, Unknowns};
 use crate::filter::Gaussian;
 use crate::filter::mixture::{Mixture, likeliest, to_shares};
 

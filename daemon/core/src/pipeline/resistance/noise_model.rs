@@ -1,8 +1,9 @@
 //! One model of the rows' noise, with the least squares that follow from it.
 
+use super::momentum_error::Disturbance;
 use super::regression::{
-    Disturbance, Motion, Observation, RowWhitener, SinceBlock, Solution, UNKNOWNS, Unknowns,
-    disturbance_of, loosen_disturbance, motion_of,
+    Motion, Observation, RowWhitener, SinceBlock, Solution, UNKNOWNS, Unknowns, disturbance_of,
+    loosen_disturbance, motion_of,
 };
 use crate::filter::SquareRootInformation;
 
@@ -71,30 +72,19 @@ impl NoiseModel {
     /// The row of an observation that the model has moved to; `None` when its variance is not
     /// sound.
     pub fn row(&self, observation: &Observation) -> Option<WhiteRow> {
-        let (row, _) = self.unscaled_row(observation)?;
-        let root = self.scale().sqrt();
-        Some(WhiteRow { features: row.features / root, observed: row.observed / root })
-    }
-
-    /// The row with an error of the scale's variance, and the variance taken off.
-    fn unscaled_row(&self, observation: &Observation) -> Option<(WhiteRow, f64)> {
-        let (columns, variance) = self.whitener.innovation(&observation.sighting());
-        if !(variance > 0.0 && variance.is_finite()) {
-            return None;
-        }
-        let root = variance.sqrt();
-        let features = columns.fixed_rows::<UNKNOWNS>(1) / root;
-        Some((WhiteRow { features, observed: columns[0] / root }, variance))
+        let row = self.whitener.row(&observation.sighting())?;
+        let columns = row.columns / self.scale().sqrt();
+        let features = columns.fixed_rows::<UNKNOWNS>(1).into_owned();
+        Some(WhiteRow { features, observed: columns[0] })
     }
 
     /// Takes in an observation that the model has moved to.
     pub fn accept(&mut self, observation: &Observation, forgetting: f64) {
-        let Some((row, variance)) = self.unscaled_row(observation) else { return };
+        let Ok(row) = self.whitener.take(&observation.sighting()) else { return };
         self.information.forget(forgetting);
-        self.log_variances = forgetting * self.log_variances + variance.ln();
-        self.information.update(&row.features, row.observed);
-        let corrected = self.whitener.correct(&observation.sighting());
-        debug_assert!(corrected.is_ok(), "the row's variance was positive");
+        self.log_variances = forgetting * self.log_variances + row.variance.ln();
+        let features = row.columns.fixed_rows::<UNKNOWNS>(1).into_owned();
+        self.information.update(&features, row.columns[0]);
     }
 
     /// Makes up for what forgetting took off the penalty.

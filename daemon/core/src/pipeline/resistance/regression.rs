@@ -7,6 +7,7 @@
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2, Vector3};
 
+use super::momentum_error::{DISTURBANCE, Disturbance, MOMENTUM, STATES, momentum_seen};
 use crate::filter::{Propagation, Sighting, Whitener};
 use crate::train::Davis;
 
@@ -25,12 +26,6 @@ pub const FORCE_DELAY: usize = 5;
 pub const COLUMNS: usize = 1 + UNKNOWNS;
 /// Regressors are 1, v/20 and (v/20)²: of one magnitude over the speeds of trains.
 pub const SPEED_SCALE_MPS: f64 = 20.0;
-
-/// Hidden states of the error: accumulated momentum (or what the overlap brings over), and the
-/// disturbance.
-const STATES: usize = 2;
-const MOMENTUM: usize = 0;
-const DISTURBANCE: usize = 1;
 
 /// Known part and regressors by column.
 pub type Columns = SVector<f64, COLUMNS>;
@@ -62,15 +57,6 @@ pub fn scaled(davis: &Davis) -> Vector3<f64> {
 /// Factors that turn scaled parameters into Davis coefficients.
 pub fn unscaling() -> Vector3<f64> {
     Vector3::new(1.0, 1.0 / SPEED_SCALE_MPS, 1.0 / (SPEED_SCALE_MPS * SPEED_SCALE_MPS))
-}
-
-/// A slow force that the model does not know: an Ornstein-Uhlenbeck process.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Disturbance {
-    /// Standard deviation in N/kN.
-    pub std_n_per_kn: f64,
-    /// Correlation time in s.
-    pub time_s: f64,
 }
 
 /// Speed in m/s, then disturbance in N/kN, as affine functions of the unknowns.
@@ -170,28 +156,23 @@ impl Observation {
         disturbance: &Disturbance,
         gap_s: Option<f64>,
     ) -> Propagation<STATES, COLUMNS> {
-        let mut step = self.decay(disturbance, gap_s.unwrap_or(f64::INFINITY));
-        if let Observation::Block(block) = self {
-            step.input[(MOMENTUM, 0)] = block.momentum;
-            step.noise[(MOMENTUM, MOMENTUM)] = block.momentum_variance;
+        match self {
+            Observation::Block(block) => {
+                disturbance.across_gap(gap_s, block.momentum, block.momentum_variance)
+            }
+            Observation::Segment(_) => disturbance.decay(gap_s.unwrap_or(f64::INFINITY)),
         }
-        step
     }
 
     /// How the error moves from the observation before to this one.
     pub fn propagation(&self, disturbance: &Disturbance) -> Propagation<STATES, COLUMNS> {
         match self {
             Observation::Block(block) => {
-                let mut step = self.decay(disturbance, block.impulse[1]);
-                step.transition[(MOMENTUM, MOMENTUM)] = 1.0;
-                step.transition[(MOMENTUM, DISTURBANCE)] = -block.impulse[1];
-                step.input.set_row(MOMENTUM, &block.impulse.transpose());
-                step.noise[(MOMENTUM, MOMENTUM)] = block.impulse_variance;
-                step
+                disturbance.over_impulse(block.impulse[1], &block.impulse, block.impulse_variance)
             }
             Observation::Segment(segment) => {
                 // The new error of the row before is that row less its other parts.
-                let mut step = self.decay(disturbance, segment.step_s);
+                let mut step: Propagation<STATES, COLUMNS> = disturbance.decay(segment.step_s);
                 step.transition[(MOMENTUM, MOMENTUM)] = -OVERLAP;
                 step.transition[(MOMENTUM, DISTURBANCE)] = -OVERLAP;
                 step.input.set_row(MOMENTUM, &(segment.row_before * OVERLAP).transpose());
@@ -200,28 +181,10 @@ impl Observation {
         }
     }
 
-    /// The disturbance over a time, and nothing else.
-    fn decay(&self, disturbance: &Disturbance, duration_s: f64) -> Propagation<STATES, COLUMNS> {
-        let mut step = Propagation {
-            transition: SMatrix::<f64, STATES, STATES>::zeros(),
-            input: SMatrix::zeros(),
-            noise: SMatrix::zeros(),
-        };
-        let kept = (-duration_s / disturbance.time_s).exp();
-        step.transition[(DISTURBANCE, DISTURBANCE)] = kept;
-        step.noise[(DISTURBANCE, DISTURBANCE)] =
-            disturbance.std_n_per_kn.powi(2) * (1.0 - kept * kept);
-        step
-    }
-
     /// What is seen of the error.
     pub fn sighting(&self) -> Sighting<STATES, COLUMNS> {
         match self {
-            Observation::Block(block) => Sighting {
-                direction: Vector2::new(1.0, 0.0),
-                observed: Columns::from_fn(|i, _| if i == 0 { block.momentum } else { 0.0 }),
-                variance: block.momentum_variance,
-            },
+            Observation::Block(block) => momentum_seen(block.momentum, block.momentum_variance),
             Observation::Segment(segment) => Sighting {
                 direction: Vector2::new(1.0, 1.0),
                 observed: segment.row,

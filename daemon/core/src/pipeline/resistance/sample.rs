@@ -4,9 +4,8 @@ use dynocar_shared::RejectionReason;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
 use super::regression::{PARAMETERS, regressors, scaled};
-use super::speed::SpeedNoise;
 use crate::force::ResolvedSample;
-use crate::pipeline::motion::OutlierRow;
+use crate::pipeline::motion::{OutlierRow, SpeedNoise};
 use crate::train::Davis;
 
 /// A sample with its forces per weight.
@@ -87,7 +86,7 @@ impl SpeedWatch {
     /// A watch that never calls a deviation below `spike_mps` a spike.
     pub fn new(spike_mps: f64) -> Self {
         // What is never called a spike is taken to be three standard deviations at the start.
-        let noise = SpeedNoise::new(spike_mps / 3.0);
+        let noise = SpeedNoise::unknown(spike_mps / 3.0);
         SpeedWatch { noise, outliers: OutlierRow::default(), spike_mps }
     }
 

@@ -6,7 +6,7 @@ use super::momentum::MomentumBlocks;
 use super::regression::{Observation, SinceBlock};
 use super::sample::UnitSample;
 use super::settings::{DataSettings, DataSource};
-use super::speed::SpeedNoise;
+use crate::pipeline::motion::SpeedNoise;
 use crate::pipeline::papers::liu::coasting::CoastingSegments;
 use crate::train::Davis;
 

@@ -127,8 +127,7 @@ impl JumpBank {
         let likeliest = self.likeliest_index();
         let mut told = None;
         for (index, hypothesis) in self.hypotheses[..self.count].iter_mut().enumerate() {
-            hypothesis.predict(rule, step, duration_s);
-            hypothesis.doubt(self.doubt.impulse_variance);
+            hypothesis.predict(rule, step, duration_s, self.doubt.impulse_variance);
             hypothesis.noise.rounding_variance = self.doubt.rounding_variance;
             let innovation = hypothesis.measure(measured_mps, &self.noise, &self.outliers);
             hypothesis.weight *= innovation.likelihood;

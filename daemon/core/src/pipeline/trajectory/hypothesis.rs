@@ -125,13 +125,14 @@ impl Hypothesis {
         }
     }
 
-    /// Moves the state over a step of a given time.
+    /// Moves the state over a step of a given time, which misses the speed by `missed_variance` in
+    /// (m/s)².
     ///
     /// # Real-time
     ///
     /// Bounded work, no allocation.
     #[inline]
-    pub fn predict(&mut self, rule: StepRule, step: &Step, duration_s: f64) {
+    pub fn predict(&mut self, rule: StepRule, step: &Step, duration_s: f64, missed_variance: f64) {
         let (advance, _) = rule.advance_or_crawl(step, &self.davis(), self.state[SPEED]);
         self.state[SPEED] = advance.speed_mps;
         let lower = &mut self.factor.0;
@@ -143,17 +144,11 @@ impl Hypothesis {
             lower[(SPEED, column)] = entry;
         }
         let own = advance.by_speed * lower[(SPEED, SPEED)];
-        lower[(SPEED, SPEED)] = (own * own + self.noise.disturbance_density * duration_s).sqrt();
+        let added = self.noise.disturbance_density * duration_s + missed_variance;
+        lower[(SPEED, SPEED)] = (own * own + added).sqrt();
         self.noise.predict(advance.by_speed, duration_s);
         self.unit.predict(&advance.by_davis, advance.by_speed, duration_s);
         self.age_s += duration_s;
-    }
-
-    /// Lets the speed be doubted by a variance in (m/s)².
-    #[inline]
-    pub fn doubt(&mut self, variance: f64) {
-        let own = &mut self.factor.0[(SPEED, SPEED)];
-        *own = (*own * *own + variance).sqrt();
     }
 
     /// Takes in a measured speed, or leaves it out when it more likely is an outlier. The weight
@@ -270,7 +265,7 @@ mod tests {
                     StepRule::Time => step.size,
                     StepRule::Distance => step.size / filter.state[SPEED],
                 };
-                filter.predict(rule, step, duration_s);
+                filter.predict(rule, step, duration_s, 0.0);
                 assert!(filter.measure(speed_mps, &model, &outliers()).is_used);
             }
             let ratio = (disturbance / NOISE_MPS).powi(2);
@@ -315,7 +310,7 @@ mod tests {
             jacobian[(SPEED, SPEED)] = advance.by_speed;
             let mut expected = jacobian * before * jacobian.transpose();
             expected[(SPEED, SPEED)] += 0.02 * 0.02 * 2.5;
-            filter.predict(StepRule::Time, &step, 2.5);
+            filter.predict(StepRule::Time, &step, 2.5, 0.0);
             assert!((filter.factor.covariance() - expected).norm() < 1e-12 * expected.norm());
         }
     }
@@ -329,7 +324,7 @@ mod tests {
         let drive_mps2 = gain * FAST.w0_n_per_kn(40.0);
         let hold = Step { size: 0.2, drive_mps2, resistance_gain: gain };
         for round in 0..60 {
-            filter.predict(StepRule::Time, &hold, 0.2);
+            filter.predict(StepRule::Time, &hold, 0.2, 0.0);
             let speed_mps = if round == 30 { 43.0 } else { 40.0 };
             let innovation = filter.measure(speed_mps, &model, &outliers());
             assert_eq!(innovation.is_used, round != 30);
@@ -337,7 +332,7 @@ mod tests {
         assert!((filter.state[SPEED] - 40.0).abs() < 0.05);
         let davis = filter.davis();
         for _ in 0..14 {
-            filter.predict(StepRule::Time, &hold, 0.2);
+            filter.predict(StepRule::Time, &hold, 0.2, 0.0);
             filter.measure(45.0, &model, &outliers());
         }
         assert!((filter.state[SPEED] - 45.0).abs() < 0.05);

@@ -267,7 +267,7 @@ mod tests {
         for index in 0..samples {
             speed_mps = StepRule::Time.advance(&step, &FAST, speed_mps).unwrap().speed_mps;
             speed_mps += disturbance * 0.2_f64.sqrt() * normal(&mut random);
-            filter.predict(StepRule::Time, &step, 0.2);
+            filter.predict(StepRule::Time, &step, 0.2, 0.0);
             let measured_mps = speed_mps + noise_mps(index) * normal(&mut random);
             filter.measure(measured_mps, &model, &OUTLIERS);
         }

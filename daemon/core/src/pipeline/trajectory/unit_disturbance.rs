@@ -86,7 +86,7 @@ mod tests {
         filter.anchor(speeds[0]);
         let outliers = OutlierModel { share: 1e-9, density: 0.5 };
         for (step, &speed_mps) in steps.iter().zip(&speeds[1..]) {
-            filter.predict(rule, step, step.size);
+            filter.predict(rule, step, step.size, 0.0);
             filter.measure(speed_mps, &model, &outliers);
         }
         (filter.davis_covariance(), filter.unit_disturbance().of_davis())

@@ -1,65 +1,35 @@
 //! Functions without unit of one covariate u.
 
-/// A form; its numbers have the unit of the covariate but for the exponent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Form {
-    /// `(max(0, u) / at)^exponent`.
-    Power,
-    /// `max(0, below / max(u, least) − 1)`.
-    Hyperbola,
-    /// `max(0, u − from) / span`.
-    Above,
-    /// `max(0, until − u) / span`.
-    Below,
-    /// 1 from `from` up to `to`, else 0.
-    Between,
-    /// 1 from `from` on, else 0.
-    From,
-    /// 1 up to `to`, else 0.
-    UpTo,
-    /// `exp(−max(0, u) / over)`.
-    Decay,
-    /// `exp(−((u − at) / width)² / 2)`.
-    Bell,
+use crate::named::named;
+
+named! {
+    /// A form; its numbers have the unit of the covariate but for the exponent.
+    Form ("in `train.toml`") {
+        /// `(max(0, u) / at)^exponent`.
+        Power "power";
+        /// `max(0, below / max(u, least) − 1)`.
+        Hyperbola "hyperbola";
+        /// `max(0, u − from) / span`.
+        Above "above";
+        /// `max(0, until − u) / span`.
+        Below "below";
+        /// 1 from `from` up to `to`, else 0.
+        Between "between";
+        /// 1 from `from` on, else 0.
+        From "from";
+        /// 1 up to `to`, else 0.
+        UpTo "up_to";
+        /// `exp(−max(0, u) / over)`.
+        Decay "decay";
+        /// `exp(−((u − at) / width)² / 2)`.
+        Bell "bell";
+    }
 }
 
 /// Below this share of `at`, a power with an exponent under 1 grows no steeper.
 const POWER_LEAST: f64 = 1e-3;
 
 impl Form {
-    /// All of them.
-    pub const ALL: [Form; 9] = [
-        Form::Power,
-        Form::Hyperbola,
-        Form::Above,
-        Form::Below,
-        Form::Between,
-        Form::From,
-        Form::UpTo,
-        Form::Decay,
-        Form::Bell,
-    ];
-
-    /// Its name in `train.toml`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Form::Power => "power",
-            Form::Hyperbola => "hyperbola",
-            Form::Above => "above",
-            Form::Below => "below",
-            Form::Between => "between",
-            Form::From => "from",
-            Form::UpTo => "up_to",
-            Form::Decay => "decay",
-            Form::Bell => "bell",
-        }
-    }
-
-    /// The form of this name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Form::ALL.into_iter().find(|form| form.name() == name)
-    }
-
     /// The names of its numbers in `train.toml`.
     pub const fn numbers(self) -> &'static [&'static str] {
         match self {

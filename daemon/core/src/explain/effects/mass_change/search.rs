@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use super::Masses;
+use super::masses::Masses;
 use super::parts::{Part, STATION_M, STOP_MIN_S, stations, stops};
 use crate::explain::effects::Candidate;
 use crate::explain::evidence::{EQUAL, RunData};
 use crate::explain::places::span_m;
 use crate::explain::scan::{Scan, Tuple};
-use crate::terms::masses::{LEAST_SHARE, PARAMETER};
+use crate::terms::masses::LEAST_SHARE;
 
 /// Sections or windows at most.
 const PARTS_MAX: usize = 5;
@@ -29,25 +29,38 @@ pub fn all_sections(scan: &Scan) -> Vec<(Part, Tuple)> {
     let stations = stations(scan);
     let mut sections = Vec::new();
     for direction in [Some(1.0), Some(-1.0)] {
-        let elementary: Vec<Tuple> = stations
-            .windows(2)
-            .map(|pair| {
-                let part = Part::Section { from_m: pair[0], to_m: pair[1], direction };
+        let part = |from: usize, to: usize| Part::Section {
+            from_m: stations[from],
+            to_m: stations[to],
+            direction,
+        };
+        let elementary: Vec<Tuple> = (0..stations.len().saturating_sub(1))
+            .map(|k| {
+                let part = part(k, k + 1);
                 scan.tuple(|run, i| if part.holds(run, i) { shape(run, i) } else { 0.0 })
             })
             .collect();
-        for from in 0..elementary.len() {
-            let mut sum = Tuple::zero(scan.fit.theta.len());
-            for to in from..elementary.len() {
-                sum.add(&elementary[to]);
-                if elementary[to].square > 0.0 && elementary[from].square > 0.0 {
-                    let (from_m, to_m) = (stations[from], stations[to + 1]);
-                    sections.push((Part::Section { from_m, to_m, direction }, sum.clone()));
-                }
-            }
-        }
+        sections.extend(joined(&elementary, part));
     }
     sections
+}
+
+/// Every row of neighbouring parts whose ends carry a force, with the sum of their tuples.
+fn joined(
+    elementary: &[Tuple],
+    part: impl Fn(usize, usize) -> Part,
+) -> impl Iterator<Item = (Part, Tuple)> {
+    (0..elementary.len()).flat_map(move |from| {
+        let mut sum = Tuple::zero(elementary[from].cross.len());
+        let mut rows = Vec::new();
+        for to in from..elementary.len() {
+            sum.add(&elementary[to]);
+            if elementary[to].square > 0.0 && elementary[from].square > 0.0 {
+                rows.push((part(from, to + 1), sum.clone()));
+            }
+        }
+        rows
+    })
 }
 
 /// One factor in all runs: nothing to choose but whether there are parts at all.
@@ -86,15 +99,7 @@ pub fn all_windows(scan: &Scan) -> Vec<(Part, Tuple)> {
                 scan.run_tuple(index, masked)
             })
             .collect();
-        for from in 0..elementary.len() {
-            let mut sum = Tuple::zero(scan.fit.theta.len());
-            for to in from..elementary.len() {
-                sum.add(&elementary[to]);
-                if elementary[to].square > 0.0 && elementary[from].square > 0.0 {
-                    windows.push((part(from, to + 1), sum.clone()));
-                }
-            }
-        }
+        windows.extend(joined(&elementary, part));
     }
     windows
 }
@@ -115,7 +120,7 @@ pub fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Option<Candidate> {
     let edges = |part: &Part| part.edges(parts.iter().map(|(other, _)| other));
     let mut masses = Masses::new(part.clone(), edges(&part), part_cost);
     let mut start = vec![(1.0 + estimate).clamp(0.7, 1.5)];
-    while masses.parts.len() < PARTS_MAX {
+    while masses.parts().len() < PARTS_MAX {
         let hypothesis = Arc::new(masses.clone());
         let model = scan.fit.model.with(hypothesis);
         let theta = scan.fit.theta.iter().chain(&start).copied().collect();
@@ -125,7 +130,7 @@ pub fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Option<Candidate> {
             break;
         };
         let free =
-            parts.iter().filter(|(part, _)| masses.parts.iter().all(|own| own.is_apart(part)));
+            parts.iter().filter(|(part, _)| masses.parts().iter().all(|own| own.is_apart(part)));
         let mut fresh = free.map(|(part, _)| {
             let masked = |run: &RunData, i: usize| {
                 if part.holds(run, i) { shape(run, i) } else { 0.0 }
@@ -136,10 +141,8 @@ pub fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Option<Candidate> {
             Some((gain, estimate, part))
                 if gain > part_cost + EQUAL && estimate.abs() > LEAST_SHARE =>
             {
-                masses.edges.push(edges(&part));
-                masses.parts.push(part);
-                masses.parameters.push(PARAMETER);
-                masses.choice_cost += part_cost;
+                let edges = edges(&part);
+                masses.push(part, edges, part_cost);
                 start.push((1.0 + estimate).clamp(0.7, 1.5));
             }
             _ => break,

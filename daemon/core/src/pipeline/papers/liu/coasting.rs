@@ -10,6 +10,7 @@
 use dynocar_shared::RejectionReason;
 
 use crate::filter::Line;
+use crate::pipeline::motion::SpeedNoise;
 use crate::pipeline::resistance::regression::{
     CoastingSegment, Columns, PARAMETERS, SPEED_SCALE_MPS,
 };
@@ -17,7 +18,6 @@ use crate::pipeline::resistance::sample::{
     SpeedWatch, UnitSample, resistance_integral, trapezoids,
 };
 use crate::pipeline::resistance::settings::DataSettings;
-use crate::pipeline::resistance::speed::SpeedNoise;
 use crate::train::Davis;
 
 /// Up to this force in N per kN of weight the train counts as coasting.
@@ -149,7 +149,7 @@ impl Chain {
         if time_s - half.start_s < half.length_s || half.rest.count() < HALF_COUNT_MIN {
             return None;
         }
-        watch.noise.take(half.rest.scatter(), half.rest.count() - 2.0);
+        watch.noise.take_scatter(half.rest.scatter(), half.rest.count() - 2.0);
         let closed = self.half.take()?;
         let before = self.half_before.replace(closed)?;
         let row = before.slopes(&closed)?;

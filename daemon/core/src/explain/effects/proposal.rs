@@ -1,0 +1,42 @@
+//! What a kind of effect makes of the data at hand.
+
+use std::sync::Arc;
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use crate::explain::hypothesis::{Hypothesis, SharedHypothesis};
+use crate::explain::scan::Scan;
+
+/// A hypothesis with values to start the fit from.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// The structure.
+    pub hypothesis: SharedHypothesis,
+    /// Values of its parameters.
+    pub start: Vec<f64>,
+}
+
+impl Candidate {
+    /// A candidate from a hypothesis.
+    pub fn new(hypothesis: impl Hypothesis + 'static, start: Vec<f64>) -> Self {
+        Candidate { hypothesis: Arc::new(hypothesis), start }
+    }
+}
+
+/// What a kind makes of the data.
+#[derive(Clone, Debug)]
+pub enum Proposal {
+    /// Structures worth a fit.
+    Candidates(Vec<Candidate>),
+    /// The data do not allow to test it: why.
+    NotTestable(String),
+}
+
+/// A kind of effect.
+pub trait Effect: Send + Sync {
+    /// Its name.
+    fn kind(&self) -> EffectKind;
+
+    /// Structures for the data at hand, given what the current model leaves.
+    fn propose(&self, scan: &Scan) -> Proposal;
+}

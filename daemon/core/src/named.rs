@@ -1,0 +1,50 @@
+//! Enums whose members have names in files, on command lines and in answers.
+
+/// Declares such an enum: each member with what it is and its name; `what` says where the names stand.
+macro_rules! named {
+    ($(#[$meta:meta])* $name:ident ($what:literal) {
+        $( $(#[doc = $doc:literal])* $item:ident $(= $number:literal)? $text:literal; )*
+    }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum $name { $( $(#[doc = $doc])* $item $(= $number)? ),* }
+
+        impl $name {
+            /// Every member.
+            pub const ALL: [$name; [$( $name::$item ),*].len()] = [$( $name::$item ),*];
+
+            #[doc = concat!("The name ", $what, ".")]
+            pub const fn name(self) -> &'static str {
+                match self { $( $name::$item => $text ),* }
+            }
+
+            /// The member of this name.
+            pub fn from_name(name: &str) -> Option<Self> {
+                Self::ALL.into_iter().find(|member| member.name() == name)
+            }
+        }
+    };
+}
+
+pub(crate) use named;
+
+#[cfg(test)]
+mod tests {
+    named! {
+        /// What a door may be.
+        Door ("in a test") {
+            /// Nobody gets in.
+            Shut = 3 "shut";
+            /// Somebody may.
+            Ajar "a_jar";
+        }
+    }
+
+    #[test]
+    fn a_name_leads_back_to_its_member() {
+        assert_eq!(Door::ALL, [Door::Shut, Door::Ajar]);
+        assert_eq!((Door::Shut as u8, Door::Ajar as u8), (3, 4));
+        assert_eq!(Door::from_name("a_jar"), Some(Door::Ajar));
+        assert_eq!((Door::from_name("open"), Door::Shut.name()), (None, "shut"));
+    }
+}

@@ -1,0 +1,156 @@
+//! The noise of a measured speed, learned from the speeds themselves.
+
+use super::rounding::Rounding;
+
+/// Degrees of freedom that a guess counts for.
+const GUESS_FREEDOM: f64 = 2.0;
+/// The degrees of freedom that the variance looks back over.
+const MEMORY: f64 = 3000.0;
+/// A scatter counts up to so many standard deviations above what the known variance lets expect:
+/// a spike too small for the gate would else widen every interval.
+const CLIP_DEVIATIONS: f64 = 4.0;
+/// Degrees of freedom before a scatter is clipped.
+const FREEDOM_BEFORE_CLIP: f64 = 20.0;
+/// No speed is known better, in (m/s)².
+const VARIANCE_MIN: f64 = 1e-6;
+
+/// Variance of a speed's white noise, and the steps that the speed is told in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpeedNoise {
+    /// Variance in (m/s)² before anything was seen, and the degrees of freedom that it counts for.
+    first: f64,
+    first_freedom: f64,
+    variance: f64,
+    freedom: f64,
+    /// The steps of the signal.
+    pub rounding: Rounding,
+}
+
+impl SpeedNoise {
+    /// Nothing is known; until the first scatter a sample is taken to have a standard deviation in m/s.
+    pub fn unknown(first_mps: f64) -> Self {
+        let first = first_mps * first_mps;
+        let rounding = Rounding::default();
+        SpeedNoise { first, first_freedom: 0.0, variance: 0.0, freedom: 0.0, rounding }
+    }
+
+    /// Starts at a standard deviation in m/s that counts for two degrees of freedom.
+    pub fn guessed(first_mps: f64) -> Self {
+        let unknown = Self::unknown(first_mps);
+        let (variance, freedom) = (unknown.first, GUESS_FREEDOM);
+        SpeedNoise { variance, freedom, first_freedom: freedom, ..unknown }
+    }
+
+    /// Takes in the sum of squares, in (m/s)², of `freedom` independent deviations.
+    pub fn take_scatter(&mut self, square_sum: f64, freedom: f64) {
+        if freedom <= 0.0 || !square_sum.is_finite() {
+            return;
+        }
+        let clipped = match self.freedom > FREEDOM_BEFORE_CLIP {
+            true => {
+                let most = freedom + CLIP_DEVIATIONS * (2.0 * freedom).sqrt();
+                square_sum.min(most * self.variance.max(self.rounding.variance()))
+            }
+            false => square_sum,
+        };
+        self.average(clipped, freedom);
+    }
+
+    /// Takes in what a filter left of a measurement: the residual in m/s, the variance of the filtered
+    /// speed, and the weight that the measurement had against a full one.
+    ///
+    /// After an update, the residual r and the variance P of the filtered speed obey E[r²] + P = R
+    /// for the variance R of the measurement.
+    pub fn take_residual(&mut self, residual_mps: f64, filtered_variance: f64, weight: f64) {
+        self.average(weight * residual_mps * residual_mps + filtered_variance, 1.0);
+    }
+
+    /// The mean over all degrees of freedom, over the newest once they are as many as are looked back over.
+    fn average(&mut self, square_sum: f64, freedom: f64) {
+        self.freedom = (self.freedom + freedom).min(MEMORY);
+        let change = (square_sum - freedom * self.variance) / self.freedom;
+        self.variance = (self.variance + change).max(VARIANCE_MIN);
+    }
+
+    /// Variance of one speed value in (m/s)²; 0 before the first scatter.
+    pub fn variance(&self) -> f64 {
+        self.variance
+    }
+
+    /// Variance of the mean of `count` values that ran through `range_mps`.
+    ///
+    /// A speed that hardly moves falls on the same step again and again, so that averaging does
+    /// not lessen its rounding error.
+    pub fn variance_of_mean(&self, count: f64, range_mps: f64) -> f64 {
+        let rounding =
+            self.rounding.variance() / count.min(1.0 + range_mps / self.rounding.quantum_mps());
+        (self.variance.max(VARIANCE_MIN) / count).max(rounding)
+    }
+
+    /// Variance of one value, such that one may treat it as independent of its neighbours;
+    /// `per_step_mps` is how far the speed moves from one sample to the next.
+    pub fn variance_of_sample(&self, per_step_mps: f64) -> f64 {
+        let variance = if self.freedom > 0.0 { self.variance } else { self.first };
+        self.rounding.variance_of_sample(variance, per_step_mps)
+    }
+
+    /// Back to the start, but for the steps of the signal.
+    pub fn reset(&mut self) {
+        self.freedom = self.first_freedom;
+        self.variance = if self.freedom > 0.0 { self.first } else { 0.0 };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+
+    #[test]
+    fn a_filter_of_a_constant_finds_the_noise_of_its_measurements() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let mut noise = SpeedNoise::guessed(0.2);
+        let (mut estimate, mut variance) = (0.0, 1.0);
+        for _ in 0..5_000 {
+            // Uniform between -1 and 1: variance 1/3.
+            let measured = 2.0 * random.random::<f64>() - 1.0;
+            let gain = variance / (variance + noise.variance());
+            estimate += gain * (measured - estimate);
+            variance *= 1.0 - gain;
+            noise.take_residual(measured - estimate, variance, 1.0);
+            variance += 1e-3;
+        }
+        assert!((noise.variance() - 1.0 / 3.0).abs() < 0.05, "{}", noise.variance());
+        noise.reset();
+        assert!((noise.variance() - 0.04).abs() < 1e-15);
+    }
+
+    #[test]
+    fn rounding_of_a_steady_speed_does_not_average_out() {
+        let mut noise = SpeedNoise::unknown(0.05);
+        for speed_mps in [5.0, 5.1, 5.1, 5.2] {
+            noise.rounding.see(speed_mps);
+        }
+        let rounding = 0.1_f64.powi(2) / 12.0;
+        assert!((noise.rounding.variance() - rounding).abs() < 1e-12);
+        assert!((noise.variance_of_mean(25.0, 0.0) - rounding).abs() < 1e-9);
+        assert!((noise.variance_of_mean(25.0, 10.0) - rounding / 25.0).abs() < 1e-9);
+        assert!((noise.variance_of_sample(0.2) - 0.05_f64.powi(2)).abs() < 1e-9, "no scatter yet");
+        noise.take_scatter(0.0, 10.0);
+        assert!((noise.variance_of_sample(0.2) - rounding).abs() < 1e-9);
+        assert!((noise.variance_of_sample(0.01) - 10.0 * rounding).abs() < 1e-9);
+    }
+
+    #[test]
+    fn one_wild_scatter_hardly_moves_the_variance() {
+        let mut noise = SpeedNoise::unknown(0.05);
+        [5.0, 5.11, 5.13].into_iter().for_each(|speed_mps| noise.rounding.see(speed_mps));
+        for _ in 0..50 {
+            noise.take_scatter(10.0 * 4e-4, 10.0);
+        }
+        noise.take_scatter(10.0 * 4.0, 10.0);
+        assert!(noise.variance() < 6e-4);
+        noise.take_scatter(f64::NAN, 10.0);
+        assert!(noise.variance() < 6e-4);
+    }
+}

@@ -1,0 +1,81 @@
+//! The project's own sources, for the tests of how they are built.
+
+use std::path::{Path, PathBuf};
+
+/// The source folders of all packages.
+pub const FOLDERS: [&str; 13] = [
+    "shared/src",
+    "client/src",
+    "client/forward/src",
+    "client/live/src",
+    "client/parquet/src",
+    "client/python/src",
+    "client/recording/src",
+    "client/watch/src",
+    "daemon/core/src",
+    "daemon/fmu/src",
+    "daemon/src",
+    "bench/src",
+    "tests/src",
+];
+
+/// The folder of the workspace.
+pub fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// All files of Rust in a folder of the workspace.
+///
+/// # Panics
+///
+/// When there is no such folder.
+pub fn rust_files(folder: &str) -> Vec<PathBuf> {
+    let (mut files, mut open) = (Vec::new(), vec![workspace().join(folder)]);
+    while let Some(folder) = open.pop() {
+        for entry in std::fs::read_dir(folder).expect("a source folder") {
+            let path = entry.expect("a folder entry").path();
+            if path.is_dir() {
+                open.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                files.push(path);
+            }
+        }
+    }
+    files
+}
+
+/// True for a file that holds nothing but tests, or what tests need.
+pub fn is_of_tests(path: &Path) -> bool {
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    name.ends_with("tests") || name == "test_runs"
+}
+
+/// How many lines an item takes from its head on: to its semicolon, or to the brace that closes it at the same
+/// indentation, as `cargo fmt` sets it.
+pub fn item_lines(lines: &[&str]) -> usize {
+    let head = lines.first().copied().unwrap_or_default();
+    let indent = &head[..head.len() - head.trim_start().len()];
+    let is_at_head = |line: &str| line.len() - line.trim_start().len() == indent.len();
+    let ends_head = |line: &&str| is_at_head(line) && line.ends_with(['{', ';', '}']);
+    let Some(last) = lines.iter().position(ends_head) else { return lines.len() };
+    let close = format!("{indent}}}");
+    let is_close = |line: &&str| line.strip_suffix(';').unwrap_or(line) == close;
+    let closes =
+        if lines[last].ends_with('{') { lines[last..].iter().position(is_close) } else { Some(0) };
+    closes.map_or(lines.len(), |more| last + more + 1)
+}
+
+/// A source without its tests.
+pub fn without_tests(text: &str) -> Vec<&str> {
+    let lines: Vec<&str> = text.lines().collect();
+    let (mut kept, mut at) = (Vec::new(), 0);
+    while at < lines.len() {
+        if lines[at].trim() == "#[cfg(test)]" {
+            at += 1 + item_lines(&lines[at + 1..]);
+        } else {
+            kept.push(lines[at]);
+            at += 1;
+        }
+    }
+    kept
+}
