@@ -59,7 +59,7 @@ impl SpeedNoise {
     /// Takes in what a filter left of a measurement: the residual in m/s, the variance of the filtered
     /// speed, and the weight that the measurement had against a full one.
     ///
-    /// After an update, the residual r and the variance P of the filtered speed obey E[r²] + P = R
+    /// After an update, the residual r and the variance P of the filtered speed obey `E(r²) + P = R`
     /// for the variance R of the measurement.
     pub fn take_residual(&mut self, residual_mps: f64, filtered_variance: f64, weight: f64) {
         self.average(weight * residual_mps * residual_mps + filtered_variance, 1.0);
