@@ -21,7 +21,7 @@ fn numbers(text: &str) -> impl Iterator<Item = &str> {
     let product = text.split("#[cfg(test)]").next().unwrap_or_default();
     product.lines().filter_map(|line| {
         let (_, rest) = line.split_once("const ")?;
-        let (name, kind) = rest.split_once(": ")?;
+        let (name, kind) = rest.split_once(" = ")?.0.split_once(": ")?;
         let is_name =
             name.chars().all(|it| it.is_ascii_uppercase() || it.is_ascii_digit() || it == '_');
         let kinds = ["f64", "usize", "u64", "[f64", "[[f64", "NullStrength", "RunScatter"];

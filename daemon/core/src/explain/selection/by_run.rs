@@ -12,23 +12,24 @@ const RUNS_MIN: usize = 2;
 /// By how much the parameters move when each run is left out, to second order; `None` for a run
 /// without which they are not determined.
 fn moves_without_each_run(fit: &Fit) -> Vec<Option<DVector<f64>>> {
-    let information = fit.information();
+    let (information, score) = (fit.information(), fit.score());
     let moved = |run: &RunNormal| {
         let rest = Cholesky::new(&information - &run.information)?;
-        Some(-rest.solve(&run.score))
+        Some(rest.solve(&(&score - &run.score)))
     };
     fit.runs.iter().map(moved).collect()
 }
 
 /// The parameters fitted without each run, to second order and within their bounds: what the other
 /// runs say of it. What they do not tell is at none, but a parameter of a single run (its wind, a load
-/// in it) stays as it was fitted: it says nothing of other runs. With fewer than three runs all stay.
+/// in it) stays as it was fitted: it says nothing of other runs. With a single run all stay.
 pub fn without_each_run(problem: &FitProblem, fit: &Fit) -> Vec<Vec<f64>> {
     let count = fit.theta.len();
     if fit.runs.len() < RUNS_MIN {
         return vec![fit.theta.clone(); fit.runs.len()];
     }
-    let (mut information, mut pull) = (fit.information(), DVector::zeros(count));
+    // What the runs and the prior pull, and beside it, as weakly as nothing, no effect.
+    let (mut information, mut pull) = (fit.information(), fit.score());
     let mut bounds = vec![Some((f64::NEG_INFINITY, f64::INFINITY)); count];
     for (effect, range) in fit.model.effects.iter().zip(fit.model.ranges()) {
         let place = effect.place();
@@ -42,7 +43,7 @@ pub fn without_each_run(problem: &FitProblem, fit: &Fit) -> Vec<Vec<f64>> {
             // As wide as what is looked for: a flat prior's variance.
             let weight = 12.0 / (spec.upper - spec.lower).powi(2);
             information[(i, i)] += weight;
-            pull[i] = weight * (effect.none() - fit.theta[i]);
+            pull[i] += weight * (effect.none() - fit.theta[i]);
         }
     }
     let moved = |run: &RunNormal| {

@@ -22,7 +22,7 @@ impl FitProblem {
         let mut scratch = Scratch::default();
         let mut fit = self.linearised(model, start, noise, &filters, &mut scratch);
         for _ in 0..STEPS_MAX {
-            let score = self.score(&fit);
+            let score = fit.score();
             let Some(next) = self.descend(&fit, &score, &filters, &mut scratch) else { break };
             let gained = fit.cost - next.cost;
             fit = next;

@@ -78,11 +78,6 @@ impl FitProblem {
         (information, score, cost)
     }
 
-    pub(super) fn score(&self, fit: &Fit) -> DVector<f64> {
-        let prior = self.prior(&fit.model, &fit.theta).1;
-        fit.runs.iter().fold(prior, |sum, run| sum + &run.score)
-    }
-
     /// Residuals, regressors and normal equations at given parameters.
     pub(super) fn linearised(
         &self,
@@ -92,13 +87,14 @@ impl FitProblem {
         filters: &[RunFilters],
         scratch: &mut Scratch,
     ) -> Fit {
-        let (prior_information, _, mut cost) = self.prior(model, &theta);
+        let (prior_information, prior_score, mut cost) = self.prior(model, &theta);
         let mut fit = Fit {
             model: model.clone(),
             noise,
             cost: 0.0,
             runs: Vec::new(),
             prior_information,
+            prior_score,
             held_information: [0.0; 3],
             innovations: Vec::new(),
             columns: Vec::new(),
@@ -120,7 +116,7 @@ impl FitProblem {
             fit.filters.push(filter);
         }
         fit.cost = cost;
-        fit.held_information = self.held_information(&fit.theta, &self.score(&fit));
+        fit.held_information = self.held_information(&fit.theta, &fit.score());
         fit
     }
 

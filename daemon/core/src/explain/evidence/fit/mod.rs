@@ -65,6 +65,8 @@ pub struct Fit {
     pub runs: Vec<RunNormal>,
     /// Information of prior and way ratio.
     pub prior_information: DMatrix<f64>,
+    /// Score of prior and way ratio.
+    pub prior_score: DVector<f64>,
     /// Information by which those of a, b, c are held that the data push against their bounds.
     held_information: [f64; 3],
     /// White innovations by run, less the runs' own factors.
@@ -95,6 +97,11 @@ impl Fit {
     /// The same with nothing held: what the data say of a coefficient at its bound.
     pub fn free_information(&self) -> DMatrix<f64> {
         self.runs.iter().fold(self.prior_information.clone(), |sum, run| sum + &run.information)
+    }
+
+    /// Score of all runs and the prior: nearly none where the fit ended.
+    pub fn score(&self) -> DVector<f64> {
+        self.runs.iter().fold(self.prior_score.clone(), |sum, run| sum + &run.score)
     }
 
     /// Cholesky factor of the information matrix; `None` when it is not positive definite.
