@@ -61,3 +61,21 @@ fn one_speed_does_not_tell_a_b_and_c_apart_and_several_do() {
     let told = varied.base.told_by_data;
     assert!([told.a, told.b, told.c].iter().all(|share| *share > 0.5), "{told:?}");
 }
+
+#[test]
+fn steady_runs_hide_a_rotating_mass_and_level_ones_hold_it_for_a_mass() {
+    let folder = tempfile::tempdir().unwrap();
+    let steady = explained(folder.path(), &[19.0]).answer;
+    let of = |answer: &dynocar_core::explain::answer::Answer, kind: &str| {
+        answer.identifiability.iter().find(|own| own.kind == kind).cloned()
+    };
+    let hidden = of(&steady, "rotating_mass").expect("it can be tested");
+    assert!(!hidden.told && hidden.std.is_none_or(|std| std > 0.01), "{hidden:?}");
+    assert!(steady.statement.contains("could hide in these data"), "{}", steady.statement);
+    let folder = tempfile::tempdir().unwrap();
+    let level = explained(folder.path(), &[5.0, 20.0, 8.0, 28.0, 4.0, 24.0, 9.0]).answer;
+    let told = of(&level, "rotating_mass").expect("it can be tested");
+    assert!(told.told && told.std.is_some_and(|std| std < 0.01), "{told:?}");
+    assert!(told.alike.contains(&"mass_change"), "{told:?}");
+    assert!(level.statement.contains("look alike"), "{}", level.statement);
+}

@@ -9,7 +9,7 @@ use nalgebra::{Cholesky, DMatrix};
 
 use super::answer::{HALF_95, Identifiability};
 use super::effects::{Candidate, LIBRARY, Proposal};
-use super::rivals::{is_in, separating_run};
+use super::rivals::{is_in, separating_run, telling_runs};
 use super::selection::{Outcome, Search};
 
 /// The kinds that are one number of the whole train or line, and not found, each at no effect.
@@ -81,12 +81,19 @@ pub fn identifiability(search: &Search, outcome: &Outcome) -> Vec<Identifiabilit
 /// In words what the data would not show, which kinds they cannot tell apart, and what would; empty where
 /// they hold all.
 pub fn not_held(all: &[Identifiability]) -> String {
+    let would =
+        |own: &Identifiability| EffectKind::from_name(own.kind).map_or("more runs", telling_runs);
     let hidden: Vec<String> = all
         .iter()
         .filter(|own| !own.told)
         .map(|own| match own.hidden_up_to() {
-            Some(most) => format!("{} ({} is known to ± {most:.3} only)", own.kind, own.parameter),
-            None => own.kind.to_owned(),
+            Some(most) => format!(
+                "{} ({} is known to ± {most:.3} only; {} would tell)",
+                own.kind,
+                own.parameter,
+                would(own)
+            ),
+            None => format!("{} ({} would tell)", own.kind, would(own)),
         })
         .collect();
     let mut text = String::new();

@@ -61,6 +61,24 @@ pub fn is_in(fit: &Fit, kind: EffectKind) -> bool {
     fit.model.effects.iter().any(|effect| effect.kind() == kind)
 }
 
+/// What would tell a kind that is one number of the train or the line.
+pub fn telling_runs(kind: EffectKind) -> &'static str {
+    use EffectKind::{
+        AmbientTemperature, CurveResistance, GradientShift, MassChange, RotatingMass, TractionGain,
+        TunnelDrag, WheelDiameter, Wind,
+    };
+    match kind {
+        AmbientTemperature => "runs on colder and warmer days",
+        Wind => "fast runs in both directions on one day",
+        MassChange | RotatingMass | TractionGain => "harder accelerating and braking",
+        WheelDiameter => "positions over several kilometres",
+        CurveResistance => "more passes of the sharpest curves",
+        TunnelDrag => "fast passes of the tunnels",
+        GradientShift => "more passes of the steepest changes of gradient",
+        _ => "more runs",
+    }
+}
+
 /// What is known to separate the kinds that are easily confused.
 pub fn separating_run(kind: EffectKind, rivals: &[EffectKind]) -> String {
     use EffectKind::{
