@@ -25,7 +25,7 @@ const FINALISTS: usize = 5;
 /// A finalist's advantage: not far below none, and no less than this share of the greatest.
 const FINALIST_MIN: f64 = -20.0;
 const FINALIST_SHARE: f64 = 0.1;
-/// A finalist takes away at least this share of the open-loop error.
+/// Kinds that take away this share of the open-loop error come before the others.
 const FINALIST_REDUCTION: f64 = 0.02;
 /// Shares of the slow part of a noise under which a kind looks again.
 const STIFF: [f64; 2] = [0.01, 1e-4];
@@ -181,7 +181,7 @@ impl Search<'_> {
         for (trial, _) in trials.iter_mut().filter(|(trial, _)| trial.advantage > FINALIST_MIN) {
             trial.reduction = reduction(&trial.fit);
         }
-        // What takes nothing from the error is no measure for the others.
+        // What takes nothing from the error comes last, and is no measure for the others.
         let helps = |trial: &Trial| trial.reduction > FINALIST_REDUCTION;
         let key = |trial: &Trial| (helps(trial), trial.advantage);
         trials.sort_by(|(one, _), (other, _)| {
@@ -194,7 +194,7 @@ impl Search<'_> {
             .into_iter()
             .enumerate()
             .map(|(rank, (trial, effect))| {
-                let is_finalist = rank < FINALISTS && trial.advantage > least && helps(&trial);
+                let is_finalist = rank < FINALISTS && trial.advantage > least;
                 let share = base.model.effects.len() as f64
                     + (rank.min(FINALISTS) + 2) as f64 / (FINALISTS + 2) as f64;
                 (self.progress)((0.1 + 0.25 * share).min(0.85), trial.kind.name());
