@@ -7,6 +7,7 @@ use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};
 use serde_json::Value;
 
+use super::attainable::attainable_mps;
 use super::place::{ends_within, place_iou};
 use super::scenario::Rival;
 
@@ -31,6 +32,8 @@ pub struct Grade {
     pub share: Option<f64>,
     /// Error on the holdout runs over that of the true model.
     pub left_ratio: Option<f64>,
+    /// The same of the true law with estimated numbers, for a law that no library holds.
+    pub attainable_ratio: Option<f64>,
     /// Greatest strength of a candidate in the first round of the search.
     pub strength: f64,
 }
@@ -90,6 +93,7 @@ pub fn grade(
         parameters,
         share: attained.and_then(|attained| attained.share),
         left_ratio: attained.map(|attained| attained.left_ratio),
+        attainable_ratio: attained.and_then(|attained| attained.attainable_ratio),
         strength: explanation.strength,
     }
 }
@@ -119,10 +123,11 @@ fn details(
         })
         .collect();
     details.push(format!(
-        "holdout {:.3?} to {:.3?} m/s, {:.2?} of the true model's, unexplained {:.3?} N/kN",
+        "holdout {:.3?} to {:.3?} m/s, {:.2?} of the true model's ({:.2?} attainable), unexplained {:.3?} N/kN",
         answer.rmse_before,
         answer.rmse_after,
         attained.map(|attained| attained.left_ratio),
+        attained.and_then(|attained| attained.attainable_ratio),
         answer.unexplained_n_per_kn
     ));
     let unlisted = simulated.effects.iter().filter(|it| matches!(it, Effect::Unlisted(_)));
@@ -143,6 +148,8 @@ struct Attained {
     share: Option<f64>,
     /// Error over that of the true model.
     left_ratio: f64,
+    /// The same of the true law with estimated numbers.
+    attainable_ratio: Option<f64>,
 }
 
 fn attained(simulated: &SimulatedDataset, explanation: &Explanation) -> Option<Attained> {
@@ -159,7 +166,8 @@ fn attained(simulated: &SimulatedDataset, explanation: &Explanation) -> Option<A
     let (before, after) = (explanation.answer.rmse_before?, explanation.answer.rmse_after?);
     let share = (before - after) / (before - oracle);
     let share = (before > 1.2 * oracle).then_some(share);
-    (oracle > 0.0).then(|| Attained { share, left_ratio: after / oracle })
+    let attainable_ratio = attainable_mps(simulated, explanation).map(|left| left / oracle);
+    (oracle > 0.0).then(|| Attained { share, left_ratio: after / oracle, attainable_ratio })
 }
 
 /// Parameters that have a single true number; the size of an effect is its distance from none.

@@ -9,6 +9,9 @@ use super::grade::{Grade, grade};
 use super::scenario::Scenario;
 use crate::parallel::over;
 
+/// An error at most so many times another is as good.
+const NEAR: f64 = 1.1;
+
 /// What came out for one kind.
 #[derive(Clone, Debug, Serialize)]
 pub struct KindRow {
@@ -32,6 +35,10 @@ pub struct KindRow {
     pub error_reduction_share: Option<f64>,
     /// Share of all answers that leave at most a tenth more error than the true model.
     pub within_a_tenth: Option<f64>,
+    /// Share of which the true law with estimated numbers does, for laws that no library holds.
+    pub attainable_within_a_tenth: Option<f64>,
+    /// Share of all answers that leave at most a tenth more than that, or than the true model.
+    pub within_a_tenth_of_attainable: Option<f64>,
 }
 
 /// False alarms on nulls.
@@ -140,8 +147,15 @@ fn row(kind: &str, grades: &[Grade]) -> KindRow {
         parameter_error: median(parameters.iter().map(|p| p.error.abs()).collect()),
         coverage: share_of(parameters.iter().map(|parameter| parameter.z.abs() < 1.96)),
         within_a_tenth: share_of(
-            grades.iter().filter_map(|grade| grade.left_ratio).map(|ratio| ratio <= 1.1),
+            grades.iter().filter_map(|grade| grade.left_ratio).map(|ratio| ratio <= NEAR),
         ),
+        attainable_within_a_tenth: share_of(
+            grades.iter().filter_map(|grade| grade.attainable_ratio).map(|ratio| ratio <= NEAR),
+        ),
+        within_a_tenth_of_attainable: share_of(grades.iter().filter_map(|grade| {
+            let (left, attainable) = (grade.left_ratio?, grade.attainable_ratio?);
+            Some(left <= NEAR * attainable.max(1.0))
+        })),
         error_reduction_share: median(right.iter().filter_map(|grade| grade.share).collect()),
     }
 }
@@ -149,14 +163,14 @@ fn row(kind: &str, grades: &[Grade]) -> KindRow {
 /// The matrix as a table for people.
 pub fn table(matrix: &Matrix) -> String {
     let mut text = String::from(
-        "kind                  right      IoU   ends  error  cover  share  tenth  named instead\n",
+        "kind                  right      IoU   ends  error  cover  share  tenth  (law   of it)  named instead\n",
     );
     let shown = |value: Option<f64>| value.map_or("     -".into(), |value| format!("{value:6.3}"));
     for row in &matrix.kinds {
         let confused: Vec<String> =
             row.confused_with.iter().map(|(named, count)| format!("{named} {count}")).collect();
         text += &format!(
-            "{:20} {:3}/{:<3} {} {} {} {} {} {}  {}\n",
+            "{:20} {:3}/{:<3} {} {} {} {} {} {} {} {}  {}\n",
             row.kind,
             row.right,
             row.runs,
@@ -166,6 +180,8 @@ pub fn table(matrix: &Matrix) -> String {
             shown(row.coverage),
             shown(row.error_reduction_share),
             shown(row.within_a_tenth),
+            shown(row.attainable_within_a_tenth),
+            shown(row.within_a_tenth_of_attainable),
             confused.join(", ")
         );
     }

@@ -3,11 +3,13 @@
 //! - [`scenario`]: what is simulated
 //! - [`case`]: one simulated dataset, explained in this process
 //! - [`grade`]: the answer against the truth
+//! - [`attainable`]: what the true law leaves when its numbers are estimated
 //! - [`place`]: its places against the true ones
 //! - [`matrix`]: all kinds over all seeds, in numbers
 //! - [`growth`]: time for 1, 4 and 16 times the data
 //! - [`command`]: the command line
 
+pub mod attainable;
 pub mod case;
 pub mod command;
 pub mod grade;

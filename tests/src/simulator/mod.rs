@@ -50,7 +50,7 @@ pub use effects::Effect;
 pub use settings::{
     Defects, EffectRequest, ForceSampling, GnssReceiver, SimulatorSettings, TrainType,
 };
-pub use unlisted::{Law, Unlisted};
+pub use unlisted::{Around, Law, Unlisted};
 
 use dynocar_shared::vocabulary::EffectKind;
 

@@ -26,20 +26,7 @@ pub struct Unexplained<'o> {
 impl<'o> Unexplained<'o> {
     /// What a finished search leaves; `None` without motion.
     pub fn of(search: &Search, outcome: &'o Outcome) -> Option<Self> {
-        let declared = search.train.resistance;
-        let (mut count, mut per_unit, mut basic) = (0.0, 0.0, 0.0);
-        for run in &search.problem.runs {
-            for bin in &run.bins {
-                let sample = &run.samples()[bin.middle()];
-                count += 1.0;
-                per_unit += sample.weight_kn / sample.inertial_mass_kg;
-                basic += declared.w0_n_per_kn(bin.speed_mps);
-            }
-        }
-        if count == 0.0 {
-            return None;
-        }
-        let n_per_kn = outcome.fit.noise.mean_acceleration_mps2(OVER_S) * count / per_unit;
+        let (n_per_kn, share) = search.problem.noise_n_per_kn(outcome.fit.noise, OVER_S)?;
         let last = outcome.rounds.last().into_iter().flatten();
         let refused = last
             .clone()
@@ -48,7 +35,7 @@ impl<'o> Unexplained<'o> {
             .collect();
         let outside = last.clone().find(|trial| trial.kind == EffectKind::Unknown);
         let place = outside.map(|trial| trial.fit.model.effects[trial.last()].place());
-        Some(Unexplained { n_per_kn, share: n_per_kn * count / basic, refused, place })
+        Some(Unexplained { n_per_kn, share, refused, place })
     }
 
     /// Whether noise explains it.

@@ -73,11 +73,7 @@ impl Search<'_> {
     pub fn greatest_strength(outcome: &Outcome) -> f64 {
         let first = outcome.rounds.first().into_iter().flatten();
         first
-            .filter(|trial| {
-                is_material(trial)
-                    && contradiction(trial).is_none()
-                    && at_bound(&trial.fit, trial.last()).is_none()
-            })
+            .filter(|trial| is_material(trial) && is_possible(trial))
             .map(Trial::strength)
             .fold(0.0, f64::max)
     }
@@ -88,6 +84,11 @@ fn is_material(trial: &Trial) -> bool {
     let last = trial.last();
     let parameters = trial.fit.effect_parameters(last);
     trial.fit.model.effects[last].is_material(parameters, trial.fit.theta[2])
+}
+
+/// Whether the last effect of a trial may be what its kind says.
+pub(super) fn is_possible(trial: &Trial) -> bool {
+    contradiction(trial).is_none() && at_bound(&trial.fit, trial.last()).is_none()
 }
 
 /// Why the last effect of a trial is not what its kind says.

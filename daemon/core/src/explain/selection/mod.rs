@@ -2,6 +2,7 @@
 
 mod acceptance;
 mod by_run;
+mod outside;
 mod price;
 mod search;
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::price::{at_bound, discounted, model_penalty, penalty};
-use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal, UNKNOWN, leaves_a_force};
+use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal, UNKNOWN};
 use crate::explain::evidence::{
     EQUAL, Fit, FitProblem, GrownModel, Noise, RunData, STRENGTH_MIN, strength,
 };
@@ -28,7 +28,7 @@ const FINALIST_SHARE: f64 = 0.1;
 /// Kinds that take away this share of the open-loop error come before the others.
 const FINALIST_REDUCTION: f64 = 0.02;
 /// Shares of the slow part of a noise under which a kind looks again.
-const STIFF: [f64; 2] = [0.01, 1e-4];
+pub(super) const STIFF: [f64; 2] = [0.01, 1e-4];
 /// Less observations than this tell nothing.
 pub const OBSERVATIONS_MIN: usize = 80;
 
@@ -150,16 +150,16 @@ impl Search<'_> {
     fn round(&self, base: &Fit, not_testable: &mut Vec<(EffectKind, String)>) -> Vec<Trial> {
         let Some(scan) = self.scan(base) else { return Vec::new() };
         let mut trials: Vec<(Trial, &dyn Effect)> = Vec::new();
+        let mut has_forms = false;
         for effect in LIBRARY {
             let kind = effect.kind();
             if base.model.effects.iter().any(|own| own.kind() == kind) {
                 continue;
             }
             (self.progress)((0.1 + 0.25 * base.model.effects.len() as f64).min(0.8), kind.name());
-            let effect = match kind {
-                EffectKind::Unknown if self.library_leaves_a_force(base, &trials) => UNKNOWN,
-                _ => effect,
-            };
+            let asks = kind == EffectKind::Unknown && self.asks_for_a_form(&scan, &trials);
+            has_forms |= asks;
+            let effect = if asks { UNKNOWN } else { effect };
             match effect.propose(&scan) {
                 Proposal::NotTestable(reason) => {
                     if !not_testable.iter().any(|(other, _)| *other == kind) {
@@ -174,6 +174,9 @@ impl Search<'_> {
                     trials.extend(best.map(|trial| (trial, effect)));
                 }
             }
+        }
+        if !has_forms {
+            self.take_form_that_noise_holds(base, &mut trials);
         }
         let by_advantage = |one: &Trial, other: &Trial| other.advantage.total_cmp(&one.advantage);
         let before = FitErrors::of(self.problem, base);
@@ -207,13 +210,6 @@ impl Search<'_> {
             .collect();
         finished.sort_by(by_advantage);
         finished
-    }
-
-    /// Whether the kind of the library that explains most leaves a force that has some form.
-    fn library_leaves_a_force(&self, base: &Fit, trials: &[(Trial, &dyn Effect)]) -> bool {
-        let trials = trials.iter().map(|(trial, _)| trial).filter(|trial| trial.advantage > 0.0);
-        let best = trials.max_by(|one, other| one.advantage.total_cmp(&other.advantage));
-        self.scan(best.map_or(base, |best| &best.fit)).is_some_and(|scan| leaves_a_force(&scan))
     }
 
     /// A scan around a fit; `None` when the fit's information is singular.
@@ -274,7 +270,12 @@ impl Search<'_> {
     }
 
     /// The best candidate of a kind when it looks for places and windows under a given noise.
-    fn look_again(&self, base: &Fit, noise: Noise, effect: &dyn Effect) -> Option<Trial> {
+    pub(super) fn look_again(
+        &self,
+        base: &Fit,
+        noise: Noise,
+        effect: &dyn Effect,
+    ) -> Option<Trial> {
         let onto = self.problem.fit(&base.model, base.theta.clone(), noise);
         let scan = self.scan(&onto)?;
         let Proposal::Candidates(candidates) = effect.propose(&scan) else { return None };
@@ -284,30 +285,8 @@ impl Search<'_> {
             .max_by(|one, other| one.advantage.total_cmp(&other.advantage))
     }
 
-    /// Looks for a form of what is left, under noises too small to hold it: the noise of a model
-    /// that lacks a large force holds that force. What is found stands in the place of everything
-    /// found before, or beside it, whichever explains more.
-    pub fn look_under_noise(&self, outcome: &mut Outcome) {
-        let models = [outcome.base.clone(), outcome.fit.clone()];
-        for base in models.iter().take(1 + usize::from(!outcome.fit.model.effects.is_empty())) {
-            if base.model.effects.iter().any(|own| own.kind() == EffectKind::Unknown) {
-                continue;
-            }
-            let before = FitErrors::of(self.problem, base);
-            for share in STIFF {
-                let noise = base.noise.stiff(share);
-                let Some(mut trial) = self.look_again(base, noise, UNKNOWN) else { continue };
-                trial.reduction = FitErrors::of(self.problem, &trial.fit).reduction_from(&before);
-                let is_better = Self::total(&trial.fit) < Self::total(&outcome.fit) - EQUAL;
-                if is_better && Self::refusal(&trial).is_none() {
-                    outcome.fit = trial.fit;
-                }
-            }
-        }
-    }
-
     /// Total cost of a model: fit and price.
-    fn total(fit: &Fit) -> f64 {
+    pub(super) fn total(fit: &Fit) -> f64 {
         fit.cost + model_penalty(fit)
     }
 

@@ -21,6 +21,8 @@ named! {
         UpTo "up_to";
         /// `exp(−max(0, u) / over)`.
         Decay "decay";
+        /// `1 − exp(−max(0, u) / over)`.
+        Rise "rise";
         /// `exp(−((u − at) / width)² / 2)`.
         Bell "bell";
     }
@@ -40,7 +42,7 @@ impl Form {
             Form::Between => &["from", "to"],
             Form::From => &["from"],
             Form::UpTo => &["to"],
-            Form::Decay => &["over"],
+            Form::Decay | Form::Rise => &["over"],
             Form::Bell => &["at", "width"],
         }
     }
@@ -55,7 +57,7 @@ impl Form {
             Form::Above | Form::Below => (other > 0.0, "a span above 0"),
             Form::Between => (other > one, "to above from"),
             Form::From | Form::UpTo => (true, "a number"),
-            Form::Decay => (one > 0.0, "over above 0"),
+            Form::Decay | Form::Rise => (one > 0.0, "over above 0"),
             Form::Bell => (other > 0.0, "a width above 0"),
         };
         (!is_right).then_some(expected)
@@ -85,6 +87,10 @@ impl Form {
                 let value = (-u.max(0.0) / one).exp();
                 (value, if u > 0.0 { -value / one } else { 0.0 })
             }
+            Form::Rise => {
+                let left = (-u.max(0.0) / one).exp();
+                (1.0 - left, if u > 0.0 { left / one } else { 0.0 })
+            }
             Form::Bell => {
                 let away = (u - one) / other;
                 let value = (-0.5 * away * away).exp();
@@ -110,6 +116,7 @@ impl Form {
             Form::From => format!("({of} ≥ {one})"),
             Form::UpTo => format!("({of} < {one})"),
             Form::Decay => format!("exp(−{of} / {one})"),
+            Form::Rise => format!("(1 − exp(−{of} / {one}))"),
             Form::Bell => format!("exp(−(({away}) / {other})² / 2)"),
         }
     }
@@ -134,7 +141,7 @@ fn short(value: f64) -> String {
 mod tests {
     use super::*;
 
-    const CASES: [(Form, [f64; 2]); 10] = [
+    const CASES: [(Form, [f64; 2]); 11] = [
         (Form::Power, [10.0, 1.5]),
         (Form::Power, [10.0, 0.5]),
         (Form::Hyperbola, [15.0, 3.0]),
@@ -144,6 +151,7 @@ mod tests {
         (Form::From, [5.0, 0.0]),
         (Form::UpTo, [5.0, 0.0]),
         (Form::Decay, [7.0, 0.0]),
+        (Form::Rise, [7.0, 0.0]),
         (Form::Bell, [7.0, 2.0]),
     ];
 

@@ -1,17 +1,23 @@
 //! A force of a form of its own, as a fit knows it.
 
+use std::sync::Arc;
+
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::OUTSIDE_COST;
+use super::numbers::{edges, fitted_numbers, is_exponent, named};
 use crate::explain::answer::{CovariateRange, ParameterValue, Place};
-use crate::explain::effects::{Candidate, Hypothesis, ReportContext, Reported};
+use crate::explain::effects::{Candidate, Hypothesis, ReportContext, Reported, SharedHypothesis};
 use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::places::{Axis, End, Reach};
 use crate::explain::scan::Scan;
 use crate::terms::extra::{self, Covariate, Extra, FORCE_MAX_N_PER_KN, Factor, Form};
 use crate::terms::{Entry, Parameter};
 
 /// A force counts from this size in N/kN on.
 const LEAST_N_PER_KN: f64 = 0.1;
+/// A share of a covariate's range by which an edge is surely moved little.
+const EDGE_FINE_SHARE: f64 = 1e-3;
 /// A force lives where it is at least this share of its greatest.
 const LIVES_SHARE: f64 = 0.1;
 
@@ -27,49 +33,22 @@ pub struct FormForce {
     /// Greatest product of the factors over the fit runs.
     greatest: f64,
     place: Place,
+    /// Least and greatest value of the last factor's covariate.
+    span: [f64; 2],
     choice_cost: f64,
 }
 
-/// Numbers of a form that are fitted, with their bounds for a covariate over the range from `low`
-/// to `high`; below `least` there are too few data to tell anything.
-fn fitted_numbers(form: Form, [least, low, high]: [f64; 3]) -> Vec<(usize, (f64, f64))> {
-    let width = high - low;
-    match form {
-        Form::Power => vec![(1, (0.1, 5.0))],
-        Form::Hyperbola => {
-            // Runs that are never slow hold no low least.
-            let least_bounds = (least, (0.3 * high).max(1.5 * least));
-            vec![(0, (0.05 * high, 3.0 * high)), (1, least_bounds)]
-        }
-        Form::Above | Form::Below => vec![(0, (low, high))],
-        // Their value jumps: they are sought, not fitted.
-        Form::Between | Form::From | Form::UpTo => Vec::new(),
-        Form::Decay => vec![(0, (0.02 * high, 3.0 * high))],
-        Form::Bell => vec![(0, (low, high)), (1, (0.01 * width, 0.6 * width))],
-    }
-}
-
-/// The name of a number in the answer; that of the second factor says so.
-fn named(factor: usize, name: &'static str) -> &'static str {
-    match (factor, name) {
-        (0, name) => name,
-        (_, "at") => "second_at",
-        (_, "exponent") => "second_exponent",
-        (_, "below") => "second_below",
-        (_, "least") => "second_least",
-        (_, "from") => "second_from",
-        (_, "until") => "second_until",
-        (_, "over") => "second_over",
-        (_, "width") => "second_width",
-        (_, other) => other,
-    }
+/// Price of a form that was chosen from so many.
+pub fn choice_cost(chosen_from: f64) -> f64 {
+    OUTSIDE_COST + 2.0 * chosen_from.ln()
 }
 
 impl FormForce {
     /// A force of this form to start from, chosen from so many; `ranges` are those of the
-    /// covariates.
+    /// covariates. Exponents that are held are not fitted.
     pub fn candidate(
         extra: &Extra,
+        holds_exponents: bool,
         ranges: &[[f64; 3]],
         chosen_from: f64,
         scan: &Scan,
@@ -78,7 +57,9 @@ impl FormForce {
         let mut parameters = vec![Parameter::new("extra_n_per_kn", (-most, most), 0.01)];
         let (mut fitted, mut start) = (Vec::new(), vec![extra.n_per_kn]);
         for (k, (factor, range)) in extra.factors.iter().zip(ranges).enumerate() {
-            for (number, bounds) in fitted_numbers(factor.form, *range) {
+            let free = fitted_numbers(factor.form, *range).into_iter();
+            let is_free = |number: usize| !(holds_exponents && is_exponent(factor.form, number));
+            for (number, bounds) in free.filter(|(number, _)| is_free(*number)) {
                 let name = named(k, factor.form.numbers()[number]);
                 let step = 2e-3 * (bounds.1 - bounds.0);
                 parameters.push(Parameter::new(name, bounds, step));
@@ -88,12 +69,7 @@ impl FormForce {
         }
         let (greatest, place) = lives(extra, scan);
         // An edge that was sought costs what a number that is fitted does.
-        let edges = |factor: &Factor| match factor.form {
-            Form::Between => 2.0,
-            Form::From | Form::UpTo => 1.0,
-            _ => 0.0,
-        };
-        let sought: f64 = extra.factors.iter().map(edges).sum();
+        let sought: usize = extra.factors.iter().map(|factor| edges(factor.form)).sum();
         let observations = scan.fit.observations().max(2) as f64;
         let force = FormForce {
             factors: extra.factors.clone(),
@@ -101,7 +77,8 @@ impl FormForce {
             fitted,
             greatest,
             place,
-            choice_cost: OUTSIDE_COST + 2.0 * chosen_from.ln() + sought * observations.ln(),
+            span: ranges.last().map_or([0.0, 1.0], |&[_, low, high]| [low, high]),
+            choice_cost: choice_cost(chosen_from) + sought as f64 * observations.ln(),
         };
         Candidate::new(force, start)
     }
@@ -176,6 +153,40 @@ impl Hypothesis for FormForce {
         self.place.clone()
     }
 
+    /// The edges of the last factor, where its value jumps.
+    fn ends(&self) -> Vec<End> {
+        let Some(last) = self.factors.last() else { return Vec::new() };
+        let ([low, high], [one, other]) = (self.span, last.numbers);
+        let end = |is_upper: bool, at: f64, low: f64, high: f64| End {
+            axis: Axis::Covariate,
+            part: 0,
+            is_upper,
+            at,
+            reach: Reach::Between(low.min(at), high.max(at)),
+            fine: EDGE_FINE_SHARE * (self.span[1] - self.span[0]),
+            run: None,
+        };
+        match last.form {
+            Form::Between => vec![end(false, one, low, other), end(true, other, one, high)],
+            Form::From => vec![end(false, one, low, high)],
+            Form::UpTo => vec![end(true, one, low, high)],
+            _ => Vec::new(),
+        }
+    }
+
+    fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
+        let mut moved = self.clone();
+        let last = moved.factors.last_mut()?;
+        let number = usize::from(end.is_upper && last.form == Form::Between);
+        last.numbers[number] = at;
+        let covariate = moved.place.covariate.as_mut()?;
+        covariate.range[usize::from(end.is_upper)] = at;
+        if last.of == Covariate::Chainage {
+            moved.place.intervals_m = Some(vec![covariate.range]);
+        }
+        last.form.refusal(last.numbers).is_none().then(|| Arc::new(moved) as SharedHypothesis)
+    }
+
     fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
         let extra = self.extra(parameters);
         let is_read_back = extra.factors.iter().all(|it| it.form.refusal(it.numbers).is_none());
@@ -202,13 +213,31 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bounds_are_in_order_however_slow_or_fast_the_runs_are() {
-        for form in Form::ALL {
-            for range in [[1.0, 0.8, 30.0], [12.0, 10.0, 22.0], [18.9, 18.5, 19.4]] {
-                for (_, (lower, upper)) in fitted_numbers(form, range) {
-                    assert!(lower < upper, "{form:?} over {range:?}: {lower} to {upper}");
-                }
-            }
-        }
+    fn an_edge_moves_the_factor_and_its_place_and_never_past_the_other() {
+        let factor =
+            Factor { of: Covariate::TimeSinceStart, form: Form::Between, numbers: [200.0, 500.0] };
+        let name = factor.of.name().into();
+        let covariate = Some(CovariateRange { name, range: [200.0, 500.0] });
+        let force = FormForce {
+            factors: vec![factor],
+            parameters: vec![Parameter::new("extra_n_per_kn", (-9.0, 9.0), 0.01)],
+            fitted: Vec::new(),
+            greatest: 1.0,
+            place: Place { covariate, ..Place::default() },
+            span: [0.0, 900.0],
+            choice_cost: 0.0,
+        };
+        let ends = force.ends();
+        assert_eq!(ends[0].reach, Reach::Between(0.0, 500.0));
+        assert_eq!(ends[1].reach, Reach::Between(200.0, 900.0));
+        let later = force.with_end(&ends[1], 700.0).unwrap();
+        assert_eq!(later.place().covariate.unwrap().range, [200.0, 700.0]);
+        let Some([Entry::Extra(extra)]) =
+            later.entries(&[2.0]).as_deref().map(|it| [it[0].clone()])
+        else {
+            panic!("a form that files can hold");
+        };
+        assert_eq!(extra.factors[0].numbers, [200.0, 700.0]);
+        assert!(force.with_end(&ends[1], 100.0).is_none());
     }
 }

@@ -4,188 +4,76 @@
 //! else it holds is laid out on a grid here and fitted later. The kinds of the library are not
 //! tried again: a force in proportion to traction, a decay from the start, places.
 
-use super::form::FormForce;
+use super::form::{FormForce, choice_cost};
+use super::known::Known;
+use super::shape::{Ground, Tried};
 use crate::explain::effects::Candidate;
-use crate::explain::scan::{Scan, Tuple};
+use crate::explain::scan::Scan;
 use crate::terms::extra::{Covariate, Extra, Factor, Form};
 
 /// Speed forms that products are tried with, beside its first and second power.
 const BEST_FOR_PRODUCTS: usize = 3;
-
-/// Share of the data that tells too little.
-const FEW: f64 = 0.03;
-/// Structures whose numbers are sought before they are fitted.
+/// Structures whose numbers are sought before they are fitted, and how many of these may share their
+/// first factor: else the variants of one crowd out the others.
 const REFINED: usize = 8;
-/// Steps of that search, as shares of the range, one after the other.
-const REFINING_STEPS: [f64; 4] = [0.1, 0.05, 0.025, 0.012];
+const REFINED_ALIKE: usize = 2;
+/// Exponents of the speed in a product that are tried as they are: one number less is to be told.
+const WHOLE_EXPONENTS: [f64; 2] = [1.0, 2.0];
 
-/// What is known of a covariate over all bins of the fit runs.
-struct Known {
-    of: Covariate,
-    /// By run and bin.
-    values: Vec<Vec<Option<f64>>>,
-    low: f64,
-    /// A share of [`FEW`] of the values is less.
-    least: f64,
-    high: f64,
+/// What the form that explains most does beyond its price, before its numbers are fitted.
+pub fn greatest_advantage(scan: &Scan) -> f64 {
+    let all = all_tried(&Ground::of(scan));
+    let first = all.first().map_or(f64::NEG_INFINITY, |best| best.worth);
+    first - choice_cost(all.len() as f64)
 }
 
-/// A shape that was tried.
-struct Tried {
-    gain: f64,
-    n_per_kn: f64,
-    factors: Vec<Factor>,
-}
-
-impl Known {
-    /// `None` where it is known nowhere or is the same throughout.
-    fn of(scan: &Scan, of: Covariate) -> Option<Self> {
-        let values: Vec<Vec<Option<f64>>> = scan
-            .problem
-            .runs
-            .iter()
-            .map(|run| {
-                run.bins.iter().map(|bin| run.samples()[bin.middle()].covariate(of)).collect()
-            })
-            .collect();
-        let mut sorted: Vec<f64> = values.iter().flatten().flatten().copied().collect();
-        sorted.sort_unstable_by(f64::total_cmp);
-        let (low, high) = (*sorted.first()?, *sorted.last()?);
-        let least = sorted[(FEW * sorted.len() as f64) as usize];
-        let is_varied = high - low > 1e-6 && (high - low).is_finite();
-        is_varied.then_some(Known { of, values, low, least, high })
-    }
-
-    fn at(&self, share: f64) -> f64 {
-        self.low + share * (self.high - self.low)
-    }
-
-    fn factor(&self, form: Form, numbers: [f64; 2]) -> Factor {
-        Factor { of: self.of, form, numbers }
-    }
-
-    /// Forms with a knee at shares of the range.
-    fn hinges(&self) -> Vec<Factor> {
-        let span = 0.1 * (self.high - self.low);
-        let knees = [0.15, 0.3, 0.45, 0.6, 0.75, 0.88];
-        let both = knees.iter().flat_map(|&share| {
-            [Form::Above, Form::Below].map(|form| self.factor(form, [self.at(share), span]))
-        });
-        both.collect()
-    }
-
-    /// Powers that are no term of a, b, c.
-    fn powers(&self, exponents: &[f64]) -> Vec<Factor> {
-        if self.low < 0.0 {
-            return Vec::new();
-        }
-        exponents.iter().map(|&it| self.factor(Form::Power, [self.high, it])).collect()
-    }
-
-    /// Parts of the range.
-    fn parts(&self) -> Vec<Factor> {
-        let edges = [0.0, 0.25, 0.5, 0.75, 1.0].map(|share| self.at(share));
-        let pairs = (0..4).flat_map(|from| (from + 1..5).map(move |to| (from, to)));
-        pairs
-            .filter_map(|(from, to)| match (from, to) {
-                (0, 4) => None,
-                // What lasts to the end of these data may last in others.
-                (from, 4) => Some(self.factor(Form::From, [edges[from], 0.0])),
-                (0, to) => Some(self.factor(Form::UpTo, [edges[to], 0.0])),
-                (from, to) => Some(self.factor(Form::Between, [edges[from], edges[to]])),
-            })
-            .collect()
-    }
-
-    fn of_speed(&self) -> Vec<Factor> {
-        let mut factors = self.hinges();
-        factors.extend(self.powers(&[0.5, 3.0]));
-        for share in [0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0] {
-            let below = share * self.high;
-            let least = [1.0, 2.0, 4.0].into_iter().map(|it: f64| it.max(1.1 * self.least));
-            let least = least.filter(|least| 1.5 * least < below);
-            factors.extend(least.map(|least| self.factor(Form::Hyperbola, [below, least])));
-        }
-        let over = [0.06, 0.12, 0.25].map(|share| share * self.high);
-        factors.extend(over.map(|over| self.factor(Form::Decay, [over, 0.0])));
-        for width in [0.04, 0.08] {
-            let middles = (1..10).map(|k| self.at(0.1 * f64::from(k)));
-            let width = width * (self.high - self.low);
-            factors.extend(middles.map(|middle| self.factor(Form::Bell, [middle, width])));
-        }
-        factors
-    }
-
-    fn alone(&self) -> Vec<Factor> {
-        match self.of {
-            Covariate::Speed => self.of_speed(),
-            // Places along the line are the library's and the bands'.
-            Covariate::Chainage => Vec::new(),
-            Covariate::TimeSinceStart | Covariate::Temperature => {
-                let edges = |it: &Factor| it.form != Form::Between;
-                self.hinges().into_iter().chain(self.parts().into_iter().filter(edges)).collect()
-            }
-            Covariate::TractionForce | Covariate::BrakeForce => {
-                let mut factors = self.hinges();
-                factors.extend(self.powers(&[0.5, 2.0]));
-                factors
-            }
-        }
-    }
-
-    /// What the force of a form of the speed may be multiplied by.
-    fn beside_speed(&self) -> Vec<Factor> {
-        let mut factors = self.parts();
-        if self.of != Covariate::Chainage {
-            let knees = self.hinges().into_iter();
-            factors.extend(knees.filter(|factor| {
-                let share = (factor.numbers[0] - self.low) / (self.high - self.low);
-                (0.2..0.8).contains(&share)
-            }));
-            factors.push(self.factor(Form::Above, [self.low, self.high - self.low]));
-        }
-        factors
-    }
-}
-
-/// The forms that explain most, one of each structure; the best first.
+/// The forms that explain most for their price, one of each first factor; the best first. None
+/// where none explains its price.
 pub fn forms(scan: &Scan) -> Vec<Candidate> {
-    let known: Vec<Known> = Covariate::ALL.iter().filter_map(|&of| Known::of(scan, of)).collect();
-    let mut all: Vec<Tried> = known
-        .iter()
-        .flat_map(Known::alone)
-        .map(|factor| tried(scan, &known, vec![factor]))
-        .collect();
-    sort(&mut all);
-    if let Some(speed) = known.iter().find(|one| one.of == Covariate::Speed) {
-        let of_speed = all.iter().filter(|it| it.factors[0].of == Covariate::Speed);
-        let mut first: Vec<Factor> =
-            of_speed.take(BEST_FOR_PRODUCTS).map(|it| it.factors[0]).collect();
-        first.extend(speed.powers(&[1.0, 2.0]));
-        let others = known.iter().filter(|one| one.of != Covariate::Speed);
-        let second: Vec<Factor> = others.flat_map(Known::beside_speed).collect();
-        for one in &first {
-            all.extend(second.iter().map(|&other| tried(scan, &known, vec![*one, other])));
-        }
-        sort(&mut all);
-    }
+    let ground = Ground::of(scan);
+    let all = all_tried(&ground);
     let count = all.len() as f64;
-    let mut best: Vec<Tried> = one_of_each_structure(all)
+    if all.first().is_none_or(|best| best.worth < choice_cost(count)) {
+        return Vec::new();
+    }
+    let mut best: Vec<Tried> = alike(one_of_each_structure(all), REFINED_ALIKE)
         .into_iter()
         .take(REFINED)
-        .map(|one| refined(scan, &known, one))
+        .flat_map(|one| {
+            let refined = ground.refined(one);
+            let whole = with_whole_exponent(&ground, &refined);
+            std::iter::once(refined).chain(whole)
+        })
         .collect();
     sort(&mut best);
     let candidate = |one: Tried| {
-        let extra = Extra { n_per_kn: one.n_per_kn, factors: one.factors };
         let range = |factor: &Factor| {
-            let range = known.iter().find(|it| it.of == factor.of);
+            let range = ground.covariate(factor.of);
             range.map_or([0.0, 0.0, 1.0], |it| [it.least, it.low, it.high])
         };
-        let ranges: Vec<[f64; 3]> = extra.factors.iter().map(range).collect();
-        FormForce::candidate(&extra, &ranges, count, scan)
+        let ranges: Vec<[f64; 3]> = one.factors.iter().map(range).collect();
+        let extra = Extra { n_per_kn: one.n_per_kn, factors: one.factors };
+        FormForce::candidate(&extra, one.holds_exponents, &ranges, count, scan)
     };
-    best.into_iter().map(candidate).collect()
+    alike(best, 1).into_iter().map(candidate).collect()
+}
+
+/// Every form of one covariate, and the products; the best first.
+fn all_tried(ground: &Ground) -> Vec<Tried> {
+    let alone = ground.known.iter().flat_map(Known::alone);
+    let mut all: Vec<Tried> = alone.map(|factor| ground.tried(vec![factor], false)).collect();
+    sort(&mut all);
+    let Some(speed) = ground.covariate(Covariate::Speed) else { return all };
+    let of_speed = all.iter().filter(|it| it.factors[0].of == Covariate::Speed);
+    let mut first: Vec<Factor> = of_speed.take(BEST_FOR_PRODUCTS).map(|it| it.factors[0]).collect();
+    first.extend(speed.powers(&WHOLE_EXPONENTS));
+    let others = ground.known.iter().filter(|one| one.of != Covariate::Speed);
+    let second: Vec<Factor> = others.flat_map(Known::beside_speed).collect();
+    for one in &first {
+        all.extend(second.iter().map(|&other| ground.tried(vec![*one, other], false)));
+    }
+    sort(&mut all);
+    all
 }
 
 /// The best of each structure that explains anything; the best first.
@@ -202,50 +90,31 @@ fn one_of_each_structure(all: Vec<Tried>) -> Vec<Tried> {
     all.into_iter().filter(|one| is_new(one)).collect()
 }
 
-/// The same structure with the numbers near by that explain most.
-fn refined(scan: &Scan, known: &[Known], mut best: Tried) -> Tried {
-    for step in REFINING_STEPS {
-        for factor in 0..best.factors.len() {
-            for number in 0..best.factors[factor].form.numbers().len() {
-                let Some(range) = known.iter().find(|it| it.of == best.factors[factor].of) else {
-                    continue;
-                };
-                for way in [-step, step] {
-                    let mut factors = best.factors.clone();
-                    let Factor { form, numbers, .. } = &mut factors[factor];
-                    let is_exponent = *form == Form::Power && number == 1;
-                    let unit = if is_exponent { 5.0 } else { range.high - range.low };
-                    numbers[number] += way * unit;
-                    if form.refusal(*numbers).is_none() {
-                        let other = tried(scan, known, factors);
-                        if other.gain > best.gain {
-                            best = other;
-                        }
-                    }
-                }
-            }
-        }
+/// The first of those whose first factor has the same form, as many as may be.
+fn alike(tried: Vec<Tried>, most: usize) -> Vec<Tried> {
+    let mut seen: Vec<(Covariate, Form)> = Vec::new();
+    let mut is_kept = |one: &Tried| {
+        let own = (one.factors[0].of, one.factors[0].form);
+        seen.push(own);
+        seen.iter().filter(|it| **it == own).count() <= most
+    };
+    tried.into_iter().filter(|one| is_kept(one)).collect()
+}
+
+/// A product of a power of the speed with the whole exponent that explains most, which is then no
+/// number to be fitted; `None` of anything else.
+fn with_whole_exponent(ground: &Ground, one: &Tried) -> Option<Tried> {
+    if one.factors.len() < 2 || one.factors[0].form != Form::Power {
+        return None;
     }
-    best
+    let whole = WHOLE_EXPONENTS.map(|exponent| {
+        let mut factors = one.factors.clone();
+        factors[0].numbers[1] = exponent;
+        ground.refined(ground.tried(factors, true))
+    });
+    whole.into_iter().max_by(|one, other| one.gain.total_cmp(&other.gain))
 }
 
 fn sort(tried: &mut [Tried]) {
-    tried.sort_by(|one, other| other.gain.total_cmp(&one.gain));
-}
-
-/// What a force of a shape explains.
-fn tried(scan: &Scan, known: &[Known], factors: Vec<Factor>) -> Tried {
-    let shape_of = Extra { n_per_kn: 1.0, factors: factors.clone() };
-    let mut sum = Tuple::zero(scan.fit.theta.len());
-    for (index, run) in scan.problem.runs.iter().enumerate() {
-        let at_bin = |bin: usize| {
-            let of = |of: Covariate| known.iter().find(|it| it.of == of)?.values[index][bin];
-            let sample = &run.samples()[run.bins[bin].middle()];
-            -scan.per_unit_resistance_mps2(sample) * shape_of.at(of).0
-        };
-        let shape: Vec<f64> = (0..run.bins.len()).map(at_bin).collect();
-        sum.add(&scan.shape_tuple(index, &shape));
-    }
-    let (gain, n_per_kn) = scan.gain(&sum);
-    Tried { gain, n_per_kn, factors }
+    tried.sort_by(|one, other| other.worth.total_cmp(&one.worth));
 }

@@ -1,14 +1,18 @@
 //! A residual that is real but fits no kind of the library: an extra force of some form, or in a
 //! range of some covariate. The kind has no name; the form is what can be said of it.
 //!
-//! - [`grammar`]: which forms are tried
-//! - [`form`]: a force of such a form
+//! - [`grammar`]: which forms are tried, of what is [`known`] of a covariate; [`shape`]: what they
+//!   explain
+//! - [`form`]: a force of such a form, of which some [`numbers`] are estimated
 //! - [`band`]: a force in a range of a covariate ([`band_axis`])
 
 mod band;
 mod band_axis;
 mod form;
 mod grammar;
+mod known;
+mod numbers;
+mod shape;
 
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -20,7 +24,7 @@ use crate::explain::scan::Scan;
 const OUTSIDE_COST: f64 = 10.0;
 /// Bands and forms that are worth a fit.
 const BANDS_MAX: usize = 2;
-const FORMS_MAX: usize = 2;
+const FORMS_MAX: usize = 4;
 
 /// The kind, as bands alone: what is tried beside every kind of the library.
 pub struct Bands;
@@ -32,6 +36,11 @@ pub struct Forms;
 /// shows there too.
 pub fn leaves_a_force(scan: &Scan) -> bool {
     band::bands(scan).first().is_some_and(|best| counts(scan, best))
+}
+
+/// Whether some form explains more, at its price, than this advantage.
+pub fn a_form_explains_more(scan: &Scan, than: f64) -> bool {
+    grammar::greatest_advantage(scan) > than
 }
 
 /// Whether a band explains its price, and as much more as an effect needs at least.
@@ -57,10 +66,9 @@ impl Effect for Forms {
     }
 
     fn propose(&self, scan: &Scan) -> Proposal {
-        let bands = band::bands(scan);
-        let shows = bands.first().is_some_and(|best| counts(scan, best));
-        let forms = if shows { grammar::forms(scan) } else { Vec::new() };
-        let bands = bands.into_iter().map(|(_, candidate)| candidate).take(BANDS_MAX);
-        Proposal::Candidates(forms.into_iter().take(FORMS_MAX).chain(bands).collect())
+        let bands = band::bands(scan).into_iter().map(|(_, candidate)| candidate).take(BANDS_MAX);
+        Proposal::Candidates(
+            grammar::forms(scan).into_iter().take(FORMS_MAX).chain(bands).collect(),
+        )
     }
 }

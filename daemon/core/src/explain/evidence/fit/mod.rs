@@ -165,6 +165,22 @@ impl FitProblem {
         })
     }
 
+    /// Standard deviation in N/kN of the force that a noise stands for, on average over some
+    /// seconds, and its share of the declared basic resistance; `None` without motion.
+    pub fn noise_n_per_kn(&self, noise: Noise, over_s: f64) -> Option<(f64, f64)> {
+        let (mut count, mut per_unit, mut basic) = (0.0, 0.0, 0.0);
+        for run in &self.runs {
+            for bin in &run.bins {
+                let sample = &run.samples()[bin.middle()];
+                count += 1.0;
+                per_unit += sample.weight_kn / sample.inertial_mass_kg;
+                basic += self.declared.w0_n_per_kn(bin.speed_mps);
+            }
+        }
+        let n_per_kn = noise.mean_acceleration_mps2(over_s) * count / per_unit;
+        (count > 0.0).then(|| (n_per_kn, n_per_kn * count / basic))
+    }
+
     /// The model with a, b, c as declared and the effects at given parameters.
     pub fn start(&self, effects: &[f64]) -> Vec<f64> {
         let Davis { a, b, c } = self.declared;

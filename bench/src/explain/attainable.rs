@@ -1,0 +1,131 @@
+//! What any search could attain: the true law with its numbers, and a, b, c, estimated from the
+//! same runs.
+
+use std::sync::Arc;
+
+use dynocar_core::explain::Explanation;
+use dynocar_core::explain::effects::{Hypothesis, Parameter};
+use dynocar_core::explain::evidence::{GrownModel, Noise, RunData, SampleForces};
+use dynocar_core::explain::score::run_error;
+use dynocar_core::simulate::{Restart, SpeedError};
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_tests::simulator::{Around, Effect, Law, SimulatedDataset, Unlisted};
+
+/// Half the difference of speeds in m/s that a law's slope is taken over.
+const SLOPE_OVER_MPS: f64 = 0.01;
+
+/// A law of the simulator, of which the numbers are looked for.
+#[derive(Debug)]
+struct TrueLaw {
+    law: Law,
+    parameters: Vec<Parameter>,
+}
+
+/// The numbers of a law beside its size; one that only scales another is none.
+fn numbers(law: Law) -> Vec<f64> {
+    match law {
+        Law::Band { centre_mps, width_mps } => vec![centre_mps, width_mps],
+        Law::Slow { below_mps, least_mps } => vec![below_mps, least_mps],
+        Law::Power { exponent, .. } => vec![exponent],
+        Law::Beyond { from_mps, .. } => vec![from_mps],
+        Law::Levelling { over_mps } => vec![over_mps],
+        Law::FastInCold { until_degc, .. } => vec![until_degc],
+        Law::FastLater { from_s, .. } => vec![from_s],
+    }
+}
+
+/// The law with other numbers.
+fn with_numbers(law: Law, numbers: &[f64]) -> Law {
+    match law {
+        Law::Band { .. } => Law::Band { centre_mps: numbers[0], width_mps: numbers[1] },
+        Law::Slow { .. } => Law::Slow { below_mps: numbers[0], least_mps: numbers[1] },
+        Law::Power { at_mps, .. } => Law::Power { at_mps, exponent: numbers[0] },
+        Law::Beyond { span_mps, .. } => Law::Beyond { from_mps: numbers[0], span_mps },
+        Law::Levelling { .. } => Law::Levelling { over_mps: numbers[0] },
+        Law::FastInCold { at_mps, .. } => Law::FastInCold { at_mps, until_degc: numbers[0] },
+        Law::FastLater { at_mps, .. } => Law::FastLater { at_mps, from_s: numbers[0] },
+    }
+}
+
+impl TrueLaw {
+    fn new(law: Law) -> Self {
+        let size = Parameter::new("n_per_kn", (-100.0, 100.0), 0.01);
+        let of = |value: f64| Parameter::new("number", (0.3 * value, 3.0 * value), 0.01 * value);
+        // A temperature may have either sign.
+        let degc = |value: f64| Parameter::new("degc", (value - 30.0, value + 30.0), 0.1);
+        let is_cold = matches!(law, Law::FastInCold { .. });
+        let others = numbers(law).into_iter().map(|it| if is_cold { degc(it) } else { of(it) });
+        TrueLaw { law, parameters: std::iter::once(size).chain(others).collect() }
+    }
+}
+
+impl Hypothesis for TrueLaw {
+    fn kind(&self) -> EffectKind {
+        EffectKind::Unknown
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        let law = with_numbers(self.law, &parameters[1..]);
+        let unlisted = Unlisted { law, n_per_kn: parameters[0] };
+        let samples = run.samples().iter().zip(run.recording.time_s());
+        for ((sample, &time_s), force) in samples.zip(forces) {
+            let degc = sample.ambient_temperature_degc.unwrap_or(0.0);
+            let at = |speed_mps: f64| {
+                unlisted.resistance_n_per_kn(Around { speed_mps: speed_mps.max(0.0), time_s, degc })
+            };
+            let speed_mps = sample.speed_mps;
+            let change = at(speed_mps + SLOPE_OVER_MPS) - at(speed_mps - SLOPE_OVER_MPS);
+            let slope = change / (2.0 * SLOPE_OVER_MPS);
+            force.resistance.other_n_per_kn += at(speed_mps) - slope * speed_mps;
+            force.resistance.other_per_mps += slope;
+        }
+    }
+}
+
+/// Error in m/s on the holdout runs that the true law leaves when its numbers and a, b, c are
+/// fitted to the fit runs, from the truth on and by the very fit that `explain` uses; `None` where
+/// no law of the simulator's own acts.
+pub fn attainable_mps(simulated: &SimulatedDataset, explanation: &Explanation) -> Option<f64> {
+    let unlisted = simulated.effects.iter().find_map(|effect| match effect {
+        Effect::Unlisted(unlisted) => Some(*unlisted),
+        _ => None,
+    })?;
+    let davis = simulated.train.resistance;
+    let mut start = vec![davis.a, davis.b, davis.c, unlisted.n_per_kn];
+    start.extend(numbers(unlisted.law));
+    let model = GrownModel::default().with(Arc::new(TrueLaw::new(unlisted.law)));
+    let problem = &explanation.problem;
+    let first = problem.fit_with_noise(&model, start, Noise::START);
+    let fit = problem.fit_with_noise(&model, first.theta, first.noise);
+    let errors = explanation.holdout.iter().map(|run| run_error(&fit, run, Restart::FullRun));
+    errors.sum::<SpeedError>().rmse_mps()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_put_back_where_they_came_from() {
+        let laws = [
+            Law::Band { centre_mps: 12.0, width_mps: 1.0 },
+            Law::Slow { below_mps: 15.0, least_mps: 3.0 },
+            Law::Power { at_mps: 40.0, exponent: 3.3 },
+            Law::Beyond { from_mps: 9.0, span_mps: 7.0 },
+            Law::Levelling { over_mps: 6.0 },
+            Law::FastInCold { at_mps: 20.0, until_degc: -3.0 },
+            Law::FastLater { at_mps: 20.0, from_s: 300.0 },
+        ];
+        for law in laws {
+            assert_eq!(with_numbers(law, &numbers(law)), law);
+            let parameters = TrueLaw::new(law).parameters;
+            for (own, spec) in numbers(law).iter().zip(&parameters[1..]) {
+                assert!(spec.lower < *own && *own < spec.upper, "{law:?}: {own} in {spec:?}");
+            }
+        }
+    }
+}

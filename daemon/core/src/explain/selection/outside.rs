@@ -1,0 +1,101 @@
+//! When a force is looked for outside the library: where the library leaves one, or the noise that is
+//! estimated beside an undeclared force may hold it.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::acceptance::is_possible;
+use super::price::penalty;
+use super::search::{Outcome, STIFF, Search, Trial};
+use crate::explain::effects::{Effect, UNKNOWN, a_form_explains_more, leaves_a_force};
+use crate::explain::evidence::{EQUAL, Fit, STRENGTH_MIN};
+use crate::explain::scan::Scan;
+use crate::explain::score::FitErrors;
+
+/// Noise that averages over so many s to more than this share of the basic resistance may hold a
+/// force: two to three times what it is where nothing is left.
+const NOISE_OVER_S: f64 = 60.0;
+const HOLDS_A_FORCE: f64 = 0.05;
+/// A form as it is laid out explains at least this share of what it will with its numbers sought and
+/// fitted: edges lie a quarter of the range apart.
+const COARSE_SHARE: f64 = 0.25;
+
+impl Search<'_> {
+    /// Whether a form explains more than the kind of the library that explains most, or that kind
+    /// leaves a force that has some form.
+    pub(super) fn asks_for_a_form(&self, scan: &Scan, trials: &[(Trial, &dyn Effect)]) -> bool {
+        let best = best_possible(trials);
+        let explained = best.map_or(0.0, |best| best.advantage);
+        let left = self.scan(best.map_or(scan.fit, |best| &best.fit));
+        left.is_some_and(|left| leaves_a_force(&left))
+            || a_form_explains_more(scan, explained.max(STRENGTH_MIN))
+    }
+
+    /// Puts a form that the noise holds in the place of what was tried outside the library, where it
+    /// explains more.
+    pub(super) fn take_form_that_noise_holds(
+        &self,
+        base: &Fit,
+        trials: &mut Vec<(Trial, &dyn Effect)>,
+    ) {
+        let is_unknown = |kind: EffectKind| kind == EffectKind::Unknown;
+        if base.model.effects.iter().any(|own| is_unknown(own.kind())) {
+            return;
+        }
+        let Some(form) = self.form_that_noise_holds(base, trials) else { return };
+        let own = trials.iter().find(|(trial, _)| is_unknown(trial.kind));
+        if own.is_none_or(|(own, _)| own.advantage < form.advantage) {
+            trials.retain(|(trial, _)| !is_unknown(trial.kind));
+            trials.push((form, UNKNOWN));
+        }
+    }
+
+    /// The best form under a noise too small to hold a force, where the noise of a fit may hold one
+    /// and some form explains more under the small one than the kind of the library that explains
+    /// most.
+    fn form_that_noise_holds(&self, base: &Fit, trials: &[(Trial, &dyn Effect)]) -> Option<Trial> {
+        let (_, share) = self.problem.noise_n_per_kn(base.noise, NOISE_OVER_S)?;
+        if share < HOLDS_A_FORCE {
+            return None;
+        }
+        let noise = base.noise.stiff(STIFF[0]);
+        let onto = self.problem.fit(&base.model, base.theta.clone(), noise);
+        let explained = best_possible(trials).map_or(0.0, |best| {
+            let with = self.problem.fit(&best.fit.model, best.fit.theta.clone(), noise);
+            onto.cost - with.cost - penalty(&with, best.last())
+        });
+        let scan = self.scan(&onto)?;
+        a_form_explains_more(&scan, (COARSE_SHARE * explained).max(STRENGTH_MIN))
+            .then(|| self.look_again(base, noise, UNKNOWN))
+            .flatten()
+    }
+
+    /// Looks for a form of what is left, under noises too small to hold it: the noise of a model
+    /// that lacks a large force holds that force. What is found stands in the place of everything
+    /// found before, or beside it, whichever explains more.
+    pub fn look_under_noise(&self, outcome: &mut Outcome) {
+        let models = [outcome.base.clone(), outcome.fit.clone()];
+        for base in models.iter().take(1 + usize::from(!outcome.fit.model.effects.is_empty())) {
+            if base.model.effects.iter().any(|own| own.kind() == EffectKind::Unknown) {
+                continue;
+            }
+            let before = FitErrors::of(self.problem, base);
+            for share in STIFF {
+                let noise = base.noise.stiff(share);
+                let Some(mut trial) = self.look_again(base, noise, UNKNOWN) else { continue };
+                trial.reduction = FitErrors::of(self.problem, &trial.fit).reduction_from(&before);
+                let is_better = Self::total(&trial.fit) < Self::total(&outcome.fit) - EQUAL;
+                if is_better && Self::refusal(&trial).is_none() {
+                    outcome.fit = trial.fit;
+                }
+            }
+        }
+    }
+}
+
+/// The trial that explains most of those that may be what their kinds say.
+fn best_possible<'t>(trials: &'t [(Trial, &dyn Effect)]) -> Option<&'t Trial> {
+    let trials = trials.iter().map(|(trial, _)| trial);
+    let possible =
+        trials.filter(|it| it.advantage > 0.0 && it.kind != EffectKind::Unknown && is_possible(it));
+    possible.max_by(|one, other| one.advantage.total_cmp(&other.advantage))
+}

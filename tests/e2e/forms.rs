@@ -1,0 +1,87 @@
+//! Forces by laws that no library holds, their forms and what these predict.
+
+use dynocar_core::dataset::Dataset;
+use dynocar_core::explain::answer::{Answer, Verdict};
+use dynocar_core::explain::explain;
+use dynocar_core::terms::Entry;
+use dynocar_core::terms::extra::{Covariate, Extra, Form};
+use dynocar_tests::simulator::dataset_writer::dataset_files;
+use dynocar_tests::simulator::oracle::score;
+use dynocar_tests::simulator::{
+    Effect, EffectRequest, Law, SimulatedDataset, SimulatorSettings, Unlisted, simulate,
+};
+
+/// A dataset with a force by a law drawn from the seed.
+fn simulated(seed: u64) -> (SimulatedDataset, Law) {
+    let simulated = simulate(&SimulatorSettings::new(seed, EffectRequest::AnyLaw));
+    let [Effect::Unlisted(Unlisted { law, .. })] = simulated.effects[..] else {
+        panic!("the simulator was asked for a law outside the library");
+    };
+    (simulated, law)
+}
+
+/// What is said of a force that must be called unknown, and the error over the true model's.
+fn told(simulated: &SimulatedDataset) -> (Answer, Vec<Extra>, f64) {
+    let files = dataset_files(simulated);
+    let texts: Vec<(&str, &str)> =
+        files.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
+    let dataset = Dataset::load(&texts[..]).expect("a simulated dataset");
+    let explanation = explain(&dataset, &|_, _| {}).expect("usable runs");
+    let answer = explanation.answer;
+    assert_eq!(answer.verdict, Verdict::Unknown, "{}", answer.statement);
+    let grown = explanation.grown;
+    let entries = grown.model.effects.iter().enumerate().flat_map(|(index, effect)| {
+        effect.entries(grown.effect_parameters(index)).expect("a form that files can hold")
+    });
+    let extra = entries.filter_map(|entry| match entry {
+        Entry::Extra(extra) => Some(extra),
+        _ => None,
+    });
+    let left = answer.rmse_after.expect("runs are held out") / score(simulated).full_run.true_mps;
+    (answer, extra.collect(), left)
+}
+
+#[test]
+fn the_edge_of_a_force_is_told_with_an_interval_and_a_whole_exponent_as_one() {
+    let (simulated, law) = simulated(51_007);
+    let Law::FastLater { from_s, .. } = law else { panic!("{law:?}") };
+    let (answer, extra, left) = told(&simulated);
+    let [Extra { factors, .. }] = &extra[..] else { panic!("{}", answer.statement) };
+    let [speed, time] = factors[..] else { panic!("{}", answer.statement) };
+    assert_eq!((speed.of, speed.form, speed.numbers[1]), (Covariate::Speed, Form::Power, 1.0));
+    assert_eq!((time.of, time.form), (Covariate::TimeSinceStart, Form::From));
+    let known = answer.effects[0].place.uncertainty_95.as_ref().and_then(|it| it.range);
+    let [Some([low_s, high_s]), None] = known.expect("an edge") else { panic!("{known:?}") };
+    assert!(low_s <= from_s && from_s <= high_s, "{from_s} in {low_s} to {high_s} s");
+    assert!(high_s - low_s < 10.0, "{low_s} to {high_s} s");
+    assert!(left < 1.2, "{left} of the true model's error");
+}
+
+#[test]
+fn a_force_in_the_cold_is_told_where_a_library_kind_runs_to_its_bound() {
+    let (simulated, law) = simulated(41_014);
+    assert!(matches!(law, Law::FastInCold { .. }), "{law:?}");
+    let (answer, extra, left) = told(&simulated);
+    let [Extra { factors, .. }] = &extra[..] else { panic!("{}", answer.statement) };
+    let of: Vec<Covariate> = factors.iter().map(|factor| factor.of).collect();
+    assert_eq!(of, [Covariate::Speed, Covariate::Temperature], "{}", answer.statement);
+    assert!(left < 1.3, "{left} of the true model's error");
+}
+
+#[test]
+fn a_force_that_rises_to_a_level_is_told_though_no_basic_resistance_may_hold_the_level() {
+    let (simulated, law) = simulated(51_006);
+    assert!(matches!(law, Law::Levelling { .. }), "{law:?}");
+    let (answer, extra, left) = told(&simulated);
+    let [Extra { factors, .. }] = &extra[..] else { panic!("{}", answer.statement) };
+    assert_eq!((factors[0].of, factors[0].form), (Covariate::Speed, Form::Rise));
+    assert!(left < 1.2, "{left} of the true model's error");
+}
+
+#[test]
+fn a_force_that_the_noise_would_hold_is_told() {
+    let (simulated, law) = simulated(71_005);
+    assert!(matches!(law, Law::FastLater { .. }), "{law:?}");
+    let (answer, _, left) = told(&simulated);
+    assert!(left < 1.3, "{left} of the true model's error: {}", answer.statement);
+}
