@@ -243,6 +243,7 @@ class Explanation(_Answer):
     error_reduction_interval: list[float] | None  # 95 %
     unexplained_n_per_kn: float | None
     considered: list[Record]
+    identifiability: list[Record]  # kind, parameter, std at no effect, told, alike
 
     def __init__(self, native: _native.Explained) -> None:
         super().__init__(json.loads(native.json()), native.text())
