@@ -46,12 +46,18 @@ fn the_edge_of_a_force_is_told_with_an_interval_and_a_whole_exponent_as_one() {
     let (simulated, law) = simulated(51_007);
     let Law::FastLater { from_s, .. } = law else { panic!("{law:?}") };
     let (answer, extra, left) = told(&simulated);
-    let [Extra { factors, .. }] = &extra[..] else { panic!("{}", answer.statement) };
+    let [Extra { n_per_kn, factors }] = &extra[..] else { panic!("{}", answer.statement) };
     let [speed, time] = factors[..] else { panic!("{}", answer.statement) };
     assert_eq!((speed.of, speed.form, speed.numbers[1]), (Covariate::Speed, Form::Power, 1.0));
-    assert_eq!((time.of, time.form), (Covariate::TimeSinceStart, Form::From));
+    assert_eq!(time.of, Covariate::TimeSinceStart);
     let known = answer.effects[0].place.uncertainty_95.as_ref().and_then(|it| it.range);
-    let [Some([low_s, high_s]), None] = known.expect("an edge") else { panic!("{known:?}") };
+    // More from the edge on is less up to it with another b.
+    let ([low_s, high_s], is_more) = match (time.form, known.expect("an edge")) {
+        (Form::From, [Some(edge), None]) => (edge, *n_per_kn > 0.0),
+        (Form::UpTo, [None, Some(edge)]) => (edge, *n_per_kn < 0.0),
+        other => panic!("{other:?}"),
+    };
+    assert!(is_more, "{n_per_kn} N/kN: {}", answer.statement);
     assert!(low_s <= from_s && from_s <= high_s, "{from_s} in {low_s} to {high_s} s");
     assert!(high_s - low_s < 10.0, "{low_s} to {high_s} s");
     assert!(left < 1.2, "{left} of the true model's error");

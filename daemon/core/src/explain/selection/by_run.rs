@@ -6,16 +6,18 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use crate::explain::answer::HALF_95;
 use crate::explain::evidence::{Fit, FitProblem, RunData, RunNormal};
 
+/// A parameter at its bound is held there to this share of what is looked for.
+const HELD_SHARE: f64 = 1e-4;
 /// Less runs than these tell nothing of each other.
 const RUNS_MIN: usize = 2;
 
 /// By how much the parameters move when each run is left out, to second order; `None` for a run
 /// without which they are not determined.
 fn moves_without_each_run(fit: &Fit) -> Vec<Option<DVector<f64>>> {
-    let (information, score) = (fit.information(), fit.score());
+    let information = fit.information();
     let moved = |run: &RunNormal| {
         let rest = Cholesky::new(&information - &run.information)?;
-        Some(rest.solve(&(&score - &run.score)))
+        Some(-rest.solve(&run.score))
     };
     fit.runs.iter().map(moved).collect()
 }
@@ -40,8 +42,15 @@ pub fn without_each_run(problem: &FitProblem, fit: &Fit) -> Vec<Vec<f64>> {
         };
         for (parameter, (i, spec)) in range.zip(effect.parameters()).enumerate() {
             bounds[i] = (acts(parameter) > 1).then_some((spec.lower, spec.upper));
+            let width = spec.upper - spec.lower;
+            let at_bound = |bound: f64| (fit.theta[i] - bound).abs() < spec.step;
+            if at_bound(spec.lower) || at_bound(spec.upper) {
+                // What is pushed against a bound by all stays there.
+                information[(i, i)] += (HELD_SHARE * width).powi(-2);
+                continue;
+            }
             // As wide as what is looked for: a flat prior's variance.
-            let weight = 12.0 / (spec.upper - spec.lower).powi(2);
+            let weight = 12.0 / width.powi(2);
             information[(i, i)] += weight;
             pull[i] += weight * (effect.none() - fit.theta[i]);
         }

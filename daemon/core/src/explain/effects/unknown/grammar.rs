@@ -8,7 +8,6 @@ use super::form::{FormForce, choice_cost};
 use super::known::Known;
 use super::shape::{Ground, Tried};
 use crate::explain::effects::Candidate;
-use crate::explain::evidence::EQUAL;
 use crate::explain::scan::Scan;
 use crate::terms::extra::{Covariate, Extra, Factor, Form};
 
@@ -41,7 +40,7 @@ pub fn forms(scan: &Scan) -> Vec<Candidate> {
         .into_iter()
         .take(REFINED)
         .flat_map(|one| {
-            let refined = resisting(&ground, ground.refined(one));
+            let refined = ground.refined(one);
             let whole = with_whole_exponent(&ground, &refined);
             std::iter::once(refined).chain(whole)
         })
@@ -114,28 +113,6 @@ fn with_whole_exponent(ground: &Ground, one: &Tried) -> Option<Tried> {
         ground.refined(ground.tried(factors, true))
     });
     whole.into_iter().max_by(|one, other| one.gain.total_cmp(&other.gain))
-}
-
-/// A force on one side of an edge, where a, b and c can hold the other side as well: the side on which
-/// something resists, and not the one on which something pushes.
-fn resisting(ground: &Ground, one: Tried) -> Tried {
-    let Some(other_side) = one.factors.last().and_then(|last| match last.form {
-        Form::From => Some(Form::UpTo),
-        Form::UpTo => Some(Form::From),
-        _ => None,
-    }) else {
-        return one;
-    };
-    if one.n_per_kn > 0.0 {
-        return one;
-    }
-    let mut factors = one.factors.clone();
-    if let Some(last) = factors.last_mut() {
-        last.form = other_side;
-    }
-    let mirrored = ground.tried(factors, one.holds_exponents);
-    let is_as_good = mirrored.n_per_kn > 0.0 && mirrored.gain > one.gain - EQUAL;
-    if is_as_good { mirrored } else { one }
 }
 
 fn sort(tried: &mut [Tried]) {
