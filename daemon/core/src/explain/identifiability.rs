@@ -8,30 +8,15 @@ use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{Cholesky, DMatrix};
 
 use super::answer::{HALF_95, Identifiability};
-use super::effects::{Candidate, LIBRARY, Proposal};
+use super::effects::{Candidate, LIBRARY};
 use super::rivals::{is_in, separating_run, telling_runs};
 use super::selection::{Outcome, Search};
 
-/// The kinds that are one number of the whole train or line, and not found, each at no effect.
+/// The kinds that are one number of the whole train or line, and not found.
 fn whole_kinds(search: &Search, outcome: &Outcome) -> Vec<Candidate> {
     let Some(scan) = search.scan(&outcome.fit) else { return Vec::new() };
-    let is_whole = |candidate: &Candidate| {
-        let hypothesis = &candidate.hypothesis;
-        hypothesis.parameters().len() == 1
-            && hypothesis.ends().is_empty()
-            && !hypothesis.is_event()
-            && hypothesis.formula(&candidate.start).is_none()
-    };
-    LIBRARY
-        .iter()
-        .filter(|effect| {
-            effect.kind() != EffectKind::Unknown && !is_in(&outcome.fit, effect.kind())
-        })
-        .filter_map(|effect| match effect.propose(&scan) {
-            Proposal::Candidates(candidates) => candidates.into_iter().find(is_whole),
-            Proposal::NotTestable(_) => None,
-        })
-        .collect()
+    let others = LIBRARY.iter().filter(|effect| !is_in(&outcome.fit, effect.kind()));
+    others.filter_map(|effect| effect.whole(&scan)).collect()
 }
 
 /// What the data say of each number that was not found.

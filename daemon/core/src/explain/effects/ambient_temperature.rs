@@ -48,6 +48,10 @@ impl Effect for AmbientTemperature {
         }
         Proposal::Candidates(vec![Candidate::new(Linear, vec![0.0])])
     }
+
+    fn whole(&self, scan: &Scan) -> Option<Candidate> {
+        self.propose(scan).first()
+    }
 }
 
 impl Hypothesis for Linear {

@@ -38,6 +38,10 @@ impl Effect for CurveResistance {
             vec![declared_k],
         )])
     }
+
+    fn whole(&self, scan: &Scan) -> Option<Candidate> {
+        self.propose(scan).first()
+    }
 }
 
 impl Hypothesis for Curves {

@@ -28,10 +28,9 @@ impl Effect for GradientShift {
     }
 
     fn propose(&self, scan: &Scan) -> Proposal {
-        let Some(track) = scan.track.filter(|track| track.gradient().is_some()) else {
+        let Some(hypothesis) = shift(scan) else {
             return Proposal::NotTestable("no gradient profile over the chainage".into());
         };
-        let hypothesis = Shift { track: Arc::clone(track), length_m: scan.train.length_m };
         let mut best: Option<(f64, f64)> = None;
         let count = (gradient::SHIFT_MAX_M / GRID_M) as i32;
         for k in (-count..=count).filter(|&k| k != 0) {
@@ -54,6 +53,16 @@ impl Effect for GradientShift {
         };
         Proposal::Candidates(vec![Candidate::new(hypothesis, vec![shift_m])])
     }
+
+    fn whole(&self, scan: &Scan) -> Option<Candidate> {
+        Some(Candidate::new(shift(scan)?, vec![0.0]))
+    }
+}
+
+/// The declared gradient elsewhere; `None` where the line has none.
+fn shift(scan: &Scan) -> Option<Shift> {
+    let track = scan.track.filter(|track| track.gradient().is_some())?;
+    Some(Shift { track: Arc::clone(track), length_m: scan.train.length_m })
 }
 
 impl Shift {

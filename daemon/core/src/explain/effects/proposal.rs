@@ -32,6 +32,16 @@ pub enum Proposal {
     NotTestable(String),
 }
 
+impl Proposal {
+    /// The first structure, where there is one.
+    pub fn first(self) -> Option<Candidate> {
+        match self {
+            Proposal::Candidates(candidates) => candidates.into_iter().next(),
+            Proposal::NotTestable(_) => None,
+        }
+    }
+}
+
 /// A kind of effect.
 pub trait Effect: Send + Sync {
     /// Its name.
@@ -39,4 +49,10 @@ pub trait Effect: Send + Sync {
 
     /// Structures for the data at hand, given what the current model leaves.
     fn propose(&self, scan: &Scan) -> Proposal;
+
+    /// The kind as one number of the whole train or line, with no place or run chosen; `None` where it
+    /// is none, and where the data do not allow to test it.
+    fn whole(&self, _scan: &Scan) -> Option<Candidate> {
+        None
+    }
 }

@@ -25,6 +25,10 @@ impl Effect for RotatingMass {
         let declared = scan.train.rotating_mass_factor;
         Proposal::Candidates(vec![Candidate::new(Gamma { declared }, vec![declared])])
     }
+
+    fn whole(&self, scan: &Scan) -> Option<Candidate> {
+        self.propose(scan).first()
+    }
 }
 
 impl Hypothesis for Gamma {

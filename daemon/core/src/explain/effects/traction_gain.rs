@@ -26,6 +26,10 @@ impl Effect for TractionGain {
         }
         Proposal::Candidates(vec![Candidate::new(Gain, vec![1.0])])
     }
+
+    fn whole(&self, scan: &Scan) -> Option<Candidate> {
+        self.propose(scan).first()
+    }
 }
 
 impl Hypothesis for Gain {

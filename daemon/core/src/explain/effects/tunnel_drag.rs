@@ -17,6 +17,7 @@ use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{End, Inside, Stretches, find};
 use crate::explain::scan::Scan;
 use crate::terms::{place, tunnel};
+use crate::track::Track;
 
 /// Motion in s inside mapped tunnels that tells of them.
 const MAPPED_MIN_S: f64 = 10.0;
@@ -43,19 +44,10 @@ impl Effect for TunnelDrag {
 
     fn propose(&self, scan: &Scan) -> Proposal {
         let length_m = scan.train.length_m;
-        let inside_s = scan.seconds_where(|_, sample| sample.tunnel_share.is_some_and(|s| s > 0.0));
         let Some(track) = scan.track else {
             return Proposal::NotTestable("the line is not known".into());
         };
-        let mapped_m: Vec<[f64; 2]> =
-            track.tunnels().iter().map(|tunnel| [tunnel.start_m, tunnel.end_m]).collect();
-        let mut candidates = Vec::new();
-        if inside_s > MAPPED_MIN_S {
-            let mapped_m = mapped_m.clone();
-            let mapped =
-                Tunnels { found: None, length_m, mapped_m, choice_cost: 0.0, map_error: 0.0 };
-            candidates.push(Candidate::new(mapped, vec![0.0]));
-        }
+        let mut candidates: Vec<Candidate> = self.whole(scan).into_iter().collect();
         let inside = Inside::Share { length_m };
         let shape = |run: &RunData, i: usize| {
             let speed = run.smooth_mps[i];
@@ -68,13 +60,30 @@ impl Effect for TunnelDrag {
         let hypothesis = Tunnels {
             found: Some(found.stretches()),
             length_m,
-            mapped_m,
+            mapped_m: mapped_m(track),
             choice_cost: found.choice_cost + UNMAPPED_COST,
             map_error: found.map_error,
         };
         candidates.push(Candidate::new(hypothesis, vec![found.estimate]));
         Proposal::Candidates(candidates)
     }
+
+    fn whole(&self, scan: &Scan) -> Option<Candidate> {
+        let inside_s = scan.seconds_where(|_, sample| sample.tunnel_share.is_some_and(|s| s > 0.0));
+        let mapped = Tunnels {
+            found: None,
+            length_m: scan.train.length_m,
+            mapped_m: mapped_m(scan.track?),
+            choice_cost: 0.0,
+            map_error: 0.0,
+        };
+        (inside_s > MAPPED_MIN_S).then(|| Candidate::new(mapped, vec![0.0]))
+    }
+}
+
+/// Chainages in m of the mapped tunnels.
+fn mapped_m(track: &Track) -> Vec<[f64; 2]> {
+    track.tunnels().iter().map(|tunnel| [tunnel.start_m, tunnel.end_m]).collect()
 }
 
 impl Hypothesis for Tunnels {

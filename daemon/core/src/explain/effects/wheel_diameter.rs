@@ -25,6 +25,10 @@ impl Effect for WheelDiameter {
         }
         Proposal::Candidates(vec![Candidate::new(Scale, vec![1.0])])
     }
+
+    fn whole(&self, scan: &Scan) -> Option<Candidate> {
+        self.propose(scan).first()
+    }
 }
 
 impl Hypothesis for Scale {

@@ -51,6 +51,10 @@ impl Effect for Wind {
         }
         Proposal::Candidates(candidates)
     }
+
+    fn whole(&self, scan: &Scan) -> Option<Candidate> {
+        self.propose(scan).first()
+    }
 }
 
 fn blow(wind_plus_mps: f64, run: &RunData, forces: &mut [SampleForces]) {

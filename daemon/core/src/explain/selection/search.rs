@@ -25,8 +25,10 @@ const FINALISTS: usize = 5;
 /// A finalist's advantage: not far below none, and no less than this share of the greatest.
 const FINALIST_MIN: f64 = -20.0;
 const FINALIST_SHARE: f64 = 0.1;
-/// Kinds that take away this share of the open-loop error come before the others.
+/// Kinds that take away this share of the open-loop error come before the others, and are all that is
+/// looked at again beyond this number of observations, where small things are significant.
 const FINALIST_REDUCTION: f64 = 0.02;
+const MANY_OBSERVATIONS: usize = 5_000;
 /// Shares of the slow part of a noise under which a kind looks again.
 pub(super) const STIFF: [f64; 2] = [0.01, 1e-4];
 /// Less observations than this tell nothing.
@@ -193,11 +195,13 @@ impl Search<'_> {
         });
         let greatest = trials.first().map_or(0.0, |(trial, _)| trial.advantage);
         let least = FINALIST_MIN.max(FINALIST_SHARE * greatest);
+        let is_long = base.observations() > MANY_OBSERVATIONS;
         let mut finished: Vec<Trial> = trials
             .into_iter()
             .enumerate()
             .map(|(rank, (trial, effect))| {
-                let is_finalist = rank < FINALISTS && trial.advantage > least;
+                let is_finalist =
+                    rank < FINALISTS && trial.advantage > least && (helps(&trial) || !is_long);
                 let share = base.model.effects.len() as f64
                     + (rank.min(FINALISTS) + 2) as f64 / (FINALISTS + 2) as f64;
                 (self.progress)((0.1 + 0.25 * share).min(0.85), trial.kind.name());

@@ -7,7 +7,7 @@ mod search;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Effect, Proposal};
+use super::{Candidate, Effect, Proposal};
 use crate::explain::scan::Scan;
 use search::{all_sections, all_windows, everywhere, grow};
 
@@ -26,7 +26,11 @@ impl Effect for MassChange {
             candidates.extend(grow(scan, &sections));
         }
         candidates.extend(grow(scan, &all_windows(scan)));
-        candidates.extend(everywhere(scan));
+        candidates.extend(self.whole(scan));
         Proposal::Candidates(candidates)
+    }
+
+    fn whole(&self, scan: &Scan) -> Option<Candidate> {
+        everywhere(scan)
     }
 }
