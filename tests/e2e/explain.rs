@@ -37,6 +37,18 @@ fn nothing_undeclared_is_called_nothing() {
 }
 
 #[test]
+fn what_one_run_alone_tells_is_found_where_the_others_gain_nothing_from_it() {
+    // Only one fit run goes on over one of the two sections: left out, the others say nothing of it.
+    let request = EffectRequest::Kinds(vec![EffectKind::MassChange]);
+    let simulated = simulate(&SimulatorSettings::new(9005, request));
+    let folder = tempfile::tempdir().unwrap();
+    let answer = explained(&simulated, folder.path()).answer;
+    let kinds: Vec<&str> = answer.effects.iter().map(|effect| effect.kind).collect();
+    assert_eq!((answer.verdict, &kinds[..]), (Verdict::Effect, &["mass_change"][..]));
+    assert!(answer.rmse_after.unwrap() < 0.2 * answer.rmse_before.unwrap(), "{}", answer.statement);
+}
+
+#[test]
 fn a_curve_resistance_is_found_and_the_grown_files_leave_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let simulated = with_kinds(&[EffectKind::CurveResistance]);

@@ -1,6 +1,7 @@
 //! What else was considered, and why it lost.
 
 use dynocar_core::explain::evidence::STRENGTH_MIN;
+use dynocar_core::explain::identifiability::not_held;
 
 use super::Section;
 use crate::report::Subject;
@@ -46,6 +47,10 @@ pub fn section(subject: &Subject) -> Section {
         body += "<p>The runs hold too little motion for any of them.</p>\n";
     } else {
         body += &table.html();
+    }
+    let not_held = not_held(&subject.explanation.answer.identifiability);
+    if !not_held.is_empty() {
+        body += &format!("<p>{}</p>\n", escape(not_held.trim()));
     }
     let forms = subject.explanation.answer.effects.iter().flat_map(|effect| &effect.runners_up);
     let forms: Vec<String> = forms
