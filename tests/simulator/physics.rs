@@ -162,6 +162,25 @@ fn cars_feel_the_line_one_after_the_other() {
 }
 
 #[test]
+fn couplings_move_the_leading_car_and_not_the_train() {
+    for (rigid, train_type) in IDEAL.iter().zip(TrainType::ALL) {
+        let coupled = SimulatorSettings { has_couplings: true, ..rigid.settings.clone() };
+        let coupled = simulate(&coupled);
+        for (one, other) in rigid.runs.iter().zip(&coupled.runs) {
+            let moved = |(one, other): (&TrueState, &TrueState)| {
+                assert_eq!((one.position_m, one.speed_mps), (other.position_m, other.speed_mps));
+                other.wheel_speed_mps - one.wheel_speed_mps
+            };
+            let away_mps: Vec<f64> = one.states.iter().zip(&other.states).map(moved).collect();
+            let most_mps = away_mps.iter().fold(0.0_f64, |most, away| most.max(away.abs()));
+            let way_m = away_mps.iter().sum::<f64>() * TRUE_STEP_S;
+            assert!((1e-3..1.0).contains(&most_mps), "{train_type:?}: {most_mps} m/s");
+            assert!(way_m.abs() < 2.0, "{train_type:?}: the leading car is {way_m} m ahead");
+        }
+    }
+}
+
+#[test]
 fn the_declared_model_predicts_an_ideal_null_recording() {
     for dataset in IDEAL.iter() {
         let score = oracle::score(dataset);

@@ -16,12 +16,15 @@ pub struct Case {
     pub scenario: Scenario,
     /// The seed.
     pub seed: u64,
+    /// Trains of cars on couplings, in a wind of each day that nobody declares.
+    pub is_coupled: bool,
 }
 
 impl Case {
     /// Simulates the case.
     pub fn simulate(&self) -> SimulatedDataset {
-        simulate(&self.scenario.settings(self.seed))
+        let ordinary = self.scenario.settings(self.seed);
+        simulate(&if self.is_coupled { ordinary.coupled() } else { ordinary })
     }
 
     /// Writes the dataset, with its truth beside it, as `<kind>-<seed>` into a folder.

@@ -24,12 +24,15 @@ pub struct ExplainArguments {
     /// Only this kind, as tunnel_drag, or none, two_effects, poor_recording; may be repeated
     #[arg(long = "kind", value_name = "NAME")]
     kinds: Vec<String>,
+    /// Trains of cars on couplings instead of rigid ones, in a wind of each day that nobody declares
+    #[arg(long)]
+    coupled: bool,
     /// Datasets at a time
     #[arg(long, default_value_t = 2)]
     threads: usize,
     /// Instead of the matrix, the time for 1, 4 and 16 times the data: one dataset of each kind
     /// (none, tunnel_drag, dragging_brake and wind unless chosen) with more runs, then longer ones
-    #[arg(long, conflicts_with_all = ["seeds", "threads", "write", "verbose"])]
+    #[arg(long, conflicts_with_all = ["seeds", "threads", "write", "verbose", "coupled"])]
     growth: bool,
     /// Tell the outcome of every dataset on standard error
     #[arg(long)]
@@ -68,8 +71,12 @@ pub fn explain(arguments: &ExplainArguments) -> Result<(), (String, u8)> {
         });
         return give(&arguments.json, &sizes, || growth::table(&sizes));
     }
+    let mut cases = matrix::cases(&scenarios, seeds, first);
+    for case in &mut cases {
+        case.is_coupled = arguments.coupled;
+    }
     if let Some(folder) = &arguments.write {
-        for case in matrix::cases(&scenarios, seeds, first) {
+        for case in &cases {
             case.write(folder).map_err(|error| (format!("{}: {error}", folder.display()), 1))?;
         }
     }
@@ -78,7 +85,7 @@ pub fn explain(arguments: &ExplainArguments) -> Result<(), (String, u8)> {
             tell(case, grade);
         }
     };
-    let matrix = matrix::run(&scenarios, seeds, first, arguments.threads.max(1), &tell);
+    let matrix = matrix::run(&scenarios, &cases, arguments.threads.max(1), &tell);
     give(&arguments.json, &matrix, || matrix::table(&matrix))
 }
 

@@ -1,7 +1,7 @@
 //! An answer against the truth.
 
 use dynocar_core::explain::Explanation;
-use dynocar_core::explain::answer::Answer;
+use dynocar_core::explain::answer::{Answer, HALF_95};
 use dynocar_core::track::LinearProfile;
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};
@@ -47,6 +47,13 @@ pub struct ParameterGrade {
     pub error: f64,
     /// Error over the standard deviation.
     pub z: f64,
+}
+
+impl ParameterGrade {
+    /// True when the 95 % interval holds the truth.
+    pub fn is_held(&self) -> bool {
+        self.z.abs() < HALF_95
+    }
 }
 
 /// Grades an explanation; `rival` is a kind that is hardly told from the one that acts.

@@ -31,6 +31,8 @@ pub struct KindRow {
     pub parameter_error: Option<f64>,
     /// Share of the 95 % intervals that hold the truth.
     pub coverage: Option<f64>,
+    /// Root mean square of the parameters' errors over their standard deviations.
+    pub z_rms: Option<f64>,
     /// Median share of the attainable reduction of the error on the holdout runs.
     pub error_reduction_share: Option<f64>,
     /// Share of all answers that leave at most a tenth more error than the true model.
@@ -57,8 +59,19 @@ pub struct FalseAlarms {
 pub struct Matrix {
     /// By kind.
     pub kinds: Vec<KindRow>,
+    /// 95 % intervals of parameters over all kinds, those of a profile or a list together as one.
+    pub intervals: Intervals,
     /// On nulls.
     pub false_alarms: FalseAlarms,
+}
+
+/// 95 % intervals.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Intervals {
+    /// All.
+    pub all: usize,
+    /// Those that hold the truth; shares of lists added up.
+    pub held: f64,
 }
 
 /// The middle of some values, the upper one of two.
@@ -70,27 +83,25 @@ pub fn median(mut values: Vec<f64>) -> Option<f64> {
     Some(values[values.len() / 2])
 }
 
-/// Every scenario with every seed, scenario by scenario.
+/// Every scenario with every seed, scenario by scenario; with rigid trains.
 pub fn cases(scenarios: &[Scenario], seeds: usize, first_seed: u64) -> Vec<Case> {
-    scenarios
-        .iter()
-        .flat_map(|&scenario| {
-            (0..seeds).map(move |k| Case { scenario, seed: first_seed + k as u64 })
-        })
-        .collect()
+    let of = |scenario: Scenario| {
+        let seeds = first_seed..first_seed + seeds as u64;
+        seeds.map(move |seed| Case { scenario, seed, is_coupled: false })
+    };
+    scenarios.iter().flat_map(|&scenario| of(scenario)).collect()
 }
 
-/// Runs the matrix: each scenario over seeds from `first_seed`, on `threads` threads. Every finished
-/// case is told to `tell`.
+/// Runs the matrix over [`cases`] of these scenarios, on `threads` threads. Every finished case is
+/// told to `tell`.
 pub fn run(
     scenarios: &[Scenario],
-    seeds: usize,
-    first_seed: u64,
+    cases: &[Case],
     threads: usize,
     tell: &(dyn Fn(&Case, &Grade) + Sync),
 ) -> Matrix {
-    let cases = cases(scenarios, seeds, first_seed);
-    let grades = over(&cases, threads, |case| {
+    let seeds = cases.len() / scenarios.len().max(1);
+    let grades = over(cases, threads, |case| {
         let simulated = case.simulate();
         let explanation = explained(&read(&simulated));
         let graded = grade(&simulated, case.scenario.rival(), &explanation);
@@ -103,6 +114,7 @@ pub fn run(
     let strengths = nulls.clone().flat_map(|(_, grades)| grades.iter().map(|g| g.strength));
     let strengths: Vec<f64> = strengths.collect();
     Matrix {
+        intervals: intervals(&grades),
         false_alarms: FalseAlarms {
             runs: nulls.map(|(_, grades)| grades.len()).sum(),
             raised: raised.sum(),
@@ -119,6 +131,11 @@ fn quantiles(mut values: Vec<f64>) -> Vec<(f64, f64)> {
     [0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 1.0].into_iter().filter_map(at).collect()
 }
 
+fn root_mean_square(all: impl ExactSizeIterator<Item = f64>) -> Option<f64> {
+    let count = all.len() as f64;
+    (count > 0.0).then(|| (all.map(|one| one * one).sum::<f64>() / count).sqrt())
+}
+
 /// Share of what is true; `None` of nothing.
 fn share_of(all: impl Iterator<Item = bool>) -> Option<f64> {
     let (mut count, mut held) = (0, 0);
@@ -127,6 +144,20 @@ fn share_of(all: impl Iterator<Item = bool>) -> Option<f64> {
         held += usize::from(own);
     }
     (count > 0).then(|| f64::from(held as u32) / f64::from(count))
+}
+
+fn intervals(grades: &[Grade]) -> Intervals {
+    let mut of_all = Intervals::default();
+    for grade in grades.iter().filter(|grade| grade.is_right) {
+        let mut lists: BTreeMap<&str, Vec<bool>> = BTreeMap::new();
+        for parameter in &grade.parameters {
+            lists.entry(&parameter.name).or_default().push(parameter.is_held());
+        }
+        of_all.all += lists.len();
+        of_all.held +=
+            lists.into_values().filter_map(|list| share_of(list.into_iter())).sum::<f64>();
+    }
+    of_all
 }
 
 fn row(kind: &str, grades: &[Grade]) -> KindRow {
@@ -145,7 +176,8 @@ fn row(kind: &str, grades: &[Grade]) -> KindRow {
         iou: median(right.iter().filter_map(|grade| grade.iou).collect()),
         place_coverage: share_of(right.iter().flat_map(|grade| grade.ends_held.iter().copied())),
         parameter_error: median(parameters.iter().map(|p| p.error.abs()).collect()),
-        coverage: share_of(parameters.iter().map(|parameter| parameter.z.abs() < 1.96)),
+        coverage: share_of(parameters.iter().map(|parameter| parameter.is_held())),
+        z_rms: root_mean_square(parameters.iter().map(|parameter| parameter.z)),
         within_a_tenth: share_of(
             grades.iter().filter_map(|grade| grade.left_ratio).map(|ratio| ratio <= NEAR),
         ),
@@ -163,14 +195,14 @@ fn row(kind: &str, grades: &[Grade]) -> KindRow {
 /// The matrix as a table for people.
 pub fn table(matrix: &Matrix) -> String {
     let mut text = String::from(
-        "kind                  right      IoU   ends  error  cover  share  tenth  (law   of it)  named instead\n",
+        "kind                  right      IoU   ends  error  cover      z  share  tenth  (law   of it)  named instead\n",
     );
     let shown = |value: Option<f64>| value.map_or("     -".into(), |value| format!("{value:6.3}"));
     for row in &matrix.kinds {
         let confused: Vec<String> =
             row.confused_with.iter().map(|(named, count)| format!("{named} {count}")).collect();
         text += &format!(
-            "{:20} {:3}/{:<3} {} {} {} {} {} {} {} {}  {}\n",
+            "{:20} {:3}/{:<3} {} {} {} {} {} {} {} {} {}  {}\n",
             row.kind,
             row.right,
             row.runs,
@@ -178,12 +210,19 @@ pub fn table(matrix: &Matrix) -> String {
             shown(row.place_coverage),
             shown(row.parameter_error),
             shown(row.coverage),
+            shown(row.z_rms),
             shown(row.error_reduction_share),
             shown(row.within_a_tenth),
             shown(row.attainable_within_a_tenth),
             shown(row.within_a_tenth_of_attainable),
             confused.join(", ")
         );
+    }
+    let Intervals { all, held } = matrix.intervals;
+    if all > 0 {
+        let share = 100.0 * held / all as f64;
+        text +=
+            &format!("95 % intervals of parameters that hold the truth: {share:.1} % of {all}\n");
     }
     let FalseAlarms { runs, raised, strength_quantiles } = &matrix.false_alarms;
     text += &format!("false alarms: {raised} of {runs}\n");

@@ -149,6 +149,10 @@ impl Disturbances {
         let mut of_run = Random::new(settings.seed, Stream::Variation(plan.number));
         self.resistance_factor = 1.0 + 0.01 * factor * of_run.gaussian();
         self.force_reading_factor = 1.0 + 0.002 * factor * of_run.gaussian();
+        let daily_mps = settings.daily_wind_sd_mps;
+        self.headwind_mps =
+            daily_mps * Random::new(settings.seed, Stream::Day(plan.number)).gaussian();
+        self.gust_sd_mps = daily_mps;
         let mut survey = Random::new(settings.seed, Stream::Survey);
         let surveyed: Vec<(f64, f64)> = self
             .gradient
@@ -168,8 +172,8 @@ impl Disturbances {
             }
             Effect::Wind { wind_plus_mps, run_sd_mps, gust_sd_mps } => {
                 let of_the_day = Random::new(seed, Stream::Gusts(plan.number)).gaussian();
-                self.headwind_mps = plan.direction * wind_plus_mps + run_sd_mps * of_the_day;
-                self.gust_sd_mps = *gust_sd_mps;
+                self.headwind_mps += plan.direction * wind_plus_mps + run_sd_mps * of_the_day;
+                self.gust_sd_mps = self.gust_sd_mps.max(*gust_sd_mps);
             }
             Effect::DraggingBrake { force_n, windows, residual_pressure_pa } => {
                 self.drag_force_n = *force_n;

@@ -12,13 +12,15 @@
 //! - [`train_maker`], [`line_maker`], [`run_maker`]: what there is
 //! - [`effects`], [`unlisted`], [`effect_maker`], [`disturbances`]: what is undeclared, and what it
 //!   changes
-//! - [`driving`], [`permitted_speed`], [`driver`], [`actuators`], [`dynamics`], [`true_run`]: what happens
+//! - [`driving`], [`permitted_speed`], [`driver`], [`actuators`], [`dynamics`], [`true_run`],
+//!   [`couplings`]: what happens
 //! - [`sensors`], [`defects`], [`gnss`]: what is recorded of it
 //! - [`truth`], [`oracle`]: what a perfect explainer would find, and how well it would predict
 //! - [`columns`], [`dataset_writer`]: the recording as a dataset folder
 
 pub mod actuators;
 pub mod columns;
+pub mod couplings;
 pub mod dataset_writer;
 pub mod defects;
 pub mod disturbances;
@@ -220,7 +222,10 @@ fn simulate_run(
     let stream = |stream: Stream| Random::new(settings.seed, stream);
     let disturbances = Disturbances::of(effects, train, line, &plan, settings);
     let physics = TruePhysics { train, line, plan: &plan, disturbances: &disturbances };
-    let states = drive_run(&physics, settings);
+    let mut states = drive_run(&physics, settings);
+    if settings.has_couplings {
+        couplings::move_leading_car(&physics, &mut states);
+    }
     let clean = measure_run(
         &states,
         &plan,

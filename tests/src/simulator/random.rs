@@ -27,6 +27,8 @@ pub enum Stream {
     Survey,
     /// What differs from run to run without being planned.
     Variation(usize),
+    /// The wind of a run's day.
+    Day(usize),
     /// Gusts of wind in a run.
     Gusts(usize),
     /// The driver of a run.
@@ -53,6 +55,7 @@ impl Stream {
             Stream::SensorTypes => 11,
             Stream::Survey => 12,
             Stream::Variation(run) => of_run(13, run),
+            Stream::Day(run) => of_run(15, run),
             Stream::Gusts(run) => of_run(6, run),
             Stream::Driver(run) => of_run(7, run),
             Stream::Slip(run) => of_run(8, run),

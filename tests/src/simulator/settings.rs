@@ -135,6 +135,11 @@ pub struct SimulatorSettings {
     /// each gradient (standard deviation 0.05 ‰), and from run to run the calibration of the
     /// forces (0.2 %) and the basic resistance (1 %).
     pub hidden_variation: f64,
+    /// Cars on couplings instead of a rigid train: the leading one, which carries the tacho, moves
+    /// against the others.
+    pub has_couplings: bool,
+    /// Spread in m/s of a wind of each run that nobody declares; its gusts spread as much.
+    pub daily_wind_sd_mps: f64,
     /// Wheel-slip events that a run has on average, where traction allows.
     pub wheel_slips_per_run: f64,
     /// What goes wrong between sensors and file.
@@ -195,6 +200,8 @@ impl SimulatorSettings {
             is_level_and_straight: false,
             maps_tunnels: true,
             hidden_variation: 1.0,
+            has_couplings: false,
+            daily_wind_sd_mps: 0.0,
             wheel_slips_per_run: 0.25,
             defects: Defects::NONE,
             gnss: None,
@@ -213,5 +220,10 @@ impl SimulatorSettings {
             wheel_slips_per_run: 0.0,
             ..SimulatorSettings::new(seed, effects)
         }
+    }
+
+    /// The same with cars on couplings, and winds of 0.7 m/s that nobody declares.
+    pub fn coupled(self) -> Self {
+        SimulatorSettings { has_couplings: true, daily_wind_sd_mps: 0.7, ..self }
     }
 }

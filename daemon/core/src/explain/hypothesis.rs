@@ -54,6 +54,8 @@ pub struct ReportContext<'a> {
     pub c_covariance: f64,
     /// Mean weight of the fit runs in kN.
     pub weight_kn: f64,
+    /// By how much a standard deviation that is told by the scatter between runs is enlarged.
+    pub few_runs_factor: f64,
 }
 
 /// A structure that a kind proposes: everything but the values of its parameters.

@@ -15,7 +15,7 @@ use super::identifiability::{identifiability, not_held};
 use super::rivals::{Rivals, is_in, rivals, separating_run};
 use super::runners_up::runners_up;
 use super::score::{self, Score};
-use super::selection::{Outcome, Search, deviations, discounted, penalty};
+use super::selection::{Outcome, Search, deviations, discounted, few_runs_factor, penalty};
 use super::told::{not_told, told_by_data};
 use super::unexplained::Unexplained;
 use crate::dataset::Note;
@@ -164,6 +164,7 @@ fn effect_answers(
                 c_deviation: deviation[2],
                 c_covariance: covariance[(2, range.start)],
                 weight_kn,
+                few_runs_factor: few_runs_factor(search.problem.runs.len()),
             });
             let answer = EffectAnswer {
                 kind: effect.kind().name(),

@@ -23,10 +23,9 @@ use crate::track::{self, LinearProfile};
 
 /// Nodes in the length over which the error changes.
 const NODES_A_LENGTH: f64 = 3.0;
-/// Nodes at least, and at most for the errors of a map and for a line that nobody surveyed.
+/// Nodes at least, and at most.
 const NODES_MIN: f64 = 4.0;
-const MAP_NODES_MAX: f64 = 28.0;
-const UNSURVEYED_NODES_MAX: f64 = 160.0;
+const NODES_MAX: f64 = 160.0;
 /// What is tied to the line shows in so many runs.
 const RUNS_MIN: usize = 2;
 
@@ -58,14 +57,14 @@ impl Effect for GradientError {
             return Proposal::NotTestable("one passage does not tell what stays".into());
         }
         let is_one_way = runs.iter().all(|run| run.direction == runs[0].direction);
-        let mut profiles = vec![Profile::new(span_m, gradient::MAP, MAP_NODES_MAX, 1, is_one_way)];
+        let mut profiles = vec![Profile::new(span_m, gradient::MAP, 1, is_one_way)];
         let is_level = scan.track.is_none_or(|track| track.is_level());
         if is_level && leaves_a_force(scan) {
             let towards = |direction| runs.iter().filter(|run| run.direction == direction).count();
             let may_part = towards(1.0).min(towards(-1.0)) >= RUNS_MIN;
             let ways = if may_part { 1..=2 } else { 1..=1 };
             for scale in gradient::UNSURVEYED {
-                let of = |ways| Profile::new(span_m, scale, UNSURVEYED_NODES_MAX, ways, false);
+                let of = |ways| Profile::new(span_m, scale, ways, false);
                 profiles.extend(ways.clone().map(of).filter(|it| it.apart_m() <= scale.length_m));
             }
         }
@@ -104,15 +103,9 @@ fn rms(values: &[f64]) -> f64 {
 }
 
 impl Profile {
-    fn new(
-        [low_m, high_m]: [f64; 2],
-        scale: ErrorScale,
-        nodes_max: f64,
-        ways: usize,
-        is_one_way: bool,
-    ) -> Self {
+    fn new([low_m, high_m]: [f64; 2], scale: ErrorScale, ways: usize, is_one_way: bool) -> Self {
         let nodes = (high_m - low_m) * NODES_A_LENGTH / scale.length_m + 1.0;
-        let count = nodes.floor().clamp(NODES_MIN, nodes_max);
+        let count = nodes.floor().clamp(NODES_MIN, NODES_MAX);
         let apart_m = (high_m - low_m) / (count - 1.0);
         let nodes_m: Vec<f64> = (0..count as usize).map(|k| low_m + apart_m * k as f64).collect();
         Profile {

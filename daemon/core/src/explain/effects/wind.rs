@@ -130,7 +130,8 @@ impl Hypothesis for ByRun {
         let mean = context.parameters.iter().sum::<f64>() / count;
         let scatter: f64 = context.parameters.iter().map(|wind| (wind - mean).powi(2)).sum();
         let mut reported = Reported::default();
-        reported.push("wind_plus_mps", mean, (scatter / (count * (count - 1.0))).sqrt());
+        let std = context.few_runs_factor * (scatter / (count * (count - 1.0))).sqrt();
+        reported.push("wind_plus_mps", mean, std);
         let by_run = |values: &[f64], signed: bool| -> BTreeMap<String, f64> {
             let signed = |direction: f64| if signed { direction } else { 1.0 };
             let runs = self.runs.iter().zip(values);

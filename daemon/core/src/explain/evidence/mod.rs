@@ -25,6 +25,6 @@ pub use fit::{Fit, FitProblem, Nearby, RunNormal};
 pub use model::{GrownForces, GrownModel};
 pub use noise::{Noise, RunScatter};
 pub use run_data::{Bin, RunData, RunDataError, RunPower, prepare};
-pub use run_scatter::WeightedFilter;
+pub use run_scatter::{PRIOR_RUNS, WeightedFilter};
 pub use sample_forces::SampleForces;
 pub use whitener::Whitener;

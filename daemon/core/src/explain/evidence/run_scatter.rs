@@ -25,8 +25,8 @@ pub type Columns = [Vec<f64>; DEVIATIONS];
 /// recorder.
 const DELAY_S: f64 = 0.02;
 
-/// So many runs with the usual scatter are added to those seen.
-const PRIOR_RUNS: f64 = 4.0;
+/// What is known beforehand of the scatter between runs counts as so many of them.
+pub const PRIOR_RUNS: f64 = 4.0;
 /// Beyond these a factor is an effect and no scatter.
 const FORCE_MAX: f64 = 0.008;
 const RESISTANCE_MAX: f64 = 0.03;

@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::explain::answer::HALF_95;
-use crate::explain::evidence::{Fit, FitProblem, RunData, RunNormal};
+use crate::explain::evidence::{Fit, FitProblem, PRIOR_RUNS, RunData, RunNormal};
 
 /// A parameter at its bound is held there to this share of what is looked for.
 const HELD_SHARE: f64 = 1e-4;
@@ -71,20 +71,24 @@ pub fn without_each_run(problem: &FitProblem, fit: &Fit) -> Vec<Vec<f64>> {
 
 /// The form of an effect (a train of one piece, averages over bins) is itself good to this share
 /// of its size.
-const FORM_SHARE: f64 = 0.015;
+const FORM_SHARE: f64 = 0.005;
 
-/// Student's 97.5 % quantile for the runs' degrees of freedom over the normal one, so that
-/// 1.96 standard deviations make a 95 % interval.
-fn few_runs_factor(runs: usize) -> f64 {
-    let freedom = (runs as f64 - 1.0).max(2.0);
+/// Student's 97.5 % quantile over the normal one, so that 1.96 standard deviations make a 95 %
+/// interval.
+fn students_factor(freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |student| student.inverse_cdf(0.975) / HALF_95)
+}
+
+/// By how much a standard deviation that only the scatter between so many runs tells is enlarged.
+pub fn few_runs_factor(runs: usize) -> f64 {
+    students_factor((runs as f64 - 1.0).max(2.0))
 }
 
 /// Standard deviations of all parameters, and their covariance.
 ///
-/// The likelihood's covariance is enlarged where the parameters move more when single runs are
-/// left out than it says (jackknife over runs). With few runs a parameter's own scatter is itself
-/// uncertain: where that of all parameters together is greater, half of the enlargement is theirs.
+/// The likelihood's variance and the scatter between the runs (jackknife: how the parameters move when
+/// single runs are left out) are averaged, the likelihood counting as `PRIOR_RUNS` runs and the scatter
+/// as those there are. Half of a parameter's scatter is that of all together, where that is more.
 pub fn deviations(fit: &Fit) -> (Vec<f64>, DMatrix<f64>) {
     let count = fit.theta.len();
     let Some(factor) = Cholesky::new(fit.free_information()) else {
@@ -99,19 +103,25 @@ pub fn deviations(fit: &Fit) -> (Vec<f64>, DMatrix<f64>) {
     let left = (runs - 1.0) / runs;
     let own: Vec<f64> = (0..count).map(|i| left * scatter[i] / covariance[(i, i)]).collect();
     let pooled = own.iter().sum::<f64>() / count as f64;
-    let enlarged: Vec<f64> = own.iter().map(|own| own.max(0.5 * (own + pooled)).max(1.0)).collect();
-    let few = few_runs_factor(fit.runs.len());
-    let mut deviations: Vec<f64> =
-        (0..count).map(|i| few * (covariance[(i, i)] * enlarged[i]).sqrt()).collect();
+    let freedom = PRIOR_RUNS + runs - 1.0;
+    let averaged = |own: f64| {
+        let seen = own.max(0.5 * (own + pooled));
+        students_factor(freedom) * ((PRIOR_RUNS + (runs - 1.0) * seen) / freedom).sqrt()
+    };
+    let enlarged: Vec<f64> = own.into_iter().map(averaged).collect();
+    let scaled =
+        DMatrix::from_fn(count, count, |i, j| covariance[(i, j)] * enlarged[i] * enlarged[j]);
+    let mut deviations: Vec<f64> = (0..count).map(|i| scaled[(i, i)].sqrt()).collect();
     for (effect, range) in fit.model.effects.iter().zip(fit.model.ranges()) {
         for i in range.clone() {
             let form = FORM_SHARE * (fit.theta[i] - effect.none());
             deviations[i] = deviations[i].hypot(form);
         }
-        deviations[range.start] = deviations[range.start].hypot(effect.shared_error());
+        // What all passages share of a map's error lies on the size, or on every gradient.
+        let last = if effect.is_gradient() { range.end } else { range.start + 1 };
+        for deviation in &mut deviations[range.start..last] {
+            *deviation = deviation.hypot(effect.shared_error());
+        }
     }
-    let scaled = DMatrix::from_fn(count, count, |i, j| {
-        covariance[(i, j)] * (enlarged[i] * enlarged[j]).sqrt()
-    });
     (deviations, scaled)
 }
