@@ -20,16 +20,14 @@ const DAMPING_RATIO: f64 = 0.15;
 fn coupling(train_type: TrainType) -> (f64, f64) {
     match train_type {
         TrainType::Freight => (1.2e7, 0.015),
-        _ => (2.5e7, 0.0),
+        _ => (1e7, 0.0),
     }
 }
 
-/// Share of the traction that a car gives: a locomotive's, or an even part of a multiple unit's.
+/// Share of the traction that a car gives: the locomotive pulls, or the leading third of a multiple unit.
 fn traction_share(train_type: TrainType, index: usize, cars: usize) -> f64 {
-    match train_type {
-        TrainType::Freight => f64::from(u8::from(index == 0)),
-        _ => 1.0 / cars as f64,
-    }
+    let pulling = if train_type == TrainType::Freight { 1 } else { cars.div_ceil(3) };
+    if index < pulling { 1.0 / pulling as f64 } else { 0.0 }
 }
 
 /// The cars against the centre of mass.

@@ -88,7 +88,8 @@ pub fn few_runs_factor(runs: usize) -> f64 {
 ///
 /// The likelihood's variance and the scatter between the runs (jackknife: how the parameters move when
 /// single runs are left out) are averaged, the likelihood counting as `PRIOR_RUNS` runs and the scatter
-/// as those there are. Half of a parameter's scatter is that of all together, where that is more.
+/// as those there are; nothing is known better than the likelihood says. Half of a parameter's scatter
+/// is that of all together, where that is more.
 pub fn deviations(fit: &Fit) -> (Vec<f64>, DMatrix<f64>) {
     let count = fit.theta.len();
     let Some(factor) = Cholesky::new(fit.free_information()) else {
@@ -106,7 +107,8 @@ pub fn deviations(fit: &Fit) -> (Vec<f64>, DMatrix<f64>) {
     let freedom = PRIOR_RUNS + runs - 1.0;
     let averaged = |own: f64| {
         let seen = own.max(0.5 * (own + pooled));
-        students_factor(freedom) * ((PRIOR_RUNS + (runs - 1.0) * seen) / freedom).sqrt()
+        let both = (PRIOR_RUNS + (runs - 1.0) * seen) / freedom;
+        students_factor(freedom) * both.max(1.0).sqrt()
     };
     let enlarged: Vec<f64> = own.into_iter().map(averaged).collect();
     let scaled =
