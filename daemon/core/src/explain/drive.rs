@@ -196,7 +196,7 @@ fn told_by(problem: &FitProblem, open: OpenDrive, declared: Option<Drive>) -> Op
     if fit.observations() < OBSERVATIONS_MIN {
         return None;
     }
-    let (deviation, _) = deviations(&fit);
+    let deviation = deviations(&fit).std;
     let found = fit.effect_parameters(0);
     let at = open.at(found);
     let form_kw = AUXILIARIES_FORM_SHARE * moving_power_kw(problem);

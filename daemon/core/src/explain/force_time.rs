@@ -70,7 +70,7 @@ pub fn told(dataset: &Dataset) -> Result<Option<Told>, RunDataError> {
     if fit.observations() < OBSERVATIONS_MIN {
         return Ok(None);
     }
-    let (deviation, _) = deviations(&fit);
+    let deviation = deviations(&fit).std;
     let late = Told { value: fit.effect_parameters(0)[0], std: deviation[3] };
     let is_inside = LateStamps.at_bound(&[late.value]).is_none();
     let counts = late.value > LATE_SHARE_MIN * step_s && is_inside;

@@ -10,6 +10,7 @@
 //! - [`scan`], [`places`], [`residual_pressure`]: what a force of some shape, at some place or
 //!   time, would explain
 //! - [`selection`]: the search for effects, its significance, evidence by run
+//! - [`map_error`]: the finished model beside what the map's own error makes all runs err alike
 //! - [`score`], [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
 //! - [`unexplained`], [`told`], [`identifiability`], [`rivals`], [`runners_up`], [`verdict`], [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
@@ -24,6 +25,7 @@ pub mod evidence;
 pub mod force_time;
 pub mod hypothesis;
 pub mod identifiability;
+pub mod map_error;
 pub mod places;
 pub mod report;
 pub mod residual_pressure;
@@ -42,7 +44,7 @@ use crate::plausibility::Severity;
 use answer::Answer;
 use evidence::{Fit, FitProblem, RunData, RunDataError};
 use score::{PredictedRun, Score};
-use selection::{Outcome, Progress, Search};
+use selection::{Deviations, Outcome, Progress, Search};
 use unexplained::Unexplained;
 
 /// Fit and holdout runs with the models that were fitted.
@@ -57,6 +59,8 @@ pub struct Explanation {
     pub base: Fit,
     /// The same with the effects.
     pub grown: Fit,
+    /// How surely its parameters are known.
+    pub deviations: Deviations,
     /// Open-loop errors.
     pub score: Score,
     /// Predicted measured speeds of all runs by the grown model.
@@ -100,10 +104,11 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
         search.look_under_noise(&mut outcome);
     }
     let known = places::settle(&problem, &mut outcome.fit);
+    let deviations = map_error::beside_map_error(&search, &mut outcome);
     progress(0.95, "scoring the holdout runs");
     let score = Score::of(&problem, &holdout, &outcome.base, &outcome.fit);
     let predictions = score::predictions(&problem, &holdout, &outcome.fit);
-    let mut answer = verdict::answer(&search, &outcome, &known, &score, notes);
+    let mut answer = verdict::answer(&search, &outcome, &deviations, &known, &score, notes);
     if let Some(told) = told_drive {
         answer.statement += &told.answer.sentence();
         answer.drive = Some(told.answer);
@@ -115,5 +120,16 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
     let strength = Search::greatest_strength(&outcome);
     progress(1.0, "done");
     let (base, grown) = (outcome.base.clone(), outcome.fit.clone());
-    Ok(Explanation { strength, answer, base, grown, score, predictions, outcome, problem, holdout })
+    Ok(Explanation {
+        answer,
+        problem,
+        holdout,
+        base,
+        grown,
+        deviations,
+        score,
+        predictions,
+        outcome,
+        strength,
+    })
 }

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use dynocar_shared::vocabulary::EffectKind;
-use nalgebra::DMatrix;
 
 use super::answer::{
     Answer, BaseAnswer, Considered, DavisDeviations, EffectAnswer, HALF_95, ParameterValue, Place,
@@ -15,7 +14,7 @@ use super::identifiability::{identifiability, not_held};
 use super::rivals::{Rivals, is_in, rivals, separating_run};
 use super::runners_up::runners_up;
 use super::score::{self, Score};
-use super::selection::{Outcome, Search, deviations, discounted, few_runs_factor, penalty};
+use super::selection::{Deviations, Outcome, Search, discounted, few_runs_factor, penalty};
 use super::told::{not_told, told_by_data};
 use super::unexplained::Unexplained;
 use crate::dataset::Note;
@@ -31,13 +30,13 @@ const LIBRARY_SHARE_MIN: f64 = 0.5;
 pub fn answer(
     search: &Search,
     outcome: &Outcome,
+    deviations: &Deviations,
     known: &[Option<PlaceUncertainty>],
     score: &Score,
     notes: Vec<Note>,
 ) -> Answer {
     let fit = &outcome.fit;
-    let (deviation, covariance) = deviations(fit);
-    let effects = effect_answers(search, outcome, known, (&deviation, &covariance));
+    let effects = effect_answers(search, outcome, known, deviations);
     // What has no name has no rivals either.
     let is_unknown = is_in(&outcome.fit, EffectKind::Unknown);
     let rivals = if is_unknown { Vec::new() } else { rivals(outcome) };
@@ -59,7 +58,7 @@ pub fn answer(
             statement(search, outcome, verdict, &effects, &rivals, left.as_ref());
         let not_told = match verdict {
             Verdict::InsufficientData => String::new(),
-            _ => not_told(search.problem, fit, &deviation) + &not_held(&identifiability),
+            _ => not_told(search.problem, fit, &deviations.std) + &not_held(&identifiability),
         };
         (text + &worse_held_out(&effects, score) + &not_told, experiment)
     } else {
@@ -77,8 +76,12 @@ pub fn answer(
             a: fit.theta[0],
             b: fit.theta[1],
             c: fit.theta[2],
-            std: DavisDeviations { a: deviation[0], b: deviation[1], c: deviation[2] },
-            told_by_data: told_by_data(search.problem, &deviation),
+            std: DavisDeviations {
+                a: deviations.std[0],
+                b: deviations.std[1],
+                c: deviations.std[2],
+            },
+            told_by_data: told_by_data(search.problem, &deviations.std),
         },
         metric: "full_run",
         scored_runs: score.holdout_runs.iter().filter(|run| run[0].count > 0).count(),
@@ -141,7 +144,7 @@ fn effect_answers(
     search: &Search,
     outcome: &Outcome,
     known: &[Option<PlaceUncertainty>],
-    (deviation, covariance): (&[f64], &DMatrix<f64>),
+    Deviations { std, covariance }: &Deviations,
 ) -> Vec<EffectAnswer> {
     let fit = &outcome.fit;
     let mut answers: Vec<(f64, EffectAnswer)> = fit
@@ -159,9 +162,9 @@ fn effect_answers(
                 / search.problem.runs.len().max(1) as f64;
             let reported = effect.report(&ReportContext {
                 parameters: &fit.theta[range.clone()],
-                deviations: &deviation[range.clone()],
+                deviations: &std[range.clone()],
                 c: fit.theta[2],
-                c_deviation: deviation[2],
+                c_deviation: std[2],
                 c_covariance: covariance[(2, range.start)],
                 weight_kn,
                 few_runs_factor: few_runs_factor(search.problem.runs.len()),

@@ -78,6 +78,13 @@ impl Effect for GradientError {
     }
 }
 
+/// The map's own small error, at none: no effect, but what every fit is beside.
+pub fn map_error(span_m: [f64; 2], scale: ErrorScale) -> Candidate {
+    let profile = Profile::new(span_m, scale, 1, false);
+    let start = vec![0.0; profile.parameters.len()];
+    Candidate::new(profile, start)
+}
+
 /// Inverse covariance of an Ornstein-Uhlenbeck process at `count` equally distant nodes, for each
 /// of some ways.
 fn prior_information(

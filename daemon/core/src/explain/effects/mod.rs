@@ -26,6 +26,7 @@ mod wind;
 
 pub use super::hypothesis::{AtBound, Hypothesis, ReportContext, Reported, SharedHypothesis};
 pub use crate::terms::{Entry, Parameter};
+pub use gradient_error::map_error;
 pub use proposal::{Candidate, Effect, Proposal};
 
 /// Every kind, in the order of the search: timing, scales, mass and gain, what is tied to a

@@ -9,7 +9,7 @@ use crate::dataset::{Dataset, Role};
 use crate::explain::Explanation;
 use crate::explain::answer::{EffectAnswer, HALF_95, ParameterValue, RunWindow};
 use crate::explain::evidence::RunData;
-use crate::explain::selection::deviations;
+use crate::explain::selection::Deviations;
 use crate::force::ResolvedSample;
 
 /// Panels at most, beside those of single runs.
@@ -239,7 +239,7 @@ fn unevenness(panel: &Panel) -> f64 {
 
 /// Covariance of the grown model's parameters, with the deviations that are told.
 pub(super) fn covariance(explanation: &Explanation) -> DMatrix<f64> {
-    let (deviations, covariance) = deviations(&explanation.grown);
+    let Deviations { std: deviations, covariance } = &explanation.deviations;
     let count = deviations.len();
     DMatrix::from_fn(count, count, |i, j| {
         let scale = (covariance[(i, i)] * covariance[(j, j)]).sqrt();

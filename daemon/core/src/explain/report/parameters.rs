@@ -28,8 +28,7 @@ pub struct ParameterRow {
 /// a, b, c and the parameters of all effects.
 pub fn rows(dataset: &Dataset, explanation: &Explanation) -> Vec<ParameterRow> {
     let declared = dataset.train.resistance;
-    let (before, _) = deviations(&explanation.base);
-    let (after, _) = deviations(&explanation.grown);
+    let before = deviations(&explanation.base).std;
     let davis = [
         ("a", "constant part", "N/kN", declared.a),
         ("b", "part that grows with speed", "N/kN per m/s", declared.b),
@@ -45,7 +44,7 @@ pub fn rows(dataset: &Dataset, explanation: &Explanation) -> Vec<ParameterRow> {
             unit,
             declared: Some(value),
             before: Some(estimate(&explanation.base.theta, &before)),
-            after: estimate(&explanation.grown.theta, &after),
+            after: estimate(&explanation.grown.theta, &explanation.deviations.std),
         }
     });
     let of_effects = explanation.answer.effects.iter().flat_map(|e| effect_rows(dataset, e));

@@ -111,7 +111,7 @@ fn spans(bins: &[Bin]) -> Vec<(usize, usize)> {
 fn columns(fit: &Fit, run: &RunData) -> Vec<Vec<f64>> {
     let (mut forces, mut base, mut moved) = (GrownForces::default(), Vec::new(), Vec::new());
     fit.model.predict_bins(run, &fit.theta, &mut forces, &mut base);
-    let (deviations, _) = deviations(fit);
+    let deviations = deviations(fit).std;
     (0..fit.theta.len())
         .map(|i| {
             let known = Some(0.1 * deviations[i]).filter(|step| step.is_finite() && *step > 0.0);

@@ -71,7 +71,7 @@ pub fn without_each_run(problem: &FitProblem, fit: &Fit) -> Vec<Vec<f64>> {
 
 /// The form of an effect (a train of one piece, averages over bins) is itself good to this share
 /// of its size.
-const FORM_SHARE: f64 = 0.005;
+const FORM_SHARE: f64 = 0.015;
 
 /// Student's 97.5 % quantile over the normal one, so that 1.96 standard deviations make a 95 %
 /// interval.
@@ -84,16 +84,33 @@ pub fn few_runs_factor(runs: usize) -> f64 {
     students_factor((runs as f64 - 1.0).max(2.0))
 }
 
+/// How surely the parameters of a fitted model are known.
+#[derive(Clone, Debug)]
+pub struct Deviations {
+    /// Standard deviations, of which 1.96 make a 95 % interval.
+    pub std: Vec<f64>,
+    /// Covariance by likelihood and scatter, without what the form and the map add.
+    pub covariance: DMatrix<f64>,
+}
+
+impl Deviations {
+    /// Those of the first so many parameters.
+    pub fn of_first(mut self, count: usize) -> Self {
+        self.std.truncate(count);
+        Deviations { std: self.std, covariance: self.covariance.resize(count, count, 0.0) }
+    }
+}
+
 /// Standard deviations of all parameters, and their covariance.
 ///
 /// The likelihood's variance and the scatter between the runs (jackknife: how the parameters move when
 /// single runs are left out) are averaged, the likelihood counting as `PRIOR_RUNS` runs and the scatter
 /// as those there are; nothing is known better than the likelihood says. Half of a parameter's scatter
 /// is that of all together, where that is more.
-pub fn deviations(fit: &Fit) -> (Vec<f64>, DMatrix<f64>) {
+pub fn deviations(fit: &Fit) -> Deviations {
     let count = fit.theta.len();
     let Some(factor) = Cholesky::new(fit.free_information()) else {
-        return (vec![f64::NAN; count], DMatrix::zeros(count, count));
+        return Deviations { std: vec![f64::NAN; count], covariance: DMatrix::zeros(count, count) };
     };
     let covariance = factor.inverse();
     let runs = fit.runs.len() as f64;
@@ -113,17 +130,17 @@ pub fn deviations(fit: &Fit) -> (Vec<f64>, DMatrix<f64>) {
     let enlarged: Vec<f64> = own.into_iter().map(averaged).collect();
     let scaled =
         DMatrix::from_fn(count, count, |i, j| covariance[(i, j)] * enlarged[i] * enlarged[j]);
-    let mut deviations: Vec<f64> = (0..count).map(|i| scaled[(i, i)].sqrt()).collect();
+    let mut std: Vec<f64> = (0..count).map(|i| scaled[(i, i)].sqrt()).collect();
     for (effect, range) in fit.model.effects.iter().zip(fit.model.ranges()) {
         for i in range.clone() {
             let form = FORM_SHARE * (fit.theta[i] - effect.none());
-            deviations[i] = deviations[i].hypot(form);
+            std[i] = std[i].hypot(form);
         }
         // What all passages share of a map's error lies on the size, or on every gradient.
         let last = if effect.is_gradient() { range.end } else { range.start + 1 };
-        for deviation in &mut deviations[range.start..last] {
-            *deviation = deviation.hypot(effect.shared_error());
+        for std in &mut std[range.start..last] {
+            *std = std.hypot(effect.shared_error());
         }
     }
-    (deviations, scaled)
+    Deviations { std, covariance: scaled }
 }

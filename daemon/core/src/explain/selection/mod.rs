@@ -7,6 +7,6 @@ mod price;
 mod search;
 
 pub use acceptance::Refusal;
-pub use by_run::{deviations, few_runs_factor, without_each_run};
+pub use by_run::{Deviations, deviations, few_runs_factor, without_each_run};
 pub use price::{discounted, model_penalty, penalty};
 pub use search::{OBSERVATIONS_MIN, Outcome, Progress, Search, Trial};

@@ -1,0 +1,48 @@
+//! What the map's own small error, the same in every passage, does to a finished model.
+//!
+//! Every gradient of a map is a little wrong, and each run over it errs alike: what the runs agree on may be
+//! the map's. The finished model is fitted once more with that error beside it, a Gaussian process along the
+//! line. What the data cannot tell from it is not told, and what they can is told better.
+
+use super::effects::map_error;
+use super::evidence::Fit;
+use super::places::{MAP_ERROR_PERMILLE, span_m};
+use super::selection::{Deviations, Outcome, Search, deviations, penalty};
+use crate::terms::gradient::{ErrorScale, MAP};
+
+/// How large the error may be, in multiples of a usual survey's: the likeliest is taken.
+const MAP_ERROR_TIMES: [f64; 3] = [0.3, 1.0, 3.0];
+
+/// Moves the finished model to where it fits best beside the map's error; how surely its parameters are
+/// known then. Where nothing was found, the model without effects is the same.
+pub fn beside_map_error(search: &Search, outcome: &mut Outcome) -> Deviations {
+    let Some(joint) = joint(search, &outcome.fit) else { return deviations(&outcome.fit) };
+    let count = outcome.fit.theta.len();
+    let theta = joint.theta[..count].to_vec();
+    outcome.fit = search.problem.at(&outcome.fit.model, theta, outcome.fit.noise);
+    if outcome.fit.model.effects.is_empty() {
+        outcome.base = outcome.fit.clone();
+    }
+    deviations(&joint).of_first(count)
+}
+
+/// The model with the map's error as its last effect; `None` where a gradient is fitted anyway, and where
+/// there is no map or no measured position.
+fn joint(search: &Search, fit: &Fit) -> Option<Fit> {
+    let is_fitted = fit.model.effects.iter().any(|effect| effect.is_gradient());
+    if is_fitted || search.track.is_none() || search.problem.way_ratio.is_none() {
+        return None;
+    }
+    let span_m = span_m(&search.scan(fit)?).filter(|[low, high]| high > low)?;
+    let of_scale = |times: f64| {
+        let permille = times * MAP_ERROR_PERMILLE;
+        let error = map_error(span_m, ErrorScale { permille, ..MAP });
+        let theta = fit.theta.iter().chain(&error.start).copied().collect();
+        let joint = search.problem.fit(&fit.model.with(error.hypothesis), theta, fit.noise);
+        let cost = joint.cost + penalty(&joint, fit.model.effects.len());
+        (cost, joint)
+    };
+    let all = MAP_ERROR_TIMES.into_iter().map(of_scale);
+    let likeliest = all.min_by(|one, other| one.0.total_cmp(&other.0))?;
+    Some(likeliest.1)
+}
