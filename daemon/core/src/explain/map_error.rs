@@ -6,12 +6,9 @@
 
 use super::effects::map_error;
 use super::evidence::Fit;
-use super::places::{MAP_ERROR_PERMILLE, span_m};
-use super::selection::{Deviations, Outcome, Search, deviations, penalty};
-use crate::terms::gradient::{ErrorScale, MAP};
-
-/// How large the error may be, in multiples of a usual survey's: the likeliest is taken.
-const MAP_ERROR_TIMES: [f64; 3] = [0.3, 1.0, 3.0];
+use super::places::span_m;
+use super::selection::{Deviations, Outcome, Search, deviations};
+use crate::terms::gradient::SURVEYED;
 
 /// Moves the finished model to where it fits best beside the map's error; how surely its parameters are
 /// known then. Where nothing was found, the model without effects is the same.
@@ -34,15 +31,7 @@ fn joint(search: &Search, fit: &Fit) -> Option<Fit> {
         return None;
     }
     let span_m = span_m(&search.scan(fit)?).filter(|[low, high]| high > low)?;
-    let of_scale = |times: f64| {
-        let permille = times * MAP_ERROR_PERMILLE;
-        let error = map_error(span_m, ErrorScale { permille, ..MAP });
-        let theta = fit.theta.iter().chain(&error.start).copied().collect();
-        let joint = search.problem.fit(&fit.model.with(error.hypothesis), theta, fit.noise);
-        let cost = joint.cost + penalty(&joint, fit.model.effects.len());
-        (cost, joint)
-    };
-    let all = MAP_ERROR_TIMES.into_iter().map(of_scale);
-    let likeliest = all.min_by(|one, other| one.0.total_cmp(&other.0))?;
-    Some(likeliest.1)
+    let error = map_error(span_m, SURVEYED);
+    let theta = fit.theta.iter().chain(&error.start).copied().collect();
+    Some(search.problem.fit(&fit.model.with(error.hypothesis), theta, fit.noise))
 }

@@ -5,6 +5,7 @@ use super::inside::Inside;
 use super::runs::best_runs;
 use crate::explain::evidence::{Bin, RunData};
 use crate::explain::scan::{Scan, Tuple};
+use crate::terms::gradient;
 use crate::track::Track;
 
 /// Shortest interval in m that is looked for.
@@ -16,7 +17,7 @@ const PLACE_RUNS_MIN: usize = 2;
 /// A further interval must add this share of what the others explain.
 const FURTHER_SHARE: f64 = 0.05;
 /// A surveyed gradient is good to this in ‰, which is N/kN.
-pub const MAP_ERROR_PERMILLE: f64 = 0.1;
+pub const MAP_ERROR_PERMILLE: f64 = gradient::SURVEYED.permille;
 /// Intervals of one effect at most.
 const INTERVALS_MAX: usize = 6;
 
