@@ -74,6 +74,7 @@ impl SampleField {
     }
 
     /// The field's bit in [`TrainSample::valid`].
+    #[inline]
     pub const fn bit(self) -> u16 {
         1 << self as u16
     }
@@ -185,6 +186,7 @@ impl TrainSample {
     }
 
     /// The value of a field, when its validity bit is set.
+    #[inline]
     pub const fn get(&self, field: SampleField) -> Option<f64> {
         if self.valid & field.bit() == 0 {
             return None;

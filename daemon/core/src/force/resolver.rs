@@ -164,7 +164,7 @@ impl ForceResolver {
     ///
     /// Bounded work, no allocation.
     pub fn resolve(&mut self, valid: &ValidSample) -> ResolvedSample {
-        let sample = &valid.sample;
+        let sample = valid.sample;
         let train = &*self.train;
         let known = &train.corrections;
         let direction = f64::from(sample.direction);

@@ -83,6 +83,7 @@ impl StepProfile {
         Ok(StepProfile { starts_m, values, cumulative, buckets, buckets_per_m })
     }
 
+    #[inline]
     fn entry_at(&self, chainage_m: f64) -> usize {
         let offset = (chainage_m - self.starts_m[0]) * self.buckets_per_m;
         // A negative or NaN offset saturates to bucket 0.
@@ -105,7 +106,11 @@ impl StepProfile {
 
     /// Integral of the function from the first entry to a chainage in m.
     pub fn integral_to(&self, chainage_m: f64) -> f64 {
-        let entry = self.entry_at(chainage_m);
+        self.integral_within(self.entry_at(chainage_m), chainage_m)
+    }
+
+    /// The same to a chainage in m of an entry.
+    fn integral_within(&self, entry: usize, chainage_m: f64) -> f64 {
         self.cumulative[entry] + self.values[entry] * (chainage_m - self.starts_m[entry])
     }
 
@@ -116,11 +121,14 @@ impl StepProfile {
             return self.value_at(centre_m);
         }
         let (rear, front) = (centre_m - 0.5 * length_m, centre_m + 0.5 * length_m);
-        let (rear_entry, front_entry) = (self.entry_at(rear), self.entry_at(front));
-        if rear_entry == front_entry {
+        let rear_entry = self.entry_at(rear);
+        let reaches = |&next_m: &f64| next_m <= front;
+        if !self.starts_m.get(rear_entry + 1).is_some_and(reaches) {
             return self.values[rear_entry];
         }
-        (self.integral_to(front) - self.integral_to(rear)) / length_m
+        let front_entry = self.entry_at(front);
+        (self.integral_within(front_entry, front) - self.integral_within(rear_entry, rear))
+            / length_m
     }
 
     /// The entries (chainage in m, value).

@@ -51,16 +51,16 @@ impl ValidationLimits {
 
 /// A sample that passed, with what its predecessors say about it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ValidSample {
+pub struct ValidSample<'a> {
     /// The sample as it came.
-    pub sample: TrainSample,
+    pub sample: &'a TrainSample,
     /// Time in s since the accepted sample before it; 0 when it starts a stretch.
     pub step_s: f64,
     /// Number of the stretch of unbroken motion; integrals never cross its change.
     pub stretch: u32,
 }
 
-impl ValidSample {
+impl ValidSample<'_> {
     /// True while the controller's wheel-slide protection is active.
     pub fn is_sliding(&self) -> bool {
         self.sample.flags & FLAG_WHEEL_SLIDE != 0
@@ -155,7 +155,10 @@ impl Validator {
     /// # Real-time
     ///
     /// Bounded work, no allocation.
-    pub fn check(&mut self, sample: &TrainSample) -> Result<ValidSample, RejectionReason> {
+    pub fn check<'a>(
+        &mut self,
+        sample: &'a TrainSample,
+    ) -> Result<ValidSample<'a>, RejectionReason> {
         if sample.train_id != self.train.0 {
             return Err(RejectionReason::WrongTrain);
         }
@@ -309,14 +312,14 @@ impl Validator {
         self.refusals_in_a_row > self.limits.refusals_before_restart
     }
 
-    fn accept(&mut self, sample: &TrainSample, step_s: Option<f64>) -> ValidSample {
+    fn accept<'a>(&mut self, sample: &'a TrainSample, step_s: Option<f64>) -> ValidSample<'a> {
         if step_s.is_none() {
             self.stretch = self.stretch.wrapping_add(1);
         }
         self.last = Some(*sample);
         self.last_refused = None;
         self.refusals_in_a_row = 0;
-        ValidSample { sample: *sample, step_s: step_s.unwrap_or(0.0), stretch: self.stretch }
+        ValidSample { sample, step_s: step_s.unwrap_or(0.0), stretch: self.stretch }
     }
 }
 

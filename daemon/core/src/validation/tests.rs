@@ -24,7 +24,8 @@ fn cruising(index: u64) -> TrainSample {
 fn steady_motion_passes_in_one_stretch() {
     let mut validator = validator();
     for index in 0..50 {
-        let valid = validator.check(&cruising(index)).unwrap();
+        let sample = cruising(index);
+        let valid = validator.check(&sample).unwrap();
         assert_eq!(valid.stretch, 1);
         assert_eq!(valid.step_s, if index == 0 { 0.0 } else { 0.2 });
     }
@@ -153,11 +154,11 @@ fn a_clock_set_back_is_refused_a_few_times_and_then_believed() {
         .map(|index| {
             let mut sample = cruising(index);
             sample.sequence = 1011 + index;
-            validator.check(&sample)
+            validator.check(&sample).map(|valid| valid.stretch)
         })
         .collect();
     assert!(results[..5].iter().all(|r| *r == Err(RejectionReason::TimeNotIncreasing)));
-    assert_eq!(results[5].unwrap().stretch, 2);
+    assert_eq!(results[5], Ok(2));
     assert!(results[6].is_ok());
 }
 

@@ -84,10 +84,8 @@ impl Information {
     ///
     /// Bounded work, no allocation.
     pub fn push(&mut self, row: &Row, kept: f64) {
-        self.matrix *= kept;
-        self.matrix.ger(row.weight, &row.features, &row.features, 1.0);
-        self.side *= kept;
-        self.side.axpy(row.weight * row.observed, &row.features, 1.0);
+        self.matrix.ger(row.weight, &row.features, &row.features, kept);
+        self.side.axpy(row.weight * row.observed, &row.features, kept);
         self.square_sum = kept * self.square_sum + row.weight * row.observed * row.observed;
         self.count = kept * self.count + 1.0;
     }
