@@ -20,10 +20,16 @@ pub struct ForwardStep<const N: usize> {
     pub component: usize,
     /// What the measurement said.
     pub innovation: Innovation,
-    /// How far it moved the state, for an innovation of 1.
-    pub gain: SVector<f64, N>,
     /// Jacobian of the move from the step before to this one.
     pub jacobian: SMatrix<f64, N, N>,
+}
+
+impl<const N: usize> ForwardStep<N> {
+    /// How far the measurement moved the state, for an innovation of 1.
+    #[inline]
+    pub fn gain(&self) -> SVector<f64, N> {
+        self.predicted.covariance.column(self.component) * self.innovation.inverse_variance
+    }
 }
 
 /// Writes the mean of every step, given the measurements of all, into `means`, which must be as
@@ -43,7 +49,7 @@ pub fn smooth_means<const N: usize>(forward: &[ForwardStep<N>], means: &mut [SVe
     for (step, mean) in forward.iter().zip(means).rev() {
         *mean = step.filtered.mean - step.filtered.covariance * later;
         let Innovation { value, inverse_variance, .. } = step.innovation;
-        let shift = step.gain.dot(&later) + inverse_variance * value;
+        let shift = step.gain().dot(&later) + inverse_variance * value;
         // Chosen, not indexed: the vector stays in registers.
         later =
             SVector::from_fn(|i, _| if i == step.component { later[i] - shift } else { later[i] });

@@ -117,7 +117,7 @@ mod tests {
             if let Some(jacobian) = jacobian {
                 smoother.predict(jacobian);
             }
-            smoother.take(step.component, &step.innovation, &step.gain);
+            smoother.take(step.component, &step.innovation, &step.gain());
             smoother.remember(&step.filtered, SECOND, number);
             number += 1;
         });

@@ -34,8 +34,8 @@ impl Innovation {
     ) -> Result<Self, NotPositiveDefinite> {
         let variance = predicted_variance + noise_variance;
         let inverse_variance = 1.0 / variance;
-        // Also refuses NaN; an infinite variance by its inverse.
-        let is_sound = variance >= noise_variance && variance > 0.0 && inverse_variance > 0.0;
+        // Also refuses NaN.
+        let is_sound = variance >= noise_variance && variance > 0.0 && variance.is_finite();
         match is_sound && value.is_finite() {
             true => Ok(Innovation { value, variance, inverse_variance }),
             false => Err(NotPositiveDefinite),
@@ -151,12 +151,12 @@ impl<const N: usize> Gaussian<N> {
         noise_variance: f64,
     ) -> SVector<f64, N> {
         let spread = self.covariance.column(i).into_owned();
-        let gain = spread * innovation.inverse_variance;
-        self.mean += gain * innovation.value;
+        // The inverse is known last: what does not need it is reckoned before.
+        self.mean += (spread * innovation.value) * innovation.inverse_variance;
         let mut row = SVector::zeros();
         row[i] = 1.0;
         measured(&mut self.covariance, &row, &spread, innovation.inverse_variance, noise_variance);
-        gain
+        spread * innovation.inverse_variance
     }
 
     /// Takes in a measurement of component `i`.

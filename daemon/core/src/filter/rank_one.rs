@@ -26,25 +26,25 @@ pub(super) fn measured<const N: usize>(
     noise_variance: f64,
 ) {
     if noise_variance * inverse_variance < SHARE_LEFT_MIN {
-        *covariance = wide(*covariance, row, spread, inverse_variance, noise_variance);
+        *covariance = wide(*covariance, *row, *spread, inverse_variance, noise_variance);
     } else {
         // Products before the factor: the result is exactly symmetric.
         *covariance -= (spread * spread.transpose()) * inverse_variance;
     }
 }
 
-/// Joseph's form, away from the usual way and by value, so that there P stays in registers.
+/// Joseph's form, away from the usual way and all by value, so that there nothing leaves its registers.
 #[cold]
 #[inline(never)]
 fn wide<const N: usize>(
     mut covariance: SMatrix<f64, N, N>,
-    row: &SVector<f64, N>,
-    spread: &SVector<f64, N>,
+    row: SVector<f64, N>,
+    spread: SVector<f64, N>,
     inverse_variance: f64,
     noise_variance: f64,
 ) -> SMatrix<f64, N, N> {
     let gain = spread * inverse_variance;
-    joseph(&mut covariance, row, spread, &gain, noise_variance);
+    joseph(&mut covariance, &row, &spread, &gain, noise_variance);
     covariance
 }
 

@@ -42,10 +42,9 @@ impl MovingState {
             }
             let predicted = state;
             let innovation = state.innovation(0, measured, self.variance).unwrap();
-            let gain = state.take(0, &innovation, self.variance);
+            state.take(0, &innovation, self.variance);
             let filtered = state;
-            let taken =
-                ForwardStep { predicted, filtered, component: 0, innovation, gain, jacobian };
+            let taken = ForwardStep { predicted, filtered, component: 0, innovation, jacobian };
             seen(&taken, (step > 0).then_some(&jacobian));
             forward.push(taken);
         }

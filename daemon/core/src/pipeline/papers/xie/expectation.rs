@@ -168,10 +168,9 @@ impl KalmanExpectation {
             let predicted = state;
             let variance = model.noise.measured_distance_m2;
             let innovation = state.innovation(DISTANCE, entry.observed.distance_m, variance)?;
-            let gain = state.take(DISTANCE, &innovation, variance);
+            state.take(DISTANCE, &innovation, variance);
             let (component, filtered) = (DISTANCE, state);
-            let step = ForwardStep { predicted, filtered, component, innovation, gain, jacobian };
-            self.forward.push(step);
+            self.forward.push(ForwardStep { predicted, filtered, component, innovation, jacobian });
         }
         Ok(())
     }
