@@ -9,9 +9,10 @@
 //! ```
 //!
 //! with the gradient in ‰ and the means taken along the train. [`ForceResolver`] gives
-//! everything but w0(v), which is what the estimators look for.
+//! everything but w0(v), which is what the estimators look for; [`balance`] says what all of it accelerates.
 //! Each part is a law of [`crate::terms`], with what is declared of it in the train and the line.
 
+pub mod balance;
 mod resolver;
 
 pub use resolver::{ForceResolver, ResolvedSample};

@@ -71,6 +71,12 @@ impl ResolvedSample {
         Some(self.traction_force_n? - self.brake_force_n?)
     }
 
+    /// gamma, of what is declared.
+    #[inline]
+    pub fn rotating_mass_factor(&self) -> f64 {
+        self.inertial_mass_kg / self.mass_kg - 1.0
+    }
+
     /// What a force may depend on, where it is known.
     #[inline]
     pub fn covariate(&self, of: Covariate) -> Option<f64> {

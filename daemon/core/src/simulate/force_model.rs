@@ -2,6 +2,7 @@
 
 use super::recording::Recording;
 use crate::force::ResolvedSample;
+use crate::force::balance::ActingForces;
 use crate::train::Davis;
 
 /// The acceleration of a train at each sample of a recorded run, for any speed.
@@ -110,13 +111,13 @@ impl ForceModel for QuadraticForces {
 
 /// A gradient that is not known counts as level track; [`Recording::knows_gradient`] tells.
 fn declared_polynomial(sample: &ResolvedSample, resistance: Davis) -> Polynomial {
-    let gradient_permille = sample.gradient_permille.unwrap_or(0.0);
-    let tied_n_per_kn = gradient_permille + sample.extra_n_per_kn;
-    let control_force_n = sample.control_force_n().unwrap_or(0.0);
-    let weight_per_kg = sample.weight_kn / sample.inertial_mass_kg;
-    [
-        control_force_n / sample.inertial_mass_kg - weight_per_kg * (tied_n_per_kn + resistance.a),
-        -weight_per_kg * resistance.b,
-        -weight_per_kg * resistance.c,
-    ]
+    let Davis { a, b, c } = resistance;
+    let acting = ActingForces {
+        mass_kg: sample.mass_kg,
+        rotating_mass_factor: sample.rotating_mass_factor(),
+        force_n: sample.control_force_n().unwrap_or(0.0),
+        gradient_permille: sample.gradient_permille.unwrap_or(0.0),
+        resistance_n_per_kn: [sample.extra_n_per_kn + a, b, c],
+    };
+    acting.acceleration_mps2()
 }

@@ -1,8 +1,9 @@
 //! What accelerates the train at one sample.
 
 use crate::force::ResolvedSample;
-use crate::terms::{Resistance, rotating};
-use crate::train::{Davis, TrainModel};
+use crate::force::balance::{ActingForces, mps2_per_n_per_kn};
+use crate::terms::Resistance;
+use crate::train::Davis;
 
 /// What accelerates the train at one sample; effects change these fields.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,38 +42,29 @@ impl SampleForces {
         }
     }
 
-    /// Acceleration in m/s² that 1 N/kN of resistance takes away.
-    #[inline]
-    fn per_unit_resistance_mps2(&self) -> f64 {
-        TrainModel::weight_kn(1.0) / (1.0 + self.rotating_mass_factor)
-    }
-
     /// The acceleration p0 + p1 v + p2 v² in m/s² for speeds near `speed_mps`.
     #[inline]
     pub fn polynomial(&self, davis: Davis, speed_mps: f64) -> [f64; 3] {
-        let mass_kg = self.mass_kg * self.mass_factor;
-        let per_kg = 1.0 / rotating::inertial_mass_kg(mass_kg, self.rotating_mass_factor);
-        let weight_kn = TrainModel::weight_kn(mass_kg);
-        let force_n = self.traction_n - self.brake_n - self.extra_n;
-        let unit = self.per_unit_resistance_mps2();
-        let [w0, w1, w2] = self.resistance.polynomial(davis, speed_mps);
-        [
-            per_kg * (force_n - weight_kn * self.gradient_permille) - unit * w0,
-            -unit * w1,
-            -unit * w2,
-        ]
+        let acting = ActingForces {
+            mass_kg: self.mass_kg * self.mass_factor,
+            rotating_mass_factor: self.rotating_mass_factor,
+            force_n: self.traction_n - self.brake_n - self.extra_n,
+            gradient_permille: self.gradient_permille,
+            resistance_n_per_kn: self.resistance.polynomial(davis, speed_mps),
+        };
+        acting.acceleration_mps2()
     }
 
     /// What the acceleration changes by for each ‰ of gradient along the travel.
     #[inline]
     pub(super) fn gradient_slope(&self) -> f64 {
-        -self.per_unit_resistance_mps2()
+        -mps2_per_n_per_kn(self.rotating_mass_factor)
     }
 
     /// What the acceleration changes by for each unit of a, b and c.
     #[inline]
     pub(super) fn davis_slopes(&self, speed_mps: f64) -> [f64; 3] {
-        let unit = self.per_unit_resistance_mps2();
+        let unit = mps2_per_n_per_kn(self.rotating_mass_factor);
         self.resistance.davis_slopes(speed_mps).map(|slope| -unit * slope)
     }
 }
