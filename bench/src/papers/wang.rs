@@ -13,6 +13,7 @@ pub mod energy_rows;
 pub mod leg;
 pub mod line;
 pub mod mass_rows;
+mod paper;
 pub mod printed;
 pub mod resistance_rows;
 pub mod sensor;
@@ -21,8 +22,6 @@ pub mod step_row;
 
 use super::row::Row;
 use super::seeds::Seeds;
-
-const PAPER: &str = "Wang 2022";
 
 /// Every row of the paper over a number of seeded runs.
 ///

@@ -10,6 +10,7 @@ pub mod bound;
 pub mod offline;
 pub mod online;
 mod ratio_posterior;
+mod row;
 pub mod scenario;
 
 use super::row::Row;
@@ -25,11 +26,6 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
     rows.extend(offline::noise_rows(seeds));
     rows.extend(online::rows(seeds));
     rows
-}
-
-/// A line of this paper without any figure yet.
-fn row(table: &'static str, quantity: String, unit: &'static str, seeds: Seeds) -> Row {
-    Row::new("Xia 2023", table, quantity, unit, seeds)
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The command line: `dynocar record`, `recover`, `convert` and `replay --verify` become this program.
 
 mod annotate;
+mod failure;
 mod flight_recorder;
 mod record;
 
@@ -13,15 +14,14 @@ use dynocar::config::DaemonConfig;
 use dynocar::output::{print, require_new, tell};
 use dynocar::programs::{RECORDING, called_as};
 
-use crate::convert::{
-    FromDatasetError, ModelFiles, ToDatasetError, Unpacked, from_dataset, to_dataset,
-};
+use crate::convert::{ModelFiles, ToDatasetError, Unpacked, from_dataset, to_dataset};
 use crate::page::page;
 use crate::reading::{Ending, ReadError};
 use crate::recording::Recording;
 use crate::recover::{RecoverError, recover};
 use crate::verify::{Configurations, Outcome, overlay, overlay_text, text, verify};
 
+pub use failure::from_dataset_failure;
 pub use record::WantedArguments;
 
 /// Recordings of what a controller and the daemon write, as MCAP.
@@ -214,15 +214,6 @@ fn execute_from_dataset(from: &Path, output: &Path, is_quiet: bool) -> Result<()
         tell(&format!("{}: {samples} samples", output.display()));
     }
     Ok(())
-}
-
-/// A dataset that makes no recording is wrong input; a recording that cannot be written is not.
-pub fn from_dataset_failure(error: FromDatasetError) -> Failure {
-    match error {
-        FromDatasetError::Dataset(error) => error.into(),
-        FromDatasetError::Write { .. } => Failure::Work(error.to_string()),
-        error => Failure::Input(error.to_string()),
-    }
 }
 
 fn execute_verify(arguments: &VerifyArguments) -> Result<(), Failure> {

@@ -6,20 +6,17 @@ mod draw;
 mod json;
 mod report;
 mod runs;
+mod understood;
+
+pub use understood::Understood;
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use dynocar_core::dataset::note::notes;
-use dynocar_core::dataset::{
-    DatasetError, DatasetHead, Note, Place, Run, parse_track, parse_train, top_keys,
-};
-use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
+use dynocar_core::dataset::{Place, parse_track, parse_train, top_keys};
 use serde::Serialize;
 
 use super::{ErrorAnswer, Failure};
-use crate::config::DaemonConfig;
 use crate::dataset::{self, FileKind, LoadError, file_error, kind_of, read_text};
 use crate::output::{give, require_file, require_folder, tell, write_json};
 
@@ -34,18 +31,6 @@ pub struct CheckArguments {
     /// Also draw the line's profile and the train's effort curves as SVG into this folder.
     #[arg(long, value_name = "FOLDER")]
     draw: Option<PathBuf>,
-}
-
-/// What was understood.
-pub enum Understood {
-    /// A dataset, with what became of each of its runs.
-    Dataset(Box<DatasetHead>, Vec<Result<Run, DatasetError>>),
-    /// A train.
-    Train(Box<TrainModel>),
-    /// A line.
-    Track(Box<Track>),
-    /// A daemon's configuration.
-    Daemon(Box<DaemonConfig>),
 }
 
 /// Runs `dynocar check`.
@@ -96,35 +81,6 @@ impl Understood {
     /// The answer for people.
     pub fn text(&self) -> String {
         report::report(self)
-    }
-
-    fn kind(&self) -> FileKind {
-        match self {
-            Understood::Dataset(..) => FileKind::Dataset,
-            Understood::Train(_) => FileKind::Train,
-            Understood::Track(_) => FileKind::Track,
-            Understood::Daemon(_) => FileKind::Daemon,
-        }
-    }
-
-    /// What may spoil results, the worst first.
-    fn notes(&self) -> Vec<Note> {
-        match self {
-            Understood::Dataset(head, runs) => {
-                notes(&head.train, head.track.as_deref(), runs.iter().flatten())
-            }
-            Understood::Train(train) => notes(train, None, []),
-            Understood::Track(_) | Understood::Daemon(_) => Vec::new(),
-        }
-    }
-
-    /// What is wrong with single runs.
-    pub fn errors(&self) -> impl Iterator<Item = &DatasetError> {
-        let runs = match self {
-            Understood::Dataset(_, runs) => &runs[..],
-            Understood::Train(_) | Understood::Track(_) | Understood::Daemon(_) => &[],
-        };
-        runs.iter().filter_map(|run| run.as_ref().err())
     }
 }
 

@@ -5,197 +5,23 @@
 
 mod check;
 mod checker;
+mod error;
 mod models;
 mod pace;
+mod parts;
 mod quantities;
 mod raw;
+mod whole;
 
+pub use error::ConfigError;
 pub use pace::is_slow;
+pub use parts::{IdleStrategy, LogFormat, ModelsConfig, PipelineConfig, StateConfig, ThreadConfig};
 pub use quantities::Answers;
+pub use whole::{DaemonConfig, TrainConfig};
 
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-
-use dynocar_core::dataset::FileProblem;
-use dynocar_core::pipeline::EstimatorSettings;
-use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
-use dynocar_shared::TrainId;
-use serde::Deserialize;
+use std::path::Path;
 
 use crate::dataset::read_text;
-use crate::models::{ModelHash, ModelText};
-use crate::shadow::rule::Rule;
-
-/// What a pipeline thread does while no sample comes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum IdleStrategy {
-    /// Looks for samples without pause: lowest latency, one whole core.
-    Busy,
-    /// Looks for a while, then sleeps until the controller wakes it.
-    Adaptive,
-    /// Sleeps at once: least processor time.
-    Event,
-}
-
-impl std::fmt::Display for IdleStrategy {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            IdleStrategy::Busy => "busy",
-            IdleStrategy::Adaptive => "adaptive",
-            IdleStrategy::Event => "event",
-        })
-    }
-}
-
-/// How the daemon writes its log.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum LogFormat {
-    /// Lines for people.
-    Text,
-    /// One JSON object a line.
-    Json,
-}
-
-/// A train that the daemon serves.
-#[derive(Clone, Debug)]
-pub struct TrainConfig {
-    /// Its number on the channels.
-    pub id: TrainId,
-    /// What is declared of it.
-    pub model: Arc<TrainModel>,
-    /// The line it runs on, when known.
-    pub track: Option<Arc<Track>>,
-    /// By what that model of train and line is known.
-    pub model_hash: ModelHash,
-    /// What the configuration declares, as its files spell it.
-    pub text: ModelText,
-    /// The models to be tried beside the one in force; those of the store when absent.
-    pub candidates: Option<Vec<ModelHash>>,
-    /// Which wheels it runs on; estimates are not kept across a change. Empty when not told.
-    pub wheel_set: String,
-    /// The pipelines that answer a controller's questions, each by its number.
-    pub answers: Answers,
-}
-
-/// Where and how estimates are kept over restarts.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct StateConfig {
-    /// Directory of the state files.
-    pub directory: PathBuf,
-    /// How often they are written, in s.
-    pub interval_s: u64,
-    /// An older estimate is not taken up, in h.
-    pub age_max_h: u64,
-}
-
-/// The store of models, and what becomes of those on trial.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ModelsConfig {
-    /// The store's directory.
-    pub directory: PathBuf,
-    /// When a model is adopted or taken back.
-    pub rule: Rule,
-    /// The most candidates of a train that are on trial at once.
-    pub candidates_max: usize,
-    /// Processor core of the thread that tries them.
-    pub core: Option<usize>,
-    /// How often the trials are written down, in s.
-    pub interval_s: u64,
-}
-
-/// A thread that serves pipelines.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ThreadConfig {
-    /// Name, also shown by the operating system.
-    pub name: String,
-    /// Processor core that it is bound to.
-    pub core: Option<usize>,
-    /// What it does while no sample comes.
-    pub idle: IdleStrategy,
-    /// Real-time priority (`SCHED_FIFO`), 1 to 99; the system's ordinary scheduling when absent.
-    pub priority: Option<u8>,
-}
-
-/// A pipeline: one estimator for each of its trains.
-#[derive(Clone, Debug)]
-pub struct PipelineConfig {
-    /// Name for people.
-    pub name: String,
-    /// Kind and settings of the estimator.
-    pub estimator: EstimatorSettings,
-    /// Place of its thread in [`DaemonConfig::threads`].
-    pub thread: usize,
-    /// The trains it serves.
-    pub trains: Vec<TrainId>,
-}
-
-/// A configuration, checked as a whole.
-#[derive(Clone, Debug)]
-pub struct DaemonConfig {
-    /// Run-time directory; the environment's when absent.
-    pub root: Option<PathBuf>,
-    /// Level of the log, as `info` or `dynocar=debug`.
-    pub log: String,
-    /// Form of the log.
-    pub log_format: LogFormat,
-    /// How long an adaptive thread looks for samples before it sleeps, in µs.
-    pub spin_us: u64,
-    /// How often a snapshot is vouched for while no sample comes, in ms.
-    pub heartbeat_ms: u64,
-    /// Keeps all memory of the daemon resident, so that no thread waits for a page.
-    pub lock_memory: bool,
-    /// The trains.
-    pub trains: Vec<TrainConfig>,
-    /// The threads.
-    pub threads: Vec<ThreadConfig>,
-    /// Loopback address that hands out metrics; none when absent.
-    pub metrics: Option<std::net::SocketAddr>,
-    /// Estimates that outlive the daemon; none are kept when absent.
-    pub state: Option<StateConfig>,
-    /// The store of models; without it what is declared stays in force.
-    pub models: Option<ModelsConfig>,
-    /// The pipelines, by the number that their snapshots carry.
-    pub pipelines: Vec<PipelineConfig>,
-}
-
-/// Why a configuration is refused.
-#[derive(Debug, thiserror::Error)]
-pub enum ConfigError {
-    /// The file's text cannot be had.
-    #[error("{path}: {problem}")]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why not.
-        problem: FileProblem,
-    },
-    /// The file is no TOML, or has a key or type that is not expected.
-    #[error("{path}: {message}")]
-    Malformed {
-        /// The file.
-        path: PathBuf,
-        /// What the reader says, with the line.
-        message: String,
-    },
-    /// A value lies outside its range.
-    #[error("{path}: {key} = {value}: expected {allowed}")]
-    OutOfRange {
-        /// The file.
-        path: PathBuf,
-        /// The key, with its table.
-        key: String,
-        /// The value it was given.
-        value: String,
-        /// The allowed range, in words.
-        allowed: String,
-    },
-    /// A train or track file is wrong; the message names it.
-    #[error(transparent)]
-    Model(#[from] crate::dataset::LoadError),
-}
 
 impl DaemonConfig {
     /// Reads and checks a configuration and the train and track files it names.

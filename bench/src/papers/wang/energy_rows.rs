@@ -9,10 +9,10 @@ use dynocar_core::pipeline::Estimator;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::PAPER;
 use super::driver::Driver;
 use super::leg::{kalman, known_resistance, leg};
 use super::line::STATIONS_M;
+use super::paper::PAPER;
 use super::sensor::measure;
 use super::shuttle::{BRAKE_MAX_N, Calm, EMPTY_MASS_KG, Instant, PERIOD_S, Shuttle};
 use crate::papers::row::Row;

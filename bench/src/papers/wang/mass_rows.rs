@@ -7,10 +7,10 @@ use dynocar_core::pipeline::papers::wang::MassRegression;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::PAPER;
 use super::bound::{Information, mass_std_in_wind};
 use super::disturbance::{GradientError, Presumed, Wind};
 use super::leg::{kalman, known_resistance, leg, staged, there_and_back};
+use super::paper::PAPER;
 use super::resistance_rows::{CROSSING, joint_least_squares};
 use super::sensor::measure;
 use super::shuttle::{Calm, Disturbance, Shuttle};

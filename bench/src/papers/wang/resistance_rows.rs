@@ -9,8 +9,8 @@ use dynocar_core::train::Davis;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::PAPER;
 use super::bound::Information;
+use super::paper::PAPER;
 use super::printed::PrintedDescent;
 use super::sensor::measure;
 use super::shuttle::{Calm, Instant, Shuttle};

@@ -6,8 +6,8 @@ use dynocar_core::pipeline::{Estimator, Outcome};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::PAPER;
 use super::leg::{kalman, known_resistance, staged, there_and_back};
+use super::paper::PAPER;
 use super::sensor::measure;
 use super::shuttle::{Calm, EMPTY_MASS_KG, Shuttle};
 use crate::papers::row::Row;

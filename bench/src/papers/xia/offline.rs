@@ -18,7 +18,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::bound::{davis_covariance, disturbed_davis_covariance};
 use super::ratio_posterior::likeliest_fit;
-use super::row;
+use super::row::row;
 use super::scenario::{CASES, Profile, Run, all_speeds_mps, drive, fast_speeds_mps};
 use crate::papers::row::Row;
 use crate::papers::score::{Score, w0_errors};

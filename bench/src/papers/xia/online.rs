@@ -19,11 +19,12 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::bound::disturbed_davis_covariance;
+use super::offline;
+use super::row::row;
 use super::scenario::{
     CASES, Profile, ROTATING_MASS_FACTOR, Run, SAMPLING_M, SPEED_NOISE_MPS, all_speeds_mps, drive,
     fast_speeds_mps,
 };
-use super::{offline, row};
 use crate::papers::row::Row;
 use crate::papers::score::{Score, w0_std};
 use crate::papers::seeds::{Seeds, normal};

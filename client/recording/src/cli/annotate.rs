@@ -9,7 +9,7 @@ use dynocar::cli::Failure;
 use dynocar::output::{require_new, tell};
 use dynocar_core::explain::report::timeline::Timeline;
 
-use super::from_dataset_failure;
+use super::failure::from_dataset_failure;
 use crate::annotate::{AnnotateError, annotate};
 use crate::convert::from_dataset;
 

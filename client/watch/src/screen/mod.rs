@@ -111,9 +111,3 @@ fn keys(frame: &mut Frame<'_>, area: Rect, trains: usize, palette: Palette) {
     }
     frame.render_widget(Paragraph::new(words).style(palette.faint()), area);
 }
-
-/// A heading over a section, with a rule to the right edge.
-fn heading(words: &str, width: u16, palette: Palette) -> Line<'static> {
-    let rule = "─".repeat(usize::from(width).saturating_sub(words.chars().count() + 4));
-    Line::styled(format!("── {words} {rule}"), palette.faint())
-}

@@ -5,9 +5,8 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
-use super::heading;
 use super::plots::{self, sparkline};
-use super::style::Palette;
+use super::style::{Palette, heading};
 use crate::history::Point;
 use crate::state::TrainState;
 use crate::words::{Row, duration, residual, rows};

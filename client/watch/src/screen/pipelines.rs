@@ -5,8 +5,7 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
-use super::heading;
-use super::style::Palette;
+use super::style::{Palette, heading};
 use crate::state::{PipelineState, TrainState};
 use crate::words::{duration, refusals};
 

@@ -1,7 +1,8 @@
-//! Colours, or none.
+//! Colours, or none, and headings.
 
 use dynocar_shared::Status;
 use ratatui::style::{Color, Modifier, Style};
+use ratatui::text::Line;
 
 /// Colours where they are wanted; without them bold and faint alone.
 #[derive(Clone, Copy, Debug)]
@@ -53,4 +54,10 @@ impl Palette {
             Status::Unestimated => self.faint(),
         }
     }
+}
+
+/// A heading over a section, with a rule to the right edge.
+pub fn heading(words: &str, width: u16, palette: Palette) -> Line<'static> {
+    let rule = "─".repeat(usize::from(width).saturating_sub(words.chars().count() + 4));
+    Line::styled(format!("── {words} {rule}"), palette.faint())
 }

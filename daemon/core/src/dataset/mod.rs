@@ -60,7 +60,7 @@ pub use quality::{Phases, RunQuality};
 pub use quantity::Quantity;
 pub use remark::Remark;
 pub use resolved::{DATASET_TRAIN, GradientSource};
-pub use run::{Extras, Run};
+pub use run::{Extras, Run, is_parquet};
 pub use table::LineCounts;
 pub use track_file::parse_track;
 pub use train_file::parse_train;
@@ -255,11 +255,6 @@ fn unread(file: String, problem: FileProblem, listed_at: Option<&Place>) -> Data
         }
         (_, Some(place)) => place.clone().problem(Problem::ListedFile { file, problem }),
     }
-}
-
-/// True for the name of a Parquet file, which a run may be in place of CSV.
-pub fn is_parquet(path: &str) -> bool {
-    path.ends_with(".parquet")
 }
 
 /// Handles are shares of a curve, which must then be declared.

@@ -6,7 +6,6 @@ use dynocar_shared::{SampleField, TrainSample};
 
 use super::error::{DatasetError, Place, Problem};
 use super::forces::ForceSource;
-use super::is_parquet;
 use super::manifest::{Role, RunEntry};
 use super::motion::PositionSource;
 use super::power;
@@ -213,4 +212,9 @@ fn extras(table: &Table) -> Extras {
         line_power_w: power::line_power_w(table)
             .map(|values| values.iter().map(|&it| (!it.is_nan()).then_some(it)).collect()),
     }
+}
+
+/// True for the name of a Parquet file, which a run may be in place of CSV.
+pub fn is_parquet(path: &str) -> bool {
+    path.ends_with(".parquet")
 }

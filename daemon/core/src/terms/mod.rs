@@ -16,6 +16,7 @@ pub mod extra;
 pub mod gradient;
 mod key;
 pub mod masses;
+mod parameter;
 pub mod place;
 mod resistance;
 pub mod rotating;
@@ -27,6 +28,7 @@ pub mod wheel;
 pub mod wind;
 
 pub use key::{Entry, Joined, Key};
+pub use parameter::Parameter;
 pub use resistance::Resistance;
 pub use suspect::{Least, Seen, Suspect};
 
@@ -59,26 +61,6 @@ pub const SUSPECTS: [Suspect; 11] = [
     gradient::SUSPECT,
     adhesion::SUSPECT,
 ];
-
-/// A parameter of a term, as a fit knows it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Parameter {
-    /// Its name in the answer.
-    pub name: &'static str,
-    /// Least value.
-    pub lower: f64,
-    /// Greatest value.
-    pub upper: f64,
-    /// Step for finite differences.
-    pub step: f64,
-}
-
-impl Parameter {
-    /// A parameter with its bounds.
-    pub const fn new(name: &'static str, (lower, upper): (f64, f64), step: f64) -> Self {
-        Parameter { name, lower, upper, step }
-    }
-}
 
 #[cfg(test)]
 mod tests {
