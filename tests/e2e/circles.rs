@@ -74,24 +74,25 @@ impl Package {
         let segments = |path: &str| path.split("::").map(str::to_owned).collect::<Vec<_>>();
         let mut imports = Vec::new();
         for statement in text.split(';') {
-            let Some((before, tree)) = statement.rsplit_once("use ") else { continue };
-            let before = before.rsplit('\n').next().unwrap_or_default().trim();
-            for path in paths(tree).iter().map(|path| segments(path)) {
-                if before.starts_with("pub") {
+            let (code, tree) = statement.rsplit_once("use ").unwrap_or((statement, ""));
+            let before = code.rsplit('\n').next().unwrap_or_default().trim();
+            let is_handed_on = before.starts_with("pub");
+            let is_use = !tree.is_empty() && (is_handed_on || before.is_empty());
+            for path in paths(tree).iter().filter(|_| is_use).map(|path| segments(path)) {
+                if is_handed_on {
+                    if ["crate", "super"].contains(&path[0].as_str()) {
+                        imports.push(path.clone());
+                    }
                     let name = path.last().cloned().unwrap_or_default();
                     self.handed_on.insert((module.clone(), name), path);
-                } else if before.is_empty() {
+                } else {
                     imports.push(path);
                 }
             }
-        }
-        for word in text.split(|letter: char| !(letter.is_alphanumeric() || "_:".contains(letter)))
-        {
-            // What ends in :: is the head of a tree, which was read above.
-            let is_path = word.starts_with("crate::") || word.starts_with("super::");
-            if is_path && !word.ends_with("::") {
-                imports.push(segments(word));
-            }
+            let inline = if is_use { code } else { statement }.replace("::<", "<");
+            let is_of_path = |letter: char| letter.is_alphanumeric() || "_:".contains(letter);
+            let words = inline.split(|letter| !is_of_path(letter));
+            imports.extend(words.filter(|word| word.contains("::")).map(segments));
         }
         self.imports.insert(module, imports);
     }

@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::OUTSIDE_COST;
 use super::band_axis::{AXES, BandAxis};
+use super::outside::OUTSIDE_COST;
 use crate::explain::answer::{CovariateRange, Place};
 use crate::explain::effects::{Candidate, Hypothesis, Parameter, SharedHypothesis};
 use crate::explain::evidence::{Bin, RunData, SampleForces};

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::OUTSIDE_COST;
 use super::numbers::{edges, fitted_numbers, is_exponent, named};
+use super::outside::OUTSIDE_COST;
 use crate::explain::answer::{CovariateRange, ParameterValue, Place};
 use crate::explain::effects::{Candidate, Hypothesis, ReportContext, Reported, SharedHypothesis};
 use crate::explain::evidence::{RunData, SampleForces};

@@ -12,6 +12,7 @@ mod form;
 mod grammar;
 mod known;
 mod numbers;
+mod outside;
 mod shape;
 
 use dynocar_shared::vocabulary::EffectKind;
@@ -20,8 +21,6 @@ use super::{Candidate, Effect, Proposal};
 use crate::explain::evidence::STRENGTH_MIN;
 use crate::explain::scan::Scan;
 
-/// The library comes first: what is outside must explain more than a known kind.
-const OUTSIDE_COST: f64 = 10.0;
 /// Bands and forms that are worth a fit.
 const BANDS_MAX: usize = 2;
 const FORMS_MAX: usize = 4;
