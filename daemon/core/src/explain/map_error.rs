@@ -10,15 +10,15 @@ use super::places::span_m;
 use super::selection::{Deviations, Outcome, Search, deviations};
 use crate::terms::gradient::SURVEYED;
 
-/// Moves the finished model to where it fits best beside the map's error; how surely its parameters are
-/// known then. Where nothing was found, the model without effects is the same.
+/// Moves the effects that were found to where they fit best beside the map's error; how surely the
+/// parameters of the finished model are known then. Without an effect the model stays where it is: a, b
+/// and c alone are not told better.
 pub fn beside_map_error(search: &Search, outcome: &mut Outcome) -> Deviations {
     let Some(joint) = joint(search, &outcome.fit) else { return deviations(&outcome.fit) };
     let count = outcome.fit.theta.len();
-    let theta = joint.theta[..count].to_vec();
-    outcome.fit = search.problem.at(&outcome.fit.model, theta, outcome.fit.noise);
-    if outcome.fit.model.effects.is_empty() {
-        outcome.base = outcome.fit.clone();
+    if !outcome.fit.model.effects.is_empty() {
+        let theta = joint.theta[..count].to_vec();
+        outcome.fit = search.problem.at(&outcome.fit.model, theta, outcome.fit.noise);
     }
     deviations(&joint).of_first(count)
 }

@@ -71,7 +71,7 @@ pub fn without_each_run(problem: &FitProblem, fit: &Fit) -> Vec<Vec<f64>> {
 
 /// The form of an effect (a train of one piece, averages over bins) is itself good to this share
 /// of its size.
-const FORM_SHARE: f64 = 0.015;
+const FORM_SHARE: f64 = 0.01;
 
 /// Student's 97.5 % quantile over the normal one, so that 1.96 standard deviations make a 95 %
 /// interval.
@@ -105,8 +105,7 @@ impl Deviations {
 ///
 /// The likelihood's variance and the scatter between the runs (jackknife: how the parameters move when
 /// single runs are left out) are averaged, the likelihood counting as `PRIOR_RUNS` runs and the scatter
-/// as those there are; nothing is known better than the likelihood says. Half of a parameter's scatter
-/// is that of all together, where that is more.
+/// as those there are.
 pub fn deviations(fit: &Fit) -> Deviations {
     let count = fit.theta.len();
     let Some(factor) = Cholesky::new(fit.free_information()) else {
@@ -115,19 +114,20 @@ pub fn deviations(fit: &Fit) -> Deviations {
     let covariance = factor.inverse();
     let runs = fit.runs.len() as f64;
     let mut scatter = DVector::zeros(count);
-    for moved in moves_without_each_run(fit).into_iter().flatten() {
-        scatter += moved.component_mul(&moved);
+    let moves = moves_without_each_run(fit);
+    for moved in moves.iter().flatten() {
+        scatter += moved.component_mul(moved);
     }
+    // What one run alone tells scatters with none.
+    let least = if moves.iter().all(Option::is_some) { 0.0 } else { 1.0 };
     let left = (runs - 1.0) / runs;
-    let own: Vec<f64> = (0..count).map(|i| left * scatter[i] / covariance[(i, i)]).collect();
-    let pooled = own.iter().sum::<f64>() / count as f64;
     let freedom = PRIOR_RUNS + runs - 1.0;
-    let averaged = |own: f64| {
-        let seen = own.max(0.5 * (own + pooled));
+    let enlarged = |i: usize| {
+        let seen = left * scatter[i] / covariance[(i, i)];
         let both = (PRIOR_RUNS + (runs - 1.0) * seen) / freedom;
-        students_factor(freedom) * both.max(1.0).sqrt()
+        students_factor(freedom) * both.max(least).sqrt()
     };
-    let enlarged: Vec<f64> = own.into_iter().map(averaged).collect();
+    let enlarged: Vec<f64> = (0..count).map(enlarged).collect();
     let scaled =
         DMatrix::from_fn(count, count, |i, j| covariance[(i, j)] * enlarged[i] * enlarged[j]);
     let mut std: Vec<f64> = (0..count).map(|i| scaled[(i, i)].sqrt()).collect();
