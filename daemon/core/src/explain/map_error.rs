@@ -10,17 +10,24 @@ use super::places::span_m;
 use super::selection::{Deviations, Outcome, Search, deviations};
 use crate::terms::gradient::SURVEYED;
 
-/// Moves the effects that were found to where they fit best beside the map's error; how surely the
-/// parameters of the finished model are known then. Without an effect the model stays where it is: a, b
+/// Moves the models without and with the effects that were found to where they fit best beside the map's
+/// error; how surely the parameters of the latter are known then. Where nothing was found they stay: a, b
 /// and c alone are not told better.
 pub fn beside_map_error(search: &Search, outcome: &mut Outcome) -> Deviations {
     let Some(joint) = joint(search, &outcome.fit) else { return deviations(&outcome.fit) };
     let count = outcome.fit.theta.len();
     if !outcome.fit.model.effects.is_empty() {
-        let theta = joint.theta[..count].to_vec();
-        outcome.fit = search.problem.at(&outcome.fit.model, theta, outcome.fit.noise);
+        outcome.fit = moved(search, &outcome.fit, &joint);
+        if let Some(joint) = self::joint(search, &outcome.base) {
+            outcome.base = moved(search, &outcome.base, &joint);
+        }
     }
     deviations(&joint).of_first(count)
+}
+
+/// A model with its parameters as they are beside the map's error.
+fn moved(search: &Search, fit: &Fit, joint: &Fit) -> Fit {
+    search.problem.at(&fit.model, joint.theta[..fit.theta.len()].to_vec(), fit.noise)
 }
 
 /// The model with the map's error as its last effect; `None` where a gradient is fitted anyway, and where

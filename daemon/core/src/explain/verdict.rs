@@ -35,10 +35,10 @@ pub fn answer(
     score: &Score,
     notes: Vec<Note>,
 ) -> Answer {
-    let fit = &outcome.fit;
+    let (fit, std) = (&outcome.fit, &deviations.std);
     let effects = effect_answers(search, outcome, known, deviations);
     // What has no name has no rivals either.
-    let is_unknown = is_in(&outcome.fit, EffectKind::Unknown);
+    let is_unknown = is_in(fit, EffectKind::Unknown);
     let rivals = if is_unknown { Vec::new() } else { rivals(outcome) };
     let left = Unexplained::of(search, outcome);
     let verdict = verdict(search, outcome, &rivals, left.as_ref());
@@ -58,7 +58,7 @@ pub fn answer(
             statement(search, outcome, verdict, &effects, &rivals, left.as_ref());
         let not_told = match verdict {
             Verdict::InsufficientData => String::new(),
-            _ => not_told(search.problem, fit, &deviations.std) + &not_held(&identifiability),
+            _ => not_told(search.problem, fit, std) + &not_held(&identifiability),
         };
         (text + &worse_held_out(&effects, score) + &not_told, experiment)
     } else {
@@ -76,12 +76,8 @@ pub fn answer(
             a: fit.theta[0],
             b: fit.theta[1],
             c: fit.theta[2],
-            std: DavisDeviations {
-                a: deviations.std[0],
-                b: deviations.std[1],
-                c: deviations.std[2],
-            },
-            told_by_data: told_by_data(search.problem, &deviations.std),
+            std: DavisDeviations { a: std[0], b: std[1], c: std[2] },
+            told_by_data: told_by_data(search.problem, std),
         },
         metric: "full_run",
         scored_runs: score.holdout_runs.iter().filter(|run| run[0].count > 0).count(),
