@@ -8,6 +8,7 @@ use dynocar_core::dataset::parse_train;
 use dynocar_core::explain::answer::{ParameterValue, Verdict};
 use dynocar_core::explain::effects::LIBRARY;
 use dynocar_core::explain::scan::Scan;
+use dynocar_core::explain::selection::deviations;
 use dynocar_core::explain::{Explanation, explain};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::write_dataset;
@@ -46,6 +47,21 @@ fn what_one_run_alone_tells_is_found_where_the_others_gain_nothing_from_it() {
     let kinds: Vec<&str> = answer.effects.iter().map(|effect| effect.kind).collect();
     assert_eq!((answer.verdict, &kinds[..]), (Verdict::Effect, &["mass_change"][..]));
     assert!(answer.rmse_after.unwrap() < 0.2 * answer.rmse_before.unwrap(), "{}", answer.statement);
+}
+
+#[test]
+fn a_number_is_no_surer_than_the_map_that_all_runs_share() {
+    let request = EffectRequest::Kinds(vec![EffectKind::RotatingMass]);
+    let simulated = simulate(&SimulatorSettings::new(SEED, request));
+    let folder = tempfile::tempdir().unwrap();
+    let explanation = explained(&simulated, folder.path());
+    let effect = &explanation.answer.effects[0];
+    assert_eq!(effect.kind, "rotating_mass", "{}", explanation.answer.statement);
+    let ParameterValue::Number(told) = effect.std["rotating_mass_factor"] else {
+        panic!("a deviation is a number");
+    };
+    let by_runs_alone = deviations(&explanation.grown).std[3];
+    assert!(told > 1.1 * by_runs_alone, "{told}, and {by_runs_alone} by the runs alone");
 }
 
 #[test]
