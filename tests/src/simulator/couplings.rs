@@ -4,6 +4,8 @@
 //! couplings add is how its first car moves against the whole: a chain of masses on springs and dampers,
 //! with slack in a freight train, under the forces that act on each car.
 
+use dynocar_core::train::TrainModel;
+
 use super::dynamics::TruePhysics;
 use super::settings::TrainType;
 use super::train_maker::Car;
@@ -98,7 +100,7 @@ pub fn move_leading_car(physics: &TruePhysics<'_>, states: &mut [TrueState]) {
         state.wheel_speed_mps = (state.wheel_speed_mps + chain.speed_mps[0]).max(0.0);
         let shared_n =
             state.acting.brake_force_n + state.resistance.ordinary_n + state.resistance.extra_n;
-        let weight_n = 9.81 * state.mass_kg;
+        let weight_n = 1000.0 * TrainModel::weight_kn(state.mass_kg);
         for (index, (car, force_n)) in train.cars.iter().zip(&mut forces_n).enumerate() {
             let car_m = state.position_m + plan.direction * car.ahead_m;
             let gradient = physics.disturbances.gradient.mean_around(car_m, car.length_m) / 1000.0;

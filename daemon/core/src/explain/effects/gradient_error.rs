@@ -78,7 +78,7 @@ impl Effect for GradientError {
     }
 }
 
-/// The map's own small error, at none: no effect, but what every fit is beside.
+/// The map's own small error, at none: no effect, but what the finished model is fitted beside.
 pub fn map_error(span_m: [f64; 2], scale: ErrorScale) -> Candidate {
     let profile = Profile::new(span_m, scale, 1, false);
     let start = vec![0.0; profile.parameters.len()];
