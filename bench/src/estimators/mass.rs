@@ -10,6 +10,7 @@ use dynocar_core::pipeline::mass::bias_bank::{
 use dynocar_core::pipeline::mass::bias_model::BiasModel;
 use dynocar_core::pipeline::mass::line_resistance::LineResistance;
 use dynocar_core::pipeline::mass::motion::Motion;
+use dynocar_core::simulate::motion as simulate;
 use dynocar_core::train::TrainModel;
 use nalgebra::{Matrix3, RowVector3, Vector3};
 
@@ -35,7 +36,7 @@ struct Drive {
 fn drive(train: &TrainModel) -> Arc<Drive> {
     let dynamics = Dynamics::new(train, LineResistance::declared(train));
     let mut random = Random::new(21);
-    let mut speed_mps: f64 = 12.0;
+    let mut train_motion = simulate::Motion { distance_m: 0.0, speed_mps: 12.0 };
     let motions = (0..SAMPLES).map(|index| {
         let force_n = match (index / 50) % 4 {
             0 | 1 => 0.15 * train.mass_kg,
@@ -45,7 +46,7 @@ fn drive(train: &TrainModel) -> Arc<Drive> {
         let mut motion = Motion {
             time_ns: (index as f64 * STEP_S * 1e9) as i64,
             stretch: 0,
-            speed_mps: speed_mps + SPEED_VARIANCE.sqrt() * random.normal(),
+            speed_mps: train_motion.speed_mps + SPEED_VARIANCE.sqrt() * random.normal(),
             force_n,
             declared_kg: 1e5,
             known_n_per_kn: 2.0 * (0.01 * index as f64).sin(),
@@ -53,8 +54,10 @@ fn drive(train: &TrainModel) -> Arc<Drive> {
             curvature_per_m: 0.0,
             tunnel_share: 0.0,
         };
-        let drag = dynamics.drag_mps2(&motion, speed_mps);
-        speed_mps += STEP_S * (1.05 * dynamics.push_mps2(&motion) - drag);
+        let push_mps2 = 1.05 * dynamics.push_mps2(&motion);
+        let pull =
+            |_: f64, now: simulate::Motion| push_mps2 - dynamics.drag_mps2(&motion, now.speed_mps);
+        train_motion = simulate::advance(train_motion, STEP_S, pull);
         motion.speed_mps = motion.speed_mps.max(1.0);
         motion
     });

@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use dynocar_core::filter::Gaussian;
 use dynocar_core::filter::random::Random;
+use dynocar_core::simulate::motion::{Motion, advance};
+use dynocar_core::train::Davis;
 use nalgebra::{RowSVector, SMatrix, SVector};
 
 use super::measure::{Agreement, Case, Contender};
@@ -31,14 +33,14 @@ type Sample = (SVector<f64, STATES>, f64);
 /// Traction, coasting and braking, linearised about the true speed.
 fn samples() -> Arc<[Sample]> {
     let mut random = Random::new(31);
-    let mut speed_mps = 20.0_f64;
-    let davis = [1.4, 0.02, 0.0011];
+    let mut motion = Motion { distance_m: 0.0, speed_mps: 20.0 };
+    let davis = Davis { a: 1.4, b: 0.02, c: 0.0011 };
     (0..SAMPLES)
         .map(|index| {
             let phase = (index / 80) % 3;
             let traction = if phase == 0 { 25.0 } else { 0.0 };
             let brake = if phase == 2 { 18.0 } else { 0.0 };
-            let powers = [1.0, speed_mps, speed_mps * speed_mps];
+            let powers = [1.0, motion.speed_mps, motion.speed_mps * motion.speed_mps];
             let mut gradient = SVector::<f64, STATES>::zeros();
             gradient[SPEED] = 1.0;
             gradient[DISTURBANCE] = -STEP_S / INERTIA;
@@ -48,10 +50,12 @@ fn samples() -> Arc<[Sample]> {
             gradient[5] = STEP_S * traction / INERTIA;
             gradient[6] = -STEP_S * brake / INERTIA;
             gradient[7] = if index % 80 == 0 { 0.2 } else { 0.0 };
-            let resisted: f64 = (0..3).map(|i| davis[i] * powers[i]).sum();
-            speed_mps += STEP_S * (traction - brake - resisted) / INERTIA;
-            speed_mps = speed_mps.max(3.0);
-            (gradient, speed_mps + SPEED_VARIANCE.sqrt() * random.normal())
+            let pull = |_: f64, now: Motion| {
+                (traction - brake - davis.w0_n_per_kn(now.speed_mps)) / INERTIA
+            };
+            motion = advance(motion, STEP_S, pull);
+            motion.speed_mps = motion.speed_mps.max(3.0);
+            (gradient, motion.speed_mps + SPEED_VARIANCE.sqrt() * random.normal())
         })
         .collect()
 }

@@ -7,6 +7,7 @@
 //! differences into white innovations, for residuals and regressors alike, so that the fit is a
 //! least-squares problem whatever the noise.
 
+mod bins;
 mod cleaning;
 mod criterion;
 mod fade;
@@ -17,14 +18,16 @@ mod noise_search;
 mod run_data;
 mod run_scatter;
 mod sample_forces;
+mod way;
 mod whitener;
 
+pub use bins::Bin;
 pub use criterion::{EQUAL, NULL_STRENGTH, NullStrength, STRENGTH_MIN, p_value, strength};
 pub use fade::Fade;
 pub use fit::{Fit, FitProblem, Nearby, RunNormal};
 pub use model::{GrownForces, GrownModel};
 pub use noise::{Noise, RunScatter};
-pub use run_data::{Bin, RunData, RunDataError, RunPower, prepare};
+pub use run_data::{RunData, RunDataError, RunPower, prepare};
 pub use run_scatter::{PRIOR_RUNS, WeightedFilter};
 pub use sample_forces::SampleForces;
 pub use whitener::Whitener;

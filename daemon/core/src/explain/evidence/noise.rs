@@ -1,11 +1,15 @@
 //! The process that is left when the model is right.
 
 /// Noise of the bins: white measurement noise, a white force, and a force that fades with a time
-/// constant (Ornstein-Uhlenbeck), as gusts or a rough map leave it.
+/// constant (Ornstein-Uhlenbeck), as gusts or a rough map leave it. Where the control force changes,
+/// the car with the tacho moves against the others on its couplings: more measurement noise there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     /// Variance in (m/s)² of a bin's mean speed.
     pub measurement_var: f64,
+    /// Further standard deviation in m/s for each m/s² by which the acceleration of the control
+    /// force changed of late, in s.
+    pub jump_s: f64,
     /// Spectral density in (m/s)²/s of the white acceleration.
     pub white_density: f64,
     /// Variance in (m/s²)² of the fading acceleration.
@@ -20,6 +24,7 @@ impl Noise {
     /// Where an estimation starts.
     pub const START: Noise = Noise {
         measurement_var: 1e-4,
+        jump_s: 0.0,
         white_density: 1e-6,
         fading_var: 1e-5,
         fading_s: 20.0,
@@ -39,18 +44,26 @@ impl Noise {
         (white_density * over_s + 2.0 * fading_var * fading_s * lasting_s).sqrt() / over_s
     }
 
+    /// Variance in (m/s)² of the mean speed of a bin before which the control force changed by an
+    /// acceleration.
+    #[inline]
+    pub(super) fn bin_var(&self, jump_mps2: f64) -> f64 {
+        let of_jump_mps = self.jump_s * jump_mps2;
+        self.measurement_var + of_jump_mps * of_jump_mps
+    }
+
     pub(super) fn to_logs(self) -> [f64; 4] {
         [self.measurement_var, self.white_density, self.fading_var, self.fading_s].map(f64::ln)
     }
 
-    pub(super) fn from_logs(logs: [f64; 4], scatter: RunScatter) -> Self {
+    pub(super) fn from_logs(self, logs: [f64; 4]) -> Self {
         let bounded = |value: f64, low: f64, high: f64| value.exp().clamp(low, high);
         Noise {
             measurement_var: bounded(logs[0], 1e-8, 1.0),
             white_density: bounded(logs[1], 1e-9, 1e-2),
             fading_var: bounded(logs[2], 1e-10, 1e-2),
             fading_s: bounded(logs[3], 4.0, 400.0),
-            scatter,
+            ..self
         }
     }
 }

@@ -4,32 +4,47 @@ use super::noise::Noise;
 use super::run_data::RunData;
 use super::whitener::Whitener;
 
+/// What is tried for the noise at changes of the control force, in s.
+const JUMPS_S: [f64; 6] = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0];
+
 impl Noise {
     /// The noise under which the differences of the fit runs from a model are likeliest, robust
     /// to outliers. `residuals` holds one vector of bin differences per run.
     pub fn estimate(runs: &[RunData], residuals: &[Vec<f64>], start: Noise) -> Noise {
-        let mut whitened = Vec::new();
-        let mut cost = |logs: [f64; 4]| -> f64 {
-            let noise = Noise::from_logs(logs, start.scatter);
-            let outside: f64 = logs
-                .iter()
-                .zip(noise.to_logs())
-                .map(|(log, kept)| (log - kept) * (log - kept))
-                .sum();
-            let mut total = 10.0 * outside;
-            for (run, residual) in runs.iter().zip(residuals) {
+        let cost = |noise: Noise| -> f64 {
+            let mut whitened = Vec::new();
+            let of_run = |(run, residual): (&RunData, &Vec<f64>)| {
                 let whitener = Whitener::new(run, noise);
                 whitener.whiten(residual, &mut whitened);
-                total += whitener.minus_two_log_likelihood(&whitened);
-            }
-            total
+                whitener.minus_two_log_likelihood(&whitened)
+            };
+            runs.iter().zip(residuals).map(of_run).sum()
         };
-        Noise::from_logs(nelder_mead(start.to_logs(), &mut cost), start.scatter)
+        let smooth = likeliest(start, &cost);
+        let with = |jump_s: &f64| Noise { jump_s: *jump_s, ..smooth };
+        let ragged = JUMPS_S.iter().map(with).map(|noise| (noise, cost(noise)));
+        let best = ragged.min_by(|one, other| one.1.total_cmp(&other.1));
+        match best {
+            Some((noise, _)) if noise.jump_s != smooth.jump_s => likeliest(noise, &cost),
+            _ => smooth,
+        }
     }
 }
 
+/// The likeliest noise with the jumps of `start`.
+fn likeliest(start: Noise, cost: &impl Fn(Noise) -> f64) -> Noise {
+    let bounded_cost = |logs: [f64; 4]| {
+        let noise = start.from_logs(logs);
+        let kept = noise.to_logs();
+        let outside: f64 =
+            logs.iter().zip(kept).map(|(log, kept)| (log - kept) * (log - kept)).sum();
+        10.0 * outside + cost(noise)
+    };
+    start.from_logs(nelder_mead(start.to_logs(), &bounded_cost))
+}
+
 /// Nelder and Mead's simplex search in four dimensions, bounded work.
-fn nelder_mead(start: [f64; 4], cost: &mut impl FnMut([f64; 4]) -> f64) -> [f64; 4] {
+fn nelder_mead(start: [f64; 4], cost: &impl Fn([f64; 4]) -> f64) -> [f64; 4] {
     const STEPS: usize = 90;
     let mut simplex: Vec<([f64; 4], f64)> = (0..5)
         .map(|vertex| {
@@ -51,7 +66,7 @@ fn nelder_mead(start: [f64; 4], cost: &mut impl FnMut([f64; 4]) -> f64) -> [f64;
         let centre: [f64; 4] =
             std::array::from_fn(|i| simplex[..4].iter().map(|v| v.0[i]).sum::<f64>() / 4.0);
         let worst = simplex[4];
-        let mut attempt = |by: f64| {
+        let attempt = |by: f64| {
             let point = along(&centre, &worst.0, by);
             (point, cost(point))
         };

@@ -8,41 +8,10 @@ use crate::simulate::{BridgeLimits, Recording, SimulateError};
 use crate::train::TrainModel;
 use crate::validation::{ValidationLimits, Validator};
 
+use super::bins::{self, Bin};
 use super::cleaning;
 use super::sample_forces::SampleForces;
-
-/// Width in s of a bin over which speeds are averaged.
-const BIN_S: f64 = 2.0;
-/// A bin is at least this many sampling periods wide.
-const BIN_SAMPLES_MIN: f64 = 2.0;
-/// Below this speed in m/s the train's motion is not used: holding brakes and stiction act.
-const MOVING_MPS: f64 = 0.8;
-/// A longer step in s between samples ends a segment of motion.
-const SEGMENT_GAP_MAX_S: f64 = 5.0;
-/// Segments of fewer bins say nothing.
-const SEGMENT_BINS_MIN: usize = 4;
-
-/// Mean over a few samples of one segment of motion, with the features of its middle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bin {
-    /// First sample.
-    pub first: usize,
-    /// One past the last sample.
-    pub end: usize,
-    /// Number of the segment of motion within the run, from 0.
-    pub segment: usize,
-    /// Mean time in s since the run's first sample.
-    pub time_s: f64,
-    /// Mean measured speed in m/s.
-    pub speed_mps: f64,
-}
-
-impl Bin {
-    /// The sample in the middle.
-    pub fn middle(&self) -> usize {
-        (self.first + self.end) / 2
-    }
-}
+use super::way::way_ratio;
 
 /// A run, ready for fitting and for open-loop simulation.
 #[derive(Clone, Debug)]
@@ -159,7 +128,7 @@ fn prepare_run(
     let first_ns = samples.first().map_or(0, |sample| sample.time_ns);
     let time_s: Vec<f64> =
         samples.iter().map(|sample| (sample.time_ns - first_ns) as f64 * 1e-9).collect();
-    let replaced = cleaning::clean(&mut samples, sampling_period_s(&time_s));
+    let replaced = cleaning::clean(&mut samples, bins::sampling_period_s(&time_s));
     let recording = Recording::new(samples, BridgeLimits::default())
         .map_err(|source| RunDataError::Simulate { file: run.file.clone(), source })?;
     let declared = recording
@@ -168,7 +137,7 @@ fn prepare_run(
         .map(|sample| SampleForces::declared(sample, train.rotating_mass_factor))
         .collect();
     let smooth_mps = smoothed(&recording);
-    let bins = bins(&recording);
+    let bins = bins::bins(&recording);
     let way_ratio = match run.position_source {
         PositionSource::IntegratedSpeed => None,
         _ => way_ratio(&recording),
@@ -208,102 +177,4 @@ fn smoothed(recording: &Recording) -> Vec<f64> {
             (sum / (to - from) as f64).max(0.0)
         })
         .collect()
-}
-
-fn sampling_period_s(time_s: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    if steps.is_empty() {
-        return BIN_S;
-    }
-    let at = steps.len() / 2;
-    *steps.select_nth_unstable_by(at, f64::total_cmp).1
-}
-
-fn bins(recording: &Recording) -> Vec<Bin> {
-    let (samples, time_s) = (recording.samples(), recording.time_s());
-    let width_s = BIN_S.max(BIN_SAMPLES_MIN * sampling_period_s(time_s));
-    let usable = |i: usize| recording.is_simulated(i) && samples[i].speed_mps > MOVING_MPS;
-    let mut bins: Vec<Bin> = Vec::new();
-    let mut segment = 0;
-    let mut i = 0;
-    while i < samples.len() {
-        if !usable(i) {
-            i += 1;
-            continue;
-        }
-        let mut end = i + 1;
-        while end < samples.len()
-            && usable(end)
-            && time_s[end] - time_s[end - 1] <= SEGMENT_GAP_MAX_S
-        {
-            end += 1;
-        }
-        let segment_bins = segment_bins(recording, i, end, segment, width_s);
-        if segment_bins.len() >= SEGMENT_BINS_MIN {
-            bins.extend(segment_bins);
-            segment += 1;
-        }
-        i = end;
-    }
-    bins
-}
-
-fn segment_bins(
-    recording: &Recording,
-    first: usize,
-    end: usize,
-    segment: usize,
-    width_s: f64,
-) -> Vec<Bin> {
-    let (samples, time_s) = (recording.samples(), recording.time_s());
-    let mut bins = Vec::new();
-    let mut from = first;
-    while from < end {
-        // The small margin keeps rounded times from splitting a bin.
-        let until_s = time_s[from] + width_s * (1.0 - 1e-6);
-        let mut to = from + 1;
-        while to < end && time_s[to] < until_s {
-            to += 1;
-        }
-        let count = (to - from) as f64;
-        let mean = |value: &dyn Fn(usize) -> f64| (from..to).map(value).sum::<f64>() / count;
-        bins.push(Bin {
-            first: from,
-            end: to,
-            segment,
-            time_s: mean(&|i| time_s[i]),
-            speed_mps: mean(&|i| samples[i].speed_mps),
-        });
-        from = to;
-    }
-    bins
-}
-
-/// Total way by position over total way by integrated speed.
-///
-/// Balises correct the position while the odometer shares the error of the wheel diameter, so
-/// that the ratio over many kilometres tells the diameter. The standard deviation assumes an
-/// error of 10 m at either end, the distance that an odometer drifts between two balises at a
-/// scale error of 1 %.
-fn way_ratio(recording: &Recording) -> Option<(f64, f64)> {
-    const END_ERROR_M: f64 = 10.0;
-    const WAY_MIN_M: f64 = 1500.0;
-    let (samples, time_s) = (recording.samples(), recording.time_s());
-    let (mut by_position_m, mut by_speed_m) = (0.0, 0.0);
-    let mut last: Option<usize> = None;
-    for (i, sample) in samples.iter().enumerate() {
-        let Some(position_m) = sample.position_m else { continue };
-        if let Some(k) = last
-            && time_s[i] - time_s[k] <= SEGMENT_GAP_MAX_S
-        {
-            by_position_m += sample.direction * (position_m - samples[k].position_m?);
-            let mean_mps = 0.5 * (sample.speed_mps + samples[k].speed_mps);
-            by_speed_m += mean_mps * (time_s[i] - time_s[k]);
-        }
-        last = Some(i);
-    }
-    if by_speed_m < WAY_MIN_M || by_position_m < 0.5 * by_speed_m {
-        return None;
-    }
-    Some((by_position_m / by_speed_m, END_ERROR_M * std::f64::consts::SQRT_2 / by_speed_m))
 }

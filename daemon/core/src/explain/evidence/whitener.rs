@@ -43,7 +43,7 @@ impl Whitener {
     /// The filter of one run: level of the speed difference and fading acceleration. Each segment
     /// of motion starts with an unknown level; the fading acceleration lives through stops.
     pub fn new(run: &RunData, noise: Noise) -> Self {
-        let Noise { measurement_var, white_density, fading_var, fading_s, .. } = noise;
+        let Noise { white_density, fading_var, fading_s, .. } = noise;
         // Covariance of (level, fading acceleration).
         let (mut pll, mut plf, mut pff) = (0.0, 0.0, fading_var);
         let mut log_determinant = 0.0;
@@ -51,6 +51,7 @@ impl Whitener {
         let mut steps = Vec::with_capacity(run.bins.len());
         let mut by_step = Fade::new(fading_s);
         for bin in &run.bins {
+            let measurement_var = noise.bin_var(bin.jump_mps2);
             let step_s = before.map_or(0.0, |(_, time_s)| bin.time_s - time_s);
             let starts = before.is_none_or(|(segment, _)| segment != bin.segment);
             before = Some((bin.segment, bin.time_s));

@@ -135,6 +135,7 @@ mod tests {
             segment,
             time_s: 2.0 * k as f64,
             speed_mps: 10.0,
+            jump_mps2: 0.0,
         };
         segments.iter().enumerate().map(bin).collect()
     }

@@ -1,0 +1,40 @@
+//! Freight trains on couplings with slack, the tacho on the locomotive.
+
+use dynocar_core::dataset::Dataset;
+use dynocar_core::explain::explain;
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_tests::simulator::dataset_writer::dataset_files;
+use dynocar_tests::simulator::{Effect, EffectRequest, SimulatorSettings, TrainType, simulate};
+
+/// Largest error of a gain as share of the force, as a root mean square.
+const ERROR_MAX: f64 = 0.005;
+
+#[test]
+fn a_locomotive_that_leaps_ahead_of_its_wagons_does_not_pull_harder() {
+    let seeds = 99_001..99_007;
+    let count = seeds.clone().count() as f64;
+    let squares: f64 = seeds
+        .map(|seed| {
+            let simulated = simulate(&SimulatorSettings {
+                train_type: Some(TrainType::Freight),
+                has_couplings: true,
+                ..SimulatorSettings::new(seed, EffectRequest::Kinds(vec![EffectKind::TractionGain]))
+            });
+            let [Effect::TractionGain { gain: truth }] = simulated.effects[..] else {
+                panic!("another effect")
+            };
+            let files = dataset_files(&simulated);
+            let texts: Vec<(&str, &str)> =
+                files.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
+            let dataset = Dataset::load(&texts[..]).unwrap();
+            let answer = explain(&dataset, &|_, _| ()).unwrap().answer;
+            let told = serde_json::to_value(&answer).unwrap();
+            let gain = told["effects"][0]["parameters"]["gain"].as_f64().expect("a gain");
+            let std = told["effects"][0]["std"]["gain"].as_f64().expect("its deviation");
+            eprintln!("seed {seed}: {gain:.4} for {truth:.4}, {:+.1} sd", (gain - truth) / std);
+            (gain - truth).powi(2)
+        })
+        .sum();
+    let error = (squares / count).sqrt();
+    assert!(error < ERROR_MAX, "gains are off by {error:.4}");
+}
