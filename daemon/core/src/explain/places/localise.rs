@@ -18,6 +18,8 @@ const PLACE_RUNS_MIN: usize = 2;
 const FURTHER_SHARE: f64 = 0.05;
 /// A surveyed gradient is good to this in ‰, which is N/kN.
 pub const MAP_ERROR_PERMILLE: f64 = gradient::SURVEYED.permille;
+/// Times that all intervals are refined beside each other.
+const SWEEPS: usize = 2;
 /// Intervals of one effect at most.
 const INTERVALS_MAX: usize = 6;
 
@@ -122,13 +124,19 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside, positive: bool) -> Option
         choice_cost: interval_cost + subset,
         map_error: 0.0,
     };
-    places.polish(&mut found);
+    places.polish(&mut found, 0);
     while found.intervals_m.len() < INTERVALS_MAX {
         let Some(added) = places.with_another(&cells, &found) else { break };
         if added.gain - found.gain < (interval_cost + 6.0).max(FURTHER_SHARE * found.gain) {
             break;
         }
         found = Found { choice_cost: found.choice_cost + interval_cost, ..added };
+    }
+    if found.intervals_m.len() > 1 {
+        // Each was found beside those before it alone.
+        for _ in 0..SWEEPS {
+            (0..found.intervals_m.len()).for_each(|index| places.polish(&mut found, index));
+        }
     }
     found.intervals_m.sort_by(|one, other| one[0].total_cmp(&other[0]));
     found.map_error = places.map_error(&found);
@@ -196,14 +204,13 @@ impl Places<'_, '_> {
         sum
     }
 
-    /// The sum over the chosen runs and some intervals, each with its edges to itself.
+    /// The sum over the chosen runs of some intervals together: what one leaves behind in the noise is
+    /// still there when the train comes to the next.
     fn over(&self, intervals_m: &[[f64; 2]], runs: &Option<Vec<usize>>) -> Tuple {
         let mut sum = Tuple::zero(self.scan.fit.theta.len());
         let is_chosen = |index: &usize| runs.as_ref().is_none_or(|runs| runs.contains(index));
         for index in (0..self.bins.len()).filter(is_chosen) {
-            for &interval_m in intervals_m {
-                sum.add(&self.run_tuple(index, &[interval_m]));
-            }
+            sum.add(&self.run_tuple(index, intervals_m));
         }
         sum
     }
@@ -222,22 +229,20 @@ impl Places<'_, '_> {
         let mut grown = found.clone();
         grown.intervals_m.push(cell.interval_m);
         grown.gain = gain;
-        self.polish(&mut grown);
+        self.polish(&mut grown, found.intervals_m.len());
         Some(grown)
     }
 
-    /// Moves the ends of the last interval while that explains more.
-    fn polish(&self, found: &mut Found) {
-        let last = found.intervals_m.len() - 1;
-        let others = found.intervals_m[..last].to_vec();
-        let base = self.over(&others, &found.runs);
+    /// Moves the ends of an interval while that explains more.
+    fn polish(&self, found: &mut Found, index: usize) {
+        let mut others = found.intervals_m.clone();
+        let own = others.remove(index);
         let value = |interval: [f64; 2]| {
-            let mut sum = self.over(&[interval], &found.runs);
-            sum.add(&base);
-            let (gain, estimate) = self.scan.gain(&sum);
+            let together = [&others[..], &[interval]].concat();
+            let (gain, estimate) = self.scan.gain(&self.over(&together, &found.runs));
             if self.positive && estimate <= 0.0 { (0.0, estimate) } else { (gain, estimate) }
         };
-        let mut best = (found.intervals_m[last], value(found.intervals_m[last]));
+        let mut best = (own, value(own));
         let mut step_m = 0.5 * (best.0[1] - best.0[0]);
         while step_m > FINEST_M {
             let [from, to] = best.0;
@@ -259,7 +264,7 @@ impl Places<'_, '_> {
                 _ => step_m *= 0.5,
             }
         }
-        found.intervals_m[last] = best.0;
+        found.intervals_m[index] = best.0;
         (found.gain, found.estimate) = best.1;
     }
 }

@@ -1,0 +1,38 @@
+//! Two places of resistance close behind one another.
+
+use dynocar_core::dataset::Dataset;
+use dynocar_core::explain::explain;
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_tests::simulator::dataset_writer::dataset_files;
+use dynocar_tests::simulator::{Effect, EffectRequest, SimulatorSettings, simulate};
+
+/// Of a fast train on 60 km: 2.7 km each, 1.1 km apart, so that the end of one and the start of the other
+/// are felt together.
+const SEED: u64 = 97_004;
+/// Largest distance in m of an end from the truth; a sample is 16 m of way there.
+const END_ERROR_MAX_M: f64 = 30.0;
+
+#[test]
+fn two_places_felt_together_are_told_with_their_ends_and_are_no_tunnels() {
+    let effects = EffectRequest::Kinds(vec![EffectKind::LocalResistance]);
+    let simulated = simulate(&SimulatorSettings::new(SEED, effects));
+    let [Effect::LocalResistance { intervals_m: truth, .. }] = &simulated.effects[..] else {
+        panic!("another effect")
+    };
+    assert_eq!(truth.len(), 2);
+    assert!(truth[1].0 - truth[0].1 < 1500.0, "{truth:?}");
+    let files = dataset_files(&simulated);
+    let texts: Vec<(&str, &str)> =
+        files.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
+    let answer = explain(&Dataset::load(&texts[..]).unwrap(), &|_, _| ()).unwrap().answer;
+    let told = serde_json::to_value(&answer).unwrap();
+    assert_eq!(told["effects"][0]["kind"], "local_resistance", "{}", told["statement"]);
+    assert_eq!(told["effects"].as_array().map(Vec::len), Some(1), "{}", told["statement"]);
+    for (place, &(from_m, to_m)) in truth.iter().enumerate() {
+        for (end, true_m) in [from_m, to_m].into_iter().enumerate() {
+            let found_m = &told["effects"][0]["where"]["intervals_m"][place][end];
+            let error_m = (found_m.as_f64().expect("an end") - true_m).abs();
+            assert!(error_m < END_ERROR_MAX_M, "{found_m} for {true_m} m");
+        }
+    }
+}
