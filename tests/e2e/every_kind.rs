@@ -22,7 +22,13 @@ fn is_found(kind: EffectKind) {
     assert_eq!(answer.verdict, verdict, "{kind}: {}", answer.statement);
     let found: Vec<&str> = answer.effects.iter().map(|effect| effect.kind).collect();
     assert_eq!(found, [kind.name()], "{}", answer.statement);
-    assert!(answer.rmse_after < answer.rmse_before, "{kind}: {}", answer.statement);
+    let [before_mps, after_mps] = answer.fit_runs.expect("runs to fit");
+    assert!(after_mps < before_mps, "{kind}: {}", answer.statement);
+    // What a run left out was loaded with, as one is here, nobody can know.
+    let is_predictable = kind != EffectKind::MassChange;
+    if is_predictable {
+        assert!(answer.rmse_after < answer.rmse_before, "{kind}: {}", answer.statement);
+    }
 }
 
 #[test]

@@ -60,7 +60,8 @@ impl Noise {
         let bounded = |value: f64, low: f64, high: f64| value.exp().clamp(low, high);
         Noise {
             measurement_var: bounded(logs[0], 1e-8, 1.0),
-            white_density: bounded(logs[1], 1e-9, 1e-2),
+            // No model is good to 0.01 N/kN in every second; where nearly nothing is left, all would count.
+            white_density: bounded(logs[1], 1e-8, 1e-2),
             fading_var: bounded(logs[2], 1e-10, 1e-2),
             fading_s: bounded(logs[3], 4.0, 400.0),
             ..self
