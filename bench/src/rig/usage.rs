@@ -134,8 +134,8 @@ mod tests {
         let usage = std::thread::Builder::new()
             .name("a name".into())
             .spawn(move || {
-                // Large enough that the allocator maps it anew for this thread.
-                std::hint::black_box(vec![1_u8; 4 << 20]);
+                // Beyond 32 MiB glibc never takes memory that was given back before.
+                std::hint::black_box(vec![1_u8; 40 << 20]);
                 of_thread(id, "a name")
             })
             .unwrap()
