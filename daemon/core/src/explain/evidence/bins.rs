@@ -14,6 +14,7 @@ pub(super) const SEGMENT_GAP_MAX_S: f64 = 5.0;
 const SEGMENT_BINS_MIN: usize = 4;
 /// Time in s for which the couplings of a train ring after a change of force.
 const RINGING_S: f64 = 6.0;
+
 /// Mean over a few samples of one segment of motion, with the features of its middle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bin {
@@ -111,12 +112,14 @@ fn segment_bins(
     bins
 }
 
-/// Range in m/s² of the acceleration of the control force from [`RINGING_S`] before a sample to before
-/// another.
+/// Range in m/s² of the acceleration of the control force, where it is known, from [`RINGING_S`] before
+/// a sample to before another.
 fn jump_mps2(recording: &Recording, from: usize, to: usize) -> f64 {
     let (samples, time_s) = (recording.samples(), recording.time_s());
     let recent = time_s[..from].iter().rev().take_while(|at_s| time_s[from] - **at_s <= RINGING_S);
-    let accelerations = samples[from - recent.count()..to].iter().map(|sample| {
+    let known = (from - recent.count()..to).filter(|&i| recording.is_simulated(i));
+    let accelerations = known.map(|i| {
+        let sample = &samples[i];
         let force_n = sample.traction_force_n.unwrap_or(0.0) - sample.brake_force_n.unwrap_or(0.0);
         force_n / sample.mass_kg
     });

@@ -56,7 +56,7 @@ impl Noise {
         [self.measurement_var, self.white_density, self.fading_var, self.fading_s].map(f64::ln)
     }
 
-    pub(super) fn from_logs(self, logs: [f64; 4]) -> Self {
+    pub(super) fn with_logs(self, logs: [f64; 4]) -> Self {
         let bounded = |value: f64, low: f64, high: f64| value.exp().clamp(low, high);
         Noise {
             measurement_var: bounded(logs[0], 1e-8, 1.0),

@@ -34,13 +34,13 @@ impl Noise {
 /// The likeliest noise with the jumps of `start`.
 fn likeliest(start: Noise, cost: &impl Fn(Noise) -> f64) -> Noise {
     let bounded_cost = |logs: [f64; 4]| {
-        let noise = start.from_logs(logs);
+        let noise = start.with_logs(logs);
         let kept = noise.to_logs();
         let outside: f64 =
             logs.iter().zip(kept).map(|(log, kept)| (log - kept) * (log - kept)).sum();
         10.0 * outside + cost(noise)
     };
-    start.from_logs(nelder_mead(start.to_logs(), &bounded_cost))
+    start.with_logs(nelder_mead(start.to_logs(), &bounded_cost))
 }
 
 /// Nelder and Mead's simplex search in four dimensions, bounded work.
