@@ -1,10 +1,9 @@
 //! Every kind of effect, simulated alone, is found by its name.
 
-use dynocar_core::dataset::Dataset;
 use dynocar_core::explain::answer::Verdict;
 use dynocar_core::explain::explain;
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_tests::simulator::dataset_writer::dataset_files;
+use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
 
 /// The first seed of the matrix of effects.
@@ -13,10 +12,7 @@ const SEED: u64 = 9001;
 /// Explains a dataset with one effect of a kind.
 fn is_found(kind: EffectKind) {
     let request = EffectRequest::Kinds(vec![kind]);
-    let files = dataset_files(&simulate(&SimulatorSettings::new(SEED, request)));
-    let texts: Vec<(&str, &str)> =
-        files.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
-    let dataset = Dataset::load(&texts[..]).expect("a simulated dataset");
+    let dataset = read_files(&dataset_files(&simulate(&SimulatorSettings::new(SEED, request))));
     let answer = explain(&dataset, &|_, _| {}).expect("usable runs").answer;
     let verdict = if kind == EffectKind::Unknown { Verdict::Unknown } else { Verdict::Effect };
     assert_eq!(answer.verdict, verdict, "{kind}: {}", answer.statement);

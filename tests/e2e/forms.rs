@@ -1,11 +1,10 @@
 //! Forces by laws that no library holds, their forms and what these predict.
 
-use dynocar_core::dataset::Dataset;
 use dynocar_core::explain::answer::{Answer, Verdict};
 use dynocar_core::explain::explain;
 use dynocar_core::terms::Entry;
 use dynocar_core::terms::extra::{Covariate, Extra, Form};
-use dynocar_tests::simulator::dataset_writer::dataset_files;
+use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{
     Effect, EffectRequest, Law, SimulatedDataset, SimulatorSettings, Unlisted, simulate,
@@ -22,10 +21,7 @@ fn simulated(seed: u64) -> (SimulatedDataset, Law) {
 
 /// What is said of a force that must be called unknown, and the error over the true model's.
 fn told(simulated: &SimulatedDataset) -> (Answer, Vec<Extra>, f64) {
-    let files = dataset_files(simulated);
-    let texts: Vec<(&str, &str)> =
-        files.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
-    let dataset = Dataset::load(&texts[..]).expect("a simulated dataset");
+    let dataset = read_files(&dataset_files(simulated));
     let explanation = explain(&dataset, &|_, _| {}).expect("usable runs");
     let answer = explanation.answer;
     assert_eq!(answer.verdict, Verdict::Unknown, "{}", answer.statement);

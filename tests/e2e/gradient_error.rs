@@ -5,7 +5,7 @@ use dynocar_core::explain::answer::{ParameterValue, Verdict};
 use dynocar_core::explain::explain;
 use dynocar_core::track::{LinearProfile, StepProfile};
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_tests::simulator::dataset_writer::dataset_files;
+use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{Effect, EffectRequest, SimulatorSettings, TrainType, simulate};
 
 #[test]
@@ -21,10 +21,7 @@ fn a_wrong_gradient_is_found_with_its_profile_and_ambiguous_where_all_runs_go_on
         panic!("{:?}", simulated.effects)
     };
     let truth = LinearProfile::new(profile.clone()).expect("a profile");
-    let files = dataset_files(&simulated);
-    let texts: Vec<(&str, &str)> =
-        files.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
-    let dataset = Dataset::load(&texts[..]).expect("a simulated dataset");
+    let dataset = read_files(&dataset_files(&simulated));
 
     let answer = explain(&dataset, &|_, _| {}).expect("usable runs").answer;
     assert_eq!(answer.verdict, Verdict::Effect, "{}", answer.statement);
@@ -66,9 +63,7 @@ fn a_line_declared_level_is_found_to_climb() {
         line["gradient"].clone().try_into().expect("a list of chainages and gradients");
     line.insert("gradient".into(), toml::Value::from(vec![vec![0.0, 0.0]]));
     *track = document.to_string();
-    let texts: Vec<(&str, &str)> =
-        files.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
-    let dataset = Dataset::load(&texts[..]).expect("a simulated dataset");
+    let dataset = read_files(&files);
 
     let answer = explain(&dataset, &|_, _| {}).expect("usable runs").answer;
     let kinds: Vec<&str> = answer.effects.iter().map(|effect| effect.kind).collect();

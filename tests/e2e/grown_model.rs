@@ -8,7 +8,7 @@ use dynocar_core::explain::evidence::{Fit, FitProblem, GrownModel, Noise, RunDat
 use dynocar_core::explain::scan::Scan;
 use dynocar_core::terms::wheel;
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_tests::simulator::dataset_writer::dataset_files;
+use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{
     Effect, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate,
 };
@@ -68,9 +68,7 @@ fn assert_same_forces(kind: EffectKind, fit: &Fit, declared: &RunData, grown: &R
 #[test]
 fn every_kind_written_as_a_grown_model_is_applied_to_the_bit() {
     let files = dataset_files(&simulated());
-    let texts: Vec<(&str, &str)> =
-        files.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
-    let dataset = Dataset::load(&texts[..]).expect("a simulated dataset");
+    let dataset = read_files(&files);
     let runs = prepare(&dataset).expect("usable runs");
     assert!(runs.iter().all(|run| run.replaced == 0), "no outliers");
     let problem = FitProblem::new(runs.clone(), dataset.train.resistance);

@@ -1,9 +1,8 @@
 //! Freight trains on couplings with slack, the tacho on the locomotive.
 
-use dynocar_core::dataset::Dataset;
 use dynocar_core::explain::explain;
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_tests::simulator::dataset_writer::dataset_files;
+use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{Effect, EffectRequest, SimulatorSettings, TrainType, simulate};
 
 /// Largest error of a gain as share of the force, as a root mean square.
@@ -23,10 +22,7 @@ fn a_locomotive_that_leaps_ahead_of_its_wagons_does_not_pull_harder() {
             let [Effect::TractionGain { gain: truth }] = simulated.effects[..] else {
                 panic!("another effect")
             };
-            let files = dataset_files(&simulated);
-            let texts: Vec<(&str, &str)> =
-                files.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
-            let dataset = Dataset::load(&texts[..]).unwrap();
+            let dataset = read_files(&dataset_files(&simulated));
             let answer = explain(&dataset, &|_, _| ()).unwrap().answer;
             let told = serde_json::to_value(&answer).unwrap();
             let gain = told["effects"][0]["parameters"]["gain"].as_f64().expect("a gain");

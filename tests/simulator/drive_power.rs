@@ -4,6 +4,7 @@
 use dynocar_core::dataset::{Dataset, ForceSource};
 use dynocar_core::explain::{drive, explain};
 use dynocar_shared::vocabulary::EffectKind;
+use dynocar_tests::simulator::dataset_writer::read_files;
 use dynocar_tests::simulator::power::{TrueDrive, power_files};
 use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, TrainType, simulate};
 
@@ -28,9 +29,7 @@ fn dataset(seed: u64, drive: &TrueDrive, effects: EffectRequest) -> Dataset {
         ..SimulatorSettings::new(seed, effects)
     };
     let files = power_files(&simulate(&settings), drive);
-    let texts: Vec<(&str, &str)> =
-        files.iter().map(|(name, text)| (&name[..], &text[..])).collect();
-    Dataset::load(&texts[..]).unwrap()
+    read_files(&files)
 }
 
 /// The drive of a seed: from 0.76 to 0.95, with auxiliaries of 40 to 100 kW on every other line.

@@ -1,9 +1,8 @@
 //! Two places of resistance close behind one another.
 
-use dynocar_core::dataset::Dataset;
 use dynocar_core::explain::explain;
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_tests::simulator::dataset_writer::dataset_files;
+use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{Effect, EffectRequest, SimulatorSettings, simulate};
 
 /// Of a fast train on 60 km: 2.7 km each, 1.1 km apart, so that the end of one and the start of the other
@@ -21,10 +20,7 @@ fn two_places_felt_together_are_told_with_their_ends_and_are_no_tunnels() {
     };
     assert_eq!(truth.len(), 2);
     assert!(truth[1].0 - truth[0].1 < 1500.0, "{truth:?}");
-    let files = dataset_files(&simulated);
-    let texts: Vec<(&str, &str)> =
-        files.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
-    let answer = explain(&Dataset::load(&texts[..]).unwrap(), &|_, _| ()).unwrap().answer;
+    let answer = explain(&read_files(&dataset_files(&simulated)), &|_, _| ()).unwrap().answer;
     let told = serde_json::to_value(&answer).unwrap();
     assert_eq!(told["effects"][0]["kind"], "local_resistance", "{}", told["statement"]);
     assert_eq!(told["effects"].as_array().map(Vec::len), Some(1), "{}", told["statement"]);

@@ -4,7 +4,9 @@ use std::{io, path::Path};
 
 use dynocar_core::dataset::Dataset;
 use dynocar_core::explain::{Explanation, explain};
-use dynocar_tests::simulator::dataset_writer::{dataset_files, write_dataset, write_truth};
+use dynocar_tests::simulator::dataset_writer::{
+    dataset_files, read_files, write_dataset, write_truth,
+};
 use dynocar_tests::simulator::{SimulatedDataset, simulate};
 
 use super::scenario::Scenario;
@@ -46,10 +48,7 @@ impl Case {
 ///
 /// When the simulator's files are refused.
 pub fn read(simulated: &SimulatedDataset) -> Dataset {
-    let files = dataset_files(simulated);
-    let texts: Vec<(&str, &str)> =
-        files.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
-    Dataset::load(&texts[..]).expect("a simulated dataset")
+    read_files(&dataset_files(simulated))
 }
 
 /// Explains a simulated dataset.

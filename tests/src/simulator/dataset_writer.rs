@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::{fs, io};
 
+use dynocar_core::dataset::Dataset;
 use dynocar_core::train::TrainModel;
 
 use super::columns::{FileStyle, make_style, row_text};
@@ -37,6 +38,17 @@ pub fn dataset_files(dataset: &SimulatedDataset) -> Vec<FileText> {
             .map(|run| (run.plan.file(), run_csv(run, &style, dataset.declared_train().length_m))),
     );
     files
+}
+
+/// Reads a simulated dataset's files as the program does.
+///
+/// # Panics
+///
+/// When one is refused.
+pub fn read_files(files: &[FileText]) -> Dataset {
+    let texts: Vec<(&str, &str)> =
+        files.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
+    Dataset::load(&texts[..]).expect("a simulated dataset")
 }
 
 /// Writes a dataset into a folder, which is made if it does not exist.
