@@ -14,10 +14,11 @@
 //! - [`fixed_lag`]: what later measurements say of an earlier state, without a backward pass
 //! - [`adjoint`]: fixed-interval smoothing without an inverse (Bryson and Frazier)
 //! - [`particle`], [`random`]: particle filter, marginal particle smoother and their seeded generator
-//! - [`mixture`]: hypotheses side by side
+//! - [`bank`]: hypotheses side by side, weighed by evidence; [`mixture`]: beliefs mixed by weight
 //! - [`lanes`]: sums and powers over slices
 
 pub mod adjoint;
+pub mod bank;
 mod bounded;
 pub mod drifting_level;
 pub mod fixed_lag;
@@ -39,6 +40,7 @@ mod test_runs;
 pub mod triangular;
 mod whitening;
 
+pub use bank::Bank;
 pub use bounded::{Bounded, bounded_minimum};
 pub use drifting_level::DriftingLevel;
 pub use gaussian::{Gaussian, Innovation};

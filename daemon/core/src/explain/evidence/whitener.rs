@@ -1,8 +1,15 @@
 //! Whitening of the noise, and Huber's loss of what it leaves.
 
+use nalgebra::{Matrix2, Vector2};
+
 use super::fade::Fade;
 use super::noise::Noise;
 use super::run_data::RunData;
+use crate::filter::Gaussian;
+
+/// Places in the belief: the level of the speed difference in m/s, the fading acceleration in m/s².
+const LEVEL: usize = 0;
+const FADING: usize = 1;
 
 /// Innovations beyond this many standard deviations count linearly (Huber).
 const HUBER: f64 = 3.0;
@@ -34,9 +41,17 @@ struct Step {
     starts: bool,
     fade: f64,
     carry_s: f64,
-    level_gain: f64,
-    fading_gain: f64,
+    /// What the level and the fading acceleration take of an innovation.
+    gain: Vector2<f64>,
     per_deviation: f64,
+}
+
+/// Covariance that an acceleration of unit variance which fades in `fading_s` gains over a step together with the
+/// speed that it makes (Ornstein-Uhlenbeck process and its integral).
+fn fading_noise(fade: f64, step_s: f64, fading_s: f64) -> Matrix2<f64> {
+    let speed = fading_s * fading_s * (2.0 * step_s / fading_s - 3.0 + 4.0 * fade - fade * fade);
+    let both = fading_s * (1.0 - fade) * (1.0 - fade);
+    Matrix2::new(speed.max(0.0), both, both, 1.0 - fade * fade)
 }
 
 impl Whitener {
@@ -44,52 +59,37 @@ impl Whitener {
     /// of motion starts with an unknown level; the fading acceleration lives through stops.
     pub fn new(run: &RunData, noise: Noise) -> Self {
         let Noise { white_density, fading_var, fading_s, .. } = noise;
-        // Covariance of (level, fading acceleration).
-        let (mut pll, mut plf, mut pff) = (0.0, 0.0, fading_var);
+        let mut belief =
+            Gaussian::<2>::independent(Vector2::zeros(), Vector2::new(0.0, fading_var.sqrt()));
         let mut log_determinant = 0.0;
         let mut before: Option<(usize, f64)> = None;
         let mut steps = Vec::with_capacity(run.bins.len());
         let mut by_step = Fade::new(fading_s);
         for bin in &run.bins {
-            let measurement_var = noise.bin_var(bin.jump_mps2);
+            let bin_var = noise.bin_var(bin.jump_mps2);
             let step_s = before.map_or(0.0, |(_, time_s)| bin.time_s - time_s);
             let starts = before.is_none_or(|(segment, _)| segment != bin.segment);
             before = Some((bin.segment, bin.time_s));
             let fade = by_step.over(step_s);
             let carry_s = fading_s * (1.0 - fade);
-            let gone = 1.0 - fade * fade;
+            let mut step =
+                Step { starts, fade, carry_s, gain: Vector2::new(1.0, 0.0), per_deviation: 0.0 };
             if starts {
-                (pll, plf, pff) = (measurement_var, 0.0, fade * fade * pff + fading_var * gone);
-                steps.push(Step {
-                    starts,
-                    fade,
-                    carry_s,
-                    level_gain: 1.0,
-                    fading_gain: 0.0,
-                    per_deviation: 0.0,
-                });
-                continue;
+                belief.fade(FADING, fade, fading_var * (1.0 - fade * fade));
+                belief.replace(LEVEL, 0.0, bin_var);
+            } else {
+                let moved = Matrix2::new(1.0, carry_s, 0.0, fade);
+                let added = fading_var * fading_noise(fade, step_s, fading_s);
+                let white = Matrix2::new(white_density * step_s, 0.0, 0.0, 0.0);
+                belief.predict(Vector2::zeros(), &moved, &(added + white));
+                // Without mean and observation only the variances are told.
+                if let Ok(innovation) = belief.innovation(LEVEL, 0.0, bin_var) {
+                    step.gain = belief.take(LEVEL, &innovation, bin_var);
+                    step.per_deviation = innovation.inverse_variance.sqrt();
+                    log_determinant += innovation.variance.ln();
+                }
             }
-            let driven = fading_var
-                * fading_s
-                * fading_s
-                * (2.0 * step_s / fading_s - 3.0 + 4.0 * fade - fade * fade);
-            let crossed = fading_var * fading_s * (1.0 - fade) * (1.0 - fade);
-            let level = pll
-                + 2.0 * carry_s * plf
-                + carry_s * carry_s * pff
-                + white_density * step_s
-                + driven.max(0.0);
-            let mixed = fade * (plf + carry_s * pff) + crossed;
-            let fading = fade * fade * pff + fading_var * gone;
-            let variance = level + measurement_var;
-            let (level_gain, fading_gain) = (level / variance, mixed / variance);
-            pll = level * measurement_var / variance;
-            plf = mixed * measurement_var / variance;
-            pff = fading - fading_gain * mixed;
-            log_determinant += variance.ln();
-            let per_deviation = 1.0 / variance.sqrt();
-            steps.push(Step { starts, fade, carry_s, level_gain, fading_gain, per_deviation });
+            steps.push(step);
         }
         Whitener { steps, log_determinant }
     }
@@ -108,8 +108,8 @@ impl Whitener {
             fading *= step.fade;
             let difference = value - ahead;
             innovations.push(difference * step.per_deviation);
-            level = ahead + step.level_gain * difference;
-            fading += step.fading_gain * difference;
+            level = ahead + step.gain[LEVEL] * difference;
+            fading += step.gain[FADING] * difference;
         }
     }
 

@@ -13,7 +13,8 @@ use super::law::Law;
 use super::motion::{STATES, State, StepInputs};
 use super::tracker::{TrackerModel, measure};
 use crate::filter::Gaussian;
-use crate::filter::mixture::{Mixture, likeliest, to_shares};
+use crate::filter::bank::{Bank, Nats};
+use crate::filter::mixture::Mixture;
 
 const SPEED: usize = State::Speed as usize;
 const SCALE: usize = State::Scale as usize;
@@ -23,24 +24,25 @@ const DRIFT: usize = State::Drift as usize;
 /// spread is part of the error.
 const CLEAR: f64 = 0.9;
 
+/// Number of laws: a dry rail, a wet one, and the brake itself.
+pub const LAWS: usize = 3;
+
 /// One law with its belief.
 #[derive(Clone, Debug)]
 struct Hypothesis {
     model: TrackerModel,
     state: Gaussian<STATES>,
-    probability: f64,
-    /// Scratch of a step.
+    /// What the possible changes of hypothesis make of it: scratch of a step.
     mixed: Gaussian<STATES>,
-    log_likelihood: f64,
     normalised: f64,
 }
 
 /// Laws weighed by evidence.
 #[derive(Clone, Debug)]
 pub struct LawBank {
-    hypotheses: Vec<Hypothesis>,
+    laws: Bank<[Hypothesis; LAWS], Nats, LAWS>,
     /// Their probabilities.
-    shares: Vec<f64>,
+    shares: [f64; LAWS],
     /// Rate in 1/s at which one hypothesis gives way to another.
     change_rate_per_s: f64,
     demand: f64,
@@ -48,81 +50,52 @@ pub struct LawBank {
 }
 
 impl LawBank {
-    /// A bank of at least one hypothesis, all equally probable at first.
-    ///
-    /// # Panics
-    ///
-    /// When there is no hypothesis.
-    pub fn new(models: Vec<TrackerModel>, change_rate_per_s: f64) -> Self {
-        assert!(!models.is_empty(), "a bank holds at least one law");
+    /// A bank of hypotheses, all equally probable at first.
+    pub fn new(models: [TrackerModel; LAWS], change_rate_per_s: f64) -> Self {
         let empty = Mixture::<STATES>::default().belief;
-        let shares = vec![0.0; models.len()];
-        let hypotheses = models
-            .into_iter()
-            .map(|model| Hypothesis {
-                model,
-                state: empty,
-                probability: 0.0,
-                mixed: empty,
-                log_likelihood: 0.0,
-                normalised: 0.0,
-            })
-            .collect();
-        LawBank { hypotheses, shares, change_rate_per_s, demand: 0.0, is_started: false }
+        let hypothesis = |model| Hypothesis { model, state: empty, mixed: empty, normalised: 0.0 };
+        let laws = Bank::even(models.map(hypothesis));
+        let shares = [0.0; LAWS];
+        LawBank { laws, shares, change_rate_per_s, demand: 0.0, is_started: false }
     }
 
-    /// Probability of a change within a step to one certain other hypothesis.
+    /// Probability of a change within a step to one certain other law.
     fn switch_probability(&self, step_s: f64) -> f64 {
-        let others = (self.hypotheses.len() - 1).max(1) as f64;
-        (self.change_rate_per_s * step_s).min(0.5) / others
+        (self.change_rate_per_s * step_s).min(0.5) / (LAWS - 1) as f64
     }
 
-    /// Mixes the beliefs as the possible changes of hypothesis ask, into `mixed`.
-    fn mix(&mut self, step_s: f64) {
+    /// Mixes the beliefs as the possible changes of hypothesis ask, into `mixed`; gives what
+    /// each hypothesis weighs before its likelihood, in nats.
+    fn mix(&mut self, step_s: f64) -> [f64; LAWS] {
+        let mut weights = [0.0; LAWS];
         let switch = self.switch_probability(step_s);
-        let stay = 1.0 - switch * (self.hypotheses.len() - 1) as f64;
-        for to in 0..self.hypotheses.len() {
-            let target = &self.hypotheses[to];
+        let stay = 1.0 - switch * (LAWS - 1) as f64;
+        for to in 0..LAWS {
+            let target = &self.laws.hypotheses()[to];
             let prior = target.model.prior_scale(target.state.mean[SPEED], self.demand);
-            let weight_of = |from: usize, hypothesis: &Hypothesis| {
-                hypothesis.probability * if from == to { stay } else { switch }
-            };
             let mut mixture = Mixture::default();
-            for (from, hypothesis) in self.hypotheses.iter().enumerate() {
-                let own = &hypothesis.state;
-                let state = if from == to { *own } else { reopen(own, prior) };
-                mixture.add(weight_of(from, hypothesis), &state.mean, &state.covariance);
+            for (from, (law, share)) in self.laws.hypotheses().iter().zip(self.shares).enumerate() {
+                let (state, kept) = match from == to {
+                    true => (law.state, stay),
+                    false => (reopen(&law.state, prior), switch),
+                };
+                mixture.add(share * kept, &state.mean, &state.covariance);
             }
-            let target = &mut self.hypotheses[to];
-            target.mixed = mixture.belief;
-            // The prior weight of the hypothesis, before its likelihood.
-            target.log_likelihood = mixture.weight.max(f64::MIN_POSITIVE).ln();
+            self.laws.hypotheses_mut()[to].mixed = mixture.belief;
+            weights[to] = mixture.weight.max(f64::MIN_POSITIVE).ln();
         }
-    }
-
-    /// Probabilities from the log-likelihoods; false when they cannot be normalised.
-    fn weigh(&mut self) -> bool {
-        for (share, hypothesis) in self.shares.iter_mut().zip(&self.hypotheses) {
-            *share = hypothesis.log_likelihood;
-        }
-        let is_sound = to_shares(&mut self.shares);
-        for (share, hypothesis) in self.shares.iter().zip(&mut self.hypotheses) {
-            hypothesis.probability = *share;
-        }
-        is_sound
-    }
-
-    fn most_probable(&self) -> &Hypothesis {
-        &self.hypotheses[likeliest(0, self.shares.iter().copied())]
+        weights
     }
 
     /// Mean and spread of the coefficient over the hypotheses that `counts` admits.
     fn mixture(&self, counts: impl Fn(&Law) -> bool) -> Option<(Uncertain, f64)> {
         let mut mixture = Mixture::<1>::default();
-        for hypothesis in self.hypotheses.iter().filter(|h| counts(&h.model.law)) {
-            let own = hypothesis.model.estimate(&hypothesis.state, self.demand).coefficient;
-            let (mean, variance) = (Vector1::new(own.value), Vector1::new(own.std * own.std));
-            mixture.add(hypothesis.probability, &mean, &variance);
+        for (law, share) in self.laws.hypotheses().iter().zip(self.shares) {
+            if counts(&law.model.law) {
+                let own = law.model.estimate(&law.state, self.demand).coefficient;
+                let (mean, variance) = (Vector1::new(own.value), Vector1::new(own.std * own.std));
+                mixture.add(share, &mean, &variance);
+            }
         }
         let coefficient = Uncertain::new(mixture.belief.mean[0], mixture.belief.std(0));
         (mixture.weight > 0.0).then_some((coefficient, mixture.weight))
@@ -139,11 +112,12 @@ fn reopen(state: &Gaussian<STATES>, scale: Uncertain) -> Gaussian<STATES> {
 
 impl Engine for LawBank {
     fn start(&mut self, first: &Observation) {
-        let probability = 1.0 / self.hypotheses.len() as f64;
-        for hypothesis in &mut self.hypotheses {
-            hypothesis.state = hypothesis.model.initial(first);
-            hypothesis.probability = probability;
+        let (laws, weights) = self.laws.weighed_mut();
+        for (law, weight) in laws.iter_mut().zip(weights) {
+            law.state = law.model.initial(first);
+            *weight = 0.0;
         }
+        self.shares = self.laws.shares(|_| true);
         self.demand = first.demand;
         self.is_started = true;
     }
@@ -153,21 +127,22 @@ impl Engine for LawBank {
             self.start(observed);
             return Ok(Step::Restarted);
         }
-        self.mix(inputs.step_s);
-        for hypothesis in &mut self.hypotheses {
-            let model = &hypothesis.model;
-            let mut state = hypothesis.mixed;
-            model.advance(inputs, &mut state);
-            let (log_likelihood, normalised) = measure(model, &mut state, observed)?;
-            hypothesis.state = state;
-            hypothesis.log_likelihood += log_likelihood;
-            hypothesis.normalised = normalised;
+        let priors = self.mix(inputs.step_s);
+        let (laws, weights) = self.laws.weighed_mut();
+        for ((law, weight), prior) in laws.iter_mut().zip(weights).zip(priors) {
+            let Hypothesis { model, state, mixed, normalised } = law;
+            let mut next = *mixed;
+            model.advance(inputs, &mut next);
+            let (log_likelihood, innovation) = measure(model, &mut next, observed)?;
+            (*state, *normalised) = (next, innovation);
+            *weight = prior + log_likelihood;
         }
         self.demand = observed.demand;
-        if !self.weigh() {
+        if !self.laws.settle() {
             return Err(EngineError::NotFinite { value: f64::NAN });
         }
-        let normalised = self.most_probable().normalised;
+        self.shares = self.laws.shares(|_| true);
+        let normalised = self.laws.likeliest().normalised;
         Ok(Step::Updated { normalised_innovation: Some(normalised) })
     }
 
@@ -176,16 +151,18 @@ impl Engine for LawBank {
             return None;
         }
         let is_demand = |law: &Law| *law == Law::Demand;
-        let has_demand = self.hypotheses.iter().any(|h| is_demand(&h.model.law));
+        let has_demand = self.laws.hypotheses().iter().any(|h| is_demand(&h.model.law));
         let limited = self.mixture(is_demand).map_or(0.0, |(_, weight)| weight);
-        let best = self
-            .hypotheses
+        let (best, share) = self
+            .laws
+            .hypotheses()
             .iter()
-            .filter(|h| is_demand(&h.model.law) == (limited > 0.5))
-            .max_by(|one, other| one.probability.total_cmp(&other.probability))?;
+            .zip(self.shares)
+            .filter(|(h, _)| is_demand(&h.model.law) == (limited > 0.5))
+            .max_by(|(_, one), (_, other)| one.total_cmp(other))?;
         let own = best.model.estimate(&best.state, self.demand);
         let (mixed, weight) = self.mixture(|law| is_demand(law) == (limited > 0.5))?;
-        let coefficient = if best.probability > CLEAR * weight { own.coefficient } else { mixed };
+        let coefficient = if share > CLEAR * weight { own.coefficient } else { mixed };
         Some(Estimate { coefficient, brake_limited: has_demand.then_some(limited), ..own })
     }
 }

@@ -3,8 +3,7 @@
 //! What the declared model lacks acts like an acceleration: a gradient error stays for minutes,
 //! wind grows with the speed, a gust lasts seconds. One noise for all of them is either too
 //! trusting in wind or too timid in calm. Each filter therefore assumes one behaviour, and the
-//! evidence of the innovations weighs them (static multiple models: Bar-Shalom, Li,
-//! Kirubarajan 2001, section 11.6.2).
+//! evidence of the innovations weighs them.
 
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use nalgebra::{Matrix2, Vector2, Vector3};
@@ -12,7 +11,8 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 use super::bias_model::{BiasModel, MapError};
 use super::line_resistance::LineResistance;
 use super::motion::Motion;
-use crate::filter::mixture::{Mixture, likeliest, to_shares};
+use crate::filter::bank::{Bank, Nats};
+use crate::filter::mixture::Mixture;
 use crate::filter::{Gaussian, NotPositiveDefinite};
 use crate::pipeline::motion::{OutlierRow, Trust};
 use crate::train::TrainModel;
@@ -84,18 +84,25 @@ pub struct Moments {
     pub correlation: f64,
 }
 
-/// The filters with the evidence for each.
+/// A filter under one behaviour of the bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
+struct Behaviour {
+    model: BiasModel,
+    filter: Gaussian<3>,
+    /// Outliers in a row under it.
+    outliers: OutlierRow,
+    /// Share of the bias that is left after a step of the length that the bank remembers.
+    keep: f64,
+}
+
+/// The filters with the evidence for each.
+#[derive(Clone, Debug, PartialEq)]
 pub struct BiasBank {
     dynamics: Dynamics,
-    models: [BiasModel; MODELS],
-    filters: [Gaussian<3>; MODELS],
-    /// Outliers in a row under each behaviour.
-    outliers: [OutlierRow; MODELS],
-    log_weights: [f64; MODELS],
+    behaviours: Bank<[Behaviour; MODELS], Nats, MODELS>,
     forgetting: f64,
-    /// Share of each bias that is left after a step, and the step in s that it holds for.
-    keeps: ([f64; MODELS], f64),
+    /// Step in s that the behaviours know what is kept over.
+    kept_step_s: f64,
 }
 
 impl BiasBank {
@@ -107,35 +114,30 @@ impl BiasBank {
         inverse_mass: (f64, f64),
         memory: f64,
     ) -> Self {
-        let filters = models.map(|model| {
-            Gaussian::independent(
+        let behaviours = models.map(|model| Behaviour {
+            model,
+            filter: Gaussian::independent(
                 Vector3::new(0.0, inverse_mass.0, 0.0),
                 Vector3::new(1.0, inverse_mass.1, model.std_mps2),
-            )
+            ),
+            outliers: OutlierRow::default(),
+            keep: 1.0,
         });
-        let log_weights = [0.0; MODELS];
-        BiasBank {
-            dynamics,
-            models,
-            filters,
-            outliers: Default::default(),
-            log_weights,
-            forgetting: 1.0 - 1.0 / memory,
-            keeps: ([1.0; MODELS], 0.0),
-        }
+        let forgetting = 1.0 - 1.0 / memory;
+        BiasBank { dynamics, behaviours: Bank::even(behaviours), forgetting, kept_step_s: 0.0 }
     }
 
     /// Starts anew at a measured speed; mass and bias stay as they are.
     pub fn restart_speed(&mut self, speed_mps: f64, noise_variance: f64) {
-        self.outliers = Default::default();
-        for filter in &mut self.filters {
-            filter.replace(SPEED, speed_mps, noise_variance);
+        for behaviour in self.behaviours.hypotheses_mut() {
+            behaviour.outliers = OutlierRow::default();
+            behaviour.filter.replace(SPEED, speed_mps, noise_variance);
         }
     }
 
     /// Opens the mass: the same mean and variance for every behaviour, biases as at the start.
     pub fn reopen(&mut self, inverse_mass: f64, variance: f64) {
-        for (filter, model) in self.filters.iter_mut().zip(&self.models) {
+        for Behaviour { filter, model, .. } in self.behaviours.hypotheses_mut() {
             filter.replace(INVERSE_MASS, inverse_mass, variance);
             filter.replace(BIAS, 0.0, model.std_mps2 * model.std_mps2);
         }
@@ -144,7 +146,7 @@ impl BiasBank {
     /// Lets the error of the map at a place into every bias of which nothing is known yet.
     pub fn begin_on_map(&mut self, motion: &Motion) {
         let map = MapError::over(motion, 0.0, self.dynamics.mps2_per_n_per_kn());
-        for (filter, model) in self.filters.iter_mut().zip(&self.models) {
+        for Behaviour { filter, model, .. } in self.behaviours.hypotheses_mut() {
             let std_mps2 = model.std_beside_mps2(map.std_mps2, motion.speed_mps);
             filter.replace(BIAS, 0.0, std_mps2 * std_mps2);
         }
@@ -156,13 +158,15 @@ impl BiasBank {
         let (push_from, push_to) = (dynamics.push_mps2(from), dynamics.push_mps2(to));
         let bend = to.known_n_per_kn - from.known_n_per_kn;
         let change = (push_to - push_from, dynamics.mps2_per_n_per_kn() * bend);
-        if self.keeps.1 != step_s {
-            self.keeps = (self.models.map(|model| model.keep(step_s)), step_s);
+        if self.kept_step_s != step_s {
+            self.kept_step_s = step_s;
+            for behaviour in self.behaviours.hypotheses_mut() {
+                behaviour.keep = behaviour.model.keep(step_s);
+            }
         }
         let map = MapError::over(from, step_s, dynamics.mps2_per_n_per_kn());
-        let filters = self.filters.iter_mut().zip(&self.models).zip(self.keeps.0);
-        for ((filter, model), keep) in filters {
-            let (keep, bias_variance) = model.drift(keep, &map, from.speed_mps);
+        for Behaviour { filter, model, keep, .. } in self.behaviours.hypotheses_mut() {
+            let (keep, bias_variance) = model.drift(*keep, &map, from.speed_mps);
             let [speed, inverse_mass, bias] = filter.mean.into();
             let shape = model.shape(speed);
             let start = push_from * inverse_mass - dynamics.drag_mps2(from, speed) + shape * bias;
@@ -180,11 +184,7 @@ impl BiasBank {
 
     /// The filter with the most evidence.
     pub fn best(&self) -> &Gaussian<3> {
-        &self.filters[self.best_index()]
-    }
-
-    fn best_index(&self) -> usize {
-        likeliest(0, self.log_weights)
+        &self.behaviours.likeliest().filter
     }
 
     /// Takes a measured speed into every filter that does not hold it for an outlier; tells what
@@ -202,10 +202,12 @@ impl BiasBank {
         noise_variance: f64,
     ) -> Result<Trust, NotPositiveDefinite> {
         let mut judged = [Trust::of(0.0); MODELS];
-        for (index, filter) in self.filters.iter_mut().enumerate() {
+        let (behaviours, weights) = self.behaviours.weighed_mut();
+        for ((judged, behaviour), weight) in judged.iter_mut().zip(behaviours).zip(weights) {
+            let Behaviour { filter, outliers, .. } = behaviour;
             let innovation = filter.innovation(SPEED, speed_mps, noise_variance)?;
             let trust = Trust::of(innovation.normalised());
-            let is_believed = self.outliers[index].push(trust.is_outlier());
+            let is_believed = outliers.push(trust.is_outlier());
             if trust.is_full() {
                 filter.take(SPEED, &innovation, noise_variance);
             } else if !trust.is_outlier() {
@@ -213,47 +215,32 @@ impl BiasBank {
             } else if is_believed {
                 filter.replace(SPEED, speed_mps, noise_variance);
             }
-            judged[index] = trust;
-            let log_weight = &mut self.log_weights[index];
+            *judged = trust;
             let evidence = -trust.surprise() - 0.5 * innovation.variance.ln();
-            *log_weight = self.forgetting * *log_weight + evidence;
+            *weight = self.forgetting * *weight + evidence;
         }
-        let best = self.best_index();
-        let highest = self.log_weights[best];
-        for log_weight in &mut self.log_weights {
-            *log_weight = (*log_weight - highest).max(LOG_WEIGHT_MIN);
-        }
-        Ok(judged[best])
-    }
-
-    /// Share of the evidence for each behaviour.
-    pub fn weights(&self) -> [f64; MODELS] {
-        let mut weights = self.log_weights;
-        to_shares(&mut weights);
-        weights
+        self.behaviours.settle();
+        self.behaviours.raise_to(LOG_WEIGHT_MIN);
+        Ok(judged[self.behaviours.likeliest_place()])
     }
 
     /// Inverse mass and bias, averaged over the behaviours by their evidence.
     pub fn moments(&self) -> Moments {
-        self.averaged(&self.weights())
+        self.averaged(|_| true)
     }
 
     /// The same of those behaviours alone that know of forces which jump between samples.
     pub fn moments_after_a_jump(&self) -> Moments {
-        let mut log_weights = self.log_weights;
-        for (log_weight, model) in log_weights.iter_mut().zip(&self.models) {
-            if !model.knows_of_jumps() {
-                *log_weight = f64::NEG_INFINITY;
-            }
-        }
-        to_shares(&mut log_weights);
-        self.averaged(&log_weights)
+        self.averaged(BiasModel::knows_of_jumps)
     }
 
-    fn averaged(&self, weights: &[f64; MODELS]) -> Moments {
+    fn averaged(&self, counts: impl Fn(&BiasModel) -> bool) -> Moments {
+        let behaviours = self.behaviours.hypotheses();
+        let shares = self.behaviours.shares(|place| counts(&behaviours[place].model));
         let mut mixture = Mixture::<2>::default();
-        let behaviours = weights.iter().zip(&self.models).zip(&self.filters);
-        for ((weight, model), filter) in behaviours.filter(|((weight, _), _)| **weight > 0.0) {
+        for (share, Behaviour { model, filter, .. }) in
+            shares.into_iter().zip(behaviours).filter(|(share, _)| *share > 0.0)
+        {
             let shape = model.shape(filter.mean[SPEED]);
             let [_, inverse_mass, bias] = filter.mean.into();
             let own = &filter.covariance;
@@ -264,7 +251,7 @@ impl BiasBank {
                 cross,
                 shape * shape * own[(BIAS, BIAS)],
             );
-            mixture.add(*weight, &Vector2::new(inverse_mass, shape * bias), &covariance);
+            mixture.add(share, &Vector2::new(inverse_mass, shape * bias), &covariance);
         }
         let Gaussian { mean, covariance } = mixture.belief;
         let product = (covariance[(0, 0)] * covariance[(1, 1)]).sqrt();
@@ -280,8 +267,8 @@ impl BiasBank {
 
     /// True while every filter is sound.
     pub fn is_sound(&self) -> bool {
-        self.filters.iter().all(Gaussian::is_sound)
-            && self.log_weights.iter().all(|weight| weight.is_finite())
+        self.behaviours.hypotheses().iter().all(|behaviour| behaviour.filter.is_sound())
+            && self.behaviours.weights().iter().all(|weight| weight.is_finite())
     }
 }
 
@@ -377,7 +364,7 @@ mod tests {
                 speed += STEP_S * (acting_mps2 - dynamics().mps2_per_n_per_kn() * 5.0);
                 bank.measure(speed, NOISE_VARIANCE).unwrap();
             }
-            let weights = bank.weights();
+            let weights = bank.behaviours.shares(|_| true);
             assert!(weights[expected] > weights[1 - expected], "{acting_mps2}: {weights:?}");
             assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
             assert!((bank.moments().bias_mps2 - acting_mps2).abs() < 2e-3);

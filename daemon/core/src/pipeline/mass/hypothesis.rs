@@ -33,12 +33,11 @@ pub struct Expectation {
     pub filtered_variance: f64,
 }
 
-/// The regression with the evidence for its assumption.
+/// The regression under its assumption.
 #[derive(Clone, Debug)]
 pub struct Hypothesis {
     model: BiasModel,
     regression: DriftingLevel<UNKNOWNS>,
-    log_likelihood: f64,
 }
 
 impl Hypothesis {
@@ -46,7 +45,7 @@ impl Hypothesis {
     pub fn new(model: BiasModel, mean: &Row, std: &Row) -> Self {
         let mut regression = DriftingLevel::new(mean, std);
         regression.restart_bias(model.std_mps2);
-        Hypothesis { model, regression, log_likelihood: 0.0 }
+        Hypothesis { model, regression }
     }
 
     /// The regression.
@@ -57,12 +56,6 @@ impl Hypothesis {
     /// Bias in m/s² at a speed for a stated bias of 1 m/s².
     pub fn shape(&self, speed_mps: f64) -> f64 {
         self.model.shape(speed_mps)
-    }
-
-    /// Logarithm of the likelihood of all measurements, up to what is common to all
-    /// assumptions.
-    pub fn evidence(&self) -> f64 {
-        self.log_likelihood
     }
 
     /// Forgets the level after a gap.
@@ -108,11 +101,12 @@ impl Hypothesis {
         }
     }
 
-    /// Absorbs an equation.
-    pub fn absorb(&mut self, row: &Row, value: f64, weight: f64) {
+    /// Absorbs an equation; gives the logarithm of its likelihood, up to what is common to all
+    /// assumptions.
+    pub fn absorb(&mut self, row: &Row, value: f64, weight: f64) -> f64 {
         let innovation = self.regression.absorb(row, value, weight);
-        if let Some(normalised) = innovation.normalised {
-            self.log_likelihood -= 0.5 * (normalised * normalised + innovation.log_variance_ratio);
-        }
+        let evidence =
+            |normalised: f64| -0.5 * (normalised * normalised + innovation.log_variance_ratio);
+        innovation.normalised.map_or(0.0, evidence)
     }
 }

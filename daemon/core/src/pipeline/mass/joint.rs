@@ -12,8 +12,8 @@ use super::joint_settings::{JOINT_MODELS, JointLeastSquaresSettings};
 use super::line_resistance::LineResistance;
 use super::motion::{Motion, StopWatch};
 use super::section::Section;
+use crate::filter::bank::{Bank, Nats};
 use crate::filter::drifting_level::BIAS;
-use crate::filter::mixture::likeliest;
 use crate::force::ResolvedSample;
 use crate::pipeline::judge::{InputHealth, LackOfFit};
 use crate::pipeline::motion::{OutlierRow, SpeedNoise, SpeedRange, Trust, kink_variance};
@@ -33,9 +33,8 @@ const REFRESH_EVERY: u32 = 50;
 pub struct JointLeastSquares {
     pub(super) settings: JointLeastSquaresSettings,
     pub(super) regressors: Regressors,
-    initial: [Hypothesis; JOINT_MODELS],
-    pub(super) hypotheses: [Hypothesis; JOINT_MODELS],
-    pub(super) best: usize,
+    initial: Bank<[Hypothesis; JOINT_MODELS], Nats, JOINT_MODELS>,
+    pub(super) bank: Bank<[Hypothesis; JOINT_MODELS], Nats, JOINT_MODELS>,
     stops: StopWatch,
     last: Option<(Motion, Integrals)>,
     integrals: Integrals,
@@ -75,13 +74,13 @@ impl JointLeastSquares {
         mean.fixed_rows_mut::<3>(POLYNOMIALS[0]).copy_from(&basic);
         let mut std = Row::repeat(settings.resistance_std_n_per_kn);
         std[INVERSE_MASS] = 0.01 * settings.mass_std_percent;
-        let initial = settings.bias_models().map(|model| Hypothesis::new(model, &mean, &std));
+        let models = settings.bias_models();
+        let initial = Bank::even(models.map(|model| Hypothesis::new(model, &mean, &std)));
         Ok(JointLeastSquares {
             settings,
             regressors,
-            hypotheses: initial.clone(),
+            bank: initial.clone(),
             initial,
-            best: 0,
             stops: StopWatch::new(settings.stop_min_s),
             last: None,
             integrals: Integrals::zero(),
@@ -102,7 +101,7 @@ impl JointLeastSquares {
     }
     /// z1, z2 and z3, the latter two beyond what is declared; `None` when the regression is not sound.
     pub fn resistance(&self) -> Option<LineResistance> {
-        let solution = self.hypotheses[self.best].regression().solve()?;
+        let solution = self.bank.likeliest().regression().solve()?;
         let [basic, curve, tunnel] = Section::ALL.map(|section| self.davis(&solution, section));
         Some(LineResistance {
             basic,
@@ -122,7 +121,7 @@ impl JointLeastSquares {
 
     /// Mass in kg and its standard deviation; `None` when the regression is not sound.
     pub fn mass_kg(&self) -> Option<(f64, f64)> {
-        let inverse = self.hypotheses[self.best].regression().solve()?[INVERSE_MASS];
+        let inverse = self.bank.likeliest().regression().solve()?[INVERSE_MASS];
         let std = self.covariance_root()?.row(INVERSE_MASS).norm();
         let mass_kg = self.regressors.reference_mass_kg / inverse;
         Some((mass_kg, mass_kg / inverse * std))
@@ -139,7 +138,7 @@ impl JointLeastSquares {
     }
 
     pub(super) fn covariance_root(&self) -> Option<SMatrix<f64, UNKNOWNS, UNKNOWNS>> {
-        self.hypotheses[self.best].regression().covariance_root()
+        self.bank.likeliest().regression().covariance_root()
     }
 
     /// Covariance of some unknowns from the square root of the whole.
@@ -157,12 +156,13 @@ impl JointLeastSquares {
         let (row, value) = self.integrals.equation(motion.speed_mps);
         let is_opened = std::mem::take(&mut self.is_opened);
         let map = MapError::over(&motion, 0.0, self.regressors.mps2_per_n_per_kn());
-        for hypothesis in &mut self.hypotheses {
+        let (hypotheses, weights) = self.bank.weighed_mut();
+        for (hypothesis, weight) in hypotheses.iter_mut().zip(weights) {
             if is_opened && map.std_mps2 > 0.0 {
                 hypothesis.begin_on_map(&map, motion.speed_mps);
             }
             hypothesis.free_level();
-            hypothesis.absorb(&row, value, 1.0 / self.noise.variance());
+            *weight += hypothesis.absorb(&row, value, 1.0 / self.noise.variance());
         }
         self.monitor.break_here();
         self.last = Some((motion, self.regressors.rates(&motion)));
@@ -174,21 +174,21 @@ impl JointLeastSquares {
         self.integrals.add(&last.1, &rates, step_s);
         let (row, value) = self.integrals.equation(motion.speed_mps);
         let step = self.step(&last, &rates, step_s);
-        for hypothesis in &mut self.hypotheses {
-            hypothesis.propagate(&step);
-        }
+        self.bank.hypotheses_mut().iter_mut().for_each(|hypothesis| hypothesis.propagate(&step));
         let variance = self.noise.variance();
-        let mut expected = self.hypotheses[self.best].expect(&row, value, variance);
+        let mut expected = self.bank.likeliest().expect(&row, value, variance);
         if Trust::of(expected.normalised).is_outlier() {
             // Impossible to one assumption, as a force that jumps to one that knows of none: it gives
             // way to one under which the speed is possible.
-            for (index, hypothesis) in self.hypotheses.iter().enumerate() {
+            let mut place = self.bank.likeliest_place();
+            for (index, hypothesis) in self.bank.hypotheses().iter().enumerate() {
                 let other = hypothesis.expect(&row, value, variance);
                 let is_possible = !Trust::of(other.normalised).is_outlier();
                 if is_possible && other.normalised.abs() < expected.normalised.abs() {
-                    (expected, self.best) = (other, index);
+                    (expected, place) = (other, index);
                 }
             }
+            self.bank.believe(place);
         }
         if !expected.normalised.is_finite() {
             self.reset();
@@ -204,11 +204,12 @@ impl JointLeastSquares {
             return Outcome::Rejected(RejectionReason::Outlier);
         }
         self.monitor.push(expected.normalised);
-        for hypothesis in &mut self.hypotheses {
-            hypothesis.absorb(&row, value, trust.weight / variance);
+        let (hypotheses, weights) = self.bank.weighed_mut();
+        for (hypothesis, weight) in hypotheses.iter_mut().zip(weights) {
+            *weight += hypothesis.absorb(&row, value, trust.weight / variance);
         }
         self.noise.take_residual(expected.residual_mps, expected.filtered_variance, trust.weight);
-        self.choose();
+        self.bank.settle();
         self.refresh();
         self.speeds.push(motion.speed_mps);
         self.last = Some((motion, rates));
@@ -241,10 +242,6 @@ impl JointLeastSquares {
         }
     }
 
-    fn choose(&mut self) {
-        self.best = likeliest(self.best, self.hypotheses.iter().map(Hypothesis::evidence));
-    }
-
     /// Takes the latest resistance over once in a while; it changes slowly.
     fn refresh(&mut self) {
         self.updates_since_refresh += 1;
@@ -257,7 +254,7 @@ impl JointLeastSquares {
 
     /// Looks at the force that the bias has to take up.
     fn look(&mut self) {
-        let best = &self.hypotheses[self.best];
+        let best = self.bank.likeliest();
         let (Some(solution), Some(root)) = (best.regression().solve(), self.covariance_root())
         else {
             return;
@@ -271,8 +268,7 @@ impl JointLeastSquares {
     }
 
     fn reset(&mut self) {
-        self.hypotheses.clone_from(&self.initial);
-        self.best = 0;
+        self.bank.clone_from(&self.initial);
         self.noise.reset();
         self.is_opened = true;
         self.is_fresh_reset = true;
@@ -287,9 +283,11 @@ impl Estimator for JointLeastSquares {
 
     fn update(&mut self, sample: &ResolvedSample) -> Outcome {
         if self.stops.departs(sample.time_ns, sample.stretch, sample.speed_mps) {
-            for hypothesis in &mut self.hypotheses {
-                hypothesis.reopen(0.01 * self.settings.mass_change_std_percent);
-            }
+            let relative_std = 0.01 * self.settings.mass_change_std_percent;
+            self.bank
+                .hypotheses_mut()
+                .iter_mut()
+                .for_each(|hypothesis| hypothesis.reopen(relative_std));
             self.is_opened = true;
             self.last = None;
         }

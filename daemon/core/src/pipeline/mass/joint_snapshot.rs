@@ -20,7 +20,7 @@ impl JointLeastSquares {
     pub(super) fn write_snapshot(&self, snapshot: &mut ParameterSnapshot) {
         snapshot.generation = self.generation;
         write_innovations(snapshot, &self.monitor);
-        let best = &self.hypotheses[self.best];
+        let best = self.bank.likeliest();
         let (Some(solution), Some(root)) = (best.regression().solve(), self.covariance_root())
         else {
             snapshot.parameter_count = 0;

@@ -88,12 +88,12 @@ impl MassKalman {
             settings,
             reference_mass_kg: train.mass_kg,
             inertia_factor: 1.0 + train.rotating_mass_factor,
-            initial_bank: bank,
+            moments: bank.moments(),
+            initial_bank: bank.clone(),
             bank,
             stops: StopWatch::new(settings.stop_min_s),
             gate: SampleGate::default(),
             last: None,
-            moments: bank.moments(),
             declared_mass_kg: train.mass_kg,
             is_warm_started: false,
             is_opened: true,
@@ -145,7 +145,7 @@ impl MassKalman {
         self.declared_mass_kg = declared_mass_kg;
         let std = 0.01 * self.settings.mass_std_percent / ratio;
         self.initial_bank.reopen(1.0 / ratio, std * std);
-        self.bank = self.initial_bank;
+        self.bank.clone_from(&self.initial_bank);
         self.moments = self.bank.moments();
     }
 
@@ -208,7 +208,7 @@ impl MassKalman {
     }
 
     fn reset(&mut self) {
-        self.bank = self.initial_bank;
+        self.bank.clone_from(&self.initial_bank);
         self.moments = self.bank.moments();
         self.noise.reset();
         self.is_opened = true;

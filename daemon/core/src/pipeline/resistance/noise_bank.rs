@@ -9,7 +9,8 @@ use super::momentum_error::Disturbance;
 use super::noise_model::{NoiseModel, PRIOR_ROWS, WhiteRow};
 use super::regression::{Motion, Observation, PARAMETERS, SinceBlock, Solution, Unknowns};
 use crate::filter::Gaussian;
-use crate::filter::mixture::{Mixture, likeliest, to_shares};
+use crate::filter::bank::{Bank, Nats};
+use crate::filter::mixture::Mixture;
 
 /// Standard deviations of the disturbance in N/kN: from nothing to as large as resistance itself.
 const STDS_N_PER_KN: [f64; 6] = [0.01, 0.03, 0.1, 0.3, 1.0, 3.0];
@@ -50,11 +51,11 @@ pub struct LikeliestNoise {
 /// Noise models side by side; the first has no disturbance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NoiseBank {
-    models: [NoiseModel; MODELS],
-    weights: [f64; MODELS],
+    models: Bank<[NoiseModel; MODELS], Nats, MODELS>,
+    /// Their probabilities.
+    shares: [f64; MODELS],
     penalty: Unknowns,
     forgetting: f64,
-    likeliest: usize,
     rows_since_renewal: u32,
     last_time_ns: Option<i64>,
     mixture: Option<Solution>,
@@ -70,12 +71,14 @@ impl NoiseBank {
                 time_s: TIMES_S[place % TIMES_S.len()],
             },
         };
+        let of_place = |place| NoiseModel::new(disturbance(place), penalty);
+        let mut models = Bank::even(std::array::from_fn(of_place));
+        models.believe(LIKELIEST_AT_FIRST);
         NoiseBank {
-            models: std::array::from_fn(|index| NoiseModel::new(disturbance(index), penalty)),
-            weights: [0.0; MODELS],
+            models,
+            shares: [0.0; MODELS],
             penalty: *penalty,
             forgetting,
-            likeliest: LIKELIEST_AT_FIRST,
             rows_since_renewal: 0,
             last_time_ns: None,
             mixture: None,
@@ -84,7 +87,7 @@ impl NoiseBank {
 
     /// Adds what is known of the unknowns from elsewhere to every model, a row of unit variance.
     pub fn know(&mut self, features: &Unknowns, observed: f64) {
-        for model in &mut self.models {
+        for model in self.models.hypotheses_mut() {
             model.know(features, observed);
         }
     }
@@ -107,7 +110,7 @@ impl NoiseBank {
             .replace(time_ns)
             .map(|last_ns| time_ns.saturating_sub(last_ns) as f64 * 1e-9)
             .filter(|&gap_s| gap_s > 0.0);
-        for model in &mut self.models {
+        for model in self.models.hypotheses_mut() {
             match observation.is_first() {
                 true => model.restart(observation, gap_s),
                 false => model.propagate(observation),
@@ -115,7 +118,7 @@ impl NoiseBank {
         }
         match observation {
             Observation::Block(block) if block.is_first => None,
-            _ => self.models[self.likeliest].row(observation),
+            _ => self.models.likeliest().row(observation),
         }
     }
 
@@ -126,21 +129,21 @@ impl NoiseBank {
     ///
     /// One small factorisation for each model of weight, no allocation.
     pub fn accept(&mut self, observation: &Observation) -> bool {
-        for model in &mut self.models {
+        for model in self.models.hypotheses_mut() {
             model.accept(observation, self.forgetting);
         }
         self.renew_penalty();
-        let before = self.likeliest;
+        let before = self.models.likeliest_place();
         self.weigh();
         self.mixture = self.mix(1.0, self.student_factor());
-        before != self.likeliest
+        before != self.models.likeliest_place()
     }
 
     /// Goes on without the predicted observation: as the start of a new chain for a block,
     /// whose momentum may have truly changed.
     pub fn refuse(&mut self, observation: &Observation) {
         if matches!(observation, Observation::Block(_)) {
-            for model in &mut self.models {
+            for model in self.models.hypotheses_mut() {
                 model.restart(observation, Some(0.0));
             }
         }
@@ -148,38 +151,38 @@ impl NoiseBank {
 
     /// Lets the disturbance have jumped, by so much in N/kN.
     pub fn loosen(&mut self, std_n_per_kn: f64) {
-        for model in &mut self.models {
+        for model in self.models.hypotheses_mut() {
             model.loosen(std_n_per_kn);
         }
     }
 
     /// Rows taken in, the forgotten ones in part.
     pub fn count(&self) -> f64 {
-        self.models[0].count()
+        self.undisturbed().count()
     }
 
     /// The likeliest model's own solution; `None` while the rows do not determine it.
     pub fn likeliest_solution(&self) -> Option<Solution> {
-        self.models[self.likeliest].solution()
+        self.models.likeliest().solution()
     }
 
     /// Speed and disturbance by the likeliest model, so long after the newest block.
     pub fn likeliest_motion(&self, since: &SinceBlock) -> Motion {
-        self.models[self.likeliest].motion(since)
+        self.models.likeliest().motion(since)
     }
 
     /// The likeliest noise model.
     pub fn likeliest_noise(&self) -> LikeliestNoise {
-        let model = &self.models[self.likeliest];
+        let model = self.models.likeliest();
         let scale = model.scale();
         let Disturbance { std_n_per_kn, time_s } = *model.disturbance();
         let disturbance = Disturbance { std_n_per_kn: std_n_per_kn * scale.sqrt(), time_s };
-        LikeliestNoise { place: self.likeliest, disturbance, scale }
+        LikeliestNoise { place: self.models.likeliest_place(), disturbance, scale }
     }
 
     /// The disturbance now, in N/kN for given unknowns, with its standard deviation.
     pub fn disturbance(&self, unknowns: &Unknowns) -> (f64, f64) {
-        self.models[self.likeliest].disturbance_now(unknowns)
+        self.models.likeliest().disturbance_now(unknowns)
     }
 
     /// The mixture of all models; `None` while the rows do not determine the parameters.
@@ -222,25 +225,22 @@ impl NoiseBank {
                 weight * model.scale() * model.disturbance().std_n_per_kn.powi(2)
             })
             .sum();
-        let likelihood = |index: usize| self.models[index].log_likelihood();
-        Disturbed {
-            std_n_per_kn: variance.sqrt(),
-            evidence: 2.0 * (likelihood(self.likeliest) - likelihood(0)),
-        }
+        let gain = self.models.likeliest().log_likelihood() - self.undisturbed().log_likelihood();
+        Disturbed { std_n_per_kn: variance.sqrt(), evidence: 2.0 * gain }
     }
 
     /// The mixture of the likeliest models that together have so much of the probability, each
     /// covariance times a factor.
     fn mix(&self, probability: f64, factor: f64) -> Option<Solution> {
         let mut order: [usize; MODELS] = std::array::from_fn(|index| index);
-        order.sort_unstable_by(|&i, &j| self.weights[j].total_cmp(&self.weights[i]));
+        order.sort_unstable_by(|&i, &j| self.shares[j].total_cmp(&self.shares[i]));
         let mut mixture = Mixture::default();
         for index in order {
-            let weight = self.weights[index];
+            let weight = self.shares[index];
             if mixture.weight >= probability || weight <= WEIGHT_MIN {
                 break;
             }
-            let own = self.models[index].solution()?;
+            let own = self.models.hypotheses()[index].solution()?;
             mixture.add(weight, &own.estimate, &(own.covariance * factor));
         }
         let Gaussian { mean: estimate, covariance } = mixture.belief;
@@ -248,17 +248,21 @@ impl NoiseBank {
     }
 
     fn weighty(&self) -> impl Iterator<Item = (&NoiseModel, f64)> {
-        self.models.iter().zip(self.weights).filter(|(_, weight)| *weight > WEIGHT_MIN)
+        self.models.hypotheses().iter().zip(self.shares).filter(|(_, weight)| *weight > WEIGHT_MIN)
     }
 
     fn weigh(&mut self) {
-        if self.models[0].freedom() < 1.0 {
+        if self.undisturbed().freedom() < 1.0 {
             return;
         }
-        self.weights =
-            std::array::from_fn(|index| self.models[index].log_likelihood() + log_prior(index));
-        self.likeliest = likeliest(self.likeliest, self.weights);
-        to_shares(&mut self.weights);
+        let (models, weights) = self.models.weighed_mut();
+        *weights = std::array::from_fn(|place| models[place].log_likelihood() + log_prior(place));
+        self.models.settle();
+        self.shares = self.models.shares(|_| true);
+    }
+
+    fn undisturbed(&self) -> &NoiseModel {
+        &self.models.hypotheses()[0]
     }
 
     /// Every so many rows, gives back what forgetting took off the priors.
@@ -267,7 +271,7 @@ impl NoiseBank {
         if self.forgetting < 1.0 && self.rows_since_renewal == RENEWAL_ROWS {
             self.rows_since_renewal = 0;
             let weights = self.penalty * (1.0 - self.forgetting.powi(RENEWAL_ROWS as i32));
-            for model in &mut self.models {
+            for model in self.models.hypotheses_mut() {
                 model.add_penalty(&weights);
             }
         }
@@ -276,7 +280,7 @@ impl NoiseBank {
     /// Widens a variance so that 1.96 standard deviations hold 95 % although the variance itself
     /// is estimated with few degrees of freedom (Student's t).
     fn student_factor(&self) -> f64 {
-        let freedom = self.models[0].freedom() + PRIOR_ROWS;
+        let freedom = self.undisturbed().freedom() + PRIOR_ROWS;
         1.0 + 2.5 / (freedom - 1.2).max(0.8)
     }
 }

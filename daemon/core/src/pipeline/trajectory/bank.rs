@@ -7,13 +7,15 @@
 //! models; Adams, MacKay 2007, run lengths). Ages are kept about evenly on a logarithmic scale:
 //! when the bank is full, the two hypotheses closest in relative age become one.
 
+use arrayvec::ArrayVec;
 use nalgebra::{Matrix3, Vector3};
 
-use super::hypothesis::{Hypothesis, Innovation, OutlierModel};
+use super::hypothesis::{Hypothesis, Innovation, OutlierModel, united};
 use super::noise::NoiseModel;
 use super::step::{Step, StepRule};
 use crate::filter::Gaussian;
-use crate::filter::mixture::{Mixture, likeliest};
+use crate::filter::bank::{Bank, Odds};
+use crate::filter::mixture::Mixture;
 use crate::train::Davis;
 
 /// The most hypotheses of a bank.
@@ -44,8 +46,7 @@ pub struct StepDoubt {
 #[derive(Clone, Debug, PartialEq)]
 pub struct JumpBank {
     /// By age, the oldest first.
-    hypotheses: [Hypothesis; HYPOTHESES_MAX],
-    count: usize,
+    hypotheses: Bank<ArrayVec<Hypothesis, HYPOTHESES_MAX>, Odds, HYPOTHESES_MAX>,
     capacity: usize,
     jumps: JumpModel,
     noise: NoiseModel,
@@ -72,8 +73,7 @@ impl JumpBank {
         outliers: OutlierModel,
     ) -> Self {
         JumpBank {
-            hypotheses: [first; HYPOTHESES_MAX],
-            count: 1,
+            hypotheses: Bank::of_one(first),
             capacity: capacity.clamp(1, HYPOTHESES_MAX),
             jumps,
             noise,
@@ -85,23 +85,17 @@ impl JumpBank {
 
     /// The hypotheses, the oldest first.
     pub fn hypotheses(&self) -> &[Hypothesis] {
-        &self.hypotheses[..self.count]
+        self.hypotheses.hypotheses()
     }
 
     /// The most probable hypothesis.
     pub fn likeliest(&self) -> &Hypothesis {
-        &self.hypotheses[self.likeliest_index()]
-    }
-
-    fn likeliest_index(&self) -> usize {
-        likeliest(0, self.hypotheses().iter().map(|hypothesis| hypothesis.weight))
+        self.hypotheses.likeliest()
     }
 
     /// Takes the speed of every hypothesis from a measurement alone.
     pub fn anchor(&mut self, speed_mps: f64) {
-        for hypothesis in &mut self.hypotheses[..self.count] {
-            hypothesis.anchor(speed_mps);
-        }
+        self.hypotheses.hypotheses_mut().iter_mut().for_each(|it| it.anchor(speed_mps));
     }
 
     /// Says how far the next step can be believed; none is doubted unless this is called.
@@ -124,19 +118,22 @@ impl JumpBank {
         measured_mps: f64,
     ) -> Option<Innovation> {
         self.spawn(duration_s);
-        let likeliest = self.likeliest_index();
+        let likeliest = self.hypotheses.likeliest_place();
         let mut told = None;
-        for (index, hypothesis) in self.hypotheses[..self.count].iter_mut().enumerate() {
+        let (hypotheses, weights) = self.hypotheses.weighed_mut();
+        for (place, (hypothesis, weight)) in hypotheses.iter_mut().zip(weights).enumerate() {
             hypothesis.predict(rule, step, duration_s, self.doubt.impulse_variance);
             hypothesis.noise.rounding_variance = self.doubt.rounding_variance;
             let innovation = hypothesis.measure(measured_mps, &self.noise, &self.outliers);
-            hypothesis.weight *= innovation.likelihood;
-            if index == likeliest {
+            *weight *= if hypothesis.is_sound() { innovation.likelihood } else { 0.0 };
+            if place == likeliest {
                 told = Some(innovation);
             }
         }
-        self.drop_unlikely();
-        if self.count == 0 { None } else { told }
+        self.hypotheses.settle();
+        // Also drops what became NaN because no weight is above 0.
+        self.hypotheses.drop_up_to(WEIGHT_MIN);
+        told.filter(|_| !self.hypotheses().is_empty())
     }
 
     /// Adds the hypothesis that the coefficients jump now.
@@ -149,63 +146,38 @@ impl JumpBank {
         let mut child = *self.likeliest();
         let variance = self.jumps.std.component_mul(&self.jumps.std);
         let probability = self.since_spawn_s * (-self.jumps.evidence).exp();
-        child.weight *= probability.min(JUMP_PROBABILITY_MAX);
         self.since_spawn_s = 0.0;
         if child.jump(&variance) {
-            if self.count == self.capacity {
+            let likeliest = self.hypotheses.likeliest_place();
+            let weight =
+                self.hypotheses.weights()[likeliest] * probability.min(JUMP_PROBABILITY_MAX);
+            if self.hypotheses().len() == self.capacity {
                 self.unite_closest();
             }
-            self.hypotheses[self.count] = child;
-            self.count += 1;
+            self.hypotheses.join(child, weight);
         }
     }
 
     /// Makes one of the two neighbours whose ages differ least in proportion.
     fn unite_closest(&mut self) {
-        let age = |i: usize| self.hypotheses[i].age_s;
-        let gap = |i: usize| (age(i) - age(i + 1)) / age(i).max(f64::MIN_POSITIVE);
-        let Some(older) = (0..self.count - 1).min_by(|&i, &j| gap(i).total_cmp(&gap(j))) else {
-            return;
-        };
-        let (one, other) = (&self.hypotheses[older], &self.hypotheses[older + 1]);
-        self.hypotheses[older] = one.united(other);
-        self.remove(older + 1);
-    }
-
-    fn remove(&mut self, index: usize) {
-        self.hypotheses.copy_within(index + 1..self.count, index);
-        self.count -= 1;
-    }
-
-    /// Drops what is unsound or out of the question, and sets the greatest weight to 1.
-    fn drop_unlikely(&mut self) {
-        let mut best = 0.0;
-        for hypothesis in &mut self.hypotheses[..self.count] {
-            if !hypothesis.is_sound() {
-                hypothesis.weight = 0.0;
-            }
-            best = hypothesis.weight.max(best);
-        }
-        for index in (0..self.count).rev() {
-            let weight = self.hypotheses[index].weight / best;
-            self.hypotheses[index].weight = weight;
-            // Also drops what became NaN because no weight is above 0.
-            if !(weight > WEIGHT_MIN) {
-                self.remove(index);
-            }
-        }
+        let age_s = |place: usize| self.hypotheses()[place].age_s;
+        let gap = |i: usize| (age_s(i) - age_s(i + 1)) / age_s(i).max(f64::MIN_POSITIVE);
+        let places = 0..self.hypotheses().len() - 1;
+        let Some(older) = places.min_by(|&i, &j| gap(i).total_cmp(&gap(j))) else { return };
+        let of = |place: usize| (&self.hypotheses()[place], self.hypotheses.weights()[place]);
+        let both = united(of(older), of(older + 1));
+        self.hypotheses.unite(older, both);
     }
 
     /// Mean and covariance of (a, b, c) over the hypotheses that count.
     pub fn davis(&self) -> (Davis, Matrix3<f64>) {
-        let live = self.hypotheses();
-        let total: f64 = live.iter().map(|hypothesis| hypothesis.weight).sum();
-        let published =
-            |hypothesis: &&Hypothesis| hypothesis.weight >= WEIGHT_PUBLISHED_MIN * total;
+        let total: f64 = self.hypotheses.weights().iter().sum();
         let mut mixture = Mixture::<3>::default();
-        for hypothesis in live.iter().filter(published) {
-            let own = hypothesis.davis_covariance_over_noise(&self.noise);
-            mixture.add(hypothesis.weight, &hypothesis.state.fixed_rows::<3>(0).into(), &own);
+        for (hypothesis, weight) in self.hypotheses().iter().zip(self.hypotheses.weights()) {
+            if *weight >= WEIGHT_PUBLISHED_MIN * total {
+                let own = hypothesis.davis_covariance_over_noise(&self.noise);
+                mixture.add(*weight, &hypothesis.state.fixed_rows::<3>(0).into(), &own);
+            }
         }
         let Gaussian { mean, covariance } = mixture.belief;
         (Davis { a: mean[0], b: mean[1], c: mean[2] }, covariance)

@@ -20,7 +20,7 @@ pub struct OutlierModel {
     pub density: f64,
 }
 
-/// State, covariance and weight under one hypothesis.
+/// State and covariance under one hypothesis.
 ///
 /// The state is extended over a step by the step's derivatives; the covariance factor stays
 /// triangular without a factorisation, since a step moves the speed alone.
@@ -34,8 +34,6 @@ pub struct Hypothesis {
     pub noise: LearnedNoise,
     /// Covariance that a disturbance of unit density would have left with the gains used.
     unit: UnitDisturbance,
-    /// The hypothesis' probability, up to a factor that all of a bank share.
-    pub weight: f64,
     /// Time in s since its jump.
     pub age_s: f64,
     /// Measurements left out in a row.
@@ -68,7 +66,6 @@ impl Hypothesis {
             )),
             noise,
             unit: UnitDisturbance::default(),
-            weight: 1.0,
             age_s: 0.0,
             outliers: OutlierRow::default(),
         }
@@ -151,8 +148,8 @@ impl Hypothesis {
         self.age_s += duration_s;
     }
 
-    /// Takes in a measured speed, or leaves it out when it more likely is an outlier. The weight
-    /// stays; whoever compares hypotheses multiplies it by the likelihood.
+    /// Takes in a measured speed, or leaves it out when it more likely is an outlier; whoever
+    /// compares hypotheses weighs them by the likelihood.
     ///
     /// # Real-time
     ///
@@ -187,32 +184,32 @@ impl Hypothesis {
         Innovation { innovation_mps, deviation_mps, likelihood: inlier + outlier, is_used }
     }
 
-    /// Mean and covariance of two hypotheses by their weights, with the weight of both; the
-    /// rest is the likelier's.
-    ///
-    /// The spread between them stays in the covariance: neither knows exactly when the jump
-    /// was, and samples from before it would bias the coefficients.
-    pub fn united(&self, other: &Hypothesis) -> Hypothesis {
-        let (more, less) = if self.weight >= other.weight { (self, other) } else { (other, self) };
-        let weight = more.weight + less.weight;
-        let mut both = Mixture::default();
-        both.add(more.weight, &more.state, &more.factor.covariance());
-        both.add(less.weight, &less.state, &less.factor.covariance());
-        let mut united = *more;
-        united.weight = weight;
-        if let Some(factor) = CovarianceFactor::of(&both.belief.covariance) {
-            united.state = both.belief.mean;
-            united.factor = factor;
-            united.unit = more.unit.mixed(&less.unit, less.weight / weight);
-        }
-        united
-    }
-
     /// True while state and covariance are numbers.
     #[inline]
     pub fn is_sound(&self) -> bool {
-        (self.state.sum() + self.weight).is_finite() && self.factor.is_sound()
+        self.state.sum().is_finite() && self.factor.is_sound()
     }
+}
+
+/// Mean and covariance of two hypotheses by their weights, with the weight of both; the rest is
+/// the likelier's.
+///
+/// The spread between them stays in the covariance: neither knows exactly when the jump was, and
+/// samples from before it would bias the coefficients.
+pub fn united(one: (&Hypothesis, f64), other: (&Hypothesis, f64)) -> (Hypothesis, f64) {
+    let ((more, greater), (less, smaller)) =
+        if one.1 >= other.1 { (one, other) } else { (other, one) };
+    let mut both = Mixture::default();
+    both.add(greater, &more.state, &more.factor.covariance());
+    both.add(smaller, &less.state, &less.factor.covariance());
+    let weight = both.weight;
+    let mut united = *more;
+    if let Some(factor) = CovarianceFactor::of(&both.belief.covariance) {
+        united.state = both.belief.mean;
+        united.factor = factor;
+        united.unit = more.unit.mixed(&less.unit, smaller / weight);
+    }
+    (united, weight)
 }
 
 #[cfg(test)]
@@ -344,15 +341,13 @@ mod tests {
     #[test]
     fn united_hypotheses_keep_mean_spread_and_weight() {
         let model = noise(0.0);
-        let mut one = first(&model);
-        let mut other = first(&model);
+        let one = first(&model);
+        let mut other = one;
         other.state[A] += 1.0;
-        one.weight = 0.25;
-        other.weight = 0.75;
-        let united = one.united(&other);
-        assert!((united.state[A] - (FAST.a + 0.75)).abs() < 1e-12);
-        let variance = united.davis_covariance()[(A, A)];
+        let (both, weight) = united((&one, 0.25), (&other, 0.75));
+        assert!((both.state[A] - (FAST.a + 0.75)).abs() < 1e-12);
+        let variance = both.davis_covariance()[(A, A)];
         assert!((variance - (0.09 + 0.75 * 0.25)).abs() < 1e-12);
-        assert_eq!(united.weight, 1.0);
+        assert_eq!(weight, 1.0);
     }
 }

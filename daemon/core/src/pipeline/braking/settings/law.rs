@@ -45,7 +45,7 @@ impl LawSettings {
                 scale: PriorScale::OfLaw(Uncertain::new(1.0, std)),
             },
         };
-        let hypotheses = vec![
+        let hypotheses = [
             hypothesis(Law::Rail(RailCondition::Dry), self.scale_std),
             hypothesis(Law::Rail(RailCondition::Wet), self.scale_std),
             hypothesis(Law::Demand, self.braking.demand_relative_std),
