@@ -36,7 +36,7 @@ const CALLS: [(&str, &str); 11] = [
 /// Whole files whose sentences are messages: of impossible data and declarations, of stops.
 const SENTENCES: [&str; 3] = [
     "daemon/core/src/plausibility/words.rs",
-    "daemon/core/src/plausibility/declared.rs",
+    "daemon/analysis/src/dataset/declared.rs",
     "shared/src/stopping.rs",
 ];
 /// Stands for what changes from message to message.
