@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use dynocar_tests::sources::workspace;
 
 /// Where messages are raised.
-const FOLDERS: [&str; 12] = [
+const FOLDERS: [&str; 13] = [
     "daemon/src",
     "daemon/core/src",
+    "daemon/analysis/src",
     "daemon/fmu/src",
     "shared/src",
     "client/src",

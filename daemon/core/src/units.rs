@@ -1,4 +1,4 @@
-//! The units a column may be in.
+//! The units a quantity may be in.
 //!
 //! Every unit converts to its dimension's base unit: SI, except °C for temperature, since that
 //! is what a sample holds.
@@ -49,7 +49,6 @@ pub struct Unit {
     shift: f64,
     multiply: f64,
     divide: f64,
-    spellings: &'static [&'static str],
 }
 
 /// Newtons in a pound-force: 0.45359237 kg at 9.80665 m/s² (NIST SP 811, appendix B.8).
@@ -60,91 +59,54 @@ const MILE_PER_HOUR_MPS: f64 = 0.44704;
 const UNITS: [Unit; 38] = {
     use Dimension::*;
     [
-        unit(
-            "s",
-            Time,
-            1.0,
-            1.0,
-            &["sec", "secs", "second", "seconds", "sek", "sekunden", "sekunde"],
-        ),
-        unit(
-            "ms",
-            Time,
-            1.0,
-            1e3,
-            &["msec", "millis", "millisec", "milliseconds", "millisekunden"],
-        ),
-        unit("us", Time, 1.0, 1e6, &["usec", "micros", "microseconds", "mikrosekunden"]),
-        unit("ns", Time, 1.0, 1e9, &["nsec", "nanos", "nanoseconds"]),
-        unit("min", Time, 60.0, 1.0, &["mins", "minute", "minutes", "minuten"]),
-        unit("h", Time, 3600.0, 1.0, &["hr", "hour", "hours", "std", "stunden"]),
-        unit("m", Length, 1.0, 1.0, &["meter", "meters", "metre", "metres", "mtr"]),
-        unit("km", Length, 1e3, 1.0, &["kilometer", "kilometers", "kilometre", "kilometres"]),
-        unit("mm", Length, 1.0, 1e3, &["millimeter", "millimetre", "millimeters"]),
-        unit(
-            "m/s",
-            Speed,
-            1.0,
-            1.0,
-            &["mps", "mpers", "ms1", "mpersec", "metrespersecond", "msec"],
-        ),
-        unit(
-            "km/h",
-            Speed,
-            1.0,
-            3.6,
-            &["kph", "kmph", "kmperh", "kmh1", "kmhr", "kmperhour", "kmstd"],
-        ),
-        unit("mph", Speed, MILE_PER_HOUR_MPS, 1.0, &["miph", "milesperhour", "mih"]),
-        unit("m/s2", Acceleration, 1.0, 1.0, &["mps2", "mss", "mpss", "mpers2", "ms", "msec2"]),
-        unit("N", Force, 1.0, 1.0, &["newton", "newtons"]),
-        unit("kN", Force, 1e3, 1.0, &["kilonewton", "kilonewtons"]),
-        unit("MN", Force, 1e6, 1.0, &["meganewton"]),
-        unit("lbf", Force, POUND_FORCE_N, 1.0, &["lb", "lbs"]),
-        unit("Pa", Pressure, 1.0, 1.0, &["pascal"]),
-        unit("kPa", Pressure, 1e3, 1.0, &["kilopascal"]),
-        unit("bar", Pressure, 1e5, 1.0, &["bars", "barg"]),
-        unit("kg", Mass, 1.0, 1.0, &["kilogram", "kilograms", "kgs"]),
-        unit("t", Mass, 1e3, 1.0, &["to", "ton", "tons", "tonne", "tonnes", "tonnen"]),
-        unit("degC", Temperature, 1.0, 1.0, &["c", "celsius", "gradc", "grad", "cel"]),
-        shifted("K", -273.15, 1.0, 1.0, &["kelvin"]),
-        shifted("degF", -32.0, 5.0, 9.0, &["f", "fahrenheit"]),
-        unit("permille", Ratio, 1.0, 1e3, &["promille", "permil", "mmm", "mperkm", "mkm"]),
-        unit("%", Ratio, 1.0, 1e2, &["pct", "percent", "prozent", "perc", "pc"]),
-        unit("1", Ratio, 1.0, 1.0, &["pu", "ratio", "rad", "mm"]),
-        unit("deg", Angle, 1.0, 1.0, &["degree", "degrees", "grad"]),
-        unit("rad", Angle, 180.0, std::f64::consts::PI, &["radian", "radians"]),
-        unit("1/m", Curvature, 1.0, 1.0, &["perm", "m1"]),
-        unit("W", Power, 1.0, 1.0, &["watt", "watts"]),
-        unit("kW", Power, 1e3, 1.0, &["kilowatt"]),
-        unit("V", Voltage, 1.0, 1.0, &[]),
-        unit("kV", Voltage, 1e3, 1.0, &[]),
-        unit("A", Current, 1.0, 1.0, &[]),
-        unit("kA", Current, 1e3, 1.0, &[]),
-        unit("1", Count, 1.0, 1.0, &["bool", "flag", "count", "pax", "persons"]),
+        unit("s", Time, 1.0, 1.0),
+        unit("ms", Time, 1.0, 1e3),
+        unit("us", Time, 1.0, 1e6),
+        unit("ns", Time, 1.0, 1e9),
+        unit("min", Time, 60.0, 1.0),
+        unit("h", Time, 3600.0, 1.0),
+        unit("m", Length, 1.0, 1.0),
+        unit("km", Length, 1e3, 1.0),
+        unit("mm", Length, 1.0, 1e3),
+        unit("m/s", Speed, 1.0, 1.0),
+        unit("km/h", Speed, 1.0, 3.6),
+        unit("mph", Speed, MILE_PER_HOUR_MPS, 1.0),
+        unit("m/s2", Acceleration, 1.0, 1.0),
+        unit("N", Force, 1.0, 1.0),
+        unit("kN", Force, 1e3, 1.0),
+        unit("MN", Force, 1e6, 1.0),
+        unit("lbf", Force, POUND_FORCE_N, 1.0),
+        unit("Pa", Pressure, 1.0, 1.0),
+        unit("kPa", Pressure, 1e3, 1.0),
+        unit("bar", Pressure, 1e5, 1.0),
+        unit("kg", Mass, 1.0, 1.0),
+        unit("t", Mass, 1e3, 1.0),
+        unit("degC", Temperature, 1.0, 1.0),
+        shifted("K", -273.15, 1.0, 1.0),
+        shifted("degF", -32.0, 5.0, 9.0),
+        unit("permille", Ratio, 1.0, 1e3),
+        unit("%", Ratio, 1.0, 1e2),
+        unit("1", Ratio, 1.0, 1.0),
+        unit("deg", Angle, 1.0, 1.0),
+        unit("rad", Angle, 180.0, std::f64::consts::PI),
+        unit("1/m", Curvature, 1.0, 1.0),
+        unit("W", Power, 1.0, 1.0),
+        unit("kW", Power, 1e3, 1.0),
+        unit("V", Voltage, 1.0, 1.0),
+        unit("kV", Voltage, 1e3, 1.0),
+        unit("A", Current, 1.0, 1.0),
+        unit("kA", Current, 1e3, 1.0),
+        unit("1", Count, 1.0, 1.0),
     ]
 };
 
-/// Name, dimension, factor and divisor to the base unit, and how headers spell it besides its name
-/// with or without the marks in it: in small letters and digits.
-const fn unit(
-    name: &'static str,
-    dimension: Dimension,
-    multiply: f64,
-    divide: f64,
-    spellings: &'static [&'static str],
-) -> Unit {
-    Unit { name, dimension, shift: 0.0, multiply, divide, spellings }
+/// Name, dimension, factor and divisor to the base unit.
+const fn unit(name: &'static str, dimension: Dimension, multiply: f64, divide: f64) -> Unit {
+    Unit { name, dimension, shift: 0.0, multiply, divide }
 }
 
-const fn shifted(
-    name: &'static str,
-    shift: f64,
-    multiply: f64,
-    divide: f64,
-    spellings: &'static [&'static str],
-) -> Unit {
-    Unit { name, dimension: Dimension::Temperature, shift, multiply, divide, spellings }
+const fn shifted(name: &'static str, shift: f64, multiply: f64, divide: f64) -> Unit {
+    Unit { name, dimension: Dimension::Temperature, shift, multiply, divide }
 }
 
 impl Unit {
@@ -178,11 +140,6 @@ impl Unit {
     /// The name, as written in a dataset.
     pub fn name(&self) -> &'static str {
         self.name
-    }
-
-    /// How headers spell it besides its name, in small letters and digits.
-    pub fn spellings(&self) -> &'static [&'static str] {
-        self.spellings
     }
 
     /// What the unit measures.

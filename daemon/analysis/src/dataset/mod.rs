@@ -12,11 +12,12 @@
 //!
 //! - `document`, `names`, [`error`]: TOML with the line of every key; mistakes with their choices
 //! - [`manifest`], [`train_file`], [`track_file`]: the three TOML files
-//! - [`quantity`], [`units`]: what a column may hold
+//! - [`quantity`]: what a column may hold, in which [`units`](dynocar_core::units)
 //! - `table`: a CSV file as columns of numbers
-//! - `order`, `spikes`, `motion`, `power`, `forces`, `altitude`: from columns to time, speed, position,
-//!   forces and gradient
-//! - `resolved`, [`run`], [`quality`], [`remark`], `remarking`, [`note`]: samples, counts and warnings
+//! - `order`, `spikes`, `motion`, `power`, `forces`, [`stamps`], `altitude`: from columns to time, speed,
+//!   position, forces and gradient
+//! - `resolved`, [`run`], [`quality`], `findings`, [`remark`], `remarking`, `declared`, [`note`]: samples,
+//!   counts and warnings
 //! - [`guess`]: a description of files that nobody has described yet
 
 mod altitude;
@@ -42,6 +43,7 @@ mod remarking;
 mod resolved;
 pub mod run;
 mod spikes;
+pub mod stamps;
 mod table;
 pub mod track_file;
 pub mod train_file;

@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 
-use dynocar_core::terms::delay;
 use dynocar_core::train::Drive;
 use dynocar_shared::{SampleField, TrainSample};
 
@@ -17,6 +16,7 @@ use super::quantity::Quantity;
 use super::remark::Remark;
 use super::remarking::remarks;
 use super::resolved::{Context, GradientSource, Resolved};
+use super::stamps;
 use super::table::Table;
 
 /// Quantities that a sample does not carry, one value for each sample, `None` where missing.
@@ -114,7 +114,7 @@ impl Run {
             let step_s = (ahead.time_ns - sample.time_ns) as f64 * 1e-9;
             for field in [SampleField::TractionForce, SampleField::BrakeForce] {
                 if let Some((here_n, ahead_n)) = sample.get(field).zip(ahead.get(field)) {
-                    sample.set(field, delay::stamped_late(here_n, ahead_n, step_s, late_s));
+                    sample.set(field, stamps::stamped_late(here_n, ahead_n, step_s, late_s));
                 }
             }
         }

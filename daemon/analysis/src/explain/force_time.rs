@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use dynocar_core::terms::delay;
+use crate::dataset::stamps;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::{HALF_95, Told};
@@ -44,7 +44,8 @@ impl Hypothesis for LateStamps {
             let other = if late_s >= 0.0 { i + 1 } else { i.wrapping_sub(1) };
             let Some(ahead) = recorded.get(other) else { continue };
             let step_s = (time_s[other] - time_s[i]).abs();
-            let at = |k: usize| delay::stamped_late(recorded[i][k], ahead[k], step_s, late_s.abs());
+            let at =
+                |k: usize| stamps::stamped_late(recorded[i][k], ahead[k], step_s, late_s.abs());
             [force.traction_n, force.brake_n] = [at(0), at(1)];
         }
     }
@@ -74,7 +75,7 @@ pub fn told(dataset: &Dataset) -> Result<Option<Told>, RunDataError> {
     let late = Told { value: fit.effect_parameters(0)[0], std: deviation[3] };
     let is_inside = LateStamps.at_bound(&[late.value]).is_none();
     let counts = late.value > LATE_SHARE_MIN * step_s && is_inside;
-    Ok((counts && delay::is_stamped_late(late.value, late.std)).then_some(late))
+    Ok((counts && stamps::is_stamped_late(late.value, late.std)).then_some(late))
 }
 
 /// What is told of it, as a sentence to follow another.

@@ -11,7 +11,7 @@
 //!   time, would explain
 //! - [`selection`]: the search for effects, its significance, evidence by run
 //! - [`map_error`]: the finished model beside what the map's own error makes all runs err alike
-//! - [`score`], [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
+//! - [`score`], `stop_runs`, [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
 //! - [`unexplained`], [`told`], [`identifiability`], [`rivals`], [`runners_up`], [`verdict`], [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
 //!
@@ -34,6 +34,7 @@ pub mod runners_up;
 pub mod scan;
 pub mod score;
 pub mod selection;
+mod stop_runs;
 pub mod stop_to_stop;
 pub mod told;
 pub mod unexplained;

@@ -1,10 +1,11 @@
 //! Open-loop prediction: the judge of a finished model.
 
-use dynocar_core::simulate::{Prediction, Restart, SpeedError, stop_runs};
+use dynocar_core::simulate::{Prediction, Restart, SpeedError};
 
 use super::bootstrap::intervals_95;
 use super::evidence::{Fit, FitProblem, GrownForces, RunData};
 use super::selection::without_each_run;
+use super::stop_runs::stop_runs;
 use super::stop_to_stop::StopToStop;
 
 /// Errors of the model without and with the effects.

@@ -96,7 +96,7 @@ pub(super) fn clean(samples: &mut [ResolvedSample], period_s: f64) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_runs::coasting;
+    use super::super::coasting;
     use super::*;
 
     #[test]

@@ -32,4 +32,6 @@ pub use noise::{Noise, RunScatter};
 pub use run_data::{RunData, RunDataError, RunPower, prepare};
 pub use run_scatter::{PRIOR_RUNS, WeightedFilter};
 pub use sample_forces::SampleForces;
+#[cfg(test)]
+pub use test_runs::coasting;
 pub use whitener::Whitener;

@@ -65,7 +65,7 @@ fn ways(recording: &Recording) -> Vec<Way> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_runs::coasting;
+    use super::super::coasting;
     use super::*;
     use dynocar_core::force::ResolvedSample;
     use dynocar_core::simulate::BridgeLimits;
