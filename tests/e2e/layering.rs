@@ -45,6 +45,13 @@ fn the_core_and_the_analysis_know_no_channel_clock_or_logger() {
 #[test]
 fn what_runs_live_is_built_without_what_explains_recordings() {
     assert_free_of("dynocar-core", &["dynocar-analysis", "csv", "granit-parser", "strsim"]);
+    // The daemon's program reads its files by the analysis; its threads know nothing of it.
+    for folder in ["daemon/src/runtime", "daemon/src/shadow", "daemon/src/state"] {
+        for file in rust_files(folder) {
+            let text = std::fs::read_to_string(&file).expect("a source file");
+            assert!(!text.contains("dynocar_analysis"), "{}", file.display());
+        }
+    }
 }
 
 #[test]

@@ -1,8 +1,9 @@
-//! The pure library of Dynocar: physics and statistics.
+//! What runs beside a controller: physics and statistics, pure.
 //!
-//! It knows no channel, clock, file, thread or logger: texts, times and seeds come in as
-//! arguments. The daemon runs these pipelines online, `dynocar identify` offline; both get the
-//! same bits from the same samples.
+//! It knows no channel, clock, file, thread or logger: times and seeds come in as arguments. The
+//! daemon runs these pipelines online, `dynocar identify` offline; both get the same bits from the
+//! same samples. What recorded runs tell beyond that is the library `dynocar_analysis`'s, which is
+//! built on this one.
 //!
 //! # Layout, in the order a sample takes
 //!
@@ -16,6 +17,7 @@
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
 //! - [`simulate`]: the speed that a force model predicts over a recorded run
 //! - [`trial`]: which of several models predicts better, told while a train runs
+//! - [`named!`]: enums whose members have names in files
 
 pub mod filter;
 pub mod force;

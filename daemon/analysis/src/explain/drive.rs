@@ -6,12 +6,13 @@
 
 use std::sync::Arc;
 
+use dynocar_core::terms::Parameter;
 use dynocar_core::train::Drive;
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 
 use super::answer::{DriveAnswer, HALF_95, Told};
-use super::effects::{AtBound, Hypothesis, Parameter};
+use super::effects::{AtBound, Hypothesis};
 use super::evidence::{
     FitProblem, GrownModel, Noise, RunData, RunDataError, SampleForces, prepare,
 };

@@ -5,11 +5,13 @@
 
 use std::sync::Arc;
 
+use dynocar_core::terms::Parameter;
+
 use crate::dataset::stamps;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::{HALF_95, Told};
-use super::effects::{Hypothesis, Parameter};
+use super::effects::Hypothesis;
 use super::evidence::{
     FitProblem, GrownModel, Noise, RunData, RunDataError, SampleForces, prepare,
 };

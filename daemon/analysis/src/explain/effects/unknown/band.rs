@@ -4,13 +4,14 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use dynocar_core::terms::Parameter;
 use dynocar_core::terms::extra::Covariate;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::band_axis::{AXES, BandAxis};
 use super::outside::OUTSIDE_COST;
 use crate::explain::answer::{CovariateRange, Place};
-use crate::explain::effects::{Candidate, Hypothesis, Parameter, SharedHypothesis};
+use crate::explain::effects::{Candidate, Hypothesis, SharedHypothesis};
 use crate::explain::evidence::{Bin, RunData, SampleForces};
 use crate::explain::places::{Axis, End, MAP_ERROR_PERMILLE, Reach};
 use crate::explain::scan::{Scan, Tuple};
