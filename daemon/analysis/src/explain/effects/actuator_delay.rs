@@ -1,9 +1,10 @@
 //! Forces that act later than reported: a dead time, then a first-order lag.
 
 use dynocar_core::terms::delay::{self, DelayLine};
+use dynocar_core::terms::{Entry, Parameter};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal};
+use super::{Candidate, Effect, Hypothesis, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::{Scan, Tuple};
 

@@ -1,9 +1,9 @@
 //! Basic resistance that follows the outside temperature: w0 (1 + beta (T - reference)).
 
-use dynocar_core::terms::ambient;
+use dynocar_core::terms::{Entry, Parameter, ambient};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal, ReportContext, Reported};
+use super::{Candidate, Effect, Hypothesis, Proposal, ReportContext, Reported};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 

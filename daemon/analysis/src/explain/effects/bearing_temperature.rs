@@ -1,9 +1,9 @@
 //! Cold bearings that warm up.
 
-use dynocar_core::terms::{Resistance, bearings};
+use dynocar_core::terms::{Entry, Parameter, Resistance, bearings};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal};
+use super::{Candidate, Effect, Hypothesis, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 

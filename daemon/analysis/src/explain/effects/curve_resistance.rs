@@ -1,9 +1,9 @@
 //! Curve resistance k/R in N/kN with another k than declared (Röckl, Schmidt; declared k = 600).
 
-use dynocar_core::terms::curve;
+use dynocar_core::terms::{Entry, Parameter, curve};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal};
+use super::{Candidate, Effect, Hypothesis, Proposal};
 use crate::explain::answer::Place;
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;

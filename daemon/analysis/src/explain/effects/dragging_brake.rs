@@ -5,10 +5,11 @@
 
 use std::sync::Arc;
 
+use dynocar_core::terms::Parameter;
 use dynocar_core::terms::brake::{self, BUILD_UP_S, build_up};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Parameter, Proposal, SharedHypothesis};
+use super::{Candidate, Effect, Hypothesis, Proposal, SharedHypothesis};
 use crate::explain::answer::{Place, RunWindow};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{Axis, End, Reach};

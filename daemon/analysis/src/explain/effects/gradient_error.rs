@@ -10,12 +10,13 @@
 //! evidence decides.
 
 use dynocar_core::terms::gradient::{self, ErrorScale};
+use dynocar_core::terms::{Entry, Parameter};
 use dynocar_core::track::{self, LinearProfile};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 
 use super::unknown::leaves_a_force;
-use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal, ReportContext, Reported};
+use super::{Candidate, Effect, Hypothesis, Proposal, ReportContext, Reported};
 use crate::explain::answer::ParameterValue;
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{MAP_ERROR_PERMILLE, span_m};

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use dynocar_core::terms::gradient;
+use dynocar_core::terms::{Entry, Parameter, gradient};
 use dynocar_core::track::Track;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal};
+use super::{Candidate, Effect, Hypothesis, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 

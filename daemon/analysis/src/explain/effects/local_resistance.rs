@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use dynocar_core::terms::place;
+use dynocar_core::terms::{Entry, Parameter, place};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal, SharedHypothesis};
+use super::{Candidate, Effect, Hypothesis, Proposal, SharedHypothesis};
 use crate::explain::answer::{Place, RunWindow};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{End, Inside, Stretches, find};

@@ -4,10 +4,10 @@
 use std::sync::Arc;
 
 use dynocar_core::force::ResolvedSample;
-use dynocar_core::terms::adhesion;
+use dynocar_core::terms::{Parameter, adhesion};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Parameter, Proposal, SharedHypothesis};
+use super::{Candidate, Effect, Hypothesis, Proposal, SharedHypothesis};
 use crate::explain::answer::Place;
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{End, Found, Inside, Stretches, best_of_runs, find};

@@ -24,8 +24,6 @@ mod unknown;
 mod wheel_diameter;
 mod wind;
 
-use dynocar_core::terms::{Entry, Parameter};
-
 pub use super::hypothesis::{AtBound, Hypothesis, ReportContext, Reported, SharedHypothesis};
 pub use gradient_error::map_error;
 pub use proposal::{Candidate, Effect, Proposal};

@@ -1,10 +1,10 @@
 //! Another rotating mass than declared: inertial mass = mass (1 + gamma). Unlike the mass it does
 //! not feel the gradient.
 
-use dynocar_core::terms::rotating;
+use dynocar_core::terms::{Entry, Parameter, rotating};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal};
+use super::{Candidate, Effect, Hypothesis, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 

@@ -1,9 +1,9 @@
 //! A reported traction force that is not the true one: gain = reported over true.
 
-use dynocar_core::terms::traction;
+use dynocar_core::terms::{Entry, Parameter, traction};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal};
+use super::{Candidate, Effect, Hypothesis, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 

@@ -6,14 +6,11 @@
 
 use std::sync::Arc;
 
-use dynocar_core::terms::{place, tunnel};
+use dynocar_core::terms::{Entry, Parameter, place, tunnel};
 use dynocar_core::track::Track;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{
-    Candidate, Effect, Entry, Hypothesis, Parameter, Proposal, ReportContext, Reported,
-    SharedHypothesis,
-};
+use super::{Candidate, Effect, Hypothesis, Proposal, ReportContext, Reported, SharedHypothesis};
 use crate::explain::answer::Place;
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{End, Inside, Stretches, find};

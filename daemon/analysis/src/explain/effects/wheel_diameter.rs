@@ -1,10 +1,10 @@
 //! Wheels of another diameter than declared: measured speed = scale * true speed, and the odometer
 //! with it. Balises tell it from the rotating mass: they correct the position.
 
-use dynocar_core::terms::wheel;
+use dynocar_core::terms::{Entry, Parameter, wheel};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal};
+use super::{Candidate, Effect, Hypothesis, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use dynocar_core::terms::wind;
+use dynocar_core::terms::{Entry, Parameter, wind};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Entry, Hypothesis, Parameter, Proposal, ReportContext, Reported};
+use super::{Candidate, Effect, Hypothesis, Proposal, ReportContext, Reported};
 use crate::explain::answer::ParameterValue;
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;

@@ -2,14 +2,12 @@
 
 use std::sync::Arc;
 
-use dynocar_core::terms::masses;
+use dynocar_core::terms::{Entry, Parameter, masses};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::parts::Part;
 use crate::explain::answer::{MassSection, MassWindow, ParameterValue, Place, RunWindow};
-use crate::explain::effects::{
-    Entry, Hypothesis, Parameter, ReportContext, Reported, SharedHypothesis,
-};
+use crate::explain::effects::{Hypothesis, ReportContext, Reported, SharedHypothesis};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{Axis, End, Reach};
 
