@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 use dynocar::survey::read::{recordings, vehicle};
-use dynocar_core::survey::survey;
+use dynocar_analysis::survey::survey;
 use dynocar_tests::simulator::dataset_writer::write_dataset;
 use dynocar_tests::simulator::{
     EffectRequest, GnssReceiver, SimulatorSettings, TrainType, simulate,

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use dynocar_core::explain::report::timeline::Timeline;
+use dynocar_analysis::explain::report::timeline::Timeline;
 use tempfile::NamedTempFile;
 
 use crate::output::tell;

@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Read};
 use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 
-use dynocar_core::dataset::{
+use dynocar_analysis::dataset::{
     ColumnMapping, Dataset, DatasetError, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE,
     Place, Problem, is_parquet, parse_track, parse_train, top_keys,
 };

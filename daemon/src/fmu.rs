@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::io::{Cursor, Write as _};
 use std::path::{Path, PathBuf};
 
-use dynocar_core::dataset::Run;
+use dynocar_analysis::dataset::Run;
 use dynocar_fmu::variables::{Meaning, ModelFile};
 use dynocar_fmu::{ESTIMATORS, INTERFACES, Interface, documentation, model_description};
 use dynocar_shared::TrainSample;

@@ -7,8 +7,8 @@
 
 use std::path::{Path, PathBuf};
 
-use dynocar_core::dataset::{DatasetFiles, FileProblem, MANIFEST_FILE};
-use dynocar_core::explain::{Explanation, evidence::Fit};
+use dynocar_analysis::dataset::{DatasetFiles, FileProblem, MANIFEST_FILE};
+use dynocar_analysis::explain::{Explanation, evidence::Fit};
 use dynocar_core::terms::extra::{self, Extra, Factor};
 use dynocar_core::terms::{Entry, Key};
 use toml::{Table, Value};

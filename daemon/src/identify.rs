@@ -5,7 +5,7 @@ use std::sync::Arc;
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline, SettingError};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
 
-use dynocar_core::dataset::{Dataset, Run};
+use dynocar_analysis::dataset::{Dataset, Run};
 
 /// The samples of all runs, in file order, as a controller publishes them: numbered on without
 /// a gap, each run under a number of its own.

@@ -10,8 +10,8 @@ use dynocar::models::{
 };
 use dynocar::replay::{Rate, ReplayReport, Replayer};
 use dynocar::shadow::record;
+use dynocar_analysis::dataset::Dataset;
 use dynocar_client::{SnapshotReader, monotonic_now_ns};
-use dynocar_core::dataset::Dataset;
 use dynocar_shared::{ParameterSnapshot, Status, TrainId};
 use dynocar_tests::process::{Process, Site, await_true};
 use rustix::process::Signal;

@@ -1,7 +1,7 @@
 //! Every kind of effect, simulated alone, is found by its name.
 
-use dynocar_core::explain::answer::Verdict;
-use dynocar_core::explain::explain;
+use dynocar_analysis::explain::answer::Verdict;
+use dynocar_analysis::explain::explain;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};

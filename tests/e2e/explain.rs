@@ -4,12 +4,12 @@ use std::path::Path;
 
 use dynocar::dataset;
 use dynocar::grown::write_grown;
-use dynocar_core::dataset::parse_train;
-use dynocar_core::explain::answer::{ParameterValue, Verdict};
-use dynocar_core::explain::effects::LIBRARY;
-use dynocar_core::explain::scan::Scan;
-use dynocar_core::explain::selection::deviations;
-use dynocar_core::explain::{Explanation, explain};
+use dynocar_analysis::dataset::parse_train;
+use dynocar_analysis::explain::answer::{ParameterValue, Verdict};
+use dynocar_analysis::explain::effects::LIBRARY;
+use dynocar_analysis::explain::scan::Scan;
+use dynocar_analysis::explain::selection::deviations;
+use dynocar_analysis::explain::{Explanation, explain};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::write_dataset;
 use dynocar_tests::simulator::oracle::score;

@@ -44,7 +44,7 @@ fn every_number_of_explain_is_on_its_page_and_few_decide() {
     let (deciding, looking) = page.split_once("## How finely it looks").unwrap();
     let (deciding, looking) = (named(deciding), named(looking));
     let mut files = Vec::new();
-    sources(&workspace.join("daemon/core/src/explain"), &mut files);
+    sources(&workspace.join("daemon/analysis/src/explain"), &mut files);
     // A report's sizes judge nothing.
     files.retain(|file| !file.components().any(|part| part.as_os_str() == "report"));
     let texts: Vec<String> =

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use dynocar::dataset;
 use dynocar::identify::{identify, published_samples};
-use dynocar_core::dataset::Dataset;
+use dynocar_analysis::dataset::Dataset;
 use dynocar_core::pipeline::EstimatorSettings;
 use dynocar_fmu::estimators::PIPELINES;
 use dynocar_fmu::ffi::Status;

@@ -1,7 +1,7 @@
 //! Forces by laws that no library holds, their forms and what these predict.
 
-use dynocar_core::explain::answer::{Answer, Verdict};
-use dynocar_core::explain::explain;
+use dynocar_analysis::explain::answer::{Answer, Verdict};
+use dynocar_analysis::explain::explain;
 use dynocar_core::terms::Entry;
 use dynocar_core::terms::extra::{Covariate, Extra, Form};
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};

@@ -8,7 +8,7 @@ use dynocar::config::is_slow;
 use dynocar::dataset;
 use dynocar::identify::{default_estimators, identify, published_samples};
 use dynocar::replay::{Rate, Replayer};
-use dynocar_core::dataset::Dataset;
+use dynocar_analysis::dataset::Dataset;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId};
 use dynocar_tests::golden::{self, Golden, TOLERANCE, without_stamps};
 use dynocar_tests::process::Site;

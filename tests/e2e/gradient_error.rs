@@ -1,8 +1,8 @@
 //! A declared gradient that is wrong along the line: told by the direction of travel.
 
-use dynocar_core::dataset::Dataset;
-use dynocar_core::explain::answer::{ParameterValue, Verdict};
-use dynocar_core::explain::explain;
+use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::explain::answer::{ParameterValue, Verdict};
+use dynocar_analysis::explain::explain;
 use dynocar_core::track::{LinearProfile, StepProfile};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};

@@ -1,11 +1,13 @@
 //! What `explain` fits, written as files, is what the daemon then applies, to the bit.
 
 use dynocar::grown::grow;
-use dynocar_core::dataset::{Dataset, parse_track, parse_train};
-use dynocar_core::explain::effects::{Candidate, LIBRARY, Proposal, UNKNOWN};
-use dynocar_core::explain::evidence::prepare;
-use dynocar_core::explain::evidence::{Fit, FitProblem, GrownModel, Noise, RunData, SampleForces};
-use dynocar_core::explain::scan::Scan;
+use dynocar_analysis::dataset::{Dataset, parse_track, parse_train};
+use dynocar_analysis::explain::effects::{Candidate, LIBRARY, Proposal, UNKNOWN};
+use dynocar_analysis::explain::evidence::prepare;
+use dynocar_analysis::explain::evidence::{
+    Fit, FitProblem, GrownModel, Noise, RunData, SampleForces,
+};
+use dynocar_analysis::explain::scan::Scan;
 use dynocar_core::terms::wheel;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};

@@ -4,7 +4,7 @@ use std::fs::{create_dir_all, read_to_string};
 use std::path::Path;
 
 use dynocar::dataset::open;
-use dynocar_core::dataset::manifest::Manifest;
+use dynocar_analysis::dataset::manifest::Manifest;
 use dynocar_tests::process::Site;
 use dynocar_tests::simulator::dataset_writer::dataset_files;
 use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};

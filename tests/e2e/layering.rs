@@ -29,18 +29,35 @@ fn assert_free_of(package: &str, forbidden: &[&str]) {
     }
 }
 
+/// The packages without channel, clock, file, thread and log: what runs live, and what explains recordings.
+const PURE: [&str; 2] = ["dynocar-core", "dynocar-analysis"];
+
 #[test]
-fn the_core_knows_no_channel_clock_or_logger() {
-    assert_free_of(
-        "dynocar-core",
-        &["iceoryx2", "tracing", "log", "tokio", "rustix", "libc", "dynocar-client"],
-    );
+fn the_core_and_the_analysis_know_no_channel_clock_or_logger() {
+    for package in PURE {
+        assert_free_of(
+            package,
+            &["iceoryx2", "tracing", "log", "tokio", "rustix", "libc", "dynocar-client"],
+        );
+    }
+}
+
+#[test]
+fn what_runs_live_is_built_without_what_explains_recordings() {
+    assert_free_of("dynocar-core", &["dynocar-analysis", "csv", "granit-parser", "strsim"]);
+    // The daemon's program reads its files by the analysis; its threads know nothing of it.
+    for folder in ["daemon/src/runtime", "daemon/src/shadow", "daemon/src/state"] {
+        for file in rust_files(folder) {
+            let text = std::fs::read_to_string(&file).expect("a source file");
+            assert!(!text.contains("dynocar_analysis"), "{}", file.display());
+        }
+    }
 }
 
 #[test]
 fn what_a_controller_links_pulls_in_no_estimator() {
     for package in ["dynocar-client", "dynocar-shared"] {
-        assert_free_of(package, &["dynocar-core", "nalgebra"]);
+        assert_free_of(package, &["dynocar-core", "dynocar-analysis", "nalgebra"]);
     }
 }
 
@@ -51,7 +68,7 @@ fn what_a_simulator_loads_has_no_channel() {
 
 #[test]
 fn what_recordings_are_written_with_is_in_no_controller_and_no_daemon() {
-    for package in ["dynocar", "dynocar-client", "dynocar-fmu", "dynocar-core"] {
+    for package in ["dynocar", "dynocar-client", "dynocar-fmu"].into_iter().chain(PURE) {
         assert_free_of(package, &["dynocar-recording", "mcap", "prost", "parquet", "arrow"]);
     }
     assert_free_of("dynocar-recording", &["parquet", "arrow"]);
@@ -59,7 +76,7 @@ fn what_recordings_are_written_with_is_in_no_controller_and_no_daemon() {
 
 #[test]
 fn no_network_client_is_in_a_controller_or_a_daemon() {
-    for package in ["dynocar", "dynocar-client", "dynocar-core"] {
+    for package in ["dynocar", "dynocar-client"].into_iter().chain(PURE) {
         assert_free_of(package, &["dynocar-forward", "mqtt", "tokio"]);
     }
     assert_free_of("dynocar-forward", &["tokio", "rustls", "openssl"]);
@@ -67,7 +84,7 @@ fn no_network_client_is_in_a_controller_or_a_daemon() {
 
 #[test]
 fn the_terminal_stays_out_of_daemon_and_controller() {
-    for package in ["dynocar", "dynocar-client", "dynocar-core"] {
+    for package in ["dynocar", "dynocar-client"].into_iter().chain(PURE) {
         assert_free_of(package, &["ratatui", "crossterm"]);
     }
 }
@@ -85,12 +102,12 @@ fn the_contract_depends_on_nothing() {
 }
 
 #[test]
-fn the_core_touches_no_file_thread_clock_or_terminal() {
-    let files = rust_files("daemon/core/src");
-    assert!(files.len() > 10, "the core's sources were found");
+fn the_core_and_the_analysis_touch_no_file_thread_clock_or_terminal() {
+    let folders = ["daemon/core/src", "daemon/analysis/src"].map(rust_files);
+    assert!(folders.iter().all(|files| files.len() > 10), "the sources were found");
     let forbidden =
         ["std::fs", "std::thread", "std::net", "Instant::now", "SystemTime", "println!("];
-    for file in files {
+    for file in folders.into_iter().flatten() {
         let text = std::fs::read_to_string(&file).expect("a source file");
         for word in forbidden {
             assert!(!text.contains(word), "{}: {word}", file.display());

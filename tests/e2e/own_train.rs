@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use dynocar::dataset::load;
-use dynocar_core::dataset::Run;
+use dynocar_analysis::dataset::Run;
 use dynocar_shared::SampleField;
 use dynocar_tests::process::{Process, Site};
 use rustix::process::Signal;

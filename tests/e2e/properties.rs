@@ -50,7 +50,7 @@ fn train() -> Arc<TrainModel> {
                 [resistance]\na = 1.9\nb = 0.03\nc = 0.0043\n\
                 [brake]\nmax_force_kn = 150\ncylinder_diameter_mm = 203\ndisc_radius_mm = 297\n\
                 wheel_radius_mm = 460\nefficiency = 0.85\nratio = 2.55\nfriction = 0.28\npads = 24\n";
-    Arc::new(dynocar_core::dataset::parse_train("train.toml", text).expect("a train"))
+    Arc::new(dynocar_analysis::dataset::parse_train("train.toml", text).expect("a train"))
 }
 
 proptest! {

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use dynocar::dataset::load;
-use dynocar_core::explain::{Explanation, explain};
+use dynocar_analysis::explain::{Explanation, explain};
 use dynocar_tests::simulator::random::{Random, Stream};
 
 const MASS_T: f64 = 100.0;
@@ -66,7 +66,7 @@ fn one_speed_does_not_tell_a_b_and_c_apart_and_several_do() {
 fn steady_runs_hide_a_rotating_mass_and_level_ones_hold_it_for_a_mass() {
     let folder = tempfile::tempdir().unwrap();
     let steady = explained(folder.path(), &[19.0]).answer;
-    let of = |answer: &dynocar_core::explain::answer::Answer, kind: &str| {
+    let of = |answer: &dynocar_analysis::explain::answer::Answer, kind: &str| {
         answer.identifiability.iter().find(|own| own.kind == kind).cloned()
     };
     let hidden = of(&steady, "rotating_mass").expect("it can be tested");

@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use dynocar_tests::sources::workspace;
 
 /// Where messages are raised.
-const FOLDERS: [&str; 12] = [
+const FOLDERS: [&str; 13] = [
     "daemon/src",
     "daemon/core/src",
+    "daemon/analysis/src",
     "daemon/fmu/src",
     "shared/src",
     "client/src",
@@ -36,7 +37,7 @@ const CALLS: [(&str, &str); 11] = [
 /// Whole files whose sentences are messages: of impossible data and declarations, of stops.
 const SENTENCES: [&str; 3] = [
     "daemon/core/src/plausibility/words.rs",
-    "daemon/core/src/plausibility/declared.rs",
+    "daemon/analysis/src/dataset/declared.rs",
     "shared/src/stopping.rs",
 ];
 /// Stands for what changes from message to message.

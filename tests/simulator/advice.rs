@@ -6,11 +6,11 @@
 
 use std::sync::Arc;
 
-use dynocar_core::advice::drive::{Drive, DriveKind, Scene};
-use dynocar_core::advice::known::davis_of;
-use dynocar_core::advice::noise::NoiseSeen;
-use dynocar_core::advice::resistance::forecast;
-use dynocar_core::advice::{best, forecasts, mass};
+use dynocar_analysis::advice::drive::{Drive, DriveKind, Scene};
+use dynocar_analysis::advice::known::davis_of;
+use dynocar_analysis::advice::noise::NoiseSeen;
+use dynocar_analysis::advice::resistance::forecast;
+use dynocar_analysis::advice::{best, forecasts, mass};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
 use dynocar_core::simulate::motion::{Motion, advance};
 use dynocar_core::train::{Davis, EffortCurve, TrainModel};

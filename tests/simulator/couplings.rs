@@ -1,6 +1,6 @@
 //! Freight trains on couplings with slack, the tacho on the locomotive.
 
-use dynocar_core::explain::explain;
+use dynocar_analysis::explain::explain;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{Effect, EffectRequest, SimulatorSettings, TrainType, simulate};

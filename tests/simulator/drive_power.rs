@@ -1,8 +1,8 @@
 //! Simulated trains of which the drive's power is recorded and no force: the efficiency that is
 //! told, its interval, and what is explained with it.
 
-use dynocar_core::dataset::{Dataset, ForceSource};
-use dynocar_core::explain::{drive, explain};
+use dynocar_analysis::dataset::{Dataset, ForceSource};
+use dynocar_analysis::explain::{drive, explain};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::read_files;
 use dynocar_tests::simulator::power::{TrueDrive, power_files};

@@ -3,8 +3,8 @@
 
 use dynocar::dataset;
 use dynocar::survey::survey_folder;
-use dynocar_core::dataset::Dataset;
-use dynocar_core::explain::explain;
+use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::explain::explain;
 use dynocar_tests::simulator::dataset_writer::write_dataset;
 use dynocar_tests::simulator::{
     EffectRequest, ForceSampling, GnssReceiver, SimulatorSettings, TrainType, simulate,

@@ -1,6 +1,6 @@
 //! Two places of resistance close behind one another.
 
-use dynocar_core::explain::explain;
+use dynocar_analysis::explain::explain;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{Effect, EffectRequest, SimulatorSettings, simulate};

@@ -3,8 +3,8 @@
 use dynocar::dataset;
 use dynocar::survey::answer::Answer;
 use dynocar::survey::survey_folder;
-use dynocar_core::explain::answer::Verdict;
-use dynocar_core::explain::{Explanation, explain};
+use dynocar_analysis::explain::answer::Verdict;
+use dynocar_analysis::explain::{Explanation, explain};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::write_dataset;
 use dynocar_tests::simulator::{

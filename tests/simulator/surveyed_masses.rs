@@ -5,7 +5,7 @@ use std::path::Path;
 use dynocar::dataset;
 use dynocar::identify::identify;
 use dynocar::survey::survey_folder;
-use dynocar_core::dataset::{Dataset, Role, Run};
+use dynocar_analysis::dataset::{Dataset, Role, Run};
 use dynocar_core::pipeline::EstimatorSettings;
 use dynocar_shared::{Parameter, PipelineKind, SampleField, TrainSample};
 use dynocar_tests::simulator::dataset_writer::write_dataset;

@@ -10,8 +10,8 @@ use std::sync::Arc;
 
 use dynocar::config::DaemonConfig;
 use dynocar::state::{entry::StateContent, file};
-use dynocar_core::dataset::{Dataset, parse_track, parse_train};
-use dynocar_core::import::{Reading, Source, import};
+use dynocar_analysis::dataset::{Dataset, parse_track, parse_train};
+use dynocar_analysis::import::{Reading, Source, import};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
 use dynocar_core::train::TrainModel;
 use dynocar_shared::{PipelineKind, TrainId, TrainSample};

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// The source folders of all packages.
-pub const FOLDERS: [&str; 13] = [
+pub const FOLDERS: [&str; 14] = [
     "shared/src",
     "client/src",
     "client/forward/src",
@@ -13,6 +13,7 @@ pub const FOLDERS: [&str; 13] = [
     "client/recording/src",
     "client/watch/src",
     "daemon/core/src",
+    "daemon/analysis/src",
     "daemon/fmu/src",
     "daemon/src",
     "bench/src",

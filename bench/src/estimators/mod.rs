@@ -24,7 +24,7 @@ pub mod textbook;
 pub mod trajectory_bank;
 pub mod trajectory_fit;
 
-use dynocar_core::dataset::DatasetError;
+use dynocar_analysis::dataset::DatasetError;
 
 use measure::Case;
 use pipelines::DemoRun;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dynocar_core::dataset::{DATASET_TRAIN, DatasetError, DatasetHead};
+use dynocar_analysis::dataset::{DATASET_TRAIN, DatasetError, DatasetHead};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
 use dynocar_core::track::Track;
 use dynocar_core::train::{BrakeGear, TrainModel};

@@ -3,11 +3,12 @@
 
 use std::sync::Arc;
 
-use dynocar_core::explain::Explanation;
-use dynocar_core::explain::effects::{Hypothesis, Parameter};
-use dynocar_core::explain::evidence::{GrownModel, Noise, RunData, SampleForces};
-use dynocar_core::explain::score::run_error;
+use dynocar_analysis::explain::Explanation;
+use dynocar_analysis::explain::effects::Hypothesis;
+use dynocar_analysis::explain::evidence::{GrownModel, Noise, RunData, SampleForces};
+use dynocar_analysis::explain::score::run_error;
 use dynocar_core::simulate::{Restart, SpeedError};
+use dynocar_core::terms::Parameter;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::{Around, Effect, Law, SimulatedDataset, Unlisted};
 

@@ -2,8 +2,8 @@
 
 use std::{io, path::Path};
 
-use dynocar_core::dataset::Dataset;
-use dynocar_core::explain::{Explanation, explain};
+use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::explain::{Explanation, explain};
 use dynocar_tests::simulator::dataset_writer::{
     dataset_files, read_files, write_dataset, write_truth,
 };

@@ -1,7 +1,7 @@
 //! An answer against the truth.
 
-use dynocar_core::explain::Explanation;
-use dynocar_core::explain::answer::{Answer, HALF_95};
+use dynocar_analysis::explain::Explanation;
+use dynocar_analysis::explain::answer::{Answer, HALF_95};
 use dynocar_core::track::LinearProfile;
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};

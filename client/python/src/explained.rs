@@ -6,9 +6,9 @@ use dynocar::cli::Failure;
 use dynocar::cli::explain as command;
 use dynocar::report::images::images;
 use dynocar::report::provenance::command_line;
-use dynocar_core::dataset::Dataset;
-use dynocar_core::explain::Explanation;
-use dynocar_core::explain::score::PredictedRun;
+use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::explain::Explanation;
+use dynocar_analysis::explain::score::PredictedRun;
 use pyo3::prelude::*;
 
 use crate::background::in_background;

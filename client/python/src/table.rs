@@ -5,7 +5,7 @@ use std::sync::Arc;
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch, RecordBatchIterator, UInt32Array};
 use arrow_buffer::{NullBuffer, ScalarBuffer};
-use dynocar_core::dataset::{Extras, Run};
+use dynocar_analysis::dataset::{Extras, Run};
 use dynocar_shared::SampleField;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;

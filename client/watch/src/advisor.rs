@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use dynocar_core::advice::known::davis_of;
-use dynocar_core::advice::noise::NoiseSeen;
-use dynocar_core::advice::remedy::{in_words, remedy};
-use dynocar_core::advice::{for_resistance, mass::for_mass};
+use dynocar_analysis::advice::known::davis_of;
+use dynocar_analysis::advice::noise::NoiseSeen;
+use dynocar_analysis::advice::remedy::{in_words, remedy};
+use dynocar_analysis::advice::{for_resistance, mass::for_mass};
 use dynocar_core::train::TrainModel;
 use dynocar_shared::{Manoeuvre, Parameter, Quantity, Status};
 

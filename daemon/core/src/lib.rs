@@ -1,13 +1,14 @@
-//! The pure library of Dynocar: physics and statistics.
+//! What runs beside a controller: physics and statistics, pure.
 //!
-//! It knows no channel, clock, file, thread or logger: texts, times and seeds come in as
-//! arguments. The daemon runs these pipelines online, `dynocar identify` offline; both get the
-//! same bits from the same samples.
+//! It knows no channel, clock, file, thread or logger: times and seeds come in as arguments. The
+//! daemon runs these pipelines online, `dynocar identify` offline; both get the same bits from the
+//! same samples. What recorded runs tell beyond that is the library `dynocar_analysis`'s, which is
+//! built on this one.
 //!
 //! # Layout, in the order a sample takes
 //!
+//! - [`units`]: the units that quantities may be in
 //! - [`train`], [`track`]: what is declared of the train and the line
-//! - [`dataset`]: recorded runs, from texts to the samples that a controller would publish
 //! - [`validation`]: which samples are fit for use, and why the others are not
 //! - [`plausibility`]: whether samples can be true: units, exchanged forces, signs
 //! - [`terms`]: the physical terms of the model, one law each, that all of the following share
@@ -15,29 +16,18 @@
 //! - [`filter`]: recursive estimators of fixed size, without knowledge of trains
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
 //! - [`simulate`]: the speed that a force model predicts over a recorded run
-//! - [`stops`]: what recorded stops say of a brake of unknown force
-//! - [`survey`]: a line and its gradient from recordings with GNSS
-//! - [`explain`]: which undeclared effect explains what the declared model leaves
 //! - [`trial`]: which of several models predicts better, told while a train runs
-//! - [`driven`]: the train itself, force in and speed out, by the law that `explain` predicts with
-//! - [`advice`]: what to drive next, so that the estimates become sharper
-//! - [`import`]: trains and lines from other projects' files
+//! - [`named!`]: enums whose members have names in files
 
-pub mod advice;
-pub mod dataset;
-pub mod driven;
-pub mod explain;
 pub mod filter;
 pub mod force;
-pub mod import;
 mod named;
 pub mod pipeline;
 pub mod plausibility;
 pub mod simulate;
-pub mod stops;
-pub mod survey;
 pub mod terms;
 pub mod track;
 pub mod train;
 pub mod trial;
+pub mod units;
 pub mod validation;

@@ -1,6 +1,7 @@
 //! Enums whose members have names in files, on command lines and in answers.
 
 /// Declares such an enum: each member with what it is and its name; `what` says where the names stand.
+#[macro_export]
 macro_rules! named {
     ($(#[$meta:meta])* $name:ident ($what:literal) {
         $( $(#[doc = $doc:literal])* $item:ident $(= $number:literal)? $text:literal; )*
@@ -25,8 +26,6 @@ macro_rules! named {
         }
     };
 }
-
-pub(crate) use named;
 
 #[cfg(test)]
 mod tests {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use dynocar_core::dataset::DatasetError;
+use dynocar_analysis::dataset::DatasetError;
 use dynocar_core::pipeline::SettingError;
 
 /// Why a call of the FMU is refused; the instance is as it was before, but for the variables of a row

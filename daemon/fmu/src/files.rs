@@ -5,8 +5,8 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use dynocar_core::dataset::{parse_track, parse_train};
-use dynocar_core::driven::{Beginning, DrivenTrain};
+use dynocar_analysis::dataset::{parse_track, parse_train};
+use dynocar_analysis::driven::{Beginning, DrivenTrain};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;

@@ -3,7 +3,7 @@
 
 use std::ffi::CStr;
 
-use dynocar_core::driven::{Beginning, DrivenTrain};
+use dynocar_analysis::driven::{Beginning, DrivenTrain};
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 
 use crate::error::ModelError;

@@ -1,7 +1,7 @@
 //! What a variable of an FMU can be. Each model has a table of them: what `modelDescription.xml` says
 //! and what is set and got both come from there. A variable's value reference is its place in it.
 
-use dynocar_core::driven::ForcePart;
+use dynocar_analysis::driven::ForcePart;
 use dynocar_shared::layout::{FieldLayout, hex_digits, layout_hash};
 use dynocar_shared::{Parameter, PipelineKind, SampleField};
 

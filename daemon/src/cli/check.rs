@@ -13,7 +13,7 @@ pub use understood::Understood;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use dynocar_core::dataset::{Place, parse_track, parse_train, top_keys};
+use dynocar_analysis::dataset::{Place, parse_track, parse_train, top_keys};
 use serde::Serialize;
 
 use super::{ErrorAnswer, Failure};

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
-use dynocar_core::dataset::{Dataset, DatasetFiles, Place, Role};
-use dynocar_core::explain::answer::{Answer, RunnerUp};
-use dynocar_core::explain::evidence::RunDataError;
-use dynocar_core::explain::report::timeline::Timeline;
-use dynocar_core::explain::selection::Progress;
-use dynocar_core::explain::{Explanation, explain};
+use dynocar_analysis::dataset::{Dataset, DatasetFiles, Place, Role};
+use dynocar_analysis::explain::answer::{Answer, RunnerUp};
+use dynocar_analysis::explain::evidence::RunDataError;
+use dynocar_analysis::explain::report::timeline::Timeline;
+use dynocar_analysis::explain::selection::Progress;
+use dynocar_analysis::explain::{Explanation, explain};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Failure;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use dynocar_core::dataset::{DatasetError, DatasetFiles, FileProblem};
+use dynocar_analysis::dataset::{DatasetError, DatasetFiles, FileProblem};
 use dynocar_fmu::variables::ModelFile;
 use dynocar_fmu::{ESTIMATORS, PLANT};
 

@@ -6,7 +6,7 @@ mod runs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use dynocar_core::dataset::{Dataset, Note};
+use dynocar_analysis::dataset::{Dataset, Note};
 use dynocar_core::pipeline::EstimatorSettings;
 use dynocar_shared::TrainId;
 use serde::Serialize;

@@ -6,9 +6,9 @@ mod summary;
 use std::path::PathBuf;
 
 use clap::Args;
-use dynocar_core::dataset::note::notes;
-use dynocar_core::dataset::{parse_track, parse_train};
-use dynocar_core::import::{Format, ImportError, Reading, Source, import};
+use dynocar_analysis::dataset::note::notes;
+use dynocar_analysis::dataset::{parse_track, parse_train};
+use dynocar_analysis::import::{Format, ImportError, Reading, Source, import};
 
 use super::Failure;
 use super::train_text::{TRAIN_FILE, TrainArguments};

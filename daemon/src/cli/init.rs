@@ -11,9 +11,9 @@ mod summary;
 
 use std::path::Path;
 
-use dynocar_core::dataset::guess::{Guess, GuessError, GuessProblem, Recording, guess};
-use dynocar_core::dataset::note::notes;
-use dynocar_core::dataset::{MANIFEST_FILE, Place, Quantity};
+use dynocar_analysis::dataset::guess::{Guess, GuessError, GuessProblem, Recording, guess};
+use dynocar_analysis::dataset::note::notes;
+use dynocar_analysis::dataset::{MANIFEST_FILE, Place, Quantity};
 use toml::Value;
 
 use super::Failure;

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use dynocar_core::dataset::{Note, Role};
-use dynocar_core::stops::{FindSettings, Law, RecordedStop, Study, StudySettings};
+use dynocar_analysis::dataset::{Note, Role};
+use dynocar_analysis::stops::{FindSettings, Law, RecordedStop, Study, StudySettings};
 use serde::Serialize;
 
 use super::Failure;

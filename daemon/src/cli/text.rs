@@ -1,6 +1,6 @@
 //! Aligned text for people.
 
-use dynocar_core::dataset::Note;
+use dynocar_analysis::dataset::Note;
 use dynocar_core::plausibility::Severity;
 
 /// Widest line of running text.

@@ -1,7 +1,7 @@
 //! The text of a first `train.toml`: what is known of a train, and a marked default for the rest.
 
 use clap::Args;
-use dynocar_core::dataset::parse_train;
+use dynocar_analysis::dataset::parse_train;
 use toml::Value;
 
 use super::Failure;

@@ -18,7 +18,7 @@ use hdrhistogram::Histogram;
 
 pub use summary::{DemoAnswer, Summary};
 
-use dynocar_core::dataset::Dataset;
+use dynocar_analysis::dataset::Dataset;
 
 use crate::dataset::{self, LoadError};
 use crate::run::{RunError, stop_on_signals};

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use dynocar_core::explain::Explanation;
-use dynocar_core::explain::answer::Verdict;
+use dynocar_analysis::explain::Explanation;
+use dynocar_analysis::explain::answer::Verdict;
 use tracing::{info, warn};
 
 use super::error::LearnError;

@@ -3,9 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use dynocar_core::dataset::Dataset;
-use dynocar_core::explain::Explanation;
-use dynocar_core::explain::answer::{Answer, EffectAnswer, ParameterValue, Verdict};
+use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::explain::Explanation;
+use dynocar_analysis::explain::answer::{Answer, EffectAnswer, ParameterValue, Verdict};
 use dynocar_shared::TrainId;
 
 use super::memory::OpenQuestion;
@@ -128,7 +128,7 @@ fn windows(effect: &EffectAnswer, pool: &Pool, explanation: &Explanation) -> Vec
             .unwrap_or_default()
     };
     if let Some(windows) = &effect.place.windows {
-        let window = |it: &dynocar_core::explain::answer::RunWindow| EventWindow {
+        let window = |it: &dynocar_analysis::explain::answer::RunWindow| EventWindow {
             sha256: sha256_of(&it.run),
             run: it.run.clone(),
             t_start_s: it.t_start_s,

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
 
-use dynocar_core::explain::answer::Verdict;
-use dynocar_core::explain::evidence::RunDataError;
-use dynocar_core::explain::{Explanation, explain};
+use dynocar_analysis::explain::answer::Verdict;
+use dynocar_analysis::explain::evidence::RunDataError;
+use dynocar_analysis::explain::{Explanation, explain};
 use dynocar_shared::TrainId;
 use tracing::warn;
 

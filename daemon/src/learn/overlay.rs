@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynocar_core::dataset::{ColumnMapping, DatasetFiles, FileProblem, MANIFEST_FILE};
+use dynocar_analysis::dataset::{ColumnMapping, DatasetFiles, FileProblem, MANIFEST_FILE};
 use toml::{Table, Value};
 
 use crate::dataset::{DatasetFolder, LoadError};

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use dynocar_core::dataset::{Dataset, DatasetHead, Role, Run};
+use dynocar_analysis::dataset::{Dataset, DatasetHead, Role, Run};
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
 

@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use dynocar_core::dataset::{MANIFEST_FILE, Manifest};
+use dynocar_analysis::dataset::{MANIFEST_FILE, Manifest};
 use dynocar_shared::TrainId;
 use sha2::{Digest, Sha256};
 use tracing::warn;

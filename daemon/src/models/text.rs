@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 
-use dynocar_core::dataset::{DatasetError, parse_track, parse_train};
+use dynocar_analysis::dataset::{DatasetError, parse_track, parse_train};
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
 use serde::{Deserialize, Serialize};

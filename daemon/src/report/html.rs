@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use dynocar_core::explain::report::Estimate;
-use dynocar_core::explain::report::words::{self, number};
+use dynocar_analysis::explain::report::Estimate;
+use dynocar_analysis::explain::report::words::{self, number};
 
 /// Text from outside, harmless within elements and quoted attributes.
 pub fn escape(text: &str) -> String {

@@ -1,10 +1,10 @@
 //! The report's plots as files of their own.
 
-use dynocar_core::dataset::{Dataset, Role};
-use dynocar_core::explain::Explanation;
-use dynocar_core::explain::report::ReportData;
-use dynocar_core::explain::report::errors::RunErrors;
-use dynocar_core::explain::report::panels::Panel;
+use dynocar_analysis::dataset::{Dataset, Role};
+use dynocar_analysis::explain::Explanation;
+use dynocar_analysis::explain::report::ReportData;
+use dynocar_analysis::explain::report::errors::RunErrors;
+use dynocar_analysis::explain::report::panels::Panel;
 
 use super::ReportError;
 use super::plots::speeds::Width;
@@ -75,7 +75,7 @@ fn panel_name(panel: &Panel, run: Option<usize>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use dynocar_core::explain::report::covariates::Covariate;
+    use dynocar_analysis::explain::report::covariates::Covariate;
 
     use super::*;
 

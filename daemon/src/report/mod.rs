@@ -22,9 +22,9 @@ pub mod provenance;
 pub mod sections;
 mod subject;
 
-use dynocar_core::dataset::Dataset;
-use dynocar_core::explain::Explanation;
-use dynocar_core::explain::report::ReportData;
+use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::explain::Explanation;
+use dynocar_analysis::explain::report::ReportData;
 
 pub use subject::{ReportError, Subject};
 

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use dynocar_core::dataset::Role;
-use dynocar_core::explain::answer::Verdict;
-use dynocar_core::explain::report::words;
+use dynocar_analysis::dataset::Role;
+use dynocar_analysis::explain::answer::Verdict;
+use dynocar_analysis::explain::report::words;
 use dynocar_core::plausibility::Severity;
 
 use super::document::document;

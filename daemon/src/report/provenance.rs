@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::SystemTime;
 
-use dynocar_core::dataset::MANIFEST_FILE;
+use dynocar_analysis::dataset::MANIFEST_FILE;
 use sha2::{Digest, Sha256};
 
 use crate::dataset::{self, LoadError};

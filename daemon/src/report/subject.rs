@@ -1,8 +1,8 @@
 //! What a page tells of, and why it cannot be made.
 
-use dynocar_core::dataset::Dataset;
-use dynocar_core::explain::Explanation;
-use dynocar_core::explain::report::ReportData;
+use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::explain::Explanation;
+use dynocar_analysis::explain::report::ReportData;
 
 use super::plots::PlotError;
 use super::provenance::Provenance;

@@ -1,7 +1,7 @@
 //! The result of a survey for machines.
 
-use dynocar_core::dataset::Dataset;
-use dynocar_core::survey::{Survey, Vehicle};
+use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::survey::{Survey, Vehicle};
 use serde::Serialize;
 
 use super::trip_rows::late_s;

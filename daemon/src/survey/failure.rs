@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use dynocar_core::survey::SurveyError;
+use dynocar_analysis::survey::SurveyError;
 
 use crate::dataset::LoadError;
 use crate::output::OutputError;

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use dynocar_core::dataset::Dataset;
-use dynocar_core::survey::stops::Stop;
-use dynocar_core::survey::{Survey, survey};
+use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::survey::stops::Stop;
+use dynocar_analysis::survey::{Survey, survey};
 
 use super::answer::Answer;
 use super::failure::SurveyFailure;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use dynocar_core::dataset::Dataset;
-use dynocar_core::survey::{Survey, Vehicle};
+use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::survey::{Survey, Vehicle};
 
 /// What the files are made of.
 pub struct Material<'m> {

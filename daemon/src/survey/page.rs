@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use dynocar_core::dataset::Dataset;
-use dynocar_core::survey::Survey;
+use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::survey::Survey;
 
 use super::answer::Answer;
 use super::write::gradient_entries;

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use dynocar_core::dataset::{Dataset, ForceSource, Role, Run};
-use dynocar_core::survey::common::Prior;
-use dynocar_core::survey::geodesy::LocalPlane;
-use dynocar_core::survey::line::{FallingWay, Ways};
-use dynocar_core::survey::recording::RawRecording;
-use dynocar_core::survey::way::Way;
-use dynocar_core::survey::{KnownLine, Vehicle};
+use dynocar_analysis::dataset::{Dataset, ForceSource, Role, Run};
+use dynocar_analysis::survey::common::Prior;
+use dynocar_analysis::survey::geodesy::LocalPlane;
+use dynocar_analysis::survey::line::{FallingWay, Ways};
+use dynocar_analysis::survey::recording::RawRecording;
+use dynocar_analysis::survey::way::Way;
+use dynocar_analysis::survey::{KnownLine, Vehicle};
 use dynocar_core::track::Track;
 use dynocar_shared::SampleField;
 

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use dynocar_core::dataset::{Dataset, ForceSource, Quantity, Run};
-use dynocar_core::survey::{Survey, Trip};
-use dynocar_core::terms::delay::{is_stamped_late, stamped_late};
+use dynocar_analysis::dataset::stamps::{is_stamped_late, stamped_late};
+use dynocar_analysis::dataset::{Dataset, ForceSource, Quantity, Run};
+use dynocar_analysis::survey::{Survey, Trip};
 use dynocar_shared::{SampleField, TrainSample};
 
 use super::material::Material;

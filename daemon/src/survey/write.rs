@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use dynocar_core::dataset::DatasetFiles;
-use dynocar_core::survey::layout::HEIGHT_STEP_M;
-use dynocar_core::survey::{Survey, SurveyedProfile};
+use dynocar_analysis::dataset::DatasetFiles;
+use dynocar_analysis::survey::layout::HEIGHT_STEP_M;
+use dynocar_analysis::survey::{Survey, SurveyedProfile};
 use toml::{Table, Value};
 
 use super::failure::SurveyFailure;
@@ -200,13 +200,13 @@ fn track_toml(material: &Material) -> String {
     }
     if ways.is_one_track() {
         let per_m = ways.chainage_per_m;
-        let entry = |curve: &dynocar_core::survey::curves::FoundCurve| {
+        let entry = |curve: &dynocar_analysis::survey::curves::FoundCurve| {
             let (from_m, to_m) = (per_m * curve.from_m, per_m * curve.to_m);
             format!("{from_m:.1}, {to_m:.1}, {:.1}", curve.radius_m)
         };
         text.list("curves", profile.curves.iter().map(entry));
     }
-    let stop = |stop: &dynocar_core::survey::stops::Stop| {
+    let stop = |stop: &dynocar_analysis::survey::stops::Stop| {
         let name = Value::String(stop.name.clone()).to_string();
         format!("{:.1}, {name}", stop.chainage_m.value)
     };

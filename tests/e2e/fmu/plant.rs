@@ -3,7 +3,7 @@
 use std::fs::{read_to_string, write};
 
 use dynocar::dataset;
-use dynocar_core::explain::evidence::{GrownForces, GrownModel, RunData, prepare};
+use dynocar_analysis::explain::evidence::{GrownForces, GrownModel, RunData, prepare};
 use dynocar_core::simulate::{Prediction, Restart};
 use dynocar_fmu::ffi::Status;
 use dynocar_fmu::{MISSING, PLANT};

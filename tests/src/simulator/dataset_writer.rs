@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::{fs, io};
 
-use dynocar_core::dataset::Dataset;
+use dynocar_analysis::dataset::Dataset;
 use dynocar_core::train::TrainModel;
 
 use super::columns::{FileStyle, make_style, row_text};

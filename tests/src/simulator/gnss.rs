@@ -1,6 +1,6 @@
 //! What a GNSS receiver makes of the truth.
 
-use dynocar_core::survey::geodesy::LocalPlane;
+use dynocar_analysis::survey::geodesy::LocalPlane;
 use dynocar_shared::TrainSample;
 
 use super::line_maker::Line;

@@ -7,7 +7,7 @@ use arrow_array::{
     ArrayRef, BooleanArray, Decimal128Array, DurationMillisecondArray, Float32Array, Float64Array,
     Int16Array, StringArray, TimestampMicrosecondArray, UInt64Array,
 };
-use dynocar_core::dataset::{ColumnMapping, Dataset, DatasetFiles, FileProblem, is_parquet};
+use dynocar_analysis::dataset::{ColumnMapping, Dataset, DatasetFiles, FileProblem, is_parquet};
 use dynocar_parquet::rows::{Wanted, write_rows};
 
 use crate::support::{program, said, shared, table};

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use dynocar::storage::Disk;
-use dynocar_core::explain::report::timeline::{RunTimeline, Timeline};
+use dynocar_analysis::explain::report::timeline::{RunTimeline, Timeline};
 use mcap::McapError;
 use mcap::records::MessageHeader;
 use prost::Message;

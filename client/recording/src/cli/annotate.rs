@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::Args;
 use dynocar::cli::Failure;
 use dynocar::output::{require_new, tell};
-use dynocar_core::explain::report::timeline::Timeline;
+use dynocar_analysis::explain::report::timeline::Timeline;
 
 use super::failure::from_dataset_failure;
 use crate::annotate::{AnnotateError, annotate};

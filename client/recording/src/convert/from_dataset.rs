@@ -7,7 +7,7 @@ use std::path::{Component, Path, PathBuf};
 use dynocar::dataset::{self, LoadError};
 use dynocar::identify::published_samples;
 use dynocar::storage::{Disk, settle};
-use dynocar_core::dataset::{Dataset, DatasetFiles, MANIFEST_FILE};
+use dynocar_analysis::dataset::{Dataset, DatasetFiles, MANIFEST_FILE};
 use dynocar_shared::{TrainId, TrainSample};
 use mcap::McapError;
 

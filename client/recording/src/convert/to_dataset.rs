@@ -4,7 +4,7 @@ use std::path::{Component, Path, PathBuf};
 
 use dynocar::output::{OutputError, require_new, write_file};
 use dynocar::storage::{Disk, Storage, folder_of};
-use dynocar_core::dataset::{MANIFEST_FILE, Quantity};
+use dynocar_analysis::dataset::{MANIFEST_FILE, Quantity};
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainSample};
 

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use dynocar_core::explain::answer::Verdict;
-use dynocar_core::explain::report::timeline::{
+use dynocar_analysis::explain::answer::Verdict;
+use dynocar_analysis::explain::report::timeline::{
     ActingEffect, ResidualWindow, RunTimeline, SpeedPoint, Timeline,
 };
 use dynocar_recording::annotate::messages::{Effect, PredictedSpeed, Residual};

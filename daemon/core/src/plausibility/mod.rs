@@ -1,18 +1,15 @@
 //! Whether samples can be true: wrong units, swapped forces, reversed signs.
 //!
 //! The same laws judge a train's samples live ([`Plausibility`] in every
-//! [`Pipeline`](crate::pipeline::Pipeline)), recorded runs ([`of_samples`]) and what is declared
-//! ([`declared`]).
+//! [`Pipeline`](crate::pipeline::Pipeline)) and recorded runs.
 //!
 //! # Layout, in the order of the work
 //!
 //! - [`watch`]: sample by sample, with [`balance`] (forces against acceleration) and [`pressure`]
 //! - [`diagnosis`]: which slip makes all figures come out as they did
 //! - [`slip`]: the slips, their names and severity; [`words`]: a finding in a sentence
-//! - [`declared`]: the train's and the line's own figures
 
 pub mod balance;
-pub mod declared;
 pub mod diagnosis;
 pub mod pressure;
 pub mod slip;
@@ -21,16 +18,12 @@ pub mod words;
 
 use std::sync::Arc;
 
-use dynocar_shared::{RejectionReason, SampleField, TrainSample};
+use dynocar_shared::{RejectionReason, TrainSample};
 
 pub use diagnosis::Findings;
 pub use slip::{Finding, Severity, Slip};
 
-use crate::dataset::DATASET_TRAIN;
-use crate::force::ForceResolver;
-use crate::track::Track;
 use crate::train::TrainModel;
-use crate::validation::{ValidationLimits, Validator};
 use watch::Watch;
 
 /// Judges the samples of one train as they come.
@@ -83,31 +76,4 @@ impl Plausibility {
     pub fn findings(&self) -> &Findings {
         &self.findings
     }
-}
-
-/// Judges the samples of a recorded run; positions that were integrated from the speed tell
-/// nothing about it.
-pub fn of_samples(
-    train: &Arc<TrainModel>,
-    track: Option<&Arc<Track>>,
-    samples: &[TrainSample],
-    is_position_recorded: bool,
-) -> Findings {
-    let limits = ValidationLimits::for_train(train.mass_kg);
-    let mut validator = Validator::new(DATASET_TRAIN, train.mass_kg, limits);
-    let mut resolver = ForceResolver::new(Arc::clone(train), track.cloned());
-    let mut plausibility = Plausibility::new(Arc::clone(train));
-    for sample in samples {
-        let resolved = validator.check(sample).map(|valid| resolver.resolve(&valid));
-        let gradient_permille = match &resolved {
-            Ok(resolved) => resolved.gradient_permille,
-            Err(_) => resolver.stated_gradient_permille(sample),
-        };
-        let mut sample = *sample;
-        if !is_position_recorded {
-            sample.valid &= !SampleField::Position.bit();
-        }
-        plausibility.take(&sample, resolved.map(drop), gradient_permille);
-    }
-    *plausibility.findings()
 }

@@ -3,8 +3,8 @@
 use dynocar_shared::{PipelineKind, Reason};
 use serde::Serialize;
 
-use crate::dataset::units::{Dimension, Unit};
-use crate::named::named;
+use crate::named;
+use crate::units::{Dimension, Unit};
 
 /// A unit is named when its factor and the one found differ by no more than this share.
 const UNIT_TOLERANCE: f64 = 0.2;

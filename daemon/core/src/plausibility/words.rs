@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::slip::{Finding, Slip};
-use crate::dataset::units::{Dimension, Unit};
+use crate::units::{Dimension, Unit};
 
 impl Finding {
     /// The finding in words; `read_as` is the unit that the quantity was read in.

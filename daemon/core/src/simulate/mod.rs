@@ -27,6 +27,7 @@
 
 #[cfg(test)]
 mod analytic_tests;
+mod departure;
 mod force_model;
 #[cfg(test)]
 mod gap_tests;
@@ -34,10 +35,9 @@ mod metric;
 pub mod motion;
 mod prediction;
 mod recording;
-mod stop_runs;
 
+pub use departure::{STANDING_MPS, departs};
 pub use force_model::{ForceModel, QuadraticForces};
 pub use metric::{MOVING_SPEED_MPS, SpeedError};
 pub use prediction::{Prediction, Restart};
 pub use recording::{BridgeLimits, Recording, SimulateError, is_pulled};
-pub use stop_runs::stop_runs;

@@ -1,9 +1,9 @@
 //! The open-loop simulation of a recorded run.
 
+use super::departure::departs;
 use super::force_model::ForceModel;
 use super::motion::{SPEED_MAX_MPS, STEP_MAX_S, speed_after};
 use super::recording::{Recording, SampleRole};
-use super::stop_runs::departs;
 use crate::force::ResolvedSample;
 
 /// How long the simulation runs before it takes up a measured speed again.

@@ -148,7 +148,11 @@ impl Recording {
     }
 
     /// True where the simulation takes up the measured speed because nothing was known before.
-    pub(super) fn starts(&self, index: usize) -> bool {
+    ///
+    /// # Panics
+    ///
+    /// When the run has no sample of this index.
+    pub fn starts(&self, index: usize) -> bool {
         self.roles[index] == SampleRole::Starts
     }
 

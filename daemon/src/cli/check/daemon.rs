@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use dynocar_core::dataset::Place;
+use dynocar_analysis::dataset::Place;
 use dynocar_shared::Quantity;
 use serde::Serialize;
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynocar_core::explain::report::line::AlongLine;
+use dynocar_analysis::explain::report::line::AlongLine;
 
 use super::Understood;
 use crate::cli::Failure;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynocar_core::dataset::{
+use dynocar_analysis::dataset::{
     ColumnMapping, DatasetError, DatasetHead, ForceSource, GradientSource, Manifest, Note,
     PositionSource, Quantity, Remark, Role, Run, RunEntry, RunQuality,
 };

@@ -1,6 +1,6 @@
 //! What was understood, in words and columns.
 
-use dynocar_core::dataset::{Manifest, PositionReference, Quantity};
+use dynocar_analysis::dataset::{Manifest, PositionReference, Quantity};
 use dynocar_core::track::{LinearProfile, Track};
 use dynocar_core::train::{BrakeGear, Corrections, EffortCurve, TrainModel};
 

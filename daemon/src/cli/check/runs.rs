@@ -1,7 +1,7 @@
 //! The runs of a dataset: what the train did, what the data are like, what to know.
 
-use dynocar_core::dataset::quality::QuantityCount;
-use dynocar_core::dataset::{
+use dynocar_analysis::dataset::quality::QuantityCount;
+use dynocar_analysis::dataset::{
     DatasetError, ForceSource, GradientSource, Manifest, Note, PositionSource, Remark, Role, Run,
 };
 use dynocar_core::plausibility::Slip;

@@ -1,7 +1,7 @@
 //! What was understood of a path.
 
-use dynocar_core::dataset::note::notes;
-use dynocar_core::dataset::{DatasetError, DatasetHead, Note, Run};
+use dynocar_analysis::dataset::note::notes;
+use dynocar_analysis::dataset::{DatasetError, DatasetHead, Note, Run};
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
 

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use dynocar_core::dataset::{Role, Run};
+use dynocar_analysis::dataset::{Role, Run};
 use serde::Serialize;
 
 use super::answer::EstimatorAnswer;

@@ -1,6 +1,6 @@
 //! What was imported as the texts of `train.toml` and `track.toml`.
 
-use dynocar_core::import::{Account, ImportedLine, ImportedTrain, Remark};
+use dynocar_analysis::import::{Account, ImportedLine, ImportedTrain, Remark};
 use toml::Value;
 
 use crate::cli::Failure;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use dynocar_core::dataset::Note;
-use dynocar_core::import::{Account, ImportedLine, ImportedTrain, Remark};
+use dynocar_analysis::dataset::Note;
+use dynocar_analysis::import::{Account, ImportedLine, ImportedTrain, Remark};
 
 use crate::cli::text::{TextTable, entry, for_shell, notes, on_one_line};
 use crate::cli::train_text::TrainText;

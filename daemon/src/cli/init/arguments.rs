@@ -4,9 +4,9 @@ use std::io::{IsTerminal, stderr, stdin};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use dynocar_core::dataset::Quantity;
-use dynocar_core::dataset::guess::Told;
-use dynocar_core::dataset::units::Unit;
+use dynocar_analysis::dataset::Quantity;
+use dynocar_analysis::dataset::guess::Told;
+use dynocar_core::units::Unit;
 
 use crate::cli::train_text::TrainArguments;
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynocar_core::dataset::guess::{Guess, GuessedColumn};
+use dynocar_analysis::dataset::guess::{Guess, GuessedColumn};
 use toml::Value;
 
 use crate::cli::text::comment;
@@ -104,8 +104,8 @@ fn quoted(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_core::dataset::guess::{Recording, guess};
-    use dynocar_core::dataset::manifest::{Manifest, Role};
+    use dynocar_analysis::dataset::guess::{Recording, guess};
+    use dynocar_analysis::dataset::manifest::{Manifest, Role};
 
     #[test]
     fn names_with_any_marks_lead_back_to_their_column() {

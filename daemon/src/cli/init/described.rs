@@ -1,7 +1,7 @@
 //! What is written, and what was understood of recordings.
 
-use dynocar_core::dataset::Note;
-use dynocar_core::dataset::guess::Guess;
+use dynocar_analysis::dataset::Note;
+use dynocar_analysis::dataset::guess::Guess;
 
 /// Name of the daemon's configuration.
 pub const DAEMON_FILE: &str = "daemon.toml";

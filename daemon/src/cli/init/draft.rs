@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use dynocar_core::dataset::guess::Recording;
-use dynocar_core::dataset::{DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Run};
+use dynocar_analysis::dataset::guess::Recording;
+use dynocar_analysis::dataset::{DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Run};
 
 use crate::cli::Failure;
 use crate::cli::train_text::TRAIN_FILE;

@@ -2,7 +2,7 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use dynocar_core::dataset::Place;
+use dynocar_analysis::dataset::Place;
 
 use crate::cli::Failure;
 

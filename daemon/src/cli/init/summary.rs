@@ -5,7 +5,7 @@ use std::path::Path;
 use super::described::{DAEMON_FILE, Described};
 use crate::cli::text::{TextTable, entry, for_shell, notes};
 use crate::cli::train_text::{TRAIN_FILE, TrainText};
-use dynocar_core::dataset::MANIFEST_FILE;
+use dynocar_analysis::dataset::MANIFEST_FILE;
 
 /// What was written, understood and is left to do.
 pub fn text(folder: &Path, train: &TrainText, described: Option<&Described>) -> String {

@@ -92,7 +92,7 @@ fn label(train: &TrainModel, top_mps: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_core::dataset::parse_train;
+    use dynocar_analysis::dataset::parse_train;
 
     const TRAIN: &str = "[train]\nname = \"<T>\"\nmass_t = 100\nlength_m = 50\n\
         rotating_mass_factor = 0.1\n[resistance]\na = 1\nb = 0.01\nc = 0.001\n";

@@ -8,7 +8,7 @@ use super::axes::{Axis, band, chart, frame, padded, range_with_zero, stroke, zer
 use super::reading::Reading;
 use super::speeds::Width;
 use super::{AFTER, Plot, PlotError, SCALE, for_page};
-use dynocar_core::explain::answer::HALF_95;
+use dynocar_analysis::explain::answer::HALF_95;
 
 /// A profile of (chainage in m, gradient in ‰, its standard deviation in ‰) as SVG.
 ///

@@ -1,7 +1,7 @@
 //! The residual force against one covariate.
 
-use dynocar_core::explain::report::covariates::Covariate;
-use dynocar_core::explain::report::panels::{Panel, PanelBin};
+use dynocar_analysis::explain::report::covariates::Covariate;
+use dynocar_analysis::explain::report::panels::{Panel, PanelBin};
 use plotters::backend::SVGBackend;
 use plotters::drawing::IntoDrawingArea;
 use plotters::element::{Circle, PathElement};

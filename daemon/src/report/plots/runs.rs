@@ -1,7 +1,7 @@
 //! The error of every run, before and after.
 
-use dynocar_core::dataset::Role;
-use dynocar_core::explain::report::errors::RunErrors;
+use dynocar_analysis::dataset::Role;
+use dynocar_analysis::explain::report::errors::RunErrors;
 use plotters::backend::SVGBackend;
 use plotters::drawing::IntoDrawingArea;
 use plotters::element::{Circle, PathElement};

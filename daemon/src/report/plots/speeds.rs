@@ -1,7 +1,7 @@
 //! Measured and predicted speed of a run, and the error of the prediction below it.
 
-use dynocar_core::dataset::Role;
-use dynocar_core::explain::report::traces::{Trace, TracePoint};
+use dynocar_analysis::dataset::Role;
+use dynocar_analysis::explain::report::traces::{Trace, TracePoint};
 use plotters::backend::SVGBackend;
 use plotters::drawing::IntoDrawingArea;
 use plotters::element::PathElement;

@@ -1,7 +1,7 @@
 //! What else was considered, and why it lost.
 
-use dynocar_core::explain::evidence::STRENGTH_MIN;
-use dynocar_core::explain::identifiability::not_held;
+use dynocar_analysis::explain::evidence::STRENGTH_MIN;
+use dynocar_analysis::explain::identifiability::not_held;
 
 use super::Section;
 use crate::report::Subject;

@@ -2,11 +2,11 @@
 
 use std::fmt::Write as _;
 
-use dynocar_core::dataset::Role;
-use dynocar_core::explain::report::Estimate;
-use dynocar_core::explain::report::errors::{ErrorPair, Resampling, RunErrors};
-use dynocar_core::explain::report::traces::Trace;
-use dynocar_core::explain::stop_to_stop::StopToStop;
+use dynocar_analysis::dataset::Role;
+use dynocar_analysis::explain::report::Estimate;
+use dynocar_analysis::explain::report::errors::{ErrorPair, Resampling, RunErrors};
+use dynocar_analysis::explain::report::traces::Trace;
+use dynocar_analysis::explain::stop_to_stop::StopToStop;
 
 use super::{Section, legend};
 use crate::report::html::{Column, Table, escape, estimate, percent};

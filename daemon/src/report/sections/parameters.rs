@@ -1,6 +1,6 @@
 //! What was fitted.
 
-use dynocar_core::explain::report::words::number;
+use dynocar_analysis::explain::report::words::number;
 
 use super::{Section, places};
 use crate::report::Subject;

@@ -1,7 +1,7 @@
 //! Where the effects act, and how surely that is known.
 
-use dynocar_core::explain::report::places::PlaceRuns;
-use dynocar_core::explain::report::words::joined;
+use dynocar_analysis::explain::report::places::PlaceRuns;
+use dynocar_analysis::explain::report::words::joined;
 
 use crate::report::Subject;
 use crate::report::html::{Column, Table, escape, estimate};

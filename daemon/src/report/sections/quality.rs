@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use dynocar_core::dataset::{ForceSource, GradientSource, OrderCounts, PositionSource, Run};
-use dynocar_core::explain::evidence::RunData;
+use dynocar_analysis::dataset::{ForceSource, GradientSource, OrderCounts, PositionSource, Run};
+use dynocar_analysis::explain::evidence::RunData;
 
 use super::Section;
 use crate::report::Subject;

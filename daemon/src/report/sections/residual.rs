@@ -1,6 +1,6 @@
 //! The residual as a force against covariates.
 
-use dynocar_core::explain::report::covariates::Covariate;
+use dynocar_analysis::explain::report::covariates::Covariate;
 
 use super::{Section, legend};
 use crate::report::html::escape;

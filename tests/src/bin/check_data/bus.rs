@@ -6,10 +6,10 @@ use std::path::Path;
 use dynocar::dataset;
 use dynocar::survey::answer::Answer;
 use dynocar::survey::survey_folder;
-use dynocar_core::dataset::Dataset;
-use dynocar_core::explain::answer::Answer as ExplainAnswer;
-use dynocar_core::explain::explain;
-use dynocar_core::explain::stop_to_stop::StopToStop;
+use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::explain::answer::Answer as ExplainAnswer;
+use dynocar_analysis::explain::explain;
+use dynocar_analysis::explain::stop_to_stop::StopToStop;
 use dynocar_shared::PipelineKind;
 
 use super::bus_variants::{self, ByPower, OtherDay};

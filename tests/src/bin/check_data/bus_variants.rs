@@ -5,9 +5,9 @@ use std::path::Path;
 
 use dynocar::dataset;
 use dynocar::survey::survey_folder;
-use dynocar_core::dataset::{Dataset, Role};
-use dynocar_core::explain::answer::Told;
-use dynocar_core::explain::{drive, explain};
+use dynocar_analysis::dataset::{Dataset, Role};
+use dynocar_analysis::explain::answer::Told;
+use dynocar_analysis::explain::{drive, explain};
 use dynocar_core::train::Drive;
 use dynocar_shared::SampleField;
 

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use dynocar::dataset;
-use dynocar_core::explain::explain;
+use dynocar_analysis::explain::explain;
 use serde_json::Value;
 
 use super::report::Report;

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use dynocar_core::import::{Imported, Reading, Source, import};
+use dynocar_analysis::import::{Imported, Reading, Source, import};
 
 use super::report::Report;
 use super::trainruns::{THEIR_GRAVITY_MPS2, TRAINS};

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use dynocar::dataset;
-use dynocar_core::dataset::{Dataset, Role, Run};
+use dynocar_analysis::dataset::{Dataset, Role, Run};
 use dynocar_core::force::ForceResolver;
 use dynocar_core::simulate::{
     BridgeLimits, Prediction, QuadraticForces, Recording, Restart, SpeedError,

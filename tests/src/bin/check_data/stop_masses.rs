@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dynocar::identify::identify;
-use dynocar_core::dataset::{Dataset, Role, Run};
+use dynocar_analysis::dataset::{Dataset, Role, Run};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
 use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, SampleField, Status, TrainId, TrainSample,

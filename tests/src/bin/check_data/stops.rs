@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use dynocar::dataset;
-use dynocar_core::stops::{FindSettings, Study, StudySettings};
+use dynocar_analysis::stops::{FindSettings, Study, StudySettings};
 
 use super::report::Report;
 

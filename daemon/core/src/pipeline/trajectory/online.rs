@@ -25,7 +25,7 @@ pub struct OnlineSettings {
 }
 
 /// Outliers: one sample in a hundred, anywhere within ±1 m/s of the prediction.
-pub(crate) const OUTLIERS: OutlierModel = OutlierModel { share: 0.01, density: 0.5 };
+pub const OUTLIERS: OutlierModel = OutlierModel { share: 0.01, density: 0.5 };
 
 /// Blocks of 30 s that the long-run variance of the innovations looks back over.
 const LONG_RUN_BLOCKS: f64 = 60.0;

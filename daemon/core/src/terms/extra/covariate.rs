@@ -1,6 +1,6 @@
 //! What a force may depend on.
 
-use crate::named::named;
+use crate::named;
 
 named! {
     /// A quantity known at every sample, or at some.

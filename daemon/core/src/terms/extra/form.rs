@@ -1,6 +1,6 @@
 //! Functions without unit of one covariate u.
 
-use crate::named::named;
+use crate::named;
 
 named! {
     /// A form; its numbers have the unit of the covariate but for the exponent.

@@ -1,6 +1,6 @@
 //! What was found along a line: places with their intervals, errors of the gradient, the residual.
 
-use dynocar_core::explain::report::line::{AlongLine, Stretch};
+use dynocar_analysis::explain::report::line::{AlongLine, Stretch};
 use plotters::element::{PathElement, Rectangle, Text};
 use plotters::style::Color;
 use plotters::style::text_anchor::{HPos, VPos};

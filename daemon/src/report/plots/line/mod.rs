@@ -5,7 +5,7 @@ mod declared;
 mod found;
 mod panel;
 
-use dynocar_core::explain::report::line::AlongLine;
+use dynocar_analysis::explain::report::line::AlongLine;
 use dynocar_core::track::Track;
 use plotters::backend::SVGBackend;
 use plotters::drawing::IntoDrawingArea;
@@ -177,9 +177,9 @@ impl Ground<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_core::dataset::parse_track;
-    use dynocar_core::explain::report::line::{FoundPlace, Stretch};
-    use dynocar_core::explain::report::panels::PanelBin;
+    use dynocar_analysis::dataset::parse_track;
+    use dynocar_analysis::explain::report::line::{FoundPlace, Stretch};
+    use dynocar_analysis::explain::report::panels::PanelBin;
 
     const LINE: &str = "[track]\nname = \"A & B\"\nlength_m = 2000\n\
         gradient = [[0, 10.0], [1000, -5.0]]\ncurves = [[500, 700, 400]]\n\

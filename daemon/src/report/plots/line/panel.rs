@@ -1,7 +1,7 @@
 //! A property of the line: its data, their range, what a pointer reads of them.
 
-use dynocar_core::explain::report::line::Stretch;
-use dynocar_core::explain::report::panels::PanelBin;
+use dynocar_analysis::explain::report::line::Stretch;
+use dynocar_analysis::explain::report::panels::PanelBin;
 
 use crate::report::plots::axes::range_with_zero;
 use crate::report::plots::panel::{reading, vertical_range};

@@ -1,0 +1,118 @@
+//! What to drive next: the manoeuvre that tells most of what is known worst.
+//!
+//! Everything comes from a snapshot and what is declared of the train: the present covariance, the
+//! noise behind it ([`noise`]), the manoeuvres within the train's limits ([`drive`]), and what the
+//! pipeline's own filter would know after each ([`resistance`], [`mass`]). What driving does not help has its
+//! remedy in words ([`remedy`]). The line is taken as level: a snapshot does not tell where the train is.
+
+pub mod drive;
+pub mod known;
+pub mod mass;
+pub mod noise;
+pub mod remedy;
+pub mod resistance;
+
+use dynocar_shared::{Parameter, ParameterSnapshot};
+use nalgebra::Vector3;
+
+use drive::{DriveKind, Scene};
+use dynocar_core::pipeline::trajectory::index::DAVIS;
+use dynocar_core::train::TrainModel;
+use known::davis_of;
+use noise::Noise;
+use resistance::{Forecast, forecast};
+
+/// Times in s that a driver may be asked for, the shortest first.
+pub const WITHIN_S: [f64; 3] = [20.0, 60.0, 180.0];
+/// An interval of this share of the present one is worth asking for at once.
+const GOOD_SHARE: f64 = 0.5;
+/// An interval beyond this share of the present one is not worth the driving.
+const WORTH_SHARE: f64 = 0.9;
+/// Coasting is advised where it is at most so much worse than the best: no error of a force is in it.
+const COASTING_SHARE: f64 = 1.05;
+
+/// A manoeuvre with its effect.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Advice {
+    /// What it tells of.
+    pub parameter: Parameter,
+    /// The manoeuvre in words.
+    pub drive: String,
+    /// Standard deviation now, in the parameter's unit in a snapshot.
+    pub std_now: f64,
+    /// And after it.
+    pub std_after: f64,
+}
+
+impl Advice {
+    /// In words: "20 s coasting from 25 m/s (90 km/h) halves the interval of c".
+    pub fn told(&self) -> String {
+        let name = if self.parameter == Parameter::Mass { "mass" } else { self.parameter.name() };
+        let interval = format!("the interval of {name}");
+        let effect = match self.std_after / self.std_now {
+            share if share < 0.3 => format!("divides {interval} by {:.0}", share.recip()),
+            share if share < 0.4 => format!("cuts {interval} to a third"),
+            share if share <= 0.55 => format!("halves {interval}"),
+            share => format!("narrows {interval} by {:.0} %", 100.0 * (1.0 - share)),
+        };
+        format!("{} {effect}", self.drive)
+    }
+}
+
+/// What each manoeuvre of the catalogue would tell of a, b and c.
+pub fn forecasts(
+    snapshot: &ParameterSnapshot,
+    train: &TrainModel,
+    mass_kg: f64,
+    noise: &Noise,
+    within_s: f64,
+) -> Vec<Forecast> {
+    let Some((davis, covariance)) = davis_of(snapshot) else { return Vec::new() };
+    let scene = Scene::new(train, davis, mass_kg, snapshot.speed_max_mps);
+    let drives = scene.catalogue(within_s);
+    drives.into_iter().filter_map(|drive| forecast(&scene, &covariance, noise, drive)).collect()
+}
+
+/// The manoeuvre for the worst-known coefficient; `None` where none of three minutes is worth it.
+///
+/// Worst known is the coefficient whose deviation makes most of the resistance's at the train's highest
+/// speed. The shortest time in which the best manoeuvre halves its interval is advised, else the longest.
+pub fn for_resistance(
+    snapshot: &ParameterSnapshot,
+    train: &TrainModel,
+    mass_kg: f64,
+    noise: &Noise,
+) -> Option<Advice> {
+    let (davis, covariance) = davis_of(snapshot)?;
+    let now = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
+    let top_mps = Scene::new(train, davis, mass_kg, snapshot.speed_max_mps).speed_max_mps;
+    let worst = now.component_mul(&Vector3::new(1.0, top_mps, top_mps * top_mps)).imax();
+    let share = |it: &Forecast| it.std[worst] / now[worst];
+    let best_within = |within_s| best(&forecasts(snapshot, train, mass_kg, noise, within_s), worst);
+    let mut chosen = None;
+    for within_s in WITHIN_S {
+        chosen = best_within(within_s).or(chosen);
+        if chosen.as_ref().is_some_and(|it| share(it) <= GOOD_SHARE) {
+            break;
+        }
+    }
+    let chosen = chosen.filter(|it| share(it) <= WORTH_SHARE)?;
+    Some(Advice {
+        parameter: DAVIS[worst],
+        drive: chosen.drive.told(chosen.lasts_s, chosen.end_mps),
+        std_now: now[worst],
+        std_after: chosen.std[worst],
+    })
+}
+
+/// The forecast that leaves the least of a coefficient's deviation; coasting where it is as good.
+pub fn best(forecasts: &[Forecast], coefficient: usize) -> Option<Forecast> {
+    let std = |it: &&Forecast| it.std[coefficient];
+    let least = |all: &mut dyn Iterator<Item = &Forecast>| {
+        all.min_by(|one, other| std(one).total_cmp(&std(other))).copied()
+    };
+    let overall = least(&mut forecasts.iter())?;
+    let coasting = least(&mut forecasts.iter().filter(|it| it.drive.kind == DriveKind::Coast));
+    let is_as_good = |it: &Forecast| std(&it) <= COASTING_SHARE * std(&&overall);
+    Some(coasting.filter(is_as_good).unwrap_or(overall))
+}

@@ -1,0 +1,284 @@
+//! Recorded runs of one train on one line, read from texts.
+//!
+//! A dataset is a folder with a `dataset.toml` that says which columns of the runs' CSV files
+//! hold which quantities in which units, a `train.toml` and, where the line is known, a
+//! `track.toml`. Everything particular to the files ends here: what comes out are the very
+//! [`TrainSample`](dynocar_shared::TrainSample)s that a controller would publish, in SI units,
+//! and an account of what the data are like.
+//!
+//! The texts come in through [`DatasetFiles`]; this library opens no file.
+//!
+//! # Layout, in the order of reading
+//!
+//! - `document`, `names`, [`error`]: TOML with the line of every key; mistakes with their choices
+//! - [`manifest`], [`train_file`], [`track_file`]: the three TOML files
+//! - [`quantity`]: what a column may hold, in which [`units`](dynocar_core::units)
+//! - `table`: a CSV file as columns of numbers
+//! - `order`, `spikes`, `motion`, `power`, `forces`, [`stamps`], `altitude`: from columns to time, speed,
+//!   position, forces and gradient
+//! - `resolved`, [`run`], [`quality`], `findings`, [`remark`], `remarking`, `declared`, [`note`]: samples,
+//!   counts and warnings
+//! - [`guess`]: a description of files that nobody has described yet
+
+mod altitude;
+mod corrections;
+mod declared;
+mod document;
+pub mod error;
+mod extra;
+mod finding_unit;
+mod findings;
+mod forces;
+pub mod guess;
+pub mod manifest;
+mod motion;
+mod names;
+pub mod note;
+mod order;
+mod power;
+pub mod quality;
+pub mod quantity;
+pub mod remark;
+mod remarking;
+mod resolved;
+pub mod run;
+mod spikes;
+pub mod stamps;
+mod table;
+pub mod track_file;
+pub mod train_file;
+
+#[cfg(test)]
+mod tests;
+
+pub use document::top_keys;
+pub use error::{DatasetError, FileProblem, Place, Problem};
+pub use forces::ForceSource;
+pub use manifest::{ColumnMapping, FileEntry, Manifest, PositionReference, Role, RunEntry};
+pub use motion::PositionSource;
+pub use names::Choices;
+pub use note::Note;
+pub use order::OrderCounts;
+pub use quality::{Phases, RunQuality};
+pub use quantity::Quantity;
+pub use remark::Remark;
+pub use resolved::{DATASET_TRAIN, GradientSource};
+pub use run::{Extras, Run, is_parquet};
+pub use table::LineCounts;
+pub use track_file::parse_track;
+pub use train_file::parse_train;
+
+use std::sync::Arc;
+
+use dynocar_shared::SampleField;
+
+use dynocar_core::track::Track;
+use dynocar_core::train::{Drive, TrainModel};
+
+/// Name of the file that makes a folder a dataset.
+pub const MANIFEST_FILE: &str = "dataset.toml";
+
+/// Where the texts of a dataset come from. Paths are as the dataset writes them, from its
+/// folder.
+pub trait DatasetFiles {
+    /// The text of a file.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be had.
+    fn read(&self, path: &str) -> Result<String, FileProblem>;
+
+    /// The text of a run's file as CSV, of which the columns that these mappings name are read. Of a
+    /// [`is_parquet`] file it is plain CSV, with commas between the cells and points in the numbers, and
+    /// times are in the unit that the mapping declares.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be had.
+    fn read_run(&self, path: &str, _columns: &[ColumnMapping]) -> Result<String, FileProblem> {
+        self.read(path)
+    }
+
+    /// The file's name in messages.
+    fn label(&self, path: &str) -> String {
+        path.into()
+    }
+}
+
+/// A dataset held in memory, as (path, text).
+impl DatasetFiles for [(&str, &str)] {
+    fn read(&self, path: &str) -> Result<String, FileProblem> {
+        let file = self.iter().find(|(name, _)| *name == path);
+        file.map(|(_, text)| (*text).into()).ok_or(FileProblem::Missing)
+    }
+}
+
+/// What a dataset declares; its runs can be read one by one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DatasetHead {
+    /// The content of `dataset.toml`.
+    pub manifest: Manifest,
+    /// The train.
+    pub train: Arc<TrainModel>,
+    /// The line; `None` when it is not known.
+    pub track: Option<Arc<Track>>,
+}
+
+/// A dataset, read in full.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dataset {
+    /// Its name.
+    pub name: String,
+    /// Source, licence and the like.
+    pub description: Option<String>,
+    /// The train.
+    pub train: Arc<TrainModel>,
+    /// The line; `None` when it is not known.
+    pub track: Option<Arc<Track>>,
+    /// The runs, in the order of the manifest.
+    pub runs: Vec<Run>,
+}
+
+impl Dataset {
+    /// The same with forces that act `late_s` before their stamps taken where they act.
+    pub fn with_forces_moved(&self, late_s: f64) -> Dataset {
+        let mut dataset = self.clone();
+        dataset.runs.iter_mut().for_each(|run| run.move_forces(late_s));
+        dataset
+    }
+
+    /// The same with the forces that come from power taken from another drive.
+    pub fn with_drive(&self, drive: Drive) -> Dataset {
+        let mut dataset = self.clone();
+        let before = self.train.drive.unwrap_or(Drive::USUAL);
+        for run in &mut dataset.runs {
+            run.retake_forces(before, drive);
+        }
+        dataset.train = Arc::new(TrainModel { drive: Some(drive), ..(*self.train).clone() });
+        dataset
+    }
+
+    /// Forgets the forces of all samples without traction, for a train whose friction brake is not
+    /// recorded: there the true force is unknown.
+    pub fn keep_traction_only(&mut self) {
+        for sample in self.runs.iter_mut().flat_map(|run| &mut run.samples) {
+            let pulls = sample.get(SampleField::TractionForce).is_some_and(|force| force > 0.0);
+            let brakes = sample.get(SampleField::BrakeForce).is_some_and(|force| force > 0.0);
+            if !pulls || brakes {
+                sample.valid &= !(SampleField::TractionForce.bit() | SampleField::BrakeForce.bit());
+            }
+        }
+    }
+}
+
+impl DatasetHead {
+    /// Reads `dataset.toml`, the train and the line, but no run.
+    ///
+    /// # Errors
+    ///
+    /// The first mistake, with file, line and choices.
+    pub fn open(files: &(impl DatasetFiles + ?Sized)) -> Result<Self, DatasetError> {
+        let label = files.label(MANIFEST_FILE);
+        let manifest = Manifest::parse(&label, &text(files, MANIFEST_FILE, None)?)?;
+        let FileEntry { path, place } = &manifest.train_file;
+        let train = parse_train(&files.label(path), &text(files, path, Some(place))?)?;
+        let track = match &manifest.track_file {
+            Some(FileEntry { path, place }) => {
+                Some(Arc::new(parse_track(&files.label(path), &text(files, path, Some(place))?)?))
+            }
+            None => None,
+        };
+        require_curves(&manifest, &train)?;
+        Ok(DatasetHead { manifest, train: Arc::new(train), track })
+    }
+
+    /// Reads one run by its place in the manifest, from 0.
+    ///
+    /// # Errors
+    ///
+    /// The first mistake in its file, with line and column.
+    ///
+    /// # Panics
+    ///
+    /// When there is no such run.
+    pub fn read_run(
+        &self,
+        files: &(impl DatasetFiles + ?Sized),
+        index: usize,
+    ) -> Result<Run, DatasetError> {
+        let entry = &self.manifest.runs[index];
+        let context = resolved::Context {
+            manifest: &self.manifest,
+            train: &self.train,
+            track: self.track.as_ref(),
+        };
+        let text = files
+            .read_run(&entry.file, &self.manifest.columns)
+            .map_err(|problem| unread(files.label(&entry.file), problem, Some(&entry.place)))?;
+        run::read(context, index as u32 + 1, entry, &files.label(&entry.file), &text)
+    }
+}
+
+impl Dataset {
+    /// Reads a dataset with all its runs.
+    ///
+    /// # Errors
+    ///
+    /// The first mistake, with file, line and choices.
+    pub fn load(files: &(impl DatasetFiles + ?Sized)) -> Result<Self, DatasetError> {
+        let head = DatasetHead::open(files)?;
+        let runs = (0..head.manifest.runs.len()).map(|index| head.read_run(files, index));
+        let runs = runs.collect::<Result<_, _>>()?;
+        let Manifest { name, description, .. } = head.manifest;
+        Ok(Dataset { name, description, train: head.train, track: head.track, runs })
+    }
+
+    /// The runs with a role.
+    pub fn with_role(&self, role: Role) -> impl Iterator<Item = &Run> {
+        self.runs.iter().filter(move |run| run.role == role)
+    }
+}
+
+/// The text of a file; `listed_at` is where the dataset names it.
+fn text(
+    files: &(impl DatasetFiles + ?Sized),
+    path: &str,
+    listed_at: Option<&Place>,
+) -> Result<String, DatasetError> {
+    files.read(path).map_err(|problem| unread(files.label(path), problem, listed_at))
+}
+
+fn unread(file: String, problem: FileProblem, listed_at: Option<&Place>) -> DatasetError {
+    match (&problem, listed_at) {
+        (&FileProblem::NotUtf8 { line }, _) => {
+            Place::line(&file, line).problem(Problem::File(problem))
+        }
+        (FileProblem::NotText(_) | FileProblem::Table(_), _) | (_, None) => {
+            Place::whole(&file).problem(Problem::File(problem))
+        }
+        (_, Some(place)) => place.clone().problem(Problem::ListedFile { file, problem }),
+    }
+}
+
+/// Handles are shares of a curve, which must then be declared.
+fn require_curves(manifest: &Manifest, train: &TrainModel) -> Result<(), DatasetError> {
+    let cases = [
+        (Quantity::TractionHandle, Quantity::TractionForce, &train.traction, "[traction] effort"),
+        (
+            Quantity::BrakeHandle,
+            Quantity::BrakeForce,
+            &train.brake,
+            "[brake] max_force_kn or effort",
+        ),
+    ];
+    for (handle, force, curve, key) in cases {
+        if let (Some(mapping), None, None) =
+            (manifest.mapping(handle), manifest.mapping(force), curve)
+        {
+            let (quantity, train_file) = (handle.name(), manifest.train_file.path.clone());
+            let problem = Problem::NoEffortCurve { quantity, train_file, key };
+            return Err(mapping.place.clone().problem(problem));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,248 @@
+//! What the data of a run are like: counts, ranges and what the train did.
+
+use dynocar_core::validation::{ValidationLimits, Validator};
+use dynocar_shared::{RejectionReason, TrainSample};
+use serde::Serialize;
+
+use super::forces::Force;
+use super::order::OrderCounts;
+use super::quantity::Quantity;
+use super::resolved::{Context, DATASET_TRAIN, Resolved};
+use super::table::LineCounts;
+
+/// Below this speed in m/s the train stands.
+const STANDSTILL_MPS: f64 = 0.1;
+/// A force below this share of the greatest one counts as none.
+const COASTING_SHARE: f64 = 0.005;
+
+/// What the data of a run are like.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RunQuality {
+    /// Rows of the file, and lines that are no plain rows.
+    pub lines: LineCounts,
+    /// Rows without a time, which cannot become samples.
+    pub rows_without_time: usize,
+    /// Order and regularity in time.
+    pub order: OrderCounts,
+    /// First time in s, as in the file.
+    pub start_s: f64,
+    /// From the first to the last row in order, in s.
+    pub duration_s: f64,
+    /// Missing cells of every mapped quantity that has some, among rows with a time.
+    pub missing: Vec<QuantityCount>,
+    /// Values that stick out from their neighbours.
+    pub outliers: Vec<QuantityCount>,
+    /// Values below zero by noise: speeds set to zero, forces counted as the other force.
+    pub noise_below_zero: Vec<QuantityCount>,
+    /// Samples that validation refuses, by reason.
+    pub refused: Vec<ReasonCount>,
+    /// Lowest and highest speed in m/s, without outliers; `None` without speeds.
+    pub speed_range_mps: Option<(f64, f64)>,
+    /// Lowest and highest chainage of the train's centre in m; `None` without positions.
+    pub position_range_m: Option<(f64, f64)>,
+    /// Distance in m by integrating the speed.
+    pub distance_m: f64,
+    /// What the train did, and for how long.
+    pub phases: Phases,
+}
+
+/// A count for a quantity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct QuantityCount {
+    /// The quantity.
+    pub quantity: Quantity,
+    /// How many.
+    pub count: usize,
+}
+
+/// A count for a reason.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ReasonCount {
+    /// The reason.
+    pub reason: RejectionReason,
+    /// How many.
+    pub count: usize,
+}
+
+impl Serialize for ReasonCount {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        use serde::ser::SerializeStruct;
+        let mut fields = serializer.serialize_struct("ReasonCount", 2)?;
+        fields.serialize_field("reason", self.reason.name())?;
+        fields.serialize_field("count", &self.count)?;
+        fields.end()
+    }
+}
+
+/// For how many s the train did what.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Phases {
+    /// Speed below 0.1 m/s.
+    pub standstill_s: f64,
+    /// Moving without traction or brake.
+    pub coasting_s: f64,
+    /// Traction outweighs the brake.
+    pub traction_s: f64,
+    /// The brake outweighs traction.
+    pub braking_s: f64,
+    /// Speed or forces are missing, or rows are.
+    pub unknown_s: f64,
+}
+
+impl RunQuality {
+    /// How many values of a quantity are missing.
+    pub fn missing_of(&self, quantity: Quantity) -> usize {
+        count_of(&self.missing, quantity)
+    }
+
+    /// How many values of a quantity stick out.
+    pub fn outliers_of(&self, quantity: Quantity) -> usize {
+        count_of(&self.outliers, quantity)
+    }
+
+    /// Samples that validation refuses, whatever the reason.
+    pub fn refused_in_all(&self) -> usize {
+        self.refused.iter().map(|refused| refused.count).sum()
+    }
+}
+
+fn count_of(counts: &[QuantityCount], quantity: Quantity) -> usize {
+    counts.iter().find(|count| count.quantity == quantity).map_or(0, |count| count.count)
+}
+
+/// Looks at a run that is read.
+pub(super) fn assess(context: Context, run: &Resolved, samples: &[TrainSample]) -> RunQuality {
+    let ordered: Vec<usize> = (0..samples.len()).filter(|&row| run.order.in_order[row]).collect();
+    let time = |place: Option<&usize>| place.map_or(0.0, |&row| run.times_s[row]);
+    let (start_s, end_s) = (time(ordered.first()), time(ordered.last()));
+    let is_good = |row: &usize| !run.speeds.is_spike[*row];
+    let speeds = (0..samples.len()).filter(is_good).map(|row| run.speeds.speed_mps[row]);
+    RunQuality {
+        lines: run.table.lines,
+        rows_without_time: run.rows_without_time,
+        order: run.order.counts,
+        start_s,
+        duration_s: end_s - start_s,
+        missing: missing(run),
+        outliers: outliers(run),
+        noise_below_zero: noise_below_zero(run),
+        refused: refused(context, samples),
+        speed_range_mps: range(speeds),
+        position_range_m: range(run.position_m.iter().copied()),
+        distance_m: distance_m(run, &ordered),
+        phases: phases(run, &ordered),
+    }
+}
+
+fn counts(all: impl IntoIterator<Item = (Quantity, usize)>) -> Vec<QuantityCount> {
+    all.into_iter()
+        .filter(|(_, count)| *count > 0)
+        .map(|(quantity, count)| QuantityCount { quantity, count })
+        .collect()
+}
+
+fn missing(run: &Resolved) -> Vec<QuantityCount> {
+    counts(
+        run.table.columns().map(|(quantity, values)| {
+            (quantity, values.iter().filter(|value| value.is_nan()).count())
+        }),
+    )
+}
+
+/// The mapped quantities behind the two forces.
+fn force_quantities(run: &Resolved) -> (Quantity, Quantity) {
+    let mapped = |choices: [Quantity; 2], otherwise| {
+        choices.into_iter().find(|&q| run.table.column(q).is_some()).unwrap_or(otherwise)
+    };
+    let control = Quantity::ControlForce;
+    (
+        mapped([Quantity::TractionForce, Quantity::TractionHandle], control),
+        mapped([Quantity::BrakeForce, Quantity::BrakeHandle], control),
+    )
+}
+
+/// Counts something of both forces, together when they come from one column.
+fn of_forces(run: &Resolved, count: impl Fn(&Force) -> usize) -> Vec<(Quantity, usize)> {
+    let (traction, brake) = force_quantities(run);
+    let (of_traction, of_brake) = (count(&run.forces.traction), count(&run.forces.brake));
+    if traction == brake {
+        return vec![(traction, of_traction + of_brake)];
+    }
+    vec![(traction, of_traction), (brake, of_brake)]
+}
+
+fn outliers(run: &Resolved) -> Vec<QuantityCount> {
+    let marked = |marks: &[bool]| marks.iter().filter(|&&mark| mark).count();
+    let mut all = vec![(Quantity::Speed, marked(&run.speeds.is_spike))];
+    all.extend(of_forces(run, |force| marked(&force.is_spike) + force.handle_out_of_range));
+    counts(all)
+}
+
+fn noise_below_zero(run: &Resolved) -> Vec<QuantityCount> {
+    let mut all = vec![(Quantity::Speed, run.speeds.zeroed)];
+    all.extend(of_forces(run, |force| force.zeroed));
+    counts(all)
+}
+
+/// What the validation in front of every pipeline refuses of these samples.
+fn refused(context: Context, samples: &[TrainSample]) -> Vec<ReasonCount> {
+    let nominal_mass_kg = context.train.mass_kg;
+    let limits = ValidationLimits::for_train(nominal_mass_kg);
+    let mut validator = Validator::new(DATASET_TRAIN, nominal_mass_kg, limits);
+    let mut counts = vec![0; RejectionReason::ALL.len()];
+    for sample in samples {
+        if let Err(reason) = validator.check(sample) {
+            counts[reason as usize] += 1;
+        }
+    }
+    let counted = RejectionReason::ALL.iter().map(|&reason| (reason, counts[reason as usize]));
+    counted
+        .filter(|(_, count)| *count > 0)
+        .map(|(reason, count)| ReasonCount { reason, count })
+        .collect()
+}
+
+fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    values.filter(|value| !value.is_nan()).fold(None, |range, value| match range {
+        None => Some((value, value)),
+        Some((low, high)) => Some((f64::min(low, value), f64::max(high, value))),
+    })
+}
+
+/// The integral of the speed over the rows in order, by trapezoids between good speeds.
+fn distance_m(run: &Resolved, ordered: &[usize]) -> f64 {
+    let is_good = |row: &usize| !run.speeds.speed_mps[*row].is_nan() && !run.speeds.is_spike[*row];
+    let good: Vec<usize> = ordered.iter().copied().filter(is_good).collect();
+    good.windows(2)
+        .map(|pair| {
+            let mean_mps = 0.5 * (run.speeds.speed_mps[pair[0]] + run.speeds.speed_mps[pair[1]]);
+            mean_mps * (run.times_s[pair[1]] - run.times_s[pair[0]])
+        })
+        .sum()
+}
+
+/// Each step counts for what the row at its start says.
+fn phases(run: &Resolved, ordered: &[usize]) -> Phases {
+    let mut phases = Phases::default();
+    let least_n = COASTING_SHARE * run.forces.greatest_n;
+    for pair in ordered.windows(2) {
+        let (row, step_s) = (pair[0], run.times_s[pair[1]] - run.times_s[pair[0]]);
+        let speed_mps = run.speeds.speed_mps[row];
+        let control_n = run.forces.traction.force_n[row] - run.forces.brake.force_n[row];
+        let phase = if run.order.counts.is_gap(step_s) || speed_mps.is_nan() {
+            &mut phases.unknown_s
+        } else if speed_mps < STANDSTILL_MPS {
+            &mut phases.standstill_s
+        } else if control_n.is_nan() {
+            &mut phases.unknown_s
+        } else if control_n > least_n {
+            &mut phases.traction_s
+        } else if control_n < -least_n {
+            &mut phases.braking_s
+        } else {
+            &mut phases.coasting_s
+        };
+        *phase += step_s;
+    }
+    phases
+}

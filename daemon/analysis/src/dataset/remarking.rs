@@ -1,0 +1,220 @@
+//! Looks for what may be remarked on in a run.
+
+use dynocar_core::plausibility::{Findings, Slip};
+use dynocar_core::train::Drive;
+
+use super::finding_unit::read_as;
+use super::forces::{Force, ForceSource};
+use super::motion::PositionSource;
+use super::quality::RunQuality;
+use super::quantity::Quantity;
+use super::remark::Remark;
+use super::resolved::{Context, GradientSource, Resolved};
+
+/// Below this distance in m, comparisons of position and speed say nothing.
+const DISTANCE_MIN_M: f64 = 200.0;
+/// Rows at either end that tell where a run begins and ends.
+const END_ROWS: usize = 5;
+/// Position and integrated speed may differ by this share: wheel wear, balises, gaps.
+const DISTANCE_TOLERANCE: f64 = 0.05;
+/// So far in m off the line's ends a train's end may be.
+const LINE_TOLERANCE_M: f64 = 50.0;
+/// Median time steps in s of recordings that make sense.
+const USUAL_STEP_S: (f64, f64) = (0.0005, 60.0);
+
+/// A moving train's columns that all keep their values for so many s are remarked on.
+const STANDS_STILL_MIN_S: f64 = 10.0;
+/// The speed in m/s from which a train surely moves.
+const MOVING_MPS: f64 = 1.0;
+
+/// Looks for what may be wrong with a run.
+pub(super) fn remarks(
+    context: Context,
+    run: &Resolved,
+    quality: &RunQuality,
+    findings: &Findings,
+) -> Vec<Remark> {
+    let slip = |finding| Remark::Slip { finding, read_as: read_as(context.manifest, finding) };
+    let mut remarks: Vec<Remark> = findings.iter().map(slip).collect();
+    of_time(quality, &mut remarks);
+    of_content(context, run, quality, &mut remarks);
+    remarks.extend(stands_still(run));
+    of_position(context, run, quality, findings, &mut remarks);
+    if run.speeds.negative > 0 {
+        remarks.push(Remark::NegativeSpeed { count: run.speeds.negative });
+    }
+    let handles = (Quantity::TractionHandle, Quantity::BrakeHandle);
+    of_force(run, &run.forces.traction, Quantity::TractionForce, handles.0, &mut remarks);
+    of_force(run, &run.forces.brake, Quantity::BrakeForce, handles.1, &mut remarks);
+    of_power(context, run, &mut remarks);
+    if run.gradient_source == GradientSource::Unknown {
+        remarks.push(Remark::GradientUnknown);
+    }
+    of_plausibility(run, &mut remarks);
+    remarks
+}
+
+/// What a force from power is reckoned with.
+fn of_power(context: Context, run: &Resolved, remarks: &mut Vec<Remark>) {
+    if run.forces.traction.source != ForceSource::Power {
+        return;
+    }
+    let declared = context.train.drive;
+    let drive = declared.unwrap_or(Drive::USUAL);
+    let has_friction = context.train.brake_gear.friction_brake.is_some()
+        && run.table.filled(Quantity::BrakeCylinderPressure).is_some();
+    remarks.push(Remark::ForceByPower {
+        efficiency: drive.efficiency,
+        is_declared: declared.is_some(),
+        speed_min_mps: drive.speed_min_mps,
+        is_brake: run.forces.brake.source == ForceSource::Power && !has_friction,
+    });
+}
+
+fn of_time(quality: &RunQuality, remarks: &mut Vec<Remark>) {
+    let step_s = quality.order.step_s;
+    if step_s > 0.0 && !(USUAL_STEP_S.0..=USUAL_STEP_S.1).contains(&step_s) {
+        remarks.push(Remark::UnusualStep { step_s });
+    }
+}
+
+/// What a run lacks altogether.
+fn of_content(context: Context, run: &Resolved, quality: &RunQuality, remarks: &mut Vec<Remark>) {
+    let quantities = context.manifest.columns.iter().map(|mapping| mapping.quantity);
+    let empty = quantities.filter(|&quantity| run.table.filled(quantity).is_none());
+    remarks.extend(empty.map(|quantity| Remark::NoValues { quantity }));
+    if run.order.in_order.iter().filter(|&&mark| mark).count() < 2 {
+        remarks.push(Remark::OneRow);
+    } else if let Some((_, highest_mps)) = quality.speed_range_mps
+        && highest_mps < MOVING_MPS
+    {
+        remarks.push(Remark::NeverMoves { highest_mps });
+    }
+}
+
+/// The longest stretch of a moving train in which no column but the time changes.
+fn stands_still(run: &Resolved) -> Option<Remark> {
+    let columns: Vec<&[f64]> = run
+        .table
+        .columns()
+        .filter(|(quantity, _)| *quantity != Quantity::Time)
+        .map(|(_, values)| values)
+        .collect();
+    let same = |one: f64, other: f64| one == other || (one.is_nan() && other.is_nan());
+    let repeats = |row: usize| columns.iter().all(|values| same(values[row], values[row - 1]));
+    let mut longest: Option<(f64, usize)> = None;
+    let mut start = 0;
+    for row in 1..run.times_s.len() {
+        if !repeats(row) {
+            start = row;
+        }
+        let for_s = run.times_s[row] - run.times_s[start];
+        let moves = run.speeds.speed_mps[row] >= MOVING_MPS;
+        if moves && for_s >= STANDS_STILL_MIN_S && longest.is_none_or(|(most, _)| for_s > most) {
+            longest = Some((for_s, start));
+        }
+    }
+    let (for_s, start) = longest?;
+    let (from_s, speed_mps) = (run.times_s[start], run.speeds.speed_mps[start]);
+    Some(Remark::StandsStill { from_s, for_s, speed_mps })
+}
+
+fn of_position(
+    context: Context,
+    run: &Resolved,
+    quality: &RunQuality,
+    findings: &Findings,
+    remarks: &mut Vec<Remark>,
+) {
+    if run.position_source == PositionSource::IntegratedSpeed {
+        if context.track.is_some() && run.entry.start_m.is_none() {
+            remarks.push(Remark::StartUnknown);
+        }
+        return;
+    }
+    let ordered = |row: &usize| run.order.in_order[*row] && !run.position_m[*row].is_nan();
+    let rows: Vec<usize> = (0..run.position_m.len()).filter(ordered).collect();
+    if rows.len() < 2 {
+        return;
+    }
+    // The medians of a few rows, since a row at an end may be an outlier; of so few that the way
+    // between them is the run's.
+    let few = END_ROWS.min(rows.len() / 100).max(1);
+    let median_m = |rows: &[usize]| {
+        let mut positions: Vec<f64> = rows.iter().map(|&row| run.position_m[row]).collect();
+        positions.sort_by(f64::total_cmp);
+        positions[(positions.len() - 1) / 2]
+    };
+    let net_m = median_m(&rows[rows.len() - few..]) - median_m(&rows[..few]);
+    let direction = run.entry.direction;
+    let is_told = |slips: &[Slip]| findings.iter().any(|finding| slips.contains(&finding.slip));
+    if net_m * f64::from(direction) < -DISTANCE_MIN_M && !is_told(&[Slip::DirectionReversed]) {
+        remarks.push(Remark::AgainstDirection { direction, net_m });
+    }
+    let (position_m, speed_m) = (net_m.abs(), quality.distance_m);
+    let is_long = position_m.max(speed_m) > DISTANCE_MIN_M;
+    let is_mismatch_told = is_told(&[Slip::TimeScale, Slip::SpeedScale, Slip::PositionScale]);
+    if !is_mismatch_told
+        && is_long
+        && (position_m - speed_m).abs() > DISTANCE_TOLERANCE * position_m.max(speed_m)
+    {
+        remarks.push(Remark::DistanceMismatch { position_m, speed_m });
+    }
+    let length_m = context.track.and_then(|track| track.length_m);
+    // A train may stop with its head at the line's end and its centre half a length outside.
+    let beyond_m = LINE_TOLERANCE_M + 0.5 * context.train.length_m;
+    if let (Some(length_m), Some((from_m, to_m))) = (length_m, quality.position_range_m)
+        && (from_m < -beyond_m || to_m > length_m + beyond_m)
+    {
+        remarks.push(Remark::OffTheLine { from_m, to_m, length_m });
+    }
+}
+
+fn of_force(
+    run: &Resolved,
+    force: &Force,
+    quantity: Quantity,
+    handle: Quantity,
+    remarks: &mut Vec<Remark>,
+) {
+    if force.negative > 0 {
+        let lowest_n = force.force_n.iter().copied().fold(f64::INFINITY, f64::min);
+        remarks.push(Remark::NegativeForce { quantity, count: force.negative, lowest_n });
+    }
+    if force.handle_out_of_range > 0 {
+        let column = run.table.column(handle).unwrap_or_default();
+        let lowest = column.iter().copied().fold(f64::INFINITY, f64::min);
+        let highest = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let count = force.handle_out_of_range;
+        remarks.push(Remark::HandleOutOfRange { quantity: handle, count, lowest, highest });
+    }
+    if force.source == ForceSource::Column && run.table.column(handle).is_some() {
+        remarks.push(Remark::UnusedHandle { quantity: handle });
+    }
+    if force.source == ForceSource::None {
+        remarks.push(Remark::ForceNotRecorded { quantity });
+    }
+}
+
+/// The bounds beyond which [`dynocar_core::validation::Validator`] refuses a sample.
+const PLAUSIBLE: [(Quantity, f64, f64); 7] = [
+    (Quantity::Acceleration, -20.0, 20.0),
+    (Quantity::SpecificForce, -20.0, 20.0),
+    (Quantity::BrakeCylinderPressure, -5e4, 2e6),
+    (Quantity::AmbientTemperature, -80.0, 80.0),
+    (Quantity::Gradient, -150.0, 150.0),
+    (Quantity::Latitude, -90.0, 90.0),
+    (Quantity::Longitude, -180.0, 180.0),
+];
+
+fn of_plausibility(run: &Resolved, remarks: &mut Vec<Remark>) {
+    for (quantity, low, high) in PLAUSIBLE {
+        let Some(column) = run.table.column(quantity) else { continue };
+        let is_outside = |value: &&f64| !value.is_nan() && !(low..=high).contains(*value);
+        let count = column.iter().filter(is_outside).count();
+        if count > 0 {
+            let unit = quantity.unit().name();
+            remarks.push(Remark::Implausible { quantity, count, low, high, unit });
+        }
+    }
+}

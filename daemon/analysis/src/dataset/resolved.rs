@@ -1,0 +1,202 @@
+//! The columns of a run after all that is particular to its file, and the samples that they give.
+
+use std::sync::Arc;
+
+use dynocar_core::track::Track;
+use dynocar_core::train::TrainModel;
+use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
+use dynocar_shared::{SampleField, TrainId, TrainSample};
+use serde::Serialize;
+
+use super::altitude;
+use super::forces::Forces;
+use super::manifest::{Manifest, RunEntry};
+use super::motion::{Placement, PositionSource, Speeds};
+use super::order::TimeOrder;
+use super::quantity::Quantity;
+use super::table::Table;
+
+/// The train's id in the samples of a dataset; a replay may set another.
+pub const DATASET_TRAIN: TrainId = TrainId(1);
+
+/// Where the gradient under the train comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GradientSource {
+    /// The line's file, at the train's position.
+    Track,
+    /// The mapped `gradient` column.
+    Column,
+    /// `specific_force` minus dv/dt, formed when the forces are resolved (see
+    /// [`dynocar_core::force::ForceResolver`]): there dv/dt cancels against the change of speed.
+    SpecificForce,
+    /// The slope of the mapped `altitude` over the distance.
+    Altitude,
+    /// Nothing tells.
+    Unknown,
+}
+
+/// What is declared around a run.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Context<'d> {
+    pub manifest: &'d Manifest,
+    pub train: &'d Arc<TrainModel>,
+    pub track: Option<&'d Arc<Track>>,
+}
+
+/// The columns of a run after all that is particular to its file.
+pub(super) struct Resolved<'d> {
+    pub entry: &'d RunEntry,
+    pub table: Table,
+    pub times_s: Vec<f64>,
+    pub order: TimeOrder,
+    pub rows_without_time: usize,
+    pub speeds: Speeds,
+    pub forces: Forces,
+    pub position_m: Vec<f64>,
+    pub position_source: PositionSource,
+    pub gradient_permille: Option<Vec<f64>>,
+    pub gradient_source: GradientSource,
+}
+
+impl<'d> Resolved<'d> {
+    pub fn of(context: Context<'d>, entry: &'d RunEntry, mut table: Table) -> Self {
+        let (timeless_before, rows_without_time) = drop_timeless(&mut table);
+        table.hold_last(Quantity::Passengers);
+        let column = |quantity| table.column(quantity).unwrap_or_default();
+        let times_s = column(Quantity::Time).to_vec();
+        let order = TimeOrder::of(&times_s, &timeless_before);
+        let speeds = Speeds::of(column(Quantity::Speed), &order);
+        let forces = Forces::of(&table, &speeds.speed_mps, context.train, &order);
+        let placement = Placement {
+            reference: context.manifest.position_reference,
+            direction: f64::from(entry.direction),
+            train_length_m: context.train.length_m,
+            start_m: entry.start_m,
+        };
+        let (position_m, position_source) = match table.filled(Quantity::Position) {
+            Some(column) => (placement.centre_m(column), PositionSource::Column),
+            None => {
+                let position_m = placement.integrate(&times_s, &speeds, &order);
+                (position_m, PositionSource::IntegratedSpeed)
+            }
+        };
+        let (gradient_permille, gradient_source) =
+            gradient(context.track.map(Arc::as_ref), &table, &position_m);
+        Resolved {
+            entry,
+            times_s,
+            order,
+            rows_without_time,
+            speeds,
+            forces,
+            position_m,
+            position_source,
+            gradient_permille,
+            gradient_source,
+            table,
+        }
+    }
+
+    /// The samples, one for each row.
+    ///
+    /// The mass is the row's, else the run's declared one, else that of the empty train and its
+    /// counted passengers.
+    pub fn samples(&self, number: u32, train: &TrainModel) -> Vec<TrainSample> {
+        let column = |quantity| self.table.column(quantity).unwrap_or_default();
+        let fields: [(SampleField, &[f64]); 10] = [
+            (SampleField::Position, &self.position_m),
+            (SampleField::Speed, &self.speeds.speed_mps),
+            (SampleField::TractionForce, &self.forces.traction.force_n),
+            (SampleField::BrakeForce, &self.forces.brake.force_n),
+            (SampleField::BrakeCylinderPressure, column(Quantity::BrakeCylinderPressure)),
+            (SampleField::Acceleration, column(Quantity::Acceleration)),
+            (SampleField::SpecificForce, column(Quantity::SpecificForce)),
+            (SampleField::Mass, column(Quantity::TrainMass)),
+            (SampleField::AmbientTemperature, column(Quantity::AmbientTemperature)),
+            (SampleField::Gradient, self.gradient_permille.as_deref().unwrap_or_default()),
+        ];
+        let radius_m = column(Quantity::CurveRadius);
+        let passengers = column(Quantity::Passengers);
+        let wheel_slide = column(Quantity::WheelSlide);
+        let is_there =
+            |values: &[f64], row: usize| values.get(row).copied().filter(|v| v.is_finite());
+        let mut sequence = 0;
+        (0..self.times_s.len())
+            .map(|row| {
+                sequence += 1 + self.order.lost_before[row];
+                let mut sample = TrainSample::empty(DATASET_TRAIN);
+                sample.time_ns = (self.times_s[row] * 1e9).round() as i64;
+                sample.sequence = sequence;
+                sample.run = number;
+                sample.direction = self.entry.direction;
+                let counted = is_there(passengers, row)
+                    .map(|count| train.mass_kg + count * train.passenger_mass_kg);
+                if let Some(mass_kg) = self.entry.mass_kg.or(counted) {
+                    sample.set(SampleField::Mass, mass_kg);
+                }
+                for (field, values) in fields {
+                    if let Some(value) = is_there(values, row) {
+                        sample.set(field, value);
+                    }
+                }
+                if let Some(radius) = is_there(radius_m, row) {
+                    sample.set(SampleField::CurveRadius, radius.abs());
+                }
+                if is_there(wheel_slide, row).is_some_and(|slide| slide > 0.5) {
+                    sample.flags |= FLAG_WHEEL_SLIDE;
+                }
+                sample
+            })
+            .collect()
+    }
+}
+
+/// Drops the rows whose time is missing; gives how many went before each kept row and in all.
+fn drop_timeless(table: &mut Table) -> (Vec<u64>, usize) {
+    let times = table.column(Quantity::Time).unwrap_or_default();
+    // Nanoseconds in an i64 reach 292 years; a time beyond is no time.
+    let keep: Vec<bool> = times.iter().map(|time| time.abs() < 9.2e9).collect();
+    let (mut before, mut dropped) = (Vec::with_capacity(keep.len()), 0);
+    for &is_kept in &keep {
+        if is_kept {
+            before.push(std::mem::take(&mut dropped));
+        } else {
+            dropped += 1;
+        }
+    }
+    let total = keep.len() - before.len();
+    if total > 0 {
+        table.retain(&keep);
+    }
+    (before, total)
+}
+
+/// The gradient that the samples carry, and where the gradient comes from first.
+///
+/// A mapped `gradient` goes into the samples whatever the line's file says, since it counts
+/// where the position is missing.
+fn gradient(
+    track: Option<&Track>,
+    table: &Table,
+    position_m: &[f64],
+) -> (Option<Vec<f64>>, GradientSource) {
+    let column = table.filled(Quantity::Gradient).map(<[f64]>::to_vec);
+    if track.is_some_and(|track| track.gradient().is_some()) {
+        return (column, GradientSource::Track);
+    }
+    if column.is_some() {
+        return (column, GradientSource::Column);
+    }
+    if table.filled(Quantity::SpecificForce).is_some() {
+        return (None, GradientSource::SpecificForce);
+    }
+    let slope = table
+        .filled(Quantity::Altitude)
+        .map(|altitude| altitude::gradient_permille(position_m, altitude))
+        .filter(|slope| slope.iter().any(|slope| !slope.is_nan()));
+    match slope {
+        Some(slope) => (Some(slope), GradientSource::Altitude),
+        None => (None, GradientSource::Unknown),
+    }
+}

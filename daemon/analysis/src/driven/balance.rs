@@ -1,0 +1,124 @@
+//! The forces of a moment, part by part.
+
+use dynocar_core::train::{Davis, TrainModel};
+
+use crate::explain::evidence::SampleForces;
+
+/// A force along the travel; what retards is positive, but for traction, which drives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ForcePart {
+    /// Traction force that acts, after gain and delay.
+    Traction,
+    /// Brake force that acts, after the delay.
+    Brake,
+    /// Weight along the gradient.
+    Gradient,
+    /// Basic resistance by the Davis coefficients.
+    Basic,
+    /// Curves.
+    Curve,
+    /// Tunnels, by their length, as share of c and beside it.
+    Tunnel,
+    /// What the wind adds to the air resistance.
+    Wind,
+    /// What the temperature adds to the basic resistance.
+    Ambient,
+    /// Cold bearings.
+    Bearing,
+    /// Places.
+    Place,
+    /// Forms of their own.
+    Other,
+}
+
+impl ForcePart {
+    /// Every part.
+    pub const ALL: [ForcePart; 11] = [
+        ForcePart::Traction,
+        ForcePart::Brake,
+        ForcePart::Gradient,
+        ForcePart::Basic,
+        ForcePart::Curve,
+        ForcePart::Tunnel,
+        ForcePart::Wind,
+        ForcePart::Ambient,
+        ForcePart::Bearing,
+        ForcePart::Place,
+        ForcePart::Other,
+    ];
+}
+
+/// What accelerates a train at a moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Balance {
+    forces: SampleForces,
+    davis: Davis,
+    speed_mps: f64,
+    is_held: bool,
+}
+
+impl Balance {
+    pub(super) fn new(forces: SampleForces, davis: Davis, speed_mps: f64) -> Self {
+        Balance { forces, davis, speed_mps, is_held: false }
+    }
+
+    /// The same at another speed in m/s nearby.
+    pub(super) fn at(self, speed_mps: f64) -> Self {
+        Balance { speed_mps, ..self }
+    }
+
+    /// The same while a brake that nobody reports holds the train.
+    pub(super) fn held(self) -> Self {
+        Balance { is_held: true, ..self }
+    }
+
+    /// What the forces make of the train in m/s²: negative even where they hold it at rest.
+    #[inline]
+    pub(super) fn unheld_mps2(&self) -> f64 {
+        let [p0, p1, p2] = self.forces.polynomial(self.davis, self.speed_mps);
+        p0 + self.speed_mps * (p1 + self.speed_mps * p2)
+    }
+
+    /// dv/dt in m/s²; 0 for a train that is held at rest.
+    pub fn acceleration_mps2(&self) -> f64 {
+        let free_mps2 = self.unheld_mps2();
+        let stays = self.is_held || (self.speed_mps == 0.0 && free_mps2 < 0.0);
+        if stays { 0.0 } else { free_mps2 }
+    }
+
+    /// Gross mass in kg.
+    pub fn mass_kg(&self) -> f64 {
+        self.forces.mass_kg
+    }
+
+    /// A part in N. On a standing train it is what would act.
+    pub fn force_n(&self, part: ForcePart) -> f64 {
+        let SampleForces { resistance, .. } = &self.forces;
+        let (davis, speed_mps) = (self.davis, self.speed_mps);
+        let n_per_kn = match part {
+            ForcePart::Traction => return self.forces.traction_n,
+            ForcePart::Brake => return self.forces.brake_n,
+            ForcePart::Gradient => self.forces.gradient_permille,
+            ForcePart::Basic => davis.w0_n_per_kn(speed_mps),
+            ForcePart::Curve => resistance.curve_n_per_kn,
+            ForcePart::Tunnel => resistance.in_tunnels_n_per_kn(davis, speed_mps),
+            ForcePart::Wind => resistance.by_wind_n_per_kn(davis, speed_mps),
+            ForcePart::Ambient => resistance.by_factor_n_per_kn(davis, speed_mps),
+            ForcePart::Bearing => resistance.bearing_n_per_kn,
+            ForcePart::Place => resistance.place_n_per_kn,
+            ForcePart::Other => resistance.other_at_n_per_kn(speed_mps),
+        };
+        self.weight_kn() * n_per_kn
+    }
+
+    /// All that resists in N but brake and gradient.
+    pub fn resistance_n(&self) -> f64 {
+        let (davis, speed_mps) = (self.davis, self.speed_mps);
+        let extra_n_per_kn = self.forces.resistance.extra_n_per_kn(davis, speed_mps);
+        self.weight_kn() * (davis.w0_n_per_kn(speed_mps) + extra_n_per_kn)
+    }
+
+    fn weight_kn(&self) -> f64 {
+        TrainModel::weight_kn(self.forces.mass_kg)
+    }
+}

@@ -1,0 +1,149 @@
+//! A train driven by forces: force in, speed out, by the law of the open-loop prediction.
+//!
+//! The forces of a moment come from [`ForceResolver`] and [`SampleForces`], as `explain` takes them
+//! over a recorded run, and each step is [`advance`]: what the grown model predicts there, the train
+//! drives here. Only the speed at which a resistance is evaluated is its own, not a measured one.
+
+mod balance;
+
+use std::sync::Arc;
+
+pub use balance::{Balance, ForcePart};
+use dynocar_core::force::ForceResolver;
+use dynocar_core::simulate::is_pulled;
+use dynocar_core::simulate::motion::{Motion, STEP_MAX_S, advance};
+use dynocar_core::track::Track;
+use dynocar_core::train::TrainModel;
+use dynocar_core::validation::ValidSample;
+use dynocar_shared::{SampleField, TrainSample};
+
+use crate::explain::evidence::SampleForces;
+
+/// How a train begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Beginning {
+    /// Chainage of its centre in m.
+    pub position_m: f64,
+    /// True speed in m/s, never negative.
+    pub speed_mps: f64,
+    /// Whether a standing train that is not pulled is held by a brake, reported or not.
+    pub is_held_at_rest: bool,
+}
+
+/// A train on a line, moved by what acts on it.
+#[derive(Clone, Debug)]
+pub struct DrivenTrain {
+    train: Arc<TrainModel>,
+    forces: ForceResolver,
+    is_held_at_rest: bool,
+    position_m: f64,
+    speed_mps: f64,
+    balance: Option<Balance>,
+}
+
+impl DrivenTrain {
+    /// A train at its beginning; without a line the gradient comes with what acts.
+    pub fn new(train: Arc<TrainModel>, track: Option<Arc<Track>>, beginning: Beginning) -> Self {
+        let Beginning { position_m, speed_mps, is_held_at_rest } = beginning;
+        let forces = ForceResolver::new(Arc::clone(&train), track);
+        DrivenTrain { train, forces, is_held_at_rest, position_m, speed_mps, balance: None }
+    }
+
+    /// Chainage of the train's centre in m, by its own motion.
+    pub fn position_m(&self) -> f64 {
+        self.position_m
+    }
+
+    /// True speed in m/s.
+    pub fn speed_mps(&self) -> f64 {
+        self.speed_mps
+    }
+
+    /// Speed in m/s as the train's own sensor tells it.
+    pub fn measured_speed_mps(&self) -> f64 {
+        self.speed_mps * self.train.corrections.speed_scale
+    }
+
+    /// Dead time in s by which forces act later than they are reported. The train remembers those of
+    /// its last 1000 steps.
+    pub fn dead_time_s(&self) -> f64 {
+        self.train.corrections.actuator_delay_s
+    }
+
+    /// What accelerates the train where it was looked at last, at the end of the newest step.
+    pub fn balance(&self) -> Option<&Balance> {
+        self.balance.as_ref()
+    }
+
+    /// Balances the forces of a moment without moving.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    pub fn look(&mut self, acting: &TrainSample) {
+        let here = Motion { distance_m: 0.0, speed_mps: self.speed_mps };
+        let (balance, pulled) = self.balanced(acting, here);
+        let is_held = self.is_held_at_rest && self.speed_mps == 0.0 && !pulled;
+        self.balance = Some(if is_held { balance.held() } else { balance });
+    }
+
+    /// Moves for a time in s; `acting` is what acts so many s after the step's beginning.
+    ///
+    /// A sample's forces, mass, temperature and, without a line, gradient and curve act; a force
+    /// that is missing is none. Its position says where on the line it acts; missing, that is where
+    /// the train has come to. Its speed is not asked.
+    ///
+    /// # Real-time
+    ///
+    /// No allocation; work in proportion to the time.
+    pub fn drive(&mut self, step_s: f64, acting: impl Fn(f64) -> TrainSample) {
+        let parts = (step_s / STEP_MAX_S).ceil();
+        let part_s = step_s / parts;
+        for part in 0..parts as u32 {
+            self.drive_part(part_s, |at_s| acting(f64::from(part) * part_s + at_s));
+        }
+    }
+
+    fn drive_part(&mut self, step_s: f64, acting: impl Fn(f64) -> TrainSample) {
+        let begin = Motion { distance_m: 0.0, speed_mps: self.speed_mps };
+        let mut is_held = self.is_held_at_rest && self.speed_mps == 0.0;
+        let mut direction = 1.0;
+        let after = advance(begin, step_s, |at_s, motion| {
+            let sample = acting(at_s);
+            let (balance, pulled) = self.balanced(&sample, motion);
+            is_held &= !pulled;
+            direction = f64::from(sample.direction);
+            self.balance = Some(balance);
+            balance.unheld_mps2()
+        });
+        if is_held {
+            self.balance = self.balance.map(Balance::held);
+            return;
+        }
+        self.speed_mps = after.speed_mps;
+        self.position_m += direction * after.distance_m;
+        // The forces were taken at the speed that the step's beginning promised.
+        self.balance = self.balance.map(|balance| balance.at(after.speed_mps));
+    }
+
+    /// The forces at a motion within a step, and whether the train is pulled.
+    fn balanced(&mut self, acting: &TrainSample, motion: Motion) -> (Balance, bool) {
+        let mut sample = *acting;
+        if sample.get(SampleField::Position).is_none() {
+            let way_m = f64::from(sample.direction) * motion.distance_m;
+            sample.set(SampleField::Position, self.position_m + way_m);
+        }
+        for force in [SampleField::TractionForce, SampleField::BrakeForce] {
+            sample.set(force, sample.get(force).unwrap_or(0.0));
+        }
+        let speed_scale = self.train.corrections.speed_scale;
+        sample.set(SampleField::Speed, motion.speed_mps * speed_scale);
+        let resolved =
+            self.forces.resolve(&ValidSample { sample: &sample, step_s: 0.0, stretch: 1 });
+        let forces = SampleForces::declared(&resolved, self.train.rotating_mass_factor);
+        (Balance::new(forces, self.train.resistance, motion.speed_mps), is_pulled(&resolved))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,345 @@
+//! The machine-readable answer of `dynocar explain --json`.
+
+use std::collections::BTreeMap;
+
+use dynocar_core::named;
+use dynocar_core::plausibility::Severity;
+use serde::{Deserialize, Serialize};
+
+use super::stop_to_stop::StopToStop;
+use crate::dataset::Note;
+
+named! {
+    /// What the data say, in a word.
+    #[derive(Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    Verdict ("as in answers for machines") {
+        /// Nothing undeclared acts, as far as the data tell.
+        None "none";
+        /// One or more effects of the library act.
+        Effect "effect";
+        /// Several effects explain the data equally well.
+        Ambiguous "ambiguous";
+        /// The residual is real, but no effect of the library explains it.
+        Unknown "unknown";
+        /// The data do not suffice for a statement.
+        InsufficientData "insufficient_data";
+    }
+}
+
+/// A stretch of time in a run, in the recording's own time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RunWindow {
+    /// The run's file.
+    pub run: String,
+    /// Start in s.
+    pub t_start_s: f64,
+    /// End in s.
+    pub t_end_s: f64,
+}
+
+/// A range of a covariate.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CovariateRange {
+    /// Its name with the unit.
+    pub name: String,
+    /// Lowest and highest value.
+    pub range: [f64; 2],
+}
+
+/// How surely a window's ends are known.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WindowUncertainty {
+    /// The run's file.
+    pub run: String,
+    /// 95 % interval of the start in s.
+    pub t_start_s: [f64; 2],
+    /// 95 % interval of the end in s; absent for an end that was not estimated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub t_end_s: Option<[f64; 2]>,
+}
+
+/// How surely a place is known: 95 % intervals of the ends that were estimated.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct PlaceUncertainty {
+    /// Of both ends of every interval, in m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub intervals_m: Option<Vec<[[f64; 2]; 2]>>,
+    /// Of the windows that were estimated from the speeds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub windows: Option<Vec<WindowUncertainty>>,
+    /// Of the least and the greatest value of the covariate; `null` where the data end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range: Option<[Option<[f64; 2]>; 2]>,
+    /// Probability that the effect acts in a run, for all fit runs where the runs were chosen.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub run_probability: Option<BTreeMap<String, f64>>,
+}
+
+/// Where an effect acts; all that is given holds together.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Place {
+    /// Chainages in m of the train's centre.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub intervals_m: Option<Vec<[f64; 2]>>,
+    /// Stretches of time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub windows: Option<Vec<RunWindow>>,
+    /// Files of the runs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub runs: Option<Vec<String>>,
+    /// Lowest and highest speed in m/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speed_range_mps: Option<[f64; 2]>,
+    /// A covariate and its range.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub covariate: Option<CovariateRange>,
+    /// How surely that is known, where it was estimated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uncertainty_95: Option<PlaceUncertainty>,
+}
+
+impl Answer {
+    /// The notes by which the data cannot be true.
+    pub fn impossibilities(&self) -> impl Iterator<Item = &Note> {
+        self.notes.iter().filter(|note| note.severity == Severity::Fundamental)
+    }
+}
+
+impl Place {
+    /// A place that is a set of intervals; nothing given for an empty set.
+    pub fn of_intervals(intervals_m: Vec<[f64; 2]>) -> Self {
+        Place { intervals_m: (!intervals_m.is_empty()).then_some(intervals_m), ..Place::default() }
+    }
+
+    /// Whether the place may be in a run, by its file.
+    pub fn may_be_in(&self, file: &str) -> bool {
+        self.runs.as_ref().is_none_or(|runs| runs.iter().any(|run| run == file))
+            && self.windows.as_ref().is_none_or(|all| all.iter().any(|own| own.run == file))
+    }
+}
+
+/// A mass that holds between two places.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MassSection {
+    /// Lower chainage in m.
+    pub from_m: f64,
+    /// Upper chainage in m.
+    pub to_m: f64,
+    /// Direction of travel, 1 or -1.
+    pub direction: i8,
+    /// True over declared mass.
+    pub mass_factor: f64,
+}
+
+/// A mass that holds for some time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MassWindow {
+    /// The run's file.
+    pub run: String,
+    /// Start in s.
+    pub t_start_s: f64,
+    /// End in s.
+    pub t_end_s: f64,
+    /// True over declared mass.
+    pub mass_factor: f64,
+}
+
+/// The value of a parameter.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum ParameterValue {
+    /// A number.
+    Number(f64),
+    /// A number for each run.
+    ByRun(BTreeMap<String, f64>),
+    /// Numbers in the order of a list.
+    List(Vec<f64>),
+    /// [chainage in m, value] along the line.
+    Profile(Vec<[f64; 2]>),
+    /// Masses by place.
+    Sections(Vec<MassSection>),
+    /// Masses by time.
+    Windows(Vec<MassWindow>),
+    /// A formula.
+    Formula(String),
+}
+
+/// An effect that was found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EffectAnswer {
+    /// Its kind.
+    pub kind: &'static str,
+    /// Where it acts.
+    #[serde(rename = "where")]
+    pub place: Place,
+    /// Parameters in SI units.
+    pub parameters: BTreeMap<String, ParameterValue>,
+    /// Their standard deviations.
+    pub std: BTreeMap<String, ParameterValue>,
+    /// Probability that the search finds as much where nothing acts.
+    pub p_value: f64,
+    /// Share of the open-loop error on the fit runs that goes when the effect is added last.
+    pub error_reduction: f64,
+    /// For an effect outside the library, forms that explain less of the data, the best first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub runners_up: Vec<RunnerUp>,
+}
+
+/// Another form of an effect outside the library.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RunnerUp {
+    /// Its formula.
+    pub formula: String,
+    /// By how much its evidence is less, in units of -2 log likelihood.
+    pub evidence_less: f64,
+}
+
+/// Half of a 95 % interval in standard deviations.
+pub const HALF_95: f64 = 1.96;
+
+/// What the data say of one number at no effect.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Identifiability {
+    /// The kind of effect.
+    pub kind: &'static str,
+    /// Its parameter, with the unit.
+    pub parameter: &'static str,
+    /// Standard deviation, a, b, c and what was found fitted beside it; `None` where the data say
+    /// nothing.
+    pub std: Option<f64>,
+    /// Whether an effect that is large enough to matter would show.
+    pub told: bool,
+    /// Other kinds beside which it would not: either could stand for the other.
+    pub alike: Vec<&'static str>,
+}
+
+impl Identifiability {
+    /// What would show, in the unit of the parameter: half of the 95 % interval.
+    pub fn hidden_up_to(&self) -> Option<f64> {
+        self.std.map(|std| HALF_95 * std)
+    }
+}
+
+/// An effect that was considered.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Considered {
+    /// Its kind.
+    pub kind: &'static str,
+    /// What it explains beyond a, b, c and the effects found, less the cost of its parameters and
+    /// choices, in units of -2 log likelihood; absent when it could not be tested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub evidence: Option<f64>,
+    /// Why it was not chosen, or could not be tested.
+    pub remark: String,
+}
+
+/// A value with its standard deviation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Told {
+    /// The value.
+    pub value: f64,
+    /// Its standard deviation.
+    pub std: f64,
+}
+
+/// A drive whose force comes from its electric power.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DriveAnswer {
+    /// Share of the power that reaches the rims, for the declared mass: both scale alike.
+    pub efficiency: Told,
+    /// Power in kW that is fed beside the drive; absent where the drive's own power is recorded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub auxiliary_power_kw: Option<Told>,
+    /// The declared efficiency, with which forces were read; absent where the usual one was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub declared_efficiency: Option<f64>,
+    /// What lies at a bound of what is looked for: it is not told, and the declared drive stays.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_bound: Option<&'static str>,
+}
+
+/// Davis coefficients with their standard deviations.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BaseAnswer {
+    /// a in N/kN.
+    pub a: f64,
+    /// b in N/kN per m/s.
+    pub b: f64,
+    /// c in N/kN per (m/s)².
+    pub c: f64,
+    /// Their standard deviations.
+    pub std: DavisDeviations,
+    /// Share of their variance before the data that the data take away: 1 where they say all, 0
+    /// where they say nothing.
+    pub told_by_data: DavisDeviations,
+}
+
+/// A number for each of a, b, c.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DavisDeviations {
+    /// Of a.
+    pub a: f64,
+    /// Of b.
+    pub b: f64,
+    /// Of c.
+    pub c: f64,
+}
+
+/// The answer.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Answer {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The verdict in a sentence or two.
+    pub statement: String,
+    /// What may spoil the verdict, the worst first; with a fundamental one there is none.
+    pub notes: Vec<Note>,
+    /// The effects found, the strongest first.
+    pub effects: Vec<EffectAnswer>,
+    /// Kinds that explain the data as well as the first effect.
+    pub ambiguous_with: Vec<&'static str>,
+    /// What would separate or settle them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub experiment: Option<String>,
+    /// a, b, c fitted together with the effects.
+    pub base: BaseAnswer,
+    /// Always `full_run`.
+    pub metric: &'static str,
+    /// Holdout runs with motion, which judge the model.
+    pub scored_runs: usize,
+    /// Why nothing was scored, and what the errors on the fit runs are worth; absent when it was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unscored: Option<String>,
+    /// RMSE in m/s on the holdout runs without the effects.
+    pub rmse_before: Option<f64>,
+    /// RMSE in m/s on the holdout runs with the effects.
+    pub rmse_after: Option<f64>,
+    /// 95 % interval of 1 - after / before, by bootstrap over the holdout runs.
+    pub error_reduction_interval: Option<[f64; 2]>,
+    /// The same errors restarted every 60 s: before and after.
+    pub window60: Option<[f64; 2]>,
+    /// Errors of the holdout runs from stop to stop, each from its departure; absent where they do
+    /// not stop twice, and where forces are unknown near every stop, as forces from power are.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stop_to_stop: Option<StopToStop>,
+    /// The same errors on the fit runs: before and after.
+    pub fit_runs: Option<[f64; 2]>,
+    /// The drive, where the force comes from its power.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drive: Option<DriveAnswer>,
+    /// Seconds by which forces act before their stamps; absent where samples are dense or it is not
+    /// told.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_late_s: Option<Told>,
+    /// What stays unexplained and is taken for noise: a force of this standard deviation in N/kN
+    /// on average over a minute; absent without motion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unexplained_n_per_kn: Option<f64>,
+    /// What else was considered.
+    pub considered: Vec<Considered>,
+    /// What the data say of the numbers of train and line that were not found.
+    pub identifiability: Vec<Identifiability>,
+    /// Prediction files by run.
+    pub predictions: BTreeMap<String, String>,
+}

@@ -1,0 +1,245 @@
+//! The efficiency of a drive whose force is not recorded but its power: a scale that the runs tell
+//! through the mass, before anything undeclared is looked for.
+//!
+//! The efficiency acts one way when the drive pulls and the other way when it brakes, and so do
+//! the auxiliaries: what is told of them holds for the declared mass.
+
+use std::sync::Arc;
+
+use dynocar_core::terms::Parameter;
+use dynocar_core::train::Drive;
+use dynocar_shared::vocabulary::EffectKind;
+use nalgebra::DMatrix;
+
+use super::answer::{DriveAnswer, HALF_95, Told};
+use super::effects::{AtBound, Hypothesis};
+use super::evidence::{
+    FitProblem, GrownModel, Noise, RunData, RunDataError, SampleForces, prepare,
+};
+use super::selection::{OBSERVATIONS_MIN, deviations};
+use crate::dataset::{Dataset, Role};
+
+/// Efficiency, and what is fed beside the drive in kW beyond what is fed at rest.
+const PARAMETERS: [Parameter; 2] = [
+    Parameter::new("efficiency", (*Drive::EFFICIENCIES.start(), *Drive::EFFICIENCIES.end()), 0.005),
+    Parameter::new("auxiliary_power_kw", (-2000.0, 2000.0), 0.1),
+];
+/// Below this speed in m/s a drive takes nothing.
+const RESTING_MPS: f64 = 0.05;
+/// So many samples at rest tell what is fed beside the drive.
+const RESTING_MIN: usize = 30;
+/// What is fed beside a drive that drives differs from what is fed at rest by this share at least.
+const DRIVING_SHARE: f64 = 0.25;
+
+/// What a line feeds beside a drive, before the runs have driven, in kW.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Auxiliaries {
+    power_kw: f64,
+    std_kw: f64,
+}
+
+impl Auxiliaries {
+    /// The power at rest of some runs and its scatter; the declared one with a wide one where they
+    /// never rest.
+    fn of(powered: &[&RunData], declared: Drive) -> Self {
+        let rows = powered.iter().filter_map(|run| Some((run, run.power.as_ref()?)));
+        let mut resting_kw: Vec<f64> = rows
+            .flat_map(|(run, power)| run.samples().iter().zip(&power.power_w))
+            .filter(|(sample, power_w)| sample.speed_mps < RESTING_MPS && power_w.is_finite())
+            .map(|(_, power_w)| 1e-3 * power_w)
+            .collect();
+        if resting_kw.len() < RESTING_MIN {
+            let power_kw = 1e-3 * declared.auxiliary_power_w;
+            return Auxiliaries { power_kw, std_kw: PARAMETERS[1].upper };
+        }
+        resting_kw.sort_unstable_by(f64::total_cmp);
+        let at = |share: f64| resting_kw[((resting_kw.len() - 1) as f64 * share) as usize];
+        let power_kw = at(0.5).max(0.0);
+        let scatter_kw = 0.5 * (at(0.84) - at(0.16));
+        Auxiliaries { power_kw, std_kw: scatter_kw.hypot(DRIVING_SHARE * power_kw).max(0.1) }
+    }
+}
+
+/// One number stands for the map of a drive's efficiencies, which differ between a light and a full
+/// load by some hundredths: standard deviation of what it leaves of the efficiency.
+const EFFICIENCY_FORM_STD: f64 = 0.01;
+/// The same of the auxiliaries, as a share of the drive's root mean square power.
+const AUXILIARIES_FORM_SHARE: f64 = 0.02;
+
+/// Root mean square of the power in kW of moving samples.
+fn moving_power_kw(problem: &FitProblem) -> f64 {
+    let rows = problem.runs.iter().filter_map(|run| Some((run, run.power.as_ref()?)));
+    let moving = rows
+        .flat_map(|(run, power)| run.samples().iter().zip(&power.power_w))
+        .filter(|(sample, power_w)| sample.speed_mps > RESTING_MPS && power_w.is_finite());
+    let (count, sum) = moving.fold((0.0, 0.0), |(n, sum), (_, w)| (n + 1.0, sum + w * w));
+    if count > 0.0 { 1e-3 * f64::sqrt(sum / count) } else { 0.0 }
+}
+
+/// A drive with an efficiency, and auxiliaries where the power holds them, for unknown.
+#[derive(Debug)]
+struct OpenDrive {
+    declared: Drive,
+    /// What is fed at rest, where the power holds it.
+    resting: Option<Auxiliaries>,
+    prior: DMatrix<f64>,
+}
+
+impl OpenDrive {
+    fn new(declared: Drive, resting: Option<Auxiliaries>) -> Self {
+        let weights = match resting {
+            Some(resting) => vec![0.0, resting.std_kw.powi(-2)],
+            None => vec![0.0],
+        };
+        OpenDrive { declared, resting, prior: DMatrix::from_diagonal(&weights.into()) }
+    }
+
+    fn at(&self, parameters: &[f64]) -> Drive {
+        let auxiliary_power_w = match (self.resting, parameters.get(1)) {
+            (Some(resting), Some(more_kw)) => 1e3 * (resting.power_kw + more_kw),
+            _ => self.declared.auxiliary_power_w,
+        };
+        Drive { efficiency: parameters[0], auxiliary_power_w, ..self.declared }
+    }
+
+    fn start(&self) -> Vec<f64> {
+        let all = [self.declared.efficiency, 0.0];
+        all[..self.parameters().len()].to_vec()
+    }
+}
+
+impl Hypothesis for OpenDrive {
+    /// The kind that it would be taken for.
+    fn kind(&self) -> EffectKind {
+        EffectKind::TractionGain
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        if self.resting.is_some() { &PARAMETERS } else { &PARAMETERS[..1] }
+    }
+
+    /// A drive without losses.
+    fn none(&self) -> f64 {
+        1.0
+    }
+
+    /// What is fed at rest says what may be fed while driving.
+    fn prior_information(&self) -> Option<&DMatrix<f64>> {
+        Some(&self.prior)
+    }
+
+    fn at_bound(&self, parameters: &[f64]) -> Option<AtBound> {
+        let spec = &PARAMETERS[0];
+        let near = |bound: &f64| (parameters[0] - bound).abs() < spec.step;
+        let bound = [spec.lower, spec.upper].into_iter().find(near)?;
+        Some(AtBound { name: spec.name, bound })
+    }
+
+    fn touches(&self, _parameter: usize, run: &RunData) -> bool {
+        run.power.is_some()
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        let Some(power) = &run.power else { return };
+        let drive = self.at(parameters);
+        let rows = power.power_w.iter().zip(run.samples());
+        for (force, (&power_w, sample)) in forces.iter_mut().zip(rows) {
+            let more = drive.beyond_n(self.declared, power_w, sample.speed_mps);
+            let Some([traction_n, brake_n]) = more else { continue };
+            force.traction_n += traction_n;
+            if power.is_brake {
+                force.brake_n += brake_n;
+            }
+        }
+    }
+}
+
+/// A drive as the runs tell it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ToldDrive {
+    /// With what was found.
+    pub drive: Drive,
+    /// The same for machines.
+    pub answer: DriveAnswer,
+}
+
+/// What the fit runs of a dataset tell of the drive whose power they record; `None` where no force
+/// comes from power, or too little is driven to tell.
+///
+/// # Errors
+///
+/// When a run has no usable sample.
+pub fn told(dataset: &Dataset) -> Result<Option<ToldDrive>, RunDataError> {
+    if dataset.runs.iter().all(|run| run.power().is_none()) {
+        return Ok(None);
+    }
+    let mut runs = prepare(dataset)?;
+    runs.retain(|run| run.role == Role::Fit);
+    let powered: Vec<&RunData> = runs.iter().filter(|run| run.power.is_some()).collect();
+    if powered.is_empty() {
+        return Ok(None);
+    }
+    let declared = dataset.train.drive;
+    let drive = declared.unwrap_or(Drive::USUAL);
+    let holds_more = |run: &&RunData| run.power.as_ref().is_some_and(|it| it.has_auxiliaries);
+    let resting = powered.iter().any(holds_more).then(|| Auxiliaries::of(&powered, drive));
+    let open = OpenDrive::new(drive, resting);
+    let problem = FitProblem::new(runs, dataset.train.resistance);
+    Ok(told_by(&problem, open, declared))
+}
+
+fn told_by(problem: &FitProblem, open: OpenDrive, declared: Option<Drive>) -> Option<ToldDrive> {
+    let start = problem.start(&open.start());
+    let open = Arc::new(open);
+    let model = GrownModel::default().with(open.clone());
+    let first = problem.fit_with_noise(&model, start, Noise::START);
+    let fit = problem.fit_with_noise(&model, first.theta, first.noise);
+    if fit.observations() < OBSERVATIONS_MIN {
+        return None;
+    }
+    let deviation = deviations(&fit).std;
+    let found = fit.effect_parameters(0);
+    let at = open.at(found);
+    let form_kw = AUXILIARIES_FORM_SHARE * moving_power_kw(problem);
+    let at_bound = open.at_bound(found).map(|at| at.name);
+    let answer = DriveAnswer {
+        efficiency: Told { value: at.efficiency, std: deviation[3].hypot(EFFICIENCY_FORM_STD) },
+        auxiliary_power_kw: open
+            .resting
+            .map(|_| Told { value: 1e-3 * at.auxiliary_power_w, std: deviation[4].hypot(form_kw) }),
+        declared_efficiency: declared.map(|drive| drive.efficiency),
+        at_bound,
+    };
+    // What lies at a bound is not told.
+    let drive = if at_bound.is_some() { open.declared } else { at };
+    Some(ToldDrive { drive, answer })
+}
+
+impl DriveAnswer {
+    /// What is told of the drive, as a sentence to follow another.
+    pub fn sentence(&self) -> String {
+        let Told { value, std } = self.efficiency;
+        let read = match self.declared_efficiency {
+            Some(declared) => format!("declared {declared}"),
+            None => format!("{} is usual", Drive::USUAL.efficiency),
+        };
+        if let Some(name) = self.at_bound {
+            return format!(
+                " The force comes from power, and these runs do not tell the drive's efficiency \
+                 ({name} at its bound; {read}): it stays."
+            );
+        }
+        let auxiliaries = self.auxiliary_power_kw.map_or(String::new(), |told| {
+            format!(
+                " and {:.1} ± {:.1} kW for what is fed beside it",
+                told.value,
+                HALF_95 * told.std
+            )
+        });
+        format!(
+            " The force comes from power, at an efficiency of {value:.3} ± {:.3} ({read}){auxiliaries}, \
+             for the declared mass: of a mass that is 1 % off, so is the efficiency.",
+            HALF_95 * std
+        )
+    }
+}

@@ -1,0 +1,79 @@
+//! Forces that act later than reported: a dead time, then a first-order lag.
+
+use dynocar_core::terms::delay::{self, DelayLine};
+use dynocar_core::terms::{Entry, Parameter};
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Candidate, Effect, Hypothesis, Proposal};
+use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::scan::{Scan, Tuple};
+
+/// Delay and lag in s that a fit may start from.
+const STARTS: [[f64; 2]; 4] = [[0.3, 0.3], [1.0, 1.0], [0.2, 2.0], [2.0, 0.3]];
+
+/// The kind.
+pub struct ActuatorDelay;
+
+#[derive(Debug)]
+struct DelayAndLag;
+
+impl Effect for ActuatorDelay {
+    fn kind(&self) -> EffectKind {
+        EffectKind::ActuatorDelay
+    }
+
+    fn propose(&self, scan: &Scan) -> Proposal {
+        let best = STARTS
+            .into_iter()
+            .map(|start| (decrease(scan, start), start))
+            .max_by(|one, other| one.0.total_cmp(&other.0));
+        let candidate = |(_, start): (f64, [f64; 2])| Candidate::new(DelayAndLag, start.to_vec());
+        Proposal::Candidates(best.map(candidate).into_iter().collect())
+    }
+}
+
+/// Decrease of the cost when the forces act with this delay and lag.
+fn decrease(scan: &Scan, [delay_s, lag_s]: [f64; 2]) -> f64 {
+    let mut sum = Tuple::zero(scan.fit.theta.len());
+    for (index, run) in scan.problem.runs.iter().enumerate() {
+        let mut late = run.declared.clone();
+        DelayAndLag.apply(&[delay_s, lag_s], run, &mut late);
+        let control_n = |force: &SampleForces| force.traction_n - force.brake_n;
+        sum.add(&scan.run_tuple(index, |run, i| {
+            let change_n = control_n(&late[i]) - control_n(&run.declared[i]);
+            change_n / run.samples()[i].inertial_mass_kg
+        }));
+    }
+    scan.decrease_at_one(&sum)
+}
+
+impl Hypothesis for DelayAndLag {
+    fn kind(&self) -> EffectKind {
+        EffectKind::ActuatorDelay
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &delay::PARAMETERS
+    }
+
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        parameters[0] + parameters[1] > delay::LEAST_S
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        let mut line = DelayLine::new(parameters[0], parameters[1]);
+        for (force, sample) in forces.iter_mut().zip(run.samples()) {
+            let at = (sample.time_ns, sample.stretch);
+            if let Some(late) = line.acting(at, Some([force.traction_n, force.brake_n])) {
+                [force.traction_n, force.brake_n] = late;
+            }
+        }
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        Some(vec![
+            Entry::Number(&delay::DELAY, parameters[0]),
+            Entry::Number(&delay::LAG, parameters[1]),
+        ])
+    }
+}

@@ -1,0 +1,90 @@
+//! Basic resistance that follows the outside temperature: w0 (1 + beta (T - reference)).
+
+use dynocar_core::terms::{Entry, Parameter, ambient};
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Candidate, Effect, Hypothesis, Proposal, ReportContext, Reported};
+use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::scan::Scan;
+
+/// Mean temperatures of the runs must differ by so many K.
+const SPREAD_MIN_K: f64 = 4.0;
+
+/// The kind.
+pub struct AmbientTemperature;
+
+#[derive(Debug)]
+struct Linear;
+
+/// Mean outside temperature of a run in °C.
+fn mean_degc(run: &RunData) -> Option<f64> {
+    let (sum, count) = run
+        .samples()
+        .iter()
+        .filter_map(|sample| sample.ambient_temperature_degc)
+        .fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
+    (count > 0).then(|| sum / f64::from(count))
+}
+
+impl Effect for AmbientTemperature {
+    fn kind(&self) -> EffectKind {
+        EffectKind::AmbientTemperature
+    }
+
+    fn propose(&self, scan: &Scan) -> Proposal {
+        let means: Option<Vec<f64>> = scan.problem.runs.iter().map(mean_degc).collect();
+        let Some(means) = means else {
+            return Proposal::NotTestable(
+                "ambient_temperature is not recorded in every run".into(),
+            );
+        };
+        let low = means.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = means.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if high - low < SPREAD_MIN_K {
+            let spread = high - low;
+            return Proposal::NotTestable(format!(
+                "the runs' outside temperatures differ by {spread:.1} K only"
+            ));
+        }
+        Proposal::Candidates(vec![Candidate::new(Linear, vec![0.0])])
+    }
+
+    fn whole(&self, scan: &Scan) -> Option<Candidate> {
+        self.propose(scan).first()
+    }
+}
+
+impl Hypothesis for Linear {
+    fn kind(&self) -> EffectKind {
+        EffectKind::AmbientTemperature
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &ambient::PARAMETERS
+    }
+
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        parameters[0].abs() > ambient::LEAST_PER_K
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        for (force, sample) in forces.iter_mut().zip(run.samples()) {
+            let degc = sample.ambient_temperature_degc;
+            ambient::act(parameters[0], ambient::REFERENCE_K, degc, &mut force.resistance);
+        }
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        Some(vec![
+            Entry::Number(&ambient::W0_PER_K, parameters[0]),
+            Entry::Number(&ambient::REFERENCE, ambient::REFERENCE_K),
+        ])
+    }
+
+    fn report(&self, context: &ReportContext) -> Reported {
+        let mut reported = Reported::default();
+        reported.push("w0_per_k", context.parameters[0], context.deviations[0]);
+        reported.push("reference_k", ambient::REFERENCE_K, 0.0);
+        reported
+    }
+}

@@ -1,0 +1,66 @@
+//! Cold bearings that warm up.
+
+use dynocar_core::terms::{Entry, Parameter, Resistance, bearings};
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Candidate, Effect, Hypothesis, Proposal};
+use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::scan::Scan;
+
+/// The kind.
+pub struct BearingTemperature;
+
+#[derive(Debug)]
+struct Warming;
+
+impl Effect for BearingTemperature {
+    fn kind(&self) -> EffectKind {
+        EffectKind::BearingTemperature
+    }
+
+    fn propose(&self, scan: &Scan) -> Proposal {
+        let longest_s = scan.problem.runs.iter().map(RunData::duration_s).fold(0.0, f64::max);
+        if longest_s < 240.0 {
+            return Proposal::NotTestable("runs are too short for bearings to warm up".into());
+        }
+        let best = [80.0, 160.0, 300.0, 600.0, 1200.0]
+            .into_iter()
+            .map(|tau_s| {
+                let tuple = scan.tuple(|run, i| {
+                    let sample = &run.samples()[i];
+                    let mut cold = Resistance::BASIC;
+                    bearings::act(1.0, tau_s, sample.since_cold_s, &mut cold);
+                    -cold.bearing_n_per_kn * scan.per_unit_resistance_mps2(sample)
+                });
+                let (gain, estimate) = scan.gain(&tuple);
+                (if estimate > 0.0 { gain } else { 0.0 }, estimate, tau_s)
+            })
+            .max_by(|one, other| one.0.total_cmp(&other.0));
+        let Some((_, delta, tau_s)) = best else { return Proposal::Candidates(Vec::new()) };
+        Proposal::Candidates(vec![Candidate::new(Warming, vec![delta.clamp(0.05, 10.0), tau_s])])
+    }
+}
+
+impl Hypothesis for Warming {
+    fn kind(&self) -> EffectKind {
+        EffectKind::BearingTemperature
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &bearings::PARAMETERS
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        for (force, sample) in forces.iter_mut().zip(run.samples()) {
+            let since_cold_s = sample.since_cold_s;
+            bearings::act(parameters[0], parameters[1], since_cold_s, &mut force.resistance);
+        }
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        Some(vec![
+            Entry::Number(&bearings::DELTA_A, parameters[0]),
+            Entry::Number(&bearings::TAU, parameters[1]),
+        ])
+    }
+}

@@ -1,0 +1,77 @@
+//! Curve resistance k/R in N/kN with another k than declared (Röckl, Schmidt; declared k = 600).
+
+use dynocar_core::terms::{Entry, Parameter, curve};
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Candidate, Effect, Hypothesis, Proposal};
+use crate::explain::answer::Place;
+use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::scan::Scan;
+
+/// The kind.
+pub struct CurveResistance;
+
+#[derive(Debug)]
+struct Curves {
+    declared_k: f64,
+    intervals_m: Vec<[f64; 2]>,
+}
+
+impl Effect for CurveResistance {
+    fn kind(&self) -> EffectKind {
+        EffectKind::CurveResistance
+    }
+
+    fn propose(&self, scan: &Scan) -> Proposal {
+        let in_curve_s = scan.seconds_where(|_, sample| {
+            sample.curvature_per_m.is_some_and(|curvature| curvature > 0.0)
+        });
+        if in_curve_s < 20.0 {
+            return Proposal::NotTestable("no curves known on the way".into());
+        }
+        let declared_k = scan.train.curve_constant_n_per_kn_m;
+        let intervals_m = scan.track.map_or_else(Vec::new, |track| {
+            track.curves().iter().map(|curve| [curve.start_m, curve.end_m]).collect()
+        });
+        Proposal::Candidates(vec![Candidate::new(
+            Curves { declared_k, intervals_m },
+            vec![declared_k],
+        )])
+    }
+
+    fn whole(&self, scan: &Scan) -> Option<Candidate> {
+        self.propose(scan).first()
+    }
+}
+
+impl Hypothesis for Curves {
+    fn kind(&self) -> EffectKind {
+        EffectKind::CurveResistance
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &curve::PARAMETERS
+    }
+
+    fn none(&self) -> f64 {
+        self.declared_k
+    }
+
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        (parameters[0] - self.declared_k).abs() > curve::LEAST_N_PER_KN_M
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        for (force, sample) in forces.iter_mut().zip(run.samples()) {
+            curve::act(parameters[0], sample.curvature_per_m, &mut force.resistance);
+        }
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        Some(vec![Entry::Number(&curve::CONSTANT, parameters[0])])
+    }
+
+    fn place(&self) -> Place {
+        Place::of_intervals(self.intervals_m.clone())
+    }
+}

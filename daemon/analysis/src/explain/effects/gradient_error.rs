@@ -1,0 +1,275 @@
+//! A declared gradient that is wrong by a function of the chainage: the same in every passage, with
+//! opposite forces in the two directions, or of each direction its own where they have ways of
+//! their own.
+//!
+//! The function is linear between nodes. Before the data it is a Gaussian process whose
+//! correlation falls exponentially along the line, so that the nodes are a linear Gaussian block
+//! of the fit; the exponential makes their information tridiagonal (Rasmussen and Williams 2006,
+//! appendix B: the Ornstein-Uhlenbeck process). How large it is and how fast it changes are those
+//! of a map's errors or, where a level line is declared, of a line that nobody surveyed: their
+//! evidence decides.
+
+use dynocar_core::terms::gradient::{self, ErrorScale};
+use dynocar_core::terms::{Entry, Parameter};
+use dynocar_core::track::{self, LinearProfile};
+use dynocar_shared::vocabulary::EffectKind;
+use nalgebra::DMatrix;
+
+use super::unknown::leaves_a_force;
+use super::{Candidate, Effect, Hypothesis, Proposal, ReportContext, Reported};
+use crate::explain::answer::ParameterValue;
+use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::places::{MAP_ERROR_PERMILLE, span_m};
+use crate::explain::scan::Scan;
+
+/// Nodes in the length over which the error changes.
+const NODES_A_LENGTH: f64 = 3.0;
+/// Nodes at least, and at most.
+const NODES_MIN: f64 = 4.0;
+const NODES_MAX: f64 = 160.0;
+/// What is tied to the line shows in so many runs.
+const RUNS_MIN: usize = 2;
+
+/// The kind.
+pub struct GradientError;
+
+#[derive(Debug)]
+struct Profile {
+    nodes_m: Vec<f64>,
+    /// Every node's, or those of growing and then those of falling chainage.
+    parameters: Vec<Parameter>,
+    information: DMatrix<f64>,
+    is_one_way: bool,
+    choice_cost: f64,
+}
+
+impl Effect for GradientError {
+    fn kind(&self) -> EffectKind {
+        EffectKind::GradientError
+    }
+
+    fn propose(&self, scan: &Scan) -> Proposal {
+        let runs = &scan.problem.runs;
+        let span_m = span_m(scan).filter(|_| scan.problem.way_ratio.is_some());
+        let Some(span_m) = span_m.filter(|[low, high]| high > low) else {
+            return Proposal::NotTestable("positions are not measured".into());
+        };
+        if runs.len() < RUNS_MIN {
+            return Proposal::NotTestable("one passage does not tell what stays".into());
+        }
+        let is_one_way = runs.iter().all(|run| run.direction == runs[0].direction);
+        let mut profiles = vec![Profile::new(span_m, gradient::MAP, 1, is_one_way)];
+        let is_level = scan.track.is_none_or(|track| track.is_level());
+        if is_level && leaves_a_force(scan) {
+            let towards = |direction| runs.iter().filter(|run| run.direction == direction).count();
+            let may_part = towards(1.0).min(towards(-1.0)) >= RUNS_MIN;
+            let ways = if may_part { 1..=2 } else { 1..=1 };
+            for scale in gradient::UNSURVEYED {
+                let of = |ways| Profile::new(span_m, scale, ways, false);
+                profiles.extend(ways.clone().map(of).filter(|it| it.apart_m() <= scale.length_m));
+            }
+        }
+        let choice_cost = 2.0 * (profiles.len() as f64).ln();
+        let candidate = |mut profile: Profile| {
+            profile.choice_cost = choice_cost;
+            let start = vec![0.0; profile.parameters.len()];
+            Candidate::new(profile, start)
+        };
+        Proposal::Candidates(profiles.into_iter().map(candidate).collect())
+    }
+}
+
+/// The map's own small error, at none: no effect, but what the finished model is fitted beside.
+pub fn map_error(span_m: [f64; 2], scale: ErrorScale) -> Candidate {
+    let profile = Profile::new(span_m, scale, 1, false);
+    let start = vec![0.0; profile.parameters.len()];
+    Candidate::new(profile, start)
+}
+
+/// Inverse covariance of an Ornstein-Uhlenbeck process at `count` equally distant nodes, for each
+/// of some ways.
+fn prior_information(
+    count: usize,
+    ways: usize,
+    apart_m: f64,
+    ErrorScale { permille, length_m }: ErrorScale,
+) -> DMatrix<f64> {
+    let rho = (-apart_m / length_m).exp();
+    let scale = (permille.powi(2) * (1.0 - rho * rho)).recip();
+    DMatrix::from_fn(ways * count, ways * count, |i, j| match i.abs_diff(j) {
+        _ if i / count != j / count => 0.0,
+        0 if i % count == 0 || (i + 1) % count == 0 => scale,
+        0 => scale * (1.0 + rho * rho),
+        1 => -scale * rho,
+        _ => 0.0,
+    })
+}
+
+fn rms(values: &[f64]) -> f64 {
+    let squares: f64 = values.iter().map(|value| value * value).sum();
+    (squares / values.len() as f64).sqrt()
+}
+
+impl Profile {
+    fn new([low_m, high_m]: [f64; 2], scale: ErrorScale, ways: usize, is_one_way: bool) -> Self {
+        let nodes = (high_m - low_m) * NODES_A_LENGTH / scale.length_m + 1.0;
+        let count = nodes.floor().clamp(NODES_MIN, NODES_MAX);
+        let apart_m = (high_m - low_m) / (count - 1.0);
+        let nodes_m: Vec<f64> = (0..count as usize).map(|k| low_m + apart_m * k as f64).collect();
+        Profile {
+            parameters: vec![gradient::ERROR_PARAMETER; ways * nodes_m.len()],
+            information: prior_information(nodes_m.len(), ways, apart_m, scale),
+            nodes_m,
+            is_one_way,
+            choice_cost: 0.0,
+        }
+    }
+
+    fn apart_m(&self) -> f64 {
+        self.nodes_m[1] - self.nodes_m[0]
+    }
+
+    fn at_nodes(&self, values: &[f64]) -> Vec<[f64; 2]> {
+        self.nodes_m.iter().zip(values).map(|(&node_m, &value)| [node_m, value]).collect()
+    }
+
+    /// The lists of both directions, or of growing and of falling chainage, by their names.
+    fn lists<'a>(
+        &self,
+        names: [&'static str; 2],
+        values: &'a [f64],
+    ) -> impl Iterator<Item = (&'static str, &'a [f64])> {
+        names.into_iter().zip(values.chunks(self.nodes_m.len()))
+    }
+
+    fn error(&self, values: &[f64]) -> Option<track::GradientError> {
+        let mut ways = values.chunks(self.nodes_m.len()).map(|values| {
+            LinearProfile::new(self.nodes_m.iter().copied().zip(values.iter().copied()).collect())
+        });
+        let profile = ways.next()?.ok()?;
+        let falling = ways.next().transpose().ok()?;
+        Some(track::GradientError { profile, falling })
+    }
+}
+
+impl Hypothesis for Profile {
+    fn kind(&self) -> EffectKind {
+        EffectKind::GradientError
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    fn size(&self, parameters: &[f64]) -> f64 {
+        rms(parameters)
+    }
+
+    fn prior_information(&self) -> Option<&DMatrix<f64>> {
+        Some(&self.information)
+    }
+
+    fn twins(&self) -> &[EffectKind] {
+        if self.is_one_way { &[EffectKind::LocalResistance] } else { &[] }
+    }
+
+    fn shared_error(&self) -> f64 {
+        MAP_ERROR_PERMILLE
+    }
+
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        rms(parameters) > gradient::ERROR_LEAST_PERMILLE
+    }
+
+    fn choice_cost(&self) -> f64 {
+        self.choice_cost
+    }
+
+    fn touches(&self, parameter: usize, run: &RunData) -> bool {
+        let (nodes, last) = (self.nodes_m.len(), self.nodes_m.len() - 1);
+        if self.parameters.len() > nodes && (parameter < nodes) != (run.direction > 0.0) {
+            return false;
+        }
+        let node = parameter % nodes;
+        let from_m = if node == 0 { f64::MIN } else { self.nodes_m[node - 1] };
+        let to_m = if node == last { f64::MAX } else { self.nodes_m[node + 1] };
+        let passes = |at_m: f64| (from_m..=to_m).contains(&at_m);
+        run.samples().iter().any(|sample| sample.position_m.is_some_and(passes))
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        let Some(error) = self.error(parameters) else { return };
+        for (force, sample) in forces.iter_mut().zip(run.samples()) {
+            if let Some(position_m) = sample.position_m {
+                let at = (position_m, sample.direction);
+                gradient::err(&error, at, &mut force.gradient_permille);
+            }
+        }
+    }
+
+    fn is_gradient(&self) -> bool {
+        true
+    }
+
+    fn gradient_permille(&self, parameter: usize, run: &RunData, permille: &mut Vec<f64>) {
+        let nodes = self.nodes_m.len();
+        let (is_two_ways, is_growing) = (self.parameters.len() > nodes, parameter < nodes);
+        let (at_m, last_m) = (self.nodes_m[parameter % nodes], self.nodes_m[nodes - 1]);
+        let apart_m = self.apart_m();
+        let share = |position_m: f64| {
+            // The first and the last value hold beyond them.
+            let inside_m = position_m.clamp(self.nodes_m[0], last_m);
+            (1.0 - (inside_m - at_m).abs() / apart_m).max(0.0)
+        };
+        permille.clear();
+        permille.extend(run.samples().iter().map(|sample| match sample.position_m {
+            Some(_) if is_two_ways && is_growing != (sample.direction > 0.0) => 0.0,
+            Some(position_m) => sample.direction * share(position_m),
+            None => 0.0,
+        }));
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        let entry = |(name, values): (&'static str, &[f64])| {
+            Entry::List(name, self.at_nodes(values).iter().map(|row| row.to_vec()).collect())
+        };
+        let names = [gradient::ERROR, gradient::ERROR_FALLING];
+        Some(self.lists(names, parameters).map(entry).collect())
+    }
+
+    fn report(&self, context: &ReportContext) -> Reported {
+        let (values, deviations) = (context.parameters, context.deviations);
+        let mut reported = Reported::default();
+        let own = rms(values);
+        let by_node = values.iter().zip(deviations).map(|(value, std)| (value * std).powi(2));
+        let std = by_node.sum::<f64>().sqrt() / (own * values.len() as f64).max(1e-12);
+        reported.push("rms_permille", own, std);
+        let names = ["profile", "profile_falling"];
+        let profile = |list: &[f64]| ParameterValue::Profile(self.at_nodes(list));
+        for ((name, values), (_, deviations)) in
+            self.lists(names, values).zip(self.lists(names, deviations))
+        {
+            reported.values.insert(name.into(), profile(values));
+            reported.deviations.insert(name.into(), profile(deviations));
+        }
+        reported
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_prior_is_the_inverse_of_an_exponential_covariance_for_each_way() {
+        let (count, apart_m, scale) = (6, 700.0, gradient::MAP);
+        let covariance = DMatrix::from_fn(2 * count, 2 * count, |i, j| {
+            let away_m = apart_m * i.abs_diff(j) as f64;
+            let is_one_way = i / count == j / count;
+            let correlation = (-away_m / scale.length_m).exp();
+            if is_one_way { scale.permille.powi(2) * correlation } else { 0.0 }
+        });
+        let product = prior_information(count, 2, apart_m, scale) * covariance;
+        assert!((product - DMatrix::identity(2 * count, 2 * count)).norm() < 1e-9);
+    }
+}

@@ -1,0 +1,190 @@
+//! The structure: parts, each with a mass factor of its own.
+
+use std::sync::Arc;
+
+use dynocar_core::terms::{Entry, Parameter, masses};
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::parts::Part;
+use crate::explain::answer::{MassSection, MassWindow, ParameterValue, Place, RunWindow};
+use crate::explain::effects::{Hypothesis, ReportContext, Reported, SharedHypothesis};
+use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::places::{Axis, End, Reach};
+
+/// Parts in which another mass holds.
+#[derive(Clone, Debug)]
+pub struct Masses {
+    parts: Vec<Part>,
+    /// Of every part, where its ends could be; empty where nothing was chosen.
+    edges: Vec<Vec<f64>>,
+    parameters: Vec<Parameter>,
+    choice_cost: f64,
+}
+
+impl Masses {
+    /// One part with where its ends could be, and twice the logarithm of what it was chosen from.
+    pub fn new(part: Part, edges: Vec<f64>, choice_cost: f64) -> Self {
+        let mut masses = Masses {
+            parts: Vec::new(),
+            edges: Vec::new(),
+            parameters: Vec::new(),
+            choice_cost: 0.0,
+        };
+        masses.push(part, edges, choice_cost);
+        masses
+    }
+
+    /// Adds a part with a factor of its own.
+    pub fn push(&mut self, part: Part, edges: Vec<f64>, choice_cost: f64) {
+        self.parts.push(part);
+        self.edges.push(edges);
+        self.parameters.push(masses::PARAMETER);
+        self.choice_cost += choice_cost;
+    }
+
+    /// Where another mass holds, in the order of the factors.
+    pub fn parts(&self) -> &[Part] {
+        &self.parts
+    }
+}
+
+impl Hypothesis for Masses {
+    fn kind(&self) -> EffectKind {
+        EffectKind::MassChange
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    fn choice_cost(&self) -> f64 {
+        self.choice_cost
+    }
+
+    fn none(&self) -> f64 {
+        1.0
+    }
+
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        parameters.iter().any(|factor| (factor - 1.0).abs() > masses::LEAST_SHARE)
+    }
+
+    fn touches(&self, parameter: usize, run: &RunData) -> bool {
+        match &self.parts[parameter] {
+            Part::Section { .. } => true,
+            Part::Window { run: file, .. } => *file == run.file,
+        }
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        for (part, factor) in self.parts.iter().zip(parameters) {
+            for (i, force) in forces.iter_mut().enumerate() {
+                if part.holds(run, i) {
+                    force.mass_factor *= factor;
+                }
+            }
+        }
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        let mut rows = Vec::new();
+        for (part, &factor) in self.parts.iter().zip(parameters) {
+            let Part::Section { from_m, to_m, direction } = *part else { return None };
+            let towards = direction.map_or(vec![1.0, -1.0], |direction| vec![direction]);
+            rows.extend(towards.into_iter().map(|towards| vec![from_m, to_m, towards, factor]));
+        }
+        Some(vec![Entry::Rows(masses::LIST, rows)])
+    }
+
+    fn ends(&self) -> Vec<End> {
+        let mut ends = Vec::new();
+        for (part, (own, edges)) in self.parts.iter().zip(&self.edges).enumerate() {
+            let (axis, run) = match own {
+                Part::Section { .. } => (Axis::Chainage, None),
+                Part::Window { run, .. } => (Axis::Time, Some(run.clone())),
+            };
+            for (is_upper, at) in [false, true].into_iter().zip(own.ends()) {
+                if !edges.is_empty() {
+                    let (reach, run) = (Reach::OneOf(edges.clone()), run.clone());
+                    ends.push(End { axis, part, is_upper, at, reach, fine: 0.0, run });
+                }
+            }
+        }
+        ends
+    }
+
+    fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
+        let mut moved = self.clone();
+        moved.parts[end.part] = self.parts[end.part].with_end(end.is_upper, at)?;
+        let others = self.parts.iter().enumerate().filter(|(k, _)| *k != end.part);
+        let is_free = others.into_iter().all(|(_, other)| other.is_apart(&moved.parts[end.part]));
+        is_free.then(|| Arc::new(moved) as SharedHypothesis)
+    }
+
+    fn place(&self) -> Place {
+        let windows: Vec<RunWindow> = self
+            .parts
+            .iter()
+            .filter_map(|part| match part {
+                Part::Window { run, from_s, to_s, offset_s } => Some(RunWindow {
+                    run: run.clone(),
+                    t_start_s: offset_s + from_s,
+                    t_end_s: offset_s + to_s,
+                }),
+                Part::Section { .. } => None,
+            })
+            .collect();
+        let intervals: Vec<[f64; 2]> = self
+            .parts
+            .iter()
+            .filter_map(|part| match part {
+                Part::Section { from_m, to_m, .. } => Some([*from_m, *to_m]),
+                Part::Window { .. } => None,
+            })
+            .collect();
+        Place {
+            windows: (!windows.is_empty()).then_some(windows),
+            intervals_m: (!intervals.is_empty()).then_some(intervals),
+            ..Place::default()
+        }
+    }
+
+    fn report(&self, context: &ReportContext) -> Reported {
+        let (mut sections, mut windows, mut deviations) = (Vec::new(), Vec::new(), Vec::new());
+        for (k, part) in self.parts.iter().enumerate() {
+            let mass_factor = context.parameters[k];
+            match part {
+                Part::Section { from_m, to_m, direction } => {
+                    for towards in direction.map_or(vec![1.0, -1.0], |direction| vec![direction]) {
+                        sections.push(MassSection {
+                            from_m: *from_m,
+                            to_m: *to_m,
+                            direction: towards as i8,
+                            mass_factor,
+                        });
+                        deviations.push(context.deviations[k]);
+                    }
+                }
+                Part::Window { run, from_s, to_s, offset_s } => {
+                    windows.push(MassWindow {
+                        run: run.clone(),
+                        t_start_s: offset_s + from_s,
+                        t_end_s: offset_s + to_s,
+                        mass_factor,
+                    });
+                    deviations.push(context.deviations[k]);
+                }
+            }
+        }
+        let mut reported = Reported::default();
+        let name = if windows.is_empty() {
+            reported.values.insert("sections".into(), ParameterValue::Sections(sections));
+            "sections"
+        } else {
+            reported.values.insert("windows".into(), ParameterValue::Windows(windows));
+            "windows"
+        };
+        reported.deviations.insert(name.into(), ParameterValue::List(deviations));
+        reported
+    }
+}

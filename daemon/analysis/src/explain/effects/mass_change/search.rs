@@ -1,0 +1,153 @@
+//! The search for the parts of the line or of a run in which another mass holds.
+
+use std::sync::Arc;
+
+use dynocar_core::terms::masses::LEAST_SHARE;
+
+use super::masses::Masses;
+use super::parts::{Part, STATION_M, STOP_MIN_S, stations, stops};
+use crate::explain::effects::Candidate;
+use crate::explain::evidence::{EQUAL, RunData};
+use crate::explain::places::span_m;
+use crate::explain::scan::{Scan, Tuple};
+
+/// Sections or windows at most.
+const PARTS_MAX: usize = 5;
+
+/// What a mass factor slightly above 1 does: traction and brake force move more mass, while all
+/// that goes with the weight stays.
+fn shape(run: &RunData, index: usize) -> f64 {
+    let sample = &run.samples()[index];
+    -sample.control_force_n().unwrap_or(0.0) / sample.inertial_mass_kg
+}
+
+/// Every stretch between two stations in one direction, with its tuple; none where positions are not
+/// measured, for then the runs share no places.
+pub fn all_sections(scan: &Scan) -> Vec<(Part, Tuple)> {
+    if scan.problem.way_ratio.is_none() {
+        return Vec::new();
+    }
+    let stations = stations(scan);
+    let mut sections = Vec::new();
+    for direction in [Some(1.0), Some(-1.0)] {
+        let part = |from: usize, to: usize| Part::Section {
+            from_m: stations[from],
+            to_m: stations[to],
+            direction,
+        };
+        let elementary: Vec<Tuple> = (0..stations.len().saturating_sub(1))
+            .map(|k| {
+                let part = part(k, k + 1);
+                scan.tuple(|run, i| if part.holds(run, i) { shape(run, i) } else { 0.0 })
+            })
+            .collect();
+        sections.extend(joined(&elementary, part));
+    }
+    sections
+}
+
+/// Every row of neighbouring parts whose ends carry a force, with the sum of their tuples.
+fn joined(
+    elementary: &[Tuple],
+    part: impl Fn(usize, usize) -> Part,
+) -> impl Iterator<Item = (Part, Tuple)> {
+    (0..elementary.len()).flat_map(move |from| {
+        let mut sum = Tuple::zero(elementary[from].cross.len());
+        let mut rows = Vec::new();
+        for to in from..elementary.len() {
+            sum.add(&elementary[to]);
+            if elementary[to].square > 0.0 && elementary[from].square > 0.0 {
+                rows.push((part(from, to + 1), sum.clone()));
+            }
+        }
+        rows
+    })
+}
+
+/// One factor in all runs: nothing to choose but whether there are parts at all.
+pub fn everywhere(scan: &Scan) -> Option<Candidate> {
+    let [low, high] = span_m(scan)?;
+    let runs = &scan.problem.runs;
+    let first = runs.first()?.direction;
+    let direction = runs.iter().all(|run| run.direction == first).then_some(first);
+    let part = Part::Section { from_m: low - STATION_M, to_m: high + STATION_M, direction };
+    let (_, estimate) = scan.gain(&scan.tuple(shape));
+    let start = vec![(1.0 + estimate).clamp(0.7, 1.5)];
+    let choice_cost = 2.0 * std::f64::consts::LN_2;
+    Some(Candidate::new(Masses::new(part, Vec::new(), choice_cost), start))
+}
+
+/// Every stretch between two stops of a run, with its tuple.
+pub fn all_windows(scan: &Scan) -> Vec<(Part, Tuple)> {
+    let mut windows = Vec::new();
+    for (index, run) in scan.problem.runs.iter().enumerate() {
+        let mut edges = vec![0.0];
+        edges.extend(stops(run).iter().map(|stop| 0.5 * (stop.0 + stop.1)));
+        edges.push(run.duration_s());
+        edges.dedup_by(|one, other| *one - *other < STOP_MIN_S);
+        let part = |from: usize, to: usize| Part::Window {
+            run: run.file.clone(),
+            from_s: edges[from],
+            to_s: edges[to],
+            offset_s: run.offset_s,
+        };
+        let elementary: Vec<Tuple> = (0..edges.len() - 1)
+            .map(|k| {
+                let part = part(k, k + 1);
+                let masked = |run: &RunData, i: usize| {
+                    if part.holds(run, i) { shape(run, i) } else { 0.0 }
+                };
+                scan.run_tuple(index, masked)
+            })
+            .collect();
+        windows.extend(joined(&elementary, part));
+    }
+    windows
+}
+
+/// Adds parts one by one, each fitted with a factor of its own, while they explain something.
+pub fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Option<Candidate> {
+    let part_cost = 2.0 * (parts.len().max(2) as f64).ln();
+    let best = |scan: &Scan, tuples: &mut dyn Iterator<Item = (Part, Tuple)>| {
+        tuples
+            .map(|(part, tuple)| {
+                let (gain, estimate) = scan.gain(&tuple);
+                (gain, estimate, part)
+            })
+            .filter(|(_, estimate, _)| estimate.abs() > LEAST_SHARE)
+            .max_by(|one, other| one.0.total_cmp(&other.0))
+    };
+    let (_, estimate, part) = best(scan, &mut parts.iter().cloned())?;
+    let edges = |part: &Part| part.edges(parts.iter().map(|(other, _)| other));
+    let mut masses = Masses::new(part.clone(), edges(&part), part_cost);
+    let mut start = vec![(1.0 + estimate).clamp(0.7, 1.5)];
+    while masses.parts().len() < PARTS_MAX {
+        let hypothesis = Arc::new(masses.clone());
+        let model = scan.fit.model.with(hypothesis);
+        let theta = scan.fit.theta.iter().chain(&start).copied().collect();
+        let fit = scan.problem.fit(&model, theta, scan.fit.noise);
+        start = fit.theta[scan.fit.theta.len()..].to_vec();
+        let Some(next) = Scan::new(scan.problem, scan.holdout, scan.train, scan.track, &fit) else {
+            break;
+        };
+        let free =
+            parts.iter().filter(|(part, _)| masses.parts().iter().all(|own| own.is_apart(part)));
+        let mut fresh = free.map(|(part, _)| {
+            let masked = |run: &RunData, i: usize| {
+                if part.holds(run, i) { shape(run, i) } else { 0.0 }
+            };
+            (part.clone(), next.tuple(masked))
+        });
+        match best(&next, &mut fresh) {
+            Some((gain, estimate, part))
+                if gain > part_cost + EQUAL && estimate.abs() > LEAST_SHARE =>
+            {
+                let edges = edges(&part);
+                masses.push(part, edges, part_cost);
+                start.push((1.0 + estimate).clamp(0.7, 1.5));
+            }
+            _ => break,
+        }
+    }
+    Some(Candidate::new(masses, start))
+}

@@ -1,0 +1,168 @@
+//! Air resistance in tunnels: c v² is larger for the part of the train inside.
+//!
+//! A map without a tunnel is no proof that there is none: beside the mapped tunnels, places are
+//! looked for where c v² is larger. Trains that pass a place at different speeds tell that from a
+//! constant resistance there.
+
+use std::sync::Arc;
+
+use dynocar_core::terms::{Entry, Parameter, place, tunnel};
+use dynocar_core::track::Track;
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Candidate, Effect, Hypothesis, Proposal, ReportContext, Reported, SharedHypothesis};
+use crate::explain::answer::Place;
+use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::places::{End, Inside, Stretches, find};
+use crate::explain::scan::Scan;
+
+/// Motion in s inside mapped tunnels that tells of them.
+const MAPPED_MIN_S: f64 = 10.0;
+/// A tunnel that nobody mapped is less likely than some resistance at a place.
+const UNMAPPED_COST: f64 = 4.0;
+
+/// The kind.
+pub struct TunnelDrag;
+
+#[derive(Clone, Debug)]
+struct Tunnels {
+    /// Where they were found; `None`: the mapped ones.
+    found: Option<Stretches>,
+    length_m: f64,
+    mapped_m: Vec<[f64; 2]>,
+    choice_cost: f64,
+    map_error: f64,
+}
+
+impl Effect for TunnelDrag {
+    fn kind(&self) -> EffectKind {
+        EffectKind::TunnelDrag
+    }
+
+    fn propose(&self, scan: &Scan) -> Proposal {
+        let length_m = scan.train.length_m;
+        let Some(track) = scan.track else {
+            return Proposal::NotTestable("the line is not known".into());
+        };
+        let mut candidates: Vec<Candidate> = self.whole(scan).into_iter().collect();
+        let inside = Inside::Share { length_m };
+        let shape = |run: &RunData, i: usize| {
+            let speed = run.smooth_mps[i];
+            -scan.per_unit_resistance_mps2(&run.samples()[i]) * speed * speed
+        };
+        let Some(found) = find(scan, &shape, inside, true).filter(|found| found.runs.is_none())
+        else {
+            return Proposal::Candidates(candidates);
+        };
+        let hypothesis = Tunnels {
+            found: Some(found.stretches()),
+            length_m,
+            mapped_m: mapped_m(track),
+            choice_cost: found.choice_cost + UNMAPPED_COST,
+            map_error: found.map_error,
+        };
+        candidates.push(Candidate::new(hypothesis, vec![found.estimate]));
+        Proposal::Candidates(candidates)
+    }
+
+    fn whole(&self, scan: &Scan) -> Option<Candidate> {
+        let inside_s = scan.seconds_where(|_, sample| sample.tunnel_share.is_some_and(|s| s > 0.0));
+        let mapped = Tunnels {
+            found: None,
+            length_m: scan.train.length_m,
+            mapped_m: mapped_m(scan.track?),
+            choice_cost: 0.0,
+            map_error: 0.0,
+        };
+        (inside_s > MAPPED_MIN_S).then(|| Candidate::new(mapped, vec![0.0]))
+    }
+}
+
+/// Chainages in m of the mapped tunnels.
+fn mapped_m(track: &Track) -> Vec<[f64; 2]> {
+    track.tunnels().iter().map(|tunnel| [tunnel.start_m, tunnel.end_m]).collect()
+}
+
+impl Hypothesis for Tunnels {
+    fn kind(&self) -> EffectKind {
+        EffectKind::TunnelDrag
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &tunnel::PARAMETERS
+    }
+
+    fn choice_cost(&self) -> f64 {
+        self.choice_cost
+    }
+
+    fn shared_error(&self) -> f64 {
+        self.map_error
+    }
+
+    fn is_material(&self, parameters: &[f64], c: f64) -> bool {
+        parameters[0] > tunnel::LEAST_SHARE_OF_C * c
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        let found = self.found.as_ref().map(|found| place::profile(&found.intervals_m, 1.0));
+        for (force, sample) in forces.iter_mut().zip(run.samples()) {
+            let share = match &found {
+                None => sample.tunnel_share,
+                Some(profile) => profile
+                    .as_ref()
+                    .ok()
+                    .zip(sample.position_m)
+                    .map(|(profile, position_m)| profile.mean_around(position_m, self.length_m)),
+            };
+            tunnel::act(parameters[0], share, &mut force.resistance);
+            let sheltered = share.unwrap_or(0.0).max(sample.tunnel_share.unwrap_or(0.0));
+            tunnel::enter(Some(sheltered), &mut force.resistance);
+        }
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        let mut entries = vec![Entry::Number(&tunnel::DC, parameters[0])];
+        if let Some(found) = &self.found {
+            // The files know one greater c for all tunnels.
+            if !self.mapped_m.is_empty() {
+                return None;
+            }
+            let rows = found.intervals_m.iter().map(|interval_m| interval_m.to_vec()).collect();
+            entries.push(Entry::Rows("tunnels", rows));
+        }
+        Some(entries)
+    }
+
+    fn ends(&self) -> Vec<End> {
+        self.found.as_ref().map_or_else(Vec::new, Stretches::ends)
+    }
+
+    fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
+        let found = Some(self.found.as_ref()?.moved(end, at)?);
+        Some(Arc::new(Tunnels { found, ..self.clone() }))
+    }
+
+    fn place(&self) -> Place {
+        let found = self.found.as_ref().map(|stretches| &stretches.intervals_m);
+        Place::of_intervals(found.unwrap_or(&self.mapped_m).clone())
+    }
+
+    fn report(&self, context: &ReportContext) -> Reported {
+        let (extra, extra_deviation) = (context.parameters[0], context.deviations[0]);
+        let mut reported = Reported::default();
+        let force_per_unit = 1.0 * context.weight_kn;
+        reported.push("dc_n_per_mps2", extra * force_per_unit, extra_deviation * force_per_unit);
+        let c = context.c;
+        // A c that is not told from none makes no factor.
+        if c > context.c_deviation {
+            // Delta method for 1 + extra / c.
+            let (by_extra, by_c) = (1.0 / c, -extra / (c * c));
+            let variance = (by_extra * extra_deviation).powi(2)
+                + (by_c * context.c_deviation).powi(2)
+                + 2.0 * by_extra * by_c * context.c_covariance;
+            reported.push("c_factor", 1.0 + extra / c, variance.max(0.0).sqrt());
+        }
+        reported
+    }
+}

@@ -1,0 +1,235 @@
+//! A residual that is real but fits no kind of the library: an extra force in a range of some
+//! covariate. It is not an explanation; it says where an explanation is to be looked for.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use dynocar_core::terms::Parameter;
+use dynocar_core::terms::extra::Covariate;
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::band_axis::{AXES, BandAxis};
+use super::outside::OUTSIDE_COST;
+use crate::explain::answer::{CovariateRange, Place};
+use crate::explain::effects::{Candidate, Hypothesis, SharedHypothesis};
+use crate::explain::evidence::{Bin, RunData, SampleForces};
+use crate::explain::places::{Axis, End, MAP_ERROR_PERMILLE, Reach};
+use crate::explain::scan::{Scan, Tuple};
+
+/// Cells into which the range of a covariate is cut.
+const CELLS: usize = 20;
+/// Motion in s that a band must hold.
+const BAND_MIN_S: f64 = 60.0;
+
+#[derive(Clone, Debug)]
+struct Band {
+    axis: BandAxis,
+    low: f64,
+    high: f64,
+    /// Least and greatest value of the covariate, and the width of a cell.
+    span: [f64; 2],
+    cell: f64,
+    /// Files of all fit runs, by number, for the covariate `Run`.
+    files: Vec<String>,
+    choice_cost: f64,
+}
+
+/// The ranges in which an extra force explains most, one of each covariate, with what it explains;
+/// the best first.
+pub fn bands(scan: &Scan) -> Vec<(f64, Candidate)> {
+    let mut bands: Vec<(f64, Candidate)> =
+        AXES.iter().filter_map(|&axis| best_band(scan, axis)).collect();
+    bands.sort_by(|one, other| other.0.total_cmp(&one.0));
+    bands
+}
+
+/// Equal cells of the range of a covariate.
+struct Cells {
+    low: f64,
+    width: f64,
+    count: usize,
+    /// What an extra force in each explains.
+    tuples: Vec<Tuple>,
+    /// Motion in s in each.
+    seconds: Vec<f64>,
+}
+
+impl Cells {
+    /// `None` where the covariate does not vary.
+    fn of(scan: &Scan, axis: BandAxis) -> Option<Self> {
+        let runs = &scan.problem.runs;
+        let by_run: Vec<Vec<Option<f64>>> = runs
+            .iter()
+            .enumerate()
+            .map(|(number, run)| {
+                let middles = run.bins.iter().map(Bin::middle);
+                middles.map(|i| axis.value(run, Some(number), i)).collect()
+            })
+            .collect();
+        let (low, high) = by_run
+            .iter()
+            .flatten()
+            .flatten()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (v.min(l), v.max(h)));
+        if high - low < 1e-6 || !(high - low).is_finite() {
+            return None;
+        }
+        let is_run = axis == BandAxis::Run;
+        let count = if is_run { runs.len() } else { CELLS };
+        let width = if is_run { 1.0 } else { (high - low) / count as f64 * (1.0 + 1e-9) };
+        let low = if is_run { -0.5 } else { low };
+        let tuples = vec![Tuple::zero(scan.fit.theta.len()); count];
+        let mut cells = Cells { low, width, count, tuples, seconds: vec![0.0; count] };
+        for (number, values) in by_run.iter().enumerate() {
+            cells.add_run(scan, axis, number, values);
+        }
+        Some(cells)
+    }
+
+    fn edge(&self, cell: usize) -> f64 {
+        self.low + self.width * cell as f64
+    }
+
+    fn add_run(&mut self, scan: &Scan, axis: BandAxis, number: usize, values: &[Option<f64>]) {
+        let run = &scan.problem.runs[number];
+        let time_s = run.recording.time_s();
+        let mut shapes: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+        for (k, (bin, value)) in run.bins.iter().zip(values).enumerate() {
+            let Some(value) = value else { continue };
+            let cell = (((value - self.low) / self.width) as usize).min(self.count - 1);
+            let shape = shapes.entry(cell).or_insert_with(|| vec![0.0; run.bins.len()]);
+            shape[k] = axis.shape(scan, &run.samples()[bin.middle()]);
+            self.seconds[cell] += time_s[bin.end - 1] - time_s[bin.first];
+        }
+        for (cell, shape) in shapes {
+            self.tuples[cell].add(&scan.shape_tuple(number, &shape));
+        }
+    }
+}
+
+/// The range of a covariate in which an extra force explains most.
+fn best_band(scan: &Scan, axis: BandAxis) -> Option<(f64, Candidate)> {
+    let cells = Cells::of(scan, axis)?;
+    let count = cells.count;
+    let mut best: Option<(f64, f64, usize, usize)> = None;
+    for from in 0..count {
+        let mut sum = Tuple::zero(scan.fit.theta.len());
+        let mut seconds_s = 0.0;
+        for to in from..count {
+            sum.add(&cells.tuples[to]);
+            let (gain, estimate) = scan.gain(&sum);
+            seconds_s += cells.seconds[to];
+            if seconds_s > BAND_MIN_S && best.is_none_or(|best| gain > best.0) {
+                best = Some((gain, estimate, from, to + 1));
+            }
+        }
+    }
+    let (gain, estimate, from, to) = best?;
+    let structures = AXES.len() as f64 * (count * (count + 1)) as f64 / 2.0;
+    let choice_cost = OUTSIDE_COST + 2.0 * structures.ln();
+    let files = scan.problem.runs.iter().map(|run| run.file.clone()).collect();
+    let (low, high) = (cells.edge(from), cells.edge(to));
+    let span = [cells.edge(0), cells.edge(count)];
+    let band = Band { axis, low, high, span, cell: cells.width, files, choice_cost };
+    Some((gain, Candidate::new(band, vec![estimate])))
+}
+
+impl Hypothesis for Band {
+    fn kind(&self) -> EffectKind {
+        EffectKind::Unknown
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        self.axis.parameters()
+    }
+
+    fn choice_cost(&self) -> f64 {
+        self.choice_cost
+    }
+
+    fn shared_error(&self) -> f64 {
+        // A band of chainage is an error of the map, which every passage has in full.
+        if self.axis == BandAxis::Of(Covariate::Chainage) { MAP_ERROR_PERMILLE } else { 0.0 }
+    }
+
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        let least = match self.axis {
+            BandAxis::Of(Covariate::Chainage) => 0.3,
+            BandAxis::Of(Covariate::TractionForce) | BandAxis::Of(Covariate::BrakeForce) => 0.02,
+            _ => 0.1,
+        };
+        // At its bound a band stands for something of another form.
+        let most = 0.9 * self.axis.parameters()[0].upper;
+        (least..most).contains(&parameters[0].abs())
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        let number = self.files.iter().position(|file| *file == run.file);
+        for (i, force) in forces.iter_mut().enumerate() {
+            let value = self.axis.value(run, number, i);
+            if !value.is_some_and(|value| value >= self.low && value < self.high) {
+                continue;
+            }
+            match self.axis {
+                BandAxis::Of(Covariate::Chainage) => {
+                    force.gradient_permille += run.samples()[i].direction * parameters[0];
+                }
+                BandAxis::Of(Covariate::TractionForce) => force.traction_n *= 1.0 + parameters[0],
+                BandAxis::Of(Covariate::BrakeForce) => force.brake_n *= 1.0 + parameters[0],
+                _ => force.resistance.other_n_per_kn += parameters[0],
+            }
+        }
+    }
+
+    fn formula(&self, parameters: &[f64]) -> Option<String> {
+        let (name, [low, high]) = (self.axis.name(), [self.low, self.high]);
+        let parameter = &self.axis.parameters()[0];
+        Some(format!("{} = {:.4} · ({low:.4} ≤ {name} < {high:.4})", parameter.name, parameters[0]))
+    }
+
+    fn ends(&self) -> Vec<End> {
+        if self.axis == BandAxis::Run {
+            return Vec::new();
+        }
+        // Bounds of the covariate itself are no ends.
+        let end = |is_upper: bool, at: f64, low: f64, high: f64| End {
+            axis: Axis::Covariate,
+            part: 0,
+            is_upper,
+            at,
+            reach: Reach::Between(low, high),
+            fine: 0.1 * self.cell,
+            run: None,
+        };
+        let lower = end(false, self.low, self.span[0], self.high - 0.5 * self.cell);
+        let upper = end(true, self.high, self.low + 0.5 * self.cell, self.span[1]);
+        let is_inside = |end: &End| end.at > self.span[0] && end.at < self.span[1];
+        [lower, upper].into_iter().filter(is_inside).collect()
+    }
+
+    fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
+        let (low, high) = if end.is_upper { (self.low, at) } else { (at, self.high) };
+        (low < high).then(|| Arc::new(Band { low, high, ..self.clone() }) as SharedHypothesis)
+    }
+
+    fn place(&self) -> Place {
+        let mut place = Place::default();
+        match self.axis {
+            BandAxis::Of(Covariate::Speed) => place.speed_range_mps = Some([self.low, self.high]),
+            BandAxis::Of(Covariate::Chainage) => {
+                place.intervals_m = Some(vec![[self.low, self.high]])
+            }
+            BandAxis::Run => {
+                let inside = self.files.iter().enumerate().filter(|(k, _)| {
+                    let k = *k as f64;
+                    k >= self.low && k < self.high
+                });
+                place.runs = Some(inside.map(|(_, file)| file.clone()).collect());
+            }
+            _ => {}
+        }
+        place.covariate =
+            Some(CovariateRange { name: self.axis.name().into(), range: [self.low, self.high] });
+        place
+    }
+}

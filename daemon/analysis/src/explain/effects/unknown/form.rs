@@ -1,0 +1,243 @@
+//! A force of a form of its own, as a fit knows it.
+
+use std::sync::Arc;
+
+use dynocar_core::terms::extra::{self, Covariate, Extra, FORCE_MAX_N_PER_KN, Factor, Form};
+use dynocar_core::terms::{Entry, Parameter};
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::numbers::{edges, fitted_numbers, is_exponent, named};
+use super::outside::OUTSIDE_COST;
+use crate::explain::answer::{CovariateRange, ParameterValue, Place};
+use crate::explain::effects::{Candidate, Hypothesis, ReportContext, Reported, SharedHypothesis};
+use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::places::{Axis, End, Reach};
+use crate::explain::scan::Scan;
+
+/// A force counts from this size in N/kN on.
+const LEAST_N_PER_KN: f64 = 0.1;
+/// A share of a covariate's range by which an edge is surely moved little.
+const EDGE_FINE_SHARE: f64 = 1e-3;
+/// A force lives where it is at least this share of its greatest.
+const LIVES_SHARE: f64 = 0.1;
+
+/// The structure: which factors, and which of their numbers are fitted.
+#[derive(Clone, Debug)]
+pub struct FormForce {
+    /// Factors with the numbers that they start from.
+    factors: Vec<Factor>,
+    /// The size and the numbers that are fitted.
+    parameters: Vec<Parameter>,
+    /// Factor and number of each that is fitted, after the size.
+    fitted: Vec<(usize, usize)>,
+    /// Greatest product of the factors over the fit runs.
+    greatest: f64,
+    place: Place,
+    /// Least and greatest value of the last factor's covariate.
+    span: [f64; 2],
+    choice_cost: f64,
+}
+
+/// Price of a form that was chosen from so many.
+pub fn choice_cost(chosen_from: f64) -> f64 {
+    OUTSIDE_COST + 2.0 * chosen_from.ln()
+}
+
+impl FormForce {
+    /// A force of this form to start from, chosen from so many; `ranges` are those of the
+    /// covariates. Exponents that are held are not fitted.
+    pub fn candidate(
+        extra: &Extra,
+        holds_exponents: bool,
+        ranges: &[[f64; 3]],
+        chosen_from: f64,
+        scan: &Scan,
+    ) -> Candidate {
+        let most = FORCE_MAX_N_PER_KN;
+        let mut parameters = vec![Parameter::new("extra_n_per_kn", (-most, most), 0.01)];
+        let (mut fitted, mut start) = (Vec::new(), vec![extra.n_per_kn]);
+        for (k, (factor, range)) in extra.factors.iter().zip(ranges).enumerate() {
+            let free = fitted_numbers(factor.form, *range).into_iter();
+            let is_free = |number: usize| !(holds_exponents && is_exponent(factor.form, number));
+            for (number, bounds) in free.filter(|(number, _)| is_free(*number)) {
+                let name = named(k, factor.form.numbers()[number]);
+                let step = 2e-3 * (bounds.1 - bounds.0);
+                parameters.push(Parameter::new(name, bounds, step));
+                fitted.push((k, number));
+                start.push(factor.numbers[number].clamp(bounds.0, bounds.1));
+            }
+        }
+        let (greatest, place) = lives(extra, scan);
+        // An edge that was sought costs what a number that is fitted does.
+        let sought: usize = extra.factors.iter().map(|factor| edges(factor.form)).sum();
+        let observations = scan.fit.observations().max(2) as f64;
+        let force = FormForce {
+            factors: extra.factors.clone(),
+            parameters,
+            fitted,
+            greatest,
+            place,
+            span: ranges.last().map_or([0.0, 1.0], |&[_, low, high]| [low, high]),
+            choice_cost: choice_cost(chosen_from) + sought as f64 * observations.ln(),
+        };
+        Candidate::new(force, start)
+    }
+
+    /// The force for given parameters.
+    fn extra(&self, parameters: &[f64]) -> Extra {
+        let mut factors = self.factors.clone();
+        for (&(factor, number), &value) in self.fitted.iter().zip(&parameters[1..]) {
+            factors[factor].numbers[number] = value;
+        }
+        Extra { n_per_kn: parameters[0], factors }
+    }
+}
+
+/// The greatest product of the factors over the fit runs, and where it lives.
+fn lives(extra: &Extra, scan: &Scan) -> (f64, Place) {
+    let unit = Extra { n_per_kn: 1.0, ..extra.clone() };
+    let of_bins = || {
+        scan.problem.runs.iter().flat_map(|run| {
+            let middles = run.bins.iter().map(|bin| &run.samples()[bin.middle()]);
+            middles.map(|sample| (sample, unit.at(|of| sample.covariate(of)).0))
+        })
+    };
+    let greatest = of_bins().map(|(_, value)| value).fold(0.0, f64::max);
+    let range = |of: Covariate| {
+        let inside = of_bins().filter(|(_, value)| *value >= LIVES_SHARE * greatest);
+        inside
+            .filter_map(|(sample, _)| sample.covariate(of))
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+                [low.min(value), high.max(value)]
+            })
+    };
+    let mut place = Place::default();
+    for factor in &extra.factors {
+        match factor.of {
+            Covariate::Speed => place.speed_range_mps = Some(range(factor.of)),
+            Covariate::Chainage => place.intervals_m = Some(vec![range(factor.of)]),
+            _ => {}
+        }
+    }
+    let last = extra.factors.last().map_or(Covariate::Speed, |factor| factor.of);
+    place.covariate = Some(CovariateRange { name: last.name().into(), range: range(last) });
+    (greatest, place)
+}
+
+impl Hypothesis for FormForce {
+    fn kind(&self) -> EffectKind {
+        EffectKind::Unknown
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        let extra = [self.extra(parameters)];
+        for (sample, force) in run.samples().iter().zip(forces) {
+            let known = |of: Covariate| sample.covariate(of);
+            extra::act(&extra, sample.speed_mps, known, &mut force.resistance);
+        }
+    }
+
+    fn choice_cost(&self) -> f64 {
+        self.choice_cost
+    }
+
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        (parameters[0] * self.greatest).abs() >= LEAST_N_PER_KN
+    }
+
+    fn place(&self) -> Place {
+        self.place.clone()
+    }
+
+    /// The edges of the last factor, where its value jumps.
+    fn ends(&self) -> Vec<End> {
+        let Some(last) = self.factors.last() else { return Vec::new() };
+        let ([low, high], [one, other]) = (self.span, last.numbers);
+        let end = |is_upper: bool, at: f64, low: f64, high: f64| End {
+            axis: Axis::Covariate,
+            part: 0,
+            is_upper,
+            at,
+            reach: Reach::Between(low.min(at), high.max(at)),
+            fine: EDGE_FINE_SHARE * (self.span[1] - self.span[0]),
+            run: None,
+        };
+        match last.form {
+            Form::Between => vec![end(false, one, low, other), end(true, other, one, high)],
+            Form::From => vec![end(false, one, low, high)],
+            Form::UpTo => vec![end(true, one, low, high)],
+            _ => Vec::new(),
+        }
+    }
+
+    fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
+        let mut moved = self.clone();
+        let last = moved.factors.last_mut()?;
+        let number = usize::from(end.is_upper && last.form == Form::Between);
+        last.numbers[number] = at;
+        let covariate = moved.place.covariate.as_mut()?;
+        covariate.range[usize::from(end.is_upper)] = at;
+        if last.of == Covariate::Chainage {
+            moved.place.intervals_m = Some(vec![covariate.range]);
+        }
+        last.form.refusal(last.numbers).is_none().then(|| Arc::new(moved) as SharedHypothesis)
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        let extra = self.extra(parameters);
+        let is_read_back = extra.factors.iter().all(|it| it.form.refusal(it.numbers).is_none());
+        is_read_back.then(|| vec![Entry::Extra(extra)])
+    }
+
+    fn formula(&self, parameters: &[f64]) -> Option<String> {
+        Some(self.extra(parameters).law())
+    }
+
+    fn report(&self, context: &ReportContext) -> Reported {
+        let mut reported = Reported::default();
+        for (i, spec) in self.parameters.iter().enumerate() {
+            reported.push(spec.name, context.parameters[i], context.deviations[i]);
+        }
+        let formula = self.extra(context.parameters).law();
+        reported.values.insert("formula".into(), ParameterValue::Formula(formula));
+        reported
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_edge_moves_the_factor_and_its_place_and_never_past_the_other() {
+        let factor =
+            Factor { of: Covariate::TimeSinceStart, form: Form::Between, numbers: [200.0, 500.0] };
+        let name = factor.of.name().into();
+        let covariate = Some(CovariateRange { name, range: [200.0, 500.0] });
+        let force = FormForce {
+            factors: vec![factor],
+            parameters: vec![Parameter::new("extra_n_per_kn", (-9.0, 9.0), 0.01)],
+            fitted: Vec::new(),
+            greatest: 1.0,
+            place: Place { covariate, ..Place::default() },
+            span: [0.0, 900.0],
+            choice_cost: 0.0,
+        };
+        let ends = force.ends();
+        assert_eq!(ends[0].reach, Reach::Between(0.0, 500.0));
+        assert_eq!(ends[1].reach, Reach::Between(200.0, 900.0));
+        let later = force.with_end(&ends[1], 700.0).unwrap();
+        assert_eq!(later.place().covariate.unwrap().range, [200.0, 700.0]);
+        let Some([Entry::Extra(extra)]) =
+            later.entries(&[2.0]).as_deref().map(|it| [it[0].clone()])
+        else {
+            panic!("a form that files can hold");
+        };
+        assert_eq!(extra.factors[0].numbers, [200.0, 700.0]);
+        assert!(force.with_end(&ends[1], 100.0).is_none());
+    }
+}

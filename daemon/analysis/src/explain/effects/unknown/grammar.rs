@@ -1,0 +1,121 @@
+//! Which forms an unexplained force may have: every form of one covariate, and products of two.
+//!
+//! A form is linear in its size, so that what it explains follows from one whitened shape; what
+//! else it holds is laid out on a grid here and fitted later. The kinds of the library are not
+//! tried again: a force in proportion to traction, a decay from the start, places.
+
+use dynocar_core::terms::extra::{Covariate, Extra, Factor, Form};
+
+use super::form::{FormForce, choice_cost};
+use super::known::Known;
+use super::shape::{Ground, Tried};
+use crate::explain::effects::Candidate;
+use crate::explain::scan::Scan;
+
+/// Speed forms that products are tried with, beside its first and second power.
+const BEST_FOR_PRODUCTS: usize = 3;
+/// Structures whose numbers are sought before they are fitted, and how many of these may share their
+/// first factor: else the variants of one crowd out the others.
+const REFINED: usize = 8;
+const REFINED_ALIKE: usize = 2;
+/// Exponents of the speed in a product that are tried as they are: one number less is to be told.
+const WHOLE_EXPONENTS: [f64; 2] = [1.0, 2.0];
+
+/// What the form that explains most does beyond its price, before its numbers are fitted.
+pub fn greatest_advantage(scan: &Scan) -> f64 {
+    let all = all_tried(&Ground::of(scan));
+    let first = all.first().map_or(f64::NEG_INFINITY, |best| best.worth);
+    first - choice_cost(all.len() as f64)
+}
+
+/// The forms that explain most for their price, one of each first factor; the best first. None
+/// where none explains its price.
+pub fn forms(scan: &Scan) -> Vec<Candidate> {
+    let ground = Ground::of(scan);
+    let all = all_tried(&ground);
+    let count = all.len() as f64;
+    if all.first().is_none_or(|best| best.worth < choice_cost(count)) {
+        return Vec::new();
+    }
+    let mut best: Vec<Tried> = alike(one_of_each_structure(all), REFINED_ALIKE)
+        .into_iter()
+        .take(REFINED)
+        .flat_map(|one| {
+            let refined = ground.refined(one);
+            let whole = with_whole_exponent(&ground, &refined);
+            std::iter::once(refined).chain(whole)
+        })
+        .collect();
+    sort(&mut best);
+    let candidate = |one: Tried| {
+        let range = |factor: &Factor| {
+            let range = ground.covariate(factor.of);
+            range.map_or([0.0, 0.0, 1.0], |it| [it.least, it.low, it.high])
+        };
+        let ranges: Vec<[f64; 3]> = one.factors.iter().map(range).collect();
+        let extra = Extra { n_per_kn: one.n_per_kn, factors: one.factors };
+        FormForce::candidate(&extra, one.holds_exponents, &ranges, count, scan)
+    };
+    alike(best, 1).into_iter().map(candidate).collect()
+}
+
+/// Every form of one covariate, and the products; the best first.
+fn all_tried(ground: &Ground) -> Vec<Tried> {
+    let alone = ground.known.iter().flat_map(Known::alone);
+    let mut all: Vec<Tried> = alone.map(|factor| ground.tried(vec![factor], false)).collect();
+    sort(&mut all);
+    let Some(speed) = ground.covariate(Covariate::Speed) else { return all };
+    let of_speed = all.iter().filter(|it| it.factors[0].of == Covariate::Speed);
+    let mut first: Vec<Factor> = of_speed.take(BEST_FOR_PRODUCTS).map(|it| it.factors[0]).collect();
+    first.extend(speed.powers(&WHOLE_EXPONENTS));
+    let others = ground.known.iter().filter(|one| one.of != Covariate::Speed);
+    let second: Vec<Factor> = others.flat_map(Known::beside_speed).collect();
+    for one in &first {
+        all.extend(second.iter().map(|&other| ground.tried(vec![*one, other], false)));
+    }
+    sort(&mut all);
+    all
+}
+
+/// The best of each structure that explains anything; the best first.
+fn one_of_each_structure(all: Vec<Tried>) -> Vec<Tried> {
+    let mut seen: Vec<Vec<(Covariate, Form)>> = Vec::new();
+    let mut is_new = |one: &Tried| {
+        let structure: Vec<_> = one.factors.iter().map(|it| (it.of, it.form)).collect();
+        let is_new = one.gain > 0.0 && !seen.contains(&structure);
+        if is_new {
+            seen.push(structure);
+        }
+        is_new
+    };
+    all.into_iter().filter(|one| is_new(one)).collect()
+}
+
+/// The first of those whose first factor has the same form, as many as may be.
+fn alike(tried: Vec<Tried>, most: usize) -> Vec<Tried> {
+    let mut seen: Vec<(Covariate, Form)> = Vec::new();
+    let mut is_kept = |one: &Tried| {
+        let own = (one.factors[0].of, one.factors[0].form);
+        seen.push(own);
+        seen.iter().filter(|it| **it == own).count() <= most
+    };
+    tried.into_iter().filter(|one| is_kept(one)).collect()
+}
+
+/// A product of a power of the speed with the whole exponent that explains most, which is then no
+/// number to be fitted; `None` of anything else.
+fn with_whole_exponent(ground: &Ground, one: &Tried) -> Option<Tried> {
+    if one.factors.len() < 2 || one.factors[0].form != Form::Power {
+        return None;
+    }
+    let whole = WHOLE_EXPONENTS.map(|exponent| {
+        let mut factors = one.factors.clone();
+        factors[0].numbers[1] = exponent;
+        ground.refined(ground.tried(factors, true))
+    });
+    whole.into_iter().max_by(|one, other| one.gain.total_cmp(&other.gain))
+}
+
+fn sort(tried: &mut [Tried]) {
+    tried.sort_by(|one, other| other.worth.total_cmp(&one.worth));
+}

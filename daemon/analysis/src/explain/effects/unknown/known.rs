@@ -1,0 +1,138 @@
+//! A covariate over the fit runs, and the forms of it that are tried.
+
+use dynocar_core::terms::extra::{Covariate, Factor, Form};
+
+use crate::explain::scan::Scan;
+
+/// So many bins tell too little, or a share of them where there are few.
+const FEW_BINS: usize = 8;
+const FEW_SHARE: f64 = 0.03;
+
+/// What is known of a covariate over all bins of the fit runs.
+pub struct Known {
+    /// Which.
+    pub of: Covariate,
+    /// By run and bin.
+    pub values: Vec<Vec<Option<f64>>>,
+    /// Least value.
+    pub low: f64,
+    /// Of less, there are too few values to tell anything.
+    pub least: f64,
+    /// Greatest value.
+    pub high: f64,
+}
+
+impl Known {
+    /// `None` where it is known nowhere or is the same throughout.
+    pub fn of(scan: &Scan, of: Covariate) -> Option<Self> {
+        let values: Vec<Vec<Option<f64>>> = scan
+            .problem
+            .runs
+            .iter()
+            .map(|run| {
+                run.bins.iter().map(|bin| run.samples()[bin.middle()].covariate(of)).collect()
+            })
+            .collect();
+        let mut sorted: Vec<f64> = values.iter().flatten().flatten().copied().collect();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let (low, high) = (*sorted.first()?, *sorted.last()?);
+        let few = FEW_BINS.min((FEW_SHARE * sorted.len() as f64) as usize);
+        let least = sorted[few];
+        let is_varied = high - low > 1e-6 && (high - low).is_finite();
+        is_varied.then_some(Known { of, values, low, least, high })
+    }
+
+    fn at(&self, share: f64) -> f64 {
+        self.low + share * (self.high - self.low)
+    }
+
+    fn factor(&self, form: Form, numbers: [f64; 2]) -> Factor {
+        Factor { of: self.of, form, numbers }
+    }
+
+    /// Forms with a knee at shares of the range.
+    fn hinges(&self) -> Vec<Factor> {
+        let span = 0.1 * (self.high - self.low);
+        let knees = [0.15, 0.3, 0.45, 0.6, 0.75, 0.88];
+        let both = knees.iter().flat_map(|&share| {
+            [Form::Above, Form::Below].map(|form| self.factor(form, [self.at(share), span]))
+        });
+        both.collect()
+    }
+
+    /// Powers that are no term of a, b, c.
+    pub fn powers(&self, exponents: &[f64]) -> Vec<Factor> {
+        if self.low < 0.0 {
+            return Vec::new();
+        }
+        exponents.iter().map(|&it| self.factor(Form::Power, [self.high, it])).collect()
+    }
+
+    /// Parts of the range.
+    fn parts(&self) -> Vec<Factor> {
+        let edges = [0.0, 0.25, 0.5, 0.75, 1.0].map(|share| self.at(share));
+        let pairs = (0..4).flat_map(|from| (from + 1..5).map(move |to| (from, to)));
+        pairs
+            .filter_map(|(from, to)| match (from, to) {
+                (0, 4) => None,
+                // What lasts to the end of these data may last in others.
+                (from, 4) => Some(self.factor(Form::From, [edges[from], 0.0])),
+                (0, to) => Some(self.factor(Form::UpTo, [edges[to], 0.0])),
+                (from, to) => Some(self.factor(Form::Between, [edges[from], edges[to]])),
+            })
+            .collect()
+    }
+
+    fn of_speed(&self) -> Vec<Factor> {
+        let mut factors = self.hinges();
+        factors.extend(self.powers(&[0.5, 3.0]));
+        for share in [0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0] {
+            let below = share * self.high;
+            let least = [1.0, 2.0, 4.0].into_iter().map(|it: f64| it.max(1.1 * self.least));
+            let least = least.filter(|least| 1.5 * least < below);
+            factors.extend(least.map(|least| self.factor(Form::Hyperbola, [below, least])));
+        }
+        let over = [0.06, 0.12, 0.25].map(|share| share * self.high);
+        for form in [Form::Decay, Form::Rise] {
+            factors.extend(over.map(|over| self.factor(form, [over, 0.0])));
+        }
+        for width in [0.04, 0.08] {
+            let middles = (1..10).map(|k| self.at(0.1 * f64::from(k)));
+            let width = width * (self.high - self.low);
+            factors.extend(middles.map(|middle| self.factor(Form::Bell, [middle, width])));
+        }
+        factors
+    }
+
+    /// Forms that a force may have of this covariate alone.
+    pub fn alone(&self) -> Vec<Factor> {
+        match self.of {
+            Covariate::Speed => self.of_speed(),
+            // Places along the line are the library's and the bands'.
+            Covariate::Chainage => Vec::new(),
+            Covariate::TimeSinceStart | Covariate::Temperature => {
+                let edges = |it: &Factor| it.form != Form::Between;
+                self.hinges().into_iter().chain(self.parts().into_iter().filter(edges)).collect()
+            }
+            Covariate::TractionForce | Covariate::BrakeForce => {
+                let mut factors = self.hinges();
+                factors.extend(self.powers(&[0.5, 2.0]));
+                factors
+            }
+        }
+    }
+
+    /// What the force of a form of the speed may be multiplied by.
+    pub fn beside_speed(&self) -> Vec<Factor> {
+        let mut factors = self.parts();
+        if self.of != Covariate::Chainage {
+            let knees = self.hinges().into_iter();
+            factors.extend(knees.filter(|factor| {
+                let share = (factor.numbers[0] - self.low) / (self.high - self.low);
+                (0.2..0.8).contains(&share)
+            }));
+            factors.push(self.factor(Form::Above, [self.low, self.high - self.low]));
+        }
+        factors
+    }
+}

@@ -1,0 +1,99 @@
+//! What a force of a form explains, and the numbers with which it explains most.
+
+use dynocar_core::terms::extra::{Covariate, Extra, Factor};
+
+use super::known::Known;
+use super::numbers::{estimated, is_exponent};
+use crate::explain::scan::{Scan, Tuple};
+
+/// Steps of the search for numbers, as shares of the range, one after the other.
+const REFINING_STEPS: [f64; 7] = [0.1, 0.05, 0.025, 0.012, 0.006, 0.003, 0.0015];
+
+/// A shape that was tried.
+#[derive(Clone)]
+pub struct Tried {
+    /// Decrease of the cost by it.
+    pub gain: f64,
+    /// The same less the price of its numbers.
+    pub worth: f64,
+    /// The size in N/kN with which it explains most.
+    pub n_per_kn: f64,
+    /// The form.
+    pub factors: Vec<Factor>,
+    /// Whether exponents stay what they are and are no numbers to be fitted.
+    pub holds_exponents: bool,
+}
+
+/// What shapes are tried on.
+pub struct Ground<'s> {
+    scan: &'s Scan<'s>,
+    /// The covariates that vary.
+    pub known: Vec<Known>,
+    /// Price of a number (Schwarz).
+    number_cost: f64,
+}
+
+impl<'s> Ground<'s> {
+    /// What a scan offers.
+    pub fn of(scan: &'s Scan) -> Self {
+        let known = Covariate::ALL.iter().filter_map(|&of| Known::of(scan, of)).collect();
+        let number_cost = (scan.fit.observations().max(2) as f64).ln();
+        Ground { scan, known, number_cost }
+    }
+
+    /// A covariate, where it varies.
+    pub fn covariate(&self, of: Covariate) -> Option<&Known> {
+        self.known.iter().find(|known| known.of == of)
+    }
+
+    /// What a force of these factors explains.
+    pub fn tried(&self, factors: Vec<Factor>, holds_exponents: bool) -> Tried {
+        let shape_of = Extra { n_per_kn: 1.0, factors };
+        let mut sum = Tuple::zero(self.scan.fit.theta.len());
+        for (index, run) in self.scan.problem.runs.iter().enumerate() {
+            let at_bin = |bin: usize| {
+                let of = |of: Covariate| self.covariate(of)?.values[index][bin];
+                let sample = &run.samples()[run.bins[bin].middle()];
+                -self.scan.per_unit_resistance_mps2(sample) * shape_of.at(of).0
+            };
+            let shape: Vec<f64> = (0..run.bins.len()).map(at_bin).collect();
+            sum.add(&self.scan.shape_tuple(index, &shape));
+        }
+        let (gain, n_per_kn) = self.scan.gain(&sum);
+        let factors = shape_of.factors;
+        let of_factors = factors.iter().map(|factor| estimated(factor.form, holds_exponents));
+        let worth = gain - (1 + of_factors.sum::<usize>()) as f64 * self.number_cost;
+        Tried { gain, worth, n_per_kn, factors, holds_exponents }
+    }
+
+    /// The same structure with the numbers near by that explain most.
+    pub fn refined(&self, mut best: Tried) -> Tried {
+        for step in REFINING_STEPS {
+            for factor in 0..best.factors.len() {
+                for number in 0..best.factors[factor].form.numbers().len() {
+                    for way in [-step, step] {
+                        if let Some(other) = self.moved(&best, (factor, number), way)
+                            && other.gain > best.gain
+                        {
+                            best = other;
+                        }
+                    }
+                }
+            }
+        }
+        best
+    }
+
+    /// A shape with one number moved by a share of its range; `None` where that is no form.
+    fn moved(&self, one: &Tried, (factor, number): (usize, usize), way: f64) -> Option<Tried> {
+        let range = self.covariate(one.factors[factor].of)?;
+        let mut factors = one.factors.clone();
+        let Factor { form, numbers, .. } = &mut factors[factor];
+        let is_exponent = is_exponent(*form, number);
+        if is_exponent && one.holds_exponents {
+            return None;
+        }
+        numbers[number] += way * if is_exponent { 5.0 } else { range.high - range.low };
+        form.refusal(*numbers).is_none().then(|| self.tried(factors, one.holds_exponents))
+    }
+}

@@ -1,0 +1,131 @@
+//! Means over a few samples of motion: what is compared with a model.
+
+use dynocar_core::simulate::Recording;
+
+/// Width in s of a bin over which speeds are averaged.
+const BIN_S: f64 = 2.0;
+/// A bin is at least this many sampling periods wide.
+const BIN_SAMPLES_MIN: f64 = 2.0;
+/// Below this speed in m/s the train's motion is not used: holding brakes and stiction act.
+const MOVING_MPS: f64 = 0.8;
+/// A longer step in s between samples ends a segment of motion.
+pub(super) const SEGMENT_GAP_MAX_S: f64 = 5.0;
+/// Segments of fewer bins say nothing.
+const SEGMENT_BINS_MIN: usize = 4;
+/// Time in s for which the couplings of a train ring after a change of force.
+const RINGING_S: f64 = 6.0;
+
+/// Mean over a few samples of one segment of motion, with the features of its middle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bin {
+    /// First sample.
+    pub first: usize,
+    /// One past the last sample.
+    pub end: usize,
+    /// Number of the segment of motion within the run, from 0.
+    pub segment: usize,
+    /// Mean time in s since the run's first sample.
+    pub time_s: f64,
+    /// Mean measured speed in m/s.
+    pub speed_mps: f64,
+    /// By how much in m/s² the acceleration of the control force changed from a few seconds before
+    /// to its end.
+    pub jump_mps2: f64,
+}
+
+impl Bin {
+    /// The sample in the middle.
+    pub fn middle(&self) -> usize {
+        (self.first + self.end) / 2
+    }
+}
+
+/// Median time in s between samples.
+pub(super) fn sampling_period_s(time_s: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    if steps.is_empty() {
+        return BIN_S;
+    }
+    let at = steps.len() / 2;
+    *steps.select_nth_unstable_by(at, f64::total_cmp).1
+}
+
+/// The bins of all segments of motion, in order of time.
+pub(super) fn bins(recording: &Recording) -> Vec<Bin> {
+    let (samples, time_s) = (recording.samples(), recording.time_s());
+    let width_s = BIN_S.max(BIN_SAMPLES_MIN * sampling_period_s(time_s));
+    let usable = |i: usize| recording.is_simulated(i) && samples[i].speed_mps > MOVING_MPS;
+    let mut bins: Vec<Bin> = Vec::new();
+    let mut segment = 0;
+    let mut i = 0;
+    while i < samples.len() {
+        if !usable(i) {
+            i += 1;
+            continue;
+        }
+        let mut end = i + 1;
+        while end < samples.len()
+            && usable(end)
+            && time_s[end] - time_s[end - 1] <= SEGMENT_GAP_MAX_S
+        {
+            end += 1;
+        }
+        let segment_bins = segment_bins(recording, i, end, segment, width_s);
+        if segment_bins.len() >= SEGMENT_BINS_MIN {
+            bins.extend(segment_bins);
+            segment += 1;
+        }
+        i = end;
+    }
+    bins
+}
+
+fn segment_bins(
+    recording: &Recording,
+    first: usize,
+    end: usize,
+    segment: usize,
+    width_s: f64,
+) -> Vec<Bin> {
+    let (samples, time_s) = (recording.samples(), recording.time_s());
+    let mut bins = Vec::new();
+    let mut from = first;
+    while from < end {
+        // The small margin keeps rounded times from splitting a bin.
+        let until_s = time_s[from] + width_s * (1.0 - 1e-6);
+        let mut to = from + 1;
+        while to < end && time_s[to] < until_s {
+            to += 1;
+        }
+        let count = (to - from) as f64;
+        let mean = |value: &dyn Fn(usize) -> f64| (from..to).map(value).sum::<f64>() / count;
+        bins.push(Bin {
+            first: from,
+            end: to,
+            segment,
+            time_s: mean(&|i| time_s[i]),
+            speed_mps: mean(&|i| samples[i].speed_mps),
+            jump_mps2: jump_mps2(recording, from, to),
+        });
+        from = to;
+    }
+    bins
+}
+
+/// Range in m/s² of the acceleration of the control force, where it is known, from [`RINGING_S`] before
+/// a sample to before another.
+fn jump_mps2(recording: &Recording, from: usize, to: usize) -> f64 {
+    let (samples, time_s) = (recording.samples(), recording.time_s());
+    let recent = time_s[..from].iter().rev().take_while(|at_s| time_s[from] - **at_s <= RINGING_S);
+    let known = (from - recent.count()..to).filter(|&i| recording.is_simulated(i));
+    let accelerations = known.map(|i| {
+        let sample = &samples[i];
+        let force_n = sample.traction_force_n.unwrap_or(0.0) - sample.brake_force_n.unwrap_or(0.0);
+        force_n / sample.mass_kg
+    });
+    let (least, most) = accelerations
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), it| {
+            (least.min(it), most.max(it))
+        });
+    most - least
+}

@@ -1,0 +1,210 @@
+//! The joint fit of a, b, c and the parameters of all effects.
+
+mod descent;
+mod linearised;
+mod nearby;
+mod robust;
+
+use dynocar_core::train::Davis;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
+
+use super::model::GrownModel;
+use super::noise::Noise;
+use super::run_data::RunData;
+use super::run_scatter::{Columns, WeightedFilter, scatter_columns};
+use super::whitener::Whitener;
+pub use nearby::Nearby;
+
+/// Standard deviation of the declared a, b, c as share of their size: a weak prior that keeps
+/// directions apart which the runs do not excite.
+const PRIOR_SHARE: [f64; 3] = [0.4, 0.8, 0.4];
+/// A declared coefficient is wrong by at most so many of these; what asks for more, or for less
+/// resistance than none, is a force that the basic resistance does not have.
+const DECLARED_DEVIATIONS_MAX: f64 = 4.0;
+/// A coefficient below none by no more than this share of one is an error of estimation.
+const BELOW_NONE_MAX: f64 = 0.25;
+/// A coefficient that is held at its bound is known to this share of its prior deviation.
+const HELD_SHARE: f64 = 1e-3;
+
+/// The runs that are fitted and what is known beforehand.
+#[derive(Clone, Debug)]
+pub struct FitProblem {
+    /// The fit runs.
+    pub runs: Vec<RunData>,
+    declared: Davis,
+    prior_deviation: [f64; 3],
+    /// Columns of the runs' own factors.
+    scatter_columns: Vec<Columns>,
+    /// Measured way over way by integrated speed, with its standard deviation.
+    pub way_ratio: Option<(f64, f64)>,
+}
+
+/// Normal equations of one run at the fitted parameters.
+#[derive(Clone, Debug)]
+pub struct RunNormal {
+    /// Information matrix.
+    pub information: DMatrix<f64>,
+    /// Score: half the negative gradient of the cost.
+    pub score: DVector<f64>,
+    /// Robust cost of the run.
+    pub cost: f64,
+}
+
+/// A fitted model.
+#[derive(Clone)]
+pub struct Fit {
+    /// The model's structure.
+    pub model: GrownModel,
+    /// a, b, c, then the parameters of the effects.
+    pub theta: Vec<f64>,
+    /// The noise under which it was fitted.
+    pub noise: Noise,
+    /// Robust -2 log likelihood with the prior, up to a constant.
+    pub cost: f64,
+    /// Normal equations by run.
+    pub runs: Vec<RunNormal>,
+    /// Information of prior and way ratio.
+    pub prior_information: DMatrix<f64>,
+    /// Score of prior and way ratio.
+    pub prior_score: DVector<f64>,
+    /// Information by which those of a, b, c are held that the data push against their bounds.
+    held_information: [f64; 3],
+    /// White innovations by run, less the runs' own factors.
+    pub innovations: Vec<Vec<f64>>,
+    /// Whitened regressors by run and parameter, less what the runs' own factors would explain;
+    /// empty for a parameter that does not touch the run.
+    pub columns: Vec<Vec<Vec<f64>>>,
+    /// Differences of the bins by run, not whitened.
+    pub residuals: Vec<Vec<f64>>,
+    /// The filters by run.
+    pub whiteners: Vec<Whitener>,
+    /// The filters of the runs' own factors, with the weights of the innovations.
+    pub filters: Vec<WeightedFilter>,
+    /// The runs' own factors less 1 and delays, with their covariance.
+    factors: Vec<(Vector3<f64>, Matrix3<f64>)>,
+}
+
+impl Fit {
+    /// Information matrix of all runs and the prior, with what is held at its bounds.
+    pub fn information(&self) -> DMatrix<f64> {
+        let mut information = self.free_information();
+        for (i, held) in self.held_information.iter().enumerate() {
+            information[(i, i)] += held;
+        }
+        information
+    }
+
+    /// The same with nothing held: what the data say of a coefficient at its bound.
+    pub fn free_information(&self) -> DMatrix<f64> {
+        self.runs.iter().fold(self.prior_information.clone(), |sum, run| sum + &run.information)
+    }
+
+    /// Score of all runs and the prior: nearly none where the fit ended.
+    pub fn score(&self) -> DVector<f64> {
+        self.runs.iter().fold(self.prior_score.clone(), |sum, run| sum + &run.score)
+    }
+
+    /// Cholesky factor of the information matrix; `None` when it is not positive definite.
+    pub fn factor(&self) -> Option<Cholesky<f64, Dyn>> {
+        Cholesky::new(self.information())
+    }
+
+    /// Number of innovations.
+    pub fn observations(&self) -> usize {
+        self.whiteners.iter().map(Whitener::count).sum()
+    }
+
+    /// Measured over true speed.
+    pub fn speed_scale(&self) -> f64 {
+        let effects = self.model.effects.iter().zip(self.model.ranges());
+        effects.map(|(effect, range)| effect.speed_scale(&self.theta[range])).product()
+    }
+
+    /// The parameters of effect number `index`.
+    pub fn effect_parameters(&self, index: usize) -> &[f64] {
+        &self.theta[self.model.ranges()[index].clone()]
+    }
+}
+
+impl FitProblem {
+    /// The problem of fitting these runs around declared Davis coefficients.
+    pub fn new(runs: Vec<RunData>, declared: Davis) -> Self {
+        // A train without a declared coefficient still has a scale for it.
+        let least = [0.3, 0.005, 0.0002];
+        let sizes = [declared.a, declared.b, declared.c];
+        let prior_deviation =
+            std::array::from_fn(|i| PRIOR_SHARE[i] * sizes[i].abs().max(least[i]));
+        let way_ratio = pooled_way_ratio(&runs);
+        let scatter_columns = runs.iter().map(|run| scatter_columns(run, declared)).collect();
+        FitProblem { runs, declared, prior_deviation, scatter_columns, way_ratio }
+    }
+
+    /// Standard deviation of the declared a (0), b (1) or c (2).
+    pub fn prior_deviation(&self, coefficient: usize) -> f64 {
+        self.prior_deviation[coefficient]
+    }
+
+    /// Least and greatest a (0), b (1) or c (2): physical, and within the tolerance of what is
+    /// declared; what is declared as none has no greatest.
+    fn declared_bounds(&self, coefficient: usize) -> (f64, f64) {
+        let Davis { a, b, c } = self.declared;
+        let declared = [a, b, c][coefficient];
+        let most = DECLARED_DEVIATIONS_MAX * self.prior_deviation[coefficient];
+        let greatest = if declared == 0.0 { f64::INFINITY } else { declared + most };
+        let least = declared.min(0.0) - BELOW_NONE_MAX * self.prior_deviation[coefficient];
+        ((declared - most).max(least), greatest)
+    }
+
+    /// Information that holds a, b, c where a score pushes them against their bounds.
+    fn held_information(&self, theta: &[f64], score: &DVector<f64>) -> [f64; 3] {
+        std::array::from_fn(|i| {
+            let (lower, upper) = self.declared_bounds(i);
+            let is_held =
+                (theta[i] <= lower && score[i] < 0.0) || (theta[i] >= upper && score[i] > 0.0);
+            if is_held { (HELD_SHARE * self.prior_deviation[i]).powi(-2) } else { 0.0 }
+        })
+    }
+
+    /// Standard deviation in N/kN of the force that a noise stands for, on average over some
+    /// seconds, and its share of the declared basic resistance; `None` without motion.
+    pub fn noise_n_per_kn(&self, noise: Noise, over_s: f64) -> Option<(f64, f64)> {
+        let (mut count, mut per_unit, mut basic) = (0.0, 0.0, 0.0);
+        for run in &self.runs {
+            for bin in &run.bins {
+                let sample = &run.samples()[bin.middle()];
+                count += 1.0;
+                per_unit += sample.weight_kn / sample.inertial_mass_kg;
+                basic += self.declared.w0_n_per_kn(bin.speed_mps);
+            }
+        }
+        let n_per_kn = noise.mean_acceleration_mps2(over_s) * count / per_unit;
+        (count > 0.0).then(|| (n_per_kn, n_per_kn * count / basic))
+    }
+
+    /// The model with a, b, c as declared and the effects at given parameters.
+    pub fn start(&self, effects: &[f64]) -> Vec<f64> {
+        let Davis { a, b, c } = self.declared;
+        [a, b, c].iter().chain(effects).copied().collect()
+    }
+}
+
+/// The ratios of all runs together. Wheel creep, rounding and the places where a run starts are
+/// common to the runs: below `COMMON` nothing is told.
+fn pooled_way_ratio(runs: &[RunData]) -> Option<(f64, f64)> {
+    const COMMON: f64 = 0.001;
+    let mut ratios: Vec<f64> = runs.iter().filter_map(|run| Some(run.way_ratio?.0)).collect();
+    if ratios.is_empty() {
+        return None;
+    }
+    ratios.sort_unstable_by(f64::total_cmp);
+    let middle = ratios.len() / 2;
+    let median = if ratios.len() % 2 == 1 {
+        ratios[middle]
+    } else {
+        0.5 * (ratios[middle - 1] + ratios[middle])
+    };
+    let mean_var: f64 = runs.iter().filter_map(|run| Some(run.way_ratio?.1.powi(2))).sum::<f64>()
+        / ratios.len() as f64;
+    let deviation = (mean_var / ratios.len() as f64 + COMMON * COMMON).sqrt();
+    Some((median, deviation))
+}

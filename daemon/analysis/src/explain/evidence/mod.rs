@@ -1,0 +1,37 @@
+//! What the runs say about a model: observations, their noise, and the joint fit.
+//!
+//! The measured speed is compared with the integral of the modelled acceleration, never
+//! differentiated. Samples are averaged in bins of about two seconds, within which outliers have
+//! been replaced before. What is left after the model is a random process: measurement noise on
+//! top of the integral of an unmodelled force. A Kalman filter of that process turns the bins'
+//! differences into white innovations, for residuals and regressors alike, so that the fit is a
+//! least-squares problem whatever the noise.
+
+mod bins;
+mod cleaning;
+mod criterion;
+mod fade;
+mod fit;
+mod model;
+mod noise;
+mod noise_search;
+mod run_data;
+mod run_scatter;
+mod sample_forces;
+#[cfg(test)]
+mod test_runs;
+mod way;
+mod whitener;
+
+pub use bins::Bin;
+pub use criterion::{EQUAL, NULL_STRENGTH, NullStrength, STRENGTH_MIN, p_value, strength};
+pub use fade::Fade;
+pub use fit::{Fit, FitProblem, Nearby, RunNormal};
+pub use model::{GrownForces, GrownModel};
+pub use noise::{Noise, RunScatter};
+pub use run_data::{RunData, RunDataError, RunPower, prepare};
+pub use run_scatter::{PRIOR_RUNS, WeightedFilter};
+pub use sample_forces::SampleForces;
+#[cfg(test)]
+pub use test_runs::coasting;
+pub use whitener::Whitener;

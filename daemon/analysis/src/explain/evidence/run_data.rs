@@ -1,0 +1,180 @@
+//! A run made ready for fitting: resolved, cleaned and binned.
+
+use dynocar_core::force::{ForceResolver, ResolvedSample};
+use dynocar_core::simulate::{BridgeLimits, Recording, SimulateError};
+use dynocar_core::train::TrainModel;
+use dynocar_core::validation::{ValidationLimits, Validator};
+use dynocar_shared::TrainSample;
+
+use crate::dataset::{Dataset, ForceSource, PositionSource, Role, Run};
+
+use super::bins::{self, Bin};
+use super::cleaning;
+use super::sample_forces::SampleForces;
+use super::way::way_ratio;
+
+/// A run, ready for fitting and for open-loop simulation.
+#[derive(Clone, Debug)]
+pub struct RunData {
+    /// Path of its file, as the dataset names it.
+    pub file: String,
+    /// Fit or holdout.
+    pub role: Role,
+    /// Time in s of the run's first sample in the recording's own count.
+    pub offset_s: f64,
+    /// +1 while the chainage grows, -1 while it falls.
+    pub direction: f64,
+    /// The cleaned run.
+    pub recording: Recording,
+    /// What the declared model says of each sample.
+    pub declared: Vec<SampleForces>,
+    /// Cleaned speed in m/s, lightly smoothed, at which resistances are evaluated.
+    pub smooth_mps: Vec<f64>,
+    /// The bins of all segments of motion, in order of time.
+    pub bins: Vec<Bin>,
+    /// Way by position over way by integrated speed, with its standard deviation, where
+    /// positions are measured.
+    pub way_ratio: Option<(f64, f64)>,
+    /// The power from which the force comes.
+    pub power: Option<RunPower>,
+    /// Samples that validation refused.
+    pub rejected: usize,
+    /// Values replaced as outliers.
+    pub replaced: usize,
+}
+
+/// The power that a run's force comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunPower {
+    /// Power in W at each sample, `NaN` where missing; what is fed back is negative.
+    pub power_w: Vec<f64>,
+    /// True where it holds what is fed beside the drive.
+    pub has_auxiliaries: bool,
+    /// True where the brake force comes from it too.
+    pub is_brake: bool,
+}
+
+impl RunPower {
+    /// Of a run, at the times of samples.
+    fn of(run: &Run, samples: &[ResolvedSample]) -> Option<Self> {
+        let (recorded, has_auxiliaries) = run.power()?;
+        let mut rows = run.samples.iter().zip(recorded);
+        let at = |sample: &ResolvedSample| {
+            // Refused rows are left out, none is added.
+            let row = rows.find(|(row, _)| row.time_ns == sample.time_ns);
+            row.and_then(|(_, power_w)| *power_w).unwrap_or(f64::NAN)
+        };
+        let power_w = samples.iter().map(at).collect();
+        let is_brake = run.brake_source == ForceSource::Power;
+        Some(RunPower { power_w, has_auxiliaries, is_brake })
+    }
+}
+
+/// Why a run cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RunDataError {
+    /// No sample passed validation or has forces.
+    #[error("{file}: {source}")]
+    Simulate {
+        /// The run's file.
+        file: String,
+        /// Why it cannot be simulated.
+        source: SimulateError,
+    },
+}
+
+impl RunData {
+    /// The samples, cleaned.
+    pub fn samples(&self) -> &[ResolvedSample] {
+        self.recording.samples()
+    }
+
+    /// Time in s of moving, used motion.
+    pub fn moving_s(&self) -> f64 {
+        let time_s = self.recording.time_s();
+        self.bins.iter().map(|bin| time_s[bin.end - 1] - time_s[bin.first]).sum()
+    }
+
+    /// Duration of the run in s.
+    pub fn duration_s(&self) -> f64 {
+        self.recording.time_s().last().copied().unwrap_or(0.0)
+    }
+}
+
+/// Makes all runs of a dataset ready.
+///
+/// # Errors
+///
+/// The first run without usable samples.
+pub fn prepare(dataset: &Dataset) -> Result<Vec<RunData>, RunDataError> {
+    let train = &dataset.train;
+    let limits = ValidationLimits::for_train(train.mass_kg);
+    let mut validator = Validator::new(crate::dataset::DATASET_TRAIN, train.mass_kg, limits);
+    let mut resolver = ForceResolver::new(train.clone(), dataset.track.clone());
+    let mut resolve =
+        |sample: &TrainSample| validator.check(sample).ok().map(|valid| resolver.resolve(&valid));
+    dataset.runs.iter().map(|run| prepare_run(train, run, &mut resolve)).collect()
+}
+
+/// A run whose samples are resolved one after the other, as a daemon takes them.
+fn prepare_run(
+    train: &TrainModel,
+    run: &Run,
+    resolve: &mut dyn FnMut(&TrainSample) -> Option<ResolvedSample>,
+) -> Result<RunData, RunDataError> {
+    let numbered = run.samples.iter().map(|it| TrainSample { run: run.number, ..*it });
+    let mut samples: Vec<ResolvedSample> = numbered.filter_map(|sample| resolve(&sample)).collect();
+    let rejected = run.samples.len() - samples.len();
+    let first_ns = samples.first().map_or(0, |sample| sample.time_ns);
+    let time_s: Vec<f64> =
+        samples.iter().map(|sample| (sample.time_ns - first_ns) as f64 * 1e-9).collect();
+    let replaced = cleaning::clean(&mut samples, bins::sampling_period_s(&time_s));
+    let recording = Recording::new(samples, BridgeLimits::default())
+        .map_err(|source| RunDataError::Simulate { file: run.file.clone(), source })?;
+    let declared = recording
+        .samples()
+        .iter()
+        .map(|sample| SampleForces::declared(sample, train.rotating_mass_factor))
+        .collect();
+    let smooth_mps = smoothed(&recording);
+    let bins = bins::bins(&recording);
+    let way_ratio = match run.position_source {
+        PositionSource::IntegratedSpeed => None,
+        _ => way_ratio(&recording),
+    };
+    let power = RunPower::of(run, recording.samples());
+    Ok(RunData {
+        file: run.file.clone(),
+        role: run.role,
+        offset_s: first_ns as f64 * 1e-9,
+        direction: f64::from(run.direction),
+        recording,
+        declared,
+        smooth_mps,
+        bins,
+        way_ratio,
+        power,
+        rejected,
+        replaced,
+    })
+}
+
+/// Mean over the second around each sample.
+fn smoothed(recording: &Recording) -> Vec<f64> {
+    let (samples, time_s) = (recording.samples(), recording.time_s());
+    let (mut from, mut to) = (0, 0);
+    let mut sum = 0.0;
+    (0..samples.len())
+        .map(|i| {
+            while to < samples.len() && time_s[to] <= time_s[i] + 0.5 {
+                sum += samples[to].speed_mps;
+                to += 1;
+            }
+            while time_s[from] < time_s[i] - 0.5 {
+                sum -= samples[from].speed_mps;
+                from += 1;
+            }
+            (sum / (to - from) as f64).max(0.0)
+        })
+        .collect()
+}

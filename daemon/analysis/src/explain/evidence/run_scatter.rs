@@ -1,0 +1,167 @@
+//! What differs from run to run without being an effect: the reading of the force sensors, the
+//! resistance of the day, and the instant that a force is stamped with.
+//!
+//! Each run has a factor of its own on the control force and on the basic resistance, near 1 with
+//! a standard deviation that the runs tell themselves, and a small delay of its own. They are
+//! integrated out of every fit, so that what is common to all runs is judged by the scatter
+//! between them, and a few hundredths of a second between force and speed bend no resistance.
+
+use dynocar_core::train::Davis;
+use nalgebra::{Matrix3, Vector3};
+
+use super::model::integrate_bins;
+use super::noise::RunScatter;
+use super::run_data::RunData;
+use super::whitener::Whitener;
+
+/// A run's own deviations: of the factors on the control force and on the basic resistance from
+/// 1, and the delay of the force in s.
+const DEVIATIONS: usize = 3;
+
+/// Columns of the deviations.
+pub type Columns = [Vec<f64>; DEVIATIONS];
+
+/// Standard deviation in s of a run's own delay of the forces: stamps, filters and holds of a
+/// recorder.
+const DELAY_S: f64 = 0.02;
+
+/// What is known beforehand of the scatter between runs counts as so many of them.
+pub const PRIOR_RUNS: f64 = 4.0;
+/// Beyond these a factor is an effect and no scatter.
+const FORCE_MAX: f64 = 0.008;
+const RESISTANCE_MAX: f64 = 0.03;
+
+impl RunScatter {
+    fn precision(self) -> Matrix3<f64> {
+        let deviations = Vector3::new(self.force, self.resistance, DELAY_S);
+        Matrix3::from_diagonal(&deviations.map(|deviation| deviation.powi(-2)))
+    }
+
+    /// The scatter under which the factors of the runs are likeliest (one step of expectation
+    /// maximisation), shrunk towards the usual one.
+    pub fn updated(factors: &[(Vector3<f64>, Matrix3<f64>)]) -> Self {
+        let usual = RunScatter::USUAL;
+        let count = factors.len() as f64 + PRIOR_RUNS;
+        let mean_square = |k: usize, usual: f64| {
+            let seen: f64 = factors.iter().map(|(u, m)| u[k] * u[k] + m[(k, k)]).sum();
+            ((seen + PRIOR_RUNS * usual * usual) / count).sqrt()
+        };
+        RunScatter {
+            force: mean_square(0, usual.force).min(FORCE_MAX),
+            resistance: mean_square(1, usual.resistance).min(RESISTANCE_MAX),
+        }
+    }
+}
+
+/// Speeds in m/s at the bins that a factor of 2 instead of 1 would add (control force, basic
+/// resistance), and a delay of the control force by 1 s, to first order.
+pub fn scatter_columns(run: &RunData, davis: Davis) -> Columns {
+    let samples = run.samples();
+    let mut columns = Columns::default();
+    let force =
+        |i: usize| samples[i].control_force_n().unwrap_or(0.0) / samples[i].inertial_mass_kg;
+    integrate_bins(run, force, &mut columns[0]);
+    let resistance = |i: usize| {
+        let per_unit = samples[i].weight_kn / samples[i].inertial_mass_kg;
+        -per_unit * davis.w0_n_per_kn(run.smooth_mps[i])
+    };
+    integrate_bins(run, resistance, &mut columns[1]);
+    // The integral of the force's slope is the force.
+    let mut segment = usize::MAX;
+    let mut at_start = 0.0;
+    for bin in &run.bins {
+        if bin.segment != segment {
+            (segment, at_start) = (bin.segment, force(bin.first));
+        }
+        let mean = (bin.first..bin.end).map(force).sum::<f64>() / (bin.end - bin.first) as f64;
+        columns[2].push(at_start - mean);
+    }
+    columns
+}
+
+/// A series less what deviations explain by their columns.
+pub fn remove(columns: &Columns, series: &[f64], deviations: &Vector3<f64>) -> Vec<f64> {
+    let [force, resistance, delay] = columns;
+    let columns = force.iter().zip(resistance).zip(delay);
+    series
+        .iter()
+        .zip(columns)
+        .map(|(value, ((force, resistance), delay))| {
+            value - deviations[0] * force - deviations[1] * resistance - deviations[2] * delay
+        })
+        .collect()
+}
+
+/// Removes the runs' own factors from whitened series of one run.
+#[derive(Clone, Debug)]
+pub struct ScatterFilter {
+    columns: Columns,
+    precision: Matrix3<f64>,
+}
+
+/// The filter with the weights of the innovations.
+#[derive(Clone, Debug)]
+pub struct WeightedFilter {
+    columns: Columns,
+    weights: Vec<f64>,
+    /// Covariance of the factors after the run.
+    pub covariance: Matrix3<f64>,
+    /// Logarithm of the determinant that the factors add.
+    pub log_determinant: f64,
+}
+
+impl ScatterFilter {
+    /// The filter of a run from its columns under a noise.
+    pub fn new(columns: &Columns, whitener: &Whitener, scatter: RunScatter) -> Self {
+        let mut whitened = Columns::default();
+        for (column, out) in columns.iter().zip(&mut whitened) {
+            whitener.whiten(column, out);
+        }
+        ScatterFilter { columns: whitened, precision: scatter.precision() }
+    }
+
+    /// The filter with given weights of the innovations.
+    pub fn weighted(&self, weights: Vec<f64>) -> WeightedFilter {
+        let product = |i: usize, j: usize| -> f64 {
+            let pairs = self.columns[i].iter().zip(&self.columns[j]).zip(&weights);
+            pairs.map(|((one, other), weight)| weight * one * other).sum()
+        };
+        let information = self.precision + Matrix3::from_fn(product);
+        // A sum of a positive definite and a positive semidefinite matrix.
+        let covariance = information.try_inverse().unwrap_or_else(Matrix3::zeros);
+        let log_determinant = (information.determinant() / self.precision.determinant()).ln();
+        WeightedFilter { columns: self.columns.clone(), weights, covariance, log_determinant }
+    }
+
+    /// Cost of the factors themselves.
+    pub fn prior_cost(&self, factors: &Vector3<f64>) -> f64 {
+        factors.dot(&(self.precision * factors))
+    }
+}
+
+impl WeightedFilter {
+    /// The factors, less 1, and the delay that fit a whitened series best.
+    pub fn factors(&self, series: &[f64]) -> Vector3<f64> {
+        let product = |column: &[f64]| -> f64 {
+            column.iter().zip(series).zip(&self.weights).map(|((c, s), w)| w * c * s).sum()
+        };
+        self.covariance * Vector3::from_fn(|k, _| product(&self.columns[k]))
+    }
+
+    /// What the factors explain of the square of a series, given its weighted product with each of
+    /// their columns.
+    pub fn explained(&self, product: impl Fn(&[f64]) -> f64) -> f64 {
+        let products = Vector3::from_fn(|k, _| product(&self.columns[k]));
+        products.dot(&(self.covariance * products))
+    }
+
+    /// The series less what the factors explain.
+    pub fn remove(&self, series: &[f64], factors: &Vector3<f64>) -> Vec<f64> {
+        remove(&self.columns, series, factors)
+    }
+
+    /// Weights of the innovations.
+    pub fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+}

@@ -1,0 +1,70 @@
+//! What accelerates the train at one sample.
+
+use dynocar_core::force::ResolvedSample;
+use dynocar_core::force::balance::{ActingForces, mps2_per_n_per_kn};
+use dynocar_core::terms::Resistance;
+use dynocar_core::train::Davis;
+
+/// What accelerates the train at one sample; effects change these fields.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampleForces {
+    /// Declared gross mass in kg.
+    pub mass_kg: f64,
+    /// True traction force in N.
+    pub traction_n: f64,
+    /// True brake force in N, retarding.
+    pub brake_n: f64,
+    /// True over declared mass.
+    pub mass_factor: f64,
+    /// Rotating-mass factor gamma.
+    pub rotating_mass_factor: f64,
+    /// Gradient in ‰ along the travel.
+    pub gradient_permille: f64,
+    /// What resists, part by part, but for a, b and c.
+    pub resistance: Resistance,
+    /// Further resistance in N.
+    pub extra_n: f64,
+}
+
+impl SampleForces {
+    /// As declared.
+    #[inline]
+    pub fn declared(sample: &ResolvedSample, rotating_mass_factor: f64) -> Self {
+        SampleForces {
+            mass_kg: sample.mass_kg,
+            traction_n: sample.traction_force_n.unwrap_or(0.0),
+            brake_n: sample.brake_force_n.unwrap_or(0.0),
+            mass_factor: 1.0,
+            rotating_mass_factor,
+            gradient_permille: sample.gradient_permille.unwrap_or(0.0),
+            resistance: sample.resistance,
+            extra_n: 0.0,
+        }
+    }
+
+    /// The acceleration p0 + p1 v + p2 v² in m/s² for speeds near `speed_mps`.
+    #[inline]
+    pub fn polynomial(&self, davis: Davis, speed_mps: f64) -> [f64; 3] {
+        let acting = ActingForces {
+            mass_kg: self.mass_kg * self.mass_factor,
+            rotating_mass_factor: self.rotating_mass_factor,
+            force_n: self.traction_n - self.brake_n - self.extra_n,
+            gradient_permille: self.gradient_permille,
+            resistance_n_per_kn: self.resistance.polynomial(davis, speed_mps),
+        };
+        acting.acceleration_mps2()
+    }
+
+    /// What the acceleration changes by for each ‰ of gradient along the travel.
+    #[inline]
+    pub(super) fn gradient_slope(&self) -> f64 {
+        -mps2_per_n_per_kn(self.rotating_mass_factor)
+    }
+
+    /// What the acceleration changes by for each unit of a, b and c.
+    #[inline]
+    pub(super) fn davis_slopes(&self, speed_mps: f64) -> [f64; 3] {
+        let unit = mps2_per_n_per_kn(self.rotating_mass_factor);
+        self.resistance.davis_slopes(speed_mps).map(|slope| -unit * slope)
+    }
+}

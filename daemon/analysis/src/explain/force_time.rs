@@ -1,0 +1,90 @@
+//! The time of recorded forces: a recorder that averages over the second before its stamp, or stamps
+//! late, holds forces that act before their stamps, and at a sample a second that costs as much as all
+//! else together. It is learned before anything undeclared is looked for; a force that acts after its
+//! stamp is an actuator's delay, which is looked for.
+
+use std::sync::Arc;
+
+use dynocar_core::terms::Parameter;
+
+use crate::dataset::stamps;
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::answer::{HALF_95, Told};
+use super::effects::Hypothesis;
+use super::evidence::{
+    FitProblem, GrownModel, Noise, RunData, RunDataError, SampleForces, prepare,
+};
+use super::selection::{OBSERVATIONS_MIN, deviations};
+use crate::dataset::{Dataset, Role};
+
+/// Samples nearer in time than this in s leave a late stamp to each run's own small delay.
+const STEP_MIN_S: f64 = 0.5;
+/// The same for a late stamp of less than this share of the step between samples.
+const LATE_SHARE_MIN: f64 = 0.1;
+
+const PARAMETERS: [Parameter; 1] = [Parameter::new("force_late_s", (-1.0, 1.0), 0.02)];
+
+/// Forces that act before their stamps (after them, where negative), along straight lines between
+/// the samples.
+#[derive(Debug)]
+struct LateStamps;
+
+impl Hypothesis for LateStamps {
+    fn kind(&self) -> EffectKind {
+        EffectKind::ActuatorDelay
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &PARAMETERS
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        let (late_s, time_s) = (parameters[0], run.recording.time_s());
+        let recorded: Vec<[f64; 2]> = forces.iter().map(|it| [it.traction_n, it.brake_n]).collect();
+        for (i, force) in forces.iter_mut().enumerate() {
+            let other = if late_s >= 0.0 { i + 1 } else { i.wrapping_sub(1) };
+            let Some(ahead) = recorded.get(other) else { continue };
+            let step_s = (time_s[other] - time_s[i]).abs();
+            let at =
+                |k: usize| stamps::stamped_late(recorded[i][k], ahead[k], step_s, late_s.abs());
+            [force.traction_n, force.brake_n] = [at(0), at(1)];
+        }
+    }
+}
+
+/// By how many s the fit runs of a dataset stamp forces late; `None` where samples are dense, where
+/// they act after their stamps, or where it is not told.
+///
+/// # Errors
+///
+/// When a run has no usable sample.
+pub fn told(dataset: &Dataset) -> Result<Option<Told>, RunDataError> {
+    let step_s = dataset.runs.iter().map(|run| run.quality.order.step_s).fold(0.0, f64::max);
+    if step_s < STEP_MIN_S {
+        return Ok(None);
+    }
+    let mut runs = prepare(dataset)?;
+    runs.retain(|run| run.role == Role::Fit);
+    let problem = FitProblem::new(runs, dataset.train.resistance);
+    let model = GrownModel::default().with(Arc::new(LateStamps));
+    let first = problem.fit_with_noise(&model, problem.start(&[0.0]), Noise::START);
+    let fit = problem.fit_with_noise(&model, first.theta, first.noise);
+    if fit.observations() < OBSERVATIONS_MIN {
+        return Ok(None);
+    }
+    let deviation = deviations(&fit).std;
+    let late = Told { value: fit.effect_parameters(0)[0], std: deviation[3] };
+    let is_inside = LateStamps.at_bound(&[late.value]).is_none();
+    let counts = late.value > LATE_SHARE_MIN * step_s && is_inside;
+    Ok((counts && stamps::is_stamped_late(late.value, late.std)).then_some(late))
+}
+
+/// What is told of it, as a sentence to follow another.
+pub fn sentence(late: Told) -> String {
+    format!(
+        " Forces act {:.2} ± {:.2} s before their stamps and were taken where they act.",
+        late.value,
+        HALF_95 * late.std
+    )
+}

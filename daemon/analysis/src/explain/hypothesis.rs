@@ -1,0 +1,200 @@
+//! What an effect is to everything that fits, simulates or reports it.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use dynocar_core::terms::{Entry, Parameter};
+use dynocar_shared::vocabulary::EffectKind;
+use nalgebra::DMatrix;
+
+use super::answer::{ParameterValue, Place};
+use super::evidence::{RunData, SampleForces};
+use super::places::End;
+
+/// An effect with its structure (places, windows, runs) fixed, shared by models.
+pub type SharedHypothesis = Arc<dyn Hypothesis>;
+
+/// What an estimate says outside: values and standard deviations by the names of the answer.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Reported {
+    /// Values.
+    pub values: BTreeMap<String, ParameterValue>,
+    /// Standard deviations.
+    pub deviations: BTreeMap<String, ParameterValue>,
+}
+
+impl Reported {
+    /// Adds a number with its standard deviation.
+    pub fn push(&mut self, name: &str, value: f64, deviation: f64) {
+        self.values.insert(name.into(), ParameterValue::Number(value));
+        self.deviations.insert(name.into(), ParameterValue::Number(deviation));
+    }
+}
+
+/// A parameter at a bound of what is looked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AtBound {
+    /// Its name in the answer.
+    pub name: &'static str,
+    /// The bound.
+    pub bound: f64,
+}
+
+/// What a report may need beside the parameters of the effect itself.
+pub struct ReportContext<'a> {
+    /// Parameters of the effect.
+    pub parameters: &'a [f64],
+    /// Their standard deviations.
+    pub deviations: &'a [f64],
+    /// Fitted c of the Davis formula.
+    pub c: f64,
+    /// Its standard deviation.
+    pub c_deviation: f64,
+    /// Covariance of c with the effect's first parameter.
+    pub c_covariance: f64,
+    /// Mean weight of the fit runs in kN.
+    pub weight_kn: f64,
+    /// By how much a standard deviation that is told by the scatter between runs is enlarged.
+    pub few_runs_factor: f64,
+}
+
+/// A structure that a kind proposes: everything but the values of its parameters.
+pub trait Hypothesis: Send + Sync + std::fmt::Debug {
+    /// The kind it belongs to.
+    fn kind(&self) -> EffectKind;
+
+    /// Its parameters, in order.
+    fn parameters(&self) -> &[Parameter];
+
+    /// Changes the forces at all samples of a run.
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]);
+
+    /// False when a parameter changes nothing on a fit run.
+    fn touches(&self, _parameter: usize, _run: &RunData) -> bool {
+        true
+    }
+
+    /// True when each parameter adds a gradient in proportion to it, and nothing else.
+    fn is_gradient(&self) -> bool {
+        false
+    }
+
+    /// The gradient in ‰ along the travel that a unit of a parameter adds at each sample of a run.
+    fn gradient_permille(&self, _parameter: usize, run: &RunData, permille: &mut Vec<f64>) {
+        permille.clear();
+        permille.resize(run.samples().len(), 0.0);
+    }
+
+    /// Measured over true speed.
+    fn speed_scale(&self, _parameters: &[f64]) -> f64 {
+        1.0
+    }
+
+    /// True when its first parameter is the speed scale.
+    fn changes_speed_scale(&self) -> bool {
+        false
+    }
+
+    /// Where it acts.
+    fn place(&self) -> Place {
+        Place::default()
+    }
+
+    /// The ends of its places that were estimated from the speeds.
+    fn ends(&self) -> Vec<End> {
+        Vec::new()
+    }
+
+    /// The same structure with one of its ends elsewhere; `None` where that makes no place.
+    fn with_end(&self, _end: &End, _at: f64) -> Option<SharedHypothesis> {
+        None
+    }
+
+    /// True when it acts in certain runs only: an event, and no property of train or line.
+    fn is_event(&self) -> bool {
+        let place = self.place();
+        place.windows.is_some() || place.runs.is_some()
+    }
+
+    /// Files of the fit runs in which it acts, where these were chosen.
+    fn chosen_runs(&self) -> Option<&[String]> {
+        None
+    }
+
+    /// The same structure in other runs.
+    fn with_runs(&self, _runs: Vec<String>) -> Option<SharedHypothesis> {
+        None
+    }
+
+    /// Twice the logarithm of the number of structures it was chosen from.
+    fn choice_cost(&self) -> f64 {
+        0.0
+    }
+
+    /// Standard deviation of the first parameter by errors that all runs share, which no number
+    /// of runs averages out.
+    fn shared_error(&self) -> f64 {
+        0.0
+    }
+
+    /// Whether the effect is larger than what declared figures are usually good for.
+    fn is_material(&self, _parameters: &[f64], _c: f64) -> bool {
+        true
+    }
+
+    /// Why parameters like these are not what the kind says, whatever speaks for them.
+    fn contradiction(&self, _parameters: &[f64]) -> Option<&'static str> {
+        None
+    }
+
+    /// The value of each parameter at which there is no effect.
+    fn none(&self) -> f64 {
+        0.0
+    }
+
+    /// The first parameter that lies at a bound of what is looked for, other than at no effect: the
+    /// data ask for something else, or hold it not at all.
+    fn at_bound(&self, parameters: &[f64]) -> Option<AtBound> {
+        let mut specs = self.parameters().iter().zip(parameters);
+        specs.find_map(|(spec, &value)| {
+            let near = |bound: &f64| (value - bound).abs() < spec.step && *bound != self.none();
+            let bound = [spec.lower, spec.upper].into_iter().find(near)?;
+            Some(AtBound { name: spec.name, bound })
+        })
+    }
+
+    /// How far it is from no effect, in the unit of its first parameter.
+    fn size(&self, parameters: &[f64]) -> f64 {
+        parameters[0] - self.none()
+    }
+
+    /// Information about its parameters before the data, around no effect; `None` for a flat
+    /// prior.
+    fn prior_information(&self) -> Option<&DMatrix<f64>> {
+        None
+    }
+
+    /// Kinds that none of the runs at hand could tell from it.
+    fn twins(&self) -> &[EffectKind] {
+        &[]
+    }
+
+    /// What the effect is in the files of a train and a line; `None` where these cannot hold it.
+    fn entries(&self, _parameters: &[f64]) -> Option<Vec<Entry>> {
+        None
+    }
+
+    /// The law in a formula, for what has no name.
+    fn formula(&self, _parameters: &[f64]) -> Option<String> {
+        None
+    }
+
+    /// Parameters by the names of the answer.
+    fn report(&self, context: &ReportContext) -> Reported {
+        let mut reported = Reported::default();
+        for (i, spec) in self.parameters().iter().enumerate() {
+            reported.push(spec.name, context.parameters[i], context.deviations[i]);
+        }
+        reported
+    }
+}

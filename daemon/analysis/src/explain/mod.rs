@@ -1,0 +1,137 @@
+//! Explaining a residual: what the declared model leaves, which undeclared effect explains it,
+//! how sure that is, and what the model with the effect predicts.
+//!
+//! # Layout, in the order of the work
+//!
+//! - [`evidence`]: observations, noise, the joint fit of a, b, c and effects
+//! - [`drive`]: the efficiency of a drive of which only the power is recorded
+//! - [`force_time`]: forces that act before their stamps
+//! - [`hypothesis`], [`effects`]: what an effect is to the others; the library, one file for each kind
+//! - [`scan`], [`places`], [`residual_pressure`]: what a force of some shape, at some place or
+//!   time, would explain
+//! - [`selection`]: the search for effects, its significance, evidence by run
+//! - [`map_error`]: the finished model beside what the map's own error makes all runs err alike
+//! - [`score`], `stop_runs`, [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
+//! - [`unexplained`], [`told`], [`identifiability`], [`rivals`], [`runners_up`], [`verdict`], [`answer`]: the statement
+//! - [`report`]: what a report shows beyond it
+//!
+//! [`explain`] runs it all.
+
+pub mod answer;
+mod bootstrap;
+pub mod drive;
+pub mod effects;
+pub mod evidence;
+pub mod force_time;
+pub mod hypothesis;
+pub mod identifiability;
+pub mod map_error;
+pub mod places;
+pub mod report;
+pub mod residual_pressure;
+pub mod rivals;
+pub mod runners_up;
+pub mod scan;
+pub mod score;
+pub mod selection;
+mod stop_runs;
+pub mod stop_to_stop;
+pub mod told;
+pub mod unexplained;
+pub mod verdict;
+
+use dynocar_core::plausibility::Severity;
+
+use crate::dataset::{Dataset, Role};
+use answer::Answer;
+use evidence::{Fit, FitProblem, RunData, RunDataError};
+use score::{PredictedRun, Score};
+use selection::{Deviations, Outcome, Progress, Search};
+use unexplained::Unexplained;
+
+/// Fit and holdout runs with the models that were fitted.
+pub struct Explanation {
+    /// The machine-readable answer.
+    pub answer: Answer,
+    /// The fit runs and their prior.
+    pub problem: FitProblem,
+    /// The runs set aside.
+    pub holdout: Vec<RunData>,
+    /// The declared model with a, b, c refitted.
+    pub base: Fit,
+    /// The same with the effects.
+    pub grown: Fit,
+    /// How surely its parameters are known.
+    pub deviations: Deviations,
+    /// Open-loop errors.
+    pub score: Score,
+    /// Predicted measured speeds of all runs by the grown model.
+    pub predictions: Vec<PredictedRun>,
+    /// What the search found.
+    pub outcome: Outcome,
+    /// Greatest strength of a candidate in the first round of the search.
+    pub strength: f64,
+}
+
+/// Explains what the declared model of a dataset leaves.
+///
+/// Holdout runs are read once, to score the finished model.
+///
+/// # Errors
+///
+/// When a run has no usable sample.
+pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, RunDataError> {
+    progress(0.0, "reading the runs");
+    let told_drive = drive::told(dataset)?;
+    let retaken = told_drive.as_ref().map(|told| dataset.with_drive(told.drive));
+    let dataset = retaken.as_ref().unwrap_or(dataset);
+    let late = force_time::told(dataset)?;
+    let moved = late.map(|late| dataset.with_forces_moved(late.value));
+    let dataset = moved.as_ref().unwrap_or(dataset);
+    let (fit_runs, holdout): (Vec<RunData>, Vec<RunData>) =
+        evidence::prepare(dataset)?.into_iter().partition(|run| run.role == Role::Fit);
+    let problem = FitProblem::new(fit_runs, dataset.train.resistance);
+    let search = Search {
+        problem: &problem,
+        holdout: &holdout,
+        train: &dataset.train,
+        track: dataset.track.as_ref(),
+        progress,
+    };
+    let notes = dataset.notes();
+    // An effect that explains wrong units is none.
+    let is_possible = notes.iter().all(|note| note.severity < Severity::Fundamental);
+    let mut outcome = if is_possible { search.run() } else { search.base() };
+    if is_possible && Unexplained::of(&search, &outcome).is_some_and(|left| !left.is_noise()) {
+        search.look_under_noise(&mut outcome);
+    }
+    let known = places::settle(&problem, &mut outcome.fit);
+    let deviations = map_error::beside_map_error(&search, &mut outcome);
+    progress(0.95, "scoring the holdout runs");
+    let score = Score::of(&problem, &holdout, &outcome.base, &outcome.fit);
+    let predictions = score::predictions(&problem, &holdout, &outcome.fit);
+    let mut answer = verdict::answer(&search, &outcome, &deviations, &known, &score, notes);
+    if let Some(told) = told_drive {
+        answer.statement += &told.answer.sentence();
+        answer.drive = Some(told.answer);
+    }
+    if let Some(late) = late {
+        answer.statement += &force_time::sentence(late);
+        answer.force_late_s = Some(late);
+    }
+    let strength = Search::greatest_strength(&outcome);
+    progress(1.0, "done");
+    let (base, grown) = (outcome.base.clone(), outcome.fit.clone());
+    Ok(Explanation {
+        answer,
+        problem,
+        holdout,
+        base,
+        grown,
+        deviations,
+        score,
+        predictions,
+        outcome,
+        strength,
+    })
+}

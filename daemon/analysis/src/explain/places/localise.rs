@@ -1,0 +1,271 @@
+//! Where along the line, and in which runs, a force of a given shape acts.
+
+use dynocar_core::terms::gradient;
+use dynocar_core::track::Track;
+
+use super::found::Found;
+use super::inside::Inside;
+use super::runs::best_runs;
+use crate::explain::evidence::{Bin, RunData};
+use crate::explain::scan::{Scan, Tuple};
+
+/// Shortest interval in m that is looked for.
+const SHORTEST_M: f64 = 150.0;
+/// Ends are refined to so many m.
+const FINEST_M: f64 = 10.0;
+/// What is tied to a place shows in so many runs, where there are so many; less is an event.
+const PLACE_RUNS_MIN: usize = 2;
+/// A further interval must add this share of what the others explain.
+const FURTHER_SHARE: f64 = 0.05;
+/// A surveyed gradient is good to this in ‰, which is N/kN.
+pub const MAP_ERROR_PERMILLE: f64 = gradient::SURVEYED.permille;
+/// Times that all intervals are refined beside each other.
+const SWEEPS: usize = 2;
+/// Intervals of one effect at most.
+const INTERVALS_MAX: usize = 6;
+
+struct Cell {
+    interval_m: [f64; 2],
+    runs: Vec<Tuple>,
+}
+
+/// A shape: acceleration in m/s² per unit at a sample of a run, where the force acts in full.
+pub type Shape<'s> = &'s dyn Fn(&RunData, usize) -> f64;
+
+/// A shape at the bins of all fit runs, with the places of the bins.
+struct Places<'s, 'a> {
+    scan: &'s Scan<'a>,
+    inside: Inside,
+    positive: bool,
+    /// By run and bin: chainage in m and acceleration in m/s² per unit.
+    bins: Vec<Vec<(Option<f64>, f64)>>,
+}
+
+impl<'s, 'a> Places<'s, 'a> {
+    fn new(scan: &'s Scan<'a>, shape: Shape, inside: Inside, positive: bool) -> Self {
+        let at_bins = |run: &RunData| {
+            let middles = run.bins.iter().map(Bin::middle);
+            middles.map(|i| (run.samples()[i].position_m, shape(run, i))).collect()
+        };
+        let bins = scan.problem.runs.iter().map(at_bins).collect();
+        Places { scan, inside, positive, bins }
+    }
+
+    fn run_tuple(&self, index: usize, intervals_m: &[[f64; 2]]) -> Tuple {
+        let value = |&(position_m, value): &(Option<f64>, f64)| match self
+            .inside
+            .share(position_m, intervals_m)
+        {
+            0.0 => 0.0,
+            share => share * value,
+        };
+        let shape: Vec<f64> = self.bins[index].iter().map(value).collect();
+        self.scan.shape_tuple(index, &shape)
+    }
+
+    fn tuples(&self, interval_m: [f64; 2]) -> Vec<Tuple> {
+        (0..self.bins.len()).map(|index| self.run_tuple(index, &[interval_m])).collect()
+    }
+}
+
+/// The chainage in m over which the fit runs move.
+pub fn span_m(scan: &Scan) -> Option<[f64; 2]> {
+    let mut span: Option<[f64; 2]> = None;
+    for run in &scan.problem.runs {
+        for bin in &run.bins {
+            if let Some(at) = run.samples()[bin.middle()].position_m {
+                let [low, high] = span.unwrap_or([at, at]);
+                span = Some([low.min(at), high.max(at)]);
+            }
+        }
+    }
+    span.filter(|[low, high]| high - low > 4.0 * SHORTEST_M)
+}
+
+fn cells(places: &Places, [low, high]: [f64; 2]) -> Vec<Cell> {
+    let shortest_m = SHORTEST_M.max((high - low) / 250.0);
+    let mut cells = Vec::new();
+    let mut length_m = shortest_m;
+    while length_m < 0.6 * (high - low) {
+        let count = ((high - low) / (0.5 * length_m)).ceil() as usize;
+        for k in 0..count {
+            let from_m = low + 0.5 * length_m * k as f64;
+            let interval_m = [from_m, from_m + length_m];
+            cells.push(Cell { interval_m, runs: places.tuples(interval_m) });
+        }
+        length_m *= 1.6;
+    }
+    cells
+}
+
+/// Finds the intervals and runs in which a common factor on a shape explains most.
+///
+/// `positive` asks for a positive factor. Intervals are added while each explains more than the
+/// choice among all of them does by chance.
+pub fn find(scan: &Scan, shape: Shape, inside: Inside, positive: bool) -> Option<Found> {
+    let span = span_m(scan)?;
+    let places = Places::new(scan, shape, inside, positive);
+    let cells = cells(&places, span);
+    let interval_cost = 2.0 * (cells.len().max(2) as f64).ln();
+    let runs_min = PLACE_RUNS_MIN.min(scan.problem.runs.len());
+    let best = cells
+        .iter()
+        .map(|cell| (cell, best_runs(scan, &cell.runs, positive, runs_min)))
+        .max_by(|one, other| (one.1.1 - one.1.3).total_cmp(&(other.1.1 - other.1.3)))?;
+    let (cell, (runs, gain, _, subset)) = best;
+    if gain <= 0.0 {
+        return None;
+    }
+    let mut found = Found {
+        intervals_m: vec![cell.interval_m],
+        span_m: span,
+        runs,
+        gain,
+        estimate: 0.0,
+        choice_cost: interval_cost + subset,
+        map_error: 0.0,
+    };
+    places.polish(&mut found, 0);
+    while found.intervals_m.len() < INTERVALS_MAX {
+        let Some(added) = places.with_another(&cells, &found) else { break };
+        if added.gain - found.gain < (interval_cost + 6.0).max(FURTHER_SHARE * found.gain) {
+            break;
+        }
+        found = Found { choice_cost: found.choice_cost + interval_cost, ..added };
+    }
+    if found.intervals_m.len() > 1 {
+        // Each was found beside those before it alone.
+        for _ in 0..SWEEPS {
+            (0..found.intervals_m.len()).for_each(|index| places.polish(&mut found, index));
+        }
+    }
+    found.intervals_m.sort_by(|one, other| one[0].total_cmp(&other[0]));
+    found.map_error = places.map_error(&found);
+    Some(found)
+}
+
+/// Standard deviation in ‰ of the mean gradient over some intervals: what the line states of each,
+/// and no less than a surveyor's.
+fn gradient_std_permille(track: Option<&Track>, intervals_m: &[[f64; 2]]) -> f64 {
+    let squares: f64 = intervals_m
+        .iter()
+        .map(|[from_m, to_m]| {
+            let stated = track.and_then(|track| track.gradient_std_permille(*from_m, *to_m));
+            stated.unwrap_or(0.0).max(MAP_ERROR_PERMILLE).powi(2)
+        })
+        .sum();
+    squares.sqrt() / intervals_m.len().max(1) as f64
+}
+
+/// True when an interval overlaps none of some others.
+fn apart(one: [f64; 2], others: &[[f64; 2]]) -> bool {
+    others.iter().all(|other| one[1] <= other[0] || one[0] >= other[1])
+}
+
+impl Places<'_, '_> {
+    /// What an error of the gradient map makes of the factor. It slows the train in one direction
+    /// and helps it in the other, so that passes in both directions cancel it; a set of runs in
+    /// one direction shows it in full, the same in every run.
+    fn map_error(&self, found: &Found) -> f64 {
+        let (mut square, mut leaning, mut resistance, mut full) = (0.0, 0.0, 0.0, 0.0);
+        for (index, run) in self.scan.problem.runs.iter().enumerate() {
+            if found.runs.as_ref().is_some_and(|runs| !runs.contains(&index)) {
+                continue;
+            }
+            let tuple = self.run_tuple(index, &found.intervals_m);
+            square += tuple.square;
+            leaning += run.direction * tuple.square;
+            for (bin, &(position_m, value)) in run.bins.iter().zip(&self.bins[index]) {
+                let share = self.inside.share(position_m, &found.intervals_m);
+                let sample = &run.samples()[bin.middle()];
+                resistance += share * self.scan.per_unit_resistance_mps2(sample);
+                full += (share * value).abs();
+            }
+        }
+        if square <= 0.0 || full <= 0.0 {
+            return 0.0;
+        }
+        // With a profile of its own for each direction, nothing cancels.
+        let track = self.scan.track;
+        let is_one = track.is_none_or(|track| track.is_one_profile());
+        let leaning = if is_one { (leaning / square).abs() } else { 1.0 };
+        gradient_std_permille(track.map(|track| &**track), &found.intervals_m)
+            * leaning
+            * (resistance / full)
+    }
+
+    /// The sum over the chosen runs.
+    fn summed(&self, tuples: &[Tuple], runs: &Option<Vec<usize>>) -> Tuple {
+        let mut sum = Tuple::zero(self.scan.fit.theta.len());
+        for (index, tuple) in tuples.iter().enumerate() {
+            if runs.as_ref().is_none_or(|runs| runs.contains(&index)) {
+                sum.add(tuple);
+            }
+        }
+        sum
+    }
+
+    /// The sum over the chosen runs of some intervals together: what one leaves behind in the noise is
+    /// still there when the train comes to the next.
+    fn over(&self, intervals_m: &[[f64; 2]], runs: &Option<Vec<usize>>) -> Tuple {
+        let mut sum = Tuple::zero(self.scan.fit.theta.len());
+        let is_chosen = |index: &usize| runs.as_ref().is_none_or(|runs| runs.contains(index));
+        for index in (0..self.bins.len()).filter(is_chosen) {
+            sum.add(&self.run_tuple(index, intervals_m));
+        }
+        sum
+    }
+
+    fn with_another(&self, cells: &[Cell], found: &Found) -> Option<Found> {
+        let base = self.over(&found.intervals_m, &found.runs);
+        let (cell, gain) = cells
+            .iter()
+            .filter(|cell| apart(cell.interval_m, &found.intervals_m))
+            .map(|cell| {
+                let mut sum = self.summed(&cell.runs, &found.runs);
+                sum.add(&base);
+                (cell, self.scan.gain(&sum).0)
+            })
+            .max_by(|one, other| one.1.total_cmp(&other.1))?;
+        let mut grown = found.clone();
+        grown.intervals_m.push(cell.interval_m);
+        grown.gain = gain;
+        self.polish(&mut grown, found.intervals_m.len());
+        Some(grown)
+    }
+
+    /// Moves the ends of an interval while that explains more.
+    fn polish(&self, found: &mut Found, index: usize) {
+        let mut others = found.intervals_m.clone();
+        let own = others.remove(index);
+        let value = |interval: [f64; 2]| {
+            let together = [&others[..], &[interval]].concat();
+            let (gain, estimate) = self.scan.gain(&self.over(&together, &found.runs));
+            if self.positive && estimate <= 0.0 { (0.0, estimate) } else { (gain, estimate) }
+        };
+        let mut best = (own, value(own));
+        let mut step_m = 0.5 * (best.0[1] - best.0[0]);
+        while step_m > FINEST_M {
+            let [from, to] = best.0;
+            let tries = [
+                [from - step_m, to],
+                [from + step_m, to],
+                [from, to - step_m],
+                [from, to + step_m],
+                [from - step_m, to - step_m],
+                [from + step_m, to + step_m],
+            ];
+            let better = tries
+                .into_iter()
+                .filter(|&it| it[1] - it[0] >= 100.0 && apart(it, &others))
+                .map(|interval| (interval, value(interval)))
+                .max_by(|one, other| one.1.0.total_cmp(&other.1.0));
+            match better {
+                Some(better) if better.1.0 > best.1.0 => best = better,
+                _ => step_m *= 0.5,
+            }
+        }
+        found.intervals_m[index] = best.0;
+        (found.gain, found.estimate) = best.1;
+    }
+}

@@ -1,0 +1,186 @@
+//! What the residual is plotted against.
+
+use dynocar_core::force::ResolvedSample;
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::windows::Window;
+use crate::explain::evidence::RunData;
+
+/// What a residual may depend on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Covariate {
+    /// Chainage of the train's centre.
+    Chainage,
+    /// Speed.
+    Speed,
+    /// Time since the run's start.
+    TimeSinceStart,
+    /// The fit run, numbered from 1.
+    Run,
+    /// Direction of travel.
+    Direction,
+    /// Gradient along the travel.
+    Gradient,
+    /// Mean curvature along the train.
+    Curvature,
+    /// Share of the train inside tunnels.
+    TunnelShare,
+    /// Traction minus brake.
+    ControlForce,
+    /// Its change with time.
+    ForceChange,
+    /// Measured acceleration.
+    Acceleration,
+    /// Outside temperature.
+    Temperature,
+    /// Brake-cylinder pressure.
+    CylinderPressure,
+    /// Time within one fit run, by its place among the fit runs.
+    TimeInRun(usize),
+}
+
+impl Covariate {
+    /// Those that every window of every run may have, in the order of the page.
+    pub const COMMON: [Covariate; 13] = [
+        Covariate::Chainage,
+        Covariate::Speed,
+        Covariate::TimeSinceStart,
+        Covariate::Run,
+        Covariate::Direction,
+        Covariate::Gradient,
+        Covariate::Curvature,
+        Covariate::TunnelShare,
+        Covariate::ControlForce,
+        Covariate::ForceChange,
+        Covariate::Acceleration,
+        Covariate::Temperature,
+        Covariate::CylinderPressure,
+    ];
+
+    /// Always shown when the data have them.
+    pub const ALWAYS: [Covariate; 4] =
+        [Covariate::Chainage, Covariate::Speed, Covariate::TimeSinceStart, Covariate::Run];
+
+    /// The one on which a kind is seen best.
+    pub fn of_kind(kind: EffectKind) -> Option<Self> {
+        use EffectKind as Kind;
+        Some(match kind {
+            Kind::TunnelDrag
+            | Kind::GradientShift
+            | Kind::GradientError
+            | Kind::LocalResistance => Covariate::Chainage,
+            Kind::CurveResistance => Covariate::Curvature,
+            Kind::Wind => Covariate::Direction,
+            Kind::WheelDiameter => Covariate::Speed,
+            Kind::MassChange | Kind::RotatingMass => Covariate::Acceleration,
+            Kind::TractionGain | Kind::LowAdhesion => Covariate::ControlForce,
+            Kind::ActuatorDelay => Covariate::ForceChange,
+            Kind::BearingTemperature => Covariate::TimeSinceStart,
+            Kind::AmbientTemperature => Covariate::Temperature,
+            Kind::DraggingBrake => Covariate::Run,
+            Kind::Unknown | Kind::None => return None,
+        })
+    }
+
+    /// The one that a place names.
+    pub fn of_name(name: &str) -> Option<Self> {
+        Some(match name {
+            "chainage_m" => Covariate::Chainage,
+            "speed_mps" => Covariate::Speed,
+            "time_since_start_s" => Covariate::TimeSinceStart,
+            "traction_force_n" | "brake_force_n" => Covariate::ControlForce,
+            "ambient_temperature_degc" => Covariate::Temperature,
+            "run" => Covariate::Run,
+            _ => return None,
+        })
+    }
+
+    /// Name for people.
+    pub fn title(self) -> &'static str {
+        match self {
+            Covariate::Chainage => "Chainage",
+            Covariate::Speed => "Speed",
+            Covariate::TimeSinceStart => "Time since start",
+            Covariate::Run => "Run",
+            Covariate::Direction => "Direction of travel",
+            Covariate::Gradient => "Gradient along the travel",
+            Covariate::Curvature => "Curvature",
+            Covariate::TunnelShare => "Share of the train in tunnels",
+            Covariate::ControlForce => "Traction minus brake force",
+            Covariate::ForceChange => "Change of force",
+            Covariate::Acceleration => "Acceleration",
+            Covariate::Temperature => "Outside temperature",
+            Covariate::CylinderPressure => "Brake-cylinder pressure",
+            Covariate::TimeInRun(_) => "Time in the run",
+        }
+    }
+
+    /// Unit of its values; empty for numbers and names.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Covariate::Chainage => "km",
+            Covariate::Speed => "m/s",
+            Covariate::TimeSinceStart | Covariate::TimeInRun(_) => "s",
+            Covariate::Run | Covariate::Direction | Covariate::TunnelShare => "",
+            Covariate::Gradient => "‰",
+            Covariate::Curvature => "1/km",
+            Covariate::ControlForce => "kN",
+            Covariate::ForceChange => "kN/s",
+            Covariate::Acceleration => "m/s²",
+            Covariate::Temperature => "°C",
+            Covariate::CylinderPressure => "kPa",
+        }
+    }
+
+    /// SI value over the value in [`Covariate::unit`].
+    pub fn per_unit(self) -> f64 {
+        match self {
+            Covariate::Chainage
+            | Covariate::ControlForce
+            | Covariate::ForceChange
+            | Covariate::CylinderPressure => 1000.0,
+            Covariate::Curvature => 0.001,
+            _ => 1.0,
+        }
+    }
+
+    /// True when its values are names, not quantities.
+    pub fn is_category(self) -> bool {
+        matches!(self, Covariate::Run | Covariate::Direction)
+    }
+
+    /// Its mean over a window, in SI units (temperature in °C); `None` where it is not known or
+    /// does not apply.
+    pub fn value(self, window: &Window, run: &RunData) -> Option<f64> {
+        let (bins, samples) = (window.bins(run), run.samples());
+        let (first, last) = (bins.first()?, bins.last()?);
+        let span_s = last.time_s - first.time_s;
+        let mean = |value: &dyn Fn(&ResolvedSample) -> Option<f64>| -> Option<f64> {
+            let sum: Option<f64> = bins.iter().map(|bin| value(&samples[bin.middle()])).sum();
+            sum.map(|sum| sum / bins.len() as f64)
+        };
+        match self {
+            Covariate::Chainage => mean(&|sample| sample.position_m),
+            Covariate::Speed => mean(&|sample| Some(sample.speed_mps)),
+            Covariate::TimeSinceStart => Some(0.5 * (first.time_s + last.time_s)),
+            Covariate::Run => Some(window.run as f64 + 1.0),
+            Covariate::Direction => Some(run.direction),
+            Covariate::Gradient => mean(&|sample| sample.gradient_permille),
+            Covariate::Curvature => mean(&|sample| sample.curvature_per_m),
+            Covariate::TunnelShare => mean(&|sample| sample.tunnel_share),
+            Covariate::ControlForce => mean(&ResolvedSample::control_force_n),
+            Covariate::ForceChange => {
+                let force =
+                    |bin: &crate::explain::evidence::Bin| samples[bin.middle()].control_force_n();
+                Some((force(last)? - force(first)?) / span_s)
+            }
+            Covariate::Acceleration => Some((last.speed_mps - first.speed_mps) / span_s),
+            Covariate::Temperature => mean(&|sample| sample.ambient_temperature_degc),
+            Covariate::CylinderPressure => mean(&|sample| sample.brake_cylinder_pressure_pa),
+            Covariate::TimeInRun(index) if index == window.run => {
+                Some(run.offset_s + 0.5 * (first.time_s + last.time_s))
+            }
+            Covariate::TimeInRun(_) => None,
+        }
+    }
+}

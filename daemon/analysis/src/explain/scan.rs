@@ -1,0 +1,186 @@
+//! What a force of a given shape would explain, without a new fit.
+//!
+//! At a fitted model the innovations are orthogonal to the regressors. The decrease of the cost
+//! by one more linear parameter then follows from three inner products of its whitened regressor:
+//! with the innovations, with itself and with the other regressors. They add up over runs, so that
+//! thousands of places, windows and sets of runs can be compared.
+
+use std::sync::Arc;
+
+use dynocar_core::filter::lanes::dot;
+use dynocar_core::force::ResolvedSample;
+use dynocar_core::track::Track;
+use dynocar_core::train::TrainModel;
+use nalgebra::{DMatrix, DVector};
+
+use super::evidence::{Fit, FitProblem, RunData};
+
+/// Bins after which the whitening filter has forgotten a force.
+const MEMORY_BINS: usize = 200;
+
+/// Inner products of a whitened regressor.
+#[derive(Clone, Debug)]
+pub struct Tuple {
+    /// With the innovations.
+    pub score: f64,
+    /// With itself.
+    pub square: f64,
+    /// With the regressors of the fitted model.
+    pub cross: DVector<f64>,
+}
+
+impl Tuple {
+    /// Nothing.
+    pub fn zero(count: usize) -> Self {
+        Tuple { score: 0.0, square: 0.0, cross: DVector::zeros(count) }
+    }
+
+    /// Adds the tuple of another run with the same parameter.
+    pub fn add(&mut self, other: &Tuple) {
+        self.score += other.score;
+        self.square += other.square;
+        self.cross += &other.cross;
+    }
+
+    /// Takes out what [`add`](Tuple::add) put in.
+    pub fn take_out(&mut self, other: &Tuple) {
+        self.score -= other.score;
+        self.square -= other.square;
+        self.cross -= &other.cross;
+    }
+}
+
+/// A fitted model with the data around it.
+pub struct Scan<'a> {
+    /// The fit runs.
+    pub problem: &'a FitProblem,
+    /// Runs whose speeds must not be looked at.
+    pub holdout: &'a [RunData],
+    /// The declared train.
+    pub train: &'a TrainModel,
+    /// The declared line.
+    pub track: Option<&'a Arc<Track>>,
+    /// The fitted model.
+    pub fit: &'a Fit,
+    covariance: DMatrix<f64>,
+}
+
+impl<'a> Scan<'a> {
+    /// A scan around a fit; `None` when the fit's information is singular.
+    pub fn new(
+        problem: &'a FitProblem,
+        holdout: &'a [RunData],
+        train: &'a TrainModel,
+        track: Option<&'a Arc<Track>>,
+        fit: &'a Fit,
+    ) -> Option<Self> {
+        let covariance = fit.factor()?.inverse();
+        Some(Scan { problem, holdout, train, track, fit, covariance })
+    }
+
+    /// Acceleration in m/s² that 1 N/kN of force gives.
+    #[inline]
+    pub fn per_unit_resistance_mps2(&self, sample: &ResolvedSample) -> f64 {
+        sample.weight_kn / sample.inertial_mass_kg
+    }
+
+    /// Time in s of used motion where a condition on the sample holds.
+    pub fn seconds_where(&self, condition: impl Fn(&RunData, &ResolvedSample) -> bool) -> f64 {
+        self.bin_seconds_where(|run, i| condition(run, &run.samples()[i]))
+    }
+
+    /// Time in s of used motion where a condition on run and sample number holds.
+    pub fn bin_seconds_where(&self, condition: impl Fn(&RunData, usize) -> bool) -> f64 {
+        let mut total_s = 0.0;
+        for run in &self.problem.runs {
+            let time_s = run.recording.time_s();
+            for bin in &run.bins {
+                if condition(run, bin.middle()) {
+                    total_s += time_s[bin.end - 1] - time_s[bin.first];
+                }
+            }
+        }
+        total_s
+    }
+
+    /// The tuple of a force shape over all runs: `acceleration(run, sample)` in m/s² per unit.
+    pub fn tuple(&self, acceleration: impl Fn(&RunData, usize) -> f64) -> Tuple {
+        let mut sum = Tuple::zero(self.fit.theta.len());
+        for index in 0..self.problem.runs.len() {
+            sum.add(&self.run_tuple(index, &acceleration));
+        }
+        sum
+    }
+
+    /// The tuple of a force shape over one run.
+    pub fn run_tuple(&self, index: usize, acceleration: impl Fn(&RunData, usize) -> f64) -> Tuple {
+        let run = &self.problem.runs[index];
+        let shape: Vec<f64> = run.bins.iter().map(|bin| acceleration(run, bin.middle())).collect();
+        self.shape_tuple(index, &shape)
+    }
+
+    /// The tuple of accelerations in m/s² at the bins of one run.
+    pub fn shape_tuple(&self, index: usize, shape: &[f64]) -> Tuple {
+        let mut tuple = Tuple::zero(self.fit.theta.len());
+        let Some(first) = shape.iter().position(|&a| a != 0.0) else { return tuple };
+        let last = shape.iter().rposition(|&a| a != 0.0).unwrap_or(first);
+        // The filter forgets what is long past.
+        let until = (last + MEMORY_BINS).min(shape.len());
+        let bins = &self.problem.runs[index].bins;
+        let mut gained = Vec::with_capacity(until - first);
+        let mut speed = 0.0;
+        for k in first..until {
+            if k > 0 && bins[k - 1].segment == bins[k].segment {
+                let step_s = bins[k].time_s - bins[k - 1].time_s;
+                speed += 0.5 * step_s * (shape[k - 1] + shape[k]);
+            } else {
+                speed = 0.0;
+            }
+            gained.push(speed);
+        }
+        let mut column = Vec::with_capacity(until - first);
+        self.fit.whiteners[index].whiten_from(first, &gained, &mut column);
+        let filter = &self.fit.filters[index];
+        let weighted = &mut gained;
+        for ((weighted, value), weight) in
+            weighted.iter_mut().zip(&column).zip(&filter.weights()[first..])
+        {
+            *weighted = value * weight;
+        }
+        let with = |series: &[f64]| dot(weighted, &series[first..until]);
+        tuple.score = with(&self.fit.innovations[index]);
+        tuple.square = dot(weighted, &column) - filter.explained(with);
+        let columns = &self.fit.columns[index];
+        for (cross, other) in tuple.cross.iter_mut().zip(columns).filter(|(_, o)| !o.is_empty()) {
+            *cross = with(other);
+        }
+        tuple
+    }
+
+    /// What is left of a regressor's square when the model's regressors are projected out.
+    fn free_square(&self, tuple: &Tuple) -> f64 {
+        tuple.square - tuple.cross.dot(&(&self.covariance * &tuple.cross))
+    }
+
+    /// Decrease of the cost by a free factor on the shape, and that factor.
+    pub fn gain(&self, tuple: &Tuple) -> (f64, f64) {
+        let free = self.free_square(tuple);
+        if free <= 1e-6 * tuple.square || free <= 1e-9 {
+            return (0.0, 0.0);
+        }
+        (tuple.score * tuple.score / free, tuple.score / free)
+    }
+
+    /// Decrease of the cost when the shape acts with the factor 1.
+    pub fn decrease_at_one(&self, tuple: &Tuple) -> f64 {
+        2.0 * tuple.score - self.free_square(tuple)
+    }
+
+    /// Mean weight in kN of the fit runs.
+    pub fn weight_kn(&self) -> f64 {
+        let runs = &self.problem.runs;
+        let weights: Vec<f64> =
+            runs.iter().filter_map(|run| Some(run.samples().first()?.weight_kn)).collect();
+        weights.iter().sum::<f64>() / weights.len().max(1) as f64
+    }
+}

@@ -1,0 +1,176 @@
+//! Open-loop prediction: the judge of a finished model.
+
+use dynocar_core::simulate::{Prediction, Restart, SpeedError};
+
+use super::bootstrap::intervals_95;
+use super::evidence::{Fit, FitProblem, GrownForces, RunData};
+use super::selection::without_each_run;
+use super::stop_runs::stop_runs;
+use super::stop_to_stop::StopToStop;
+
+/// Errors of the model without and with the effects.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Score {
+    /// Whole holdout runs, by run: before and after.
+    pub holdout_runs: Vec<[SpeedError; 2]>,
+    /// Holdout runs restarted every 60 s: before and after.
+    pub holdout_window60: [SpeedError; 2],
+    /// Holdout runs from stop to stop; `None` where they do not stop twice.
+    pub holdout_stop_to_stop: Option<StopToStop>,
+    /// Whole fit runs: before and after.
+    pub fit_runs: [SpeedError; 2],
+}
+
+/// Predicted measured speeds of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PredictedRun {
+    /// The run's file.
+    pub file: String,
+    /// Times in s, in the recording's own count.
+    pub time_s: Vec<f64>,
+    /// Predicted measured speeds in m/s.
+    pub speed_mps: Vec<f64>,
+}
+
+/// Error of a model over one run.
+pub fn run_error(fit: &Fit, run: &RunData, restart: Restart) -> SpeedError {
+    error_at(fit, &fit.theta, run, restart)
+}
+
+/// The same with other parameters.
+fn error_at(fit: &Fit, theta: &[f64], run: &RunData, restart: Restart) -> SpeedError {
+    let (mut forces, mut prediction) = (GrownForces::default(), Prediction::new());
+    fit.model.forces(run, theta, &mut forces);
+    prediction.simulate(&run.recording, &forces, restart);
+    SpeedError::of(&run.recording, &prediction)
+}
+
+/// Errors of recorded runs from stop to stop, by the models without and with the effects; `None`
+/// where none of them goes from stop to stop.
+pub fn stop_to_stop(runs: &[RunData], before: &Fit, after: &Fit) -> Option<StopToStop> {
+    let errors_mps = |fit: &Fit, run: &RunData| {
+        let (mut forces, mut prediction) = (GrownForces::default(), Prediction::new());
+        fit.model.forces(run, &fit.theta, &mut forces);
+        prediction.simulate(&run.recording, &forces, Restart::AtDepartures);
+        let within = |part| SpeedError::within(&run.recording, &prediction, part).rmse_mps();
+        stop_runs(&run.recording).into_iter().filter_map(within).collect::<Vec<f64>>()
+    };
+    let of_run = |run: &RunData| {
+        let pairs = errors_mps(before, run).into_iter().zip(errors_mps(after, run));
+        pairs.map(|(before, after)| [before, after]).collect()
+    };
+    StopToStop::from_errors(runs.iter().map(of_run).collect())
+}
+
+/// Open-loop errors of the fit runs: as fitted, and each run by what the others say of it.
+#[derive(Clone, Copy, Debug)]
+pub struct FitErrors {
+    /// Root mean squares in m/s as fitted and left out, each over whole runs and with restarts
+    /// every 60 s.
+    speed_mps: [[f64; 2]; 2],
+    /// Share by which the integrated speed misses the measured way, with what that is known to.
+    way: f64,
+    /// Whether the model looks for the scale of the speeds: nothing else is judged by the way.
+    has_speed_scale: bool,
+}
+
+impl FitErrors {
+    /// Those of a fitted model.
+    pub fn of(problem: &FitProblem, fit: &Fit) -> Self {
+        let fitted = vec![fit.theta.clone(); problem.runs.len()];
+        let speed_mps = [fitted, without_each_run(problem, fit)].map(|theta| {
+            [Restart::FullRun, Restart::WINDOW_60].map(|restart| {
+                let each = problem.runs.iter().zip(&theta);
+                let each = each.map(|(run, theta)| error_at(fit, theta, run, restart));
+                each.sum::<SpeedError>().rmse_mps().unwrap_or(0.0)
+            })
+        });
+        let missed =
+            |(ratio, deviation): (f64, f64)| (ratio - 1.0 / fit.speed_scale()).hypot(deviation);
+        let has_speed_scale = fit.model.effects.iter().any(|it| it.changes_speed_scale());
+        FitErrors { speed_mps, way: problem.way_ratio.map_or(0.0, missed), has_speed_scale }
+    }
+
+    /// Share of the error that a model with these errors takes away from another: over whole runs,
+    /// with restarts or, for the scale of the speeds, of the way, whichever is most; of runs that were
+    /// fitted or of runs left out, whichever is less.
+    pub fn reduction_from(&self, before: &Self) -> f64 {
+        let share = |before: f64, after: f64| if before > 0.0 { 1.0 - after / before } else { 0.0 };
+        let of_way = if self.has_speed_scale == before.has_speed_scale {
+            f64::NEG_INFINITY
+        } else {
+            share(before.way, self.way)
+        };
+        let most = |before: &[f64; 2], after: &[f64; 2]| {
+            let of_speed = before.iter().zip(after).map(|(before, after)| share(*before, *after));
+            of_speed.fold(of_way, f64::max)
+        };
+        let each = before.speed_mps.iter().zip(&self.speed_mps);
+        each.map(|(before, after)| most(before, after)).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Share of the open-loop error of the fit runs that the larger model takes away.
+pub fn reduction(problem: &FitProblem, smaller: &Fit, larger: &Fit) -> f64 {
+    FitErrors::of(problem, larger).reduction_from(&FitErrors::of(problem, smaller))
+}
+
+/// Predictions of all runs, fit and holdout.
+pub fn predictions(problem: &FitProblem, holdout: &[RunData], fit: &Fit) -> Vec<PredictedRun> {
+    problem
+        .runs
+        .iter()
+        .chain(holdout)
+        .map(|run| {
+            let (mut forces, mut prediction) = (GrownForces::default(), Prediction::new());
+            fit.model.forces(run, &fit.theta, &mut forces);
+            prediction.simulate(&run.recording, &forces, Restart::FullRun);
+            PredictedRun {
+                file: run.file.clone(),
+                time_s: run.recording.time_s().iter().map(|time| run.offset_s + time).collect(),
+                speed_mps: prediction.speed_mps().to_vec(),
+            }
+        })
+        .collect()
+}
+
+impl Score {
+    /// Scores the model without and with the effects on fit and holdout runs.
+    pub fn of(problem: &FitProblem, holdout: &[RunData], before: &Fit, after: &Fit) -> Self {
+        let both = |run: &RunData, restart: Restart| {
+            [run_error(before, run, restart), run_error(after, run, restart)]
+        };
+        let summed = |runs: &[RunData], restart: Restart| {
+            runs.iter().fold([SpeedError::default(); 2], |sum, run| {
+                let own = both(run, restart);
+                [sum[0] + own[0], sum[1] + own[1]]
+            })
+        };
+        Score {
+            holdout_runs: holdout.iter().map(|run| both(run, Restart::FullRun)).collect(),
+            holdout_window60: summed(holdout, Restart::WINDOW_60),
+            holdout_stop_to_stop: stop_to_stop(holdout, before, after),
+            fit_runs: summed(&problem.runs, Restart::FullRun),
+        }
+    }
+
+    /// RMSE in m/s on the holdout runs: before and after.
+    pub fn holdout_rmse_mps(&self) -> [Option<f64>; 2] {
+        [0, 1].map(|side| {
+            self.holdout_runs.iter().map(|run| run[side]).sum::<SpeedError>().rmse_mps()
+        })
+    }
+
+    /// 95 % interval of 1 - after / before by bootstrap over the holdout runs; `None` with fewer
+    /// than two.
+    pub fn reduction_interval(&self) -> Option<[f64; 2]> {
+        let [interval] = intervals_95(&self.holdout_runs, |drawn| {
+            let sum = drawn
+                .iter()
+                .fold([SpeedError::default(); 2], |sum, run| [sum[0] + run[0], sum[1] + run[1]]);
+            let [before, after] = [sum[0].rmse_mps()?, sum[1].rmse_mps()?];
+            (before > 0.0).then(|| [1.0 - after / before])
+        })?;
+        Some(interval)
+    }
+}

@@ -1,0 +1,340 @@
+//! Forward search with a swap pass and pruning.
+
+use std::sync::Arc;
+
+use dynocar_core::track::Track;
+use dynocar_core::train::TrainModel;
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::price::{at_bound, discounted, model_penalty, penalty};
+use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal, UNKNOWN};
+use crate::explain::evidence::{
+    EQUAL, Fit, FitProblem, GrownModel, Noise, RunData, STRENGTH_MIN, strength,
+};
+use crate::explain::scan::Scan;
+use crate::explain::score::{FitErrors, reduction};
+
+/// Told how far the work is: share done, and what is being done. It may unwind to end the work, which
+/// holds nothing that would have to be put right.
+pub type Progress<'p> = &'p dyn Fn(f64, &str);
+
+/// Effects at most.
+const EFFECTS_MAX: usize = 4;
+/// Kinds that get a noise of their own and a second localisation in each round.
+const FINALISTS: usize = 5;
+/// A finalist's advantage: not far below none, and no less than this share of the greatest.
+const FINALIST_MIN: f64 = -20.0;
+const FINALIST_SHARE: f64 = 0.1;
+/// Kinds that take away this share of the open-loop error come before the others, and are all that is
+/// looked at again beyond this number of observations, where small things are significant.
+const FINALIST_REDUCTION: f64 = 0.02;
+const MANY_OBSERVATIONS: usize = 5_000;
+/// Shares of the slow part of a noise under which a kind looks again.
+pub(super) const STIFF: [f64; 2] = [0.01, 1e-4];
+/// Less observations than this tell nothing.
+pub const OBSERVATIONS_MIN: usize = 80;
+
+/// One candidate, fitted together with everything accepted so far.
+#[derive(Clone)]
+pub struct Trial {
+    /// Its kind.
+    pub kind: EffectKind,
+    /// The fitted model; the candidate is its last effect.
+    pub fit: Fit,
+    /// Decrease of -2 log likelihood by it, less its price: what kinds are compared by.
+    pub advantage: f64,
+    /// The same after the discount for errors that all runs share: what must be more than chance.
+    pub evidence: f64,
+    /// Share of the open-loop error that it takes away, of the fit runs and of each by what the others
+    /// say of it, whichever is less; 0 where the evidence does not ask for it.
+    pub reduction: f64,
+}
+
+impl Trial {
+    /// The number of the candidate among the effects of its model.
+    pub fn last(&self) -> usize {
+        self.fit.model.effects.len() - 1
+    }
+
+    /// What decides.
+    pub fn strength(&self) -> f64 {
+        strength(self.evidence, self.reduction)
+    }
+}
+
+/// What the search found.
+#[derive(Clone)]
+pub struct Outcome {
+    /// The declared model with a, b, c refitted.
+    pub base: Fit,
+    /// The model with all accepted effects.
+    pub fit: Fit,
+    /// The best trial of each kind in each round, the strongest first; the last round is the one
+    /// in which nothing more was accepted.
+    pub rounds: Vec<Vec<Trial>>,
+    /// Where several effects were found, what was tried in the place of each.
+    pub instead: Vec<(EffectKind, Vec<Trial>)>,
+    /// Kinds that the data do not allow to test, and why.
+    pub not_testable: Vec<(EffectKind, String)>,
+}
+
+/// The search over one dataset.
+pub struct Search<'a> {
+    /// The fit runs.
+    pub problem: &'a FitProblem,
+    /// Runs whose speeds are not looked at.
+    pub holdout: &'a [RunData],
+    /// The declared train.
+    pub train: &'a TrainModel,
+    /// The declared line.
+    pub track: Option<&'a Arc<Track>>,
+    /// Told how far the search is.
+    pub progress: Progress<'a>,
+}
+
+impl Search<'_> {
+    /// The declared model with a, b, c refitted, and no search for effects.
+    pub fn base(&self) -> Outcome {
+        (self.progress)(0.05, "fitting a, b, c");
+        let declared = GrownModel::default();
+        let start = self.problem.start(&[]);
+        let first = self.problem.fit_with_noise(&declared, start, Noise::START);
+        let base = self.problem.fit_with_noise(&declared, first.theta, first.noise);
+        Outcome {
+            base: base.clone(),
+            fit: base,
+            rounds: Vec::new(),
+            instead: Vec::new(),
+            not_testable: Vec::new(),
+        }
+    }
+
+    /// Searches.
+    pub fn run(&self) -> Outcome {
+        let mut outcome = self.base();
+        if outcome.base.observations() < OBSERVATIONS_MIN {
+            return outcome;
+        }
+        while outcome.fit.model.effects.len() < EFFECTS_MAX {
+            let round = outcome.rounds.len() as f64;
+            (self.progress)((0.1 + 0.25 * round).min(0.8), "trying effects");
+            let trials = self.round(&outcome.fit, &mut outcome.not_testable);
+            let next = self.best(&trials).map(|trial| trial.fit.clone());
+            outcome.rounds.push(trials);
+            let Some(next) = next else { break };
+            outcome.fit = next;
+            if outcome.fit.model.effects.len() > 1 {
+                (self.progress)((0.2 + 0.25 * round).min(0.85), "swapping effects");
+                outcome.instead = self.swap(&mut outcome.fit);
+                self.prune(&mut outcome.fit);
+            }
+        }
+        outcome
+    }
+
+    /// The trial to accept: the one with the strongest evidence, or one with about the same that
+    /// takes away more of the open-loop error. What is outside the library must explain more than
+    /// anything in it.
+    fn best<'t>(&self, trials: &'t [Trial]) -> Option<&'t Trial> {
+        let accepted: Vec<&Trial> =
+            trials.iter().filter(|trial| Self::refusal(trial).is_none()).collect();
+        let strongest = accepted.first()?;
+        accepted
+            .iter()
+            .take_while(|trial| trial.advantage > strongest.advantage - EQUAL)
+            .filter(|trial| trial.kind != EffectKind::Unknown)
+            .max_by(|one, other| one.reduction.total_cmp(&other.reduction))
+            .or(Some(strongest))
+            .copied()
+    }
+
+    /// Tries every kind that the model does not have yet; the strongest first.
+    fn round(&self, base: &Fit, not_testable: &mut Vec<(EffectKind, String)>) -> Vec<Trial> {
+        let Some(scan) = self.scan(base) else { return Vec::new() };
+        let mut trials: Vec<(Trial, &dyn Effect)> = Vec::new();
+        let mut has_forms = false;
+        for effect in LIBRARY {
+            let kind = effect.kind();
+            if base.model.effects.iter().any(|own| own.kind() == kind) {
+                continue;
+            }
+            (self.progress)((0.1 + 0.25 * base.model.effects.len() as f64).min(0.8), kind.name());
+            let asks = kind == EffectKind::Unknown && self.asks_for_a_form(&scan, &trials);
+            has_forms |= asks;
+            let effect = if asks { UNKNOWN } else { effect };
+            match effect.propose(&scan) {
+                Proposal::NotTestable(reason) => {
+                    if !not_testable.iter().any(|(other, _)| *other == kind) {
+                        not_testable.push((kind, reason));
+                    }
+                }
+                Proposal::Candidates(candidates) => {
+                    let best = candidates
+                        .into_iter()
+                        .map(|candidate| self.attempt(base, base, candidate, false))
+                        .max_by(|one, other| one.advantage.total_cmp(&other.advantage));
+                    trials.extend(best.map(|trial| (trial, effect)));
+                }
+            }
+        }
+        if !has_forms {
+            self.take_form_that_noise_holds(base, &mut trials);
+        }
+        let by_advantage = |one: &Trial, other: &Trial| other.advantage.total_cmp(&one.advantage);
+        let before = FitErrors::of(self.problem, base);
+        let reduction = |fit: &Fit| FitErrors::of(self.problem, fit).reduction_from(&before);
+        for (trial, _) in trials.iter_mut().filter(|(trial, _)| trial.advantage > FINALIST_MIN) {
+            trial.reduction = reduction(&trial.fit);
+        }
+        // What takes nothing from the error comes last, and is no measure for the others.
+        let helps = |trial: &Trial| trial.reduction > FINALIST_REDUCTION;
+        let key = |trial: &Trial| (helps(trial), trial.advantage);
+        trials.sort_by(|(one, _), (other, _)| {
+            let (one, other) = (key(one), key(other));
+            other.0.cmp(&one.0).then(other.1.total_cmp(&one.1))
+        });
+        let greatest = trials.first().map_or(0.0, |(trial, _)| trial.advantage);
+        let least = FINALIST_MIN.max(FINALIST_SHARE * greatest);
+        let is_long = base.observations() > MANY_OBSERVATIONS;
+        let mut finished: Vec<Trial> = trials
+            .into_iter()
+            .enumerate()
+            .map(|(rank, (trial, effect))| {
+                let is_finalist =
+                    rank < FINALISTS && trial.advantage > least && (helps(&trial) || !is_long);
+                let share = base.model.effects.len() as f64
+                    + (rank.min(FINALISTS) + 2) as f64 / (FINALISTS + 2) as f64;
+                (self.progress)((0.1 + 0.25 * share).min(0.85), trial.kind.name());
+                if !is_finalist {
+                    return trial;
+                }
+                let trial = self.finalist(base, trial, effect);
+                Trial { reduction: reduction(&trial.fit), ..trial }
+            })
+            .collect();
+        finished.sort_by(by_advantage);
+        finished
+    }
+
+    /// A scan around a fit; `None` when the fit's information is singular.
+    pub fn scan<'s>(&'s self, fit: &'s Fit) -> Option<Scan<'s>> {
+        Scan::new(self.problem, self.holdout, self.train, self.track, fit)
+    }
+
+    /// Fits a candidate on top of a fit; its evidence counts against `base`.
+    fn attempt(&self, base: &Fit, onto: &Fit, candidate: Candidate, own_noise: bool) -> Trial {
+        let kind = candidate.hypothesis.kind();
+        let model = onto.model.with(candidate.hypothesis);
+        let start = onto.theta.iter().chain(&candidate.start).copied().collect();
+        let fit = if own_noise {
+            self.problem.fit_with_noise(&model, start, onto.noise)
+        } else {
+            self.problem.fit(&model, start, onto.noise)
+        };
+        Self::trial(base, fit, kind)
+    }
+
+    fn trial(base: &Fit, fit: Fit, kind: EffectKind) -> Trial {
+        let decrease = base.cost - fit.cost;
+        let last = fit.model.effects.len() - 1;
+        let price = penalty(&fit, last);
+        let evidence = discounted(&fit, last, decrease) - price;
+        Trial { kind, fit, advantage: decrease - price, evidence, reduction: 0.0 }
+    }
+
+    /// Gives a trial the noise that remains under it and lets its kind look again for places and
+    /// windows under that noise: the noise of the smaller model holds the effect itself.
+    fn finalist(&self, base: &Fit, trial: Trial, effect: &dyn Effect) -> Trial {
+        let refit = |trial: &Trial| {
+            let fit = self.problem.fit_with_noise(
+                &trial.fit.model,
+                trial.fit.theta.clone(),
+                trial.fit.noise,
+            );
+            Self::trial(base, fit, trial.kind)
+        };
+        let mut best = refit(&trial);
+        for attempt in 0..3 {
+            let own = best.fit.noise;
+            let noises = [own, own.stiff(STIFF[0]), own.stiff(STIFF[1])];
+            let looks = if attempt == 0 { &noises[..] } else { &noises[..1] };
+            let mut is_better = false;
+            for &noise in looks {
+                let Some(again) = self.look_again(base, noise, effect) else { continue };
+                if again.advantage > best.advantage + 1.0 {
+                    best = again;
+                    is_better = true;
+                }
+            }
+            if !is_better {
+                break;
+            }
+        }
+        best
+    }
+
+    /// The best candidate of a kind when it looks for places and windows under a given noise.
+    pub(super) fn look_again(
+        &self,
+        base: &Fit,
+        noise: Noise,
+        effect: &dyn Effect,
+    ) -> Option<Trial> {
+        let onto = self.problem.fit(&base.model, base.theta.clone(), noise);
+        let scan = self.scan(&onto)?;
+        let Proposal::Candidates(candidates) = effect.propose(&scan) else { return None };
+        candidates
+            .into_iter()
+            .map(|candidate| self.attempt(base, &onto, candidate, true))
+            .max_by(|one, other| one.advantage.total_cmp(&other.advantage))
+    }
+
+    /// Total cost of a model: fit and price.
+    pub(super) fn total(fit: &Fit) -> f64 {
+        fit.cost + model_penalty(fit)
+    }
+
+    /// Takes each effect out in turn and looks whether another kind does better in its place; what was
+    /// tried in the place of each kind that stands after it.
+    fn swap(&self, fit: &mut Fit) -> Vec<(EffectKind, Vec<Trial>)> {
+        let mut tried = Vec::new();
+        for index in 0..fit.model.effects.len() {
+            let rest = self.without(fit, index);
+            let trials = self.round(&rest, &mut Vec::new());
+            let mut stands = fit.model.effects[index].kind();
+            if let Some(best) = self.best(&trials)
+                && Self::total(&best.fit) < Self::total(fit) - EQUAL
+            {
+                *fit = best.fit.clone();
+                stands = best.kind;
+            }
+            tried.push((stands, trials));
+        }
+        tried
+    }
+
+    /// Drops effects that the others have made needless.
+    fn prune(&self, fit: &mut Fit) {
+        let mut index = 0;
+        while index < fit.model.effects.len() && fit.model.effects.len() > 1 {
+            let rest = self.without(fit, index);
+            let evidence = Self::total(&rest) - Self::total(fit);
+            let reduction = reduction(self.problem, &rest, fit);
+            if strength(evidence, reduction) < STRENGTH_MIN || at_bound(fit, index).is_some() {
+                *fit = rest;
+            } else {
+                index += 1;
+            }
+        }
+    }
+
+    /// The model without one effect, refitted.
+    pub fn without(&self, fit: &Fit, index: usize) -> Fit {
+        let range = fit.model.ranges()[index].clone();
+        let mut model = fit.model.clone();
+        model.effects.remove(index);
+        let kept = fit.theta.iter().enumerate().filter(|(i, _)| !range.contains(i));
+        let start = kept.map(|(_, value)| *value).collect();
+        self.problem.fit_with_noise(&model, start, fit.noise)
+    }
+}

@@ -1,0 +1,397 @@
+//! From the search to the answer.
+
+use std::collections::BTreeMap;
+
+use dynocar_core::plausibility::Severity;
+use dynocar_core::simulate::SpeedError;
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::answer::{
+    Answer, BaseAnswer, Considered, DavisDeviations, EffectAnswer, HALF_95, ParameterValue, Place,
+    PlaceUncertainty, Verdict,
+};
+use super::effects::ReportContext;
+use super::evidence::{p_value, strength};
+use super::identifiability::{identifiability, not_held};
+use super::rivals::{Rivals, is_in, rivals, separating_run};
+use super::runners_up::runners_up;
+use super::score::{self, Score};
+use super::selection::{Deviations, Outcome, Search, discounted, few_runs_factor, penalty};
+use super::told::{not_told, told_by_data};
+use super::unexplained::Unexplained;
+use crate::dataset::Note;
+
+/// Moving time in s of the fit runs below which nothing is said.
+const MOVING_MIN_S: f64 = 180.0;
+/// Share of the decrease that the library must explain when something unknown is left too.
+const LIBRARY_SHARE_MIN: f64 = 0.5;
+
+/// The answer to a finished search; `known` says how surely the place of each effect is.
+pub fn answer(
+    search: &Search,
+    outcome: &Outcome,
+    deviations: &Deviations,
+    known: &[Option<PlaceUncertainty>],
+    score: &Score,
+    notes: Vec<Note>,
+) -> Answer {
+    let (fit, std) = (&outcome.fit, &deviations.std);
+    let effects = effect_answers(search, outcome, known, deviations);
+    // What has no name has no rivals either.
+    let is_unknown = is_in(fit, EffectKind::Unknown);
+    let rivals = if is_unknown { Vec::new() } else { rivals(outcome) };
+    let left = Unexplained::of(search, outcome);
+    let verdict = verdict(search, outcome, &rivals, left.as_ref());
+    let identifiability = match verdict {
+        Verdict::InsufficientData => Vec::new(),
+        _ => identifiability(search, outcome),
+    };
+    let [rmse_before, rmse_after] = score.holdout_rmse_mps();
+    let pair = |errors: [SpeedError; 2]| Some([errors[0].rmse_mps()?, errors[1].rmse_mps()?]);
+    let impossible: Vec<String> = notes
+        .iter()
+        .filter(|note| note.severity == Severity::Fundamental)
+        .map(ToString::to_string)
+        .collect();
+    let (statement, experiment) = if impossible.is_empty() {
+        let (text, experiment) =
+            statement(search, outcome, verdict, &effects, &rivals, left.as_ref());
+        let not_told = match verdict {
+            Verdict::InsufficientData => String::new(),
+            _ => not_told(search.problem, fit, std) + &not_held(&identifiability),
+        };
+        (text + &worse_held_out(&effects, score) + &not_told, experiment)
+    } else {
+        let text = format!("The data cannot be true as described: {}", impossible.join("; "));
+        (text, Some("Set right what is named and run this again.".into()))
+    };
+    Answer {
+        verdict,
+        statement,
+        notes,
+        effects,
+        ambiguous_with: rivals.iter().flat_map(|it| &it.kinds).map(|kind| kind.name()).collect(),
+        experiment,
+        base: BaseAnswer {
+            a: fit.theta[0],
+            b: fit.theta[1],
+            c: fit.theta[2],
+            std: DavisDeviations { a: std[0], b: std[1], c: std[2] },
+            told_by_data: told_by_data(search.problem, std),
+        },
+        metric: "full_run",
+        scored_runs: score.holdout_runs.iter().filter(|run| run[0].count > 0).count(),
+        unscored: unscored(search, score),
+        rmse_before,
+        rmse_after,
+        error_reduction_interval: score.reduction_interval(),
+        window60: pair(score.holdout_window60),
+        stop_to_stop: score.holdout_stop_to_stop.clone(),
+        fit_runs: pair(score.fit_runs),
+        drive: None,
+        force_late_s: None,
+        unexplained_n_per_kn: left.map(|left| left.n_per_kn),
+        considered: considered(outcome, &rivals),
+        identifiability,
+        predictions: BTreeMap::new(),
+    }
+}
+
+/// That the runs held out are predicted worse with what was found; empty when they are not.
+fn worse_held_out(effects: &[EffectAnswer], score: &Score) -> String {
+    let [Some(before), Some(after)] = score.holdout_rmse_mps() else { return String::new() };
+    let [shown_before, shown_after] = [before, after].map(|error| format!("{error:.3}"));
+    if effects.is_empty() || after <= before || shown_after == shown_before {
+        return String::new();
+    }
+    format!(
+        " The runs held out are predicted worse with it, {shown_before} m/s before and \
+         {shown_after} after: it holds for the runs that were fitted, not for those."
+    )
+}
+
+/// Why nothing was scored, and what is known instead; `None` when something was.
+fn unscored(search: &Search, score: &Score) -> Option<String> {
+    if score.holdout_rmse_mps()[0].is_some() {
+        return None;
+    }
+    let why = match search.holdout {
+        [] => "No run is held out (role = \"holdout\")",
+        _ => "The runs held out hold no motion",
+    };
+    let [before, after] = score.fit_runs.map(|error| error.rmse_mps());
+    let figure = match (before, after) {
+        (Some(before), Some(after)) => format!(
+            ": the open-loop error on the fit runs, {before:.3} m/s before and {after:.3} m/s \
+             after, is of runs that the model was fitted to, and tells nothing of others"
+        ),
+        _ => String::new(),
+    };
+    Some(format!("{why}, so that nothing was scored{figure}."))
+}
+
+/// Time in s of usable motion in the fit runs.
+fn moving_s(search: &Search) -> f64 {
+    // A sum of nothing would be -0.
+    search.problem.runs.iter().fold(0.0, |sum, run| sum + run.moving_s())
+}
+
+fn effect_answers(
+    search: &Search,
+    outcome: &Outcome,
+    known: &[Option<PlaceUncertainty>],
+    Deviations { std, covariance }: &Deviations,
+) -> Vec<EffectAnswer> {
+    let fit = &outcome.fit;
+    let mut answers: Vec<(f64, EffectAnswer)> = fit
+        .model
+        .effects
+        .iter()
+        .zip(fit.model.ranges())
+        .enumerate()
+        .map(|(index, (effect, range))| {
+            let rest = search.without(fit, index);
+            let decrease = discounted(fit, index, rest.cost - fit.cost);
+            let reduction = score::reduction(search.problem, &rest, fit);
+            let weights = search.problem.runs.iter().filter_map(|run| run.samples().first());
+            let weight_kn = weights.map(|sample| sample.weight_kn).sum::<f64>()
+                / search.problem.runs.len().max(1) as f64;
+            let reported = effect.report(&ReportContext {
+                parameters: &fit.theta[range.clone()],
+                deviations: &std[range.clone()],
+                c: fit.theta[2],
+                c_deviation: std[2],
+                c_covariance: covariance[(2, range.start)],
+                weight_kn,
+                few_runs_factor: few_runs_factor(search.problem.runs.len()),
+            });
+            let answer = EffectAnswer {
+                kind: effect.kind().name(),
+                place: Place { uncertainty_95: known[index].clone(), ..effect.place() },
+                parameters: reported.values,
+                std: reported.deviations,
+                p_value: p_value(strength(decrease - penalty(fit, index), reduction)),
+                error_reduction: reduction,
+                runners_up: if effect.kind() == EffectKind::Unknown {
+                    runners_up(search, outcome)
+                } else {
+                    Vec::new()
+                },
+            };
+            (decrease, answer)
+        })
+        .collect();
+    answers.sort_by(|one, other| other.0.total_cmp(&one.0));
+    answers.into_iter().map(|(_, answer)| answer).collect()
+}
+
+fn verdict(
+    search: &Search,
+    outcome: &Outcome,
+    rivals: &[Rivals],
+    left: Option<&Unexplained>,
+) -> Verdict {
+    if outcome.rounds.is_empty() || moving_s(search) < MOVING_MIN_S {
+        return Verdict::InsufficientData;
+    }
+    let effects = &outcome.fit.model.effects;
+    if left.is_some_and(|left| !left.is_noise()) {
+        return Verdict::Unknown;
+    }
+    if effects.is_empty() {
+        // What speaks for a number at a bound speaks for something, if not for that.
+        let is_left = left.is_some_and(|left| !left.refused.is_empty());
+        return if is_left { Verdict::Unknown } else { Verdict::None };
+    }
+    if is_in(&outcome.fit, EffectKind::Unknown) {
+        let total = outcome.base.cost - outcome.fit.cost;
+        let index = effects.iter().position(|effect| effect.kind() == EffectKind::Unknown);
+        let without = index.map(|index| search.without(&outcome.fit, index));
+        let library = without.map_or(0.0, |fit| outcome.base.cost - fit.cost);
+        if library < LIBRARY_SHARE_MIN * total {
+            return Verdict::Unknown;
+        }
+    }
+    if rivals.is_empty() { Verdict::Effect } else { Verdict::Ambiguous }
+}
+
+fn considered(outcome: &Outcome, rivals: &[Rivals]) -> Vec<Considered> {
+    let mut list: Vec<Considered> = Vec::new();
+    if let Some(last) = outcome.rounds.last() {
+        for trial in last {
+            let remark = if is_in(&outcome.fit, trial.kind) {
+                "found".into()
+            } else if rivals.iter().any(|it| it.kinds.contains(&trial.kind)) {
+                "explains the data as well".into()
+            } else {
+                Search::refusal(trial).map_or_else(
+                    || "explains the data, but less well than what was found".into(),
+                    |refusal| refusal.to_string(),
+                )
+            };
+            list.push(Considered {
+                kind: trial.kind.name(),
+                evidence: Some(trial.evidence),
+                remark,
+            });
+        }
+    }
+    for (kind, reason) in &outcome.not_testable {
+        list.push(Considered { kind: kind.name(), evidence: None, remark: reason.clone() });
+    }
+    list
+}
+
+fn statement(
+    search: &Search,
+    outcome: &Outcome,
+    verdict: Verdict,
+    effects: &[EffectAnswer],
+    rivals: &[Rivals],
+    left: Option<&Unexplained>,
+) -> (String, Option<String>) {
+    let described: Vec<String> = effects.iter().map(describe).collect();
+    let described = described.join("; ");
+    let not_told = left.map(Unexplained::not_told).unwrap_or_default();
+    match verdict {
+        Verdict::InsufficientData if search.problem.runs.is_empty() => {
+            let held_out = search.holdout.len();
+            let text = format!("No run is there to fit: all {held_out} are held out.");
+            (text, Some("Give some of the runs the role \"fit\".".into()))
+        }
+        Verdict::InsufficientData => {
+            let moving_s = moving_s(search);
+            let observations = outcome.base.observations();
+            let text = format!(
+                "The fit runs hold {moving_s:.0} s of usable motion ({observations} observations): too little to tell."
+            );
+            (text, Some("Record several runs of some minutes, in both directions.".into()))
+        }
+        Verdict::None => {
+            let text = "Nothing undeclared is found: the declared model with a, b, c refitted \
+                        explains the runs.";
+            (format!("{text}{not_told}"), None)
+        }
+        Verdict::Effect => (format!("Found: {described}.{not_told}"), None),
+        Verdict::Unknown => {
+            let text = if is_in(&outcome.fit, EffectKind::Unknown) {
+                format!(
+                    "The residual is real, but no effect of the library explains it; it lives \
+                     here: {described}.{not_told}"
+                )
+            } else {
+                unnamed(left, &described) + &not_told
+            };
+            let experiment = "Drive this range again with other speeds, loads and directions.";
+            (text, Some(experiment.into()))
+        }
+        Verdict::Ambiguous => {
+            let one = |Rivals { accepted, kinds }: &Rivals| {
+                let names: Vec<&str> = kinds.iter().map(|kind| kind.name()).collect();
+                format!("{} and {}", accepted.name(), names.join(", "))
+            };
+            let each: Vec<String> = rivals.iter().map(one).collect();
+            let text = format!(
+                "An effect acts, but {} explain it equally well on these runs ({described}).",
+                each.join(", as well as ")
+            );
+            let runs = rivals.iter().map(|it| separating_run(it.accepted, &it.kinds));
+            let mut experiments: Vec<String> = runs.collect();
+            experiments.dedup();
+            let experiment = (!experiments.is_empty()).then(|| experiments.join(" "));
+            (text, experiment)
+        }
+    }
+}
+
+/// A residual that nothing in the model stands for, with what is found beside it.
+fn unnamed(left: Option<&Unexplained>, found: &str) -> String {
+    let mut text = String::from("The residual is real, but no effect of the library explains it.");
+    if let Some(left) = left {
+        text += &left.describe();
+        if let Some(place) = &left.place {
+            text += &format!(" It lives most here: {}.", describe_place(place).join(", "));
+        }
+    }
+    if !found.is_empty() {
+        text += &format!(" Beside it is found: {found}.");
+    }
+    text
+}
+
+fn describe(effect: &EffectAnswer) -> String {
+    let mut parts = Vec::new();
+    for (name, value) in &effect.parameters {
+        if let ParameterValue::Formula(formula) = value {
+            parts.insert(0, formula.clone());
+        }
+        if let (ParameterValue::Number(value), Some(ParameterValue::Number(deviation))) =
+            (value, effect.std.get(name))
+        {
+            parts.push(match HALF_95 * deviation {
+                // A reference that was chosen and not estimated.
+                0.0 => format!("{name} = {value}"),
+                half_width => format!("{name} = {value:.4} ± {half_width:.4}"),
+            });
+        }
+    }
+    parts.extend(effect.parameters.values().find_map(mass_factors));
+    parts.extend(describe_place(&effect.place));
+    parts.extend(effect.place.uncertainty_95.as_ref().and_then(precision));
+    format!("{} ({})", effect.kind, parts.join(", "))
+}
+
+/// Where something acts.
+fn describe_place(place: &Place) -> Vec<String> {
+    let mut parts = Vec::new();
+    if let Some(intervals) = &place.intervals_m {
+        let shown = intervals.iter().take(4).map(|[from, to]| format!("{from:.0}–{to:.0} m"));
+        let more = if intervals.len() > 4 { " …" } else { "" };
+        parts.push(format!("at {}{more}", shown.collect::<Vec<_>>().join(", ")));
+    }
+    if let Some(windows) = &place.windows {
+        let shown =
+            windows.iter().map(|w| format!("{} {:.0}–{:.0} s", w.run, w.t_start_s, w.t_end_s));
+        parts.push(format!("in {}", shown.collect::<Vec<_>>().join(", ")));
+    }
+    if let Some(runs) = &place.runs {
+        parts.push(format!("in {}", runs.join(", ")));
+    }
+    if let Some(covariate) = &place.covariate {
+        let [low, high] = covariate.range;
+        parts.push(format!("{} from {low:.1} to {high:.1}", covariate.name));
+    }
+    parts
+}
+
+/// How well the ends of a place are known: half of the widest 95 % interval.
+fn precision(known: &PlaceUncertainty) -> Option<String> {
+    let half = |interval: [f64; 2]| 0.5 * (interval[1] - interval[0]);
+    let widest = |ends: &mut dyn Iterator<Item = [f64; 2]>| ends.map(half).reduce(f64::max);
+    let ends_m = widest(&mut known.intervals_m.iter().flatten().flatten().copied());
+    let windows = known.windows.iter().flatten();
+    let ends_s = widest(&mut windows.flat_map(|it| [Some(it.t_start_s), it.t_end_s]).flatten());
+    let range = widest(&mut known.range.iter().flatten().flatten().copied());
+    let shown = [
+        ends_m.map(|half| format!("{half:.0} m")),
+        ends_s.map(|half| format!("{half:.0} s")),
+        range.filter(|_| ends_m.is_none()).map(|half| format!("{half:.1}")),
+    ];
+    let shown: Vec<String> = shown.into_iter().flatten().collect();
+    if ends_m.or(ends_s) == Some(0.0) {
+        return Some("ends certain".into());
+    }
+    (!shown.is_empty()).then(|| format!("ends known to ± {} or better", shown.join(", ± ")))
+}
+
+/// What a list of mass factors says; a section in both directions once.
+fn mass_factors(value: &ParameterValue) -> Option<String> {
+    let mut factors: Vec<f64> = match value {
+        ParameterValue::Sections(list) => list.iter().map(|section| section.mass_factor).collect(),
+        ParameterValue::Windows(list) => list.iter().map(|window| window.mass_factor).collect(),
+        _ => return None,
+    };
+    factors.dedup();
+    let listed: Vec<String> = factors.iter().map(|factor| format!("{factor:.3}")).collect();
+    Some(format!("mass_factor = {}", listed.join(", ")))
+}

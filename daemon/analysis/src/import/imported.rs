@@ -1,0 +1,138 @@
+//! What an import gives: a train or a line as far as the file tells, and an account of every field.
+
+use dynocar_core::track::Curve;
+use dynocar_core::train::Davis;
+
+use crate::dataset::Place;
+
+/// How a file is to be read where its format leaves a choice.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Reading {
+    /// Share of the permitted load that is on the train, 0 to 1, where a file tells the load.
+    pub load_share: f64,
+    /// Which of several effort curves counts, by the name of its mode; the file's default without.
+    pub mode: Option<String>,
+}
+
+/// What became of a field.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Remark {
+    /// It stands under a key.
+    Taken {
+        /// The field, with its unit where the format has one.
+        field: String,
+        /// The key of `train.toml` or `track.toml`.
+        key: &'static str,
+        /// How it was converted or read.
+        how: String,
+    },
+    /// It was read and has no place.
+    Left {
+        /// The field.
+        field: String,
+        /// Why.
+        why: String,
+    },
+    /// A key that the file does not tell.
+    Unknown {
+        /// The key.
+        key: &'static str,
+        /// What is missing.
+        why: String,
+    },
+}
+
+/// The account of the fields of one train or line, each once.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Account {
+    remarks: Vec<Remark>,
+}
+
+impl Account {
+    /// Everything said, in the order of the work.
+    pub fn remarks(&self) -> &[Remark] {
+        &self.remarks
+    }
+
+    fn say(&mut self, remark: Remark) {
+        if !self.remarks.contains(&remark) {
+            self.remarks.push(remark);
+        }
+    }
+
+    pub(super) fn taken(&mut self, field: &str, key: &'static str, how: impl Into<String>) {
+        self.say(Remark::Taken { field: field.into(), key, how: how.into() });
+    }
+
+    pub(super) fn left(&mut self, field: &str, why: impl Into<String>) {
+        self.say(Remark::Left { field: field.into(), why: why.into() });
+    }
+
+    pub(super) fn unknown(&mut self, key: &'static str, why: impl Into<String>) {
+        self.say(Remark::Unknown { key, why: why.into() });
+    }
+
+    /// Accounts for the fields of a map that were not taken: those of `without_place` for a reason,
+    /// the others because nobody knows them. `prefix` stands before each name.
+    pub(super) fn rest<'k>(
+        &mut self,
+        prefix: &str,
+        keys: impl Iterator<Item = &'k str>,
+        taken: &[&str],
+        without_place: &[(&str, &str)],
+    ) {
+        for key in keys.filter(|key| !taken.contains(key)) {
+            let known = without_place.iter().find(|(name, _)| *name == key);
+            let why = known.map_or("not understood", |(_, why)| why);
+            self.left(&format!("{prefix}{key}"), why);
+        }
+    }
+}
+
+/// A train as far as its file tells it, in SI units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImportedTrain {
+    /// By which it is chosen among others.
+    pub id: String,
+    /// Where it stands.
+    pub place: Place,
+    /// Name for people.
+    pub name: String,
+    /// Mass in kg.
+    pub mass_kg: f64,
+    /// Length in m.
+    pub length_m: Option<f64>,
+    /// Number of cars.
+    pub cars: Option<u32>,
+    /// Rotating-mass factor gamma.
+    pub rotating_mass_factor: Option<f64>,
+    /// Basic resistance.
+    pub resistance: Option<Davis>,
+    /// Greatest traction force: (m/s, N), by speed.
+    pub traction: Option<Vec<(f64, f64)>>,
+    /// What became of the file's fields.
+    pub account: Account,
+}
+
+/// A line as far as its file tells it, in SI units; a list that is `None` is not known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImportedLine {
+    /// By which it is chosen among others.
+    pub id: String,
+    /// Where it stands.
+    pub place: Place,
+    /// Name for people.
+    pub name: String,
+    /// Length in m.
+    pub length_m: f64,
+    /// (chainage in m, ‰ climbing positive as the chainage grows).
+    pub gradient: Option<Vec<(f64, f64)>>,
+    /// Curves.
+    pub curves: Option<Vec<Curve>>,
+    /// Stops: chainage in m and name.
+    pub stops: Vec<(f64, String)>,
+    /// (chainage in m, permitted speed in m/s).
+    pub permitted_speed: Option<Vec<(f64, f64)>>,
+    /// What became of the file's fields.
+    pub account: Account,
+}

@@ -1,0 +1,23 @@
+//! What recorded runs tell.
+//!
+//! It knows no channel, clock, file, thread or logger: texts, times and seeds come in as
+//! arguments. Laws, forces, simulation and estimators are [`dynocar_core`]'s, which knows nothing
+//! of this library: what is found in recordings is what the daemon then applies.
+//!
+//! # Layout, in the order of the work
+//!
+//! - [`import`]: trains and lines from other projects' files
+//! - [`dataset`]: recorded runs, from texts to the samples that a controller would publish
+//! - [`survey`]: a line and its gradient from recordings with GNSS
+//! - [`stops`]: what recorded stops say of a brake of unknown force
+//! - [`explain`]: which undeclared effect explains what the declared model leaves
+//! - [`driven`]: the train itself, force in and speed out, by the law that `explain` predicts with
+//! - [`advice`]: what to drive next, so that the estimates become sharper
+
+pub mod advice;
+pub mod dataset;
+pub mod driven;
+pub mod explain;
+pub mod import;
+pub mod stops;
+pub mod survey;
