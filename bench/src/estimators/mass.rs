@@ -8,6 +8,7 @@ use dynocar_core::pipeline::mass::bias_bank::{
     BIAS, BiasBank, Dynamics, INVERSE_MASS, MODELS, SPEED,
 };
 use dynocar_core::pipeline::mass::bias_model::BiasModel;
+use dynocar_core::pipeline::mass::inertia::Inertia;
 use dynocar_core::pipeline::mass::line_resistance::LineResistance;
 use dynocar_core::pipeline::mass::motion::Motion;
 use dynocar_core::simulate::motion as simulate;
@@ -34,7 +35,8 @@ struct Drive {
 
 /// Traction, coasting and braking of a train 5 % lighter than declared.
 fn drive(train: &TrainModel) -> Arc<Drive> {
-    let dynamics = Dynamics::new(train, LineResistance::declared(train));
+    let dynamics =
+        Dynamics { resistance: LineResistance::declared(train), inertia: Inertia::of(train) };
     let mut random = Random::new(21);
     let mut train_motion = simulate::Motion { distance_m: 0.0, speed_mps: 12.0 };
     let motions = (0..SAMPLES).map(|index| {
@@ -54,7 +56,7 @@ fn drive(train: &TrainModel) -> Arc<Drive> {
             curvature_per_m: 0.0,
             tunnel_share: 0.0,
         };
-        let push_mps2 = 1.05 * dynamics.push_mps2(&motion);
+        let push_mps2 = 1.05 * dynamics.inertia.push_mps2(&motion);
         let pull =
             |_: f64, now: simulate::Motion| push_mps2 - dynamics.drag_mps2(&motion, now.speed_mps);
         train_motion = simulate::advance(train_motion, STEP_S, pull);
@@ -141,14 +143,14 @@ fn predict(
     step: &[Motion],
 ) {
     let (from, to) = (&step[0], &step[1]);
-    let (push_from, push_to) = (dynamics.push_mps2(from), dynamics.push_mps2(to));
+    let (push_from, push_to) = (dynamics.inertia.push_mps2(from), dynamics.inertia.push_mps2(to));
     let (speed, inverse_mass, bias) =
         (filter.mean[SPEED], filter.mean[INVERSE_MASS], filter.mean[BIAS]);
     let shape = model.shape(speed);
     let start = push_from * inverse_mass - dynamics.drag_mps2(from, speed) + shape * bias;
     let ahead = speed + STEP_S * start;
     let end = push_to * inverse_mass - dynamics.drag_mps2(to, ahead) + shape * bias;
-    let damping = dynamics.mps2_per_n_per_kn() * dynamics.resistance.slope(from, speed);
+    let damping = dynamics.inertia.mps2_per_n_per_kn() * dynamics.resistance.slope(from, speed);
     let keep = model.keep(STEP_S);
     #[rustfmt::skip]
     let transition = Matrix3::new(
@@ -157,7 +159,7 @@ fn predict(
         0.0, 0.0, keep,
     );
     let mean = Vector3::new(speed + 0.5 * STEP_S * (start + end), inverse_mass, keep * bias);
-    let bend = dynamics.mps2_per_n_per_kn() * (to.known_n_per_kn - from.known_n_per_kn);
+    let bend = dynamics.inertia.mps2_per_n_per_kn() * (to.known_n_per_kn - from.known_n_per_kn);
     let change = (push_to - push_from) * inverse_mass - bend;
     let noise = Vector3::new(model.jump_variance(change, STEP_S), 0.0, model.noise_variance(keep));
     filter.predict(mean, &transition, &Matrix3::from_diagonal(&noise));

@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use dynocar_core::filter::random::Random;
+use dynocar_core::force::balance::mps2_per_n_per_kn;
 use dynocar_core::pipeline::trajectory::bank::{JumpBank, JumpModel};
 use dynocar_core::pipeline::trajectory::hypothesis::{Hypothesis, OutlierModel};
 use dynocar_core::pipeline::trajectory::index::{A, B, C, SPEED};
 use dynocar_core::pipeline::trajectory::noise::{LearnedNoise, NoiseModel};
 use dynocar_core::pipeline::trajectory::online::{OnlineFilter, OnlineSettings};
-use dynocar_core::pipeline::trajectory::step::{Step, StepRule, resistance_gain};
+use dynocar_core::pipeline::trajectory::step::{Step, StepRule};
 use dynocar_core::train::Davis;
 use nalgebra::{RowVector4, SMatrix, Vector3, Vector4};
 
@@ -36,7 +37,7 @@ struct Drive {
 /// Traction and coasting by turns; the resistance grows by half midway.
 fn drive() -> Arc<Drive> {
     let mut random = Random::new(3);
-    let gain = resistance_gain(0.06);
+    let gain = mps2_per_n_per_kn(0.06);
     let mut speed_mps = 25.0;
     let samples = (0..STEPS).map(|index| {
         let rain = if index < STEPS / 2 { 1.0 } else { 1.5 };
@@ -52,7 +53,7 @@ fn drive() -> Arc<Drive> {
 
 /// The noise that `trajectory_kalman` starts from.
 fn noise(learns: bool) -> NoiseModel {
-    let gain = resistance_gain(0.06);
+    let gain = mps2_per_n_per_kn(0.06);
     NoiseModel {
         speed_noise_mps: 0.03,
         speed_noise_range_mps: (1e-3, 1.0),

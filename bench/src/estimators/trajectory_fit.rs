@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use dynocar_core::filter::random::Random;
+use dynocar_core::force::balance::mps2_per_n_per_kn;
 use dynocar_core::pipeline::trajectory::fit::{
     DavisPrior, FitSettings, Stretch, TrajectoryFit, TrajectoryFitter,
 };
-use dynocar_core::pipeline::trajectory::step::{Step, StepRule, resistance_gain};
+use dynocar_core::pipeline::trajectory::step::{Step, StepRule};
 use dynocar_core::train::Davis;
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::Vector3;
@@ -49,7 +50,7 @@ fn settings() -> FitSettings {
 impl Windows {
     fn new(samples: usize) -> Arc<Self> {
         let mut random = Random::new(samples as u64);
-        let gain = resistance_gain(0.06);
+        let gain = mps2_per_n_per_kn(0.06);
         let mut speed_mps = 70.0;
         let (mut steps, mut speeds_mps) = (Vec::new(), vec![speed_mps]);
         for index in 0..samples + SLIDE * WINDOWS {

@@ -10,8 +10,9 @@ pub mod scenario;
 
 use std::sync::Arc;
 
+use dynocar_core::force::balance::mps2_per_n_per_kn;
 use dynocar_core::pipeline::trajectory::fit::{FitSettings, Stretch, TrajectoryFitter};
-use dynocar_core::pipeline::trajectory::step::{Step, StepRule, resistance_gain};
+use dynocar_core::pipeline::trajectory::step::{Step, StepRule};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
 use dynocar_core::train::{Davis, TrainModel};
 use dynocar_shared::snapshot::packed_index;
@@ -104,7 +105,7 @@ fn whole_runs(runs: &[Vec<Measured>]) -> Option<Estimate> {
     let step = |pair: &[Measured]| Step {
         size: pair[1].time_s - pair[0].time_s,
         drive_mps2: 0.0,
-        resistance_gain: resistance_gain(ROTATING_MASS_FACTOR),
+        resistance_gain: mps2_per_n_per_kn(ROTATING_MASS_FACTOR),
     };
     let steps: Vec<Vec<Step>> = runs.iter().map(|run| run.windows(2).map(step).collect()).collect();
     let speed_mps = |sample: &Measured| sample.speed_kmh / 3.6;

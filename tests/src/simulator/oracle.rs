@@ -8,6 +8,7 @@ use std::sync::Arc;
 use dynocar_core::force::{ForceResolver, ResolvedSample};
 use dynocar_core::simulate::{
     BridgeLimits, ForceModel, Prediction, QuadraticForces, Recording, Restart, SpeedError,
+    declared_polynomial,
 };
 use dynocar_core::terms::delay::DelayLine;
 use dynocar_core::terms::{gradient, traction};
@@ -119,14 +120,12 @@ pub fn oracle_forces(
 ) -> OracleForces {
     let disturbances = &run.disturbances;
     let davis = dataset.train.resistance;
-    let mut quadratic = QuadraticForces::declared(recording, davis);
-    quadratic.set_speed_scale(disturbances.speed_scale);
     let acting_n = acting_forces_n(recording, disturbances);
     let declared = dataset.declared_train();
     let inertia_ratio =
         (1.0 + declared.rotating_mass_factor) / (1.0 + disturbances.rotating_mass_factor);
     let mut position_m = run.plan.start_m;
-    for (index, sample) in recording.samples().iter().enumerate() {
+    let polynomial = |(index, sample): (usize, &ResolvedSample)| {
         let time_s = recording.time_s()[index];
         position_m = sample.position_m.unwrap_or(position_m);
         // Everything but traction and brake is in proportion to the mass.
@@ -134,14 +133,17 @@ pub fn oracle_forces(
         let control_n = sample.control_force_n().unwrap_or(0.0);
         let control_change_n = acting_n[index] / mass_factor - control_n;
         let drag_n = disturbances.drag_n(time_s) / mass_factor;
-        quadratic.add_force(index, sample, [control_change_n - drag_n, 0.0, 0.0]);
-        let [constant, linear, quadratic_term] =
-            extra_n_per_kn(dataset, run, sample, (time_s, position_m));
-        let w_kn = -sample.weight_kn;
-        let force = [w_kn * constant, w_kn * linear, w_kn * quadratic_term];
-        quadratic.add_force(index, sample, force);
-        quadratic.scale_acceleration(index, inertia_ratio);
-    }
+        let changes_n = [control_change_n - drag_n, 0.0, 0.0];
+        let declared = declared_polynomial(sample, davis);
+        let extra_n_per_kn = extra_n_per_kn(dataset, run, sample, (time_s, position_m));
+        std::array::from_fn(|power| {
+            let force_n = changes_n[power] - sample.weight_kn * extra_n_per_kn[power];
+            inertia_ratio * (declared[power] + force_n / sample.inertial_mass_kg)
+        })
+    };
+    let mut quadratic = QuadraticForces::default();
+    let samples = recording.samples().iter().enumerate();
+    quadratic.set(samples.map(polynomial), disturbances.speed_scale);
     let first = &recording.samples()[0];
     OracleForces {
         quadratic,

@@ -5,6 +5,7 @@
 //! most. The error with noise is taken from km 64 on, but for the 8 km after the switch at km 82.
 
 use dynocar_core::filter::levenberg_marquardt::ParameterBox;
+use dynocar_core::force::balance::mps2_per_n_per_kn;
 use dynocar_core::pipeline::papers::xia::wolfe_newton::{
     NewtonSettings, RestartSource, wolfe_newton,
 };
@@ -12,7 +13,7 @@ use dynocar_core::pipeline::trajectory::bank::JumpModel;
 use dynocar_core::pipeline::trajectory::hypothesis::{Hypothesis, OutlierModel};
 use dynocar_core::pipeline::trajectory::noise::{LearnedNoise, NoiseModel};
 use dynocar_core::pipeline::trajectory::online::{OnlineFilter, OnlineSettings};
-use dynocar_core::pipeline::trajectory::step::{StepRule, resistance_gain};
+use dynocar_core::pipeline::trajectory::step::StepRule;
 use dynocar_core::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 use rand::SeedableRng;
@@ -56,7 +57,7 @@ fn declared() -> (Davis, Vector3<f64>) {
 }
 
 fn settings(davis: Davis, std: Vector3<f64>) -> OnlineSettings {
-    let gain = resistance_gain(ROTATING_MASS_FACTOR);
+    let gain = mps2_per_n_per_kn(ROTATING_MASS_FACTOR);
     OnlineSettings {
         davis,
         davis_std: std,

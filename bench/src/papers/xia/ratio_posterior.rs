@@ -175,7 +175,8 @@ impl RatioPosterior {
 #[cfg(test)]
 mod tests {
     use dynocar_core::filter::levenberg_marquardt::ParameterBox;
-    use dynocar_core::pipeline::trajectory::step::{Step, StepRule, resistance_gain};
+    use dynocar_core::force::balance::mps2_per_n_per_kn;
+    use dynocar_core::pipeline::trajectory::step::{Step, StepRule};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
@@ -190,7 +191,7 @@ mod tests {
             size: 2.5,
             drive_mps2: [0.38, 0.2, 0.12, 0.0, -0.25, 0.25, 0.15, 0.0][(8 * i / count) % 8]
                 + 0.05 * (0.7 * i as f64).sin(),
-            resistance_gain: resistance_gain(0.06),
+            resistance_gain: mps2_per_n_per_kn(0.06),
         };
         (0..count).map(at).collect()
     }

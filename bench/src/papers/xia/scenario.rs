@@ -4,7 +4,8 @@
 //! 0.18 m/s on the speed (a mean square of 0.05 at the truth, the paper's ε1, leaves room for
 //! just that). The truth moves by eq. 7, as the paper's own data do (mean squares of 1e-9).
 
-use dynocar_core::pipeline::trajectory::step::{Step, resistance_gain};
+use dynocar_core::force::balance::mps2_per_n_per_kn;
+use dynocar_core::pipeline::trajectory::step::Step;
 use dynocar_core::track::{Curve, Track};
 use dynocar_core::train::Davis;
 use rand::{RngExt, SeedableRng};
@@ -138,7 +139,7 @@ pub fn drive(profile: Profile, length_m: f64, seed: u64, davis_at: impl Fn(f64) 
         let step = Step {
             size: SAMPLING_M,
             drive_mps2: (force_kn - weight_kn * (uphill + curve) / 1000.0) / inertia_t,
-            resistance_gain: resistance_gain(ROTATING_MASS_FACTOR),
+            resistance_gain: mps2_per_n_per_kn(ROTATING_MASS_FACTOR),
         };
         speed_mps = next_speed_mps(&step, &davis, speed_mps);
         run.steps.push(step);

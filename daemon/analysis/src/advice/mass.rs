@@ -7,8 +7,9 @@
 
 use std::sync::Arc;
 
+use dynocar_core::force::balance::mps2_per_n_per_kn;
 use dynocar_core::pipeline::mass::{MassKalman, MassKalmanSettings};
-use dynocar_core::pipeline::trajectory::step::{Step, StepRule, resistance_gain};
+use dynocar_core::pipeline::trajectory::step::{Step, StepRule};
 use dynocar_core::pipeline::{KeptEstimate, Pipeline};
 use dynocar_core::train::{Davis, TrainModel};
 use dynocar_shared::{Parameter, ParameterSnapshot, SampleField, TrainId, TrainSample};
@@ -128,7 +129,7 @@ impl<'a> Rehearsal<'a> {
         let train = Arc::new(TrainModel { mass_kg: scene.mass_kg, ..scene.train.clone() });
         let estimator = Box::new(MassKalman::new(settings, &train).ok()?);
         let id = TrainId(1);
-        let gain = resistance_gain(train.rotating_mass_factor);
+        let gain = mps2_per_n_per_kn(train.rotating_mass_factor);
         Some(Rehearsal {
             scene,
             pipeline: Pipeline::new(id, 0, train, None, estimator),
@@ -143,7 +144,7 @@ impl<'a> Rehearsal<'a> {
 
     /// Drives a manoeuvre to its end; `is_free` holds a speed whatever the traction. Gives the time in s.
     fn drive(&mut self, drive: Drive, is_free: bool) -> f64 {
-        let gain = resistance_gain(self.scene.train.rotating_mass_factor);
+        let gain = mps2_per_n_per_kn(self.scene.train.rotating_mass_factor);
         let mut driver = drive.begin();
         let mut lasts_s = 0.0;
         while lasts_s + self.step_s <= drive.within_s {

@@ -4,11 +4,12 @@
 //! is driven: so the filter of `trajectory_kalman` itself is driven over the manoeuvre, from the present
 //! covariance, with the present noise, measuring just what it expects.
 
+use dynocar_core::force::balance::mps2_per_n_per_kn;
 use dynocar_core::pipeline::trajectory::hypothesis::Hypothesis;
 use dynocar_core::pipeline::trajectory::index::SPEED;
 use dynocar_core::pipeline::trajectory::noise::{LearnedNoise, NoiseModel};
 use dynocar_core::pipeline::trajectory::online::OUTLIERS;
-use dynocar_core::pipeline::trajectory::step::{Step, StepRule, resistance_gain};
+use dynocar_core::pipeline::trajectory::step::{Step, StepRule};
 use nalgebra::{Matrix3, Vector3};
 
 use super::drive::{Drive, Scene};
@@ -40,7 +41,7 @@ pub fn forecast(
 ) -> Option<Forecast> {
     let together = (STEP_MIN_S / noise.step_s).ceil().max(1.0);
     let step_s = together * noise.step_s;
-    let gain = resistance_gain(scene.train.rotating_mass_factor);
+    let gain = mps2_per_n_per_kn(scene.train.rotating_mass_factor);
     let model = NoiseModel {
         speed_noise_mps: noise.speed_noise_mps / together.sqrt(),
         speed_noise_range_mps: (0.0, f64::INFINITY),

@@ -4,10 +4,9 @@
 //! the map's. The finished model is fitted once more with that error beside it, a Gaussian process along the
 //! line. What the data cannot tell from it is not told, and what they can is told better.
 
-use dynocar_core::terms::gradient::SURVEYED;
-
 use super::effects::map_error;
 use super::evidence::Fit;
+use super::gradient_prior::SURVEYED;
 use super::places::span_m;
 use super::selection::{Deviations, Outcome, Search, deviations};
 

@@ -10,7 +10,7 @@
 //! - [`scan`], [`places`], [`residual_pressure`]: what a force of some shape, at some place or
 //!   time, would explain
 //! - [`selection`]: the search for effects, its significance, evidence by run
-//! - [`map_error`]: the finished model beside what the map's own error makes all runs err alike
+//! - [`gradient_prior`], [`map_error`]: how maps err; the finished model beside what the map's own error makes all runs err alike
 //! - [`score`], `stop_runs`, [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
 //! - [`unexplained`], [`told`], [`identifiability`], [`rivals`], [`runners_up`], [`verdict`], [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
@@ -23,6 +23,7 @@ pub mod drive;
 pub mod effects;
 pub mod evidence;
 pub mod force_time;
+pub mod gradient_prior;
 pub mod hypothesis;
 pub mod identifiability;
 pub mod map_error;

@@ -58,45 +58,66 @@ impl Evidence for Nats {
     }
 }
 
-/// Hypotheses with the evidence for each: an array of them where the assumptions stay the same, an
-/// [`ArrayVec`] where they come and go.
+/// At most `MAX` hypotheses with the evidence for each, in the order in which they joined.
 ///
 /// Whoever moves and measures the hypotheses adds to their weights, and lets the bank settle.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Bank<S, E, const MAX: usize> {
-    hypotheses: S,
+pub struct Bank<H, E, const MAX: usize> {
+    hypotheses: ArrayVec<H, MAX>,
     /// Of places without a hypothesis, [`Evidence::NONE`].
     weights: [f64; MAX],
     likeliest: usize,
     evidence: PhantomData<E>,
 }
 
-impl<S, E: Evidence, const MAX: usize> Bank<S, E, MAX> {
-    /// The hypotheses, in the order in which they joined.
+impl<H, E: Evidence, const MAX: usize> Bank<H, E, MAX> {
+    /// Hypotheses of equal weight, the first believed until evidence comes.
+    ///
+    /// # Panics
+    ///
+    /// When there are more than `MAX`.
+    pub fn even(hypotheses: impl IntoIterator<Item = H>) -> Self {
+        let hypotheses: ArrayVec<_, MAX> = hypotheses.into_iter().collect();
+        let mut weights = [E::NONE; MAX];
+        weights[..hypotheses.len()].fill(E::LIKELIEST);
+        Bank { hypotheses, weights, likeliest: 0, evidence: PhantomData }
+    }
+
+    /// The hypotheses.
     #[inline]
-    pub fn hypotheses(&self) -> &S {
+    pub fn hypotheses(&self) -> &[H] {
         &self.hypotheses
     }
 
     /// The same, to be moved.
     #[inline]
-    pub fn hypotheses_mut(&mut self) -> &mut S {
+    pub fn hypotheses_mut(&mut self) -> &mut [H] {
         &mut self.hypotheses
     }
 
-    /// The hypotheses and, place by place, their evidence, to be measured and weighed.
+    /// The evidence for each.
     #[inline]
-    pub fn weighed_mut(&mut self) -> (&mut S, &mut [f64; MAX]) {
-        (&mut self.hypotheses, &mut self.weights)
+    pub fn weights(&self) -> &[f64] {
+        &self.weights[..self.hypotheses.len()]
     }
 
-    /// The evidence for each place.
+    /// The hypotheses and their evidence, to be measured and weighed.
     #[inline]
-    pub fn weights(&self) -> &[f64; MAX] {
-        &self.weights
+    pub fn weighed_mut(&mut self) -> impl Iterator<Item = (&mut H, &mut f64)> {
+        self.hypotheses.iter_mut().zip(&mut self.weights)
     }
 
-    /// Place of the hypothesis with the most evidence when the bank settled last.
+    /// The hypothesis with the most evidence when the bank settled last.
+    ///
+    /// # Panics
+    ///
+    /// When there is none.
+    #[inline]
+    pub fn likeliest(&self) -> &H {
+        &self.hypotheses[self.likeliest]
+    }
+
+    /// Its place.
     #[inline]
     pub fn likeliest_place(&self) -> usize {
         self.likeliest
@@ -121,74 +142,29 @@ impl<S, E: Evidence, const MAX: usize> Bank<S, E, MAX> {
         !self.weights.iter().any(|weight| weight.is_nan())
     }
 
-    /// Raises every weight to a least one: a hypothesis that weighs so much can come back.
+    /// Probability of each hypothesis that counts; 0 of the others.
     #[inline]
-    pub fn raise_to(&mut self, least: f64) {
-        self.weights.iter_mut().for_each(|weight| *weight = weight.max(least));
-    }
-
-    /// Probability of the hypothesis at each of the places that count; 0 at the others.
-    #[inline]
-    pub fn shares(&self, counts: impl Fn(usize) -> bool) -> [f64; MAX] {
-        let share = |place| if counts(place) { E::probability(self.weights[place]) } else { 0.0 };
-        let mut shares: [f64; MAX] = std::array::from_fn(share);
-        let sum: f64 = shares.iter().sum();
+    pub fn shares(&self, counts: impl Fn(&H) -> bool) -> [f64; MAX] {
+        let mut shares = [0.0; MAX];
+        let mut sum = 0.0;
+        for (place, _) in self.hypotheses.iter().enumerate().filter(|(_, it)| counts(it)) {
+            shares[place] = E::probability(self.weights[place]);
+            sum += shares[place];
+        }
         if sum > 0.0 {
             shares.iter_mut().for_each(|share| *share /= sum);
         }
         shares
     }
 
-    fn find_likeliest(&mut self) {
-        let greatest = self.weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        if self.weights[self.likeliest] != greatest {
-            let place = self.weights.iter().position(|&weight| weight == greatest);
-            self.likeliest = place.unwrap_or(self.likeliest);
-        }
-    }
-}
-
-impl<H, E: Evidence, const MAX: usize> Bank<[H; MAX], E, MAX> {
-    /// Hypotheses of equal weight, the first believed until evidence comes.
-    pub fn even(hypotheses: [H; MAX]) -> Self {
-        let weights = [E::LIKELIEST; MAX];
-        Bank { hypotheses, weights, likeliest: 0, evidence: PhantomData }
-    }
-
-    /// The hypothesis at [`Bank::likeliest_place`].
-    #[inline]
-    pub fn likeliest(&self) -> &H {
-        &self.hypotheses[self.likeliest]
-    }
-}
-
-impl<H, E: Evidence, const MAX: usize> Bank<ArrayVec<H, MAX>, E, MAX> {
-    /// A bank that begins with one hypothesis.
-    pub fn of_one(hypothesis: H) -> Self {
-        let mut weights = [E::NONE; MAX];
-        weights[0] = E::LIKELIEST;
-        let hypotheses = std::iter::once(hypothesis).collect();
-        Bank { hypotheses, weights, likeliest: 0, evidence: PhantomData }
-    }
-
-    /// The hypothesis at [`Bank::likeliest_place`].
+    /// Lets a hypothesis join as the last.
     ///
     /// # Panics
     ///
-    /// When every one has been dropped.
-    #[inline]
-    pub fn likeliest(&self) -> &H {
-        &self.hypotheses[self.likeliest]
-    }
-
-    /// Lets a hypothesis join as the last; a full bank refuses it.
-    pub fn join(&mut self, hypothesis: H, weight: f64) -> bool {
-        let place = self.hypotheses.len();
-        let is_joined = self.hypotheses.try_push(hypothesis).is_ok();
-        if is_joined {
-            self.weights[place] = weight;
-        }
-        is_joined
+    /// When the bank is full.
+    pub fn join(&mut self, hypothesis: H, weight: f64) {
+        self.weights[self.hypotheses.len()] = weight;
+        self.hypotheses.push(hypothesis);
     }
 
     /// Puts one, with its weight, in the place of a hypothesis and of the next.
@@ -219,6 +195,14 @@ impl<H, E: Evidence, const MAX: usize> Bank<ArrayVec<H, MAX>, E, MAX> {
         self.weights[MAX - 1] = E::NONE;
         self.find_likeliest();
     }
+
+    fn find_likeliest(&mut self) {
+        let greatest = self.weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if self.weights[self.likeliest] != greatest {
+            let place = self.weights.iter().position(|&weight| weight == greatest);
+            self.likeliest = place.unwrap_or(self.likeliest);
+        }
+    }
 }
 
 #[cfg(test)]
@@ -233,9 +217,7 @@ mod tests {
         assert_eq!((*bank.likeliest(), bank.weights()[1]), ("b", 0.0));
         let shares = bank.shares(|_| true);
         assert!((shares[1] - 2.0 / 3.0).abs() < 1e-11 && shares[2] == 0.0);
-        assert_eq!(bank.shares(|place| place != 1), [1.0, 0.0, 0.0]);
-        bank.raise_to(-30.0);
-        assert_eq!(bank.weights()[2], -30.0);
+        assert_eq!(bank.shares(|name| *name != "b"), [1.0, 0.0, 0.0]);
     }
 
     #[test]
@@ -255,21 +237,22 @@ mod tests {
         let mut bank = Bank::<_, Nats, 2>::even([0, 1]);
         bank.weights[1] = f64::NAN;
         assert!(!bank.settle());
-        let mut nothing = Bank::<_, Odds, 2>::of_one(0);
+        let mut nothing = Bank::<_, Odds, 2>::even([0]);
         nothing.weights[0] = 0.0;
         assert!(!nothing.settle());
     }
 
     #[test]
     fn hypotheses_join_unite_and_go() {
-        let mut bank = Bank::<_, Odds, 3>::of_one(10);
-        assert!(bank.join(20, 3.0) && bank.join(30, 2.0) && !bank.join(40, 9.0));
+        let mut bank = Bank::<_, Odds, 3>::even([10]);
+        bank.join(20, 3.0);
+        bank.join(30, 2.0);
         assert!(bank.settle());
         assert_eq!(*bank.likeliest(), 20);
         bank.unite(0, (15, 0.1));
-        assert_eq!((bank.hypotheses()[..].to_vec(), *bank.likeliest()), (vec![15, 30], 30));
+        assert_eq!((bank.hypotheses(), *bank.likeliest()), ([15, 30].as_slice(), 30));
         bank.drop_up_to(0.2);
-        assert_eq!((bank.hypotheses()[..].to_vec(), bank.weights()[1]), (vec![30], 0.0));
+        assert_eq!((bank.hypotheses(), bank.weights().len()), ([30].as_slice(), 1));
         bank.weights[0] = f64::NAN;
         bank.drop_up_to(0.0);
         assert!(bank.hypotheses().is_empty());

@@ -27,8 +27,8 @@ impl<F: Fn(usize, f64) -> f64> ForceModel for F {
     }
 }
 
-/// Acceleration at one sample as a polynomial of the speed: p0 + p1 v + p2 v².
-type Polynomial = [f64; 3];
+/// Acceleration in m/s² at one sample as a polynomial of the speed in m/s: p0 + p1 v + p2 v².
+pub type Polynomial = [f64; 3];
 
 /// A force model that is a quadratic polynomial of the speed at every sample.
 ///
@@ -45,55 +45,17 @@ impl QuadraticForces {
     /// The declared model over a run with the given Davis coefficients.
     pub fn declared(recording: &Recording, resistance: Davis) -> Self {
         let mut forces = QuadraticForces::default();
-        forces.set_declared(recording, resistance);
+        let polynomial = |sample| declared_polynomial(sample, resistance);
+        forces.set(recording.samples().iter().map(polynomial), 1.0);
         forces
     }
 
-    /// Becomes the declared model over a run; keeps its memory, so that an optimiser allocates
-    /// only once.
-    pub fn set_declared(&mut self, recording: &Recording, resistance: Davis) {
-        self.speed_scale = 1.0;
+    /// Becomes the model of these polynomials, one for each sample, and of a measured over true
+    /// speed; keeps its memory, so that an optimiser allocates only once.
+    pub fn set(&mut self, polynomials: impl Iterator<Item = Polynomial>, speed_scale: f64) {
+        self.speed_scale = speed_scale;
         self.polynomials.clear();
-        self.polynomials.extend(
-            recording.samples().iter().map(|sample| declared_polynomial(sample, resistance)),
-        );
-    }
-
-    /// Adds the force `constant_n` + `linear` v + `quadratic` v² in N along the direction of
-    /// travel (a resistance is negative) at one sample; v in m/s.
-    ///
-    /// # Panics
-    ///
-    /// When the run has no sample of this index.
-    #[inline]
-    pub fn add_force(
-        &mut self,
-        index: usize,
-        sample: &ResolvedSample,
-        [constant_n, linear, quadratic]: [f64; 3],
-    ) {
-        let polynomial = &mut self.polynomials[index];
-        let per_kg = 1.0 / sample.inertial_mass_kg;
-        polynomial[0] += per_kg * constant_n;
-        polynomial[1] += per_kg * linear;
-        polynomial[2] += per_kg * quadratic;
-    }
-
-    /// Multiplies the acceleration at one sample, as another inertial mass does.
-    ///
-    /// # Panics
-    ///
-    /// When the run has no sample of this index.
-    #[inline]
-    pub fn scale_acceleration(&mut self, index: usize, factor: f64) {
-        for coefficient in &mut self.polynomials[index] {
-            *coefficient *= factor;
-        }
-    }
-
-    /// Sets measured speed over true speed.
-    pub fn set_speed_scale(&mut self, scale: f64) {
-        self.speed_scale = scale;
+        self.polynomials.extend(polynomials);
     }
 }
 
@@ -109,8 +71,9 @@ impl ForceModel for QuadraticForces {
     }
 }
 
-/// A gradient that is not known counts as level track; [`Recording::knows_gradient`] tells.
-fn declared_polynomial(sample: &ResolvedSample, resistance: Davis) -> Polynomial {
+/// The declared model at a sample. A gradient that is not known counts as level track;
+/// [`Recording::knows_gradient`] tells.
+pub fn declared_polynomial(sample: &ResolvedSample, resistance: Davis) -> Polynomial {
     let Davis { a, b, c } = resistance;
     let acting = ActingForces {
         mass_kg: sample.mass_kg,

@@ -37,7 +37,7 @@ mod prediction;
 mod recording;
 
 pub use departure::{STANDING_MPS, departs};
-pub use force_model::{ForceModel, QuadraticForces};
+pub use force_model::{ForceModel, Polynomial, QuadraticForces, declared_polynomial};
 pub use metric::{MOVING_SPEED_MPS, SpeedError};
 pub use prediction::{Prediction, Restart};
 pub use recording::{BridgeLimits, Recording, SimulateError, is_pulled};

@@ -22,22 +22,6 @@ pub const ERROR: &str = "gradient_error";
 pub const ERROR_FALLING: &str = "gradient_error_falling";
 /// What it lacks at one chainage.
 pub const ERROR_PARAMETER: Parameter = Parameter::new("permille", (-150.0, 150.0), 0.05);
-/// How a declared gradient may be wrong, before the data.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ErrorScale {
-    /// Standard deviation in ‰.
-    pub permille: f64,
-    /// Length in m over which it changes.
-    pub length_m: f64,
-}
-
-/// A map drawn from altitudes, with a wrong vertical curve or a smoothed hill.
-pub const MAP: ErrorScale = ErrorScale { permille: 1.5, length_m: 1500.0 };
-/// What is left in a usual survey: short pieces, each a little wrong.
-pub const SURVEYED: ErrorScale = ErrorScale { permille: 0.1, length_m: 600.0 };
-/// A line whose gradient nobody surveyed: a railway's, and a street's in hills.
-pub const UNSURVEYED: [ErrorScale; 2] =
-    [ErrorScale { permille: 8.0, length_m: 600.0 }, ErrorScale { permille: 25.0, length_m: 200.0 }];
 /// A root mean square in ‰ below this is what good surveys differ by.
 pub const ERROR_LEAST_PERMILLE: f64 = 0.25;
 

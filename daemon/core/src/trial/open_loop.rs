@@ -28,7 +28,6 @@ pub struct OpenLoop {
     train: Arc<TrainModel>,
     resolver: ForceResolver,
     samples: Vec<ResolvedSample>,
-    forces: QuadraticForces,
     prediction: Prediction,
 }
 
@@ -39,7 +38,6 @@ impl OpenLoop {
             resolver: ForceResolver::new(Arc::clone(&train), track),
             train,
             samples: Vec::with_capacity(SAMPLES_MAX),
-            forces: QuadraticForces::default(),
             prediction: Prediction::new(),
         }
     }
@@ -62,8 +60,8 @@ impl OpenLoop {
         let Ok(recording) = Recording::new(samples, BridgeLimits::default()) else {
             return WindowError::default();
         };
-        self.forces.set_declared(&recording, self.train.resistance);
-        self.prediction.simulate(&recording, &self.forces, Restart::FullRun);
+        let forces = QuadraticForces::declared(&recording, self.train.resistance);
+        self.prediction.simulate(&recording, &forces, Restart::FullRun);
         WindowError {
             speed: SpeedError::of(&recording, &self.prediction),
             way_mps: way_error_mps(&recording, self.prediction.speed_mps()).unwrap_or(0.0),

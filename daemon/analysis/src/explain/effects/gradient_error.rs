@@ -9,7 +9,7 @@
 //! of a map's errors or, where a level line is declared, of a line that nobody surveyed: their
 //! evidence decides.
 
-use dynocar_core::terms::gradient::{self, ErrorScale};
+use dynocar_core::terms::gradient;
 use dynocar_core::terms::{Entry, Parameter};
 use dynocar_core::track::{self, LinearProfile};
 use dynocar_shared::vocabulary::EffectKind;
@@ -19,6 +19,7 @@ use super::unknown::leaves_a_force;
 use super::{Candidate, Effect, Hypothesis, Proposal, ReportContext, Reported};
 use crate::explain::answer::ParameterValue;
 use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::gradient_prior::{ErrorScale, MAP, UNSURVEYED};
 use crate::explain::places::{MAP_ERROR_PERMILLE, span_m};
 use crate::explain::scan::Scan;
 
@@ -58,13 +59,13 @@ impl Effect for GradientError {
             return Proposal::NotTestable("one passage does not tell what stays".into());
         }
         let is_one_way = runs.iter().all(|run| run.direction == runs[0].direction);
-        let mut profiles = vec![Profile::new(span_m, gradient::MAP, 1, is_one_way)];
+        let mut profiles = vec![Profile::new(span_m, MAP, 1, is_one_way)];
         let is_level = scan.track.is_none_or(|track| track.is_level());
         if is_level && leaves_a_force(scan) {
             let towards = |direction| runs.iter().filter(|run| run.direction == direction).count();
             let may_part = towards(1.0).min(towards(-1.0)) >= RUNS_MIN;
             let ways = if may_part { 1..=2 } else { 1..=1 };
-            for scale in gradient::UNSURVEYED {
+            for scale in UNSURVEYED {
                 let of = |ways| Profile::new(span_m, scale, ways, false);
                 profiles.extend(ways.clone().map(of).filter(|it| it.apart_m() <= scale.length_m));
             }
@@ -262,7 +263,7 @@ mod tests {
 
     #[test]
     fn the_prior_is_the_inverse_of_an_exponential_covariance_for_each_way() {
-        let (count, apart_m, scale) = (6, 700.0, gradient::MAP);
+        let (count, apart_m, scale) = (6, 700.0, MAP);
         let covariance = DMatrix::from_fn(2 * count, 2 * count, |i, j| {
             let away_m = apart_m * i.abs_diff(j) as f64;
             let is_one_way = i / count == j / count;

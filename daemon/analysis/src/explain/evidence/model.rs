@@ -1,6 +1,6 @@
 //! The declared model with effects added, as acceleration at each sample.
 
-use dynocar_core::simulate::ForceModel;
+use dynocar_core::simulate::{ForceModel, QuadraticForces};
 use dynocar_core::terms::wheel;
 use dynocar_core::train::Davis;
 
@@ -57,11 +57,11 @@ impl GrownModel {
         self.act(run, theta, forces);
         let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
         let scale = forces.speed_scale;
-        forces.polynomials.clear();
         let samples = forces.samples.iter().zip(&run.smooth_mps);
-        forces.polynomials.extend(samples.map(|(state, &speed_mps)| {
+        let polynomials = samples.map(|(state, &speed_mps)| {
             state.polynomial(davis, wheel::true_speed_mps(speed_mps, scale))
-        }));
+        });
+        forces.quadratic.set(polynomials, scale);
     }
 
     /// Modelled measured speed at each bin, each segment starting from zero: the integral of the
@@ -112,8 +112,8 @@ pub fn integrate_bins(run: &RunData, acceleration: impl Fn(usize) -> f64, bins: 
 #[derive(Clone, Debug, Default)]
 pub struct GrownForces {
     samples: Vec<SampleForces>,
-    polynomials: Vec<[f64; 3]>,
     speed_scale: f64,
+    quadratic: QuadraticForces,
 }
 
 impl GrownForces {
@@ -137,8 +137,7 @@ impl GrownForces {
 impl ForceModel for GrownForces {
     #[inline]
     fn acceleration_mps2(&self, index: usize, speed_mps: f64) -> f64 {
-        let [p0, p1, p2] = self.polynomials[index];
-        p0 + speed_mps * (p1 + speed_mps * p2)
+        self.quadratic.acceleration_mps2(index, speed_mps)
     }
 
     fn speed_scale(&self) -> f64 {

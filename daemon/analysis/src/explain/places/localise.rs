@@ -1,12 +1,12 @@
 //! Where along the line, and in which runs, a force of a given shape acts.
 
-use dynocar_core::terms::gradient;
 use dynocar_core::track::Track;
 
 use super::found::Found;
 use super::inside::Inside;
 use super::runs::best_runs;
 use crate::explain::evidence::{Bin, RunData};
+use crate::explain::gradient_prior::SURVEYED;
 use crate::explain::scan::{Scan, Tuple};
 
 /// Shortest interval in m that is looked for.
@@ -18,7 +18,7 @@ const PLACE_RUNS_MIN: usize = 2;
 /// A further interval must add this share of what the others explain.
 const FURTHER_SHARE: f64 = 0.05;
 /// A surveyed gradient is good to this in ‰, which is N/kN.
-pub const MAP_ERROR_PERMILLE: f64 = gradient::SURVEYED.permille;
+pub const MAP_ERROR_PERMILLE: f64 = SURVEYED.permille;
 /// Times that all intervals are refined beside each other.
 const SWEEPS: usize = 2;
 /// Intervals of one effect at most.

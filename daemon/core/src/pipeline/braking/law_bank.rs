@@ -40,7 +40,7 @@ struct Hypothesis {
 /// Laws weighed by evidence.
 #[derive(Clone, Debug)]
 pub struct LawBank {
-    laws: Bank<[Hypothesis; LAWS], Nats, LAWS>,
+    laws: Bank<Hypothesis, Nats, LAWS>,
     /// Their probabilities.
     shares: [f64; LAWS],
     /// Rate in 1/s at which one hypothesis gives way to another.
@@ -59,16 +59,12 @@ impl LawBank {
         LawBank { laws, shares, change_rate_per_s, demand: 0.0, is_started: false }
     }
 
-    /// Probability of a change within a step to one certain other law.
-    fn switch_probability(&self, step_s: f64) -> f64 {
-        (self.change_rate_per_s * step_s).min(0.5) / (LAWS - 1) as f64
-    }
-
     /// Mixes the beliefs as the possible changes of hypothesis ask, into `mixed`; gives what
     /// each hypothesis weighs before its likelihood, in nats.
     fn mix(&mut self, step_s: f64) -> [f64; LAWS] {
         let mut weights = [0.0; LAWS];
-        let switch = self.switch_probability(step_s);
+        // Probability of a change within the step to one certain other law.
+        let switch = (self.change_rate_per_s * step_s).min(0.5) / (LAWS - 1) as f64;
         let stay = 1.0 - switch * (LAWS - 1) as f64;
         for to in 0..LAWS {
             let target = &self.laws.hypotheses()[to];
@@ -112,8 +108,7 @@ fn reopen(state: &Gaussian<STATES>, scale: Uncertain) -> Gaussian<STATES> {
 
 impl Engine for LawBank {
     fn start(&mut self, first: &Observation) {
-        let (laws, weights) = self.laws.weighed_mut();
-        for (law, weight) in laws.iter_mut().zip(weights) {
+        for (law, weight) in self.laws.weighed_mut() {
             law.state = law.model.initial(first);
             *weight = 0.0;
         }
@@ -128,8 +123,7 @@ impl Engine for LawBank {
             return Ok(Step::Restarted);
         }
         let priors = self.mix(inputs.step_s);
-        let (laws, weights) = self.laws.weighed_mut();
-        for ((law, weight), prior) in laws.iter_mut().zip(weights).zip(priors) {
+        for ((law, weight), prior) in self.laws.weighed_mut().zip(priors) {
             let Hypothesis { model, state, mixed, normalised } = law;
             let mut next = *mixed;
             model.advance(inputs, &mut next);

@@ -5,17 +5,16 @@
 //! trusting in wind or too timid in calm. Each filter therefore assumes one behaviour, and the
 //! evidence of the innovations weighs them.
 
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::bias_model::{BiasModel, MapError};
+use super::inertia::Inertia;
 use super::line_resistance::LineResistance;
 use super::motion::Motion;
 use crate::filter::bank::{Bank, Nats};
 use crate::filter::mixture::Mixture;
 use crate::filter::{Gaussian, NotPositiveDefinite};
 use crate::pipeline::motion::{OutlierRow, Trust};
-use crate::train::TrainModel;
 
 /// Place of the speed in m/s in a filter's state.
 pub const SPEED: usize = 0;
@@ -34,38 +33,15 @@ const LOG_WEIGHT_MIN: f64 = -30.0;
 pub struct Dynamics {
     /// Resistance of the train on the line.
     pub resistance: LineResistance,
-    /// Mass in kg that the state's inverse mass refers to.
-    pub reference_mass_kg: f64,
-    /// 1 + gamma.
-    pub inertia_factor: f64,
+    /// What forces do to it.
+    pub inertia: Inertia,
 }
 
 impl Dynamics {
-    /// Of a train with a resistance.
-    pub fn new(train: &TrainModel, resistance: LineResistance) -> Self {
-        Dynamics {
-            resistance,
-            reference_mass_kg: train.mass_kg,
-            inertia_factor: 1.0 + train.rotating_mass_factor,
-        }
-    }
-
-    /// Acceleration in m/s² of the force on the reference mass.
-    #[inline]
-    pub fn push_mps2(&self, motion: &Motion) -> f64 {
-        motion.force_n / (self.reference_mass_kg * self.inertia_factor)
-    }
-
-    /// m/s² of one N/kN.
-    #[inline]
-    pub fn mps2_per_n_per_kn(&self) -> f64 {
-        1e-3 * STANDARD_GRAVITY_MPS2 / self.inertia_factor
-    }
-
     /// Deceleration in m/s² by resistance and gradient, which does not depend on the mass.
     #[inline]
     pub fn drag_mps2(&self, motion: &Motion, speed_mps: f64) -> f64 {
-        self.mps2_per_n_per_kn() * self.resistance.w_n_per_kn(motion, speed_mps)
+        self.inertia.mps2_per_n_per_kn() * self.resistance.w_n_per_kn(motion, speed_mps)
     }
 }
 
@@ -99,7 +75,7 @@ struct Behaviour {
 #[derive(Clone, Debug, PartialEq)]
 pub struct BiasBank {
     dynamics: Dynamics,
-    behaviours: Bank<[Behaviour; MODELS], Nats, MODELS>,
+    behaviours: Bank<Behaviour, Nats, MODELS>,
     forgetting: f64,
     /// Step in s that the behaviours know what is kept over.
     kept_step_s: f64,
@@ -145,7 +121,7 @@ impl BiasBank {
 
     /// Lets the error of the map at a place into every bias of which nothing is known yet.
     pub fn begin_on_map(&mut self, motion: &Motion) {
-        let map = MapError::over(motion, 0.0, self.dynamics.mps2_per_n_per_kn());
+        let map = MapError::over(motion, 0.0, self.dynamics.inertia.mps2_per_n_per_kn());
         for Behaviour { filter, model, .. } in self.behaviours.hypotheses_mut() {
             let std_mps2 = model.std_beside_mps2(map.std_mps2, motion.speed_mps);
             filter.replace(BIAS, 0.0, std_mps2 * std_mps2);
@@ -155,16 +131,17 @@ impl BiasBank {
     /// Moves on by a step between two samples, with the force linear between them (Heun).
     pub fn predict(&mut self, from: &Motion, to: &Motion, step_s: f64) {
         let dynamics = &self.dynamics;
-        let (push_from, push_to) = (dynamics.push_mps2(from), dynamics.push_mps2(to));
+        let (push_from, push_to) =
+            (dynamics.inertia.push_mps2(from), dynamics.inertia.push_mps2(to));
         let bend = to.known_n_per_kn - from.known_n_per_kn;
-        let change = (push_to - push_from, dynamics.mps2_per_n_per_kn() * bend);
+        let change = (push_to - push_from, dynamics.inertia.mps2_per_n_per_kn() * bend);
         if self.kept_step_s != step_s {
             self.kept_step_s = step_s;
             for behaviour in self.behaviours.hypotheses_mut() {
                 behaviour.keep = behaviour.model.keep(step_s);
             }
         }
-        let map = MapError::over(from, step_s, dynamics.mps2_per_n_per_kn());
+        let map = MapError::over(from, step_s, dynamics.inertia.mps2_per_n_per_kn());
         for Behaviour { filter, model, keep, .. } in self.behaviours.hypotheses_mut() {
             let (keep, bias_variance) = model.drift(*keep, &map, from.speed_mps);
             let [speed, inverse_mass, bias] = filter.mean.into();
@@ -172,7 +149,8 @@ impl BiasBank {
             let start = push_from * inverse_mass - dynamics.drag_mps2(from, speed) + shape * bias;
             let ahead = speed + step_s * start;
             let end = push_to * inverse_mass - dynamics.drag_mps2(to, ahead) + shape * bias;
-            let damping = dynamics.mps2_per_n_per_kn() * dynamics.resistance.slope(from, speed);
+            let damping =
+                dynamics.inertia.mps2_per_n_per_kn() * dynamics.resistance.slope(from, speed);
             let mean_push = 0.5 * (push_from + push_to);
             let gradient = Vector3::new(1.0 - step_s * damping, step_s * mean_push, step_s * shape);
             let jump_variance = model.jump_variance(change.0 * inverse_mass - change.1, step_s);
@@ -202,8 +180,7 @@ impl BiasBank {
         noise_variance: f64,
     ) -> Result<Trust, NotPositiveDefinite> {
         let mut judged = [Trust::of(0.0); MODELS];
-        let (behaviours, weights) = self.behaviours.weighed_mut();
-        for ((judged, behaviour), weight) in judged.iter_mut().zip(behaviours).zip(weights) {
+        for (judged, (behaviour, weight)) in judged.iter_mut().zip(self.behaviours.weighed_mut()) {
             let Behaviour { filter, outliers, .. } = behaviour;
             let innovation = filter.innovation(SPEED, speed_mps, noise_variance)?;
             let trust = Trust::of(innovation.normalised());
@@ -220,7 +197,9 @@ impl BiasBank {
             *weight = self.forgetting * *weight + evidence;
         }
         self.behaviours.settle();
-        self.behaviours.raise_to(LOG_WEIGHT_MIN);
+        for (_, weight) in self.behaviours.weighed_mut() {
+            *weight = weight.max(LOG_WEIGHT_MIN);
+        }
         Ok(judged[self.behaviours.likeliest_place()])
     }
 
@@ -235,11 +214,10 @@ impl BiasBank {
     }
 
     fn averaged(&self, counts: impl Fn(&BiasModel) -> bool) -> Moments {
-        let behaviours = self.behaviours.hypotheses();
-        let shares = self.behaviours.shares(|place| counts(&behaviours[place].model));
+        let shares = self.behaviours.shares(|behaviour| counts(&behaviour.model));
         let mut mixture = Mixture::<2>::default();
         for (share, Behaviour { model, filter, .. }) in
-            shares.into_iter().zip(behaviours).filter(|(share, _)| *share > 0.0)
+            shares.into_iter().zip(self.behaviours.hypotheses()).filter(|(share, _)| *share > 0.0)
         {
             let shape = model.shape(filter.mean[SPEED]);
             let [_, inverse_mass, bias] = filter.mean.into();
@@ -292,8 +270,7 @@ mod tests {
                 tunnel: None,
                 reference_radius_m: 500.0,
             },
-            reference_mass_kg: REFERENCE_KG,
-            inertia_factor: 1.05,
+            inertia: Inertia { reference_mass_kg: REFERENCE_KG, rotating_mass_factor: 0.05 },
         }
     }
 
@@ -320,15 +297,16 @@ mod tests {
         // v = v0 + u ∫ push dt - drag t: normal equations in [v0, u], with u known to 0.2.
         let mut normal = Matrix2::new(0.0, 0.0, 0.0, 1.0 / 0.04);
         let mut moment = Vector2::new(0.0, 1.0 / 0.04);
-        let drag_mps2 = dynamics().mps2_per_n_per_kn() * (2.0 + 3.0);
+        let drag_mps2 = dynamics().inertia.mps2_per_n_per_kn() * (2.0 + 3.0);
         let (truth, mut push_mps) = (0.9, 0.0);
         let force = |k: i64| if k < 60 { 1_000.0 * k as f64 } else { 0.0 };
         for k in 0..120 {
             if k > 0 {
                 let (from, to) = (motion(k - 1, force(k - 1)), motion(k, force(k)));
                 bank.predict(&from, &to, STEP_S);
-                push_mps +=
-                    0.5 * STEP_S * (dynamics().push_mps2(&from) + dynamics().push_mps2(&to));
+                push_mps += 0.5
+                    * STEP_S
+                    * (dynamics().inertia.push_mps2(&from) + dynamics().inertia.push_mps2(&to));
             }
             let known = -drag_mps2 * STEP_S * k as f64;
             let speed = measured(5.0 + truth * push_mps + known);
@@ -361,7 +339,7 @@ mod tests {
             bank.restart_speed(speed, NOISE_VARIANCE);
             for k in 1..300 {
                 bank.predict(&motion(k - 1, 0.0), &motion(k, 0.0), STEP_S);
-                speed += STEP_S * (acting_mps2 - dynamics().mps2_per_n_per_kn() * 5.0);
+                speed += STEP_S * (acting_mps2 - dynamics().inertia.mps2_per_n_per_kn() * 5.0);
                 bank.measure(speed, NOISE_VARIANCE).unwrap();
             }
             let weights = bank.behaviours.shares(|_| true);

@@ -13,9 +13,9 @@
 //! times the acceleration that 0.02 N/kN makes. The integrals hold the same equation with the
 //! noise of the speed itself: white, and once per sample.
 
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use nalgebra::SVector;
 
+use super::inertia::Inertia;
 use super::motion::Motion;
 use super::speed_basis::SpeedBasis;
 use crate::filter::drifting_level::{LEVEL, PARAMETERS};
@@ -39,10 +39,8 @@ pub type Row = SVector<f64, UNKNOWNS>;
 pub struct Regressors {
     /// Speed polynomials.
     pub basis: SpeedBasis,
-    /// Mass in kg that the inverse mass refers to.
-    pub reference_mass_kg: f64,
-    /// 1 + gamma.
-    pub inertia_factor: f64,
+    /// What forces do to the train.
+    pub inertia: Inertia,
     /// Radius in m that z2 refers to.
     pub reference_radius_m: f64,
 }
@@ -52,29 +50,24 @@ impl Regressors {
     pub fn new(train: &TrainModel, reference_radius_m: f64) -> Self {
         Regressors {
             basis: SpeedBasis::new(train.speed_max_mps().filter(|&v| v > 5.0).unwrap_or(40.0)),
-            reference_mass_kg: train.mass_kg,
-            inertia_factor: 1.0 + train.rotating_mass_factor,
+            inertia: Inertia::of(train),
             reference_radius_m,
         }
     }
 
-    /// m/s² of one N/kN.
-    pub fn mps2_per_n_per_kn(&self) -> f64 {
-        1e-3 * STANDARD_GRAVITY_MPS2 / self.inertia_factor
-    }
-
     /// How fast the integrals grow.
     pub fn rates(&self, motion: &Motion) -> Integrals {
-        let phi = self.basis.at(motion.speed_mps) * self.mps2_per_n_per_kn();
+        let unit_mps2 = self.inertia.mps2_per_n_per_kn();
+        let phi = self.basis.at(motion.speed_mps) * unit_mps2;
         let shares = [1.0, self.reference_radius_m * motion.curvature_per_m, motion.tunnel_share];
         let mut row = Row::zeros();
-        row[INVERSE_MASS] = motion.force_n / (self.reference_mass_kg * self.inertia_factor);
+        row[INVERSE_MASS] = self.inertia.push_mps2(motion);
         for (at, share) in POLYNOMIALS.into_iter().zip(shares) {
             row.fixed_rows_mut::<3>(at).copy_from(&(phi * -share));
         }
-        let known_mps = self.mps2_per_n_per_kn() * motion.known_n_per_kn;
+        let known_mps = unit_mps2 * motion.known_n_per_kn;
         let tied = motion.known_n_per_kn + TYPICAL_N_PER_KN * (shares[1] + shares[2]);
-        Integrals { row, known_mps, tied_mps: self.mps2_per_n_per_kn() * tied }
+        Integrals { row, known_mps, tied_mps: unit_mps2 * tied }
     }
 }
 

@@ -33,8 +33,8 @@ const REFRESH_EVERY: u32 = 50;
 pub struct JointLeastSquares {
     pub(super) settings: JointLeastSquaresSettings,
     pub(super) regressors: Regressors,
-    initial: Bank<[Hypothesis; JOINT_MODELS], Nats, JOINT_MODELS>,
-    pub(super) bank: Bank<[Hypothesis; JOINT_MODELS], Nats, JOINT_MODELS>,
+    initial: Bank<Hypothesis, Nats, JOINT_MODELS>,
+    pub(super) bank: Bank<Hypothesis, Nats, JOINT_MODELS>,
     stops: StopWatch,
     last: Option<(Motion, Integrals)>,
     integrals: Integrals,
@@ -123,7 +123,7 @@ impl JointLeastSquares {
     pub fn mass_kg(&self) -> Option<(f64, f64)> {
         let inverse = self.bank.likeliest().regression().solve()?[INVERSE_MASS];
         let std = self.covariance_root()?.row(INVERSE_MASS).norm();
-        let mass_kg = self.regressors.reference_mass_kg / inverse;
+        let mass_kg = self.regressors.inertia.reference_mass_kg / inverse;
         Some((mass_kg, mass_kg / inverse * std))
     }
 
@@ -155,9 +155,8 @@ impl JointLeastSquares {
         self.tied_change = 0.0;
         let (row, value) = self.integrals.equation(motion.speed_mps);
         let is_opened = std::mem::take(&mut self.is_opened);
-        let map = MapError::over(&motion, 0.0, self.regressors.mps2_per_n_per_kn());
-        let (hypotheses, weights) = self.bank.weighed_mut();
-        for (hypothesis, weight) in hypotheses.iter_mut().zip(weights) {
+        let map = MapError::over(&motion, 0.0, self.regressors.inertia.mps2_per_n_per_kn());
+        for (hypothesis, weight) in self.bank.weighed_mut() {
             if is_opened && map.std_mps2 > 0.0 {
                 hypothesis.begin_on_map(&map, motion.speed_mps);
             }
@@ -204,8 +203,7 @@ impl JointLeastSquares {
             return Outcome::Rejected(RejectionReason::Outlier);
         }
         self.monitor.push(expected.normalised);
-        let (hypotheses, weights) = self.bank.weighed_mut();
-        for (hypothesis, weight) in hypotheses.iter_mut().zip(weights) {
+        for (hypothesis, weight) in self.bank.weighed_mut() {
             *weight += hypothesis.absorb(&row, value, trust.weight / variance);
         }
         self.noise.take_residual(expected.residual_mps, expected.filtered_variance, trust.weight);
@@ -232,12 +230,12 @@ impl JointLeastSquares {
         let tied_before = std::mem::replace(&mut self.tied_change, tied);
         let slope = self.latest.slope(&last.0, last.0.speed_mps);
         let walk_mps =
-            step_s * self.regressors.mps2_per_n_per_kn() * slope * self.speed_noise_mps();
+            step_s * self.regressors.inertia.mps2_per_n_per_kn() * slope * self.speed_noise_mps();
         Step {
             step_s,
             speed_mps: last.0.speed_mps,
             push_change_mps2: push,
-            map: MapError::over(&last.0, step_s, self.regressors.mps2_per_n_per_kn()),
+            map: MapError::over(&last.0, step_s, self.regressors.inertia.mps2_per_n_per_kn()),
             noise_variance: kink_variance(tied - tied_before, step_s) + walk_mps * walk_mps,
         }
     }
@@ -259,7 +257,7 @@ impl JointLeastSquares {
         else {
             return;
         };
-        let per_bias = best.shape(self.speed_mps) / self.regressors.mps2_per_n_per_kn();
+        let per_bias = best.shape(self.speed_mps) / self.regressors.inertia.mps2_per_n_per_kn();
         self.fit.look(
             per_bias * solution[BIAS],
             per_bias * root.row(BIAS).norm(),

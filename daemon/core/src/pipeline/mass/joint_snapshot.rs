@@ -44,8 +44,9 @@ impl JointLeastSquares {
             snapshot.missing_manoeuvres |= if is_known { 0 } else { manoeuvre.bit() };
         }
         write_status(snapshot, self.case(is_mass_known, known[1]).verdict());
-        let inertia_kg = self.regressors.reference_mass_kg / solution[INVERSE_MASS]
-            * self.regressors.inertia_factor;
+        let inertia = &self.regressors.inertia;
+        let mass_kg = inertia.reference_mass_kg / solution[INVERSE_MASS];
+        let inertia_kg = inertia.inertial_mass_kg(mass_kg);
         let shape = best.shape(self.speed_mps);
         snapshot.unexplained_force_n = -shape * solution[BIAS] * inertia_kg;
         snapshot.unexplained_force_std_n = shape * root.row(BIAS).norm() * inertia_kg;
@@ -77,7 +78,7 @@ impl JointLeastSquares {
     ) -> f64 {
         let davis = self.davis(solution, Section::Basic);
         let inverse = solution[INVERSE_MASS];
-        let mass_kg = self.regressors.reference_mass_kg / inverse;
+        let mass_kg = self.regressors.inertia.reference_mass_kg / inverse;
         let first = POLYNOMIALS[Section::Basic as usize];
         let own = self.covariance(root, [first, first + 1, first + 2, INVERSE_MASS]);
         let mut to_units = Matrix4::zeros();

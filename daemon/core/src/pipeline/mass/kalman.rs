@@ -8,6 +8,7 @@ use dynocar_shared::{
 use nalgebra::{Matrix2, Vector2};
 
 use super::bias_bank::{BiasBank, Dynamics, Moments, SPEED};
+use super::inertia::Inertia;
 use super::kalman_settings::MassKalmanSettings;
 use super::motion::{Motion, StopWatch};
 use super::settling::Settling;
@@ -43,8 +44,7 @@ const DECLARED_CHANGE_MIN: f64 = 0.02;
 #[derive(Clone, Debug)]
 pub struct MassKalman {
     settings: MassKalmanSettings,
-    reference_mass_kg: f64,
-    inertia_factor: f64,
+    inertia: Inertia,
     initial_bank: BiasBank,
     bank: BiasBank,
     stops: StopWatch,
@@ -78,16 +78,16 @@ impl MassKalman {
         train: &Arc<TrainModel>,
     ) -> Result<Self, SettingError> {
         settings.check()?;
+        let inertia = Inertia::of(train);
         let bank = BiasBank::new(
-            Dynamics::new(train, settings.line_resistance(train)),
+            Dynamics { resistance: settings.line_resistance(train), inertia },
             settings.bias_models(),
             (1.0, 0.01 * settings.mass_std_percent),
             EVIDENCE_MEMORY,
         );
         Ok(MassKalman {
             settings,
-            reference_mass_kg: train.mass_kg,
-            inertia_factor: 1.0 + train.rotating_mass_factor,
+            inertia,
             moments: bank.moments(),
             initial_bank: bank.clone(),
             bank,
@@ -112,7 +112,7 @@ impl MassKalman {
     /// Mass in kg and its standard deviation, as known when force last acted.
     pub fn mass_kg(&self) -> (f64, f64) {
         let inverse = self.moments.inverse_mass;
-        let mass_kg = self.reference_mass_kg / inverse;
+        let mass_kg = self.inertia.reference_mass_kg / inverse;
         (mass_kg, mass_kg / inverse * self.moments.inverse_mass_variance.sqrt())
     }
 
@@ -137,7 +137,7 @@ impl MassKalman {
 
     /// Takes over the mass that the first sample declares, if it declares another.
     fn begin_with(&mut self, declared_mass_kg: f64) {
-        let ratio = declared_mass_kg / self.reference_mass_kg;
+        let ratio = declared_mass_kg / self.inertia.reference_mass_kg;
         let is_as_kept = self.is_warm_started && (ratio - 1.0).abs() <= DECLARED_CHANGE_MIN;
         if !(ratio.is_finite() && ratio > 0.0) || is_as_kept {
             return;
@@ -170,9 +170,8 @@ impl MassKalman {
             self.reset();
             return self.begin(motion);
         };
-        let mps2 =
-            |motion: &Motion| motion.force_n / (self.reference_mass_kg * self.inertia_factor);
-        self.settling.step(mps2(&from), mps2(&motion), step_s, noise_variance);
+        let push_mps2 = [&from, &motion].map(|motion| self.inertia.push_mps2(motion));
+        self.settling.step(push_mps2[0], push_mps2[1], step_s, noise_variance);
         if measured.is_outlier() {
             // The filters have moved on; only the speed is not believed.
             self.last = Some(motion);
@@ -194,7 +193,7 @@ impl MassKalman {
     fn publish(&mut self, force_n: f64) -> Outcome {
         let is_settled = self.settling.is_settled();
         let now = if is_settled { self.bank.moments() } else { self.bank.moments_after_a_jump() };
-        let weight_kn = TrainModel::weight_kn(self.reference_mass_kg);
+        let weight_kn = TrainModel::weight_kn(self.inertia.reference_mass_kg);
         if force_n >= self.settings.force_min_n_per_kn * weight_kn {
             self.moments = now;
             let is_known = self.is_known();
@@ -298,7 +297,7 @@ impl Estimator for MassKalman {
         snapshot.missing_manoeuvres = if is_known { 0 } else { Manoeuvre::Accelerate.bit() };
         write_status(snapshot, self.case().verdict());
         write_innovations(snapshot, &self.monitor);
-        let inertia_kg = mass_kg * self.inertia_factor;
+        let inertia_kg = self.inertia.inertial_mass_kg(mass_kg);
         snapshot.unexplained_force_n = -bias_mps2 * inertia_kg;
         snapshot.unexplained_force_std_n = bias_std * inertia_kg;
         self.speeds.write(snapshot);
@@ -308,7 +307,7 @@ impl Estimator for MassKalman {
     /// Takes up the kept mass, unless the first sample declares another than the train's.
     fn warm_start(&mut self, kept: &KeptEstimate) -> bool {
         let Some((mass_kg, variance)) = kept.moments([Parameter::Mass]) else { return false };
-        let inverse = self.reference_mass_kg / mass_kg[0];
+        let inverse = self.inertia.reference_mass_kg / mass_kg[0];
         if !(inverse.is_finite() && inverse > 0.0) {
             return false;
         }

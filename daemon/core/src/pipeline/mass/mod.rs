@@ -3,7 +3,7 @@
 //!
 //! # Layout
 //!
-//! - [`motion`], [`section`], [`line_resistance`], [`speed_basis`], [`bias_model`]: what a sample
+//! - [`motion`], [`inertia`], [`section`], [`line_resistance`], [`speed_basis`], [`bias_model`]: what a sample
 //!   gives, and the parts of the model
 //! - [`JointLeastSquares`]: resistance and mass together, on [`integrals`] of motion
 //! - [`MassKalman`]: mass by Kalman filters [v, 1/m, bias], a [`bias_bank`] of them
@@ -11,6 +11,7 @@
 pub mod bias_bank;
 pub mod bias_model;
 mod hypothesis;
+pub mod inertia;
 pub mod integrals;
 mod joint;
 mod joint_settings;

@@ -78,7 +78,7 @@ impl ResistanceKalman {
             filter: filter_at(declared),
             last: None,
             last_time_ns: None,
-            noise: beside.bank().likeliest_noise(),
+            noise: beside.bank.likeliest_noise(),
             force_rate: 0.0,
             moved_mps: 0.0,
             astray: 0,
@@ -92,7 +92,7 @@ impl ResistanceKalman {
     /// Starts a stretch of motion at a sample: the speed anew, the disturbance as far as it
     /// lasts.
     fn start(&mut self, now: &UnitSample) {
-        let variance = self.beside.speed_noise().variance_of_sample(0.0);
+        let variance = self.beside.source.noise().variance_of_sample(0.0);
         self.filter.replace(SPEED, now.speed_mps, variance);
         let gap_s = self
             .last_time_ns
@@ -172,7 +172,7 @@ impl ResistanceKalman {
     /// Takes a speed into the filter, weighed by Student's t; false when it is sound for
     /// nothing.
     fn correct(&mut self, before: &UnitSample, now: &UnitSample) -> bool {
-        let white = self.beside.speed_noise().variance_of_sample(self.moved_mps.abs());
+        let white = self.beside.source.noise().variance_of_sample(self.moved_mps.abs());
         let variance = white + self.transient_variance(before, now);
         let Ok(innovation) = self.filter.innovation(SPEED, now.speed_mps, variance) else {
             return false;
@@ -198,7 +198,7 @@ impl ResistanceKalman {
     /// Student's t, a filter far from the speeds would never come back to them.
     fn recover(&mut self, now: &UnitSample) {
         self.astray = 0;
-        let known = self.beside.bank().likeliest_solution().filter(|_| self.beside.is_warm());
+        let known = self.beside.bank.likeliest_solution().filter(|_| self.beside.is_warm());
         let disturbance = *self.filter.mean.fixed_rows::<1>(DISTURBANCE).as_scalar();
         let variance = self.filter.covariance[(DISTURBANCE, DISTURBANCE)];
         self.filter = filter_at(known.as_ref().unwrap_or(self.beside.declared()));
@@ -221,16 +221,16 @@ impl ResistanceKalman {
     }
 
     fn judge(&mut self) {
-        let noise = self.beside.bank().likeliest_noise();
+        let noise = self.beside.bank.likeliest_noise();
         let is_other_model = noise.place != self.noise.place;
         self.noise = noise;
         // While rows are few, the filter's own tangent may lie far from the truth.
         if (is_other_model || !self.beside.is_warm())
-            && let Some(solution) = self.beside.bank().likeliest_solution()
+            && let Some(solution) = self.beside.bank.likeliest_solution()
         {
             self.take_over(&solution);
         }
-        let Some(solution) = self.beside.bank().widened(&self.solution()) else { return };
+        let Some(solution) = self.beside.bank.widened(&self.solution()) else { return };
         if let Some(report) = self.beside.judged(&solution, &self.monitor, self.disturbance()) {
             self.report = report;
         } else {
@@ -346,7 +346,7 @@ impl Estimator for ResistanceKalman {
                 if self.beside.has_refused_row() {
                     self.start(&now);
                 }
-                if let Some(jump_n_per_kn) = self.beside.jump_n_per_kn() {
+                if let Some(jump_n_per_kn) = self.beside.jump_n_per_kn {
                     self.filter.disturb(DISTURBANCE, jump_n_per_kn.powi(2));
                 }
                 return outcome;
@@ -381,7 +381,7 @@ impl Estimator for ResistanceKalman {
     fn write(&self, snapshot: &mut ParameterSnapshot) {
         self.beside.write_with(&self.report, &self.monitor, snapshot);
         snapshot.generation += self.resets;
-        let weight_kn = self.beside.weight_kn();
+        let weight_kn = self.beside.weight_kn;
         let (value, std) = self.disturbance();
         snapshot.unexplained_force_n = value * weight_kn;
         snapshot.unexplained_force_std_n = std * weight_kn;

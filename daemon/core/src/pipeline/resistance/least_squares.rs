@@ -13,7 +13,6 @@ use super::source::RowSource;
 use crate::filter::RunningMedian;
 use crate::force::ResolvedSample;
 use crate::pipeline::judge::missing;
-use crate::pipeline::motion::SpeedNoise;
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::papers::liu::solver::{Solver, bank_penalty};
 use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
@@ -43,8 +42,8 @@ const ROWS_BEFORE_OWN: f64 = 12.0;
 #[derive(Clone, Debug)]
 pub struct ResistanceLeastSquares {
     kind: PipelineKind,
-    source: RowSource,
-    bank: NoiseBank,
+    pub(super) source: RowSource,
+    pub(super) bank: NoiseBank,
     fresh: Solver,
     solver: Solver,
     declared: Solution,
@@ -57,9 +56,11 @@ pub struct ResistanceLeastSquares {
     report: Report,
     obstacle: Option<Reason>,
     refused_in_a_row: u32,
-    jump_n_per_kn: Option<f64>,
+    /// How far the disturbance has been let go by the newest sample.
+    pub(super) jump_n_per_kn: Option<f64>,
     disturbance: (f64, f64),
-    weight_kn: f64,
+    /// Weight of the newest sample's train.
+    pub(super) weight_kn: f64,
     resets: u64,
 }
 
@@ -172,11 +173,6 @@ impl ResistanceLeastSquares {
         }
     }
 
-    /// The noise bank.
-    pub(super) fn bank(&self) -> &NoiseBank {
-        &self.bank
-    }
-
     /// Speed and disturbance at the newest sample, which closed a block that was taken in;
     /// `None` when the source has no blocks.
     pub(super) fn motion(&self) -> Option<Motion> {
@@ -194,24 +190,9 @@ impl ResistanceLeastSquares {
         &self.report
     }
 
-    /// Noise of the speed so far.
-    pub(super) fn speed_noise(&self) -> &SpeedNoise {
-        self.source.noise()
-    }
-
-    /// Weight in kN of the newest sample's train.
-    pub(super) fn weight_kn(&self) -> f64 {
-        self.weight_kn
-    }
-
     /// True when the newest row was refused.
     pub(super) fn has_refused_row(&self) -> bool {
         self.refused_in_a_row > 0 || self.jump_n_per_kn.is_some()
-    }
-
-    /// How far the disturbance has been let go by the newest sample, in N/kN.
-    pub(super) fn jump_n_per_kn(&self) -> Option<f64> {
-        self.jump_n_per_kn
     }
 
     /// True once there are rows enough for an own solution.

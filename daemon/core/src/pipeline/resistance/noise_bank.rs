@@ -51,7 +51,7 @@ pub struct LikeliestNoise {
 /// Noise models side by side; the first has no disturbance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NoiseBank {
-    models: Bank<[NoiseModel; MODELS], Nats, MODELS>,
+    models: Bank<NoiseModel, Nats, MODELS>,
     /// Their probabilities.
     shares: [f64; MODELS],
     penalty: Unknowns,
@@ -72,7 +72,7 @@ impl NoiseBank {
             },
         };
         let of_place = |place| NoiseModel::new(disturbance(place), penalty);
-        let mut models = Bank::even(std::array::from_fn(of_place));
+        let mut models = Bank::even((0..MODELS).map(of_place));
         models.believe(LIKELIEST_AT_FIRST);
         NoiseBank {
             models,
@@ -219,11 +219,10 @@ impl NoiseBank {
         if self.mixture.is_none() {
             return Disturbed { std_n_per_kn: 0.0, evidence: 0.0 };
         }
-        let variance: f64 = self
-            .weighty()
-            .map(|(model, weight)| {
-                weight * model.scale() * model.disturbance().std_n_per_kn.powi(2)
-            })
+        let weighty = self.models.hypotheses().iter().zip(self.shares);
+        let variance: f64 = weighty
+            .filter(|(_, share)| *share > WEIGHT_MIN)
+            .map(|(model, share)| share * model.scale() * model.disturbance().std_n_per_kn.powi(2))
             .sum();
         let gain = self.models.likeliest().log_likelihood() - self.undisturbed().log_likelihood();
         Disturbed { std_n_per_kn: variance.sqrt(), evidence: 2.0 * gain }
@@ -247,16 +246,13 @@ impl NoiseBank {
         (mixture.weight > 0.0).then_some(Solution { estimate, covariance })
     }
 
-    fn weighty(&self) -> impl Iterator<Item = (&NoiseModel, f64)> {
-        self.models.hypotheses().iter().zip(self.shares).filter(|(_, weight)| *weight > WEIGHT_MIN)
-    }
-
     fn weigh(&mut self) {
         if self.undisturbed().freedom() < 1.0 {
             return;
         }
-        let (models, weights) = self.models.weighed_mut();
-        *weights = std::array::from_fn(|place| models[place].log_likelihood() + log_prior(place));
+        for (place, (model, weight)) in self.models.weighed_mut().enumerate() {
+            *weight = model.log_likelihood() + log_prior(place);
+        }
         self.models.settle();
         self.shares = self.models.shares(|_| true);
     }

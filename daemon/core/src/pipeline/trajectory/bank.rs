@@ -7,7 +7,6 @@
 //! models; Adams, MacKay 2007, run lengths). Ages are kept about evenly on a logarithmic scale:
 //! when the bank is full, the two hypotheses closest in relative age become one.
 
-use arrayvec::ArrayVec;
 use nalgebra::{Matrix3, Vector3};
 
 use super::hypothesis::{Hypothesis, Innovation, OutlierModel, united};
@@ -46,7 +45,7 @@ pub struct StepDoubt {
 #[derive(Clone, Debug, PartialEq)]
 pub struct JumpBank {
     /// By age, the oldest first.
-    hypotheses: Bank<ArrayVec<Hypothesis, HYPOTHESES_MAX>, Odds, HYPOTHESES_MAX>,
+    hypotheses: Bank<Hypothesis, Odds, HYPOTHESES_MAX>,
     capacity: usize,
     jumps: JumpModel,
     noise: NoiseModel,
@@ -73,7 +72,7 @@ impl JumpBank {
         outliers: OutlierModel,
     ) -> Self {
         JumpBank {
-            hypotheses: Bank::of_one(first),
+            hypotheses: Bank::even([first]),
             capacity: capacity.clamp(1, HYPOTHESES_MAX),
             jumps,
             noise,
@@ -120,8 +119,7 @@ impl JumpBank {
         self.spawn(duration_s);
         let likeliest = self.hypotheses.likeliest_place();
         let mut told = None;
-        let (hypotheses, weights) = self.hypotheses.weighed_mut();
-        for (place, (hypothesis, weight)) in hypotheses.iter_mut().zip(weights).enumerate() {
+        for (place, (hypothesis, weight)) in self.hypotheses.weighed_mut().enumerate() {
             hypothesis.predict(rule, step, duration_s, self.doubt.impulse_variance);
             hypothesis.noise.rounding_variance = self.doubt.rounding_variance;
             let innovation = hypothesis.measure(measured_mps, &self.noise, &self.outliers);
@@ -187,9 +185,9 @@ impl JumpBank {
 #[cfg(test)]
 mod tests {
     use super::super::noise::LearnedNoise;
-    use super::super::step::resistance_gain;
     use super::super::test_runs::{FAST, normal, random};
     use super::*;
+    use crate::force::balance::mps2_per_n_per_kn;
 
     const NOISE_MPS: f64 = 0.05;
 
@@ -227,7 +225,7 @@ mod tests {
             let factor = if time_s >= jump_s { 1.3 } else { 1.0 };
             let truth = Davis { a: factor * FAST.a, b: factor * FAST.b, c: factor * FAST.c };
             let drive_mps2 = 0.07 + 0.06 * (0.02 * time_s).sin();
-            let step = Step { size: 1.0, drive_mps2, resistance_gain: resistance_gain(0.06) };
+            let step = Step { size: 1.0, drive_mps2, resistance_gain: mps2_per_n_per_kn(0.06) };
             speed_mps = StepRule::Time.advance(&step, &truth, speed_mps).unwrap().speed_mps;
             let measured_mps = speed_mps + NOISE_MPS * normal(&mut random);
             assert!(bank.advance(StepRule::Time, &step, 1.0, measured_mps).is_some());

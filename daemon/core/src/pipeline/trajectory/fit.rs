@@ -109,6 +109,7 @@ mod tests {
     use super::super::test_runs::{FAST, normal, random, speeds, steps};
     use super::*;
     use crate::filter::levenberg_marquardt::ParameterBox;
+    use crate::force::balance::mps2_per_n_per_kn;
 
     fn fit(steps: &[Step], speeds_mps: &[f64], settings: &FitSettings) -> TrajectoryFit {
         let stretches = [Stretch { steps, speeds_mps }];
@@ -200,7 +201,7 @@ mod tests {
     #[test]
     fn a_prior_binds_what_the_data_leave_open() {
         // Ten steps of cruise at one speed tell w0 there and nothing else.
-        let gain = super::super::step::resistance_gain(0.06);
+        let gain = mps2_per_n_per_kn(0.06);
         let drive_mps2 = gain * FAST.w0_n_per_kn(80.0);
         let steps = vec![Step { size: 1.0, drive_mps2, resistance_gain: gain }; 10];
         let speeds = vec![80.0; 11];

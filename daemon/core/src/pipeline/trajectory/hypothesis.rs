@@ -202,14 +202,13 @@ pub fn united(one: (&Hypothesis, f64), other: (&Hypothesis, f64)) -> (Hypothesis
     let mut both = Mixture::default();
     both.add(greater, &more.state, &more.factor.covariance());
     both.add(smaller, &less.state, &less.factor.covariance());
-    let weight = both.weight;
     let mut united = *more;
     if let Some(factor) = CovarianceFactor::of(&both.belief.covariance) {
         united.state = both.belief.mean;
         united.factor = factor;
-        united.unit = more.unit.mixed(&less.unit, smaller / weight);
+        united.unit = more.unit.mixed(&less.unit, smaller / both.weight);
     }
-    (united, weight)
+    (united, both.weight)
 }
 
 #[cfg(test)]
@@ -218,6 +217,7 @@ mod tests {
     use super::super::test_runs::{FAST, normal, random, speeds, steps};
     use super::*;
     use crate::filter::levenberg_marquardt::ParameterBox;
+    use crate::force::balance::mps2_per_n_per_kn;
 
     const NOISE_MPS: f64 = 0.1;
 
@@ -317,7 +317,7 @@ mod tests {
         let model = noise(0.0);
         let mut filter = first(&model);
         filter.anchor(40.0);
-        let gain = super::super::step::resistance_gain(0.06);
+        let gain = mps2_per_n_per_kn(0.06);
         let drive_mps2 = gain * FAST.w0_n_per_kn(40.0);
         let hold = Step { size: 0.2, drive_mps2, resistance_gain: gain };
         for round in 0..60 {

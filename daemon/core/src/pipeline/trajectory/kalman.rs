@@ -12,9 +12,10 @@ use super::motion::{Motion, MotionStep, MotionTracker};
 use super::noise::NoiseModel;
 use super::online::{OnlineFilter, OnlineSettings};
 use super::quality::{Estimate, prior_std};
-use super::step::{Step, StepRule, resistance_gain};
+use super::step::{Step, StepRule};
 use super::unexplained::UnexplainedForce;
 use crate::force::ResolvedSample;
+use crate::force::balance::mps2_per_n_per_kn;
 use crate::pipeline::judge::InputHealth;
 use crate::pipeline::motion::{Rounding, SpeedRange, jump_variance};
 use crate::pipeline::output::write_parameters;
@@ -65,7 +66,7 @@ impl TrajectoryKalmanSettings {
         self.check_ranges()?;
         let speed_noise_mps = self.speed_noise_mps.unwrap_or(SPEED_NOISE_FIRST_MPS);
         let disturbance = self.disturbance_n_per_kn_sqrt_s.unwrap_or(DISTURBANCE_FIRST);
-        let gain = resistance_gain(train.rotating_mass_factor);
+        let gain = mps2_per_n_per_kn(train.rotating_mass_factor);
         let davis_std = prior_std(train, self.prior_relative_std);
         Ok(TrajectoryKalman::new(OnlineSettings {
             davis: train.resistance,

@@ -234,9 +234,10 @@ impl LearnedNoise {
 #[cfg(test)]
 mod tests {
     use super::super::hypothesis::{Hypothesis, OutlierModel};
-    use super::super::step::{Step, StepRule, resistance_gain};
+    use super::super::step::{Step, StepRule};
     use super::super::test_runs::{FAST, normal, random};
     use super::*;
+    use crate::force::balance::mps2_per_n_per_kn;
     use nalgebra::Vector3;
 
     const OUTLIERS: OutlierModel = OutlierModel { share: 0.01, density: 0.5 };
@@ -259,7 +260,7 @@ mod tests {
         let model = model();
         let certain = Vector3::new(1e-6, 1e-8, 1e-10);
         let mut filter = Hypothesis::new(&FAST, &certain, LearnedNoise::new(&model));
-        let gain = resistance_gain(0.06);
+        let gain = mps2_per_n_per_kn(0.06);
         let drive_mps2 = gain * FAST.w0_n_per_kn(60.0);
         let step = Step { size: 0.2, drive_mps2, resistance_gain: gain };
         let mut speed_mps = 60.0;

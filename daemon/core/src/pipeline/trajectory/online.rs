@@ -24,6 +24,16 @@ pub struct OnlineSettings {
     pub noise: NoiseModel,
 }
 
+impl OnlineSettings {
+    fn first(&self, davis: &Davis) -> Hypothesis {
+        Hypothesis::new(davis, &self.davis_std, LearnedNoise::new(&self.noise))
+    }
+
+    fn bank_of(&self, first: Hypothesis) -> JumpBank {
+        JumpBank::new(first, self.hypotheses, self.jumps, self.noise, OUTLIERS)
+    }
+}
+
 /// Outliers: one sample in a hundred, anywhere within ±1 m/s of the prediction.
 pub const OUTLIERS: OutlierModel = OutlierModel { share: 0.01, density: 0.5 };
 
@@ -44,27 +54,19 @@ impl OnlineFilter {
     pub fn new(settings: OnlineSettings) -> Self {
         OnlineFilter {
             settings,
-            bank: Self::first_bank(&settings),
+            bank: settings.bank_of(settings.first(&settings.davis)),
             long_run: LongRunVariance::new(LONG_RUN_BLOCKS),
             resets: 0,
         }
-    }
-
-    fn first_bank(settings: &OnlineSettings) -> JumpBank {
-        let noise = LearnedNoise::new(&settings.noise);
-        let first = Hypothesis::new(&settings.davis, &settings.davis_std, noise);
-        JumpBank::new(first, settings.hypotheses, settings.jumps, settings.noise, OUTLIERS)
     }
 
     /// Takes coefficients with a full covariance as its start, before the first step; false when
     /// the covariance cannot be factored. A reset goes back to the settings.
     pub fn warm_start(&mut self, davis: &Davis, covariance: &Matrix3<f64>) -> bool {
         let Some(factor) = covariance.cholesky() else { return false };
-        let noise = LearnedNoise::new(&self.settings.noise);
-        let mut first = Hypothesis::new(davis, &self.settings.davis_std, noise);
+        let mut first = self.settings.first(davis);
         first.factor.0.fixed_view_mut::<3, 3>(0, 0).copy_from(&factor.unpack());
-        let OnlineSettings { hypotheses, jumps, noise, .. } = self.settings;
-        self.bank = JumpBank::new(first, hypotheses, jumps, noise, OUTLIERS);
+        self.bank = self.settings.bank_of(first);
         true
     }
 
@@ -93,7 +95,7 @@ impl OnlineFilter {
         measured_mps: f64,
     ) -> Option<Innovation> {
         let Some(innovation) = self.bank.advance(rule, step, duration_s, measured_mps) else {
-            self.bank = Self::first_bank(&self.settings);
+            self.bank = self.settings.bank_of(self.settings.first(&self.settings.davis));
             self.resets += 1;
             self.begin(measured_mps);
             return None;

@@ -12,15 +12,9 @@
 //! of first order in Δs. The time rule is of second order, so that samples of 1 s do as well as
 //! samples of 0.2 s.
 
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use nalgebra::Vector3;
 
 use crate::train::Davis;
-
-/// κ in m/s² of deceleration per N/kN of resistance, for a rotating-mass factor.
-pub fn resistance_gain(rotating_mass_factor: f64) -> f64 {
-    STANDARD_GRAVITY_MPS2 / (1000.0 * (1.0 + rotating_mass_factor))
-}
 
 /// What a step's size counts, and with it the rule that leads over the step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +32,7 @@ pub struct Step {
     pub size: f64,
     /// Acceleration u in m/s² by every known force: traction, brake, gradient, curve, tunnel.
     pub drive_mps2: f64,
-    /// κ in m/s² per N/kN, see [`resistance_gain`].
+    /// κ in m/s² per N/kN, see [`balance`](crate::force::balance::mps2_per_n_per_kn).
     pub resistance_gain: f64,
 }
 
@@ -142,11 +136,12 @@ fn slope(davis: &Davis, speed_mps: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::force::balance::mps2_per_n_per_kn;
 
     const DAVIS: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
 
     fn steps() -> [(StepRule, Step); 2] {
-        let gain = resistance_gain(0.06);
+        let gain = mps2_per_n_per_kn(0.06);
         [
             (StepRule::Distance, Step { size: 100.0, drive_mps2: 0.2, resistance_gain: gain }),
             (StepRule::Time, Step { size: 4.0, drive_mps2: -0.3, resistance_gain: gain }),
@@ -189,7 +184,7 @@ mod tests {
     fn the_time_rule_follows_the_exact_solution_to_second_order() {
         // dv/dt = -κ c v²: v = v0 / (1 + κ c v0 t).
         let davis = Davis { a: 0.0, b: 0.0, c: 0.002 };
-        let gain = resistance_gain(0.0);
+        let gain = mps2_per_n_per_kn(0.0);
         let exact = |t: f64| 80.0 / (1.0 + gain * davis.c * 80.0 * t);
         let error = |size: f64| {
             let step = Step { size, drive_mps2: 0.0, resistance_gain: gain };
@@ -206,7 +201,7 @@ mod tests {
 
     #[test]
     fn a_train_that_stops_has_no_speed_after_the_step() {
-        let gain = resistance_gain(0.06);
+        let gain = mps2_per_n_per_kn(0.06);
         let brake = Step { size: 100.0, drive_mps2: -1.0, resistance_gain: gain };
         assert_eq!(StepRule::Distance.advance(&brake, &DAVIS, 10.0), None);
         assert_eq!(StepRule::Time.advance(&brake, &DAVIS, 10.0), None);

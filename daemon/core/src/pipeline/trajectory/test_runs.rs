@@ -4,8 +4,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::motion::tests::sample;
-use super::step::{Step, StepRule, resistance_gain};
+use super::step::{Step, StepRule};
 use crate::force::ResolvedSample;
+use crate::force::balance::mps2_per_n_per_kn;
 use crate::train::Davis;
 
 /// A high-speed train.
@@ -31,7 +32,7 @@ pub fn steps(rule: StepRule, count: usize) -> Vec<Step> {
             Step {
                 size: if rule == StepRule::Distance { 100.0 } else { 2.5 },
                 drive_mps2: phase + 0.05 * (0.7 * i as f64).sin(),
-                resistance_gain: resistance_gain(0.06),
+                resistance_gain: mps2_per_n_per_kn(0.06),
             }
         })
         .collect()

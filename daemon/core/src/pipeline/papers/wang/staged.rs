@@ -10,6 +10,7 @@ use super::descent::MeanSquare;
 use super::staged_settings::{MassRegression, StagedDescentSettings};
 use crate::force::ResolvedSample;
 use crate::pipeline::judge::{Case, InputHealth};
+use crate::pipeline::mass::inertia::Inertia;
 use crate::pipeline::mass::line_resistance::LineResistance;
 use crate::pipeline::mass::motion::{Motion, StopWatch};
 use crate::pipeline::mass::section::Section;
@@ -50,8 +51,7 @@ const BRACKET_MAX: f64 = 0.02;
 pub struct StagedDescent {
     settings: StagedDescentSettings,
     basis: SpeedBasis,
-    nominal_mass_kg: f64,
-    inertia_factor: f64,
+    inertia: Inertia,
     /// z1 on the open track.
     basic: Stage<3>,
     /// z1, which is known by then, and z2.
@@ -81,8 +81,7 @@ impl StagedDescent {
         Ok(StagedDescent {
             settings,
             basis,
-            nominal_mass_kg: train.mass_kg,
-            inertia_factor: 1.0 + train.rotating_mass_factor,
+            inertia: Inertia::of(train),
             basic: Stage::new(basis.of_davis(&train.resistance)),
             curve: Stage::new(SVector::zeros()),
             tunnel: Stage::new(SVector::zeros()),
@@ -122,8 +121,12 @@ impl StagedDescent {
     /// Mass in kg; the declared one before the last stage.
     pub fn mass_kg(&self) -> f64 {
         match self.settings.mass_regression {
-            MassRegression::ForceOnAcceleration => self.nominal_mass_kg * self.mass.coefficients[0],
-            MassRegression::AccelerationOnForce => self.nominal_mass_kg / self.mass.coefficients[0],
+            MassRegression::ForceOnAcceleration => {
+                self.inertia.reference_mass_kg * self.mass.coefficients[0]
+            }
+            MassRegression::AccelerationOnForce => {
+                self.inertia.reference_mass_kg / self.mass.coefficients[0]
+            }
         }
     }
 
@@ -141,7 +144,7 @@ impl StagedDescent {
         let force_n = 0.5 * (from.force_n + to.force_n);
         let known = 0.5 * (from.known_n_per_kn + to.known_n_per_kn);
         let acceleration_mps2 = (to.speed_mps - from.speed_mps) / step_s;
-        let inertia_mps2 = self.inertia_factor * acceleration_mps2;
+        let inertia_mps2 = self.inertia.inertial_mass_kg(1.0) * acceleration_mps2;
         self.speeds.push(speed_mps);
         if self.learned >= self.settings.resistance_samples {
             let at = Motion { speed_mps, known_n_per_kn: known, ..*to };
@@ -186,7 +189,7 @@ impl StagedDescent {
 
     /// `specific_mps2` is force over mass as the motion shows it.
     fn learn_mass(&mut self, force_n: f64, specific_mps2: f64) -> Outcome {
-        let push_mps2 = force_n / self.nominal_mass_kg;
+        let push_mps2 = force_n / self.inertia.reference_mass_kg;
         if push_mps2.abs() < 1e-3 * STANDARD_GRAVITY_MPS2 * self.settings.force_min_n_per_kn {
             return Outcome::Used;
         }

@@ -68,14 +68,14 @@ pub fn deviation(steps: &[Step], speeds_mps: &[f64], davis: &Davis) -> Option<De
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::trajectory::step::resistance_gain;
+    use crate::force::balance::mps2_per_n_per_kn;
 
     const TRUTH: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
     const SCALES: [f64; 3] = [1.0, 0.02, 0.001];
 
     /// Traction, coasting and braking over hills; the measured speeds carry a wave as noise.
     fn example() -> (Vec<Step>, Vec<f64>) {
-        let gain = resistance_gain(0.06);
+        let gain = mps2_per_n_per_kn(0.06);
         let steps: Vec<Step> = (0..60)
             .map(|i| {
                 let drive = [0.35, 0.12, 0.0, -0.25][(i / 15) % 4];

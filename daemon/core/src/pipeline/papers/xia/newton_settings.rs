@@ -4,10 +4,10 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 
 use crate::filter::levenberg_marquardt::ParameterBox;
+use crate::force::balance::mps2_per_n_per_kn;
 use crate::pipeline::settings::{SettingError, require, settings};
 use crate::pipeline::trajectory::fit::DavisPrior;
 use crate::pipeline::trajectory::quality::prior_std;
-use crate::pipeline::trajectory::step::resistance_gain;
 use crate::train::TrainModel;
 
 /// Speed noise before the first window, in m/s.
@@ -83,7 +83,7 @@ impl TrajectoryNewtonSettings {
             learns_noise: self.speed_noise_mps.is_none(),
             disturbance_mps2: match self.method {
                 FitMethod::LevenbergMarquardt => {
-                    self.disturbance_n_per_kn_sqrt_s * resistance_gain(train.rotating_mass_factor)
+                    self.disturbance_n_per_kn_sqrt_s * mps2_per_n_per_kn(train.rotating_mass_factor)
                 }
                 FitMethod::WolfeNewton => 0.0,
             },

@@ -213,12 +213,13 @@ fn newton_step(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::trajectory::step::{StepRule, resistance_gain};
+    use crate::force::balance::mps2_per_n_per_kn;
+    use crate::pipeline::trajectory::step::StepRule;
 
     const TRUTH: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
 
     fn example() -> (Vec<Step>, Vec<f64>) {
-        let resistance_gain = resistance_gain(0.06);
+        let resistance_gain = mps2_per_n_per_kn(0.06);
         let mut speeds = vec![15.0];
         let mut steps = Vec::new();
         for i in 0..200 {
