@@ -21,10 +21,11 @@ fn numbers(text: &str) -> impl Iterator<Item = &str> {
     let product = text.split("#[cfg(test)]").next().unwrap_or_default();
     product.lines().filter_map(|line| {
         let (_, rest) = line.split_once("const ")?;
-        let (name, kind) = rest.split_once(" = ")?.0.split_once(": ")?;
+        let (name, kind) = rest.split_once(" =")?.0.split_once(": ")?;
         let is_name =
             name.chars().all(|it| it.is_ascii_uppercase() || it.is_ascii_digit() || it == '_');
-        let kinds = ["f64", "usize", "u64", "[f64", "[[f64", "NullStrength", "RunScatter"];
+        let kinds = ["f64", "usize", "u64", "NullStrength", "RunScatter", "ErrorScale"];
+        let kind = kind.trim_start_matches('[');
         (is_name && kinds.iter().any(|it| kind.starts_with(it))).then_some(name)
     })
 }
