@@ -83,9 +83,9 @@ fn an_imported_line_is_read_back_with_the_numbers_of_its_source() {
     assert_eq!(line.length_m, Some(6000.0));
     assert_eq!(line.gradient_permille(1600.0, 0.0), Some(-6.67));
     assert_close(1.0 / line.curvature_per_m(600.0, 0.0).unwrap(), 500.0);
-    let at_m: Vec<f64> = line.survey().stops.iter().map(|stop| stop.0).collect();
+    let at_m: Vec<f64> = line.survey.stops.iter().map(|stop| stop.0).collect();
     assert_eq!(at_m, [0.0, 2500.0, 6000.0]);
-    assert_close(line.survey().permitted_speed_mps.as_ref().unwrap().value_at(1200.0), 30.0);
+    assert_close(line.survey.permitted_speed_mps.as_ref().unwrap().value_at(1200.0), 30.0);
     assert!(told.contains("not taken: 'altitude': track.toml holds gradients"), "{told}");
     assert!(told.contains("not in the file: tunnels: the format has none"), "{told}");
 

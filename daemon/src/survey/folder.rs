@@ -44,7 +44,7 @@ pub fn survey_folder(
     let (recordings, vehicle) = (read::recordings(&raw), read::vehicle(&raw));
     let mut survey = survey(&recordings, &vehicle, known.as_ref().map(|(known, _)| known))?;
     if let Some((_, track)) = &known {
-        name_stops(&mut survey.stops, &track.survey().stops);
+        name_stops(&mut survey.stops, &track.survey.stops);
     }
     let material = Material { source, dataset: &raw, vehicle: &vehicle, survey: &survey, line };
     let files = write(&material, out)?;

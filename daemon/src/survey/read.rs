@@ -114,7 +114,7 @@ pub fn vehicle(dataset: &Dataset) -> Vehicle {
 pub fn known_line(path: &Path) -> Result<(KnownLine, Track), SurveyFailure> {
     let track = load_track(path)?;
     let wrong = |path: &Path, problem: String| SurveyFailure::Line { path: path.into(), problem };
-    let Some(alignment) = &track.survey().alignment else {
+    let Some(alignment) = &track.survey.alignment else {
         let problem = "expected alignment = \"…csv\", the way on the map, got none".into();
         return Err(wrong(path, problem));
     };
@@ -131,7 +131,7 @@ pub fn known_line(path: &Path) -> Result<(KnownLine, Track), SurveyFailure> {
     let one = way(&growing).ok_or_else(short)?;
     let chained_m = growing[growing.len() - 1][0] - growing[0][0];
     let chainage_per_m = chained_m / one.length_m();
-    let falling = match &track.survey().alignment_falling {
+    let falling = match &track.survey.alignment_falling {
         None => {
             let mut back = growing.clone();
             back.reverse();

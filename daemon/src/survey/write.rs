@@ -77,8 +77,7 @@ fn copied_line(line: &Path) -> Result<Vec<(String, String)>, SurveyFailure> {
     };
     let track = crate::dataset::load_track(line)?;
     let mut files = vec![("track.toml".to_string(), read(line)?)];
-    for name in [&track.survey().alignment, &track.survey().alignment_falling].into_iter().flatten()
-    {
+    for name in [&track.survey.alignment, &track.survey.alignment_falling].into_iter().flatten() {
         files.push((name.clone(), read(&line.parent().unwrap_or(Path::new(".")).join(name))?));
     }
     Ok(files)

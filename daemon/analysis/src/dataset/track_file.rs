@@ -71,7 +71,7 @@ pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
 }
 
 /// Adds what a survey knows beside the profile.
-fn with_survey(track: Track, section: &Section) -> Result<Track, DatasetError> {
+fn with_survey(mut track: Track, section: &Section) -> Result<Track, DatasetError> {
     let profile = |key: &str, low: f64| -> Result<Option<StepProfile>, DatasetError> {
         let Some((list, places)) = profile(section, key, low)? else { return Ok(None) };
         let made = StepProfile::new(&list).map_err(|error| {
@@ -85,14 +85,15 @@ fn with_survey(track: Track, section: &Section) -> Result<Track, DatasetError> {
         })?;
         Ok(Some(made))
     };
-    Ok(track.with_survey(TrackSurvey {
+    track.survey = TrackSurvey {
         gradient_falling: profile("gradient_falling", -GRADIENT_MAX_PERMILLE)?,
         gradient_std_permille: profile("gradient_std", 0.0)?,
         stops: section.named_chainages("stops")?,
         permitted_speed_mps: permitted_speed(section)?,
         alignment: section.text("alignment")?.map(Into::into),
         alignment_falling: section.text("alignment_falling")?.map(Into::into),
-    }))
+    };
+    Ok(track)
 }
 
 /// The list of [chainage_m, speed_mps] under `permitted_speed`.
@@ -123,12 +124,12 @@ fn with_corrections(mut track: Track, section: &Section) -> Result<Track, Datase
     let shift = "a shift in m from -10000 to 10000";
     let is_shift = |shift_m: f64| shift_m.abs() <= 1e4;
     if let Some(shift_m) = section.number(gradient::SHIFT, shift, is_shift)? {
-        track = track.with_gradient_shift(shift_m);
+        track.gradient_shift_m = shift_m;
     }
     let falling = gradient_error(section, gradient::ERROR_FALLING)?;
     match (gradient_error(section, gradient::ERROR)?, falling) {
         (Some(profile), falling) => {
-            track = track.with_gradient_error(GradientError { profile, falling });
+            track.gradient_error = Some(GradientError { profile, falling });
         }
         (None, Some(_)) => {
             let key = section.full(gradient::ERROR_FALLING);
@@ -162,7 +163,7 @@ fn with_corrections(mut track: Track, section: &Section) -> Result<Track, Datase
             }
             sections.push(MassSection { from_m, to_m, direction, mass_factor });
         }
-        track = track.with_masses(sections);
+        track.masses = sections;
     }
     Ok(track)
 }
@@ -293,7 +294,7 @@ tunnels = [[2200.0, 2900.0]]
                permitted_speed = [[0.0, 22.5], [1500, 11]]\n";
         let track = parse_track("track.toml", &text).unwrap();
         assert_eq!(track.gradient_towards_permille(-1.0, 1300.0, 0.0), Some(1.5));
-        let survey = track.survey();
+        let survey = &track.survey;
         assert_eq!(survey.stops, [(120.0, "Depot".into()), (2900.0, String::new())]);
         assert_eq!(survey.alignment.as_deref(), Some("alignment.csv"));
         let permitted = survey.permitted_speed_mps.as_ref().map(|it| it.value_at(1600.0));

@@ -56,6 +56,9 @@ impl<const N: usize> SquareRootInformation<N> {
 
     /// Multiplies the weight of everything seen so far, penalty included, by `factor`.
     pub fn forget(&mut self, factor: f64) {
+        if factor == 1.0 {
+            return;
+        }
         let root = factor.sqrt();
         self.system.factor *= root;
         self.system.residual *= root;

@@ -151,15 +151,28 @@ impl<const N: usize> TriangularSystem<N> {
     /// Covariance (Rᵀ R)⁻¹ of the minimiser for residuals of unit variance; `None` when the
     /// rows do not determine it.
     pub fn covariance(&self) -> Option<SMatrix<f64, N, N>> {
-        let largest = self.factor.amax();
-        let smallest = (0..N).map(|i| self.factor[(i, i)].abs()).fold(f64::INFINITY, f64::min);
-        if !(largest.is_finite() && smallest > 0.0) {
-            return None;
+        let inverse = self.inverse();
+        let mut covariance = SMatrix::<f64, N, N>::zeros();
+        for i in 0..N {
+            for j in i..N {
+                let sum: f64 = (j..N).map(|k| inverse[(i, k)] * inverse[(j, k)]).sum();
+                (covariance[(i, j)], covariance[(j, i)]) = (sum, sum);
+            }
         }
-        let inverse: SMatrix<f64, N, N> =
-            self.factor.solve_upper_triangular(&SMatrix::identity())?;
-        let covariance = inverse * inverse.transpose();
-        covariance.iter().all(|entry| entry.is_finite()).then_some(covariance)
+        covariance.sum().is_finite().then_some(covariance)
+    }
+
+    /// R⁻¹, upper triangular; not finite where R has none.
+    fn inverse(&self) -> SMatrix<f64, N, N> {
+        let mut inverse = SMatrix::<f64, N, N>::zeros();
+        for j in 0..N {
+            inverse[(j, j)] = 1.0 / self.factor[(j, j)];
+            for i in (0..j).rev() {
+                let sum: f64 = (i + 1..=j).map(|k| self.factor[(i, k)] * inverse[(k, j)]).sum();
+                inverse[(i, j)] = -sum * inverse[(i, i)];
+            }
+        }
+        inverse
     }
 }
 

@@ -72,16 +72,17 @@ impl Resistance {
     /// Everything but the basic resistance of these coefficients, in N/kN.
     #[inline]
     pub fn extra_n_per_kn(&self, davis: Davis, speed_mps: f64) -> f64 {
-        let square = speed_mps * speed_mps;
-        self.constant_n_per_kn()
-            + self.other_per_mps * speed_mps
-            + self.c_share * davis.c * square
-            + self.dc * square
+        self.curve_n_per_kn
+            + self.place_n_per_kn
+            + self.bearing_n_per_kn
+            + self.other_at_n_per_kn(speed_mps)
+            + self.in_tunnels_n_per_kn(davis, speed_mps)
             + self.by_wind_n_per_kn(davis, speed_mps)
             + self.by_factor_n_per_kn(davis, speed_mps)
     }
 
     /// What tunnels add, in N/kN: by their length, as share of c and beside it.
+    #[inline]
     pub fn in_tunnels_n_per_kn(&self, davis: Davis, speed_mps: f64) -> f64 {
         self.tunnel_n_per_kn + (self.c_share * davis.c + self.dc) * speed_mps * speed_mps
     }
@@ -101,6 +102,7 @@ impl Resistance {
     }
 
     /// Everything in no library, in N/kN, for speeds near that at which it was taken.
+    #[inline]
     pub fn other_at_n_per_kn(&self, speed_mps: f64) -> f64 {
         self.other_n_per_kn + self.other_per_mps * speed_mps
     }

@@ -95,11 +95,15 @@ pub struct Track {
     tunnel: Option<TunnelProfiles>,
     curves: Vec<Curve>,
     tunnels: Vec<Tunnel>,
-    gradient_shift_m: f64,
-    gradient_error: Option<GradientError>,
     resistance_n_per_kn: Option<StepProfile>,
-    masses: Vec<MassSection>,
-    survey: TrackSurvey,
+    /// How far in m the true gradient lies from the profile, towards growing chainage.
+    pub gradient_shift_m: f64,
+    /// What the declared gradient lacks, when known.
+    pub gradient_error: Option<GradientError>,
+    /// The sections on which trains weigh more or less than declared.
+    pub masses: Vec<MassSection>,
+    /// What a survey, or another project's file, adds.
+    pub survey: TrackSurvey,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -155,39 +159,6 @@ impl Track {
     pub fn with_resistance(mut self, places: &[(f64, f64, f64)]) -> Result<Self, TrackError> {
         self.resistance_n_per_kn = Some(interval_profile("resistance", places)?);
         Ok(self)
-    }
-
-    /// The same line whose true gradient lies so many m further towards growing chainage.
-    #[must_use]
-    pub fn with_gradient_shift(mut self, shift_m: f64) -> Self {
-        self.gradient_shift_m = shift_m;
-        self
-    }
-
-    /// The same line whose true gradient is steeper by what the declared one lacks.
-    #[must_use]
-    pub fn with_gradient_error(mut self, error: GradientError) -> Self {
-        self.gradient_error = Some(error);
-        self
-    }
-
-    /// The same line with sections on which trains weigh more or less than declared.
-    #[must_use]
-    pub fn with_masses(mut self, masses: Vec<MassSection>) -> Self {
-        self.masses = masses;
-        self
-    }
-
-    /// The same line with what a survey adds.
-    #[must_use]
-    pub fn with_survey(mut self, survey: TrackSurvey) -> Self {
-        self.survey = survey;
-        self
-    }
-
-    /// What a survey added.
-    pub fn survey(&self) -> &TrackSurvey {
-        &self.survey
     }
 
     /// Further resistance in N/kN, the mean along a train; `None` when none is known.
@@ -272,16 +243,6 @@ impl Track {
         Some(self.tunnel.as_ref()?.length_m.mean_around(centre_m, train_length_m))
     }
 
-    /// How far in m the true gradient lies from the profile, towards growing chainage.
-    pub fn gradient_shift_m(&self) -> f64 {
-        self.gradient_shift_m
-    }
-
-    /// What the declared gradient lacks, when known.
-    pub fn gradient_error(&self) -> Option<&GradientError> {
-        self.gradient_error.as_ref()
-    }
-
     /// The gradient profile as surveyed, when known.
     pub fn gradient(&self) -> Option<&StepProfile> {
         self.gradient_permille.as_ref()
@@ -300,11 +261,6 @@ impl Track {
     /// The further resistance in N/kN at places, zero elsewhere, when known.
     pub fn resistance(&self) -> Option<&StepProfile> {
         self.resistance_n_per_kn.as_ref()
-    }
-
-    /// The sections on which trains weigh more or less than declared.
-    pub fn masses(&self) -> &[MassSection] {
-        &self.masses
     }
 
     /// True when the list of curves is known, be it empty.

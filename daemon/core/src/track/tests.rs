@@ -27,7 +27,8 @@ fn gradient_is_averaged_along_the_train() {
 fn trains_the_other_way_round_may_have_a_gradient_of_their_own() {
     let falling = StepProfile::new(&[(0.0, 7.0)]).unwrap();
     let gradient_falling = Some(falling);
-    let track = line().with_survey(TrackSurvey { gradient_falling, ..Default::default() });
+    let survey = TrackSurvey { gradient_falling, ..Default::default() };
+    let track = Track { survey, ..line() };
     assert_eq!(track.gradient_towards_permille(1.0, 500.0, 200.0), Some(4.0));
     assert_eq!(track.gradient_towards_permille(-1.0, 500.0, 200.0), Some(7.0));
     assert_eq!(line().gradient_towards_permille(-1.0, 500.0, 200.0), Some(4.0));
@@ -37,7 +38,7 @@ fn trains_the_other_way_round_may_have_a_gradient_of_their_own() {
 fn the_gradients_error_averages_out_over_long_stretches_only() {
     let gradient_std_permille = Some(StepProfile::new(&[(0.0, 0.8)]).unwrap());
     let survey = TrackSurvey { gradient_std_permille, ..Default::default() };
-    let track = line().with_survey(survey);
+    let track = Track { survey, ..line() };
     assert_eq!(track.gradient_std_permille(100.0, 200.0), Some(0.8));
     assert!((track.gradient_std_permille(100.0, 900.0).unwrap() - 0.4).abs() < 1e-12);
     assert_eq!(line().gradient_std_permille(100.0, 200.0), None);

@@ -272,14 +272,14 @@ fn track_answer(track: &Track) -> TrackAnswer<'_> {
         gradient_range_permille: range,
         curves: track.knows_curves().then(|| track.curves().len()),
         tunnels: track.knows_tunnels().then(|| track.tunnels().len()),
-        gradient_shift_m: track.gradient_shift_m(),
-        gradient_error: lacks(track.gradient_error().map(|error| &error.profile)),
+        gradient_shift_m: track.gradient_shift_m,
+        gradient_error: lacks(track.gradient_error.as_ref().map(|error| &error.profile)),
         gradient_error_falling: lacks(
-            track.gradient_error().and_then(|error| error.falling.as_ref()),
+            track.gradient_error.as_ref().and_then(|error| error.falling.as_ref()),
         ),
         resistance: track.resistance().map(|profile| profile.entries().collect()),
         masses: track
-            .masses()
+            .masses
             .iter()
             .map(|it| [it.from_m, it.to_m, it.direction, it.mass_factor])
             .collect(),

@@ -202,7 +202,7 @@ fn track(track: &Track) -> String {
     text += &line("gradient", &gradient(track));
     text += &line("curves", &curves(track));
     text += &line("tunnels", &tunnels(track));
-    let survey = track.survey();
+    let survey = &track.survey;
     if !survey.stops.is_empty() {
         text += &line("stops", &survey.stops.len().to_string());
     }
@@ -253,11 +253,11 @@ fn tunnels(track: &Track) -> String {
 /// What was found of the line beside its survey.
 fn found(track: &Track) -> String {
     let mut text = String::new();
-    if track.gradient_shift_m() != 0.0 {
-        let shift = short(track.gradient_shift_m(), 1);
+    if track.gradient_shift_m != 0.0 {
+        let shift = short(track.gradient_shift_m, 1);
         text += &line("shift", &format!("the gradient lies {shift} m further"));
     }
-    if let Some(error) = track.gradient_error() {
+    if let Some(error) = &track.gradient_error {
         let both = [Some(&error.profile), error.falling.as_ref()];
         let entries = || both.into_iter().flatten().flat_map(LinearProfile::entries);
         let (low, high) = range(entries().map(|(_, permille)| *permille));
@@ -276,10 +276,10 @@ fn found(track: &Track) -> String {
         };
         text += &line("resistance", &format!("further {extra}"));
     }
-    if !track.masses().is_empty() {
-        let factors = track.masses().iter().map(|section| section.mass_factor);
+    if !track.masses.is_empty() {
+        let factors = track.masses.iter().map(|section| section.mass_factor);
         let (low, high) = range(factors);
-        let (low, high, count) = (short(low, 4), short(high, 4), track.masses().len());
+        let (low, high, count) = (short(low, 4), short(high, 4), track.masses.len());
         let sections = if count == 1 { "section" } else { "sections" };
         text += &line("masses", &format!("{low} to {high} of the declared, {count} {sections}"));
     }

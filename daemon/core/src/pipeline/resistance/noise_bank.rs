@@ -54,6 +54,8 @@ pub struct NoiseBank {
     models: Bank<NoiseModel, Nats, MODELS>,
     /// Their probabilities.
     shares: [f64; MODELS],
+    /// Solutions of those that matter, after the newest row.
+    solutions: [Option<Solution>; MODELS],
     penalty: Unknowns,
     forgetting: f64,
     rows_since_renewal: u32,
@@ -77,6 +79,7 @@ impl NoiseBank {
         NoiseBank {
             models,
             shares: [0.0; MODELS],
+            solutions: [None; MODELS],
             penalty: *penalty,
             forgetting,
             rows_since_renewal: 0,
@@ -90,6 +93,7 @@ impl NoiseBank {
         for model in self.models.hypotheses_mut() {
             model.know(features, observed);
         }
+        self.solutions = [None; MODELS];
     }
 
     /// Forgets all rows.
@@ -129,14 +133,20 @@ impl NoiseBank {
     ///
     /// One small factorisation for each model of weight, no allocation.
     pub fn accept(&mut self, observation: &Observation) -> bool {
+        let seen = observation.sighting();
         for model in self.models.hypotheses_mut() {
-            model.accept(observation, self.forgetting);
+            model.accept(&seen, self.forgetting);
         }
         self.renew_penalty();
         let before = self.models.likeliest_place();
         self.weigh();
+        let likeliest = self.models.likeliest_place();
+        for (place, model) in self.models.hypotheses().iter().enumerate() {
+            let matters = self.shares[place] > WEIGHT_MIN || place == likeliest;
+            self.solutions[place] = if matters { model.solution() } else { None };
+        }
         self.mixture = self.mix(1.0, self.student_factor());
-        before != self.models.likeliest_place()
+        before != likeliest
     }
 
     /// Goes on without the predicted observation: as the start of a new chain for a block,
@@ -163,7 +173,8 @@ impl NoiseBank {
 
     /// The likeliest model's own solution; `None` while the rows do not determine it.
     pub fn likeliest_solution(&self) -> Option<Solution> {
-        self.models.likeliest().solution()
+        let cached = self.solutions[self.models.likeliest_place()];
+        cached.or_else(|| self.models.likeliest().solution())
     }
 
     /// Speed and disturbance by the likeliest model, so long after the newest block.
@@ -239,7 +250,7 @@ impl NoiseBank {
             if mixture.weight >= probability || weight <= WEIGHT_MIN {
                 break;
             }
-            let own = self.models.hypotheses()[index].solution()?;
+            let own = self.solutions[index].as_ref()?;
             mixture.add(weight, &own.estimate, &(own.covariance * factor));
         }
         let Gaussian { mean: estimate, covariance } = mixture.belief;

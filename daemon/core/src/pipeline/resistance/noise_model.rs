@@ -1,11 +1,11 @@
 //! One model of the rows' noise, with the least squares that follow from it.
 
-use super::momentum_error::Disturbance;
+use super::momentum_error::{Disturbance, STATES};
 use super::regression::{
-    Motion, Observation, RowWhitener, SinceBlock, Solution, UNKNOWNS, Unknowns, disturbance_of,
-    loosen_disturbance, motion_of,
+    COLUMNS, Motion, Observation, RowWhitener, SinceBlock, Solution, UNKNOWNS, Unknowns,
+    disturbance_of, loosen_disturbance, motion_of,
 };
-use crate::filter::SquareRootInformation;
+use crate::filter::{Sighting, SquareRootInformation};
 
 /// Rows for which the noise model as declared counts beside the rows seen.
 pub const PRIOR_ROWS: f64 = 3.0;
@@ -78,9 +78,9 @@ impl NoiseModel {
         Some(WhiteRow { features, observed: columns[0] })
     }
 
-    /// Takes in an observation that the model has moved to.
-    pub fn accept(&mut self, observation: &Observation, forgetting: f64) {
-        let Ok(row) = self.whitener.take(&observation.sighting()) else { return };
+    /// Takes in what is seen of an observation that the model has moved to.
+    pub fn accept(&mut self, seen: &Sighting<STATES, COLUMNS>, forgetting: f64) {
+        let Ok(row) = self.whitener.take(seen) else { return };
         self.information.forget(forgetting);
         self.log_variances = forgetting * self.log_variances + row.variance.ln();
         let features = row.columns.fixed_rows::<UNKNOWNS>(1).into_owned();

@@ -10,7 +10,7 @@ const JOINED_M: f64 = 0.1;
 
 /// The first and the last chainage in m that something is known of.
 pub(super) fn ends_m(track: &Track) -> Option<[f64; 2]> {
-    let survey = track.survey();
+    let survey = &track.survey;
     let starts = |profile: Option<&StepProfile>| -> Vec<f64> {
         profile.map_or_else(Vec::new, |it| it.entries().map(|entry| entry.0).collect())
     };
@@ -40,13 +40,13 @@ pub(super) fn panels(track: &Track, ends_m: [f64; 2]) -> Vec<Panel> {
         push("Height above the start", "m", points);
         push("Gradient", "‰", steps(profile, ends_m, 1.0));
     }
-    if let Some(falling) = &track.survey().gradient_falling {
+    if let Some(falling) = &track.survey.gradient_falling {
         push("Gradient of the way of falling chainage", "‰", steps(falling, ends_m, 1.0));
     }
     if track.knows_curves() {
         push("Curvature 1/R", "1/km", curvature(track, ends_m));
     }
-    if let Some(permitted) = &track.survey().permitted_speed_mps {
+    if let Some(permitted) = &track.survey.permitted_speed_mps {
         push("Permitted speed", "km/h", steps(permitted, ends_m, 3.6));
     }
     panels

@@ -132,7 +132,7 @@ impl Ground<'_> {
     fn stops(&self, chart: &mut Chart, y: [f64; 2], has_names: bool) -> Result<(), PlotError> {
         let km_per_px = (self.x[1] - self.x[0]) / f64::from(self.width.size().0);
         let mut free_km = f64::NEG_INFINITY;
-        for (at_m, name) in self.track.iter().flat_map(|track| &track.survey().stops) {
+        for (at_m, name) in self.track.iter().flat_map(|track| &track.survey.stops) {
             let at_km = at_m / 1e3;
             let line = vec![(at_km, y[0]), (at_km, y[1])];
             chart.draw_series([PathElement::new(line, stroke(AXIS, 0.6))])?;
@@ -155,7 +155,7 @@ impl Ground<'_> {
 
     fn x_title(&self) -> String {
         let mut title = String::from("Chainage, km");
-        if self.track.is_some_and(|track| !track.survey().stops.is_empty()) {
+        if self.track.is_some_and(|track| !track.survey.stops.is_empty()) {
             title += "; upright lines: stops";
         }
         if self.track.is_some_and(|track| !track.tunnels().is_empty()) {
@@ -167,7 +167,7 @@ impl Ground<'_> {
     fn label(&self, panels: &[Panel]) -> String {
         let told: Vec<String> = panels.iter().map(Panel::told).collect();
         let (name, stops, tunnels) = self.track.map_or(("", 0, 0), |track| {
-            (&track.name[..], track.survey().stops.len(), track.tunnels().len())
+            (&track.name[..], track.survey.stops.len(), track.tunnels().len())
         });
         let line = format!("The line {name} over its chainage");
         format!("{line}: {}; {stops} stops, {tunnels} tunnels", told.join("; "))
