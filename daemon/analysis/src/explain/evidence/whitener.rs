@@ -46,8 +46,8 @@ struct Step {
     per_deviation: f64,
 }
 
-/// Covariance that an acceleration of unit variance which fades in `fading_s` gains over a step together with the
-/// speed that it makes (Ornstein-Uhlenbeck process and its integral).
+/// Covariance that an acceleration of unit variance which fades in `fading_s` gains over a step
+/// together with the speed that it makes (Ornstein-Uhlenbeck process and its integral).
 fn fading_noise(fade: f64, step_s: f64, fading_s: f64) -> Matrix2<f64> {
     let speed = fading_s * fading_s * (2.0 * step_s / fading_s - 3.0 + 4.0 * fade - fade * fade);
     let both = fading_s * (1.0 - fade) * (1.0 - fade);
