@@ -159,7 +159,8 @@ impl<const N: usize> TriangularSystem<N> {
                 (covariance[(i, j)], covariance[(j, i)]) = (sum, sum);
             }
         }
-        covariance.sum().is_finite().then_some(covariance)
+        // An infinite row would else count as known for certain.
+        (self.factor.sum() + covariance.sum()).is_finite().then_some(covariance)
     }
 
     /// R⁻¹, upper triangular; not finite where R has none.
@@ -244,5 +245,12 @@ mod tests {
         let mut gathered = TriangularAccumulator::<4>::default();
         gathered.push(&[1.0, 2.0, 3.0, 4.0]);
         assert_eq!(TriangularSystem::<3>::from_rows(&mut gathered).covariance(), None);
+    }
+
+    #[test]
+    fn an_infinite_row_has_no_covariance() {
+        let factor = SMatrix::from_diagonal(&SVector::from([1.0, f64::INFINITY, 2.0]));
+        let system = TriangularSystem::<3> { factor, residual: SVector::zeros() };
+        assert_eq!(system.covariance(), None);
     }
 }

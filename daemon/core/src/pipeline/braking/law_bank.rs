@@ -145,7 +145,6 @@ impl Engine for LawBank {
             return None;
         }
         let is_demand = |law: &Law| *law == Law::Demand;
-        let has_demand = self.laws.hypotheses().iter().any(|h| is_demand(&h.model.law));
         let limited = self.mixture(is_demand).map_or(0.0, |(_, weight)| weight);
         let (best, share) = self
             .laws
@@ -157,6 +156,6 @@ impl Engine for LawBank {
         let own = best.model.estimate(&best.state, self.demand);
         let (mixed, weight) = self.mixture(|law| is_demand(law) == (limited > 0.5))?;
         let coefficient = if share > CLEAR * weight { own.coefficient } else { mixed };
-        Some(Estimate { coefficient, brake_limited: has_demand.then_some(limited), ..own })
+        Some(Estimate { coefficient, brake_limited: Some(limited), ..own })
     }
 }
