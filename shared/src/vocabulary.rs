@@ -83,6 +83,8 @@ vocabulary! {
         JointLeastSquares = 41 "joint_least_squares",
         /// Kalman filter [v, 1/m, bias] for mass.
         MassKalman = 42 "mass_kalman",
+        /// Kalman filters of resistance and mass together.
+        TrainKalman = 43 "train_kalman",
         /// Watches the residual between model and measurement.
         ResidualMonitor = 50 "residual_monitor",
         /// Copies sample to snapshot without estimating: the latency floor.

@@ -35,6 +35,8 @@ pub struct ResolvedSample {
     pub speed_mps: f64,
     /// Gross mass in kg: the sample's, else the declared one.
     pub mass_kg: f64,
+    /// True when the sample carries it: weighed, or known in another way.
+    pub is_mass_measured: bool,
     /// mass * (1 + gamma) in kg.
     pub inertial_mass_kg: f64,
     /// Weight in kN.
@@ -117,6 +119,7 @@ impl ResolvedSample {
             position_m: None,
             speed_mps: 20.0,
             mass_kg: 100e3,
+            is_mass_measured: false,
             inertial_mass_kg: 106e3,
             weight_kn: TrainModel::weight_kn(100e3),
             traction_force_n: Some(0.0),
@@ -203,6 +206,7 @@ impl ForceResolver {
             position_m,
             speed_mps: wheel::true_speed_mps(sample.speed_mps, known.speed_scale),
             mass_kg,
+            is_mass_measured: sample.get(SampleField::Mass).is_some(),
             inertial_mass_kg: rotating::inertial_mass_kg(mass_kg, train.rotating_mass_factor),
             weight_kn: TrainModel::weight_kn(mass_kg),
             traction_force_n: traction_n.map(|n| traction::true_force_n(n, known.traction_gain)),

@@ -19,6 +19,7 @@ use super::papers::xia::newton_settings::TrajectoryNewtonSettings;
 use super::resistance;
 use super::resistance::settings::{KalmanSettings, LsSettings, MilsSettings, RlsSettings};
 use super::settings::SettingError;
+use super::train_kalman::{TrainKalman, TrainKalmanSettings};
 use super::trajectory::kalman::TrajectoryKalmanSettings;
 use crate::train::TrainModel;
 
@@ -114,6 +115,8 @@ estimator_kinds! {
         |s, t| boxed(JointLeastSquares::new(*s, t));
     /// Kalman filters [v, 1/m, bias] for mass.
     MassKalman(MassKalmanSettings) = MassKalman, |s, t| boxed(MassKalman::new(*s, t));
+    /// Kalman filters of resistance and mass together.
+    TrainKalman(TrainKalmanSettings) = TrainKalman, |s, t| boxed(TrainKalman::new(*s, t));
     /// Watches the residual and names what the model may lack.
     ResidualMonitor(MonitorSettings) = ResidualMonitor,
         |s, t| boxed(ResidualMonitor::new(*s, t));

@@ -18,6 +18,7 @@ pub mod quantities;
 pub mod resistance;
 pub mod sample_gate;
 pub mod settings;
+pub mod train_kalman;
 pub mod trajectory;
 
 pub use echo::Echo;

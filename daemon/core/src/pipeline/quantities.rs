@@ -14,6 +14,7 @@ pub const fn candidates(quantity: Quantity) -> &'static [PipelineKind] {
     use PipelineKind as Kind;
     match quantity {
         Quantity::Resistance => &[
+            Kind::TrainKalman,
             Kind::TrajectoryKalman,
             Kind::ResistanceKalman,
             Kind::JointLeastSquares,
@@ -25,7 +26,7 @@ pub const fn candidates(quantity: Quantity) -> &'static [PipelineKind] {
             Kind::TrajectoryNewton,
             Kind::StagedDescent,
         ],
-        Quantity::Mass => &[Kind::MassKalman, Kind::JointLeastSquares, Kind::StagedDescent],
+        Quantity::Mass => &[Kind::TrainKalman, Kind::MassKalman, Kind::JointLeastSquares, Kind::StagedDescent],
         Quantity::Adhesion => {
             &[Kind::AdhesionLaw, Kind::AdhesionSmoother, Kind::AdhesionEkf, Kind::AdhesionEm]
         }

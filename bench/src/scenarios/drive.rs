@@ -1,0 +1,256 @@
+//! Driving from stop to stop, and what the controller writes of it.
+
+use std::collections::VecDeque;
+
+use dynocar_shared::{SampleField, TrainId, TrainSample};
+use rand::RngExt;
+
+use super::world::{Habits, LoadTold, World, normal};
+
+/// Steps of the simulation per cycle of the controller.
+const STEPS: u32 = 10;
+/// Change of acceleration in m/s³ where forces do not jump.
+const JERK_MPS3: f64 = 0.6;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Phase {
+    Standing { left_s: f64 },
+    Driving,
+    Coasting { left_s: f64 },
+    Braking,
+}
+
+/// A moment of the drive: what was written, and the truth.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment {
+    /// As the controller wrote it.
+    pub sample: TrainSample,
+    /// Mass in kg.
+    pub mass_kg: f64,
+    /// Basic resistance in N/kN at the measured speed.
+    pub w0_n_per_kn: f64,
+    /// Speed in m/s.
+    pub speed_mps: f64,
+}
+
+/// A train on its way.
+pub struct Drive {
+    world: World,
+    habits: Habits,
+    phase: Phase,
+    next_stop: usize,
+    direction: f64,
+    place_m: f64,
+    speed_mps: f64,
+    mass_kg: f64,
+    told_kg: f64,
+    target_mps: f64,
+    /// Acceleration in m/s² that the force gives, as commanded and as it acts.
+    commanded_mps2: f64,
+    acting_mps2: f64,
+    /// As reported, and what is reported and acts later.
+    reported_mps2: f64,
+    on_its_way: VecDeque<f64>,
+    /// Step within a cycle at which a command acts.
+    acts_at: u32,
+    cycle: u64,
+}
+
+impl Drive {
+    /// Begins at the first stop.
+    pub fn new(mut world: World) -> Self {
+        let habits = world.scenario.traffic.habits();
+        let acts_at = world.random.random_range(0..STEPS);
+        let place_m = world.stops_m[0];
+        let mass_kg = world.truth.mass_kg;
+        let mut drive = Drive {
+            habits,
+            phase: Phase::Standing { left_s: 10.0 },
+            next_stop: 1,
+            direction: 1.0,
+            place_m,
+            speed_mps: 0.0,
+            mass_kg,
+            told_kg: mass_kg,
+            target_mps: 0.0,
+            commanded_mps2: 0.0,
+            acting_mps2: 0.0,
+            reported_mps2: 0.0,
+            on_its_way: VecDeque::new(),
+            acts_at,
+            cycle: 0,
+            world,
+        };
+        drive.weigh();
+        drive
+    }
+
+    /// The world that it drives in.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    fn weigh(&mut self) {
+        let World { scenario, random, .. } = &mut self.world;
+        self.told_kg = match scenario.load {
+            LoadTold::Exact | LoadTold::Unknown => self.mass_kg,
+            LoadTold::Weighed(permille) => {
+                let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
+                // One weighing, wrong the same way for the whole drive.
+                if self.cycle == 0 {
+                    self.mass_kg * (1.0 + sign * 1e-3 * f64::from(permille))
+                } else {
+                    self.told_kg
+                }
+            }
+            LoadTold::Changing => self.mass_kg * (1.0 + 0.03 * normal(random)),
+        };
+    }
+
+    /// One cycle on.
+    pub fn advance(&mut self) -> Moment {
+        let cycle_s = 1.0 / f64::from(self.world.scenario.rate_hz);
+        self.command(cycle_s);
+        let step_s = cycle_s / f64::from(STEPS);
+        let from_mps2 = self.reported_mps2;
+        for step in 0..STEPS {
+            self.reported_mps2 = if self.world.scenario.jumps {
+                if step >= self.acts_at { self.commanded_mps2 } else { from_mps2 }
+            } else {
+                let share = f64::from(step + 1) / f64::from(STEPS);
+                from_mps2 + share * (self.commanded_mps2 - from_mps2)
+            };
+            self.on_its_way.push_back(self.reported_mps2);
+            let late = (self.world.delay_s / step_s).round() as usize;
+            while self.on_its_way.len() > late + 1 {
+                self.on_its_way.pop_front();
+            }
+            let before_mps2 = std::mem::replace(&mut self.acting_mps2, self.on_its_way[0]);
+            self.step(step_s, 0.5 * (before_mps2 + self.acting_mps2));
+        }
+        self.cycle += 1;
+        self.moment()
+    }
+
+    fn step(&mut self, step_s: f64, push_mps2: f64) {
+        if matches!(self.phase, Phase::Standing { .. }) {
+            return;
+        }
+        let truth = &self.world.truth;
+        let gradient = self.direction * self.world.gradient_permille(self.place_m)[1];
+        let gain = 9.806_65e-3 / (1.0 + truth.rotating_mass_factor);
+        let acceleration = |speed_mps: f64| {
+            push_mps2 - gain * (gradient + truth.resistance.w0_n_per_kn(speed_mps))
+        };
+        let middle = self.speed_mps + 0.5 * step_s * acceleration(self.speed_mps);
+        let next = (self.speed_mps + step_s * acceleration(middle)).max(0.0);
+        self.place_m += self.direction * 0.5 * step_s * (self.speed_mps + next);
+        self.speed_mps = next;
+    }
+
+    /// What the driver wants.
+    fn command(&mut self, cycle_s: f64) {
+        let before_mps2 = self.commanded_mps2;
+        self.decide(cycle_s);
+        if !self.world.scenario.jumps {
+            let most = JERK_MPS3 * cycle_s;
+            self.commanded_mps2 = self.commanded_mps2.clamp(before_mps2 - most, before_mps2 + most);
+        }
+    }
+
+    fn decide(&mut self, cycle_s: f64) {
+        let (most, brake) = self.habits.acceleration_mps2;
+        let to_stop_m = self.direction * (self.world.stops_m[self.next_stop] - self.place_m);
+        let needed = self.speed_mps * self.speed_mps / (2.0 * to_stop_m.max(0.5));
+        if needed >= brake && !matches!(self.phase, Phase::Standing { .. }) {
+            self.phase = Phase::Braking;
+        }
+        match &mut self.phase {
+            Phase::Standing { left_s } => {
+                *left_s -= cycle_s;
+                self.commanded_mps2 = -0.3;
+                if *left_s <= 0.0 {
+                    self.depart();
+                }
+            }
+            Phase::Driving => {
+                let power_mps = 0.4 * self.habits.top_mps;
+                let limit = most * (power_mps / self.speed_mps.max(power_mps));
+                let wanted = 0.3 * (self.target_mps - self.speed_mps) + 0.03;
+                self.commanded_mps2 = wanted.clamp(-0.3 * brake, limit);
+                let is_there = self.speed_mps > self.target_mps - 0.3;
+                if is_there && self.world.random.random::<f64>() < cycle_s / 60.0 {
+                    let left_s = 15.0 + 60.0 * self.world.random.random::<f64>();
+                    self.phase = Phase::Coasting { left_s };
+                }
+            }
+            Phase::Coasting { left_s } => {
+                *left_s -= cycle_s;
+                self.commanded_mps2 = 0.0;
+                let is_slow = self.speed_mps < 0.75 * self.target_mps;
+                let is_fast = self.speed_mps > 1.04 * self.target_mps;
+                if *left_s <= 0.0 || is_slow || is_fast {
+                    self.phase = Phase::Driving;
+                }
+            }
+            Phase::Braking => {
+                self.commanded_mps2 = -needed.min(1.3 * brake);
+                if self.speed_mps < 0.1 || to_stop_m < 0.3 {
+                    self.arrive();
+                }
+            }
+        }
+    }
+
+    fn depart(&mut self) {
+        self.phase = Phase::Driving;
+        self.commanded_mps2 = 0.0;
+        self.target_mps = self.habits.top_mps * (0.75 + 0.25 * self.world.random.random::<f64>());
+    }
+
+    fn arrive(&mut self) {
+        self.speed_mps = 0.0;
+        self.phase = Phase::Standing { left_s: self.habits.standing_s };
+        let last = self.world.stops_m.len() - 1;
+        if self.direction > 0.0 && self.next_stop == last {
+            self.direction = -1.0;
+        } else if self.direction < 0.0 && self.next_stop == 0 {
+            self.direction = 1.0;
+        }
+        self.next_stop = (self.next_stop as f64 + self.direction) as usize;
+        if self.world.scenario.load == LoadTold::Changing {
+            let share = 0.24 * (self.world.random.random::<f64>() - 0.5);
+            self.mass_kg = self.world.declared.mass_kg * (1.0 + share);
+            self.weigh();
+        }
+    }
+
+    fn moment(&mut self) -> Moment {
+        let World { scenario, truth, force_scale, speed_scale, .. } = &self.world;
+        let (scenario, force_scale, speed_scale) = (*scenario, *force_scale, *speed_scale);
+        let inertial_kg = self.mass_kg * (1.0 + truth.rotating_mass_factor);
+        let w0_n_per_kn = truth.resistance.w0_n_per_kn(self.speed_mps);
+        let force_n = self.reported_mps2 * inertial_kg;
+        let random = &mut self.world.random;
+        let noise_mps = scenario.speed_noise_mps * normal(random);
+        let place_m = self.place_m + scenario.position_noise_m * normal(random);
+        let measured_mps = match self.speed_mps > 0.0 {
+            true => (speed_scale * self.speed_mps + noise_mps).max(0.0),
+            false => 0.0,
+        };
+        let cycle_ns = 1_000_000_000 / i64::from(scenario.rate_hz);
+        let mut sample = TrainSample::empty(TrainId(1));
+        sample.sequence = self.cycle;
+        sample.time_ns = 1_000_000_000 + cycle_ns * self.cycle as i64;
+        sample.direction = if self.direction > 0.0 { 1 } else { -1 };
+        sample.set(SampleField::Speed, measured_mps);
+        sample.set(SampleField::Position, place_m);
+        sample.set(SampleField::TractionForce, force_scale[0] * force_n.max(0.0));
+        sample.set(SampleField::BrakeForce, force_scale[1] * (-force_n).max(0.0));
+        sample.set(SampleField::Gradient, self.world.gradient_permille(place_m)[0]);
+        if scenario.load != LoadTold::Unknown {
+            sample.set(SampleField::Mass, self.told_kg);
+        }
+        Moment { sample, mass_kg: self.mass_kg, w0_n_per_kn, speed_mps: self.speed_mps }
+    }
+}

@@ -1,0 +1,208 @@
+//! A train, its line, and the ordinary mistakes in what is declared of them.
+
+use dynocar_core::train::{Davis, TrainModel};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// The kinds of traffic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Traffic {
+    /// Stops every 1.3 km, up to 72 km/h.
+    Metro,
+    /// Electric multiple unit, stops every 5 to 10 km, up to 140 km/h.
+    Emu,
+    /// A long freight train, stops every 30 km, up to 90 km/h.
+    Freight,
+    /// Stops every 60 km, up to 290 km/h.
+    HighSpeed,
+}
+
+/// What is told of the load.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LoadTold {
+    /// The declared mass is the true one, and the configuration says so.
+    Exact,
+    /// Every sample carries a mass wrong by so many per mille, too low or too high.
+    Weighed(u32),
+    /// Samples carry no mass; the declared one is wrong by up to 12 %.
+    Unknown,
+    /// The load changes at every stop; samples carry it, each time weighed anew with 3 %.
+    Changing,
+}
+
+/// One row of the table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scenario {
+    /// The traffic.
+    pub traffic: Traffic,
+    /// What is told of the load.
+    pub load: LoadTold,
+    /// True where forces jump from cycle to cycle; else their change is limited.
+    pub jumps: bool,
+    /// Samples per second.
+    pub rate_hz: u32,
+    /// Standard deviation of the measured speed in m/s.
+    pub speed_noise_mps: f64,
+    /// Standard deviation of the measured position in m.
+    pub position_noise_m: f64,
+    /// Standard deviation in ‰ of the map's gradient.
+    pub map_std_permille: f64,
+}
+
+/// What differs between the kinds of traffic.
+pub struct Habits {
+    /// Distance between stops in m, least and most.
+    pub stop_m: (f64, f64),
+    /// Highest speed in m/s.
+    pub top_mps: f64,
+    /// Greatest acceleration and deceleration in m/s².
+    pub acceleration_mps2: (f64, f64),
+    /// Standing time at a stop in s.
+    pub standing_s: f64,
+    /// Length of the line in m.
+    pub line_m: f64,
+    /// Steepest gradient in ‰.
+    pub steep_permille: f64,
+}
+
+impl Traffic {
+    /// Its habits.
+    pub fn habits(self) -> Habits {
+        let habits = |stop_m, top_mps, acceleration_mps2, standing_s, line_m, steep_permille| Habits {
+            stop_m,
+            top_mps,
+            acceleration_mps2,
+            standing_s,
+            line_m,
+            steep_permille,
+        };
+        match self {
+            Traffic::Metro => habits((900.0, 1700.0), 20.0, (1.0, 0.9), 30.0, 16e3, 15.0),
+            Traffic::Emu => habits((5e3, 10e3), 38.0, (0.6, 0.7), 60.0, 70e3, 10.0),
+            Traffic::Freight => habits((25e3, 40e3), 24.0, (0.15, 0.3), 180.0, 120e3, 6.0),
+            Traffic::HighSpeed => habits((50e3, 80e3), 80.0, (0.45, 0.5), 180.0, 400e3, 12.0),
+        }
+    }
+
+    /// The train as declared.
+    pub fn declared(self) -> TrainModel {
+        let (mass_kg, length_m, [a, b, c]) = match self {
+            Traffic::Metro => (230e3, 120.0, [2.1, 0.02, 0.0016]),
+            Traffic::Emu => (400e3, 160.0, [1.5, 0.02, 0.0008]),
+            Traffic::Freight => (1600e3, 600.0, [1.2, 0.01, 0.0010]),
+            Traffic::HighSpeed => (480e3, 200.0, [0.8, 0.008, 0.000_45]),
+        };
+        TrainModel {
+            length_m,
+            rotating_mass_factor: 0.06,
+            ..TrainModel::bare("scenario", mass_kg, Davis { a, b, c })
+        }
+    }
+}
+
+/// A seeded draw of a scenario.
+pub struct World {
+    /// The scenario.
+    pub scenario: Scenario,
+    /// As declared.
+    pub declared: TrainModel,
+    /// The true train; its mass is that of the first load.
+    pub truth: TrainModel,
+    /// Traction and brake force as reported over the true ones.
+    pub force_scale: [f64; 2],
+    /// Measured speed over the true one.
+    pub speed_scale: f64,
+    /// How much later in s than reported forces act.
+    pub delay_s: f64,
+    /// Gradient in ‰ of the map and the true one, mean under the train, by piece of `PIECE_M`.
+    gradient: Vec<[f64; 2]>,
+    /// Where the train stops.
+    pub stops_m: Vec<f64>,
+    /// For the drive.
+    pub random: ChaCha8Rng,
+}
+
+/// Length in m of a piece of the gradient profile.
+const PIECE_M: f64 = 10.0;
+
+impl World {
+    /// Draws the truth.
+    pub fn draw(scenario: Scenario, seed: u64) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let declared = scenario.traffic.declared();
+        let habits = scenario.traffic.habits();
+        let mut truth = declared.clone();
+        let mut near = |value: f64, share: f64| value * (1.0 + share * normal(&mut random));
+        truth.resistance = Davis {
+            a: near(declared.resistance.a, 0.3).max(0.3),
+            b: near(declared.resistance.b, 0.3).max(0.0),
+            c: near(declared.resistance.c, 0.3).max(1e-5),
+        };
+        let force_scale = [near(1.0, 0.006), near(1.0, 0.006)];
+        let speed_scale = near(1.0, 0.0015);
+        let delay_s = near(0.1, 0.5).clamp(0.0, 0.25);
+        truth.rotating_mass_factor += near(1.0, 0.002) - 1.0;
+        truth.mass_kg *= match scenario.load {
+            LoadTold::Exact | LoadTold::Weighed(_) => 1.0 + 0.3 * (random.random::<f64>() - 0.5),
+            LoadTold::Unknown | LoadTold::Changing => 1.0 + 0.24 * (random.random::<f64>() - 0.5),
+        };
+        let mut stops_m = vec![500.0];
+        while stops_m[stops_m.len() - 1] < habits.line_m {
+            let (least, most) = habits.stop_m;
+            let last = stops_m[stops_m.len() - 1];
+            stops_m.push(last + least + (most - least) * random.random::<f64>());
+        }
+        let end_m = stops_m[stops_m.len() - 1] + 1000.0;
+        let gradient = profile(&scenario, &habits, declared.length_m, end_m, &mut random);
+        World { scenario, declared, truth, force_scale, speed_scale, delay_s, gradient, stops_m, random }
+    }
+
+    /// Gradient in ‰ along growing chainage by the map and in truth, under a train whose centre is here.
+    pub fn gradient_permille(&self, centre_m: f64) -> [f64; 2] {
+        let place = (centre_m / PIECE_M).clamp(0.0, (self.gradient.len() - 2) as f64);
+        let (index, share) = (place as usize, place.fract());
+        let (from, to) = (self.gradient[index], self.gradient[index + 1]);
+        [0, 1].map(|which| from[which] + share * (to[which] - from[which]))
+    }
+}
+
+/// Gradients of the map and in truth, averaged under the train.
+fn profile(
+    scenario: &Scenario,
+    habits: &Habits,
+    train_length_m: f64,
+    end_m: f64,
+    random: &mut ChaCha8Rng,
+) -> Vec<[f64; 2]> {
+    let pieces = (end_m / PIECE_M) as usize + 2;
+    let (mut map, mut error) = (Vec::with_capacity(pieces), Vec::with_capacity(pieces));
+    let mut steep = 0.0;
+    let mut left_m = 0.0;
+    let (mut from, mut to) = (normal(random), normal(random));
+    for piece in 0..pieces {
+        if left_m <= 0.0 {
+            left_m = 300.0 + 900.0 * random.random::<f64>();
+            steep = 0.5 * habits.steep_permille * normal(random).clamp(-2.0, 2.0);
+        }
+        left_m -= PIECE_M;
+        map.push(steep);
+        // Knots every 200 m, joined by straight lines of the same variance on average.
+        let at = (piece as f64 * PIECE_M / 200.0).fract();
+        if piece > 0 && at < PIECE_M / 200.0 - 1e-9 {
+            (from, to) = (to, normal(random));
+        }
+        error.push(scenario.map_std_permille * 1.22 * (from + at * (to - from)));
+    }
+    let half = (0.5 * train_length_m / PIECE_M) as usize;
+    let mean = |values: &[f64], at: usize| {
+        let range = at.saturating_sub(half)..(at + half + 1).min(values.len());
+        values[range.clone()].iter().sum::<f64>() / range.len() as f64
+    };
+    (0..pieces).map(|at| (mean(&map, at), mean(&error, at))).map(|(m, e)| [m, m + e]).collect()
+}
+
+/// A standard normal number.
+pub fn normal(random: &mut ChaCha8Rng) -> f64 {
+    let (one, two) = (1.0 - random.random::<f64>(), random.random::<f64>());
+    (-2.0 * one.ln()).sqrt() * (std::f64::consts::TAU * two).cos()
+}

@@ -1,0 +1,189 @@
+//! Filters side by side, one for each way in which the force that no model knows may behave.
+
+use nalgebra::{Matrix4, Vector4};
+
+use super::behaviour::{BEHAVIOURS, behaviours};
+use super::motion_filter::{
+    DISTURBANCE, LOAD, MotionFilter, RESISTANCE, SPEED, State, StateCovariance, Step,
+};
+use crate::filter::bank::{Bank, Nats};
+use crate::filter::mixture::Mixture;
+use crate::filter::{Gaussian, NotPositiveDefinite};
+use crate::pipeline::motion::{OutlierRow, Trust};
+
+/// Logarithm of the least weight against the best: any behaviour can come back.
+const LOG_WEIGHT_MIN: f64 = -30.0;
+/// Time in s over which evidence is remembered.
+const EVIDENCE_MEMORY_S: f64 = 600.0;
+/// Behaviours of a smaller share are left out of what is published.
+const SHARE_MIN: f64 = 1e-4;
+
+/// What a measured speed said.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// How far it is believed by the likeliest filter.
+    pub trust: Trust,
+    /// Its innovation in m/s.
+    pub innovation_mps: f64,
+    /// The predicted variance of that.
+    pub variance: f64,
+    /// The part of it that forces bring which jumped in the step.
+    pub jump_variance: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Rival {
+    filter: MotionFilter,
+    outliers: OutlierRow,
+}
+
+/// The filters with the evidence for each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MotionBank {
+    rivals: Bank<Rival, Nats, BEHAVIOURS>,
+}
+
+/// a, b, c (scaled) and the load factor, with the covariance of all; and the disturbance now.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Published {
+    /// a, b, c, scaled, and the declared mass over the true one.
+    pub mean: Vector4<f64>,
+    /// Their covariance.
+    pub covariance: Matrix4<f64>,
+    /// Disturbance in N/kN, retarding, and its standard deviation.
+    pub disturbance: (f64, f64),
+}
+
+impl MotionBank {
+    /// All behaviours, each believing the same of everything but the disturbance.
+    pub fn new(mean: &State, covariance: &StateCovariance) -> Self {
+        let behaviours = behaviours();
+        let mut rivals = Bank::even(behaviours.map(|behaviour| {
+            let mut belief = Gaussian { mean: *mean, covariance: *covariance };
+            belief.replace(DISTURBANCE, 0.0, behaviour.std_n_per_kn.powi(2));
+            let filter = MotionFilter { behaviour, belief, jump_variance: 0.0 };
+            Rival { filter, outliers: OutlierRow::default() }
+        }));
+        for ((_, weight), behaviour) in rivals.weighed_mut().zip(behaviours) {
+            *weight = behaviour.log_prior;
+        }
+        rivals.settle();
+        MotionBank { rivals }
+    }
+
+    /// Changes what every filter believes.
+    pub fn each(&mut self, change: impl Fn(&mut Gaussian<{ super::motion_filter::STATES }>)) {
+        self.rivals.hypotheses_mut().iter_mut().for_each(|it| change(&mut it.filter.belief));
+    }
+
+    /// Begins a motion at a measured speed, after a time in s without a sight of it.
+    pub fn begin(&mut self, speed_mps: f64, noise_variance: f64, gap_s: f64) {
+        for Rival { filter, outliers } in self.rivals.hypotheses_mut() {
+            *outliers = OutlierRow::default();
+            filter.belief.replace(SPEED, speed_mps, noise_variance);
+            let (keep, renewed) = filter.behaviour.over(gap_s, 0.0, 0.0);
+            filter.belief.fade(DISTURBANCE, keep, renewed);
+        }
+    }
+
+    /// Moves every filter on by a step.
+    ///
+    /// # Real-time
+    ///
+    /// One step for each behaviour, no allocation.
+    pub fn predict(&mut self, step: &Step) {
+        self.rivals.hypotheses_mut().iter_mut().for_each(|it| it.filter.predict(step));
+    }
+
+    /// The likeliest filter.
+    pub fn likeliest(&self) -> &MotionFilter {
+        &self.rivals.likeliest().filter
+    }
+
+    /// Takes a measured speed into every filter that does not hold it for an outlier.
+    ///
+    /// # Errors
+    ///
+    /// When a filter or the measurement is not sound.
+    ///
+    /// # Real-time
+    ///
+    /// One correction for each behaviour, no allocation.
+    pub fn measure(
+        &mut self,
+        speed_mps: f64,
+        noise_variance: f64,
+        step: &Step,
+    ) -> Result<Measured, NotPositiveDefinite> {
+        let forgetting = (-step.duration_s / EVIDENCE_MEMORY_S).exp();
+        let likeliest = self.rivals.likeliest_place();
+        let mut measured = None;
+        for (place, (rival, weight)) in self.rivals.weighed_mut().enumerate() {
+            let Rival { filter, outliers } = rival;
+            let noise_variance = noise_variance + filter.transient_variance(step);
+            let innovation = filter.belief.innovation(SPEED, speed_mps, noise_variance)?;
+            let trust = Trust::of(innovation.normalised());
+            let is_believed = outliers.push(trust.is_outlier());
+            if trust.is_full() {
+                filter.belief.take(SPEED, &innovation, noise_variance);
+            } else if !trust.is_outlier() {
+                filter.belief.measure(SPEED, speed_mps, noise_variance / trust.weight)?;
+            } else if is_believed {
+                filter.belief.replace(SPEED, speed_mps, noise_variance);
+            }
+            let log_prior = filter.behaviour.log_prior;
+            let evidence = -trust.surprise() - 0.5 * innovation.variance.ln();
+            // What is forgotten is the evidence, not what is known beforehand.
+            *weight = log_prior + forgetting * (*weight - log_prior) + evidence;
+            if place == likeliest {
+                measured = Some(Measured {
+                    trust,
+                    innovation_mps: innovation.value,
+                    variance: innovation.variance,
+                    jump_variance: filter.jump_variance,
+                });
+            }
+        }
+        if !self.rivals.settle() {
+            return Err(NotPositiveDefinite);
+        }
+        self.rivals.weighed_mut().for_each(|(_, weight)| *weight = weight.max(LOG_WEIGHT_MIN));
+        measured.ok_or(NotPositiveDefinite)
+    }
+
+    /// What all behaviours say together, each by its share.
+    ///
+    /// # Real-time
+    ///
+    /// A few sums for each behaviour, no allocation.
+    pub fn published(&self) -> Published {
+        const PLACES: [usize; 5] =
+            [RESISTANCE, RESISTANCE + 1, RESISTANCE + 2, LOAD, DISTURBANCE];
+        let mut mixture = Mixture::<5>::default();
+        let shares = self.rivals.shares(|_| true);
+        for (share, Rival { filter, .. }) in shares.into_iter().zip(self.rivals.hypotheses()) {
+            if share > SHARE_MIN {
+                let belief = &filter.belief;
+                mixture.add(
+                    share,
+                    &nalgebra::SVector::from(PLACES.map(|place| belief.mean[place])),
+                    &nalgebra::SMatrix::from_fn(|i, j| {
+                        belief.covariance[(PLACES[i], PLACES[j])]
+                    }),
+                );
+            }
+        }
+        let Gaussian { mean, covariance } = mixture.belief;
+        Published {
+            mean: mean.fixed_rows::<4>(0).into_owned(),
+            covariance: covariance.fixed_view::<4, 4>(0, 0).into_owned(),
+            disturbance: (mean[4], covariance[(4, 4)].max(0.0).sqrt()),
+        }
+    }
+
+    /// True while every filter is sound.
+    pub fn is_sound(&self) -> bool {
+        self.rivals.hypotheses().iter().all(|it| it.filter.belief.is_sound())
+            && self.rivals.weights().iter().all(|weight| weight.is_finite())
+    }
+}

@@ -1,0 +1,352 @@
+//! The estimator, from samples to its report.
+
+use std::sync::Arc;
+
+use dynocar_shared::{
+    Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status,
+};
+use nalgebra::{SMatrix, Vector3};
+
+use super::bank::{Measured, MotionBank};
+use super::load::{Change, LoadWatch};
+use super::motion_filter::{
+    BRAKE_SCALE, COEFFICIENTS, FORCE_DELAY, LOAD, RESISTANCE, SPEED, State, StateCovariance, Step,
+    TRACTION_SCALE,
+};
+use super::report::Report;
+use super::settings::TrainKalmanSettings;
+use super::systematic::Systematic;
+use crate::force::ResolvedSample;
+use crate::pipeline::judge::{Case, InputHealth};
+use crate::pipeline::motion::{BRIDGED_MAX_S, STANDING_MPS, SpeedNoise, SpeedRange};
+use crate::pipeline::output::{write_innovations, write_status};
+use crate::pipeline::resistance::regression::{scaled, unscaling};
+use crate::pipeline::resistance::sample::UnitSample;
+use crate::pipeline::sample_gate::{Gated, SampleGate};
+use crate::pipeline::settings::SettingError;
+use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
+use crate::train::{Davis, TrainModel};
+
+/// Innovations that the published statistics look back over.
+const INNOVATION_MEMORY: u32 = 1000;
+/// Motion in s before anything is called known; after a warm start, before it is confirmed.
+const MOVED_MIN_S: f64 = 20.0;
+const CONFIRMED_S: f64 = 3.0;
+/// How long a change of force is remembered, in s.
+const FORCE_RATE_MEMORY_S: f64 = 0.5;
+/// Share of a declared coefficient's standard deviation that comes from w0 at 20 m/s: a declared zero
+/// is no knowledge.
+const PRIOR_FLOOR_SHARE: f64 = 0.3;
+/// Weight that the first share of jumps counts for, and what is looked back over.
+const JUMP_WEIGHT_FIRST: f64 = 3.0;
+const JUMP_WEIGHT_MAX: f64 = 300.0;
+/// Share of an innovation's variance from which a jump says something of jumps.
+const JUMP_SEEN_SHARE: f64 = 0.1;
+/// The greatest factor on the covariance by innovations that are larger or more alike than it says;
+/// beyond it they contradict the estimate.
+const INFLATION_MAX: f64 = 4.0;
+
+/// Resistance and mass of a train by Kalman filters over every sample.
+#[derive(Clone, Debug)]
+pub struct TrainKalman {
+    settings: TrainKalmanSettings,
+    train_kg: f64,
+    train_length_m: f64,
+    /// Resistance as declared or kept, scaled, with its covariance.
+    first: (Vector3<f64>, SMatrix<f64, COEFFICIENTS, COEFFICIENTS>),
+    gate: SampleGate,
+    bank: MotionBank,
+    load: LoadWatch,
+    /// Newest sample of the motion.
+    last: Option<UnitSample>,
+    last_time_ns: Option<i64>,
+    /// True when the speed of the newest sample was at least the lowest that is used.
+    is_fast: bool,
+    noise: SpeedNoise,
+    /// Share of the variance that jumping forces bring, by the innovations, and its weight.
+    jump_share: (f64, f64),
+    force_rate: f64,
+    monitor: InnovationMonitor,
+    systematic: Systematic,
+    speeds: SpeedRange,
+    health: InputHealth,
+    moved_s: f64,
+    moved_min_s: f64,
+    report: Report,
+    is_fresh_reset: bool,
+    resets: u64,
+}
+
+impl TrainKalman {
+    /// An estimator for a train.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn new(
+        settings: TrainKalmanSettings,
+        train: &Arc<TrainModel>,
+    ) -> Result<Self, SettingError> {
+        settings.check_ranges()?;
+        let declared = scaled(&train.resistance);
+        let floor = PRIOR_FLOOR_SHARE * train.resistance.w0_n_per_kn(20.0).abs();
+        let stds = declared.map(|value| settings.prior_relative_std * (value.abs() + floor));
+        let first = (declared, SMatrix::from_diagonal(&stds.component_mul(&stds)));
+        let bank = first_bank(&settings, &first);
+        Ok(TrainKalman {
+            settings,
+            train_kg: train.mass_kg,
+            train_length_m: train.length_m,
+            first,
+            gate: SampleGate::default(),
+            load: LoadWatch::new(&settings),
+            last: None,
+            last_time_ns: None,
+            is_fast: false,
+            noise: SpeedNoise::guessed(settings.speed_noise_mps),
+            jump_share: (1.0, JUMP_WEIGHT_FIRST),
+            force_rate: 0.0,
+            monitor: InnovationMonitor::new(INNOVATION_MEMORY),
+            systematic: Systematic::new(
+                settings.gradient_std_permille,
+                settings.acceleration_scale_std,
+            ),
+            speeds: SpeedRange::default(),
+            health: InputHealth::default(),
+            moved_s: 0.0,
+            moved_min_s: MOVED_MIN_S,
+            report: Report::new(&bank.published()),
+            bank,
+            is_fresh_reset: false,
+            resets: 0,
+        })
+    }
+
+    fn begin(&mut self, now: UnitSample) -> Outcome {
+        let gap_s = self
+            .last_time_ns
+            .map_or(f64::INFINITY, |last| now.time_ns.saturating_sub(last) as f64 * 1e-9);
+        let noise_variance = self.noise.variance_of_sample(f64::INFINITY);
+        self.bank.begin(now.speed_mps, noise_variance, gap_s.max(0.0));
+        self.monitor.break_here();
+        self.force_rate = 0.0;
+        self.last = Some(now);
+        Outcome::Used
+    }
+
+    /// The step to a sample, with what is learned beside the state.
+    fn step(&mut self, from: &UnitSample, to: &UnitSample, sample: &ResolvedSample) -> Step {
+        let step = Step::between(from, to);
+        let duration_s = step.duration_s;
+        let faded = self.force_rate * (-duration_s / FORCE_RATE_MEMORY_S).exp();
+        let change = step.traction_change - step.brake_change;
+        self.force_rate = faded.max((change / duration_s).abs());
+        // A change of gradient or curve passes under the train in many steps, all early or all late.
+        let speed_mps = to.speed_mps.max(self.settings.speed_min_mps);
+        let steps = (self.train_length_m / (speed_mps * duration_s)).max(1.0);
+        let place_s = self.settings.position_std_m / speed_mps;
+        let drift = self.settings.drift_n_per_kn_per_sqrt_h.powi(2) * duration_s / 3600.0;
+        Step {
+            place_variance: steps * (place_s * (to.known - from.known)).powi(2),
+            jump_share: self.jump_share.0,
+            force_rate: self.force_rate,
+            map_std_permille: sample.gradient_std_permille,
+            drift_variance: drift,
+            ..step
+        }
+    }
+
+    fn advance(&mut self, from: UnitSample, now: UnitSample, sample: &ResolvedSample) -> Outcome {
+        let step = self.step(&from, &now, sample);
+        let before_mps = self.bank.likeliest().belief.mean[SPEED];
+        self.bank.predict(&step);
+        let moved_mps = (self.bank.likeliest().belief.mean[SPEED] - before_mps).abs();
+        let noise_variance = self.noise.variance_of_sample(moved_mps);
+        let measured = self.bank.measure(now.speed_mps, noise_variance, &step);
+        let Some(measured) = measured.ok().filter(|_| self.bank.is_sound()) else {
+            self.reset();
+            return self.begin(now);
+        };
+        self.last = Some(now);
+        if measured.trust.is_outlier() {
+            self.monitor.break_here();
+            return Outcome::Rejected(RejectionReason::Outlier);
+        }
+        self.learn(&measured, now.speed_mps);
+        self.speeds.push(now.speed_mps);
+        self.systematic.see(step.way_m, sample.position_m, now.speed_mps);
+        self.moved_s += step.duration_s;
+        self.is_fresh_reset &= self.moved_s < self.moved_min_s;
+        self.judge();
+        Outcome::Updated
+    }
+
+    /// Learns the noise of speeds and of forces that jump from what a speed said.
+    fn learn(&mut self, measured: &Measured, speed_mps: f64) {
+        self.monitor.push(measured.trust.normalised);
+        let belief = &self.bank.likeliest().belief;
+        let residual_mps = speed_mps - belief.mean[SPEED];
+        let filtered_variance = belief.covariance[(SPEED, SPEED)];
+        self.noise.take_residual(residual_mps, filtered_variance, measured.trust.weight);
+        let (share, weight) = &mut self.jump_share;
+        let of_variance = measured.jump_variance / measured.variance;
+        if of_variance > JUMP_SEEN_SHARE * share.min(1.0) && *share > 0.0 {
+            let whole = measured.jump_variance / *share;
+            let rest = measured.variance - measured.jump_variance;
+            let seen = (measured.innovation_mps.powi(2) - rest) / whole;
+            let weight_now = (whole / measured.variance).powi(2).min(1.0);
+            *weight = (*weight + weight_now).min(JUMP_WEIGHT_MAX);
+            *share += (seen.clamp(-4.0, 12.0) - *share) * weight_now / *weight;
+            *share = share.clamp(1e-3, 12.0);
+        }
+    }
+
+    fn judge(&mut self) {
+        let (mean_square, correlation) = (self.monitor.mean_square(), self.monitor.correlation());
+        let long_run = mean_square * (1.0 + correlation) / (1.0 - correlation).max(f64::EPSILON);
+        let inflation = long_run.clamp(1.0, INFLATION_MAX);
+        self.report.take(&self.bank.published(), inflation, &self.systematic, &self.speeds);
+    }
+
+    fn reset(&mut self) {
+        self.bank = first_bank(&self.settings, &self.first);
+        self.noise.reset();
+        self.jump_share = (1.0, JUMP_WEIGHT_FIRST);
+        self.moved_s = 0.0;
+        self.moved_min_s = MOVED_MIN_S;
+        self.report = Report::new(&self.bank.published());
+        self.is_fresh_reset = true;
+        self.resets += 1;
+    }
+
+    /// True for a sample of a train that moves fast enough, by the samples before it: a bound on the
+    /// newest speed itself would let in what noise makes faster and keep out what it makes slower.
+    fn is_under_way(&mut self, sample: &ResolvedSample) -> bool {
+        let least_mps = self.settings.speed_min_mps;
+        let was_fast = std::mem::replace(&mut self.is_fast, sample.speed_mps >= least_mps);
+        match self.last {
+            Some(_) => {
+                let believed_mps = self.bank.likeliest().belief.mean[SPEED];
+                believed_mps >= least_mps && sample.speed_mps > STANDING_MPS
+            }
+            None => was_fast && sample.speed_mps > STANDING_MPS,
+        }
+    }
+
+    /// Follows the load from sample to sample.
+    fn follow_load(&mut self, sample: &ResolvedSample) {
+        match self.load.see(sample) {
+            Some(Change::Anew(variance)) => self.bank.each(|it| it.replace(LOAD, 1.0, variance)),
+            Some(Change::Opened(variance, most)) => self.bank.each(|it| {
+                let now = it.covariance[(LOAD, LOAD)];
+                it.disturb(LOAD, variance.min((most - now).max(0.0)));
+            }),
+            None => {}
+        }
+        if self.load.departed() {
+            self.systematic.start();
+        }
+    }
+
+    fn case(&self) -> Case {
+        let failure = (Status::Invalid, Reason::NumericalFailure);
+        Case {
+            fault: self.is_fresh_reset.then_some(failure),
+            input: self.health.complaint().or(self.gate.complaint()),
+            is_ready: self.moved_s >= self.moved_min_s,
+            is_known: self.report.known() != 0,
+            lacking: Status::Unestimated,
+            contradiction: self.monitor.contradiction(),
+            remark: match self.report.is_complete() {
+                true => Reason::None,
+                false => Reason::WeakExcitation,
+            },
+        }
+    }
+}
+
+/// The declared or kept resistance, forces and load as the settings trust them.
+fn first_bank(
+    settings: &TrainKalmanSettings,
+    (resistance, covariance): &(Vector3<f64>, SMatrix<f64, COEFFICIENTS, COEFFICIENTS>),
+) -> MotionBank {
+    let mut mean = State::zeros();
+    mean[LOAD] = 1.0;
+    mean.fixed_rows_mut::<COEFFICIENTS>(RESISTANCE).copy_from(resistance);
+    let mut all = StateCovariance::zeros();
+    all[(SPEED, SPEED)] = 1.0;
+    all[(LOAD, LOAD)] = (0.01 * settings.load_std_percent).powi(2);
+    all.fixed_view_mut::<COEFFICIENTS, COEFFICIENTS>(RESISTANCE, RESISTANCE).copy_from(covariance);
+    all[(TRACTION_SCALE, TRACTION_SCALE)] = settings.force_scale_std.powi(2);
+    all[(BRAKE_SCALE, BRAKE_SCALE)] = settings.force_scale_std.powi(2);
+    all[(FORCE_DELAY, FORCE_DELAY)] = settings.force_delay_std_s.powi(2);
+    MotionBank::new(&mean, &all)
+}
+
+impl Gated for TrainKalman {
+    fn gate(&mut self) -> &mut SampleGate {
+        &mut self.gate
+    }
+
+    fn take(&mut self, sample: &ResolvedSample) -> Outcome {
+        if !self.is_under_way(sample) {
+            self.last = None;
+            return Outcome::Used;
+        }
+        let now = match UnitSample::of(sample) {
+            Ok(now) => now,
+            Err(reason) => {
+                self.last = None;
+                return self.health.note(Outcome::Rejected(reason), sample);
+            }
+        };
+        self.noise.rounding.see(now.speed_mps);
+        let last = self.last.filter(|last| {
+            let since_s = now.seconds_since(last);
+            last.stretch == now.stretch && since_s > 0.0 && since_s <= BRIDGED_MAX_S
+        });
+        let outcome = match last {
+            Some(last) => self.advance(last, now, sample),
+            None => self.begin(now),
+        };
+        self.last_time_ns = Some(now.time_ns);
+        self.health.note(outcome, sample)
+    }
+
+    fn leave_out(&mut self, sample: &ResolvedSample, reason: RejectionReason) {
+        self.last = None;
+        self.health.refuse(reason, sample);
+    }
+}
+
+impl Estimator for TrainKalman {
+    fn kind(&self) -> PipelineKind {
+        PipelineKind::TrainKalman
+    }
+
+    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+        self.follow_load(sample);
+        self.pass(sample)
+    }
+
+    fn write(&self, snapshot: &mut ParameterSnapshot) {
+        let declared_kg = self.load.declared_kg(self.train_kg);
+        self.report.write(declared_kg, &self.speeds, snapshot);
+        write_status(snapshot, self.case().verdict());
+        write_innovations(snapshot, &self.monitor);
+        snapshot.generation = self.resets;
+    }
+
+    /// Takes up the kept resistance; the load is another one after the next stop.
+    fn warm_start(&mut self, kept: &KeptEstimate) -> bool {
+        let davis = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
+        let Some((mean, covariance)) = kept.moments(davis) else { return false };
+        let scale = SMatrix::from_diagonal(&unscaling().map(|factor| 1.0 / factor));
+        let davis = Davis { a: mean[0], b: mean[1], c: mean[2] };
+        self.first = (scaled(&davis), scale * covariance * scale);
+        self.bank = first_bank(&self.settings, &self.first);
+        self.report = Report::new(&self.bank.published());
+        self.moved_min_s = CONFIRMED_S;
+        true
+    }
+}

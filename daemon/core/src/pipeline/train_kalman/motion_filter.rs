@@ -1,0 +1,168 @@
+//! A Kalman filter of speed, disturbance, load and resistance over the steps between samples.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::behaviour::Behaviour;
+use crate::filter::Gaussian;
+use crate::pipeline::motion::jump_variance;
+use crate::pipeline::resistance::regression::regressors;
+use crate::pipeline::resistance::sample::UnitSample;
+
+/// Place of the speed in m/s.
+pub const SPEED: usize = 0;
+/// Place of the force that no model knows, in N/kN, retarding.
+pub const DISTURBANCE: usize = 1;
+/// Place of the declared mass over the true one.
+pub const LOAD: usize = 2;
+/// First place of a, b and c, scaled as [`regressors`] are, in N/kN.
+pub const RESISTANCE: usize = 3;
+/// Place of the error of the traction force's scale.
+pub const TRACTION_SCALE: usize = 6;
+/// Place of the error of the brake force's scale.
+pub const BRAKE_SCALE: usize = 7;
+/// Place of the delay in s of a force behind its report.
+pub const FORCE_DELAY: usize = 8;
+/// Number of states.
+pub const STATES: usize = 9;
+
+/// A state.
+pub type State = SVector<f64, STATES>;
+/// Covariance of a state.
+pub type StateCovariance = SMatrix<f64, STATES, STATES>;
+
+/// Davis a, b, c.
+pub const COEFFICIENTS: usize = 3;
+
+/// Share of w0 that the integral between two samples, which are taken as joined by straight lines,
+/// is off by from step to step.
+const INTEGRATION_SHARE: f64 = 1e-4;
+
+/// What every behaviour takes from a step between two samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Duration in s.
+    pub duration_s: f64,
+    /// Distance in m.
+    pub way_m: f64,
+    /// Momentum per weight and speed: s.
+    pub inertia: f64,
+    /// Impulse of the traction force in N/kN s.
+    pub traction: f64,
+    /// Impulse of the brake force, retarding.
+    pub brake: f64,
+    /// Impulse of all that is known to retard beyond the basic resistance.
+    pub known: f64,
+    /// Change of the traction force over the step in N/kN.
+    pub traction_change: f64,
+    /// Change of the brake force over the step in N/kN.
+    pub brake_change: f64,
+    /// Variance in (N/kN s)² of the impulse by where on the line a known force acts.
+    pub place_variance: f64,
+    /// Share of [`jump_variance`] that the forces of this train bring.
+    pub jump_share: f64,
+    /// Fastest change of force lately in N/kN per s.
+    pub force_rate: f64,
+    /// Standard deviation in ‰ of the map's gradient, where one is stated.
+    pub map_std_permille: f64,
+    /// Variance in (N/kN)² that comes to each coefficient of the resistance.
+    pub drift_variance: f64,
+}
+
+impl Step {
+    /// Between two samples of one stretch; what is learned on the way is the caller's to fill in.
+    pub fn between(from: &UnitSample, to: &UnitSample) -> Self {
+        let duration_s = to.seconds_since(from);
+        let half_s = 0.5 * duration_s;
+        Step {
+            duration_s,
+            way_m: half_s * (from.speed_mps + to.speed_mps),
+            inertia: to.inertia,
+            traction: half_s * (from.traction + to.traction),
+            brake: half_s * (from.brake + to.brake),
+            known: half_s * (from.known + to.known),
+            traction_change: to.traction - from.traction,
+            brake_change: to.brake - from.brake,
+            place_variance: 0.0,
+            jump_share: 1.0,
+            force_rate: 0.0,
+            map_std_permille: 0.0,
+            drift_variance: 0.0,
+        }
+    }
+}
+
+/// The filter under one behaviour of the disturbance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionFilter {
+    /// The behaviour.
+    pub behaviour: Behaviour,
+    /// What is believed.
+    pub belief: Gaussian<STATES>,
+    /// Variance in (m/s)² of the speed that the newest step brought by forces that jumped.
+    pub jump_variance: f64,
+}
+
+impl MotionFilter {
+    /// Moves on by a step, by Heun's rule.
+    ///
+    /// # Real-time
+    ///
+    /// Work in proportion to the square of [`STATES`], no allocation.
+    pub fn predict(&mut self, step: &Step) {
+        let state = self.belief.mean;
+        let (load, delay_s) = (state[LOAD], state[FORCE_DELAY]);
+        let (by_traction, by_brake) = (1.0 + state[TRACTION_SCALE], 1.0 + state[BRAKE_SCALE]);
+        let traction = step.traction - delay_s * step.traction_change;
+        let brake = step.brake - delay_s * step.brake_change;
+        let force = by_traction * traction - by_brake * brake;
+        let change = by_traction * step.traction_change - by_brake * step.brake_change;
+        let impulse = load * force - step.known - step.duration_s * state[DISTURBANCE];
+        let resistance = |powers: &[f64; COEFFICIENTS]| -> f64 {
+            (0..COEFFICIENTS).map(|i| powers[i] * state[RESISTANCE + i]).sum()
+        };
+        let per_inertia = 1.0 / step.inertia;
+        let start_mps = state[SPEED];
+        let at_start = regressors(start_mps);
+        let w0_at_start = resistance(&at_start);
+        let end_mps = start_mps + per_inertia * (impulse - step.duration_s * w0_at_start);
+        let at_end = regressors(end_mps);
+        let mean: [f64; COEFFICIENTS] = std::array::from_fn(|i| 0.5 * (at_start[i] + at_end[i]));
+        let w0 = resistance(&mean);
+        let slope = (resistance(&at_end) - w0_at_start) / (end_mps - start_mps);
+        let slope = if slope.is_finite() { slope } else { 0.0 };
+
+        let seconds = step.duration_s * per_inertia;
+        let mut gradient = State::zeros();
+        gradient[SPEED] = 1.0 - seconds * slope;
+        gradient[DISTURBANCE] = -seconds;
+        gradient[LOAD] = per_inertia * force;
+        for i in 0..COEFFICIENTS {
+            gradient[RESISTANCE + i] = -seconds * mean[i];
+        }
+        gradient[TRACTION_SCALE] = per_inertia * load * traction;
+        gradient[BRAKE_SCALE] = -per_inertia * load * brake;
+        gradient[FORCE_DELAY] = -per_inertia * load * change;
+
+        let jump = step.jump_share * jump_variance(load * change, step.duration_s);
+        self.jump_variance = jump * per_inertia * per_inertia;
+        let missed = step.place_variance + (INTEGRATION_SHARE * step.duration_s * w0).powi(2);
+        let variance = self.jump_variance + missed * per_inertia * per_inertia;
+        let next_mps = start_mps + per_inertia * (impulse - step.duration_s * w0);
+        self.belief.rewrite(SPEED, next_mps, &gradient, variance);
+
+        let (keep, renewed) =
+            self.behaviour.over(step.duration_s, step.way_m, step.map_std_permille);
+        self.belief.fade(DISTURBANCE, keep, renewed);
+        for i in 0..COEFFICIENTS {
+            self.belief.disturb(RESISTANCE + i, step.drift_variance);
+        }
+    }
+
+    /// Variance in (m/s)² of the speed while a force that acts later by d changes: its impulse is
+    /// taken as d times the change at once, and is off by half d² times the rate until then.
+    pub fn transient_variance(&self, step: &Step) -> f64 {
+        let delay_s = self.belief.mean[FORCE_DELAY];
+        let square = delay_s * delay_s + self.belief.covariance[(FORCE_DELAY, FORCE_DELAY)];
+        (0.5 * square * step.force_rate / step.inertia).powi(2)
+    }
+}

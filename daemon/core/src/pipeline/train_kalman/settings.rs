@@ -1,0 +1,40 @@
+//! Settings of [`super::TrainKalman`].
+
+use crate::pipeline::motion::MOVING_MPS;
+use crate::pipeline::settings::settings;
+
+settings! {
+    /// Settings of [`super::TrainKalman`].
+    #[derive(Copy)]
+    TrainKalmanSettings {
+        /// Standard deviation in % of a mass that the samples carry, as weighed; 0 where it is exact.
+        mass_std_percent: f64 = 3.0 => (0 to 50);
+        /// Standard deviation in % of the train's declared mass where the samples carry none: from
+        /// empty to full.
+        load_std_percent: f64 = 15.0 => (0 to 50);
+        /// Standard deviation in % by which the load changes at a stop where the samples carry no mass.
+        load_change_std_percent: f64 = 10.0 => (0 to 50);
+        /// Shortest stop in s at which the load may change.
+        stop_min_s: f64 = 5.0 => (0 to 3600);
+        /// Standard deviation of each declared coefficient of resistance as a share of it.
+        prior_relative_std: f64 = 0.4 => (0.001 to 10);
+        /// Random walk of the resistance in N/kN over an hour of motion: weather, wear.
+        drift_n_per_kn_per_sqrt_h: f64 = 0.01 => (0 to 10 "N/kN");
+        /// Standard deviation of the scales of traction and brake force: 0.01 is 1 %.
+        force_scale_std: f64 = 0.007 => (0.000001 to 0.5);
+        /// Standard deviation in s of the delay of a force behind its report.
+        force_delay_std_s: f64 = 0.2 => (0.000001 to 5 "s");
+        /// Standard deviation of the scale of accelerations, by wheel diameter and rotating mass,
+        /// which nothing here can find: 0.003 is 0.3 %.
+        acceleration_scale_std: f64 = 0.0025 => (0 to 0.1);
+        /// Standard deviation in ‰ of gradients along a line for which no survey states one, of
+        /// which every passage is the same.
+        gradient_std_permille: f64 = 0.1 => (0 to 10 "‰");
+        /// Standard deviation of the measured speed in m/s to start with; it is learned.
+        speed_noise_mps: f64 = 0.05 => (0.001 to 1 "m/s");
+        /// Standard deviation in m of the position against the gradient profile.
+        position_std_m: f64 = 3.0 => (0 to 1000 "m");
+        /// Lowest speed in m/s that is used.
+        speed_min_mps: f64 = MOVING_MPS => (0.3 to 20 "m/s");
+    }
+}

@@ -1,0 +1,76 @@
+//! What no amount of samples of one train on one line makes better known.
+
+use nalgebra::{Matrix4, Vector4};
+
+use crate::pipeline::resistance::regression::regressors;
+use crate::track::GRADIENT_ERROR_FREE_M;
+
+/// The stretch of line that was driven, and the scales that cannot be found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Systematic {
+    /// Standard deviation in ‰ of gradients where no survey states one.
+    gradient_std_permille: f64,
+    /// Standard deviation of the scale of accelerations.
+    scale_std: f64,
+    /// Lowest and highest chainage in m.
+    driven_m: Option<(f64, f64)>,
+    /// Highest speed in m/s.
+    top_mps: f64,
+    /// Starts from a standstill, and the distance in m driven altogether.
+    starts: f64,
+    way_m: f64,
+}
+
+impl Systematic {
+    /// Before the first sample.
+    pub fn new(gradient_std_permille: f64, scale_std: f64) -> Self {
+        Systematic { gradient_std_permille, scale_std, driven_m: None, top_mps: 0.0, starts: 0.0, way_m: 0.0 }
+    }
+
+    /// Takes in a step of a way in m, where it ends, and the speed there.
+    pub fn see(&mut self, way_m: f64, position_m: Option<f64>, speed_mps: f64) {
+        self.way_m += way_m;
+        self.top_mps = self.top_mps.max(speed_mps);
+        if let Some(position_m) = position_m {
+            let (low, high) = self.driven_m.unwrap_or((position_m, position_m));
+            self.driven_m = Some((low.min(position_m), high.max(position_m)));
+        }
+    }
+
+    /// The train starts from a standstill.
+    pub fn start(&mut self) {
+        self.starts += 1.0;
+    }
+
+    /// Least variance in (N/kN)² of w0 by the mean error of the map over the line driven, and over the
+    /// places where the train is slow: passing a place once more brings the same error again. Without
+    /// chainage every place counts as new.
+    fn map_variances(&self) -> (f64, f64) {
+        let Some((low, high)) = self.driven_m else { return (0.0, 0.0) };
+        let line_m = high - low;
+        let between_stops_m = self.way_m / self.starts.max(1.0);
+        let pieces = (line_m / GRADIENT_ERROR_FREE_M).max(1.0);
+        let stops = (line_m / between_stops_m.max(1.0)).clamp(1.0, self.starts.max(1.0));
+        let variance = self.gradient_std_permille.powi(2);
+        (variance / pieces, variance / stops)
+    }
+
+    /// Widens the covariance of a, b, c (scaled) and of the load factor.
+    pub fn widen(&self, mean: &Vector4<f64>, covariance: &mut Matrix4<f64>) {
+        let scale = self.scale_std * self.scale_std;
+        let mut by_scale = mean * mean.transpose() * scale;
+        // Whatever scales the accelerations scales resistance and mass alike: u the other way.
+        for i in 0..3 {
+            by_scale[(i, 3)] = -by_scale[(i, 3)];
+            by_scale[(3, i)] = -by_scale[(3, i)];
+        }
+        *covariance += by_scale;
+        let (of_line, of_stops) = self.map_variances();
+        // What the map does where the train is slow fades towards the highest speed.
+        let mut slow = Vector4::zeros();
+        let [one, linear, _] = regressors(self.top_mps.max(1.0));
+        (slow[0], slow[1]) = (one, -one / linear);
+        *covariance += slow * slow.transpose() * of_stops;
+        covariance[(0, 0)] += of_line;
+    }
+}
