@@ -17,6 +17,7 @@ use crate::load::{self, LoadArguments};
 use crate::monitor::command::{MonitorArguments, monitor};
 use crate::output::give;
 use crate::papers::{self, Row, Seeds, Verdict, table};
+use crate::scenarios::command::{ScenariosArguments, scenarios};
 use crate::survey::{self, SurveyArguments};
 
 /// Measures Dynocar: accuracy against the statistical bound, speed against peers.
@@ -35,6 +36,7 @@ enum Command {
     Load(LoadArguments),
     Monitor(MonitorArguments),
     Papers(PapersArguments),
+    Scenarios(ScenariosArguments),
     Survey(SurveyArguments),
     #[command(hide = true)]
     Peer(PeerArguments),
@@ -112,6 +114,7 @@ pub fn main() -> ExitCode {
         Command::Load(arguments) => load(arguments),
         Command::Monitor(arguments) => monitor(arguments),
         Command::Papers(arguments) => papers(arguments),
+        Command::Scenarios(arguments) => scenarios(arguments),
         Command::Survey(arguments) => survey::run(arguments),
         Command::Peer(arguments) => serve(arguments).map_err(|error| (error.to_string(), 1)),
     };

@@ -10,6 +10,7 @@
 //! - [`output`]: results for people and for machines
 //! - [`parallel`]: the same work over many cases, on some threads
 //! - [`papers`]: accuracy of every estimator over seeded runs, beside the statistical bound
+//! - [`scenarios`](mod@scenarios): resistance and mass in a user's day
 //! - [`survey`](mod@survey): how the work of a survey grows with passes
 
 pub mod cli;
@@ -22,4 +23,5 @@ pub mod output;
 pub mod papers;
 pub mod parallel;
 pub mod rig;
+pub mod scenarios;
 pub mod survey;

@@ -96,6 +96,14 @@ enum {
     DYNOCAR_QUANTITY_BRAKING_RATIO = 4   /* DYNOCAR_PARAMETER_BRAKING_RATIO, the friction held */
 };
 
+/* Where the mass in a snapshot comes from. */
+enum {
+    DYNOCAR_MASS_SOURCE_NONE = 0,     /* the pipeline estimates no mass */
+    DYNOCAR_MASS_SOURCE_DECLARED = 1, /* the train's file */
+    DYNOCAR_MASS_SOURCE_WEIGHED = 2,  /* the controller's samples */
+    DYNOCAR_MASS_SOURCE_LEARNED = 3   /* what forces do to the train */
+};
+
 /* What a controller may do with an estimate. */
 enum {
     DYNOCAR_STATUS_UNESTIMATED = 1, /* not enough data; values are declared or initial ones */
@@ -147,6 +155,7 @@ enum {
     DYNOCAR_PIPELINE_STAGED_DESCENT = 40,    /* resistance and mass (Wang 2022) */
     DYNOCAR_PIPELINE_JOINT_LEAST_SQUARES = 41, /* resistance and mass */
     DYNOCAR_PIPELINE_MASS_KALMAN = 42,       /* [v, 1/m, bias] */
+    DYNOCAR_PIPELINE_TRAIN_KALMAN = 43,      /* resistance and mass as one estimate */
     DYNOCAR_PIPELINE_RESIDUAL_MONITOR = 50,  /* watches model against measurement */
     DYNOCAR_PIPELINE_ECHO = 60               /* estimates nothing: the latency floor */
 };
@@ -307,6 +316,8 @@ typedef struct dynocar_parameter_snapshot {
     double speed_min_mps;           /* lowest speed behind the estimate */
     double speed_max_mps;           /* highest speed behind the estimate */
     uint64_t model_hash; /* of train and line, as `dynocar models` names it; 0: from no files */
+    uint32_t usable_quantities; /* 1 << DYNOCAR_QUANTITY_...: what may be used, with hysteresis */
+    uint32_t mass_source;       /* DYNOCAR_MASS_SOURCE_... */
 } dynocar_parameter_snapshot;
 
 /* A snapshot copied out, with its age. */
@@ -315,7 +326,7 @@ typedef struct dynocar_reading {
     uint32_t status;    /* DYNOCAR_STATUS_...; INVALID while the daemon is silent */
     uint32_t reason;    /* DYNOCAR_REASON_...; DAEMON_SILENT while the daemon is silent */
     uint32_t is_stale;  /* 1 when the daemon has been silent for too long */
-    uint32_t is_usable; /* 1 when the values may be used: ESTIMATED and not stale */
+    uint32_t is_usable; /* 1 when the values may be used for what was asked; see usable_quantities */
     dynocar_parameter_snapshot snapshot;
 } dynocar_reading;
 
@@ -474,6 +485,7 @@ int64_t dynocar_monotonic_now_ns(void);
 const char *dynocar_code_text(dynocar_code code);
 const char *dynocar_pipeline_name(uint32_t kind);
 const char *dynocar_quantity_name(uint32_t quantity);
+const char *dynocar_mass_source_name(uint32_t mass_source);
 const char *dynocar_parameter_name(uint32_t parameter);
 const char *dynocar_status_name(uint32_t status);
 const char *dynocar_reason_name(uint32_t reason);
@@ -575,7 +587,7 @@ DYNOCAR_AT_(dynocar_train_sample, ambient_temperature_degc, 104);
 DYNOCAR_AT_(dynocar_train_sample, gradient_permille, 112);
 DYNOCAR_AT_(dynocar_train_sample, curve_radius_m, 120);
 
-DYNOCAR_SIZE_(dynocar_parameter_snapshot, 528);
+DYNOCAR_SIZE_(dynocar_parameter_snapshot, 536);
 DYNOCAR_AT_(dynocar_parameter_snapshot, epoch, 0);
 DYNOCAR_AT_(dynocar_parameter_snapshot, sequence, 8);
 DYNOCAR_AT_(dynocar_parameter_snapshot, generation, 16);
@@ -614,8 +626,10 @@ DYNOCAR_AT_(dynocar_parameter_snapshot, suspicion_evidence, 496);
 DYNOCAR_AT_(dynocar_parameter_snapshot, speed_min_mps, 504);
 DYNOCAR_AT_(dynocar_parameter_snapshot, speed_max_mps, 512);
 DYNOCAR_AT_(dynocar_parameter_snapshot, model_hash, 520);
+DYNOCAR_AT_(dynocar_parameter_snapshot, usable_quantities, 528);
+DYNOCAR_AT_(dynocar_parameter_snapshot, mass_source, 532);
 
-DYNOCAR_SIZE_(dynocar_reading, 552);
+DYNOCAR_SIZE_(dynocar_reading, 560);
 DYNOCAR_AT_(dynocar_reading, age_ns, 0);
 DYNOCAR_AT_(dynocar_reading, status, 8);
 DYNOCAR_AT_(dynocar_reading, reason, 12);

@@ -39,6 +39,8 @@ pub struct Reading<'a> {
     pub age_ns: i64,
     /// True when the daemon has been silent for too long.
     pub is_stale: bool,
+    /// What was asked for; `None` where a pipeline was.
+    pub quantity: Option<Quantity>,
 }
 
 impl Reading<'_> {
@@ -52,10 +54,21 @@ impl Reading<'_> {
         if self.is_stale { Some(Reason::DaemonSilent) } else { self.snapshot.reason() }
     }
 
-    /// True when a controller may use the values; else it falls back to its own parameters. What
-    /// that promises, whatever the reason says beside it, is told in `docs/guides/reading.md`.
+    /// True when a controller may use the values for what it asked for; else it falls back to its own
+    /// parameters. The daemon decides that, with hysteresis, so that a controller can switch on it: what
+    /// it promises, and how late it is, stands in `docs/guides/reading.md`. Of a pipeline that was asked
+    /// for by its kind, everything that it answers has to be usable.
     pub fn is_usable(&self) -> bool {
-        self.status() == Status::Estimated
+        let it = self.snapshot;
+        let is_current = self.status() != Status::Invalid;
+        is_current
+            && match self.quantity {
+                Some(quantity) => it.is_usable_for(quantity),
+                None => {
+                    let usable = it.usable_quantities;
+                    usable != 0 && it.quantities & !usable == 0
+                }
+            }
     }
 }
 
@@ -117,7 +130,7 @@ impl SnapshotReader {
     pub fn quantity(&self, quantity: Quantity, now_ns: i64) -> Result<Reading<'_>, NoAnswer> {
         let place = self.answers.place(quantity)?;
         let snapshot = self.latest[place].as_ref().ok_or(NoAnswer::NoSnapshot)?;
-        Ok(self.reading(snapshot, now_ns))
+        Ok(self.reading(snapshot, Some(quantity), now_ns))
     }
 
     /// Basic resistance, see [`ParameterSnapshot::resistance_at`]; as [`Self::quantity`].
@@ -173,12 +186,17 @@ impl SnapshotReader {
 
     /// The newest snapshot of every pipeline, by the pipeline's number in the configuration.
     pub fn readings(&self, now_ns: i64) -> impl Iterator<Item = Reading<'_>> {
-        self.latest.iter().flatten().map(move |snapshot| self.reading(snapshot, now_ns))
+        self.latest.iter().flatten().map(move |snapshot| self.reading(snapshot, None, now_ns))
     }
 
-    fn reading<'a>(&self, snapshot: &'a ParameterSnapshot, now_ns: i64) -> Reading<'a> {
+    fn reading<'a>(
+        &self,
+        snapshot: &'a ParameterSnapshot,
+        quantity: Option<Quantity>,
+        now_ns: i64,
+    ) -> Reading<'a> {
         let age_ns = now_ns.saturating_sub(snapshot.vouched_ns);
-        Reading { snapshot, age_ns, is_stale: age_ns > self.stale_after_ns }
+        Reading { snapshot, age_ns, is_stale: age_ns > self.stale_after_ns, quantity }
     }
 
     /// Messages that no daemon of ours would send: foreign train, number out of range, NaN, a time

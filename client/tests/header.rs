@@ -14,8 +14,8 @@ use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::snapshot::{COVARIANCE_ENTRIES, PARAMETERS_MAX, REJECTION_REASONS};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{
-    Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Quantity, Reason, RejectionReason,
-    SCHEMA_MAJOR, SampleField, Status, TrainSample,
+    Manoeuvre, MassSource, Parameter, ParameterSnapshot, PipelineKind, Quantity, Reason,
+    RejectionReason, SCHEMA_MAJOR, SampleField, Status, TrainSample,
 };
 
 mod support;
@@ -98,6 +98,7 @@ fn vocabulary_members() -> Vec<(&'static str, String, i64)> {
     Reason::ALL.iter().for_each(|it| add("REASON", it, *it as u32));
     PipelineKind::ALL.iter().for_each(|it| add("PIPELINE", it, *it as u32));
     Quantity::ALL.iter().for_each(|it| add("QUANTITY", it, *it as u32));
+    MassSource::ALL.iter().for_each(|it| add("MASS_SOURCE", it, *it as u32));
     Parameter::ALL.iter().for_each(|it| add("PARAMETER", it, *it as u32));
     RejectionReason::ALL.iter().for_each(|it| add("REJECTED", it, *it as u32));
     Manoeuvre::ALL.iter().for_each(|it| add("MANOEUVRE", it, it.bit()));

@@ -34,6 +34,7 @@ fn send(
     snapshot.pipeline_index = pipeline_index;
     snapshot.status = Status::Estimated as u32;
     (snapshot.quantities, snapshot.train_quantities) = (bits(answers), bits(train_answers));
+    snapshot.usable_quantities = snapshot.quantities;
     snapshot.vouched_ns = monotonic_now_ns();
     sender.send(&snapshot).unwrap();
 }

@@ -38,5 +38,5 @@ pub use sleeper::SleeperState;
 pub use snapshot::ParameterSnapshot;
 pub use stopping::{EffortPoint, RailAdhesion, Stop, StoppingError, StoppingEstimate};
 pub use vocabulary::{
-    Manoeuvre, Parameter, PipelineKind, Quantity, Reason, RejectionReason, Status,
+    Manoeuvre, MassSource, Parameter, PipelineKind, Quantity, Reason, RejectionReason, Status,
 };

@@ -1,7 +1,7 @@
 //! What the daemon answers, one snapshot for each train and pipeline.
 
 use crate::vocabulary::{
-    EffectKind, Parameter, PipelineKind, Quantity, Reason, RejectionReason, Status,
+    EffectKind, MassSource, Parameter, PipelineKind, Quantity, Reason, RejectionReason, Status,
 };
 use crate::wire_struct;
 
@@ -102,6 +102,11 @@ wire_struct! {
         /// The model of train and line that the pipeline reckons with: the first 8 bytes of SHA-256
         /// over the train's file, a zero byte and the line's file; 0 when it came from no files.
         pub model_hash: u64,
+        /// One bit for each [`Quantity`] whose values a controller may use now. It changes seldom: what
+        /// was usable stays so for half a second of doubt, and what was doubted has to hold for a while.
+        pub usable_quantities: u32,
+        /// Where the mass comes from: [`crate::vocabulary::MassSource`] by number.
+        pub mass_source: u32,
     }
 }
 
@@ -147,6 +152,8 @@ impl ParameterSnapshot {
             speed_min_mps: 0.0,
             speed_max_mps: 0.0,
             model_hash: 0,
+            usable_quantities: 0,
+            mass_source: 0,
         }
     }
 
@@ -171,6 +178,16 @@ impl ParameterSnapshot {
     /// True when this pipeline answers a quantity for the train.
     pub const fn answers(&self, quantity: Quantity) -> bool {
         self.quantities & quantity.bit() != 0
+    }
+
+    /// True when a controller may use the values for a quantity, as the daemon wrote it.
+    pub const fn is_usable_for(&self, quantity: Quantity) -> bool {
+        self.usable_quantities & quantity.bit() != 0 && !matches!(self.status(), Status::Invalid)
+    }
+
+    /// Where the mass comes from; `None` for a number that a newer peer gives.
+    pub const fn mass_source(&self) -> Option<MassSource> {
+        MassSource::from_number(self.mass_source)
     }
 
     /// The effects that the data hardly tell from the suspected one.

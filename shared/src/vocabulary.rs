@@ -146,6 +146,20 @@ vocabulary! {
 }
 
 vocabulary! {
+    /// Where the mass in a snapshot comes from.
+    MassSource: u32 {
+        /// The pipeline estimates no mass.
+        None = 0 "none",
+        /// The train's file: nothing else is known of the load yet.
+        Declared = 1 "declared",
+        /// The controller's samples, which carry it.
+        Weighed = 2 "weighed",
+        /// What forces do to the train.
+        Learned = 3 "learned",
+    }
+}
+
+vocabulary! {
     /// What a controller may do with an estimate.
     Status: u32 {
         /// Not enough data yet; the values are the declared or the initial ones.

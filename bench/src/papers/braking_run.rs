@@ -20,6 +20,7 @@ pub fn resolved(train: &TrainModel, moment: &Moment, is_first: bool) -> Resolved
         position_m: Some(moment.measured_m),
         speed_mps: moment.measured_mps,
         mass_kg: train.mass_kg,
+        is_mass_measured: false,
         inertial_mass_kg: train.mass_kg * (1.0 + train.rotating_mass_factor),
         weight_kn: TrainModel::weight_kn(train.mass_kg),
         traction_force_n: None,

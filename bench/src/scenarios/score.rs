@@ -1,6 +1,6 @@
 //! What an answer was worth over a drive.
 
-use dynocar_shared::{Parameter, ParameterSnapshot, Quantity, Status};
+use dynocar_shared::{Parameter, ParameterSnapshot, Quantity};
 
 use super::drive::Moment;
 
@@ -77,7 +77,7 @@ pub fn answer(
     quantity: Quantity,
     moment: &Moment,
 ) -> Option<Answer> {
-    if snapshot.status() != Status::Estimated {
+    if !snapshot.is_usable_for(quantity) {
         return None;
     }
     let (value, deviation, truth) = match quantity {

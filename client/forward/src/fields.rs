@@ -9,7 +9,9 @@ use std::sync::LazyLock;
 use dynocar_client::Reading;
 use dynocar_shared::schema::{Field, snapshot_fields, unit_of};
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_shared::{Manoeuvre, Parameter, PipelineKind, Reason, RejectionReason};
+use dynocar_shared::{
+    Manoeuvre, MassSource, Parameter, PipelineKind, Quantity, Reason, RejectionReason,
+};
 
 use crate::payload::Value;
 
@@ -39,7 +41,7 @@ impl Told {
 }
 
 /// Fields that words stand for, or that the metric's name says.
-const SAID_OTHERWISE: [&str; 12] = [
+const SAID_OTHERWISE: [&str; 14] = [
     "train_id",
     "pipeline_index",
     "pipeline_kind",
@@ -47,6 +49,8 @@ const SAID_OTHERWISE: [&str; 12] = [
     "reason",
     "quantities",
     "train_quantities",
+    "mass_source",
+    "usable_quantities",
     "parameter_count",
     "excited",
     "missing_manoeuvres",
@@ -105,6 +109,12 @@ pub fn each_metric(reading: &Reading<'_>, now_ns: i64, mut give: impl FnMut(Told
     let others = it.alternatives().map(EffectKind::name).collect::<Vec<_>>().join(",");
     let meaning = "Other effects that these data hardly tell from it, with commas between";
     tell("", "suspect_alternatives", meaning, Value::words(others));
+    let source = it.mass_source().map_or("unknown", MassSource::name);
+    tell("", "mass_source", "Where the mass comes from", Value::words(source));
+    let usable = Quantity::ALL.iter().filter(|quantity| it.is_usable_for(**quantity));
+    let usable = usable.map(|quantity| quantity.name()).collect::<Vec<_>>().join(",");
+    let meaning = "Quantities whose values a controller may use, with commas between";
+    tell("", "usable", meaning, Value::words(usable));
     let is_excited = |place: &usize| it.excited & (1 << place) != 0;
     let excited = (0..it.parameter_count as usize).filter(is_excited);
     let excited = excited.filter_map(|place| Parameter::from_number(it.parameters[place]));

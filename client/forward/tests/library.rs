@@ -145,6 +145,8 @@ fn every_field_of_the_layout_is_forwarded_or_said_in_words_or_is_a_time_of_the_h
         "reason",
         "quantities",
         "train_quantities",
+        "usable_quantities",
+        "mass_source",
         "rejected_by_reason",
         "parameter_count",
         "excited",

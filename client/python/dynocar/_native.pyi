@@ -89,6 +89,8 @@ class ParameterSnapshot:
     speed_min_mps: float
     speed_max_mps: float
     model_hash: int
+    usable_quantities: int
+    mass_source: int
     def __bytes__(self) -> bytes: ...
     def resistance_at(
         self, speed_mps: float, mass_kg: float

@@ -114,6 +114,7 @@ class PipelineKind(_Vocabulary):
     STAGED_DESCENT = 40
     JOINT_LEAST_SQUARES = 41
     MASS_KALMAN = 42
+    TRAIN_KALMAN = 43
     RESIDUAL_MONITOR = 50
     ECHO = 60
 
@@ -126,6 +127,15 @@ class Quantity(_Vocabulary):
     ADHESION = 2
     BRAKE_FRICTION = 3
     BRAKING_RATIO = 4
+
+
+class MassSource(_Vocabulary):
+    """Where the mass in a snapshot comes from."""
+
+    NONE = 0
+    DECLARED = 1
+    WEIGHED = 2
+    LEARNED = 3
 
 
 class Parameter(_Vocabulary):

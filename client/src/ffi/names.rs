@@ -4,7 +4,7 @@ use std::ffi::{CStr, c_char};
 
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{
-    Manoeuvre, Parameter, PipelineKind, Quantity, Reason, RejectionReason, Status,
+    Manoeuvre, MassSource, Parameter, PipelineKind, Quantity, Reason, RejectionReason, Status,
 };
 
 /// Room for the longest name and its NUL.
@@ -56,6 +56,8 @@ export_names! {
     dynocar_pipeline_name: PipelineKind by |it| it as u32,
     /// The name of a [`Quantity`].
     dynocar_quantity_name: Quantity by |it| it as u32,
+    /// The name of a [`MassSource`].
+    dynocar_mass_source_name: MassSource by |it| it as u32,
     /// The name of a [`Parameter`].
     dynocar_parameter_name: Parameter by |it| it as u32,
     /// The name of a [`Status`].

@@ -182,6 +182,7 @@ pub fn snapshot_for(sample: &TrainSample) -> ParameterSnapshot {
     snapshot.reason = 0;
     snapshot.quantities = Quantity::Resistance.bit() | Quantity::BrakingRatio.bit();
     snapshot.train_quantities = snapshot.quantities;
+    snapshot.usable_quantities = snapshot.quantities;
     snapshot.sample_sequence = sample.sequence;
     snapshot.published_ns = monotonic_now_ns();
     snapshot.vouched_ns = snapshot.published_ns;

@@ -40,6 +40,11 @@ pub trait Estimator: Send {
     /// Allocates nothing, locks nothing, reads no clock.
     fn write(&self, snapshot: &mut ParameterSnapshot);
 
+    /// Of the quantities that it answers, one bit for each that is known while the status is estimated.
+    fn known(&self) -> u32 {
+        u32::MAX
+    }
+
     /// Takes an estimate kept from earlier as its prior, before the first sample; false when
     /// it has no use for one. The status stays unestimated until samples confirm it.
     fn warm_start(&mut self, _kept: &KeptEstimate) -> bool {

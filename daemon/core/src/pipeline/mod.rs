@@ -20,6 +20,7 @@ pub mod sample_gate;
 pub mod settings;
 pub mod train_kalman;
 pub mod trajectory;
+mod usable;
 
 pub use echo::Echo;
 pub use estimator::{Estimator, Outcome};
@@ -32,6 +33,7 @@ use std::sync::Arc;
 
 use dynocar_shared::{ParameterSnapshot, Reason, RejectionReason, Status, TrainId, TrainSample};
 
+use self::usable::Usable;
 use crate::force::ForceResolver;
 use crate::plausibility::{Finding, Plausibility};
 use crate::track::Track;
@@ -46,6 +48,9 @@ pub struct Pipeline {
     plausibility: Plausibility,
     /// Share of the samples lately that validation refused.
     refused_share: f64,
+    usable: Usable,
+    /// One bit for each quantity that estimators of this kind answer.
+    answerable: u32,
     /// Resets of the pipelines that this one took over from.
     resets_before: u64,
     snapshot: ParameterSnapshot,
@@ -72,12 +77,15 @@ impl Pipeline {
         snapshot.pipeline_index = index;
         snapshot.pipeline_kind = estimator.kind() as u32;
         estimator.write(&mut snapshot);
+        let answerable = quantities::answerable(estimator.kind());
         Pipeline {
             validator: Validator::new(train_id, train.mass_kg, limits),
             plausibility: Plausibility::new(Arc::clone(&train)),
             resolver: ForceResolver::new(train, track),
             estimator,
             refused_share: 0.0,
+            usable: Usable::default(),
+            answerable,
             resets_before: 0,
             snapshot,
         }
@@ -180,6 +188,9 @@ impl Pipeline {
         } else if is_estimated && self.refused_share > REFUSED_SHARE_MAX {
             output::write_status(&mut self.snapshot, (Status::Degraded, Reason::BadInput));
         }
+        let is_estimated = self.snapshot.status() == Status::Estimated;
+        let good = if is_estimated { self.estimator.known() & self.answerable } else { 0 };
+        self.snapshot.usable_quantities = self.usable.see(good, sample.time_ns);
         &self.snapshot
     }
 

@@ -26,7 +26,9 @@ pub const fn candidates(quantity: Quantity) -> &'static [PipelineKind] {
             Kind::TrajectoryNewton,
             Kind::StagedDescent,
         ],
-        Quantity::Mass => &[Kind::TrainKalman, Kind::MassKalman, Kind::JointLeastSquares, Kind::StagedDescent],
+        Quantity::Mass => {
+            &[Kind::TrainKalman, Kind::MassKalman, Kind::JointLeastSquares, Kind::StagedDescent]
+        }
         Quantity::Adhesion => {
             &[Kind::AdhesionLaw, Kind::AdhesionSmoother, Kind::AdhesionEkf, Kind::AdhesionEm]
         }
@@ -34,6 +36,12 @@ pub const fn candidates(quantity: Quantity) -> &'static [PipelineKind] {
             &[Kind::BrakeSmoother, Kind::BrakeEkf, Kind::BrakeEm]
         }
     }
+}
+
+/// One bit for each quantity that a kind can answer.
+pub fn answerable(kind: PipelineKind) -> u32 {
+    let can = |quantity: &&Quantity| candidates(**quantity).contains(&kind);
+    Quantity::ALL.iter().filter(can).map(|quantity| quantity.bit()).sum()
 }
 
 impl EstimatorSettings {

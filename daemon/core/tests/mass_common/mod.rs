@@ -142,6 +142,7 @@ impl Simulation {
             position_m: None,
             speed_mps: if is_standing { 0.0 } else { measured.max(0.0) },
             mass_kg: DECLARED_KG,
+            is_mass_measured: false,
             inertial_mass_kg: 1.06 * DECLARED_KG,
             weight_kn: TrainModel::weight_kn(DECLARED_KG),
             traction_force_n: Some(force_n.max(0.0)),

@@ -83,6 +83,9 @@ pub trait Engine: Send {
     /// Allocates nothing.
     fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Result<Step, EngineError>;
 
+    /// Takes the variance of a measured distance in m² for another one from the next step on.
+    fn set_distance_variance(&mut self, variance_m2: f64);
+
     /// The estimate, once there is one.
     fn estimate(&self) -> Option<Estimate>;
 }

@@ -7,7 +7,7 @@ use super::intake::{BrakingIntake, Intake, Quantity};
 use super::motion::StepInputs;
 use super::report::{self, Circumstances, ReportSettings};
 use crate::force::ResolvedSample;
-use crate::pipeline::motion::SpeedRange;
+use crate::pipeline::motion::{PositionNoise, SpeedRange};
 use crate::pipeline::output::write_innovations;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 
@@ -34,6 +34,9 @@ pub struct BrakingEstimator<E> {
     now_ns: i64,
     resets: u64,
     speeds: SpeedRange,
+    /// Variance in m² of a position as declared, and what the positions show.
+    declared_position_m2: f64,
+    positions: PositionNoise,
 }
 
 impl<E: Engine> BrakingEstimator<E> {
@@ -44,7 +47,7 @@ impl<E: Engine> BrakingEstimator<E> {
         intake: BrakingIntake,
         engine: E,
         report: ReportSettings,
-        stale_after_s: f64,
+        (stale_after_s, position_std_m): (f64, f64),
     ) -> Self {
         BrakingEstimator {
             kind,
@@ -61,6 +64,8 @@ impl<E: Engine> BrakingEstimator<E> {
             now_ns: 0,
             resets: 0,
             speeds: SpeedRange::default(),
+            declared_position_m2: position_std_m * position_std_m,
+            positions: PositionNoise::default(),
         }
     }
 
@@ -125,6 +130,9 @@ impl<E: Engine> Estimator for BrakingEstimator<E> {
 
     fn update(&mut self, sample: &ResolvedSample) -> Outcome {
         self.now_ns = sample.time_ns;
+        self.positions.see(sample);
+        let position_m2 = self.positions.variance_m2(self.declared_position_m2);
+        self.engine.set_distance_variance(position_m2);
         match self.intake.take(sample) {
             Intake::NotBraking | Intake::Collected => Outcome::Used,
             Intake::Missing(reason) => {

@@ -140,6 +140,12 @@ impl Engine for LawBank {
         Ok(Step::Updated { normalised_innovation: Some(normalised) })
     }
 
+    fn set_distance_variance(&mut self, variance_m2: f64) {
+        for law in self.laws.hypotheses_mut() {
+            law.model.noise.measured_distance_m2 = variance_m2;
+        }
+    }
+
     fn estimate(&self) -> Option<Estimate> {
         if !self.is_started {
             return None;

@@ -117,18 +117,24 @@ fn case(
 ) -> Case {
     let counts = settings.counts(estimate);
     let is_impossible = counts && estimate.coefficient.value <= 0.0;
-    let contradictions = [
-        (circumstances.are_innovations_too_large, Reason::InnovationsTooLarge),
+    let is_too_large = circumstances.are_innovations_too_large;
+    // The event that would say more has not come: nothing is wrong, and nothing may be used yet.
+    let awaited = [
         (circumstances.is_stale, Reason::EstimateStale),
         (!is_number, Reason::OnlyLowerBound),
     ];
+    let awaited = awaited.into_iter().find(|(is_so, _)| counts && !is_too_large && *is_so);
+    let fault = match is_impossible {
+        true => Some((Status::Invalid, Reason::AtBound)),
+        false => awaited.map(|(_, reason)| (Status::Unestimated, reason)),
+    };
     Case {
-        fault: is_impossible.then_some((Status::Invalid, Reason::AtBound)),
+        fault,
         input: None,
         is_ready: counts,
         is_known: true,
         lacking: Status::Unestimated,
-        contradiction: contradictions.into_iter().find(|(is_so, _)| *is_so).map(|(_, it)| it),
+        contradiction: is_too_large.then_some(Reason::InnovationsTooLarge),
         // Only friction times ratio acts on the train, and the other factor is held as declared:
         // who reckons with both has the force that acts.
         remark: match quantity {

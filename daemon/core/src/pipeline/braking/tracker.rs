@@ -267,6 +267,10 @@ impl Engine for Tracker {
         Ok(Step::Updated { normalised_innovation: first_innovation })
     }
 
+    fn set_distance_variance(&mut self, variance_m2: f64) {
+        self.model.noise.measured_distance_m2 = variance_m2;
+    }
+
     fn estimate(&self) -> Option<Estimate> {
         // Half a millisecond of tolerance for the rounding of summed steps.
         let until_s = self.time_s - self.lag_s + 5e-4;

@@ -4,16 +4,19 @@
 //! - [`Trust`], [`OutlierRow`]: how far a measured speed is believed
 //! - [`jump_variance`], [`kink_variance`]: what a trapezoid over a step misses
 //! - [`Rounding`], [`SpeedNoise`]: the steps that a speed is told in, and its noise
+//! - [`PositionNoise`]: the noise of a measured position
 //! - [`SpeedRange`]: the speeds driven
 
 mod missed;
 mod outlier;
+mod position_noise;
 mod rounding;
 mod speed_noise;
 mod speed_range;
 
 pub use missed::{jump_variance, kink_variance};
 pub use outlier::{OutlierRow, Trust};
+pub use position_noise::PositionNoise;
 pub use rounding::Rounding;
 pub use speed_noise::SpeedNoise;
 pub use speed_range::SpeedRange;

@@ -157,8 +157,7 @@ impl MotionBank {
     ///
     /// A few sums for each behaviour, no allocation.
     pub fn published(&self) -> Published {
-        const PLACES: [usize; 5] =
-            [RESISTANCE, RESISTANCE + 1, RESISTANCE + 2, LOAD, DISTURBANCE];
+        const PLACES: [usize; 5] = [RESISTANCE, RESISTANCE + 1, RESISTANCE + 2, LOAD, DISTURBANCE];
         let mut mixture = Mixture::<5>::default();
         let shares = self.rivals.shares(|_| true);
         for (share, Rival { filter, .. }) in shares.into_iter().zip(self.rivals.hypotheses()) {
@@ -167,9 +166,7 @@ impl MotionBank {
                 mixture.add(
                     share,
                     &nalgebra::SVector::from(PLACES.map(|place| belief.mean[place])),
-                    &nalgebra::SMatrix::from_fn(|i, j| {
-                        belief.covariance[(PLACES[i], PLACES[j])]
-                    }),
+                    &nalgebra::SMatrix::from_fn(|i, j| belief.covariance[(PLACES[i], PLACES[j])]),
                 );
             }
         }

@@ -63,7 +63,8 @@ mod tests {
 
     #[test]
     fn a_force_beside_an_error_of_the_map_has_variance_and_correlation_of_their_sum() {
-        let force = Behaviour { std_n_per_kn: 0.1, time_s: 60.0, is_of_line: false, log_prior: 0.0 };
+        let force =
+            Behaviour { std_n_per_kn: 0.1, time_s: 60.0, is_of_line: false, log_prior: 0.0 };
         let (keep, variance) = force.over(0.5, 5.0, 0.2);
         let product = 0.01 * (-0.5_f64 / 60.0).exp() + 0.04 * gradient_error_kept(5.0);
         assert!((keep * 0.05 - product).abs() < 1e-12);

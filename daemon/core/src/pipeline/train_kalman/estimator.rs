@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use dynocar_shared::{
-    Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status,
+    MassSource, Parameter, ParameterSnapshot, PipelineKind, Quantity, Reason, RejectionReason,
+    Status,
 };
 use nalgebra::{SMatrix, Vector3};
 
@@ -32,6 +33,10 @@ const INNOVATION_MEMORY: u32 = 1000;
 /// Motion in s before anything is called known; after a warm start, before it is confirmed.
 const MOVED_MIN_S: f64 = 20.0;
 const CONFIRMED_S: f64 = 3.0;
+/// Motion in s before the mass is called known.
+const MASS_MOVED_MIN_S: f64 = 3.0;
+/// All that this estimator answers.
+const COMPLETE: u32 = Quantity::Resistance.bit() | Quantity::Mass.bit();
 /// How long a change of force is remembered, in s.
 const FORCE_RATE_MEMORY_S: f64 = 0.5;
 /// Share of a declared coefficient's standard deviation that comes from w0 at 20 m/s: a declared zero
@@ -248,18 +253,39 @@ impl TrainKalman {
         }
     }
 
+    /// The quantities known after motion enough: the mass after some seconds of traction, the resistance
+    /// after a while, or once the first samples confirm what was kept.
+    fn known_now(&self) -> u32 {
+        let ready = |quantity: Quantity, after_s: f64| {
+            u32::from(self.moved_s >= after_s.min(self.moved_min_s)) * quantity.bit()
+        };
+        let ready =
+            ready(Quantity::Resistance, MOVED_MIN_S) | ready(Quantity::Mass, MASS_MOVED_MIN_S);
+        self.report.known() & ready
+    }
+
+    fn mass_source(&self) -> MassSource {
+        if self.report.load_variance() < 0.5 * self.load.prior_variance() {
+            MassSource::Learned
+        } else if self.load.is_weighed() {
+            MassSource::Weighed
+        } else {
+            MassSource::Declared
+        }
+    }
+
     fn case(&self) -> Case {
         let failure = (Status::Invalid, Reason::NumericalFailure);
         Case {
             fault: self.is_fresh_reset.then_some(failure),
             input: self.health.complaint().or(self.gate.complaint()),
-            is_ready: self.moved_s >= self.moved_min_s,
-            is_known: self.report.known() != 0,
+            is_ready: self.moved_s >= self.moved_min_s.min(MASS_MOVED_MIN_S),
+            is_known: self.known_now() != 0,
             lacking: Status::Unestimated,
             contradiction: self.monitor.contradiction(),
-            remark: match self.report.is_complete() {
-                true => Reason::None,
-                false => Reason::WeakExcitation,
+            remark: match self.known_now() {
+                COMPLETE => Reason::None,
+                _ => Reason::WeakExcitation,
             },
         }
     }
@@ -329,11 +355,16 @@ impl Estimator for TrainKalman {
         self.pass(sample)
     }
 
+    fn known(&self) -> u32 {
+        self.known_now()
+    }
+
     fn write(&self, snapshot: &mut ParameterSnapshot) {
         let declared_kg = self.load.declared_kg(self.train_kg);
         self.report.write(declared_kg, &self.speeds, snapshot);
         write_status(snapshot, self.case().verdict());
         write_innovations(snapshot, &self.monitor);
+        snapshot.mass_source = self.mass_source() as u32;
         snapshot.generation = self.resets;
     }
 

@@ -54,6 +54,11 @@ impl LoadWatch {
         self.is_weighed
     }
 
+    /// Variance of the load factor by what the samples or the train's file say of it.
+    pub fn prior_variance(&self) -> f64 {
+        if self.is_weighed { self.mass_std.powi(2) } else { self.load_std.powi(2) }
+    }
+
     /// Mass in kg that the load factor refers to; the declared one before the first sample.
     pub fn declared_kg(&self, train_kg: f64) -> f64 {
         self.declared_kg.unwrap_or(train_kg)
@@ -64,8 +69,7 @@ impl LoadWatch {
         self.is_weighed = sample.is_mass_measured;
         self.has_departed = self.stops.departs(sample.time_ns, sample.stretch, sample.speed_mps);
         let before_kg = self.declared_kg.replace(sample.mass_kg);
-        let prior_std = if self.is_weighed { self.mass_std } else { self.load_std };
-        let anew = Change::Anew(prior_std * prior_std);
+        let anew = Change::Anew(self.prior_variance());
         let Some(before_kg) = before_kg else { return Some(anew) };
         let is_same = (sample.mass_kg / before_kg - 1.0).abs() <= SAME_SHARE;
         if !is_same && self.is_weighed {

@@ -115,9 +115,9 @@ impl Report {
         bit(&self.resistance, Quantity::Resistance) | bit(&self.mass, Quantity::Mass)
     }
 
-    /// True when resistance and mass are known.
-    pub fn is_complete(&self) -> bool {
-        self.resistance.is_known() && self.mass.is_known()
+    /// Variance of the declared mass over the true one.
+    pub fn load_variance(&self) -> f64 {
+        self.covariance[(LOAD, LOAD)]
     }
 
     /// Writes values, covariance, excitation and the unexplained force; `declared_kg` is the mass

@@ -24,7 +24,14 @@ pub struct Systematic {
 impl Systematic {
     /// Before the first sample.
     pub fn new(gradient_std_permille: f64, scale_std: f64) -> Self {
-        Systematic { gradient_std_permille, scale_std, driven_m: None, top_mps: 0.0, starts: 0.0, way_m: 0.0 }
+        Systematic {
+            gradient_std_permille,
+            scale_std,
+            driven_m: None,
+            top_mps: 0.0,
+            starts: 0.0,
+            way_m: 0.0,
+        }
     }
 
     /// Takes in a step of a way in m, where it ends, and the speed there.

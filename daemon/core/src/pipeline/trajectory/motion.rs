@@ -115,6 +115,7 @@ pub(super) mod tests {
             position_m: None,
             speed_mps,
             mass_kg: 1e5,
+            is_mass_measured: false,
             inertial_mass_kg: 1.06e5,
             weight_kn: 981.0,
             traction_force_n: Some(control_force_n.max(0.0)),

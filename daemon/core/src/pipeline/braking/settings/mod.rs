@@ -35,7 +35,7 @@ settings! {
         interval_s: f64 = 0.2 => (above 0);
         /// A longer time in s between two observations ends the braking.
         gap_max_s: f64 = 2.0;
-        /// Standard deviation of a measured position in m.
+        /// Standard deviation of a measured position in m; a greater one is learned.
         position_std_m: f64 = 0.1 => (above 0);
         /// Standard deviation of a measured speed in m/s.
         speed_std_mps: f64 = 0.1 => (above 0);
@@ -109,8 +109,8 @@ impl BrakingSettings {
             has_law_scale: kind == PipelineKind::AdhesionLaw,
         };
         let intake = self.intake(quantity, train);
-        let stale_after_s = self.stale_after_s;
-        Box::new(BrakingEstimator::new(kind, quantity, intake, engine, report, stale_after_s))
+        let sensors = (self.stale_after_s, self.position_std_m);
+        Box::new(BrakingEstimator::new(kind, quantity, intake, engine, report, sensors))
     }
 }
 

@@ -179,6 +179,10 @@ impl<E: Expectation> Engine for EmWindow<E> {
         Ok(Step::Updated { normalised_innovation: None })
     }
 
+    fn set_distance_variance(&mut self, variance_m2: f64) {
+        self.model.noise.measured_distance_m2 = variance_m2;
+    }
+
     fn estimate(&self) -> Option<Estimate> {
         self.estimate
     }

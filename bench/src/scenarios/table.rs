@@ -1,0 +1,181 @@
+//! Scenarios times pipelines, in numbers.
+
+use std::sync::Arc;
+
+use dynocar_core::pipeline::settings::SettingError;
+use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_shared::{PipelineKind, Quantity, TrainId};
+use serde::Serialize;
+
+use super::drive::Drive;
+use super::rows::NamedScenario;
+use super::score::{Score, answer};
+use super::world::{LoadTold, Scenario, World};
+use crate::parallel;
+
+/// Speed in m/s from which an answer counts.
+const COUNTS_MPS: f64 = 2.0;
+/// What is asked for.
+const QUANTITIES: [Quantity; 2] = [Quantity::Resistance, Quantity::Mass];
+
+/// What is measured.
+pub struct Plan<'a> {
+    /// The rows.
+    pub scenarios: &'a [NamedScenario],
+    /// The pipelines in each.
+    pub kinds: &'a [PipelineKind],
+    /// Drives for each.
+    pub seeds: u64,
+    /// The first seed.
+    pub first_seed: u64,
+    /// Hours of each drive.
+    pub hours: f64,
+    /// Rows at a time.
+    pub threads: usize,
+}
+
+/// One quantity of one pipeline in one scenario, over all drives.
+#[derive(Clone, Debug, Serialize)]
+pub struct Line {
+    /// The scenario.
+    pub scenario: String,
+    /// The pipeline.
+    pub pipeline: &'static str,
+    /// The quantity.
+    pub quantity: &'static str,
+    /// Share of the moving time in which it may be used, in %.
+    pub usable_percent: f64,
+    /// Share of those cycles with the truth within the 95 % interval, in %.
+    pub covered_percent: f64,
+    /// Median time in s until the first use.
+    pub first_s: Option<f64>,
+    /// Changes of usable in an hour.
+    pub changes_per_h: f64,
+    /// Longest time in s with a usable answer more than 4 deviations off.
+    pub wrong_s: f64,
+    /// Root of the mean square of the usable answers' errors, in % of the truth.
+    pub error_percent: f64,
+    /// The same over the root of the mean square of their standard deviations.
+    pub error_over_deviation: f64,
+}
+
+/// Measures everything.
+///
+/// # Errors
+///
+/// When a kind cannot be built.
+pub fn run(plan: &Plan<'_>) -> Result<Vec<Line>, SettingError> {
+    let cases: Vec<(&NamedScenario, PipelineKind)> = plan
+        .scenarios
+        .iter()
+        .flat_map(|row| plan.kinds.iter().map(move |&kind| (row, kind)))
+        .collect();
+    let lines = parallel::over(&cases, plan.threads, |(row, kind)| measure(plan, row, *kind));
+    Ok(lines.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
+}
+
+/// The settings that a user of the scenario has: the load is known exactly where it is.
+fn settings(kind: PipelineKind, scenario: &Scenario) -> Option<EstimatorSettings> {
+    let mut settings = EstimatorSettings::default_of(kind)?;
+    if let EstimatorSettings::TrainKalman(own) = &mut settings
+        && scenario.load == LoadTold::Exact
+    {
+        own.mass_std_percent = 0.0;
+    }
+    Some(settings)
+}
+
+fn measure(
+    plan: &Plan<'_>,
+    row: &NamedScenario,
+    kind: PipelineKind,
+) -> Result<Vec<Line>, SettingError> {
+    let Some(settings) = settings(kind, &row.scenario) else { return Ok(Vec::new()) };
+    let mut totals = QUANTITIES.map(|_| (Score::default(), Vec::new()));
+    for seed in plan.first_seed..plan.first_seed + plan.seeds {
+        let world = World::draw(row.scenario, seed);
+        let train = Arc::new(world.declared.clone());
+        let estimator = settings.build(&train)?;
+        let pipeline = Pipeline::new(TrainId(1), 0, train, None, estimator);
+        for ((total, firsts), score) in totals.iter_mut().zip(driven(pipeline, world, plan.hours)) {
+            total.join(&score);
+            firsts.push(score.first_s.unwrap_or(f64::INFINITY));
+        }
+    }
+    let answered = |quantity: &Quantity| settings.answers(*quantity);
+    let lines = QUANTITIES.iter().zip(totals).filter(|(quantity, _)| answered(quantity));
+    Ok(lines.map(|(quantity, total)| line(plan, row, kind, *quantity, total)).collect())
+}
+
+/// One drive.
+fn driven(mut pipeline: Pipeline, world: World, hours: f64) -> [Score; 2] {
+    let cycle_s = 1.0 / f64::from(world.scenario.rate_hz);
+    let mut drive = Drive::new(world);
+    let mut scores = QUANTITIES.map(|_| Score::default());
+    for cycle in 0..(3600.0 * hours / cycle_s) as u64 {
+        let moment = drive.advance();
+        let snapshot = pipeline.process(&moment.sample);
+        if moment.speed_mps < COUNTS_MPS {
+            continue;
+        }
+        for (score, quantity) in scores.iter_mut().zip(QUANTITIES) {
+            score.push(cycle as f64 * cycle_s, cycle_s, answer(snapshot, quantity, &moment));
+        }
+    }
+    scores
+}
+
+fn line(
+    plan: &Plan<'_>,
+    row: &NamedScenario,
+    kind: PipelineKind,
+    quantity: Quantity,
+    (total, mut firsts): (Score, Vec<f64>),
+) -> Line {
+    firsts.sort_by(f64::total_cmp);
+    let first_s = firsts[firsts.len() / 2];
+    let usable = total.usable.max(1) as f64;
+    Line {
+        scenario: row.name.clone(),
+        pipeline: kind.name(),
+        quantity: quantity.name(),
+        usable_percent: 100.0 * total.usable as f64 / total.cycles.max(1) as f64,
+        covered_percent: 100.0 * total.covered as f64 / usable,
+        first_s: first_s.is_finite().then_some(first_s),
+        changes_per_h: total.changes as f64 / (plan.hours * plan.seeds as f64),
+        wrong_s: total.wrong_s,
+        error_percent: 100.0 * (total.error_square / usable).sqrt(),
+        error_over_deviation: (total.error_square / total.deviation_square.max(f64::MIN_POSITIVE))
+            .sqrt(),
+    }
+}
+
+/// The lines as a table of Markdown, which reads in a terminal too.
+pub fn table(lines: &[Line]) -> String {
+    let mut text = String::from(
+        "| scenario | pipeline | quantity | usable % | truth within 95 % | first use s | changes per h \
+         | longest wrong s | error % | error / deviation |\n\
+         | --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n",
+    );
+    for line in lines {
+        let first = line.first_s.map_or("never".into(), |first_s| format!("{first_s:.0}"));
+        let known = line.usable_percent > 0.0;
+        let number = |value: f64, digits: usize| match known {
+            true => format!("{value:.digits$}"),
+            false => "–".into(),
+        };
+        text += &format!(
+            "| {} | `{}` | {} | {:.1} | {} | {first} | {:.1} | {:.1} | {} | {} |\n",
+            line.scenario,
+            line.pipeline,
+            line.quantity,
+            line.usable_percent,
+            number(line.covered_percent, 1),
+            line.changes_per_h,
+            line.wrong_s,
+            number(line.error_percent, 2),
+            number(line.error_over_deviation, 2),
+        );
+    }
+    text
+}

@@ -1,0 +1,135 @@
+//! What a controller may use, with hysteresis: a controller that switches with every doubt drives worse
+//! than one that never switches.
+
+use dynocar_shared::Quantity;
+
+use super::motion::BRIDGED_MAX_S;
+
+/// Time in s that an estimate has to be good before it may be used for the first time.
+const ENTER_S: f64 = 2.0;
+/// Time in s of doubt after which it may no longer be used.
+const LEAVE_S: f64 = 0.5;
+/// Time in s that an estimate has to be good after it was doubted; twice as long after each doubt.
+const RETURN_FIRST_S: f64 = 5.0;
+/// The longest of them.
+const RETURN_MAX_S: f64 = 600.0;
+/// Time in s of use after which earlier doubts are forgotten.
+const FORGET_S: f64 = 1200.0;
+
+/// Whether one quantity may be used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Switch {
+    is_usable: bool,
+    /// Time in s for which the estimate has said the contrary.
+    contrary_s: f64,
+    /// Time in s that it must say so before the switch follows.
+    enter_s: f64,
+    /// Time in s of use since the last doubt.
+    used_s: f64,
+}
+
+impl Switch {
+    const OFF: Switch = Switch { is_usable: false, contrary_s: 0.0, enter_s: ENTER_S, used_s: 0.0 };
+
+    fn see(&mut self, is_good: bool, step_s: f64) {
+        if self.is_usable {
+            self.used_s += step_s;
+        }
+        if is_good == self.is_usable {
+            self.contrary_s = 0.0;
+            return;
+        }
+        self.contrary_s += step_s;
+        let after_s = if self.is_usable { LEAVE_S } else { self.enter_s };
+        if self.contrary_s < after_s {
+            return;
+        }
+        if self.is_usable {
+            let is_forgotten = self.used_s >= FORGET_S || self.enter_s == ENTER_S;
+            self.enter_s = match is_forgotten {
+                true => RETURN_FIRST_S,
+                false => (2.0 * self.enter_s).min(RETURN_MAX_S),
+            };
+            self.used_s = 0.0;
+        }
+        self.is_usable = is_good;
+        self.contrary_s = 0.0;
+    }
+}
+
+/// Whether each quantity may be used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Usable {
+    switches: [Switch; Quantity::ALL.len()],
+    last_ns: Option<i64>,
+}
+
+impl Default for Usable {
+    fn default() -> Self {
+        Usable { switches: [Switch::OFF; Quantity::ALL.len()], last_ns: None }
+    }
+}
+
+impl Usable {
+    /// Takes in which quantities are good at a time of the controller's clock in ns, one bit each; gives
+    /// those that may be used.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    pub fn see(&mut self, good: u32, time_ns: i64) -> u32 {
+        let before_ns = self.last_ns.replace(time_ns).unwrap_or(time_ns);
+        let step_s = (time_ns.saturating_sub(before_ns) as f64 * 1e-9).clamp(0.0, BRIDGED_MAX_S);
+        let mut usable = 0;
+        for (switch, quantity) in self.switches.iter_mut().zip(Quantity::ALL) {
+            switch.see(good & quantity.bit() != 0, step_s);
+            usable |= u32::from(switch.is_usable) * quantity.bit();
+        }
+        usable
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MASS: u32 = Quantity::Mass.bit();
+
+    /// Changes over so many s at 10 Hz.
+    fn changes(duration_s: u32, is_good: impl Fn(u32) -> bool) -> (u32, u32) {
+        let mut usable = Usable::default();
+        let (mut before, mut changes, mut last) = (0, 0, 0);
+        for tick in 0..10 * duration_s {
+            last = usable.see(if is_good(tick) { MASS } else { 0 }, i64::from(tick) * 100_000_000);
+            changes += u32::from(last != before);
+            before = last;
+        }
+        (changes, last)
+    }
+
+    #[test]
+    fn a_good_estimate_is_usable_after_two_seconds_and_doubted_after_half_a_second() {
+        assert_eq!(changes(2, |_| true), (0, 0));
+        assert_eq!(changes(3, |_| true), (1, MASS));
+        assert_eq!(changes(10, |tick| tick < 94), (1, MASS), "half a second of doubt");
+        assert_eq!(changes(10, |tick| tick < 90), (2, 0));
+    }
+
+    #[test]
+    fn an_estimate_that_flickers_or_chatters_for_an_hour_changes_seldom() {
+        assert!(changes(3600, |tick| tick % 3 != 0).0 <= 1, "flickers");
+        let (often, _) = changes(3600, |tick| tick / 100 % 2 == 0);
+        assert!(often <= 12, "ten seconds each way: {often}");
+        let (slow, _) = changes(3600, |tick| tick / 1200 % 2 == 0);
+        assert!(slow <= 12, "two minutes each way: {slow}");
+    }
+
+    #[test]
+    fn a_clock_that_jumps_counts_for_no_more_than_a_gap() {
+        let mut usable = Usable::default();
+        usable.see(MASS, 0);
+        assert_eq!(usable.see(MASS, i64::MIN), 0);
+        usable.see(MASS, 0);
+        assert_eq!(usable.see(0, i64::MAX), 0);
+    }
+}
