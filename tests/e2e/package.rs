@@ -7,12 +7,8 @@ use std::process::{Command, Output};
 
 use dynocar_tests::process::Site;
 
-#[path = "init/commands.rs"]
-mod commands;
-#[path = "../../client/tests/support/mod.rs"]
-mod support;
-use commands::{DYNOCAR, done, dynocar, said};
-use support::{compiler, library_directory, must_succeed, require};
+use crate::commands::{DYNOCAR, done, dynocar, said};
+use crate::support::{compiler, library_directory, must_succeed, require};
 
 /// What the package must hold, for the program that is tested.
 const FILES: [&str; 19] = [

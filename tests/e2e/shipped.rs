@@ -7,9 +7,7 @@ use std::process::Command;
 use dynocar_shared::services::ROOT_VARIABLE;
 use dynocar_tests::process::{Process, Site};
 
-#[path = "../../client/tests/support/mod.rs"]
-mod support;
-use support::{Link, Program};
+use crate::support::{self, Link, Program};
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const CONTROLLER: &str = env!("CARGO_BIN_EXE_dynocar-example-controller");
