@@ -15,8 +15,8 @@
  * No call of a cycle throws, and all of it builds without exceptions and without run-time types;
  * where memory is short, opening throws std::bad_alloc. The calls of a cycle do no more than the
  * calls of dynocar.h behind them, by the same rules: see there which are REAL-TIME, and that a handle
- * belongs to the thread that opened it. The numbers of vocabularies (DYNOCAR_STATUS_..., DYNOCAR_PARAMETER_...) and the
- * structs are those of dynocar.h, and so are its functions for braking distances, which need no
+ * belongs to the thread that opened it. The numbers of vocabularies (DYNOCAR_PARAMETER_...) and the
+ * structs are those of dynocar.h, and so are the functions for braking distances, which need no
  * handle.
  */
 #ifndef DYNOCAR_HPP
@@ -137,10 +137,9 @@ class Sample {
   private:
     Sample &set(double &field, unsigned bit, double value) noexcept
     {
-        if (!std::isnan(value)) {
-            field = value;
-            raw_.valid = static_cast<std::uint16_t>(raw_.valid | bit);
-        }
+        const bool is_known = !std::isnan(value);
+        field = is_known ? value : 0.0;
+        raw_.valid = static_cast<std::uint16_t>(is_known ? raw_.valid | bit : raw_.valid & ~bit);
         return *this;
     }
 

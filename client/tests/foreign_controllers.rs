@@ -164,6 +164,7 @@ fn a_controller_with_the_cpp_wrapper_goes_the_whole_way_allocates_nothing_and_is
         assert_eq!(numbers(&lines["mass_t"]), [mass_t, mass_t - half, mass_t + half]);
         assert_eq!((&*lines["others"], &*lines["absent"]), ("0", "not_provided 0 0"));
         assert_eq!((&*lines["held_back"], &*lines["allocated"]), ("0", "0"));
+        assert_eq!(lines["valid"], "1", "what is NaN is missing");
         // DYNOCAR_ERROR_NULL_ARGUMENT
         assert_eq!(lines["moved"], "1");
     }

@@ -1,5 +1,6 @@
 /* round_trip.c by the wrapper for C++: the same lines, and what only the wrapper promises. */
 #include <cinttypes>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <new>
@@ -167,6 +168,9 @@ int main(int count, char **arguments)
     const auto second = dynocar::Publisher::open(train, root);
     std::printf("second %" PRId32 "\n", second.code());
     std::printf("words %s\n", second.error().c_str());
+
+    const auto unset = dynocar::Sample().speed_mps(20.0).speed_mps(std::nan("")).mass_kg(1e5);
+    std::printf("valid %d\n", unset.raw().valid == DYNOCAR_HAS_MASS);
 
     const unsigned long before = allocations;
     long cycle = drive(publisher, reader);
