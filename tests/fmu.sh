@@ -16,7 +16,7 @@ python3 -m venv "$place/venv"
 cargo build --release
 dynocar=${CARGO_TARGET_DIR:-target}/release/dynocar
 "$dynocar" fmu -o "$place/dynocar.fmu" --dataset config/demo --inputs "$place/inputs"
-"$dynocar" identify config/demo --per-run --json "$place/identified.json" >"$place/words"
+"$dynocar" identify config/demo --all --per-run --json "$place/identified.json" >"$place/words"
 "$place/venv/bin/python" tests/fmu.py "$place"
 
 # The demo as a controller would have recorded it that reports a fifth too much traction; the last run

@@ -58,7 +58,8 @@ fn numbers(line: &str) -> Vec<f64> {
     line.split_whitespace().map(|number| number.parse().unwrap()).collect()
 }
 
-fn assert_round_trip(command: &mut Command, daemon: &PlayedDaemon) {
+/// Gives what the controller printed.
+fn assert_round_trip(command: &mut Command, daemon: &PlayedDaemon) -> HashMap<String, String> {
     let lines = serve(daemon, Program::start(command.arg(daemon.root()).arg(TRAIN.to_string())));
     let line = |word: &str| lines.get(word).unwrap_or_else(|| panic!("no {word} in {lines:?}"));
     assert_eq!(line("matches"), "1");
@@ -88,6 +89,7 @@ fn assert_round_trip(command: &mut Command, daemon: &PlayedDaemon) {
     assert_eq!(line("silent"), "invalid daemon_silent 0");
     assert_eq!(line("refused"), "0");
     assert_eq!(line("untaken"), "0");
+    lines
 }
 
 /// Answers once the controller drives by its own parameters, falls silent once it drives by
@@ -141,14 +143,45 @@ fn a_c_controller_with_the_shared_library_goes_the_whole_way() {
 fn a_cpp_controller_goes_the_whole_way() {
     let directory = tempfile::tempdir().unwrap();
     let program = directory.path().join("program");
-    support::build_cpp(&foreign("round_trip.c"), &program);
+    support::build_cpp(&foreign("round_trip.c"), "c++17", &program);
     assert_round_trip(&mut Command::new(program), &PlayedDaemon::start());
+}
+
+#[test]
+fn a_controller_with_the_cpp_wrapper_goes_the_whole_way_allocates_nothing_and_is_moved() {
+    let directory = tempfile::tempdir().unwrap();
+    for standard in ["c++17", "c++20"] {
+        let program = directory.path().join(standard);
+        support::build_cpp(&foreign("round_trip.cpp"), standard, &program);
+        let lines = assert_round_trip(&mut Command::new(program), &PlayedDaemon::start());
+        let train = TRAIN.to_string();
+        assert!(lines["words"].contains(&train), "{lines:?}");
+        let mut sample = TrainSample::empty(TRAIN);
+        sample.sequence = 20;
+        let snapshot = snapshot_for(&sample);
+        let [mass_t, std] = [snapshot.value(Parameter::Mass), snapshot.std(Parameter::Mass)];
+        let (mass_t, half) = (mass_t.unwrap(), 1.96 * std.unwrap());
+        assert_eq!(numbers(&lines["mass_t"]), [mass_t, mass_t - half, mass_t + half]);
+        assert_eq!((&*lines["others"], &*lines["absent"]), ("0", "not_provided 0 0"));
+        assert_eq!((&*lines["held_back"], &*lines["allocated"]), ("0", "0"));
+        assert_eq!(lines["valid"], "1", "what is NaN is missing");
+        // DYNOCAR_ERROR_NULL_ARGUMENT
+        assert_eq!(lines["moved"], "1");
+    }
 }
 
 #[test]
 fn the_c_example_uses_the_daemon_and_falls_back() {
     let directory = tempfile::tempdir().unwrap();
     assert_example_falls_back(&mut c_program(&example("controller.c"), Link::Shared, &directory));
+}
+
+#[test]
+fn the_cpp_example_uses_the_daemon_and_falls_back() {
+    let directory = tempfile::tempdir().unwrap();
+    let program = directory.path().join("program");
+    support::build_cpp(&example("controller.cpp"), "c++17", &program);
+    assert_example_falls_back(&mut Command::new(program));
 }
 
 #[test]

@@ -235,8 +235,34 @@ fn the_header_is_clean_c99_c11_c17_and_cpp17() {
     for standard in ["c99", "c11", "c17"] {
         must_succeed(compiler("CC", "cc", standard).arg("-fsyntax-only").arg(&source));
     }
-    let mut command = support::cpp_compiler();
+    let mut command = support::cpp_compiler("c++17");
     must_succeed(command.args(["-fsyntax-only", "-x", "c++"]).arg(&source));
+}
+
+#[test]
+fn the_wrapper_is_clean_cpp17_and_cpp20_also_without_exceptions_and_in_two_parts_of_a_program() {
+    let directory = tempfile::tempdir().unwrap();
+    let part = |name: &str, text: &str| {
+        let source = directory.path().join(name);
+        std::fs::write(&source, format!("#include \"dynocar.hpp\"\n{text}")).unwrap();
+        source
+    };
+    let parts = [
+        part(
+            "main.cpp",
+            "#include \"dynocar.hpp\"\nint other();\nint main() { return other(); }\n",
+        ),
+        part("other.cpp", "int other();\nint other() { return dynocar::daemon_state(1).state; }\n"),
+    ];
+    for standard in ["c++17", "c++20"] {
+        for options in [&[][..], &["-fno-exceptions", "-fno-rtti"]] {
+            let mut command = support::cpp_compiler(standard);
+            command.arg("-Wshadow").args(options).args(&parts).arg("-o");
+            command.arg(directory.path().join("program"));
+            command.arg(library_directory().join("libdynocar_client.a"));
+            must_succeed(command.args(["-lpthread", "-ldl", "-lm"]));
+        }
+    }
 }
 
 #[test]

@@ -74,6 +74,7 @@ gzip -9n "$root"/usr/share/man/man1/*.1
 
 # What a controller links.
 put "$project/client/include/dynocar.h" usr/include/dynocar.h
+put "$project/client/include/dynocar.hpp" usr/include/dynocar.hpp
 put "$libraries/libdynocar_client.a" usr/lib/libdynocar_client.a
 # The shared library bears the interface's version in its name; below 1.0 that is the minor one.
 minor=${version#*.} major=${version%%.*}

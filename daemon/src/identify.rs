@@ -2,8 +2,12 @@
 
 use std::sync::Arc;
 
+use dynocar_core::pipeline::braking::gear::DeclaredGear;
+use dynocar_core::pipeline::quantities::candidates;
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline, SettingError};
-use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
+use dynocar_shared::{
+    ParameterSnapshot, PipelineKind, Quantity, SampleField, TrainId, TrainSample,
+};
 
 use dynocar_analysis::dataset::{Dataset, Run};
 
@@ -55,4 +59,28 @@ pub fn default_estimators() -> Vec<EstimatorSettings> {
         .filter(|&&kind| kind != PipelineKind::Echo)
         .filter_map(|&kind| EstimatorSettings::default_of(kind))
         .collect()
+}
+
+/// The recommended estimators: the best measured one for each quantity that the train's file and the
+/// recordings permit, and the monitor of the model.
+pub fn recommended_estimators(dataset: &Dataset) -> Vec<EstimatorSettings> {
+    let best = Quantity::ALL.iter().filter(|&&quantity| is_permitted(quantity, dataset));
+    let mut kinds: Vec<_> = best.map(|&quantity| candidates(quantity)[0]).collect();
+    kinds.push(PipelineKind::ResidualMonitor);
+    kinds.dedup();
+    kinds.into_iter().filter_map(EstimatorSettings::default_of).collect()
+}
+
+/// Brake coefficients need the pressure and what the gear makes of it; the others at most wait.
+fn is_permitted(quantity: Quantity, dataset: &Dataset) -> bool {
+    let has_pressure = |run: &Run| {
+        run.samples.iter().any(|it| it.get(SampleField::BrakeCylinderPressure).is_some())
+    };
+    match quantity {
+        Quantity::BrakeFriction | Quantity::BrakingRatio => {
+            DeclaredGear::of(&dataset.train.brake_gear).is_some()
+                && dataset.runs.iter().any(has_pressure)
+        }
+        Quantity::Resistance | Quantity::Mass | Quantity::Adhesion => true,
+    }
 }

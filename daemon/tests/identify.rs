@@ -4,6 +4,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use dynocar::identify::default_estimators;
+
 const MANIFEST: &str = "[dataset]
 name = \"shuttle\"
 [train]
@@ -30,13 +32,26 @@ b = 0.02
 c = 0.0005
 ";
 
-/// A run of a train of some mass that pulls, coasts and pulls again; 10 Hz, no noise.
+/// The brake gear of a CRH3 (Xie 2019, table 1).
+const GEAR: &str = "[brake]
+max_force_kn = 60
+cylinder_diameter_mm = 203
+disc_radius_mm = 297.6
+wheel_radius_mm = 460
+efficiency = 0.85
+ratio = 2.55
+friction = 0.28
+pads = 8
+";
+
+/// A run of a train of some mass that pulls, coasts and pulls again, its brake released; 10 Hz, no
+/// noise.
 fn run(mass_kg: f64) -> String {
-    let mut text = String::from("t,v,i,F\n");
+    let mut text = String::from("t,v,i,F,p\n");
     let (step_s, mut speed_mps) = (0.1, 0.0);
     for k in 0..3000 {
         let force_n: f64 = if (k / 600) % 2 == 0 { 60e3 - 5.0 * f64::from(k % 600) } else { 0.0 };
-        writeln!(text, "{:.1},{speed_mps:.6},0,{:.3}", step_s * f64::from(k), force_n / 1e3)
+        writeln!(text, "{:.1},{speed_mps:.6},0,{:.3},0", step_s * f64::from(k), force_n / 1e3)
             .unwrap();
         let w0 = 1.5 + 0.02 * speed_mps + 0.0005 * speed_mps * speed_mps;
         let resistance_n = mass_kg * 9.81e-3 * w0;
@@ -45,19 +60,88 @@ fn run(mass_kg: f64) -> String {
     text
 }
 
-fn identify(folder: &Path, arguments: &[&str]) -> Output {
+fn write_dataset(folder: &Path, manifest: &str, train: &str) {
     for (name, text) in [
-        ("dataset.toml", MANIFEST),
-        ("train.toml", TRAIN),
+        ("dataset.toml", manifest),
+        ("train.toml", train),
         ("light.csv", &run(100e3)),
         ("heavy.csv", &run(112e3)),
     ] {
         std::fs::write(folder.join(name), text).unwrap();
     }
-    let program = env!("CARGO_BIN_EXE_dynocar");
-    let mut command = Command::new(program);
-    command.current_dir(folder).args(["identify", ".", "--estimator", "mass_kalman"]);
-    command.args(arguments).output().unwrap()
+}
+
+/// The command over what lies in a folder.
+fn asked(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dynocar"));
+    command.current_dir(folder).args(["identify", "."]).args(arguments).output().unwrap()
+}
+
+/// The names of the estimators that ran, and of those that did not.
+fn ran(folder: &Path, arguments: &[&str]) -> [Vec<String>; 2] {
+    let output = asked(folder, &[arguments, &["--json", "-"]].concat());
+    let answer: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let names = |key: &str, name: fn(&serde_json::Value) -> &serde_json::Value| {
+        let entries = answer[key].as_array().unwrap();
+        entries.iter().map(|it| name(it).as_str().unwrap().to_owned()).collect()
+    };
+    [names("estimators", |it| &it["name"]), names("not_run", |it| it)]
+}
+
+fn identify(folder: &Path, arguments: &[&str]) -> Output {
+    write_dataset(folder, MANIFEST, TRAIN);
+    asked(folder, &[&["--estimator", "mass_kalman"], arguments].concat())
+}
+
+#[test]
+fn the_recommended_estimators_run_that_the_train_and_the_recordings_permit() {
+    let folder = tempfile::tempdir().unwrap();
+    let recommended = dynocar_fmu::estimators::PIPELINES.map(|kind| kind.name());
+    let without_brake: Vec<_> =
+        recommended.iter().filter(|&&it| it != "brake_smoother").copied().collect();
+    let with_pressure = MANIFEST.replace(
+        "[[runs]]\nfile = \"light",
+        "brake_cylinder_pressure = { column = \"p\", unit = \"kPa\" }\n[[runs]]\nfile = \"light",
+    );
+    let with_gear = format!("{TRAIN}{GEAR}");
+    let all = default_estimators();
+    for (manifest, train, expected) in [
+        (MANIFEST, TRAIN, without_brake.as_slice()),
+        (MANIFEST, &with_gear, &without_brake),
+        (&with_pressure, TRAIN, &without_brake),
+        (&with_pressure, &with_gear, &recommended),
+    ] {
+        write_dataset(folder.path(), manifest, train);
+        let [estimators, not_run] = ran(folder.path(), &[]);
+        assert_eq!(estimators, expected);
+        let others = all.iter().map(|it| it.kind().name()).filter(|it| !expected.contains(it));
+        assert!(not_run.iter().eq(others), "{not_run:?}");
+    }
+    let text = String::from_utf8(asked(folder.path(), &[]).stdout).unwrap();
+    assert!(text.contains("\nnot run: ls, ") && text.contains("; --all runs them"), "{text}");
+}
+
+#[test]
+fn all_estimators_or_those_named_run_when_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    write_dataset(folder.path(), MANIFEST, TRAIN);
+    let [all, not_run] = ran(folder.path(), &["--all"]);
+    assert!(all.iter().eq(default_estimators().iter().map(|it| it.kind().name())), "{all:?}");
+    assert!(not_run.is_empty());
+    let named = ["--estimator", "rls", "--estimator", "mass_kalman", "--estimator", "rls"];
+    assert_eq!(ran(folder.path(), &named), [vec!["rls", "mass_kalman"], vec![]]);
+    for (arguments, expected) in [
+        (
+            ["--estimator", "rls", "--estimator", "guess"].as_slice(),
+            "guess: expected one of ls, rls, ",
+        ),
+        (&["--all", "--estimator", "rls"], "--all: expected no --estimator beside it, got rls"),
+    ] {
+        let output = asked(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        let words = String::from_utf8(output.stderr).unwrap();
+        assert!(words.contains(expected), "{words}");
+    }
 }
 
 #[test]

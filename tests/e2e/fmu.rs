@@ -22,13 +22,11 @@ use dynocar_fmu::{ESTIMATORS, INTERFACES};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId};
 use dynocar_tests::process::Site;
 
-#[path = "init/commands.rs"]
-mod commands;
 #[path = "fmu/plant.rs"]
 mod plant;
 #[path = "fmu/simulator.rs"]
 mod simulator;
-use commands::{done, dynocar, said};
+use crate::commands::{done, dynocar, said};
 use simulator::{Fmu, reference};
 
 /// The demo's train has no brake gear; with one, every estimator has something to learn.

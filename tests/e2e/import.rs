@@ -10,12 +10,8 @@ use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_tests::browser::Browser;
 use dynocar_tests::process::Site;
 
-#[path = "init/commands.rs"]
-mod commands;
-use commands::{done, dynocar, said};
-#[path = "init/guide.rs"]
-mod guide;
-use guide::{blocks, guide, install, run};
+use crate::commands::{done, dynocar, said};
+use crate::guide::{blocks, guide, install, run};
 
 const CORPUS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/corpus/import");
 

@@ -12,9 +12,7 @@ use serde_json::Value;
 
 #[path = "init/asked.rs"]
 mod asked;
-#[path = "init/commands.rs"]
-mod commands;
-use commands::{done, dynocar, run, said};
+use crate::commands::{done, dynocar, run, said};
 
 const DEMO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo");
 

@@ -5,9 +5,7 @@ use std::process::{Command, Stdio};
 
 use dynocar_tests::process::Site;
 
-#[path = "init/commands.rs"]
-mod commands;
-use commands::{DYNOCAR, done, dynocar, run, said};
+use crate::commands::{DYNOCAR, done, dynocar, run, said};
 
 /// Standard error of a command that must end with status 2 and write nothing into the folder `new`.
 fn refusal(site: &Site, arguments: &[&str]) -> String {

@@ -9,9 +9,8 @@ use dynocar_shared::SampleField;
 use dynocar_tests::process::{Process, Site};
 use rustix::process::Signal;
 
-#[path = "init/guide.rs"]
-mod guide;
-use guide::{DYNOCAR, ROOT, blocks, guide, install, run};
+use crate::commands::DYNOCAR;
+use crate::guide::{ROOT, blocks, guide, install, run};
 
 /// A run of the demo as a recorder with German habits would have written it.
 fn recording(run: &Run, header: &str) -> String {

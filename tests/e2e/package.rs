@@ -7,19 +7,16 @@ use std::process::{Command, Output};
 
 use dynocar_tests::process::Site;
 
-#[path = "init/commands.rs"]
-mod commands;
-#[path = "../../client/tests/support/mod.rs"]
-mod support;
-use commands::{DYNOCAR, done, dynocar, said};
-use support::{compiler, library_directory, must_succeed, require};
+use crate::commands::{DYNOCAR, done, dynocar, said};
+use crate::support::{compiler, library_directory, must_succeed, require};
 
 /// What the package must hold, for the program that is tested.
-const FILES: [&str; 18] = [
+const FILES: [&str; 19] = [
     "usr/bin/dynocar",
     "usr/lib/systemd/system/dynocar.service",
     "usr/lib/sysusers.d/dynocar.conf",
     "usr/include/dynocar.h",
+    "usr/include/dynocar.hpp",
     "usr/lib/libdynocar_client.a",
     "usr/lib/libdynocar_client.so",
     "usr/lib/pkgconfig/dynocar-client.pc",
@@ -112,8 +109,8 @@ fn the_package_is_built_installed_and_runs() {
     links_and_runs(&root, folder.path());
 }
 
-/// A controller in C is built from nothing but what the package holds: with the archive, and with
-/// the shared library as pkg-config tells it.
+/// Programs in C and C++ are built from nothing but what the package holds: with the archive, and
+/// with the shared library as pkg-config names it.
 fn links_and_runs(root: &Path, folder: &Path) {
     let (source, out) = (folder.join("version.c"), folder.join("version"));
     let text = "#include <dynocar.h>\n#include <stdio.h>\n\
@@ -138,6 +135,16 @@ fn links_and_runs(root: &Path, folder: &Path) {
     asked.env("PKG_CONFIG_PATH", library.join("pkgconfig"));
     let told = must_succeed(asked.args(["--cflags", "--libs", "dynocar-client"]));
     built(&told.split_whitespace().map(String::from).collect::<Vec<_>>());
+    let (source, words) = (folder.join("absent.cpp"), told.split_whitespace());
+    let text = "#include <dynocar.hpp>\n\
+                int main() { return dynocar::daemon_state(1, \"/nowhere\").state; }\n";
+    std::fs::write(&source, text).unwrap();
+    require("c++", "g++");
+    let cpp = folder.join("absent");
+    must_succeed(
+        Command::new("c++").arg("-std=c++17").arg(&source).args(words).arg("-o").arg(&cpp),
+    );
+    must_succeed(Command::new(&cpp).env("LD_LIBRARY_PATH", &library));
     let needed = must_succeed(Command::new("ldd").arg(&out).env("LD_LIBRARY_PATH", &library));
     let (major, minor) = (env!("CARGO_PKG_VERSION_MAJOR"), env!("CARGO_PKG_VERSION_MINOR"));
     assert!(needed.contains(&format!("libdynocar_client.so.{major}.{minor} => ")), "{needed}");

@@ -7,9 +7,7 @@ use std::process::Command;
 use dynocar_shared::services::ROOT_VARIABLE;
 use dynocar_tests::process::{Process, Site};
 
-#[path = "../../client/tests/support/mod.rs"]
-mod support;
-use support::{Link, Program};
+use crate::support::{self, Link, Program};
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const CONTROLLER: &str = env!("CARGO_BIN_EXE_dynocar-example-controller");
@@ -33,10 +31,10 @@ fn daemon_that_has_learned(site: &Site) -> Process {
 fn examples(folder: &Path) -> Vec<(&'static str, Command)> {
     let source = support::client_directory().join("examples");
     let built = |name: &str| Command::new(folder.join(name));
-    for name in ["controller", "stopping"] {
+    for (name, in_cpp) in [("controller", "controller.cpp"), ("stopping", "stopping.c")] {
         let file = source.join(format!("{name}.c"));
         support::build_c(&file, "c99", Link::Shared, &folder.join(format!("{name}-c")));
-        support::build_cpp(&file, &folder.join(format!("{name}-cpp")));
+        support::build_cpp(&source.join(in_cpp), "c++17", &folder.join(format!("{name}-cpp")));
     }
     vec![
         ("C", built("controller-c")),

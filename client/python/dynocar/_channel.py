@@ -42,7 +42,8 @@ class Snapshot:
     """A pipeline's knowledge of one train at one moment, with its age.
 
     ``raw`` holds every field of ``dynocar_parameter_snapshot``. ``code`` is ``OK``, or why there is
-    none: ``NO_SNAPSHOT`` or ``NOT_PROVIDED``; then nothing may be used.
+    none: ``NO_SNAPSHOT`` or ``NOT_PROVIDED``; then nothing may be used. ``print`` shows status, reason
+    and the values with their 95 % intervals and units, ``repr`` the same on one line.
     """
 
     def __init__(self, reading: _native.Reading) -> None:
@@ -53,6 +54,35 @@ class Snapshot:
         self.reason = Reason(reading.reason)
         self.is_stale = reading.is_stale
         self.is_usable = reading.is_usable
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name} {words}" for name, words in self._intervals())
+        return f"<Snapshot {self._verdict()}{': ' if values else ''}{values}>"
+
+    def __str__(self) -> str:
+        rows = self._intervals()
+        width = max((len(name) for name, _ in rows), default=0)
+        lines = [self._verdict(), *(f"    {name:<{width}}  {words}" for name, words in rows)]
+        if rows:
+            lines.append("± is the half width of the 95 % interval")
+        return "\n".join(lines)
+
+    def _verdict(self) -> str:
+        """Which pipeline, its status with the reason, and whether the values may be used."""
+        if self.code != Code.OK:
+            return f"{self.why}, not usable"
+        reason = "" if self.reason == Reason.NONE else f" ({self.why})"
+        use = "usable" if self.is_usable else "not usable"
+        return f"{self.pipeline_kind.name.lower()} {self.status.name.lower()}{reason}, {use}"
+
+    def _intervals(self) -> list[tuple[str, str]]:
+        """Each parameter's name, and its value with interval and unit."""
+        if self.code != Code.OK:
+            return []
+        return [
+            (name.name.lower(), _with_interval(value, self.std(name), _native.parameter_unit(name)))
+            for name, value in self.values.items()
+        ]
 
     def _or_none(self) -> Snapshot | None:
         return self if self.code == Code.OK else None
@@ -137,6 +167,14 @@ class Snapshot:
         """
         found = self.raw.resistance_at(speed_mps, mass_kg)
         return None if found is None else Resistance(*found)
+
+
+def _with_interval(value: float, std: float, unit: str) -> str:
+    """A value with its 95 % interval, to two digits of the interval."""
+    half = 1.96 * std
+    is_known = math.isfinite(half) and half > 0.0
+    decimals = min(max(1 - math.floor(math.log10(half)), 0), 7) if is_known else 3
+    return f"{value:.{decimals}f} ± {half:.{decimals}f} {unit}".rstrip()
 
 
 _Self = TypeVar("_Self", bound="_End")

@@ -10,7 +10,7 @@ import html
 import json
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
@@ -151,6 +151,7 @@ class Identified(_Answer):
     dataset: str
     notes: list[Note]
     estimators: list[Estimator]
+    not_run: list[str]  # beside the recommended ones, where nobody chose
     runs: list[Record] | None
     between_runs: list[Record] | None
 
@@ -302,17 +303,20 @@ def read_dataset(path: PathLike) -> Dataset:
 def identify(
     path: PathLike,
     *,
-    estimator: str | None = None,
+    estimator: str | Iterable[str] | None = None,
+    all: bool = False,
     per_run: bool = False,
     traction_only: bool = False,
 ) -> Identified:
     """Learns the train's parameters from a dataset with the daemon's own pipelines, to the same bits.
 
-    ``estimator`` names one (all by default), ``per_run`` also learns from each run alone and says how
-    much the runs differ, ``traction_only`` uses the forces under traction only: for recordings without
-    the friction brake's force.
+    The recommended ones that the train and the recordings permit; ``estimator`` names one or several
+    instead, ``all=True`` asks every one. ``per_run`` also learns from each run alone and says how much
+    the runs differ, ``traction_only`` uses the forces under traction only: for recordings without the
+    friction brake's force.
     """
-    answer = _native.identify(path, estimator, per_run, traction_only)
+    names = [estimator] if isinstance(estimator, str) else list(estimator or ())
+    answer = _native.identify(path, names, all, per_run, traction_only)
     return _as(Identified, answer)  # type: ignore[no-any-return]
 
 

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use dynocar_client::Host;
 use dynocar_client::ffi::about::{DaemonState, state_of_daemon};
 use dynocar_client::ffi::{Code, Rail};
+use dynocar_shared::schema::unit_of;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{
     Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Quantity, Reason, RejectionReason,
@@ -40,6 +41,12 @@ pub(crate) fn monotonic_now_ns() -> i64 {
 #[pyfunction]
 pub(crate) fn version() -> &'static str {
     env!("CARGO_PKG_VERSION")
+}
+
+/// The unit of a parameter's value; empty where it has none, or where the parameter is not known.
+#[pyfunction]
+pub(crate) fn parameter_unit(number: u32) -> &'static str {
+    Parameter::from_number(number).map_or("", |it| unit_of(it.full_name()))
 }
 
 /// Schema major of the channels, layout hashes of sample and snapshot.

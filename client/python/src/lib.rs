@@ -26,7 +26,9 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use crate::about::{daemon_state, layouts, monotonic_now_ns, version, vocabularies};
+    use crate::about::{
+        daemon_state, layouts, monotonic_now_ns, parameter_unit, version, vocabularies,
+    };
     #[pymodule_export]
     use crate::channel::{Publisher, Reader};
     #[pymodule_export]

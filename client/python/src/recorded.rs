@@ -64,13 +64,14 @@ pub(crate) fn read(py: Python<'_>, path: PathBuf) -> PyResult<(Answer, Vec<Table
 pub(crate) fn identify(
     py: Python<'_>,
     path: PathBuf,
-    estimator: Option<String>,
+    names: Vec<String>,
+    all: bool,
     per_run: bool,
     traction_only: bool,
 ) -> PyResult<Answer> {
     let answer = in_background(py, None, move |_| {
-        let estimator = estimator.as_deref();
-        let question = identifying::Question { dataset: &path, estimator, per_run, traction_only };
+        let asked = identifying::Asked::of(all, &names)?;
+        let question = identifying::Question { dataset: &path, asked, per_run, traction_only };
         let answer = identifying::answer(question)?;
         Ok((json(&answer)?, identifying::text(&answer)))
     })?;

@@ -76,8 +76,13 @@ def test_a_python_controller_goes_the_whole_way(played: PlayedDaemon) -> None:
         played.order("answer")
         snapshot, cycle = drive(publisher, reader)
         assert_is_the_played_answer(snapshot)
+        assert_it_prints_itself(snapshot)
         mass = reader.mass()
         assert (mass.why, mass.is_usable, mass.is_stale) == ("not_provided", False, True)
+        assert (str(mass), repr(mass)) == (
+            "not_provided, not usable",
+            "<Snapshot not_provided, not usable>",
+        )
         assert reader.latest(PipelineKind.RESISTANCE_KALMAN) is not None
         assert reader.latest_by_index(3) is not None
         assert reader.latest(PipelineKind.MASS_KALMAN) is None and reader.latest_by_index(4) is None
@@ -124,6 +129,21 @@ def assert_is_the_played_answer(snapshot: dynocar.Snapshot) -> None:
     assert snapshot.missing_manoeuvres == Manoeuvre.COAST_SLOW | Manoeuvre.ACCELERATE
 
 
+def assert_it_prints_itself(snapshot: dynocar.Snapshot) -> None:
+    # The halves of the intervals: 1.96 of the roots of 0.25, 0.25/3, 0.25/5 and 0.25/7.
+    assert str(snapshot).splitlines() == [
+        "resistance_kalman estimated, usable",
+        "    mass     114.50 ± 0.98 t",
+        "    davis_c  0.00 ± 0.57 N/kN per (m/s)²",
+        "    davis_a  1.70 ± 0.44 N/kN",
+        "    davis_b  0.02 ± 0.37 N/kN per m/s",
+        "± is the half width of the 95 % interval",
+    ]
+    assert repr(snapshot).startswith(
+        "<Snapshot resistance_kalman estimated, usable: mass 114.50 ± 0.98 t, davis_c 0.00"
+    )
+
+
 def assert_is_silent_at_last(reader: dynocar.SnapshotReader) -> None:
     def is_silent() -> bool:
         reader.poll()
@@ -133,6 +153,8 @@ def assert_is_silent_at_last(reader: dynocar.SnapshotReader) -> None:
     snapshot = reader.resistance()
     told = (snapshot.status.name, snapshot.why, snapshot.is_usable)
     assert told == ("INVALID", "daemon_silent", False)
+    words = "resistance_kalman invalid (daemon_silent), not usable"
+    assert str(snapshot).splitlines()[0] == words
 
 
 def assert_samples_came_through(played: PlayedDaemon) -> None:

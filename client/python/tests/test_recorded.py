@@ -108,6 +108,15 @@ def test_answers_are_those_of_the_commands(
     one = dynocar.identify(recordings, estimator="ls", per_run=True, traction_only=True)
     asked = ["--estimator", "ls", "--per-run", "--traction-only"]
     assert one.to_dict() == answer_of("identify", recordings, *asked)
+    two = dynocar.identify(recordings, estimator=["ls", "mass_kalman"])
+    asked = ["--estimator", "ls", "--estimator", "mass_kalman"]
+    assert two.to_dict() == answer_of("identify", recordings, *asked)
+    usual = dynocar.identify(recordings)
+    assert usual.to_dict() == answer_of("identify", recordings)
+    every = dynocar.identify(recordings, all=True)
+    names = [it.name for it in usual.estimators]
+    assert names[0] == "trajectory_kalman" and not every.not_run
+    assert sorted(names + usual.not_run) == sorted(it.name for it in every.estimators)
     expected = answer_of("explain", recordings)
     assert expected.pop("predictions") == {}
     assert {key: value for key, value in explanation.to_dict().items() if key != "predictions"} == (
@@ -202,6 +211,9 @@ def test_errors_are_in_the_words_of_the_commands(recordings: Path, tmp_path: Pat
     with pytest.raises(dynocar.InputError) as refusal:
         dynocar.identify(recordings, estimator="guess")
     assert str(refusal.value) == words_of("identify", recordings, "--estimator", "guess")
+    with pytest.raises(dynocar.InputError) as refusal:
+        dynocar.identify(recordings, estimator="ls", all=True)
+    assert str(refusal.value) == words_of("identify", recordings, "--all", "--estimator", "ls")
     with pytest.raises(dynocar.InputError, match="expected a dataset's folder"):
         dynocar.read_dataset(recordings / "train.toml")
 

@@ -51,14 +51,14 @@ pub fn compiler(variable: &str, default: &str, standard: &str) -> Command {
 }
 
 /// [`compiler`] for C++.
-pub fn cpp_compiler() -> Command {
+pub fn cpp_compiler(standard: &str) -> Command {
     require("c++", "g++");
-    compiler("CXX", "c++", "c++17")
+    compiler("CXX", "c++", standard)
 }
 
 /// Compiles and links a program as C++ into `out`.
-pub fn build_cpp(source: &Path, out: &Path) {
-    let mut command = cpp_compiler();
+pub fn build_cpp(source: &Path, standard: &str, out: &Path) {
+    let mut command = cpp_compiler(standard);
     command.args(["-x", "c++"]).arg(source).args(["-x", "none", "-o"]).arg(out);
     command.arg(library_directory().join("libdynocar_client.a"));
     must_succeed(command.args(["-lpthread", "-ldl", "-lm"]));

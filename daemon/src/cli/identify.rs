@@ -16,7 +16,7 @@ use self::runs::{EstimatorSpread, RunAnswer};
 use super::Failure;
 use super::text::notes;
 use crate::dataset;
-use crate::identify::{default_estimators, identify, samples_of_runs};
+use crate::identify::{default_estimators, identify, recommended_estimators, samples_of_runs};
 use crate::output::{give, require_file};
 
 /// Learn the train's parameters from recorded runs with the daemon's own pipelines.
@@ -24,9 +24,12 @@ use crate::output::{give, require_file};
 pub struct IdentifyArguments {
     /// The dataset's folder, or a recording
     dataset: PathBuf,
-    /// Only this estimator, as v_mils; all of them by default
+    /// This estimator, as v_mils; may be given several times [default: the recommended ones]
     #[arg(long, value_name = "NAME")]
-    estimator: Option<String>,
+    estimator: Vec<String>,
+    /// All estimators, the papers' methods too
+    #[arg(long)]
+    all: bool,
     /// Learn from each run alone, too, and say how much the runs differ
     #[arg(long)]
     per_run: bool,
@@ -38,13 +41,43 @@ pub struct IdentifyArguments {
     pub(super) json: Option<PathBuf>,
 }
 
+/// Which estimators are asked.
+#[derive(Clone, Copy, Debug)]
+pub enum Asked<'a> {
+    /// The recommended ones that the train and the recordings permit.
+    Recommended,
+    /// All of them.
+    All,
+    /// These, in this order.
+    Named(&'a [String]),
+}
+
+impl<'a> Asked<'a> {
+    /// As it is said: all, by name, or nothing said.
+    ///
+    /// # Errors
+    ///
+    /// All and some by name exclude each other.
+    pub fn of(all: bool, names: &'a [String]) -> Result<Self, Failure> {
+        match (all, names) {
+            (true, []) => Ok(Asked::All),
+            (true, names) => Err(Failure::Input(format!(
+                "--all: expected no --estimator beside it, got {}",
+                names.join(", ")
+            ))),
+            (false, []) => Ok(Asked::Recommended),
+            (false, names) => Ok(Asked::Named(names)),
+        }
+    }
+}
+
 /// What is to be learned from.
 #[derive(Clone, Copy, Debug)]
 pub struct Question<'a> {
     /// The dataset's folder.
     pub dataset: &'a Path,
-    /// Only this estimator; all of them by default.
-    pub estimator: Option<&'a str>,
+    /// By which estimators.
+    pub asked: Asked<'a>,
     /// From each run alone, too.
     pub per_run: bool,
     /// Use the forces under traction only.
@@ -59,6 +92,8 @@ pub struct Answer {
     notes: Vec<Note>,
     /// From all runs, one after the other.
     estimators: Vec<EstimatorAnswer>,
+    /// Estimators beside the recommended ones, where nobody chose.
+    not_run: Vec<&'static str>,
     /// From each run alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     runs: Option<Vec<RunAnswer>>,
@@ -77,7 +112,7 @@ pub fn execute(arguments: &IdentifyArguments) -> Result<(), Failure> {
     }
     let answer = answer(Question {
         dataset: &arguments.dataset,
-        estimator: arguments.estimator.as_deref(),
+        asked: Asked::of(arguments.all, &arguments.estimator)?,
         per_run: arguments.per_run,
         traction_only: arguments.traction_only,
     })?;
@@ -90,8 +125,14 @@ pub fn execute(arguments: &IdentifyArguments) -> Result<(), Failure> {
 ///
 /// A wrong dataset or estimator name is an input failure.
 pub fn answer(question: Question) -> Result<Answer, Failure> {
-    let estimators = chosen_estimators(question.estimator)?;
+    let named = match question.asked {
+        Asked::Named(names) => Some(named_estimators(names)?),
+        Asked::All => Some(default_estimators()),
+        Asked::Recommended => None,
+    };
     let mut dataset = dataset::load(question.dataset)?;
+    let is_chosen = named.is_some();
+    let estimators = named.unwrap_or_else(|| recommended_estimators(&dataset));
     if question.traction_only {
         dataset.keep_traction_only();
     }
@@ -102,6 +143,7 @@ pub fn answer(question: Question) -> Result<Answer, Failure> {
         dataset: dataset.name.clone(),
         notes: dataset.notes(),
         estimators: learned,
+        not_run: if is_chosen { Vec::new() } else { others(&estimators) },
         between_runs: runs.as_deref().map(runs::spreads),
         runs,
     })
@@ -133,16 +175,27 @@ fn by_run(dataset: &Dataset, estimators: &[EstimatorSettings]) -> Result<Vec<Run
     dataset.runs.iter().enumerate().map(one).collect()
 }
 
-fn chosen_estimators(name: Option<&str>) -> Result<Vec<EstimatorSettings>, Failure> {
+fn named_estimators(names: &[String]) -> Result<Vec<EstimatorSettings>, Failure> {
     let all = default_estimators();
-    let Some(name) = name else { return Ok(all) };
-    let chosen: Vec<_> = all.iter().filter(|it| it.kind().name() == name).cloned().collect();
-    if chosen.is_empty() {
-        let names: Vec<_> = all.iter().map(|settings| settings.kind().name()).collect();
-        let names = names.join(", ");
-        return Err(Failure::Input(format!("--estimator {name}: expected one of {names}")));
+    let mut chosen: Vec<EstimatorSettings> = Vec::new();
+    for name in names {
+        let Some(settings) = all.iter().find(|it| it.kind().name() == name) else {
+            let names: Vec<_> = all.iter().map(|settings| settings.kind().name()).collect();
+            let names = names.join(", ");
+            return Err(Failure::Input(format!("--estimator {name}: expected one of {names}")));
+        };
+        if chosen.iter().all(|it| it.kind() != settings.kind()) {
+            chosen.push(settings.clone());
+        }
     }
     Ok(chosen)
+}
+
+/// The names of all but some estimators.
+fn others(estimators: &[EstimatorSettings]) -> Vec<&'static str> {
+    let is_other =
+        |it: &EstimatorSettings| estimators.iter().all(|other| other.kind() != it.kind());
+    default_estimators().iter().filter(|it| is_other(it)).map(|it| it.kind().name()).collect()
 }
 
 /// The answer for people.
@@ -174,6 +227,9 @@ pub fn text(answer: &Answer) -> String {
     }
     if let Some(runs) = &answer.runs {
         text += &runs::report(runs);
+    }
+    if !answer.not_run.is_empty() {
+        text += &format!("\nnot run: {}; --all runs them too\n", answer.not_run.join(", "));
     }
     text + "\n± is the half width of the 95 % interval\n"
 }

@@ -4,7 +4,8 @@ use std::io::IsTerminal;
 use std::path::PathBuf;
 
 use clap::Args;
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::prelude::*;
 
 use super::Failure;
 use crate::config::{DaemonConfig, LogFormat};
@@ -34,19 +35,46 @@ pub fn execute(arguments: &RunArguments) -> Result<(), Failure> {
 
 /// Starts the log as the configuration wants it.
 pub(super) fn start_log(config: &DaemonConfig) -> Result<(), Failure> {
-    let filter = EnvFilter::try_new(&config.log).map_err(|error| {
-        let log = &config.log;
-        Failure::Input(format!("daemon.log = {log:?}: expected a level as info or debug: {error}"))
-    })?;
-    let log = tracing_subscriber::fmt()
-        .with_env_filter(filter)
+    let log = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         // A log that cannot be written is told nowhere, and ends no daemon.
         .log_internal_errors(false)
         .with_ansi(std::io::stderr().is_terminal());
-    match config.log_format {
-        LogFormat::Text => log.with_target(false).init(),
-        LogFormat::Json => log.json().init(),
-    }
+    let log = match config.log_format {
+        LogFormat::Text => log.with_target(false).boxed(),
+        LogFormat::Json => log.json().boxed(),
+    };
+    tracing_subscriber::registry().with(filter(&config.log)?).with(log).init();
     Ok(())
+}
+
+/// What is logged: a level, or levels by the modules that log.
+fn filter(log: &str) -> Result<Targets, Failure> {
+    log.parse().map_err(|error| {
+        Failure::Input(format!("daemon.log = {log:?}: expected a level as info or debug: {error}"))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use tracing::Level;
+
+    use super::*;
+
+    #[test]
+    fn a_log_is_a_level_or_levels_by_module() {
+        let is_logged =
+            |log: &str, level| filter(log).unwrap().would_enable("dynocar::run", &level);
+        assert!(is_logged("info", Level::INFO) && !is_logged("info", Level::DEBUG));
+        assert!(is_logged("dynocar=debug", Level::DEBUG));
+        assert!(!is_logged("dynocar=debug", Level::TRACE));
+        assert!(is_logged("dynocar::run=trace,warn", Level::TRACE));
+        assert!(!is_logged("dynocar::runtime=trace,warn", Level::INFO));
+        assert!(!is_logged("off", Level::ERROR));
+        let expected = "daemon.log = \"dynocar=loud\": expected a level as info or debug: ";
+        let refusal = filter("dynocar=loud").unwrap_err();
+        let is_in_words =
+            |it: &Failure| matches!(it, Failure::Input(words) if words.starts_with(expected));
+        assert!(is_in_words(&refusal), "{refusal:?}");
+    }
 }

@@ -6,7 +6,7 @@ use dynocar_core::train::TrainModel;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{SampleField, TrainSample};
 
-use crate::drive::{DELAY_S, Drive, Instant, LAG_S};
+use super::drive::{DELAY_S, Drive, Instant, LAG_S};
 
 /// A train that declares nothing but what is true of it in any case.
 pub const TRAIN: &str = "

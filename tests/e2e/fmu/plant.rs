@@ -10,9 +10,9 @@ use dynocar_fmu::{MISSING, PLANT};
 use dynocar_shared::{SampleField, TrainSample};
 use dynocar_tests::process::Site;
 
-use super::commands::{done, dynocar, said};
 use super::simulator::{Fmu, reference, reference_in};
 use super::{demo, unpacked};
+use crate::commands::{done, dynocar, said};
 
 /// What runs may add to a train: something of every sort.
 const CORRECTIONS: &str = "\n[corrections]\ntraction_gain = 1.04\nambient_w0_per_k = -0.004\nbearing_delta_a_n_per_kn = 0.6\nbearing_tau_s = 400\n\

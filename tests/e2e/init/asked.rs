@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use dynocar_tests::process::Site;
 
-use super::commands::{DYNOCAR, dynocar, run, said};
+use crate::commands::{DYNOCAR, dynocar, run, said};
 
 /// More than any machine needs.
 const WATCHDOG: Duration = Duration::from_secs(120);

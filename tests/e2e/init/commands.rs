@@ -1,7 +1,5 @@
 //! Commands as a person types them, and a recording to give them.
 
-#![allow(dead_code, reason = "each test uses its own part")]
-
 use std::fmt::Write as _;
 use std::process::{Command, Output, Stdio};
 

@@ -1,13 +1,12 @@
 //! A guide of `docs/guides`, and its commands as a reader types them.
 
-#![allow(dead_code, reason = "each test uses its own part")]
-
 use std::path::Path;
 use std::process::{Command, Stdio};
 
 use dynocar_tests::process::Site;
 
-pub const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
+use crate::commands::DYNOCAR;
+
 pub const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
 /// A guide's text.

@@ -1,0 +1,9 @@
+//! What `explain` finds, and what it does not.
+
+mod declared_terms;
+mod every_kind;
+mod explain;
+mod forms;
+mod gradient_error;
+mod grown_model;
+mod told_by_data;

@@ -1,0 +1,16 @@
+//! The daemon beside controllers, in processes of their own.
+
+mod accounting;
+mod adoption;
+mod daemon;
+mod faults;
+mod golden;
+mod hostile;
+mod identical;
+mod implausible;
+mod properties;
+mod replay;
+mod restart;
+mod state;
+mod supervision;
+mod wake_model;

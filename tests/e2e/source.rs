@@ -1,0 +1,8 @@
+//! What the sources and the documents hold, looked at as text: one program, which is linked once.
+
+mod circles;
+mod explain_numbers;
+mod layering;
+mod promises;
+mod sizes;
+mod troubles;

@@ -1,0 +1,14 @@
+//! The simulator of trains, and what is learned from its recordings.
+
+mod advice;
+mod couplings;
+mod drive_power;
+mod effects;
+mod files;
+mod force_sampling;
+mod physics;
+mod places;
+mod plausibility;
+mod residual_monitor;
+mod survey;
+mod surveyed_masses;
