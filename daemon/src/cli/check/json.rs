@@ -15,6 +15,8 @@ use super::Understood;
 use super::daemon::{self, DaemonAnswer};
 use crate::cli::{ErrorAnswer, Failure};
 use crate::dataset::FileKind;
+use crate::models::Moment;
+use crate::run_facts::recorded;
 
 /// The answer of `dynocar check --json`.
 #[derive(Debug, Serialize)]
@@ -69,6 +71,9 @@ struct RunAnswer<'a> {
 enum RunOutcome<'a> {
     Read {
         mass_kg: f64,
+        /// In UTC; left out where nothing tells it.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        recorded: Option<Moment>,
         samples: usize,
         position_source: PositionSource,
         gradient_source: GradientSource,
@@ -201,6 +206,7 @@ fn dataset<'a>(manifest: &'a Manifest, runs: &'a [Result<Run, DatasetError>]) ->
             Err(error) => RunOutcome::Failed { error: error.to_string() },
             Ok(run) => RunOutcome::Read {
                 mass_kg: run.mass_kg,
+                recorded: recorded(run),
                 samples: run.samples.len(),
                 position_source: run.position_source,
                 gradient_source: run.gradient_source,

@@ -80,7 +80,7 @@ impl<'c> Assignment<'c> {
         let is_unit_open = told.unit.is_none() && named_unit(&column.name, quantity).is_none();
         let mut guessed = self.guessed(index, quantity, unit);
         guessed.reasons.insert(0, "told on the command line".into());
-        guessed.is_unit_open = is_unit_open;
+        guessed.is_unit_open = is_unit_open && guessed.format.is_none();
         self.taken.push((index, guessed, true));
         Ok(())
     }
@@ -88,7 +88,11 @@ impl<'c> Assignment<'c> {
     fn guessed(&self, index: usize, quantity: Quantity, unit: UnitChoice) -> GuessedColumn {
         let column = &self.columns[index];
         let middle = column.all.middle().unwrap_or(f64::NAN);
-        GuessedColumn::new(quantity, column.name.clone(), unit, middle)
+        let guessed = GuessedColumn::new(quantity, column.name.clone(), unit, middle);
+        match quantity {
+            Quantity::Time => guessed.written_as(&column.all.formats()),
+            _ => guessed,
+        }
     }
 
     /// The best candidate first, then the best of those that are left.
@@ -103,7 +107,7 @@ impl<'c> Assignment<'c> {
             let mut guessed = self.guessed(column, quantity, unit);
             guessed.reasons.insert(0, reason);
             guessed.doubts.splice(0..0, doubt);
-            guessed.is_unit_open = is_unit_open;
+            guessed.is_unit_open = is_unit_open && guessed.format.is_none();
             self.taken.push((column, guessed, false));
         }
     }
