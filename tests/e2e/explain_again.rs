@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use dynocar::dataset::{load, open};
+use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::process::Site;
 use dynocar_tests::simulator::dataset_writer::write_dataset;
 use dynocar_tests::simulator::{
-    Defects, Effect, EffectRequest, SimulatorSettings, TrainType, simulate,
+    Defects, Effect, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate,
 };
 
 #[path = "init/commands.rs"]
@@ -40,22 +41,22 @@ fn shown_command(words: &str) -> Vec<String> {
     line.1.split(' ').map(str::to_owned).collect()
 }
 
-/// A poor recording of a place that resists, on a line that nobody wrote down.
+/// A poor recording of places that resist in every run, on a line that nobody wrote down.
 fn recorded(site: &Site) {
-    let resistance = Effect::LocalResistance {
-        extra_n_per_kn: 2.5,
-        intervals_m: vec![(2500.0, 4000.0)],
-        runs: Vec::new(),
-    };
-    let settings = SimulatorSettings {
+    let settings = |seed| SimulatorSettings {
         train_type: Some(TrainType::Regional),
         is_level_and_straight: true,
         defects: Defects::ALL,
-        duration_s: 600.0,
-        ..SimulatorSettings::new(SEED, EffectRequest::Exactly(vec![resistance]))
+        ..SimulatorSettings::new(seed, EffectRequest::Kinds(vec![EffectKind::LocalResistance]))
     };
+    let is_in_every_run = |simulated: &SimulatedDataset| match &simulated.effects[..] {
+        [Effect::LocalResistance { runs, .. }] => runs.is_empty(),
+        _ => false,
+    };
+    let mut drawn = (SEED..).map(|seed| simulate(&settings(seed)));
+    let simulated = drawn.find(is_in_every_run).expect("one of many");
     let folder = site.path().join("day");
-    write_dataset(&simulate(&settings), &folder).unwrap();
+    write_dataset(&simulated, &folder).unwrap();
     without_a_line(&folder);
 }
 

@@ -104,7 +104,7 @@ impl Table {
             return Err(Place::whole(label).problem(Problem::NoHeader));
         }
         let header: Vec<String> = record.iter().map(|name| lossy(name).trim().into()).collect();
-        let mut rows = Rows::new(label, layout, mappings, &header, line_of(&record, layout))?;
+        let mut rows = Rows::new((label, text), layout, mappings, &header, &record)?;
         let mut has_row = read(&mut record)?;
         if layout.units_row && has_row {
             rows.require_units(&record)?;
@@ -149,13 +149,20 @@ pub(super) fn below<'t>(
     Ok(rest)
 }
 
-fn line_of(record: &ByteRecord, layout: &TextLayout) -> usize {
-    record.position().map_or(0, |it| it.line() as usize + layout.skip_rows)
+/// The line of a text, from 1, in which a record begins. The reader stands at the end of the line before,
+/// or before blank lines.
+pub(super) fn line_of(text: &str, record: &ByteRecord) -> usize {
+    let Some(position) = record.position() else { return 0 };
+    let rest = text.as_bytes().get(position.byte() as usize..).unwrap_or_default();
+    let ends = rest.iter().take_while(|byte| b"\r\n".contains(byte));
+    position.line() as usize + ends.filter(|&&byte| byte == b'\n').count()
 }
 
 /// The rows read so far.
 struct Rows<'m> {
     label: &'m str,
+    /// What stands below the lines that are passed over.
+    text: &'m str,
     width: usize,
     layout: &'m TextLayout,
     columns: Vec<Column<'m>>,
@@ -182,21 +189,23 @@ enum Flaw {
 
 impl<'m> Rows<'m> {
     fn new(
-        label: &'m str,
+        (label, text): (&'m str, &'m str),
         layout: &'m TextLayout,
         mappings: &'m [ColumnMapping],
         header: &[String],
-        header_line: usize,
+        record: &ByteRecord,
     ) -> Result<Self, DatasetError> {
         let mut columns = Vec::with_capacity(mappings.len());
         for mapping in mappings {
-            let index = find_column(mapping, header, layout)
-                .map_err(|problem| Place::line(label, header_line).problem(problem))?;
+            let place = || Place::line(label, layout.skip_rows + line_of(text, record));
+            let index =
+                find_column(mapping, header, layout).map_err(|problem| place().problem(problem))?;
             let clock = mapping.format.as_ref().map(DayClock::new);
             columns.push(Column { mapping, index, clock, values: Vec::new() });
         }
         Ok(Rows {
             label,
+            text,
             width: header.len(),
             layout,
             columns,
@@ -206,6 +215,10 @@ impl<'m> Rows<'m> {
         })
     }
 
+    fn line_of(&self, record: &ByteRecord) -> usize {
+        self.layout.skip_rows + line_of(self.text, record)
+    }
+
     /// Refuses a row of values in the place of that of units, which would be lost.
     fn require_units(&self, record: &ByteRecord) -> Result<(), DatasetError> {
         for column in &self.columns {
@@ -213,7 +226,7 @@ impl<'m> Rows<'m> {
             let is_number = parse_cell(cell, self.layout.decimal).is_some_and(|it| !it.is_nan());
             // The unit "1" is one.
             if is_number && cell != b"1" {
-                let place = Place::line(self.label, line_of(record, self.layout));
+                let place = Place::line(self.label, self.line_of(record));
                 let (column, found) = (column.mapping.column.clone(), lossy(cell).into());
                 return Err(place.problem(Problem::NoUnits { column, found }));
             }
@@ -223,7 +236,7 @@ impl<'m> Rows<'m> {
 
     /// Takes in a row; what is wrong with it stays pending.
     fn push(&mut self, record: &ByteRecord) -> Result<(), DatasetError> {
-        let line = line_of(record, self.layout);
+        let line = self.line_of(record);
         let place = || Place::line(self.label, line);
         if record.len() < self.width && record.as_slice().contains(&b'\n') {
             return Err(place().problem(Problem::UnclosedQuote));

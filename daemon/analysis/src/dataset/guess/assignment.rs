@@ -37,7 +37,8 @@ impl<'c> Assignment<'c> {
         };
         for it in told {
             let problem = assignment.take_told(it, columns);
-            problem.map_err(|problem| GuessError::new(Place::line(label, 1), problem))?;
+            let place = || Place::line(label, columns.skip_rows + 1);
+            problem.map_err(|problem| GuessError::new(place(), problem))?;
         }
         for (index, column) in columns.columns.iter().enumerate() {
             if column.unusable.is_some() || assignment.is_taken(index) {

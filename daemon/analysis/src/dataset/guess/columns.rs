@@ -7,7 +7,7 @@ use super::guessed::{GuessResult, Recording};
 use super::layout::{Layout, layout};
 use super::name::Name;
 use super::problem::{GuessError, GuessProblem};
-use crate::dataset::table::{below, reader};
+use crate::dataset::table::{below, line_of, reader};
 use crate::dataset::{Place, Problem};
 
 /// A column of the first file's header.
@@ -163,7 +163,7 @@ fn read_file(file: &Recording, layout: &Layout, decimal: u8) -> GuessResult<(Vec
         if rows <= above {
             continue;
         }
-        let line = record.position().map_or(0, |it| it.line() as usize + layout.skip_rows);
+        let line = line_of(text, &record) + layout.skip_rows;
         for (facts, cell) in facts.iter_mut().zip(&record) {
             facts.push_cell(line, cell.trim_ascii(), decimal);
         }

@@ -6,7 +6,7 @@ use super::name::Name;
 use super::problem::{GuessError, GuessProblem};
 use super::spelling;
 use crate::dataset::cell::parse_cell;
-use crate::dataset::table::reader;
+use crate::dataset::table::{line_of, reader};
 use crate::dataset::{Place, Problem, TimeFormat};
 
 /// What may separate cells, in the order of preference.
@@ -80,7 +80,7 @@ pub fn layout(label: &str, text: &str) -> Result<Layout, GuessError> {
     let (named, units) = (&rows[block.header], block.units.map(|units| &rows[units]));
     let name = |(index, cell): (usize, &String)| {
         let unit = units.and_then(|row| row.cells.get(index)).map(|cell| without_brackets(cell));
-        Name::parse(cell).with_unit(unit.filter(|unit| spelling::is_unit(unit)))
+        Name::parse(cell).with_unit(unit.filter(|unit| !unit.is_empty() && spelling::is_unit(unit)))
     };
     Ok(Layout {
         delimiter: *delimiter,
@@ -95,7 +95,7 @@ fn first_rows(text: &str, delimiter: u8) -> Vec<Row> {
     let mut reader = reader(text, delimiter);
     let (mut rows, mut record) = (Vec::new(), ByteRecord::new());
     while rows.len() <= ROWS_MAX && matches!(reader.read_byte_record(&mut record), Ok(true)) {
-        let line = record.position().map_or(1, |position| position.line() as usize);
+        let line = line_of(text, &record);
         let cells = record.iter().map(|cell| String::from_utf8_lossy(cell).into()).collect();
         rows.push(Row { line, cells });
     }
@@ -270,11 +270,8 @@ mod tests {
         let padded =
             format!("Logger;XY 7;\nSerial;1234;\n\nt;v;F\ns;km/h;[kN]\n{rows}").replace(',', ";");
         let units = vec![unit("s"), unit("km/h"), unit("kN")];
-        assert_eq!(
-            told(&padded),
-            (2, true, plain.clone(), units),
-            "a blank line counts to the names"
-        );
+        assert_eq!(told(&padded), (3, true, plain.clone(), units), "a blank line counts, too");
+        assert_eq!(told(&padded.replace('\n', "\r\n")).0, 3, "as Windows ends lines");
         let timed =
             "Messung vom 18.03.2026\nZeit;v;F\n;km/h;kN\n07:13:20,2;1,5;\n07:13:20,4;1,6;\n";
         let (skip_rows, units_row, names, _) = told(timed);

@@ -103,7 +103,7 @@ pub fn can_hold(facts: &Facts, quantity: Quantity) -> Result<(), String> {
 
 /// A column of times, whatever its name.
 fn by_cells() -> Match {
-    Match { score: SURE, reason: "its cells".into(), unit: None }
+    Match { score: SURE, reason: "what it holds".into(), unit: None }
 }
 
 /// The unit that a column's name gives for a quantity.

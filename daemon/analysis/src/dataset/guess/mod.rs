@@ -53,7 +53,7 @@ pub fn guess(files: &[Recording], told: &[Told]) -> Result<Guess, GuessError> {
         if !assignment.has(quantity) {
             let (reasons, columns) = (assignment.near(quantity), read.names());
             let problem = GuessProblem::Missing { quantity, reasons, columns };
-            return Err(GuessError::new(Place::line(label, 1), problem));
+            return Err(GuessError::new(Place::line(label, read.skip_rows + 1), problem));
         }
     }
     let (columns, unmapped) = assignment.finish();

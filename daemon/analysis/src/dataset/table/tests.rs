@@ -141,6 +141,10 @@ fn lines_above_the_names_and_units_below_them_are_passed_over() {
         refused("skip_rows = 9", "t,v\n0,1\n1,2"),
         "a.csv: skip_rows = 9: expected lines above the names, but the file has 3 lines"
     );
+    assert_eq!(
+        refused("skip_rows = 1", "Logger\r\nt,v\r\n0,1\r\n\r\n1,x\r\n2,1\r\n"),
+        "a.csv:5: column 'v': expected a number or an empty cell, got 'x'"
+    );
     let message = refused("skip_rows = 1", "t,v\n0,1\n1,2\n");
     assert!(message.starts_with("a.csv:2: unknown column 't'"), "{message}");
     assert_eq!(
