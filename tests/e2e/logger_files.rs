@@ -78,6 +78,7 @@ fn a_german_loggers_file_that_passes_midnight_is_described_and_read() {
     let checked = done(&site, &["check", "zug"]);
     assert!(checked.contains("2026-03-18 23:56:40"), "{checked}");
     assert!(checked.contains("km/h is the top speed"), "{checked}");
+    assert!(checked.contains("'Zeit' as times like 07:13:20.2"), "{checked}");
     let identified = done(&site, &["identify", "zug", "--estimator", "v_mils"]);
     assert!(identified.contains(" km/h ") && !identified.contains(" m/s"), "{identified}");
 }
@@ -118,7 +119,7 @@ fn a_wrong_description_of_a_loggers_file_is_named_with_line_and_what_helps() {
             "skip_rows = 2000",
             "skip_rows = 2000: expected lines above the names, but the",
         ),
-        ("skip_rows = 3", "skip_rows = 0", "a.csv:1: unknown column 'Zeit'"),
+        ("skip_rows = 3", "skip_rows = 0", "stand in line 4: set skip_rows = 3"),
         (
             "units_row = true",
             "units_row = false",

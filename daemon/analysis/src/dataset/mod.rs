@@ -14,7 +14,7 @@
 //! - [`manifest`], [`train_file`], [`track_file`]: the three TOML files
 //! - [`quantity`]: what a column may hold, in which [`units`](dynocar_core::units)
 //! - [`encoding`], [`text_layout`], [`clock`]: how text falls into cells, and times that are no numbers
-//! - `cell`, `table`: a CSV file as columns of numbers
+//! - `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
 //! - `order`, `spikes`, `motion`, `power`, `forces`, [`stamps`], `altitude`: from columns to time, speed,
 //!   position, forces and gradient
 //! - `resolved`, [`run`], [`quality`], `findings`, [`remark`], `remarking`, `declared`, [`note`]: samples,
@@ -34,6 +34,8 @@ mod finding_unit;
 mod findings;
 mod forces;
 pub mod guess;
+mod header;
+mod lines;
 pub mod manifest;
 mod motion;
 mod names;

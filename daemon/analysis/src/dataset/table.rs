@@ -1,12 +1,13 @@
 //! A run's CSV file as columns of numbers.
 
-use csv::{ByteRecord, ReaderBuilder};
+use csv::ByteRecord;
 
 use super::cell::{held, lossy, not_a_value, parse_cell};
 use super::clock::DayClock;
 use super::error::{DatasetError, Place, Problem};
+use super::header::{find_column, misplaced};
+use super::lines::{below, line_of, reader};
 use super::manifest::ColumnMapping;
-use super::names::Choices;
 use super::quantity::Quantity;
 use super::text_layout::TextLayout;
 
@@ -89,6 +90,7 @@ impl Table {
         text: &str,
         (layout, mappings): (&TextLayout, &[ColumnMapping]),
     ) -> Result<Self, DatasetError> {
+        let whole = text;
         let text = below(label, text, layout.skip_rows)?;
         let is_closed = text.ends_with(['\n', '\r']);
         let mut reader = reader(text, layout.delimiter);
@@ -104,7 +106,12 @@ impl Table {
             return Err(Place::whole(label).problem(Problem::NoHeader));
         }
         let header: Vec<String> = record.iter().map(|name| lossy(name).trim().into()).collect();
-        let mut rows = Rows::new((label, text), layout, mappings, &header, &record)?;
+        let mut rows = Rows::new((label, text), layout, mappings, &header)
+            .map_err(|problem| misplaced(problem, whole, (layout, mappings)))
+            .map_err(|problem| {
+                let line = layout.skip_rows + line_of(text, &record);
+                Place::line(label, line).problem(problem)
+            })?;
         let mut has_row = read(&mut record)?;
         if layout.units_row && has_row {
             rows.require_units(&record)?;
@@ -119,43 +126,6 @@ impl Table {
         }
         rows.finish()
     }
-}
-
-/// A reader of a text's rows.
-pub(super) fn reader(text: &str, delimiter: u8) -> csv::Reader<&[u8]> {
-    ReaderBuilder::new()
-        .delimiter(delimiter)
-        .has_headers(false)
-        .flexible(true)
-        .from_reader(text.as_bytes())
-}
-
-/// A text without its byte-order mark and the lines above the names.
-pub(super) fn below<'t>(
-    label: &str,
-    text: &'t str,
-    skip_rows: usize,
-) -> Result<&'t str, DatasetError> {
-    let mut rest = text.strip_prefix('\u{feff}').unwrap_or(text);
-    for lines in 0..skip_rows {
-        let Some(end) = rest.find(['\n', '\r']) else {
-            let lines = lines + usize::from(!rest.is_empty());
-            let problem = Problem::NothingBelow { skip_rows, lines };
-            return Err(Place::whole(label).problem(problem));
-        };
-        let is_pair = rest[end..].starts_with("\r\n");
-        rest = &rest[end + 1 + usize::from(is_pair)..];
-    }
-    Ok(rest)
-}
-
-/// The line of a text, from 1, in which a record begins. The reader stands at the end of the line before,
-/// or before blank lines.
-pub(super) fn line_of(text: &str, record: &ByteRecord) -> usize {
-    let Some(position) = record.position() else { return 0 };
-    let rest = text.as_bytes().get(position.byte() as usize..).unwrap_or_default();
-    let ends = rest.iter().take_while(|byte| b"\r\n".contains(byte));
-    position.line() as usize + ends.filter(|&&byte| byte == b'\n').count()
 }
 
 /// The rows read so far.
@@ -193,13 +163,10 @@ impl<'m> Rows<'m> {
         layout: &'m TextLayout,
         mappings: &'m [ColumnMapping],
         header: &[String],
-        record: &ByteRecord,
-    ) -> Result<Self, DatasetError> {
+    ) -> Result<Self, Problem> {
         let mut columns = Vec::with_capacity(mappings.len());
         for mapping in mappings {
-            let place = || Place::line(label, layout.skip_rows + line_of(text, record));
-            let index =
-                find_column(mapping, header, layout).map_err(|problem| place().problem(problem))?;
+            let index = find_column(mapping, header, layout)?;
             let clock = mapping.format.as_ref().map(DayClock::new);
             columns.push(Column { mapping, index, clock, values: Vec::new() });
         }
@@ -309,32 +276,6 @@ impl<'m> Rows<'m> {
         let columns = self.columns.into_iter();
         let columns = columns.map(|column| (column.mapping.quantity, column.values)).collect();
         Ok(Table { columns, line_of_row: self.line_of_row, first_day, lines: self.lines })
-    }
-}
-
-fn find_column(
-    mapping: &ColumnMapping,
-    header: &[String],
-    layout: &TextLayout,
-) -> Result<usize, Problem> {
-    let name = &mapping.column;
-    let count = header.iter().filter(|other| *other == name).count();
-    match count {
-        1 => Ok(header.iter().position(|other| other == name).unwrap_or(0)),
-        0 => {
-            let other = [';', ',', '\t', '|'].into_iter().find(|mark| header[0].contains(*mark));
-            Err(match (header.len(), other) {
-                (1, Some(found)) => {
-                    Problem::OtherDelimiter { expected: char::from(layout.delimiter), found }
-                }
-                _ => {
-                    let context = format!(" (for {} in {})", mapping.quantity, mapping.place);
-                    let choices = Choices::new(name, header.iter().cloned());
-                    Problem::UnknownName { what: "column", name: name.clone(), context, choices }
-                }
-            })
-        }
-        _ => Err(Problem::RepeatedColumn { column: name.clone(), count }),
     }
 }
 

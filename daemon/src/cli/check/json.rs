@@ -4,7 +4,7 @@ use std::path::Path;
 
 use dynocar_analysis::dataset::{
     ColumnMapping, DatasetError, DatasetHead, ForceSource, GradientSource, Manifest, Note,
-    PositionSource, Quantity, Remark, Role, Run, RunEntry, RunQuality,
+    PositionSource, Quantity, Remark, Role, Run, RunEntry, RunQuality, TimeFormat,
 };
 use dynocar_core::terms::extra::Extra;
 use dynocar_core::track::{LinearProfile, Track};
@@ -53,6 +53,9 @@ struct ColumnAnswer<'a> {
     quantity: Quantity,
     column: &'a str,
     unit: &'static str,
+    /// How its cells are written, where they are times and no numbers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    format: Option<&'a str>,
     scale: f64,
     offset: f64,
 }
@@ -195,6 +198,7 @@ fn dataset<'a>(manifest: &'a Manifest, runs: &'a [Result<Run, DatasetError>]) ->
         quantity: mapping.quantity,
         column: &mapping.column,
         unit: mapping.unit.name(),
+        format: mapping.format.as_ref().map(TimeFormat::name),
         scale: mapping.scale,
         offset: mapping.offset,
     };

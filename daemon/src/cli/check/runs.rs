@@ -2,7 +2,8 @@
 
 use dynocar_analysis::dataset::quality::{QuantityCount, ReasonCount};
 use dynocar_analysis::dataset::{
-    DatasetError, ForceSource, GradientSource, Manifest, Note, PositionSource, Remark, Role, Run,
+    DatasetError, ForceSource, GradientSource, Manifest, Note, PositionSource, Quantity, Remark,
+    Role, Run, is_parquet,
 };
 use dynocar_core::plausibility::Slip;
 
@@ -23,7 +24,7 @@ pub(super) fn report(manifest: &Manifest, runs: &[Read], of_dataset: &[Note]) ->
     text += &data_table(runs).to_string();
     text.push('\n');
     text += &sources(runs);
-    text += &notes(runs, of_dataset);
+    text += &notes(manifest, runs, of_dataset);
     text
 }
 
@@ -165,7 +166,7 @@ fn source(name: &str, runs: &[Read], of: impl Fn(&Run) -> &'static str) -> Strin
 }
 
 /// What to know, each note once with its runs, first what cannot be true; nothing when all is well.
-fn notes(runs: &[Read], of_dataset: &[Note]) -> String {
+fn notes(manifest: &Manifest, runs: &[Read], of_dataset: &[Note]) -> String {
     let number = |file: &String| {
         let run = runs.iter().flatten().find(|run| run.file == *file);
         run.map_or_else(String::new, |run| run.number.to_string())
@@ -177,7 +178,7 @@ fn notes(runs: &[Read], of_dataset: &[Note]) -> String {
         .collect();
     for (index, run) in runs.iter().enumerate() {
         let of_run = match run {
-            Ok(run) => notes_on(run),
+            Ok(run) => notes_on(manifest, run),
             Err(error) => vec![error.to_string()],
         };
         let number = (index + 1).to_string();
@@ -201,7 +202,19 @@ fn notes(runs: &[Read], of_dataset: &[Note]) -> String {
     if text.is_empty() { text } else { format!("\nnotes\n{text}") }
 }
 
-fn notes_on(run: &Run) -> Vec<String> {
+/// A time of a run: in s, or as the clock that its file shows.
+fn time(manifest: &Manifest, run: &Run, time_s: f64) -> String {
+    let has_format = manifest.mapping(Quantity::Time).is_some_and(|it| it.format.is_some());
+    if !has_format || is_parquet(&run.file) {
+        return format!("{} s", short(time_s, 3));
+    }
+    let of_day_s = time_s.rem_euclid(86_400.0);
+    let minutes = (of_day_s / 60.0).floor();
+    let (hour, minute) = ((minutes / 60.0).floor(), minutes % 60.0);
+    format!("{hour:02}:{minute:02}:{:06.3}", of_day_s - 60.0 * minutes)
+}
+
+fn notes_on(manifest: &Manifest, run: &Run) -> Vec<String> {
     let quality = &run.quality;
     let mut notes = Vec::new();
     let mut list = |counts: Vec<String>, what: &str| {
@@ -218,11 +231,8 @@ fn notes_on(run: &Run) -> Vec<String> {
     let refused = quality.refused.iter().map(|refused| {
         let ReasonCount { reason, count, first_line, first_s } = refused;
         let which = if *count == 1 { "" } else { "the first " };
-        format!(
-            "{reason} {count} ({which}in {}:{first_line}, at {} s)",
-            run.file,
-            short(*first_s, 3)
-        )
+        let at = time(manifest, run, *first_s);
+        format!("{reason} {count} ({which}in {}:{first_line}, at {at})", run.file)
     });
     list(refused.collect(), "refused by validation");
     if quality.rows_without_time > 0 {

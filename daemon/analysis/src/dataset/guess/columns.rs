@@ -7,7 +7,7 @@ use super::guessed::{GuessResult, Recording};
 use super::layout::{Layout, layout};
 use super::name::Name;
 use super::problem::{GuessError, GuessProblem};
-use crate::dataset::table::{below, line_of, reader};
+use crate::dataset::lines::{below, line_of, reader};
 use crate::dataset::{Place, Problem};
 
 /// A column of the first file's header.

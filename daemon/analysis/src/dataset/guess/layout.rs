@@ -6,7 +6,7 @@ use super::name::Name;
 use super::problem::{GuessError, GuessProblem};
 use super::spelling;
 use crate::dataset::cell::parse_cell;
-use crate::dataset::table::{line_of, reader};
+use crate::dataset::lines::{line_of, reader};
 use crate::dataset::{Place, Problem, TimeFormat};
 
 /// What may separate cells, in the order of preference.
