@@ -52,11 +52,11 @@ fn dated(second: u32) -> String {
 fn a_german_loggers_file_that_passes_midnight_is_described_and_read() {
     let site = Site::new();
     write(site.path().join("a.csv"), logged(clock)).unwrap();
-    let told = done(&site, &["init", "zug", "--mass-t", "100", "--csv", "a.csv"]);
+    let shown = done(&site, &["init", "zug", "--mass-t", "100", "--csv", "a.csv"]);
     for words in
         ["letters are windows-1252", "the names stand in line 4", "units stand in the line below"]
     {
-        assert!(told.contains(words), "{words}: {told}");
+        assert!(shown.contains(words), "{words}: {shown}");
     }
     let path = site.path().join("zug/dataset.toml");
     let text = read_to_string(&path).unwrap();
@@ -84,7 +84,7 @@ fn a_german_loggers_file_that_passes_midnight_is_described_and_read() {
 }
 
 #[test]
-fn times_with_a_date_tell_the_day_in_answers_and_reports() {
+fn times_with_a_date_give_the_day_of_answers_and_reports() {
     let site = Site::new();
     write(site.path().join("a.csv"), logged(dated)).unwrap();
     write(site.path().join("b.csv"), logged(dated)).unwrap();

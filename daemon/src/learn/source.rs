@@ -18,7 +18,7 @@ use crate::models::Moment;
 use crate::report::provenance::hex;
 use crate::text_file::read_beginning;
 
-/// So much of a file tells when it was recorded.
+/// So much of a file shows when it was recorded.
 const BEGINNING_BYTES: u64 = 1 << 16;
 /// How deep folders lie in the folder of runs.
 const DEPTH_MAX: usize = 6;

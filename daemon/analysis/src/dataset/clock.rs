@@ -59,8 +59,8 @@ impl TimeFormat {
         }
     }
 
-    /// True where it tells the day, too.
-    pub fn tells_date(&self) -> bool {
+    /// True where it holds the day, too.
+    pub fn has_date(&self) -> bool {
         match self {
             TimeFormat::Iso => true,
             TimeFormat::Clock => false,
@@ -87,7 +87,7 @@ impl TimeFormat {
     }
 }
 
-/// The marks of a pattern that tell a part of a time.
+/// The marks of a pattern that stand for a part of a time.
 const DAY: &[char] = &['d', 'e', 'F', 'D'];
 const MONTH: &[char] = &['m', 'b', 'B', 'F', 'D'];
 const YEAR: &[char] = &['Y', 'y', 'F', 'D'];
@@ -127,7 +127,7 @@ impl DayClock {
         &self.format
     }
 
-    /// The day of the first row, counted from 1970-01-01; `None` where the times tell no date.
+    /// The day of the first row, counted from 1970-01-01; `None` where the times hold no date.
     pub fn first_day(&self) -> Option<i64> {
         self.first_day
     }
@@ -152,7 +152,7 @@ impl DayClock {
         Some(time_s)
     }
 
-    /// The day, where it is told, and the second of it, in UTC.
+    /// The day, where the cell holds it, and the second of it, in UTC.
     fn read(&self, cell: &[u8]) -> Option<(Option<i64>, f64)> {
         let mut parsed = Parsed::new();
         let mut rest = cell;

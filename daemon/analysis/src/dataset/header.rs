@@ -12,7 +12,7 @@ use super::text_layout::TextLayout;
 /// So many lines are searched for names that stand elsewhere than declared.
 const LINES_MAX: usize = 100;
 
-/// What is wrong with the names, with the line in which they stand instead where that can be told.
+/// What is wrong with the names, with the line in which they stand instead where that is found.
 pub fn misplaced(
     problem: Problem,
     text: &str,

@@ -261,9 +261,8 @@ fn runs(root: &Section, columns: &[ColumnMapping]) -> Result<Vec<RunEntry>, Data
     let mut runs: Vec<RunEntry> = Vec::new();
     for section in root.tables("runs")? {
         let run = run(&section)?;
-        let tells_date =
-            |it: &ColumnMapping| it.format.as_ref().is_some_and(TimeFormat::tells_date);
-        if run.date_unix_s.is_some() && columns.iter().any(tells_date) {
+        let has_date = |it: &ColumnMapping| it.format.as_ref().is_some_and(TimeFormat::has_date);
+        if run.date_unix_s.is_some() && columns.iter().any(has_date) {
             let (key, other) = (section.full("date"), "columns.time.format with a date".into());
             return Err(section.place_of("date").problem(Problem::Exclusive { key, other }));
         }

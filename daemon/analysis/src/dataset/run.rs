@@ -58,7 +58,7 @@ pub struct Run {
     pub role: Role,
     /// 1 while the chainage grows, -1 while it falls.
     pub direction: i8,
-    /// When it was recorded, in s since 1970 UTC, where its file or the dataset tells.
+    /// When it was recorded, in s since 1970 UTC, where its file or the dataset holds that.
     pub recorded_unix_s: Option<i64>,
     /// The run's declared gross mass in kg, else the train's nominal one.
     pub mass_kg: f64,
@@ -212,7 +212,7 @@ fn table_of(
 }
 
 /// When a run was recorded, in s since 1970 UTC, by the beginning of its file or as declared; `None` where
-/// nothing tells. The file's text is asked for where its times may tell, and may break off anywhere.
+/// nothing says. The file's text is asked for where its times may hold it, and may break off anywhere.
 pub fn recorded_unix_s(
     manifest: &Manifest,
     entry: &RunEntry,

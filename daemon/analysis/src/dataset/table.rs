@@ -17,7 +17,7 @@ pub(super) struct Table {
     columns: Vec<(Quantity, Vec<f64>)>,
     /// The line, from 1, of every row.
     line_of_row: Vec<usize>,
-    /// The day of the first row, counted from 1970-01-01, where the times tell it.
+    /// The day of the first row, counted from 1970-01-01, where the times hold it.
     pub first_day: Option<i64>,
     /// What was odd about the lines.
     pub lines: LineCounts,

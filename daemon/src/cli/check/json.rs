@@ -74,7 +74,7 @@ struct RunAnswer<'a> {
 enum RunOutcome<'a> {
     Read {
         mass_kg: f64,
-        /// In UTC; left out where nothing tells it.
+        /// In UTC; left out where it is not known.
         #[serde(skip_serializing_if = "Option::is_none")]
         recorded: Option<Moment>,
         samples: usize,

@@ -93,11 +93,11 @@ fn layout_text(guess: &Guess, encoding: &'static Encoding) -> String {
     text
 }
 
-/// The day of a run, where its times do not tell it.
+/// The day of a run, where its times do not hold it.
 fn date_text(guess: &Guess, run: &GuessedRun) -> String {
     let format = guess.column(Quantity::Time).and_then(|time| time.format.as_ref());
     match (format, run.day) {
-        (Some(format), _) if format.tells_date() => String::new(),
+        (Some(format), _) if format.has_date() => String::new(),
         (_, Some(day)) => {
             let day = Moment { unix_s: 86_400 * u64::try_from(day).unwrap_or(0) }.day();
             format!("date = {day:<24}# as the column of dates says\n")

@@ -20,7 +20,7 @@ pub fn texts(paths: &[PathBuf]) -> Result<(Vec<(String, String)>, &'static Encod
     for path in paths {
         let label = path.display().to_string();
         let unread = |problem| file_error(&label, problem);
-        // What tells other formats than text must know whether every other byte may be 0.
+        // In UTF-16 every other byte may be 0, which is a mark of other formats elsewhere.
         let begins = guessed(&read_beginning(path, 2).map_err(unread)?);
         let is_wide = [UTF_16LE, UTF_16BE].contains(&begins);
         let bytes = read_bytes(path, if is_wide { begins } else { UTF_8 }).map_err(unread)?;

@@ -99,12 +99,17 @@ impl Facts {
     pub fn push_cell(&mut self, line: usize, cell: &[u8], decimal: u8) {
         match parse_cell(cell, decimal) {
             Some(value) if value.is_nan() || self.clocks.is_empty() => self.push(value),
-            None if self.numbers == 0 || !self.clocks.is_empty() => match self.time_s(cell) {
+            None if self.may_hold_times() => match self.time_s(cell) {
                 Some(time_s) => self.push(time_s),
                 None => self.push_text(line, &String::from_utf8_lossy(cell)),
             },
             _ => self.push_text(line, &String::from_utf8_lossy(cell)),
         }
+    }
+
+    /// True while every cell so far was empty or a time.
+    fn may_hold_times(&self) -> bool {
+        self.text.is_none() && (self.numbers == 0 || !self.clocks.is_empty())
     }
 
     /// A cell's time in the likeliest format that holds for all cells so far.

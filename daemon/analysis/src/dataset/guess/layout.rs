@@ -11,7 +11,7 @@ use crate::dataset::{Place, Problem, TimeFormat};
 
 /// What may separate cells, in the order of preference.
 const DELIMITERS: [u8; 4] = *b";\t|,";
-/// So many rows tell the layout.
+/// So many rows show the layout.
 const ROWS_MAX: usize = 200;
 
 /// How a file's text falls into cells.
@@ -251,8 +251,8 @@ mod tests {
     }
 
     #[test]
-    fn lines_above_the_names_and_units_below_them_are_told_apart() {
-        let told = |text: &str| {
+    fn lines_above_the_names_and_units_below_them_are_distinguished() {
+        let read = |text: &str| {
             let layout = layout("a.csv", text).unwrap();
             let names: Vec<String> = layout.header.iter().map(|name| name.text.clone()).collect();
             let units: Vec<Option<String>> =
@@ -262,21 +262,21 @@ mod tests {
         let unit = |text: &str| Some(text.to_string());
         let (none, plain) = (vec![None, None, None], "t v F".to_string());
         let rows = "0,1,2\n1,2,3\n2,3,4\n";
-        assert_eq!(told(&format!("t,v,F\n{rows}")), (0, false, plain.clone(), none.clone()));
+        assert_eq!(read(&format!("t,v,F\n{rows}")), (0, false, plain.clone(), none.clone()));
         assert_eq!(
-            told(&format!("Recorder X,v2\nt,v,F\n{rows}")),
+            read(&format!("Recorder X,v2\nt,v,F\n{rows}")),
             (1, false, plain.clone(), none.clone())
         );
         let padded =
             format!("Logger;XY 7;\nSerial;1234;\n\nt;v;F\ns;km/h;[kN]\n{rows}").replace(',', ";");
         let units = vec![unit("s"), unit("km/h"), unit("kN")];
-        assert_eq!(told(&padded), (3, true, plain.clone(), units), "a blank line counts, too");
-        assert_eq!(told(&padded.replace('\n', "\r\n")).0, 3, "as Windows ends lines");
+        assert_eq!(read(&padded), (3, true, plain.clone(), units), "a blank line counts, too");
+        assert_eq!(read(&padded.replace('\n', "\r\n")).0, 3, "as Windows ends lines");
         let timed =
             "Messung vom 18.03.2026\nZeit;v;F\n;km/h;kN\n07:13:20,2;1,5;\n07:13:20,4;1,6;\n";
-        let (skip_rows, units_row, names, _) = told(timed);
+        let (skip_rows, units_row, names, _) = read(timed);
         assert_eq!((skip_rows, units_row, &names[..]), (1, true, "Zeit v F"));
         let missing = format!("t,v,F\n0,n/a,n/a\n{rows}");
-        assert_eq!(told(&missing), (0, false, plain, none), "text among the values is no header");
+        assert_eq!(read(&missing), (0, false, plain, none), "text among the values is no header");
     }
 }

@@ -61,7 +61,7 @@ pub fn guess(files: &[Recording], told: &[Told]) -> Result<Guess, GuessError> {
     let position =
         position.and_then(|it| read.columns.iter().find(|column| column.name == it.name));
     let time = columns.iter().find(|column| column.quantity == Quantity::Time);
-    let lacks_date = time.is_some_and(|it| it.format.as_ref().is_some_and(|it| !it.tells_date()));
+    let lacks_date = time.is_some_and(|it| it.format.as_ref().is_some_and(|it| !it.has_date()));
     let dates = read.columns.iter().filter(|_| lacks_date);
     let runs = files.iter().zip(&read.rows).enumerate().map(|(index, (file, &rows))| GuessedRun {
         label: file.label.into(),

@@ -324,7 +324,7 @@ fn a_loggers_preamble_units_and_clock_times_are_described() {
 }
 
 #[test]
-fn dates_are_told_by_their_cells_and_doubtful_where_day_and_month_could_be_exchanged() {
+fn dates_are_recognised_by_their_cells_and_doubtful_where_day_and_month_could_be_exchanged() {
     let read = |times: [&str; 3]| {
         let row = |(k, time): (usize, &str)| format!("{time};{}\n", 10 + k);
         let rows: String = times.into_iter().enumerate().map(row).collect();
