@@ -123,10 +123,13 @@ impl Row {
         own.peek().is_some() && !own.any(is_value)
     }
 
-    /// True where at least half of the cells are units and none is a value.
+    /// True where at least half of the cells are units and none is a value. Letters alone are as well the
+    /// names of columns: t, v, F.
     fn is_of_units(&self) -> bool {
-        let units = self.filled().filter(|cell| spelling::is_unit(&without_brackets(cell))).count();
-        self.is_of_words() && units > 0 && 2 * units >= self.filled().count()
+        let cells: Vec<String> = self.filled().map(without_brackets).collect();
+        let units: Vec<&String> = cells.iter().filter(|cell| spelling::is_unit(cell)).collect();
+        let is_plain = units.iter().any(|unit| unit.chars().count() > 1);
+        self.is_of_words() && is_plain && 2 * units.len() >= cells.len()
     }
 }
 
@@ -271,6 +274,8 @@ mod tests {
             format!("Logger;XY 7;\nSerial;1234;\n\nt;v;F\ns;km/h;[kN]\n{rows}").replace(',', ";");
         let units = vec![unit("s"), unit("km/h"), unit("kN")];
         assert_eq!(read(&padded), (3, true, plain.clone(), units), "a blank line counts, too");
+        let tabular = format!("Zug;Fahrer;Strecke\nET 1;X;Y\nt;v;F\n{rows}").replace(',', ";");
+        assert_eq!(read(&tabular), (2, false, plain.clone(), none.clone()), "letters are names");
         assert_eq!(read(&padded.replace('\n', "\r\n")).0, 3, "as Windows ends lines");
         let timed =
             "Messung vom 18.03.2026\nZeit;v;F\n;km/h;kN\n07:13:20,2;1,5;\n07:13:20,4;1,6;\n";
