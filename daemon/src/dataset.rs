@@ -1,17 +1,18 @@
 //! Datasets on disk; a recording is one once it is unpacked.
 
-use std::fs::{File, FileType};
-use std::io::{ErrorKind, Read};
-use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 
+use dynocar_analysis::dataset::encoding::decoded;
 use dynocar_analysis::dataset::{
-    ColumnMapping, Dataset, DatasetError, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE,
-    Place, Problem, is_parquet, parse_track, parse_train, top_keys,
+    Dataset, DatasetError, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Manifest, Place,
+    Problem, is_parquet, parse_track, parse_train, top_keys,
 };
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
+use dynocar_core::units::Unit;
 
+pub use crate::text_file::read_text;
+use crate::text_file::{read_bytes, require_regular};
 pub use crate::unpacking::is_recording;
 use crate::unpacking::{UnpackError, Unpacked, rows_of};
 
@@ -88,6 +89,11 @@ impl DatasetFolder {
         Ok(DatasetFolder { folder, manifest: path.into(), recording: None })
     }
 
+    /// True for a recording, whose files lie there only while this does.
+    pub fn is_unpacked(&self) -> bool {
+        self.recording.is_some()
+    }
+
     /// Where a file lies that the dataset names.
     pub fn path_of(&self, path: &str) -> PathBuf {
         if path == MANIFEST_FILE { self.manifest.clone() } else { self.folder.join(path) }
@@ -99,13 +105,14 @@ impl DatasetFiles for DatasetFolder {
         read_text(&self.path_of(path))
     }
 
-    fn read_run(&self, path: &str, columns: &[ColumnMapping]) -> Result<String, FileProblem> {
+    fn read_run(&self, path: &str, manifest: &Manifest) -> Result<String, FileProblem> {
         let file = self.path_of(path);
         if !is_parquet(path) {
-            return read_text(&file);
+            let encoding = manifest.layout.encoding;
+            return decoded(read_bytes(&file, encoding)?, encoding);
         }
         require_regular(&file)?;
-        rows_of(&file, columns).map_err(FileProblem::Table)
+        rows_of(&file, &manifest.columns).map_err(FileProblem::Table)
     }
 
     fn label(&self, path: &str) -> String {
@@ -194,8 +201,22 @@ pub fn kind_of(keys: &[String]) -> Option<FileKind> {
 ///
 /// The first mistake, with file, line and choices.
 pub fn load(path: &Path) -> Result<Dataset, LoadError> {
+    load_with_speed_unit(path).map(|(dataset, _)| dataset)
+}
+
+/// Reads a dataset with all its runs, and the unit in which they hold the speed.
+///
+/// # Errors
+///
+/// The first mistake, with file, line and choices.
+pub fn load_with_speed_unit(path: &Path) -> Result<(Dataset, Unit), LoadError> {
     let folder = DatasetFolder::at(path)?;
-    Dataset::load(&folder).map_err(|error| match error.place.file == folder.label(MANIFEST_FILE) {
+    let read = || {
+        let head = DatasetHead::open(&folder)?;
+        let unit = head.manifest.speed_unit();
+        Ok((head.read(&folder)?, unit))
+    };
+    read().map_err(|error: DatasetError| match error.place.file == folder.label(MANIFEST_FILE) {
         true => other_kind(&folder.manifest, error),
         false => error.into(),
     })
@@ -230,89 +251,10 @@ fn labelled_text(path: &Path) -> Result<(String, String), LoadError> {
 /// The error of a file that was named itself and cannot be read.
 pub fn file_error(label: &str, problem: FileProblem) -> DatasetError {
     let line = match problem {
-        FileProblem::NotUtf8 { line } => Some(line),
+        FileProblem::NotUtf8 { line } | FileProblem::OtherEncoding { line, .. } => Some(line),
         _ => None,
     };
     Place { file: label.into(), line }.problem(Problem::File(problem))
-}
-
-/// A longer file is refused instead of filling the memory.
-const BYTES_MAX: u64 = 4 << 30;
-/// So many bytes tell other formats from text.
-const HEAD_BYTES: u64 = 1024;
-
-/// What a path leads to that is neither a file nor a folder.
-fn irregular(kind: FileType) -> Option<&'static str> {
-    let kinds = [
-        (kind.is_fifo(), "a pipe"),
-        (kind.is_socket(), "a socket"),
-        (kind.is_char_device() || kind.is_block_device(), "a device"),
-    ];
-    kinds.into_iter().find(|(is_it, _)| *is_it).map(|(_, name)| name)
-}
-
-/// The format of a file that begins so and is no text in UTF-8; `None` for what may be.
-fn other_format(head: &[u8]) -> Option<&'static str> {
-    let begins: [(&[u8], &'static str); 5] = [
-        (&[0x1f, 0x8b], "a gzip file: unpack it first"),
-        (b"PK\x03\x04", "a zip file or a workbook: unpack it, or save the sheet as CSV"),
-        (b"\xd0\xcf\x11\xe0", "a workbook: save the sheet as CSV"),
-        (&[0xff, 0xfe], "UTF-16: save the file as UTF-8"),
-        (&[0xfe, 0xff], "UTF-16: save the file as UTF-8"),
-    ];
-    let known = begins.into_iter().find(|(mark, _)| head.starts_with(mark)).map(|(_, name)| name);
-    known.or_else(|| match head.iter().position(|&byte| byte == 0) {
-        Some(0) => Some("binary data"),
-        // Every other byte of letters and digits.
-        Some(1) => Some("UTF-16: save the file as UTF-8"),
-        _ => None,
-    })
-}
-
-fn unreadable(error: std::io::Error) -> FileProblem {
-    match error.kind() {
-        ErrorKind::NotFound => FileProblem::Missing,
-        ErrorKind::IsADirectory => FileProblem::IsFolder,
-        kind => FileProblem::Unreadable(kind),
-    }
-}
-
-/// Refuses what is no file of a size that can be read, before it is opened: opening a pipe may wait for
-/// ever.
-fn require_regular(path: &Path) -> Result<(), FileProblem> {
-    let found = std::fs::metadata(path).map_err(unreadable)?;
-    if let Some(what) = irregular(found.file_type()) {
-        return Err(FileProblem::NotRegular(what));
-    }
-    if found.is_dir() {
-        return Err(FileProblem::IsFolder);
-    }
-    if found.len() > BYTES_MAX {
-        return Err(FileProblem::TooLarge { most: BYTES_MAX, found: found.len() });
-    }
-    Ok(())
-}
-
-/// Reads a text file.
-///
-/// # Errors
-///
-/// When there is none, it is no regular file, too large, of another format, not UTF-8 or not
-/// readable.
-pub fn read_text(path: &Path) -> Result<String, FileProblem> {
-    require_regular(path)?;
-    let mut file = File::open(path).map_err(unreadable)?;
-    let mut bytes = Vec::new();
-    file.by_ref().take(HEAD_BYTES).read_to_end(&mut bytes).map_err(unreadable)?;
-    if let Some(what) = other_format(&bytes) {
-        return Err(FileProblem::NotText(what));
-    }
-    // A file that grows while it is read is no longer than it was said to be by much.
-    file.take(BYTES_MAX).read_to_end(&mut bytes).map_err(unreadable)?;
-    String::from_utf8(bytes).map_err(|error| {
-        let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-        FileProblem::NotUtf8 { line: 1 + good.iter().filter(|&&byte| byte == b'\n').count() }
-    })
 }
 
 #[cfg(test)]

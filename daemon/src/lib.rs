@@ -10,19 +10,22 @@
 //! - [`annotation`]: an explanation beside the data that it explains
 //! - [`learn`]: recorded runs into candidates for the store
 //! - [`models`]: a store of models
-//! - [`grown`]: the model with its effects as train and track files
+//! - [`grown`]: the model with its effects as train and track files, and a dataset of them
 //! - [`output`]: where results go
+//! - [`paths`]: files as seen from a folder
 //! - [`pipelines`]: the pipelines that a configuration asks for
 //! - [`programs`]: commands that are programs of their own
 //! - [`report`]: an explanation as a page of HTML
 //! - [`demo`]: the main job as a show
 //! - [`run`]: the daemon, every stage on one screen
+//! - [`run_facts`]: what is shown of a recorded run
 //! - [`runtime`]: its threads
 //! - [`shadow`]: models on trial, and the change from one to another
 //! - [`state`]: estimates that outlive the daemon
 //! - [`storage`]: files that are replaced as a whole
 //! - [`supervision`]: what a supervisor and an operator see of the daemon
 //! - [`survey`]: raw recordings to a dataset on a surveyed line
+//! - [`text_file`]: text files from disk
 //! - [`track_text`]: the text of a line's file
 //! - [`unpacking`]: recordings as datasets
 //! - [`replay`]: recorded runs into the sample channel
@@ -38,16 +41,19 @@ pub mod identify;
 pub mod learn;
 pub mod models;
 pub mod output;
+pub mod paths;
 pub mod pipelines;
 pub mod programs;
 pub mod replay;
 pub mod report;
 pub mod run;
+pub mod run_facts;
 pub mod runtime;
 pub mod shadow;
 pub mod state;
 pub mod storage;
 pub mod supervision;
 pub mod survey;
+pub mod text_file;
 pub mod track_text;
 pub mod unpacking;

@@ -14,6 +14,7 @@ mod init;
 mod init_refused;
 mod learn;
 mod learn_page;
+mod logger_files;
 mod output;
 mod own_train;
 mod package;

@@ -85,7 +85,7 @@ fn every_kind_written_as_a_grown_model_is_applied_to_the_bit() {
             let fit = problem.fit(&base.model.with(hypothesis), theta, base.noise);
             let mut train_table = text(&files, "train.toml").parse().expect("TOML");
             let mut track_table = text(&files, "track.toml").parse().expect("TOML");
-            if !grow(&fit, &mut train_table, Some(&mut track_table)).is_empty() {
+            if !grow(&fit, &mut train_table, &mut track_table).is_empty() {
                 continue;
             }
             let train = parse_train("train.toml", &train_table.to_string()).expect("a train");

@@ -10,7 +10,9 @@ use std::sync::Arc;
 
 use dynocar::config::DaemonConfig;
 use dynocar::state::{entry::StateContent, file};
-use dynocar_analysis::dataset::{Dataset, parse_track, parse_train};
+use dynocar_analysis::dataset::encoding::{decoded, guessed};
+use dynocar_analysis::dataset::guess::{Recording, guess};
+use dynocar_analysis::dataset::{Dataset, Quantity, parse_track, parse_train};
 use dynocar_analysis::import::{Reading, Source, import};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
 use dynocar_core::train::TrainModel;
@@ -25,6 +27,8 @@ pub enum Target {
     Dataset,
     /// A run's table.
     Csv,
+    /// A logger's file: its letters, a guess of what it holds, and its table as declared.
+    Logger,
     /// A train file.
     Train,
     /// A track file.
@@ -42,7 +46,7 @@ pub enum Target {
 }
 
 /// What readers stumble over.
-const TOKENS: [&str; 22] = [
+const TOKENS: [&str; 26] = [
     "nan",
     "-inf",
     "1e999",
@@ -65,18 +69,24 @@ const TOKENS: [&str; 22] = [
     "\u{fffd}",
     "true",
     "9223372036854775807",
+    "23:59:59.999",
+    "2026-02-30T24:60:60",
+    "+99:99",
+    "9999-12-31T23:59:59-23:59",
 ];
 
 const TRAIN: &str = include_str!("../corpus/train/demo.toml");
 const TRACK: &str = include_str!("../corpus/track/demo.toml");
 const DATASET: &str = include_str!("../corpus/dataset/dataset.toml");
 const CSV: &str = include_str!("../corpus/csv/run.csv");
+const LOGGER: &str = include_str!("../corpus/dataset/logger.toml");
 
 impl Target {
     /// All of them.
-    pub const ALL: [Target; 9] = [
+    pub const ALL: [Target; 10] = [
         Target::Dataset,
         Target::Csv,
+        Target::Logger,
         Target::Train,
         Target::Track,
         Target::Import,
@@ -102,6 +112,7 @@ impl Target {
         match self {
             Target::Dataset => feed_dataset(&text, CSV),
             Target::Csv => feed_dataset(DATASET, &text),
+            Target::Logger => feed_logger(bytes),
             Target::Train => parse_train("train.toml", &text).is_ok_and(|train| {
                 assert!(train.mass_kg.is_finite() && train.mass_kg > 0.0, "{train:?}");
                 true
@@ -168,6 +179,17 @@ fn feed_dataset(manifest: &str, csv: &str) -> bool {
         }
         true
     })
+}
+
+fn feed_logger(bytes: &[u8]) -> bool {
+    let Ok(text) = decoded(bytes.to_vec(), guessed(bytes)) else { return false };
+    let is_read = feed_dataset(LOGGER, &text);
+    let recording = [Recording { label: "run.csv", text: &text }];
+    let is_guessed = guess(&recording, &[]).is_ok_and(|guess| {
+        assert!(guess.column(Quantity::Speed).is_some(), "{guess:?}");
+        true
+    });
+    is_read || is_guessed
 }
 
 fn demo_train() -> Arc<TrainModel> {

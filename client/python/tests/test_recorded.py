@@ -150,7 +150,7 @@ def test_an_explanation_is_an_object(recordings: Path, tmp_path: Path) -> None:
     with pytest.raises(AttributeError, match="cannot be changed"):
         effect.kind = "wind"
     grown = explanation.write_grown(tmp_path / "grown")
-    assert [file.name for file in grown.files] == ["train.toml", "track.toml"]
+    assert [file.name for file in grown.files] == ["train.toml", "track.toml", "dataset.toml"]
     assert all(dynocar.check(file).valid for file in grown.files)
     assert explanation.statement in grown.files[0].read_text()
 

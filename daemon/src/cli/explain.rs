@@ -15,7 +15,7 @@ use dynocar_analysis::explain::{Explanation, explain};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Failure;
-use super::text::notes;
+use super::text::{for_shell, notes};
 use crate::annotation::{AnnotationError, annotate};
 use crate::dataset::{self, DatasetFolder};
 use crate::grown::{GROWN_FILES, GROWN_MARK, GrownError, GrownFiles, write_grown};
@@ -44,7 +44,7 @@ pub struct ExplainArguments {
     /// Write the speeds that the model with the effect predicts for the holdout runs
     #[arg(long, value_name = "DIR")]
     predictions: Option<PathBuf>,
-    /// Write the grown model as train.toml and track.toml into this folder
+    /// Write the grown model, and a dataset of it and the runs, into this folder
     #[arg(long, value_name = "DIR")]
     grown: Option<PathBuf>,
     /// Write a report for people: one HTML page that needs nothing else
@@ -87,6 +87,9 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
     if let Some(folder) = &arguments.grown {
         if explanation.answer.impossibilities().next().is_none() {
             tell_grown(&grow(folder, path, &explanation)?);
+            let again = if arguments.traction_only { " --traction-only" } else { "" };
+            let folder = for_shell(&folder.display().to_string());
+            tell(&format!("what is left with it: dynocar explain {folder}{again}"));
         } else {
             tell(IMPOSSIBLE);
         }

@@ -10,7 +10,7 @@ use dynocar_fmu::{ESTIMATORS, PLANT};
 use super::Failure;
 use crate::dataset;
 use crate::fmu::{FmuError, INPUTS_MARK, archive, find_library, inputs, read_library};
-use crate::grown::GROWN_FILES;
+use crate::models::text::{TRACK_FILE, TRAIN_FILE};
 use crate::output::{require_file, require_folder, tell, write_file, write_in_folder};
 
 /// Write the estimators, or the train itself, as an FMU for co-simulation (FMI 2.0), for Simulink,
@@ -103,7 +103,7 @@ fn named_files(
 
 /// The texts of a grown train and, where it is known, its line.
 fn files_of_grown(folder: &Path) -> Result<Vec<(ModelFile, String)>, Failure> {
-    let [train, track] = GROWN_FILES.map(|name| folder.join(name));
+    let [train, track] = [TRAIN_FILE, TRACK_FILE].map(|name| folder.join(name));
     named_files(Some(&train), track.exists().then_some(&*track))
 }
 

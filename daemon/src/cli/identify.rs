@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use dynocar_analysis::dataset::{Dataset, Note};
 use dynocar_core::pipeline::EstimatorSettings;
+use dynocar_core::units::Unit;
 use dynocar_shared::TrainId;
 use serde::Serialize;
 
@@ -88,6 +89,9 @@ pub struct Question<'a> {
 #[derive(Debug, Serialize)]
 pub struct Answer {
     dataset: String,
+    /// The unit in which the runs hold the speed.
+    #[serde(skip)]
+    speed_unit: Unit,
     /// What may spoil the results, the worst first.
     notes: Vec<Note>,
     /// From all runs, one after the other.
@@ -130,17 +134,19 @@ pub fn answer(question: Question) -> Result<Answer, Failure> {
         Asked::All => Some(default_estimators()),
         Asked::Recommended => None,
     };
-    let mut dataset = dataset::load(question.dataset)?;
+    let (mut dataset, speed_unit) = dataset::load_with_speed_unit(question.dataset)?;
     let is_chosen = named.is_some();
     let estimators = named.unwrap_or_else(|| recommended_estimators(&dataset));
     if question.traction_only {
         dataset.keep_traction_only();
     }
     let all: Vec<usize> = (0..dataset.runs.len()).collect();
-    let learned = learned(&dataset, &all, &estimators)?;
-    let runs = if question.per_run { Some(by_run(&dataset, &estimators)?) } else { None };
+    let learned = learned(&dataset, &all, (&estimators, speed_unit))?;
+    let by_run = || by_run(&dataset, (&estimators, speed_unit));
+    let runs = if question.per_run { Some(by_run()?) } else { None };
     Ok(Answer {
         dataset: dataset.name.clone(),
+        speed_unit,
         notes: dataset.notes(),
         estimators: learned,
         not_run: if is_chosen { Vec::new() } else { others(&estimators) },
@@ -153,7 +159,7 @@ pub fn answer(question: Question) -> Result<Answer, Failure> {
 fn learned(
     dataset: &Dataset,
     runs: &[usize],
-    estimators: &[EstimatorSettings],
+    (estimators, speed_unit): (&[EstimatorSettings], Unit),
 ) -> Result<Vec<EstimatorAnswer>, Failure> {
     let samples = samples_of_runs(runs.iter().map(|&index| &dataset.runs[index]), TrainId(1));
     let snapshots: Vec<_> = std::thread::scope(|scope| {
@@ -164,14 +170,17 @@ fn learned(
         threads.into_iter().map(|thread| thread.join().expect("an estimator")).collect()
     });
     let answer = |(settings, snapshot): (&EstimatorSettings, Result<_, _>)| match snapshot {
-        Ok(snapshot) => Ok(EstimatorAnswer::of(settings.kind(), &snapshot)),
+        Ok(snapshot) => Ok(EstimatorAnswer::of(settings.kind(), &snapshot, speed_unit)),
         Err(error) => Err(Failure::Input(format!("{error}"))),
     };
     estimators.iter().zip(snapshots).map(answer).collect()
 }
 
-fn by_run(dataset: &Dataset, estimators: &[EstimatorSettings]) -> Result<Vec<RunAnswer>, Failure> {
-    let one = |(index, run)| Ok(RunAnswer::of(run, learned(dataset, &[index], estimators)?));
+fn by_run(
+    dataset: &Dataset,
+    learners: (&[EstimatorSettings], Unit),
+) -> Result<Vec<RunAnswer>, Failure> {
+    let one = |(index, run)| Ok(RunAnswer::of(run, learned(dataset, &[index], learners)?));
     dataset.runs.iter().enumerate().map(one).collect()
 }
 
@@ -215,18 +224,15 @@ pub fn text(answer: &Answer) -> String {
             let std = it.std.get(name).copied().unwrap_or(f64::NAN);
             text += &format!("    {name:<24} {value:>12.6} ± {:.6}\n", 1.96 * std);
         }
-        let step = (it.resistance.len() / 6).max(1);
-        for point in it.resistance.iter().step_by(step) {
-            text += &format!(
-                "    w0 at {:>5.1} m/s          {:>12.4} ± {:.4} N/kN\n",
-                point.speed_mps,
-                point.w0_n_per_kn,
-                1.96 * point.std
-            );
+        for point in &it.resistance_shown {
+            let at = answer.speed_unit.from_base(point.speed_mps);
+            let name = format!("w0 at {at:>4.0} {}", answer.speed_unit.name());
+            let (w0, half) = (point.w0_n_per_kn, 1.96 * point.std);
+            text += &format!("    {name:<24} {w0:>12.4} ± {half:.4} N/kN\n");
         }
     }
     if let Some(runs) = &answer.runs {
-        text += &runs::report(runs);
+        text += &runs::report(runs, answer.speed_unit);
     }
     if !answer.not_run.is_empty() {
         text += &format!("\nnot run: {}; --all runs them too\n", answer.not_run.join(", "));

@@ -6,6 +6,7 @@ mod daemon_text;
 mod dataset_text;
 mod described;
 mod draft;
+mod letters;
 mod paths;
 mod summary;
 
@@ -67,12 +68,7 @@ fn describe(
     train: &mut TrainText,
     has_track: bool,
 ) -> Result<Described, Failure> {
-    let mut texts = Vec::new();
-    for path in &arguments.csv {
-        let label = path.display().to_string();
-        let text = read_text(path).map_err(|problem| file_error(&label, problem))?;
-        texts.push((label, text));
-    }
+    let (texts, encoding) = letters::texts(&arguments.csv)?;
     let files = paths::from_folder(arguments.folder(), &arguments.csv)?;
     let recordings: Vec<Recording> =
         texts.iter().map(|(label, text)| Recording { label, text }).collect();
@@ -89,7 +85,7 @@ fn describe(
     let name = dataset_text::name_of(arguments.folder());
     let mut corrections = 0;
     loop {
-        let text = dataset_text::dataset(&guess, &name, &files, has_track);
+        let text = dataset_text::dataset(&guess, &name, (&files, encoding), has_track);
         let csv = files.iter().map(String::as_str).zip(recordings.iter().copied());
         let draft = Draft {
             folder: arguments.folder(),
@@ -104,7 +100,7 @@ fn describe(
         corrections += 1;
         if !is_corrected {
             let notes = notes(&head.train, head.track.as_deref(), &runs);
-            return Ok(Described { guess, files, notes, text });
+            return Ok(Described { guess, encoding, files, notes, text });
         }
     }
 }
@@ -125,7 +121,7 @@ fn failure(error: GuessError) -> Failure {
     let message = match *error.problem {
         GuessProblem::Missing { quantity, .. } => format!(
             "{error}; say which it is: --column {quantity}=COLUMN:UNIT{}",
-            if quantity == Quantity::Time { " (numbers that grow, not dates)" } else { "" }
+            if quantity == Quantity::Time { " (numbers or times that grow)" } else { "" }
         ),
         _ => error.to_string(),
     };

@@ -9,13 +9,14 @@ use dynocar_core::pipeline::EstimatorSettings;
 use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::{PipelineKind, TrainId};
 
+use super::apart;
 use super::checker::Checker;
 use super::raw::{
     RawConfig, RawMetrics, RawPipeline, RawQuantities, RawState, RawThread, RawTrain,
 };
 use super::{
     Answers, ConfigError, DaemonConfig, IdleStrategy, PipelineConfig, StateConfig, ThreadConfig,
-    TrainConfig, is_slow,
+    TrainConfig,
 };
 use crate::dataset::LoadError;
 use crate::models::ModelText;
@@ -38,7 +39,7 @@ pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
     for (train, named) in trains.iter_mut().zip(&named) {
         train.answers = Answers::settle(&checker, train.id, named, &raw.quantities, &pipelines)?;
     }
-    keep_slow_apart(&checker, &pipelines, &threads)?;
+    apart::keep_slow_apart(&checker, &pipelines, &threads)?;
     let in_use: HashSet<usize> = pipelines.iter().map(|pipeline| pipeline.thread).collect();
     if let Some(unused) = (0..threads.len()).find(|thread| !in_use.contains(thread)) {
         return checker.refuse("threads.name", &threads[unused].name, "a thread of a pipeline");
@@ -192,7 +193,7 @@ fn check_pipelines(
                         Some(place) => place,
                         None => {
                             let key = format!("pipelines.{name}.thread");
-                            return checker.refuse(key, thread, "the name of a [[threads]] table");
+                            return checker.refuse(key, &thread, apart::names_one(&thread));
                         }
                     }
                 }
@@ -200,27 +201,6 @@ fn check_pipelines(
             Ok(PipelineConfig { name, estimator, thread, trains })
         })
         .collect()
-}
-
-/// A slow pipeline may compute for milliseconds: it never shares a thread with a fast one.
-fn keep_slow_apart(
-    checker: &Checker,
-    pipelines: &[PipelineConfig],
-    threads: &[ThreadConfig],
-) -> Result<(), ConfigError> {
-    let is_slow = |pipeline: &PipelineConfig| is_slow(pipeline.estimator.kind());
-    for slow in pipelines.iter().filter(|pipeline| is_slow(pipeline)) {
-        let mut others = pipelines.iter().filter(|it| it.thread == slow.thread && !is_slow(it));
-        if let Some(fast) = others.next() {
-            let key = format!("pipelines.{}.thread", slow.name);
-            let allowed = format!(
-                "a thread without fast pipelines as {}, which {} would hold up",
-                fast.name, slow.name
-            );
-            return checker.refuse(key, &threads[slow.thread].name, allowed);
-        }
-    }
-    Ok(())
 }
 
 fn check_estimator(

@@ -3,6 +3,7 @@
 //! Unknown keys are refused; a value outside its range is refused with key, value and range.
 //! File names inside the configuration are relative to the configuration file.
 
+mod apart;
 mod check;
 mod checker;
 mod error;

@@ -40,6 +40,27 @@ mod tests {
         let expected = "pipelines.trajectory_newton.thread = t: expected a thread without fast \
                         pipelines as rls";
         assert!(message.contains(expected), "{message}");
+        // The lines that are shown do, in the place of those that were refused.
+        let (_, lines) = message.split_once("do:\n\n").unwrap();
+        assert_eq!(lines.lines().next(), Some("[[threads]]"));
+        let fast = "[[pipelines]]\nkind = \"rls\"\nthread = \"t\"\n";
+        let config = load(&format!("{THREAD}{fast}{lines}\n")).unwrap();
+        let threads: Vec<&str> = config.threads.iter().map(|it| &it.name[..]).collect();
+        assert_eq!(threads, ["t", "slow"]);
+        // Where a thread of slow pipelines is there, they go on it.
+        let slow = "[[threads]]\nname = \"slow\"\n[[pipelines]]\nkind = \"staged_descent\"\nthread = \"slow\"\n";
+        let message = load(&format!("{THREAD}{slow}{pipelines}")).unwrap_err().to_string();
+        let (_, lines) = message.split_once("do:\n\n").unwrap();
+        assert_eq!(lines, "[[pipelines]]\nkind = \"trajectory_newton\"\nthread = \"slow\"");
+        load(&format!("{THREAD}{slow}{fast}{lines}\n")).unwrap();
+    }
+
+    #[test]
+    fn a_thread_that_is_not_there_is_shown_as_lines() {
+        let pipelines = "[[pipelines]]\nkind = \"rls\"\nthread = \"x\"\n";
+        let message = load(pipelines).unwrap_err().to_string();
+        let (_, lines) = message.split_once("make one:\n\n").unwrap();
+        load(&format!("{lines}\n{pipelines}")).unwrap();
     }
 
     #[test]

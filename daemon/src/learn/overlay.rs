@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynocar_analysis::dataset::{ColumnMapping, DatasetFiles, FileProblem, MANIFEST_FILE};
+use dynocar_analysis::dataset::{DatasetFiles, FileProblem, MANIFEST_FILE, Manifest};
 use toml::{Table, Value};
 
 use crate::dataset::{DatasetFolder, LoadError};
@@ -49,8 +49,8 @@ impl DatasetFiles for Overlay<'_> {
         }
     }
 
-    fn read_run(&self, path: &str, columns: &[ColumnMapping]) -> Result<String, FileProblem> {
-        self.dataset.read_run(path, columns)
+    fn read_run(&self, path: &str, manifest: &Manifest) -> Result<String, FileProblem> {
+        self.dataset.read_run(path, manifest)
     }
 
     fn label(&self, path: &str) -> String {

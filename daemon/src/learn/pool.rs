@@ -25,7 +25,7 @@ pub struct Bounds {
     pub samples: usize,
     /// Runs so recent, counted from the newest, are explained by themselves first.
     pub recent: Duration,
-    /// Older runs are not looked at.
+    /// Runs older than this, counted from the newest, are not looked at.
     pub horizon: Duration,
 }
 

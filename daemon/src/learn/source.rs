@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use dynocar_analysis::dataset::{MANIFEST_FILE, Manifest};
+use dynocar_analysis::dataset::{MANIFEST_FILE, Manifest, RunEntry, recorded_unix_s};
 use dynocar_shared::TrainId;
 use sha2::{Digest, Sha256};
 use tracing::warn;
@@ -16,7 +16,10 @@ use super::recordings;
 use crate::dataset::read_text;
 use crate::models::Moment;
 use crate::report::provenance::hex;
+use crate::text_file::read_beginning;
 
+/// So much of a file shows when it was recorded.
+const BEGINNING_BYTES: u64 = 1 << 16;
 /// How deep folders lie in the folder of runs.
 const DEPTH_MAX: usize = 6;
 
@@ -31,7 +34,8 @@ pub struct FoundRun {
     pub place: usize,
     /// Its file.
     pub path: PathBuf,
-    /// When it was recorded: by a day in its path, else when its file was last changed.
+    /// When it was recorded: by its file or its dataset, else by a day in its path, else when its file was
+    /// last changed.
     pub recorded: Moment,
     /// SHA-256 of its content.
     pub sha256: String,
@@ -64,7 +68,8 @@ struct Lying {
     recordings: Vec<PathBuf>,
 }
 
-/// The runs of a train, the oldest first, each content once; none older than the horizon.
+/// The runs of a train, the oldest first, each content once; none older than the horizon before the newest:
+/// an archive is learned from as it was recorded.
 ///
 /// # Errors
 ///
@@ -93,7 +98,8 @@ pub fn runs_of(
         let source = &recording.source;
         runs.extend(runs_in(&recording.folder, &source.name, Some(source.recorded), memory));
     }
-    let oldest = Moment { unix_s: now.unix_s.saturating_sub(horizon.as_secs()) };
+    let newest = runs.iter().map(|run| run.recorded).max().unwrap_or(now).min(now);
+    let oldest = Moment { unix_s: newest.unix_s.saturating_sub(horizon.as_secs()) };
     runs.retain(|run| run.recorded >= oldest);
     runs.sort_by(|one, other| (one.recorded, &one.name).cmp(&(other.recorded, &other.name)));
     let mut seen = std::collections::BTreeSet::new();
@@ -167,7 +173,9 @@ fn runs_in(
         let Ok((sha256, modified)) = hash_of(&path, memory) else { continue };
         let name =
             if name.is_empty() { entry.file.clone() } else { format!("{name}/{}", entry.file) };
-        let recorded = recorded.unwrap_or_else(|| by_path(Path::new(&name), modified));
+        let recorded = recorded
+            .or_else(|| by_file(&manifest, entry, &path))
+            .unwrap_or_else(|| by_path(Path::new(&name), modified));
         let (dataset, described) = (folder.to_path_buf(), described.clone());
         runs.push(FoundRun { name, dataset, place, path, recorded, sha256, described });
     }
@@ -205,6 +213,17 @@ fn hash_of(path: &Path, memory: &mut Memory) -> io::Result<(String, Moment)> {
     Ok((sha256, Moment::of(modified)))
 }
 
+/// When a run was recorded by what its file or its dataset says.
+fn by_file(manifest: &Manifest, entry: &RunEntry, path: &Path) -> Option<Moment> {
+    let beginning = || {
+        let bytes = read_beginning(path, BEGINNING_BYTES).ok()?;
+        let (text, _) = manifest.layout.encoding.decode_without_bom_handling(&bytes);
+        Some(text.into_owned())
+    };
+    let unix_s = recorded_unix_s(manifest, entry, beginning)?.try_into().ok()?;
+    Some(Moment { unix_s })
+}
+
 /// When a run was recorded: when its file was changed, unless its path names another day, as
 /// `2026-11-23` or `day=2026-11-23`.
 fn by_path(path: &Path, modified: Moment) -> Moment {
@@ -233,6 +252,30 @@ mod tests {
         assert_eq!(by("2026-11-23/runs/1.csv"), "2026-11-23T07:00:00Z");
         assert_eq!(by("day=2026-10-01/runs/1.csv"), "2026-10-01T00:00:00Z");
         assert_eq!(by("2026-10-01_morning/runs/2026-10-02-1.csv"), "2026-10-02T00:00:00Z");
+    }
+
+    #[test]
+    fn a_run_is_of_the_day_that_its_file_says_whenever_that_was_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let manifest = |time: &str, date: &str| {
+            format!(
+                "[dataset]\nname='x'\nskip_rows=1\n[train]\nfile='train.toml'\n[columns]\n\
+                 time={{column='t',{time}}}\nspeed={{column='v',unit='km/h'}}\n\
+                 [[runs]]\nfile='1.csv'\n{date}\n"
+            )
+        };
+        let recorded = |time: &str, date: &str, cell: &str| {
+            let text = format!("Logger\nt,v\n,\n{cell},1\n{}", "x".repeat(1 << 17));
+            std::fs::write(folder.path().join("1.csv"), text).unwrap();
+            std::fs::write(folder.path().join(MANIFEST_FILE), manifest(time, date)).unwrap();
+            let runs = runs_in(folder.path(), "2020-01-02", None, &mut Memory::default());
+            runs[0].recorded.to_string()
+        };
+        let (iso, clock) = ("format='iso'", "format='clock'");
+        assert_eq!(recorded(iso, "", "2026-03-18T07:13:20.2"), "2026-03-18T07:13:20Z");
+        assert_eq!(recorded(clock, "date=2026-03-18", "07:13:20.2"), "2026-03-18T07:13:20Z");
+        assert_eq!(recorded("unit='s'", "date=2026-03-18", "0"), "2026-03-18T00:00:00Z");
+        assert_eq!(recorded(clock, "", "07:13:20.2"), "2020-01-02T00:00:00Z", "else the path's");
     }
 
     #[test]

@@ -8,11 +8,12 @@ use dynocar_analysis::explain::report::words;
 use dynocar_core::plausibility::Severity;
 
 use super::document::document;
-use super::html::{escape, tonnes};
+use super::html::escape;
 use super::sections::{
     Section, candidates, errors, line, parameters, quality, reproduce, residual,
 };
 use super::{ReportError, Subject};
+use crate::run_facts::tonnes;
 
 /// The page.
 ///

@@ -7,7 +7,7 @@ use arrow_array::{
     ArrayRef, BooleanArray, Decimal128Array, DurationMillisecondArray, Float32Array, Float64Array,
     Int16Array, StringArray, TimestampMicrosecondArray, UInt64Array,
 };
-use dynocar_analysis::dataset::{ColumnMapping, Dataset, DatasetFiles, FileProblem, is_parquet};
+use dynocar_analysis::dataset::{Dataset, DatasetFiles, FileProblem, Manifest, is_parquet};
 use dynocar_parquet::rows::{Wanted, write_rows};
 
 use crate::support::{program, said, shared, table};
@@ -76,9 +76,10 @@ impl DatasetFiles for AsParquet {
         Ok(text.replace("[dataset]\n", "[dataset]\ndelimiter = \";\"\ndecimal = \",\"\n"))
     }
 
-    fn read_run(&self, path: &str, columns: &[ColumnMapping]) -> Result<String, FileProblem> {
+    fn read_run(&self, path: &str, manifest: &Manifest) -> Result<String, FileProblem> {
         assert!(is_parquet(path));
-        let pairs: Vec<_> = columns.iter().map(|it| (it.column.as_str(), it.unit.name())).collect();
+        let columns = manifest.columns.iter();
+        let pairs: Vec<_> = columns.map(|it| (it.column.as_str(), it.unit.name())).collect();
         Ok(rows(&self.tables.join(path), &pairs))
     }
 }

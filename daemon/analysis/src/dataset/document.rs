@@ -2,6 +2,7 @@
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+use toml::value::Datetime;
 
 use super::error::{DatasetError, Place, Problem};
 use super::names::Choices;
@@ -165,6 +166,32 @@ impl<'d> Section<'d> {
             DeValue::String(text) => Ok(Some(text)),
             _ => Err(self.wrong_type(key, "a text in quotes", value)),
         }
+    }
+
+    /// True where the key is there.
+    pub fn has(&self, key: &str) -> bool {
+        self.table.contains_key(key)
+    }
+
+    /// The truth under a key.
+    pub fn truth(&self, key: &str) -> Result<Option<bool>, DatasetError> {
+        let Some(value) = self.table.get(key) else { return Ok(None) };
+        match value.get_ref() {
+            DeValue::Boolean(truth) => Ok(Some(*truth)),
+            _ => Err(self.wrong_type(key, "true or false", value)),
+        }
+    }
+
+    /// The date or time under a key, as TOML writes it, in quotes or without.
+    pub fn datetime(&self, key: &str) -> Result<Option<Datetime>, DatasetError> {
+        let Some(value) = self.table.get(key) else { return Ok(None) };
+        let datetime = match value.get_ref() {
+            DeValue::Datetime(datetime) => Some(*datetime),
+            DeValue::String(text) => text.trim().parse().ok(),
+            _ => None,
+        };
+        let wrong = || self.wrong_type(key, "a date, as 2026-03-18", value);
+        datetime.map(Some).ok_or_else(wrong)
     }
 
     /// The text under a key that must be there and not be empty.

@@ -79,6 +79,17 @@ pub enum FileProblem {
         /// First line, from 1, with other bytes.
         line: usize,
     },
+    /// The bytes of a run's file are none of the declared encoding's.
+    #[error(
+        "not {expected}: save the file as UTF-8, or set its own encoding in [dataset], as encoding = \
+         \"windows-1252\""
+    )]
+    OtherEncoding {
+        /// First line, from 1, with other bytes.
+        line: usize,
+        /// The encoding that is declared, or was taken for granted.
+        expected: &'static str,
+    },
     /// The system refuses to read it.
     #[error("cannot be read: {0}")]
     Unreadable(std::io::ErrorKind),
@@ -199,6 +210,27 @@ pub enum Problem {
     /// A run's file without a header line.
     #[error("expected a header line with the columns' names, found an empty file")]
     NoHeader,
+    /// Fewer lines in a run's file than are passed over.
+    #[error(
+        "skip_rows = {skip_rows}: expected lines above the names, but the file has {lines} lines"
+    )]
+    NothingBelow {
+        /// Lines that are passed over.
+        skip_rows: usize,
+        /// Lines that the file has.
+        lines: usize,
+    },
+    /// Numbers where a line of units should stand.
+    #[error(
+        "units_row = true: expected units below the names, found the number {found} in column \
+         '{column}'"
+    )]
+    NoUnits {
+        /// The column's name.
+        column: String,
+        /// What stands there.
+        found: String,
+    },
     /// A run's file without rows.
     #[error("expected rows of values below the header, found none")]
     NoRows,
@@ -249,7 +281,23 @@ pub enum Problem {
         /// The cell's text.
         text: String,
         /// What may be the matter; empty or starting with a separator.
-        hint: &'static str,
+        hint: String,
+    },
+    /// A cell that is neither empty nor a time in the declared format.
+    #[error(
+        "column '{column}': expected a time as {expected} (format = \"{format}\"), got '{text}'{hint}"
+    )]
+    NotATime {
+        /// The column's name.
+        column: String,
+        /// The declared format.
+        format: String,
+        /// What a time looks like in it.
+        expected: String,
+        /// The cell's text.
+        text: String,
+        /// What may be the matter; empty or starting with a separator.
+        hint: String,
     },
     /// A row with more cells than the header.
     #[error("{found} cells, but the header has {expected} columns{hint}")]

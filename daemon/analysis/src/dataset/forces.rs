@@ -244,7 +244,7 @@ mod tests {
              speed={{column='v',unit='m/s'}}\n{columns}\n[[runs]]\nfile='a.csv'\n"
         );
         let manifest = Manifest::parse("dataset.toml", &text).unwrap();
-        let table = Table::parse("a.csv", csv, &manifest).unwrap();
+        let table = Table::parse("a.csv", csv, (&manifest.layout, &manifest.columns)).unwrap();
         let times = table.column(Quantity::Time).unwrap();
         let order = TimeOrder::of(times, &vec![0; times.len()]);
         let train = parse_train("train.toml", train).unwrap();

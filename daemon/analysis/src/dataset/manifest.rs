@@ -5,10 +5,12 @@ use std::path::{Component, Path};
 use dynocar_core::named;
 use dynocar_core::units::Unit;
 
+use super::clock::{self, TimeFormat};
 use super::document::{Document, Section};
 use super::error::{DatasetError, Place, Problem};
 use super::names::Choices;
 use super::quantity::Quantity;
+use super::text_layout::TextLayout;
 
 /// Which point of the train the recorded position is of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,6 +42,8 @@ pub struct ColumnMapping {
     pub column: String,
     /// The unit of `cell * scale + offset`.
     pub unit: Unit,
+    /// How the cells are written, where they are times and no numbers.
+    pub format: Option<TimeFormat>,
     /// Factor on the cell.
     pub scale: f64,
     /// Added after the factor, in `unit`.
@@ -77,6 +81,8 @@ pub struct RunEntry {
     pub mass_kg: Option<f64>,
     /// Chainage in m at the run's start, for runs without a position column.
     pub start_m: Option<f64>,
+    /// When it was recorded, in s since 1970 UTC, where that is declared.
+    pub date_unix_s: Option<i64>,
     /// Where the run is declared.
     pub place: Place,
 }
@@ -90,10 +96,8 @@ pub struct Manifest {
     pub description: Option<String>,
     /// Which point of the train the positions are of.
     pub position_reference: PositionReference,
-    /// What separates the cells of a row.
-    pub delimiter: u8,
-    /// What separates a number's fraction: a point or a comma.
-    pub decimal: u8,
+    /// How the text of the runs' files falls into cells.
+    pub layout: TextLayout,
     /// The train's file.
     pub train_file: FileEntry,
     /// The line's file; `None` when the line is not known.
@@ -115,28 +119,28 @@ impl Manifest {
         let root = document.root();
         root.allow(&["dataset", "train", "track", "columns", "runs"])?;
         let dataset = root.required_table("dataset")?;
-        dataset.allow(&["name", "description", "position_reference", "delimiter", "decimal"])?;
+        let own = ["name", "description", "position_reference"];
+        dataset.allow(&[&own[..], &TextLayout::KEYS[..]].concat())?;
         let columns = columns(&root.required_table("columns")?)?;
-        let (delimiter, decimal) = (delimiter(&dataset)?, decimal(&dataset)?);
-        // A comma between the digits of a quoted cell separates no cells.
-        if delimiter == decimal && decimal != b',' {
-            let shown = format!("{:?}", char::from(decimal).to_string());
-            return Err(dataset.out_of_range("decimal", &shown, "another mark than the delimiter"));
-        }
         Ok(Manifest {
             name: dataset.required_text("name", "the dataset's name")?.into(),
             description: dataset.text("description")?.map(Into::into),
             position_reference: position_reference(&dataset)?,
-            delimiter,
-            decimal,
+            layout: TextLayout::of(&dataset)?,
             train_file: file_of(&root.required_table("train")?, "the path of a train.toml")?,
             track_file: match root.table("track")? {
                 Some(section) => Some(file_of(&section, "the path of a track.toml")?),
                 None => None,
             },
+            runs: runs(&root, &columns)?,
             columns,
-            runs: runs(&root)?,
         })
+    }
+
+    /// The unit in which the runs hold the speed.
+    pub fn speed_unit(&self) -> Unit {
+        let mapped = self.mapping(Quantity::Speed);
+        mapped.map_or(Quantity::Speed.unit(), |mapping| mapping.unit)
     }
 
     /// The mapping of a quantity.
@@ -160,28 +164,6 @@ fn position_reference(section: &Section) -> Result<PositionReference, DatasetErr
     }
 }
 
-fn delimiter(section: &Section) -> Result<u8, DatasetError> {
-    const KEY: &str = "delimiter";
-    match section.text(KEY)?.map(str::as_bytes) {
-        None => Ok(b','),
-        Some(&[mark]) if mark.is_ascii() && !b"\"\r\n".contains(&mark) => Ok(mark),
-        Some(other) => {
-            let shown = format!("{:?}", String::from_utf8_lossy(other));
-            Err(section.out_of_range(KEY, &shown, "one ASCII character, as \",\" \";\" or \"\\t\""))
-        }
-    }
-}
-
-fn decimal(section: &Section) -> Result<u8, DatasetError> {
-    match section.text("decimal")? {
-        None | Some(".") => Ok(b'.'),
-        Some(",") => Ok(b','),
-        Some(other) => {
-            Err(section.out_of_range("decimal", &format!("{other:?}"), "\".\" or \",\""))
-        }
-    }
-}
-
 fn columns(section: &Section) -> Result<Vec<ColumnMapping>, DatasetError> {
     let mut mappings = Vec::new();
     for (name, place) in section.keys() {
@@ -196,7 +178,13 @@ fn columns(section: &Section) -> Result<Vec<ColumnMapping>, DatasetError> {
     mappings.sort_by_key(|mapping| mapping.quantity);
     for quantity in [Quantity::Time, Quantity::Speed] {
         if mappings.iter().all(|mapping| mapping.quantity != quantity) {
-            return Err(section.missing(quantity.name(), "{ column = \"…\", unit = \"…\" }"));
+            let expected = match quantity {
+                Quantity::Time => {
+                    "{ column = \"…\", unit = \"…\" } or { column = \"…\", format = \"…\" }"
+                }
+                _ => "{ column = \"…\", unit = \"…\" }",
+            };
+            return Err(section.missing(quantity.name(), expected));
         }
     }
     let is_mapped =
@@ -216,17 +204,26 @@ fn columns(section: &Section) -> Result<Vec<ColumnMapping>, DatasetError> {
 
 fn mapping(columns: &Section, quantity: Quantity) -> Result<ColumnMapping, DatasetError> {
     let section = columns.required_table(quantity.name())?;
-    section.allow(&["column", "unit", "scale", "offset"])?;
-    let units: Vec<_> = Unit::of(quantity.dimension()).map(|unit| unit.name()).collect();
-    let expected = format!("a unit: {}", units.join(", "));
-    let unit = section.required_text("unit", &expected)?;
-    let unit = Unit::find(quantity.dimension(), unit)
-        .ok_or_else(|| section.unknown("unit", "unit", unit, &units))?;
+    let format = match quantity {
+        Quantity::Time => {
+            section.allow(&["column", "unit", "scale", "offset", "format"])?;
+            time_format(&section)?
+        }
+        _ => {
+            section.allow(&["column", "unit", "scale", "offset"])?;
+            None
+        }
+    };
+    let unit = match format {
+        Some(_) => Unit::base_of(quantity.dimension()),
+        None => unit(&section, quantity)?,
+    };
     let column = section.required_text("column", "the name of a column in the runs' files")?;
     Ok(ColumnMapping {
         quantity,
         column: column.trim().into(),
         unit,
+        format,
         scale: section
             .number("scale", "a number other than 0", |scale| scale != 0.0)?
             .unwrap_or(1.0),
@@ -235,10 +232,40 @@ fn mapping(columns: &Section, quantity: Quantity) -> Result<ColumnMapping, Datas
     })
 }
 
-fn runs(root: &Section) -> Result<Vec<RunEntry>, DatasetError> {
+fn unit(section: &Section, quantity: Quantity) -> Result<Unit, DatasetError> {
+    let units: Vec<_> = Unit::of(quantity.dimension()).map(|unit| unit.name()).collect();
+    let or_format = if quantity == Quantity::Time { "; or a format" } else { "" };
+    let expected = format!("a unit: {}{or_format}", units.join(", "));
+    let unit = section.required_text("unit", &expected)?;
+    Unit::find(quantity.dimension(), unit)
+        .ok_or_else(|| section.unknown("unit", "unit", unit, &units))
+}
+
+/// How times are written that are no numbers.
+fn time_format(section: &Section) -> Result<Option<TimeFormat>, DatasetError> {
+    const KEY: &str = "format";
+    let Some(name) = section.text(KEY)? else { return Ok(None) };
+    for other in ["unit", "scale", "offset"] {
+        if section.has(other) {
+            return Err(section.exclusive(KEY, other));
+        }
+    }
+    let allowed = "\"iso\" (2026-03-18T07:13:20.2), \"clock\" (07:13:20.2) or a pattern of strftime \
+                   with the hour, and with the whole date or none of it (%d.%m.%Y %H:%M:%S); a \
+                   fraction of the second is read in any case";
+    let refused = || section.out_of_range(KEY, &format!("{name:?}"), allowed);
+    TimeFormat::from_name(name).map(Some).ok_or_else(refused)
+}
+
+fn runs(root: &Section, columns: &[ColumnMapping]) -> Result<Vec<RunEntry>, DatasetError> {
     let mut runs: Vec<RunEntry> = Vec::new();
     for section in root.tables("runs")? {
         let run = run(&section)?;
+        let has_date = |it: &ColumnMapping| it.format.as_ref().is_some_and(TimeFormat::has_date);
+        if run.date_unix_s.is_some() && columns.iter().any(has_date) {
+            let (key, other) = (section.full("date"), "columns.time.format with a date".into());
+            return Err(section.place_of("date").problem(Problem::Exclusive { key, other }));
+        }
         let twin = runs.iter().find(|other| is_same_path(&other.file, &run.file));
         if let Some(first_line) = twin.and_then(|twin| twin.place.line) {
             let (key, file) = (section.full("file"), run.file);
@@ -261,7 +288,7 @@ fn is_same_path(one: &str, other: &str) -> bool {
 }
 
 fn run(section: &Section) -> Result<RunEntry, DatasetError> {
-    section.allow(&["file", "role", "direction", "mass_t", "start_m"])?;
+    section.allow(&["file", "role", "direction", "mass_t", "start_m", "date"])?;
     let role = match section.text("role")? {
         None => Role::Fit,
         Some(word) => Role::from_name(word)
@@ -277,8 +304,17 @@ fn run(section: &Section) -> Result<RunEntry, DatasetError> {
         direction: if direction == Some(-1.0) { -1 } else { 1 },
         mass_kg: mass_t.map(|mass| mass * 1000.0),
         start_m: section.number("start_m", "a chainage in m", |start| start.abs() <= 1e9)?,
+        date_unix_s: date(section)?,
         place: section.place(),
     })
+}
+
+/// The second at which a run's date begins.
+fn date(section: &Section) -> Result<Option<i64>, DatasetError> {
+    let Some(date) = section.datetime("date")? else { return Ok(None) };
+    let allowed = "a day of the calendar, as 2026-03-18 or 2026-03-18T07:13:20";
+    let refused = || section.out_of_range("date", &date.to_string(), allowed);
+    clock::unix_s(&date).map(Some).ok_or_else(refused)
 }
 
 #[cfg(test)]

@@ -13,7 +13,8 @@
 //! - `document`, `names`, [`error`]: TOML with the line of every key; mistakes with their choices
 //! - [`manifest`], [`train_file`], [`track_file`]: the three TOML files
 //! - [`quantity`]: what a column may hold, in which [`units`](dynocar_core::units)
-//! - `table`: a CSV file as columns of numbers
+//! - [`encoding`], [`text_layout`], [`clock`]: how text falls into cells, and times that are no numbers
+//! - `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
 //! - `order`, `spikes`, `motion`, `power`, `forces`, [`stamps`], `altitude`: from columns to time, speed,
 //!   position, forces and gradient
 //! - `resolved`, [`run`], [`quality`], `findings`, [`remark`], `remarking`, `declared`, [`note`]: samples,
@@ -21,15 +22,20 @@
 //! - [`guess`]: a description of files that nobody has described yet
 
 mod altitude;
+mod cell;
+pub mod clock;
 mod corrections;
 mod declared;
 mod document;
+pub mod encoding;
 pub mod error;
 mod extra;
 mod finding_unit;
 mod findings;
 mod forces;
 pub mod guess;
+mod header;
+mod lines;
 pub mod manifest;
 mod motion;
 mod names;
@@ -45,12 +51,14 @@ pub mod run;
 mod spikes;
 pub mod stamps;
 mod table;
+pub mod text_layout;
 pub mod track_file;
 pub mod train_file;
 
 #[cfg(test)]
 mod tests;
 
+pub use clock::TimeFormat;
 pub use document::top_keys;
 pub use error::{DatasetError, FileProblem, Place, Problem};
 pub use forces::ForceSource;
@@ -63,8 +71,9 @@ pub use quality::{Phases, RunQuality};
 pub use quantity::Quantity;
 pub use remark::Remark;
 pub use resolved::{DATASET_TRAIN, GradientSource};
-pub use run::{Extras, Run, is_parquet};
+pub use run::{Extras, Run, is_parquet, recorded_unix_s};
 pub use table::LineCounts;
+pub use text_layout::TextLayout;
 pub use track_file::parse_track;
 pub use train_file::parse_train;
 
@@ -88,14 +97,14 @@ pub trait DatasetFiles {
     /// When it cannot be had.
     fn read(&self, path: &str) -> Result<String, FileProblem>;
 
-    /// The text of a run's file as CSV, of which the columns that these mappings name are read. Of a
-    /// [`is_parquet`] file it is plain CSV, with commas between the cells and points in the numbers, and
-    /// times are in the unit that the mapping declares.
+    /// The text of a run's file as CSV, laid out as the manifest says, of which the columns that it maps
+    /// are read. Of a [`is_parquet`] file it is [plain](TextLayout::PLAIN) CSV, and times are in the unit
+    /// that the mapping declares.
     ///
     /// # Errors
     ///
     /// When it cannot be had.
-    fn read_run(&self, path: &str, _columns: &[ColumnMapping]) -> Result<String, FileProblem> {
+    fn read_run(&self, path: &str, _manifest: &Manifest) -> Result<String, FileProblem> {
         self.read(path)
     }
 
@@ -192,6 +201,18 @@ impl DatasetHead {
         Ok(DatasetHead { manifest, train: Arc::new(train), track })
     }
 
+    /// Reads all runs.
+    ///
+    /// # Errors
+    ///
+    /// The first mistake in one of their files, with line and column.
+    pub fn read(self, files: &(impl DatasetFiles + ?Sized)) -> Result<Dataset, DatasetError> {
+        let runs = (0..self.manifest.runs.len()).map(|index| self.read_run(files, index));
+        let runs = runs.collect::<Result<_, _>>()?;
+        let Manifest { name, description, .. } = self.manifest;
+        Ok(Dataset { name, description, train: self.train, track: self.track, runs })
+    }
+
     /// Reads one run by its place in the manifest, from 0.
     ///
     /// # Errors
@@ -213,7 +234,7 @@ impl DatasetHead {
             track: self.track.as_ref(),
         };
         let text = files
-            .read_run(&entry.file, &self.manifest.columns)
+            .read_run(&entry.file, &self.manifest)
             .map_err(|problem| unread(files.label(&entry.file), problem, Some(&entry.place)))?;
         run::read(context, index as u32 + 1, entry, &files.label(&entry.file), &text)
     }
@@ -226,11 +247,7 @@ impl Dataset {
     ///
     /// The first mistake, with file, line and choices.
     pub fn load(files: &(impl DatasetFiles + ?Sized)) -> Result<Self, DatasetError> {
-        let head = DatasetHead::open(files)?;
-        let runs = (0..head.manifest.runs.len()).map(|index| head.read_run(files, index));
-        let runs = runs.collect::<Result<_, _>>()?;
-        let Manifest { name, description, .. } = head.manifest;
-        Ok(Dataset { name, description, train: head.train, track: head.track, runs })
+        DatasetHead::open(files)?.read(files)
     }
 
     /// The runs with a role.
@@ -250,7 +267,7 @@ fn text(
 
 fn unread(file: String, problem: FileProblem, listed_at: Option<&Place>) -> DatasetError {
     match (&problem, listed_at) {
-        (&FileProblem::NotUtf8 { line }, _) => {
+        (&(FileProblem::NotUtf8 { line } | FileProblem::OtherEncoding { line, .. }), _) => {
             Place::line(&file, line).problem(Problem::File(problem))
         }
         (FileProblem::NotText(_) | FileProblem::Table(_), _) | (_, None) => {

@@ -1,7 +1,7 @@
 //! What the data of a run are like: counts, ranges and what the train did.
 
 use dynocar_core::validation::{ValidationLimits, Validator};
-use dynocar_shared::{RejectionReason, TrainSample};
+use dynocar_shared::{RejectionReason, SampleField, TrainSample};
 use serde::Serialize;
 
 use super::forces::Force;
@@ -40,6 +40,9 @@ pub struct RunQuality {
     pub speed_range_mps: Option<(f64, f64)>,
     /// Lowest and highest chainage of the train's centre in m; `None` without positions.
     pub position_range_m: Option<(f64, f64)>,
+    /// The mass in kg that the samples carry; `None` where they carry none, so that the train's nominal
+    /// one holds.
+    pub mass_kg: Option<Spread>,
     /// Distance in m by integrating the speed.
     pub distance_m: f64,
     /// What the train did, and for how long.
@@ -56,20 +59,37 @@ pub struct QuantityCount {
 }
 
 /// A count for a reason.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReasonCount {
     /// The reason.
     pub reason: RejectionReason,
     /// How many.
     pub count: usize,
+    /// Line in the file, from 1, of the first.
+    pub first_line: usize,
+    /// Time in s of the first.
+    pub first_s: f64,
+}
+
+/// Mean and range of a quantity over a run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// The mean over the samples.
+    pub mean: f64,
+    /// The lowest.
+    pub low: f64,
+    /// The highest.
+    pub high: f64,
 }
 
 impl Serialize for ReasonCount {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         use serde::ser::SerializeStruct;
-        let mut fields = serializer.serialize_struct("ReasonCount", 2)?;
+        let mut fields = serializer.serialize_struct("ReasonCount", 4)?;
         fields.serialize_field("reason", self.reason.name())?;
         fields.serialize_field("count", &self.count)?;
+        fields.serialize_field("first_line", &self.first_line)?;
+        fields.serialize_field("first_s", &self.first_s)?;
         fields.end()
     }
 }
@@ -126,9 +146,10 @@ pub(super) fn assess(context: Context, run: &Resolved, samples: &[TrainSample]) 
         missing: missing(run),
         outliers: outliers(run),
         noise_below_zero: noise_below_zero(run),
-        refused: refused(context, samples),
+        refused: refused(context, run, samples),
         speed_range_mps: range(speeds),
         position_range_m: range(run.position_m.iter().copied()),
+        mass_kg: spread(samples.iter().filter_map(|sample| sample.get(SampleField::Mass))),
         distance_m: distance_m(run, &ordered),
         phases: phases(run, &ordered),
     }
@@ -185,21 +206,26 @@ fn noise_below_zero(run: &Resolved) -> Vec<QuantityCount> {
 }
 
 /// What the validation in front of every pipeline refuses of these samples.
-fn refused(context: Context, samples: &[TrainSample]) -> Vec<ReasonCount> {
+fn refused(context: Context, run: &Resolved, samples: &[TrainSample]) -> Vec<ReasonCount> {
     let nominal_mass_kg = context.train.mass_kg;
     let limits = ValidationLimits::for_train(nominal_mass_kg);
     let mut validator = Validator::new(DATASET_TRAIN, nominal_mass_kg, limits);
-    let mut counts = vec![0; RejectionReason::ALL.len()];
-    for sample in samples {
-        if let Err(reason) = validator.check(sample) {
-            counts[reason as usize] += 1;
-        }
+    let mut counts: Vec<Option<ReasonCount>> = vec![None; RejectionReason::ALL.len()];
+    for (row, sample) in samples.iter().enumerate() {
+        let Err(reason) = validator.check(sample) else { continue };
+        let first = || {
+            let (first_line, first_s) = (run.table.line(row), run.times_s[row]);
+            ReasonCount { reason, count: 0, first_line, first_s }
+        };
+        counts[reason as usize].get_or_insert_with(first).count += 1;
     }
-    let counted = RejectionReason::ALL.iter().map(|&reason| (reason, counts[reason as usize]));
-    counted
-        .filter(|(_, count)| *count > 0)
-        .map(|(reason, count)| ReasonCount { reason, count })
-        .collect()
+    counts.into_iter().flatten().collect()
+}
+
+fn spread(values: impl Iterator<Item = f64> + Clone) -> Option<Spread> {
+    let (low, high) = range(values.clone())?;
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+    Some(Spread { mean: sum / count, low, high })
 }
 
 fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {

@@ -1,14 +1,12 @@
 //! One run, from its file to the samples that the pipelines take.
 
-use std::borrow::Cow;
-
 use dynocar_core::train::Drive;
 use dynocar_shared::{SampleField, TrainSample};
 
 use super::error::{DatasetError, Place, Problem};
 use super::findings;
 use super::forces::ForceSource;
-use super::manifest::{Role, RunEntry};
+use super::manifest::{Manifest, Role, RunEntry};
 use super::motion::PositionSource;
 use super::power;
 use super::quality::{self, RunQuality};
@@ -18,6 +16,9 @@ use super::remarking::remarks;
 use super::resolved::{Context, GradientSource, Resolved};
 use super::stamps;
 use super::table::Table;
+use super::text_layout::TextLayout;
+
+const DAY_S: i64 = 86_400;
 
 /// Quantities that a sample does not carry, one value for each sample, `None` where missing.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -57,6 +58,8 @@ pub struct Run {
     pub role: Role,
     /// 1 while the chainage grows, -1 while it falls.
     pub direction: i8,
+    /// When it was recorded, in s since 1970 UTC, where its file or the dataset holds that.
+    pub recorded_unix_s: Option<i64>,
     /// The run's declared gross mass in kg, else the train's nominal one.
     pub mass_kg: f64,
     /// The rows that have a time, in the file's order.
@@ -146,13 +149,7 @@ pub(super) fn read(
     label: &str,
     text: &str,
 ) -> Result<Run, DatasetError> {
-    let mut manifest = Cow::Borrowed(context.manifest);
-    if is_parquet(&entry.file) {
-        // Its text has the usual marks, whatever is declared of the text of others.
-        let manifest = manifest.to_mut();
-        (manifest.delimiter, manifest.decimal) = (b',', b'.');
-    }
-    let table = Table::parse(label, text, &manifest)?;
+    let table = table_of(context.manifest, entry, label, text)?;
     let rows = table.lines.rows;
     let has_speed = table.filled(Quantity::Speed).is_some();
     let resolved = Resolved::of(context, entry, table);
@@ -181,6 +178,12 @@ pub(super) fn read(
         number,
         role: entry.role,
         direction: entry.direction,
+        recorded_unix_s: recorded(
+            context.manifest,
+            entry,
+            resolved.table.first_day,
+            quality.start_s,
+        ),
         mass_kg: entry.mass_kg.unwrap_or(context.train.mass_kg),
         extras: extras(&resolved.table),
         position_source: resolved.position_source,
@@ -191,6 +194,59 @@ pub(super) fn read(
         quality,
         remarks,
     })
+}
+
+/// The text of a run's file as a table; that of Parquet is plain, whatever is declared of the text of others.
+fn table_of(
+    manifest: &Manifest,
+    entry: &RunEntry,
+    label: &str,
+    text: &str,
+) -> Result<Table, DatasetError> {
+    if !is_parquet(&entry.file) {
+        return Table::parse(label, text, (&manifest.layout, &manifest.columns));
+    }
+    let mut columns = manifest.columns.clone();
+    columns.iter_mut().for_each(|it| it.format = None);
+    Table::parse(label, text, (&TextLayout::PLAIN, &columns))
+}
+
+/// When a run was recorded, in s since 1970 UTC, by the beginning of its file or as declared; `None` where
+/// nothing says. The file's text is asked for where its times may hold it, and may break off anywhere.
+pub fn recorded_unix_s(
+    manifest: &Manifest,
+    entry: &RunEntry,
+    beginning: impl FnOnce() -> Option<String>,
+) -> Option<i64> {
+    if !counts_from_midnight(manifest, entry) {
+        return entry.date_unix_s;
+    }
+    let text = beginning()?;
+    // What breaks off within a line may break off within a letter.
+    let whole = &text[..=text.rfind('\n')?];
+    let table = table_of(manifest, entry, "", whole).ok()?;
+    let mut times_s = table.column(Quantity::Time)?.iter().copied();
+    recorded(manifest, entry, table.first_day, times_s.find(|time_s| !time_s.is_nan())?)
+}
+
+/// True where a run's times are those of a day.
+fn counts_from_midnight(manifest: &Manifest, entry: &RunEntry) -> bool {
+    let has_format = manifest.mapping(Quantity::Time).is_some_and(|it| it.format.is_some());
+    has_format && !is_parquet(&entry.file)
+}
+
+/// When a run was recorded whose first time is so many s, of this day.
+fn recorded(
+    manifest: &Manifest,
+    entry: &RunEntry,
+    first_day: Option<i64>,
+    first_s: f64,
+) -> Option<i64> {
+    if !counts_from_midnight(manifest, entry) {
+        return entry.date_unix_s;
+    }
+    let declared = || entry.date_unix_s.map(|second| second.div_euclid(DAY_S));
+    Some(first_day.or_else(declared)? * DAY_S + first_s.floor() as i64)
 }
 
 fn extras(table: &Table) -> Extras {

@@ -1,16 +1,24 @@
 //! A run's CSV file as columns of numbers.
 
-use csv::{ByteRecord, ReaderBuilder};
+use csv::ByteRecord;
 
+use super::cell::{held, lossy, not_a_value, parse_cell};
+use super::clock::DayClock;
 use super::error::{DatasetError, Place, Problem};
-use super::manifest::{ColumnMapping, Manifest};
-use super::names::Choices;
+use super::header::{find_column, misplaced};
+use super::lines::{below, line_of, reader};
+use super::manifest::ColumnMapping;
 use super::quantity::Quantity;
+use super::text_layout::TextLayout;
 
 /// The mapped columns of a run's file, each in its quantity's unit, `NaN` where missing.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Table {
     columns: Vec<(Quantity, Vec<f64>)>,
+    /// The line, from 1, of every row.
+    line_of_row: Vec<usize>,
+    /// The day of the first row, counted from 1970-01-01, where the times hold it.
+    pub first_day: Option<i64>,
     /// What was odd about the lines.
     pub lines: LineCounts,
 }
@@ -37,6 +45,11 @@ impl Table {
         self.column(quantity).filter(|values| values.iter().any(|value| !value.is_nan()))
     }
 
+    /// The line of the file, from 1, in which a row stands.
+    pub fn line(&self, row: usize) -> usize {
+        self.line_of_row.get(row).copied().unwrap_or(0)
+    }
+
     /// The mapped columns with their values.
     pub fn columns(&self) -> impl Iterator<Item = (Quantity, &[f64])> {
         self.columns.iter().map(|(quantity, values)| (*quantity, &values[..]))
@@ -56,24 +69,31 @@ impl Table {
 
     /// Drops the rows whose mark is false.
     pub fn retain(&mut self, keep: &[bool]) {
+        let kept = |row: &mut usize| {
+            *row += 1;
+            keep.get(*row - 1).copied().unwrap_or(false)
+        };
         for (_, values) in &mut self.columns {
-            let mut marks = keep.iter();
-            values.retain(|_| *marks.next().unwrap_or(&false));
+            let mut row = 0;
+            values.retain(|_| kept(&mut row));
         }
+        let mut row = 0;
+        self.line_of_row.retain(|_| kept(&mut row));
     }
 
     /// Reads a run's file.
     ///
     /// Cells are trimmed of spaces; empty cells, NaN and infinities are missing, except that an
     /// infinite curve radius is straight track.
-    pub fn parse(label: &str, text: &str, manifest: &Manifest) -> Result<Self, DatasetError> {
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    pub fn parse(
+        label: &str,
+        text: &str,
+        (layout, mappings): (&TextLayout, &[ColumnMapping]),
+    ) -> Result<Self, DatasetError> {
+        let whole = text;
+        let text = below(label, text, layout.skip_rows)?;
         let is_closed = text.ends_with(['\n', '\r']);
-        let mut reader = ReaderBuilder::new()
-            .delimiter(manifest.delimiter)
-            .has_headers(false)
-            .flexible(true)
-            .from_reader(text.as_bytes());
+        let mut reader = reader(text, layout.delimiter);
         let mut record = ByteRecord::new();
         let mut read = |record: &mut ByteRecord| match reader.read_byte_record(record) {
             Ok(has_more) => Ok(has_more),
@@ -86,8 +106,17 @@ impl Table {
             return Err(Place::whole(label).problem(Problem::NoHeader));
         }
         let header: Vec<String> = record.iter().map(|name| lossy(name).trim().into()).collect();
-        let mut rows = Rows::new(label, manifest, &header)?;
+        let mut rows = Rows::new((label, text), layout, mappings, &header)
+            .map_err(|problem| misplaced(problem, whole, (layout, mappings)))
+            .map_err(|problem| {
+                let line = layout.skip_rows + line_of(text, &record);
+                Place::line(label, line).problem(problem)
+            })?;
         let mut has_row = read(&mut record)?;
+        if layout.units_row && has_row {
+            rows.require_units(&record)?;
+            has_row = read(&mut record)?;
+        }
         while has_row {
             rows.push(&record)?;
             has_row = read(&mut record)?;
@@ -102,10 +131,12 @@ impl Table {
 /// The rows read so far.
 struct Rows<'m> {
     label: &'m str,
+    /// What stands below the lines that are passed over.
+    text: &'m str,
     width: usize,
-    delimiter: u8,
-    decimal: u8,
+    layout: &'m TextLayout,
     columns: Vec<Column<'m>>,
+    line_of_row: Vec<usize>,
     lines: LineCounts,
     /// What is wrong with the row last read. Whether it matters depends on whether the file
     /// breaks off there.
@@ -115,6 +146,8 @@ struct Rows<'m> {
 struct Column<'m> {
     mapping: &'m ColumnMapping,
     index: usize,
+    /// Reads the cells that are times and no numbers.
+    clock: Option<DayClock>,
     values: Vec<f64>,
 }
 
@@ -126,37 +159,59 @@ enum Flaw {
 
 impl<'m> Rows<'m> {
     fn new(
-        label: &'m str,
-        manifest: &'m Manifest,
+        (label, text): (&'m str, &'m str),
+        layout: &'m TextLayout,
+        mappings: &'m [ColumnMapping],
         header: &[String],
-    ) -> Result<Self, DatasetError> {
-        let mut columns = Vec::with_capacity(manifest.columns.len());
-        for mapping in &manifest.columns {
-            let index = find_column(label, mapping, header, manifest.delimiter)?;
-            columns.push(Column { mapping, index, values: Vec::new() });
+    ) -> Result<Self, Problem> {
+        let mut columns = Vec::with_capacity(mappings.len());
+        for mapping in mappings {
+            let index = find_column(mapping, header, layout)?;
+            let clock = mapping.format.as_ref().map(DayClock::new);
+            columns.push(Column { mapping, index, clock, values: Vec::new() });
         }
         Ok(Rows {
             label,
+            text,
             width: header.len(),
-            delimiter: manifest.delimiter,
-            decimal: manifest.decimal,
+            layout,
             columns,
+            line_of_row: Vec::new(),
             lines: LineCounts::default(),
             pending: None,
         })
     }
 
+    fn line_of(&self, record: &ByteRecord) -> usize {
+        self.layout.skip_rows + line_of(self.text, record)
+    }
+
+    /// Refuses a row of values in the place of that of units, which would be lost.
+    fn require_units(&self, record: &ByteRecord) -> Result<(), DatasetError> {
+        for column in &self.columns {
+            let cell = record.get(column.index).unwrap_or(b"").trim_ascii();
+            let is_number = parse_cell(cell, self.layout.decimal).is_some_and(|it| !it.is_nan());
+            // The unit "1" is one.
+            if is_number && cell != b"1" {
+                let place = Place::line(self.label, self.line_of(record));
+                let (column, found) = (column.mapping.column.clone(), lossy(cell).into());
+                return Err(place.problem(Problem::NoUnits { column, found }));
+            }
+        }
+        Ok(())
+    }
+
     /// Takes in a row; what is wrong with it stays pending.
     fn push(&mut self, record: &ByteRecord) -> Result<(), DatasetError> {
-        let line = record.position().map_or(0, |position| position.line() as usize);
+        let line = self.line_of(record);
         let place = || Place::line(self.label, line);
         if record.len() < self.width && record.as_slice().contains(&b'\n') {
             return Err(place().problem(Problem::UnclosedQuote));
         }
         if record.iter().skip(self.width).any(|cell| !cell.trim_ascii().is_empty()) {
-            let hint = match self.decimal {
+            let hint = match self.layout.decimal {
                 b'.' if record.len() > self.width + 1 => "; are there decimal commas?",
-                decimal if decimal == self.delimiter => {
+                decimal if decimal == self.layout.delimiter => {
                     "; where commas separate the cells, numbers with decimal commas need quotes"
                 }
                 _ => "",
@@ -167,20 +222,27 @@ impl<'m> Rows<'m> {
         self.pending = (record.len() < self.width).then_some(Flaw::Short);
         for column in &mut self.columns {
             let cell = record.get(column.index).unwrap_or(b"").trim_ascii();
-            let value = parse_cell(cell, self.decimal);
+            let value = match &mut column.clock {
+                None => parse_cell(cell, self.layout.decimal),
+                Some(_) if cell.is_empty() => Some(f64::NAN),
+                Some(clock) => clock.seconds(cell),
+            };
             column.values.push(value.map_or(f64::NAN, |value| held(column.mapping, value)));
             if value.is_some() {
                 continue;
             }
-            let error = place().problem(not_a_number(column.mapping, cell, self.decimal));
+            let is_below_names = line <= self.layout.lines_above() + 1;
+            let problem = not_a_value(column.mapping, cell, self.layout, is_below_names);
+            let error = place().problem(problem);
             // What is left of a number where a file breaks off is such a cell.
             let may_be_cut = column.index + 1 == record.len()
-                && cell.iter().all(|letter| b"0123456789+-.,eE".contains(letter));
+                && cell.iter().all(|letter| b"0123456789+-.,eE:T/ ".contains(letter));
             if !may_be_cut {
                 return Err(error);
             }
             self.pending = Some(Flaw::CutNumber(error));
         }
+        self.line_of_row.push(line);
         self.lines.rows += 1;
         Ok(())
     }
@@ -202,6 +264,7 @@ impl<'m> Rows<'m> {
         if self.pending.is_some() {
             self.lines.truncated = true;
             self.lines.rows -= 1;
+            self.line_of_row.pop();
             for column in &mut self.columns {
                 column.values.pop();
             }
@@ -209,77 +272,11 @@ impl<'m> Rows<'m> {
         if self.lines.rows == 0 {
             return Err(Place::whole(self.label).problem(Problem::NoRows));
         }
+        let first_day = self.columns.iter().find_map(|it| it.clock.as_ref()?.first_day());
         let columns = self.columns.into_iter();
         let columns = columns.map(|column| (column.mapping.quantity, column.values)).collect();
-        Ok(Table { columns, lines: self.lines })
+        Ok(Table { columns, line_of_row: self.line_of_row, first_day, lines: self.lines })
     }
-}
-
-fn find_column(
-    label: &str,
-    mapping: &ColumnMapping,
-    header: &[String],
-    delimiter: u8,
-) -> Result<usize, DatasetError> {
-    let name = &mapping.column;
-    let count = header.iter().filter(|other| *other == name).count();
-    let problem = match count {
-        1 => return Ok(header.iter().position(|other| other == name).unwrap_or(0)),
-        0 => {
-            let other = [';', ',', '\t', '|'].into_iter().find(|mark| header[0].contains(*mark));
-            match (header.len(), other) {
-                (1, Some(found)) => {
-                    Problem::OtherDelimiter { expected: char::from(delimiter), found }
-                }
-                _ => {
-                    let context = format!(" (for {} in {})", mapping.quantity, mapping.place);
-                    let choices = Choices::new(name, header.iter().cloned());
-                    Problem::UnknownName { what: "column", name: name.clone(), context, choices }
-                }
-            }
-        }
-        _ => Problem::RepeatedColumn { column: name.clone(), count },
-    };
-    Err(Place::line(label, 1).problem(problem))
-}
-
-/// The number in a trimmed cell, `NaN` for an empty one; `None` when it is something else.
-pub(super) fn parse_cell(cell: &[u8], decimal: u8) -> Option<f64> {
-    if cell.is_empty() {
-        return Some(f64::NAN);
-    }
-    let text = std::str::from_utf8(cell).ok()?;
-    if decimal == b',' {
-        // A point would be a mark of thousands here, or a mistake: neither is a number.
-        return if text.contains('.') { None } else { text.replace(',', ".").parse().ok() };
-    }
-    text.parse().ok()
-}
-
-/// A greater number in SI units is none of a railway's; its square or sum might be infinite.
-const MAGNITUDE_MAX: f64 = 1e15;
-
-/// A cell's number as it is kept: in the quantity's unit, missing when infinite or as good as that.
-fn held(mapping: &ColumnMapping, cell: f64) -> f64 {
-    if mapping.quantity == Quantity::CurveRadius && cell.is_infinite() {
-        return 0.0;
-    }
-    let value = mapping.convert(cell);
-    if value.abs() <= MAGNITUDE_MAX { value } else { f64::NAN }
-}
-
-fn not_a_number(mapping: &ColumnMapping, cell: &[u8], decimal: u8) -> Problem {
-    let printable = |letter: char| if letter.is_control() { ' ' } else { letter };
-    let text = lossy(cell).chars().take(60).map(printable).collect();
-    let with_point: Vec<u8> =
-        cell.iter().map(|&letter| if letter == b',' { b'.' } else { letter }).collect();
-    let is_comma = decimal == b'.' && parse_cell(&with_point, b'.').is_some();
-    let hint = if is_comma { "; for decimal commas set decimal = \",\" in [dataset]" } else { "" };
-    Problem::NotANumber { column: mapping.column.clone(), text, hint }
-}
-
-fn lossy(bytes: &[u8]) -> std::borrow::Cow<'_, str> {
-    String::from_utf8_lossy(bytes)
 }
 
 #[cfg(test)]

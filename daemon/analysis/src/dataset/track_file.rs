@@ -11,6 +11,8 @@ use super::error::{DatasetError, Place, Problem};
 
 /// A steeper gradient in ‰ than any adhesion railway has is a mistake of unit.
 const GRADIENT_MAX_PERMILLE: f64 = 150.0;
+/// How a line is called that nobody named.
+const UNNAMED: &str = "unnamed line";
 
 /// Reads the text of a `track.toml`; `label` names the file in messages.
 ///
@@ -21,7 +23,10 @@ pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
     let document = Document::parse(label, text)?;
     let root = document.root();
     root.allow(&["track"])?;
-    let section = root.required_table("track")?;
+    let Some(section) = root.table("track")? else {
+        let unknown = Track::new(UNNAMED.into(), None, None, None, None);
+        return unknown.map_err(|error| Place::whole(label).problem(Problem::Track(error)));
+    };
     section.allow(&[
         "name",
         "length_m",
@@ -61,7 +66,7 @@ pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
         curves: curve_places.unwrap_or_default(),
         tunnels: tunnel_places.unwrap_or_default(),
     };
-    let name = section.text("name")?.unwrap_or("unnamed line").into();
+    let name = section.text("name")?.unwrap_or(UNNAMED).into();
     let refused = |error| Err(places.of(&error, &starts, &section).problem(Problem::Track(error)));
     let track = match Track::new(name, length_m, gradient.as_deref(), curves, tunnels) {
         Ok(track) => track,
@@ -284,6 +289,10 @@ tunnels = [[2200.0, 2900.0]]
         let track = parse_track("track.toml", "[track]\ntunnels = []\n").unwrap();
         assert!(track.knows_tunnels() && !track.knows_curves());
         assert_eq!(track.gradient(), None);
+        let (absent, empty) =
+            (parse_track("track.toml", ""), parse_track("track.toml", "[track]\n"));
+        assert_eq!(absent, empty);
+        assert!(absent.is_ok_and(|track| !track.knows_tunnels() && track.gradient().is_none()));
     }
 
     #[test]

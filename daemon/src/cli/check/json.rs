@@ -4,7 +4,7 @@ use std::path::Path;
 
 use dynocar_analysis::dataset::{
     ColumnMapping, DatasetError, DatasetHead, ForceSource, GradientSource, Manifest, Note,
-    PositionSource, Quantity, Remark, Role, Run, RunEntry, RunQuality,
+    PositionSource, Quantity, Remark, Role, Run, RunEntry, RunQuality, TimeFormat,
 };
 use dynocar_core::terms::extra::Extra;
 use dynocar_core::track::{LinearProfile, Track};
@@ -15,6 +15,8 @@ use super::Understood;
 use super::daemon::{self, DaemonAnswer};
 use crate::cli::{ErrorAnswer, Failure};
 use crate::dataset::FileKind;
+use crate::models::Moment;
+use crate::run_facts::recorded;
 
 /// The answer of `dynocar check --json`.
 #[derive(Debug, Serialize)]
@@ -51,6 +53,9 @@ struct ColumnAnswer<'a> {
     quantity: Quantity,
     column: &'a str,
     unit: &'static str,
+    /// How its cells are written, where they are times and no numbers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    format: Option<&'a str>,
     scale: f64,
     offset: f64,
 }
@@ -69,6 +74,9 @@ struct RunAnswer<'a> {
 enum RunOutcome<'a> {
     Read {
         mass_kg: f64,
+        /// In UTC; left out where it is not known.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        recorded: Option<Moment>,
         samples: usize,
         position_source: PositionSource,
         gradient_source: GradientSource,
@@ -190,6 +198,7 @@ fn dataset<'a>(manifest: &'a Manifest, runs: &'a [Result<Run, DatasetError>]) ->
         quantity: mapping.quantity,
         column: &mapping.column,
         unit: mapping.unit.name(),
+        format: mapping.format.as_ref().map(TimeFormat::name),
         scale: mapping.scale,
         offset: mapping.offset,
     };
@@ -201,6 +210,7 @@ fn dataset<'a>(manifest: &'a Manifest, runs: &'a [Result<Run, DatasetError>]) ->
             Err(error) => RunOutcome::Failed { error: error.to_string() },
             Ok(run) => RunOutcome::Read {
                 mass_kg: run.mass_kg,
+                recorded: recorded(run),
                 samples: run.samples.len(),
                 position_source: run.position_source,
                 gradient_source: run.gradient_source,

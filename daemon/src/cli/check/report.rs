@@ -310,8 +310,11 @@ fn columns(manifest: &Manifest) -> String {
             offset => format!(" + {offset}"),
         };
         let (name, width) = (mapping.quantity.name(), width.unwrap_or(0));
-        let (column, unit) = (&mapping.column, mapping.unit.name());
-        text += &format!("  {name:width$}  '{column}'{scale}{offset} in {unit}\n");
+        let read_as = match &mapping.format {
+            Some(format) => format!("as times like {}", format.example()),
+            None => format!("in {}", mapping.unit.name()),
+        };
+        text += &format!("  {name:width$}  '{}'{scale}{offset} {read_as}\n", mapping.column);
     }
     text
 }

@@ -1,12 +1,14 @@
 //! The runs of a dataset: what the train did, what the data are like, what to know.
 
-use dynocar_analysis::dataset::quality::QuantityCount;
+use dynocar_analysis::dataset::quality::{QuantityCount, ReasonCount};
 use dynocar_analysis::dataset::{
-    DatasetError, ForceSource, GradientSource, Manifest, Note, PositionSource, Remark, Role, Run,
+    DatasetError, ForceSource, GradientSource, Manifest, Note, PositionSource, Quantity, Remark,
+    Role, Run, is_parquet,
 };
 use dynocar_core::plausibility::Slip;
 
 use crate::cli::text::{TextTable, WIDTH, short, wrap};
+use crate::run_facts::{mass_t, recorded, recorded_in_words};
 
 type Read = Result<Run, DatasetError>;
 
@@ -16,32 +18,40 @@ pub(super) fn report(manifest: &Manifest, runs: &[Read], of_dataset: &[Note]) ->
     let (fit, holdout) = (count(Role::Fit), count(Role::Holdout));
     let mut text = format!("runs     {}: {fit} to fit, {holdout} held out\n", runs.len());
     text += &motion_table(manifest, runs).to_string();
-    text += "  km/h is the top speed; standing to unknown are seconds\n";
+    let unit = manifest.speed_unit();
+    text += &format!("  {} is the top speed; standing to unknown are seconds\n", unit.name());
     text += "\ndata\n";
     text += &data_table(runs).to_string();
     text.push('\n');
     text += &sources(runs);
-    text += &notes(runs, of_dataset);
+    text += &notes(manifest, runs, of_dataset);
     text
 }
 
 fn motion_table(manifest: &Manifest, runs: &[Read]) -> TextTable {
-    let header = [
-        "run", "file", "role", "dir", "t", "from s", "for s", "km", "km/h", "standing", "coasting",
-        "traction", "braking", "unknown",
-    ];
-    let mut table = TextTable::new(&header, &[1, 2]);
+    let unit = manifest.speed_unit();
+    let has_date = runs.iter().flatten().any(|run| recorded(run).is_some());
+    let mut header = vec!["run", "file"];
+    header.extend(has_date.then_some("recorded"));
+    header.extend(["role", "dir", "t", "from s", "for s", "km", unit.name(), "standing"]);
+    header.extend(["coasting", "traction", "braking", "unknown"]);
+    let words: &[usize] = if has_date { &[1, 2, 3] } else { &[1, 2] };
+    let mut table = TextTable::new(&header, words);
     for (index, run) in runs.iter().enumerate() {
         let entry = &manifest.runs[index];
         let mut row = vec![(index + 1).to_string(), manifest.runs[index].file.clone()];
+        if has_date {
+            row.push(run.as_ref().map_or_else(|_| String::new(), recorded_in_words));
+        }
         row.push(entry.role.name().into());
         row.push(format!("{:+}", entry.direction));
         match run {
             Err(_) => row.push("error".into()),
             Ok(run) => {
                 let quality = &run.quality;
-                let top = quality.speed_range_mps.map(|(_, high)| format!("{:.1}", 3.6 * high));
-                row.push(tonnes(run.mass_kg));
+                let top = quality.speed_range_mps.map(|(_, high)| unit.from_base(high));
+                let top = top.map(|high| format!("{high:.1}"));
+                row.push(mass_t(run));
                 row.push(format!("{:.1}", quality.start_s));
                 row.push(format!("{:.1}", quality.duration_s));
                 row.push(format!("{:.2}", quality.distance_m / 1000.0));
@@ -61,15 +71,6 @@ fn motion_table(manifest: &Manifest, runs: &[Read]) -> TextTable {
         table.push(row);
     }
     table
-}
-
-/// A mass with the decimals that its size deserves.
-fn tonnes(mass_kg: f64) -> String {
-    if mass_kg < 10_000.0 {
-        format!("{:.3}", mass_kg / 1000.0)
-    } else {
-        format!("{:.1}", mass_kg / 1000.0)
-    }
 }
 
 fn data_table(runs: &[Read]) -> TextTable {
@@ -165,7 +166,7 @@ fn source(name: &str, runs: &[Read], of: impl Fn(&Run) -> &'static str) -> Strin
 }
 
 /// What to know, each note once with its runs, first what cannot be true; nothing when all is well.
-fn notes(runs: &[Read], of_dataset: &[Note]) -> String {
+fn notes(manifest: &Manifest, runs: &[Read], of_dataset: &[Note]) -> String {
     let number = |file: &String| {
         let run = runs.iter().flatten().find(|run| run.file == *file);
         run.map_or_else(String::new, |run| run.number.to_string())
@@ -177,7 +178,7 @@ fn notes(runs: &[Read], of_dataset: &[Note]) -> String {
         .collect();
     for (index, run) in runs.iter().enumerate() {
         let of_run = match run {
-            Ok(run) => notes_on(run),
+            Ok(run) => notes_on(manifest, run),
             Err(error) => vec![error.to_string()],
         };
         let number = (index + 1).to_string();
@@ -201,7 +202,19 @@ fn notes(runs: &[Read], of_dataset: &[Note]) -> String {
     if text.is_empty() { text } else { format!("\nnotes\n{text}") }
 }
 
-fn notes_on(run: &Run) -> Vec<String> {
+/// A time of a run: in s, or as the clock that its file shows.
+fn time(manifest: &Manifest, run: &Run, time_s: f64) -> String {
+    let has_format = manifest.mapping(Quantity::Time).is_some_and(|it| it.format.is_some());
+    if !has_format || is_parquet(&run.file) {
+        return format!("{} s", short(time_s, 3));
+    }
+    let of_day_s = time_s.rem_euclid(86_400.0);
+    let minutes = (of_day_s / 60.0).floor();
+    let (hour, minute) = ((minutes / 60.0).floor(), minutes % 60.0);
+    format!("{hour:02}:{minute:02}:{:06.3}", of_day_s - 60.0 * minutes)
+}
+
+fn notes_on(manifest: &Manifest, run: &Run) -> Vec<String> {
     let quality = &run.quality;
     let mut notes = Vec::new();
     let mut list = |counts: Vec<String>, what: &str| {
@@ -215,8 +228,12 @@ fn notes_on(run: &Run) -> Vec<String> {
     list(by_quantity(&quality.missing), "cells missing");
     list(by_quantity(&quality.outliers), "outliers");
     list(by_quantity(&quality.noise_below_zero), "below zero by noise, set right");
-    let refused =
-        quality.refused.iter().map(|refused| format!("{} {}", refused.reason, refused.count));
+    let refused = quality.refused.iter().map(|refused| {
+        let ReasonCount { reason, count, first_line, first_s } = refused;
+        let which = if *count == 1 { "" } else { "the first " };
+        let at = time(manifest, run, *first_s);
+        format!("{reason} {count} ({which}in {}:{first_line}, at {at})", run.file)
+    });
     list(refused.collect(), "refused by validation");
     if quality.rows_without_time > 0 {
         notes.push(format!("rows without a time, not usable: {}", quality.rows_without_time));

@@ -2,8 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use dynocar_core::units::Unit;
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason};
 use serde::Serialize;
+
+/// At so many speeds, or a few more, the resistance is shown.
+const SHOWN_MAX: f64 = 7.0;
 
 /// What one estimator learned.
 #[derive(Clone, Debug, Serialize)]
@@ -14,6 +18,9 @@ pub(super) struct EstimatorAnswer {
     pub values: BTreeMap<&'static str, f64>,
     pub std: BTreeMap<&'static str, f64>,
     pub resistance: Vec<ResistancePoint>,
+    /// At round speeds in the unit of the recording, for people.
+    #[serde(skip)]
+    pub resistance_shown: Vec<ResistancePoint>,
     pub samples: SampleCounts,
     pub updates: u64,
     pub innovation_mean_square: f64,
@@ -40,7 +47,7 @@ pub(super) struct SampleCounts {
 
 impl EstimatorAnswer {
     /// What a snapshot says.
-    pub(super) fn of(kind: PipelineKind, snapshot: &ParameterSnapshot) -> Self {
+    pub(super) fn of(kind: PipelineKind, snapshot: &ParameterSnapshot, speed_unit: Unit) -> Self {
         let parameters = || Parameter::ALL.iter().filter(|&&it| snapshot.index_of(it).is_some());
         EstimatorAnswer {
             name: kind.name(),
@@ -48,7 +55,8 @@ impl EstimatorAnswer {
             reason: snapshot.reason().unwrap_or(Reason::None).name(),
             values: parameters().filter_map(|&it| Some((it.name(), snapshot.value(it)?))).collect(),
             std: parameters().filter_map(|&it| Some((it.name(), snapshot.std(it)?))).collect(),
-            resistance: resistance_points(snapshot),
+            resistance: resistance_points(snapshot, 1.0),
+            resistance_shown: resistance_points(snapshot, shown_step_mps(snapshot, speed_unit)),
             samples: SampleCounts {
                 used: snapshot.samples_used,
                 rejected: RejectionReason::ALL
@@ -72,12 +80,13 @@ impl EstimatorAnswer {
     }
 }
 
-/// Resistance over the driven speeds in steps of 1 m/s.
-fn resistance_points(snapshot: &ParameterSnapshot) -> Vec<ResistancePoint> {
-    let (low, high) = (snapshot.speed_min_mps.ceil() as u32, snapshot.speed_max_mps.floor() as u32);
-    (low..=high)
-        .filter_map(|speed_mps| {
-            let speed_mps = f64::from(speed_mps);
+/// Resistance over the driven speeds in such steps.
+fn resistance_points(snapshot: &ParameterSnapshot, step_mps: f64) -> Vec<ResistancePoint> {
+    let (low_mps, high_mps) = (snapshot.speed_min_mps, snapshot.speed_max_mps);
+    let (first, last) = ((low_mps / step_mps).ceil() as u32, (high_mps / step_mps).floor() as u32);
+    (first..=last)
+        .filter_map(|count| {
+            let speed_mps = f64::from(count) * step_mps;
             let estimate = snapshot.resistance_at(speed_mps)?;
             Some(ResistancePoint {
                 speed_mps,
@@ -86,4 +95,12 @@ fn resistance_points(snapshot: &ParameterSnapshot) -> Vec<ResistancePoint> {
             })
         })
         .collect()
+}
+
+/// A step between round speeds in a unit that gives a handful of them.
+fn shown_step_mps(snapshot: &ParameterSnapshot, speed_unit: Unit) -> f64 {
+    let range = speed_unit.from_base(snapshot.speed_max_mps - snapshot.speed_min_mps);
+    let steps = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0];
+    let step = steps.into_iter().find(|step| range / step <= SHOWN_MAX).unwrap_or(100.0);
+    speed_unit.to_base(step)
 }

@@ -8,10 +8,11 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use dynocar_analysis::dataset::{Role, Run};
+use dynocar_core::units::Unit;
 use serde::Serialize;
 
 use super::answer::EstimatorAnswer;
-use crate::cli::text::TextTable;
+use crate::cli::text::{TextTable, short};
 
 /// What the estimators learned from one run alone.
 #[derive(Clone, Debug, Serialize)]
@@ -59,10 +60,21 @@ impl RunAnswer {
 /// A column of a run table: its title, and each run's value with its standard deviation.
 struct Quantity {
     title: String,
+    /// The speed in m/s at which it is.
+    at_mps: Option<f64>,
     by_run: Vec<Option<(f64, f64)>>,
 }
 
 impl Quantity {
+    /// The title for people, with a speed in their unit.
+    fn shown(&self, speed_unit: Unit) -> String {
+        let at = |speed_mps| short(speed_unit.from_base(speed_mps), 1);
+        match self.at_mps {
+            Some(speed_mps) => format!("w0 at {} {}", at(speed_mps), speed_unit.name()),
+            None => self.title.clone(),
+        }
+    }
+
     fn spread(&self) -> Option<Spread> {
         spread(self.by_run.iter().flatten())
     }
@@ -104,6 +116,7 @@ fn quantities(runs: &[RunAnswer], place: usize) -> Vec<Quantity> {
         .into_iter()
         .map(|name| Quantity {
             title: name.into(),
+            at_mps: None,
             by_run: known(&|answer| Some((*answer.values.get(name)?, *answer.std.get(name)?))),
         })
         .collect();
@@ -112,7 +125,8 @@ fn quantities(runs: &[RunAnswer], place: usize) -> Vec<Quantity> {
             let point = answer.resistance.iter().find(|point| point.speed_mps == speed_mps)?;
             Some((point.w0_n_per_kn, point.std))
         };
-        quantities.push(Quantity { title: format!("w0 at {speed_mps} m/s"), by_run: known(&at) });
+        let (title, at_mps) = (format!("w0 at {speed_mps} m/s"), Some(speed_mps));
+        quantities.push(Quantity { title, at_mps, by_run: known(&at) });
     }
     quantities
 }
@@ -144,13 +158,14 @@ pub(super) fn spreads(runs: &[RunAnswer]) -> Vec<EstimatorSpread> {
 }
 
 /// A table for each estimator, a row for each run.
-pub(super) fn report(runs: &[RunAnswer]) -> String {
+pub(super) fn report(runs: &[RunAnswer], speed_unit: Unit) -> String {
     let mut text = String::new();
     let Some(first) = runs.first() else { return text };
     for (place, estimator) in first.estimators.iter().enumerate() {
         let quantities = quantities(runs, place);
         let mut header = vec!["run", "file", "role", "declared t", "status", "used"];
-        header.extend(quantities.iter().map(|quantity| quantity.title.as_str()));
+        let titles: Vec<String> = quantities.iter().map(|it| it.shown(speed_unit)).collect();
+        header.extend(titles.iter().map(String::as_str));
         let mut table = TextTable::new(&header, &[1, 2, 4]);
         for (index, run) in runs.iter().enumerate() {
             let answer = &run.estimators[place];
@@ -170,16 +185,15 @@ pub(super) fn report(runs: &[RunAnswer]) -> String {
         }
         // Writing to a string cannot fail.
         let _ = write!(text, "\n{}, from each run alone\n{table}", estimator.name);
-        for quantity in &quantities {
+        for (quantity, title) in quantities.iter().zip(&titles) {
             let Some(Spread { runs, mean, std_between, std_stated }) = quantity.spread() else {
                 continue;
             };
             let decimals = decimals(std_between.min(std_stated));
             let _ = writeln!(
                 text,
-                "  {}: mean {mean:.decimals$} of {runs} runs; standard deviation between them \
-                 {std_between:.decimals$}, by their own intervals {std_stated:.decimals$}",
-                quantity.title
+                "  {title}: mean {mean:.decimals$} of {runs} runs; standard deviation between them \
+                 {std_between:.decimals$}, by their own intervals {std_stated:.decimals$}"
             );
         }
     }

@@ -2,11 +2,14 @@
 
 use std::path::Path;
 
-use dynocar_analysis::dataset::guess::{Guess, GuessedColumn};
+use dynocar_analysis::dataset::Quantity;
+use dynocar_analysis::dataset::guess::{Guess, GuessedColumn, GuessedRun};
+use encoding_rs::{Encoding, UTF_8};
 use toml::Value;
 
 use crate::cli::text::comment;
 use crate::cli::train_text::TRAIN_FILE;
+use crate::models::Moment;
 use crate::track_text::TRACK_FILE;
 
 /// A name for a dataset: its folder's.
@@ -16,8 +19,13 @@ pub fn name_of(folder: &Path) -> String {
     name.filter(|name| !name.is_empty()).unwrap_or_else(|| "recordings".into())
 }
 
-/// The text of `dataset.toml`; `files` are the runs' paths from its folder.
-pub fn dataset(guess: &Guess, name: &str, files: &[String], has_track: bool) -> String {
+/// The text of `dataset.toml`; `files` are the runs' paths from its folder, in this encoding.
+pub fn dataset(
+    guess: &Guess,
+    name: &str,
+    (files, encoding): (&[String], &'static Encoding),
+    has_track: bool,
+) -> String {
     let mut text = comment(
         "",
         "Recorded runs of one train. Written by dynocar init: every line under [columns] is a guess \
@@ -25,9 +33,7 @@ pub fn dataset(guess: &Guess, name: &str, files: &[String], has_track: bool) -> 
          wrong; `dynocar check` then says what it understood.",
     );
     text += &format!("[dataset]\nname = {}\n", quoted(name));
-    let delimiter = char::from(guess.delimiter).to_string();
-    text += &format!("delimiter = {}\n", quoted(&delimiter));
-    text += &format!("decimal = {}\n", quoted(&char::from(guess.decimal).to_string()));
+    text += &layout_text(guess, encoding);
     text += "# position_reference = \"head\"    # where the recorded position is the head's, not the \
              centre's\n";
     text += &format!("\n[train]\nfile = {}\n\n", quoted(TRAIN_FILE));
@@ -64,8 +70,40 @@ pub fn dataset(guess: &Guess, name: &str, files: &[String], has_track: bool) -> 
         };
         text += &format!("direction = {:<19}# {falls}\n", run.direction);
         text += "# mass_t = 100.0               # where this run's load is known\n";
+        text += &date_text(guess, run);
     }
     text
+}
+
+/// How the files' text falls into cells.
+fn layout_text(guess: &Guess, encoding: &'static Encoding) -> String {
+    let mut text = String::new();
+    if encoding != UTF_8 {
+        text += &format!("encoding = {}\n", quoted(&encoding.name().to_lowercase()));
+    }
+    let delimiter = char::from(guess.delimiter).to_string();
+    text += &format!("delimiter = {}\n", quoted(&delimiter));
+    text += &format!("decimal = {}\n", quoted(&char::from(guess.decimal).to_string()));
+    if guess.skip_rows > 0 {
+        text += &format!("skip_rows = {:<19}# lines above the names\n", guess.skip_rows);
+    }
+    if guess.units_row {
+        text += "units_row = true               # a line of units below the names\n";
+    }
+    text
+}
+
+/// The day of a run, where its times do not hold it.
+fn date_text(guess: &Guess, run: &GuessedRun) -> String {
+    let format = guess.column(Quantity::Time).and_then(|time| time.format.as_ref());
+    match (format, run.day) {
+        (Some(format), _) if format.has_date() => String::new(),
+        (_, Some(day)) => {
+            let day = Moment { unix_s: 86_400 * u64::try_from(day).unwrap_or(0) }.day();
+            format!("date = {day:<24}# as the column of dates says\n")
+        }
+        _ => "# date = 2026-03-18            # where the day is known\n".into(),
+    }
 }
 
 fn column_text(column: &GuessedColumn) -> String {
@@ -80,8 +118,12 @@ fn column_text(column: &GuessedColumn) -> String {
         1.0 => String::new(),
         scale => format!(", scale = {}", Value::Float(scale)),
     };
-    let (name, unit) = (quoted(&column.name.text), quoted(column.unit.name()));
-    text + &format!("{} = {{ column = {name}, unit = {unit}{scale} }}\n", column.quantity)
+    let name = quoted(&column.name.text);
+    let read_as = match &column.format {
+        Some(format) => format!("format = {}", quoted(format.name())),
+        None => format!("unit = {}{scale}", quoted(column.unit.name())),
+    };
+    text + &format!("{} = {{ column = {name}, {read_as} }}\n", column.quantity)
 }
 
 /// A text as TOML writes it, on one line.
@@ -113,11 +155,11 @@ mod tests {
         let files = [Recording { label: "a.csv", text }];
         let guess = guess(&files, &[]).unwrap_or_else(|error| panic!("{error}"));
         let files = ["da\"y\\1.csv".to_string()];
-        let text = dataset(&guess, "x\n[y]", &files, true);
+        let text = dataset(&guess, "x\n[y]", (&files, UTF_8), true);
         let manifest = Manifest::parse("dataset.toml", &text).unwrap_or_else(|it| panic!("{it}"));
         let columns: Vec<&str> = manifest.columns.iter().map(|it| it.column.as_str()).collect();
         assert_eq!(columns, ["t \"s\" [s]", "v\t\\x [km/h]"]);
-        assert_eq!((manifest.delimiter, manifest.name.as_str()), (b';', "x\n[y]"));
+        assert_eq!((manifest.layout.delimiter, manifest.name.as_str()), (b';', "x\n[y]"));
         assert_eq!(manifest.runs[0].file, files[0]);
         assert!(manifest.track_file.is_some() && text.contains("# Taken for nothing:"));
     }
@@ -129,7 +171,7 @@ mod tests {
         for count in 1..4 {
             let guess = guess(&vec![recording; count], &[]).unwrap();
             let files: Vec<String> = (0..count).map(|index| format!("{index}.csv")).collect();
-            let text = dataset(&guess, "x", &files, false);
+            let text = dataset(&guess, "x", (&files, UTF_8), false);
             let manifest = Manifest::parse("dataset.toml", &text).unwrap();
             let roles: Vec<Role> = manifest.runs.iter().map(|run| run.role).collect();
             assert_eq!(roles.contains(&Role::Holdout), count > 1);

@@ -2,6 +2,7 @@
 
 use dynocar_analysis::dataset::Note;
 use dynocar_analysis::dataset::guess::Guess;
+use encoding_rs::Encoding;
 
 /// Name of the daemon's configuration.
 pub const DAEMON_FILE: &str = "daemon.toml";
@@ -10,6 +11,8 @@ pub const DAEMON_FILE: &str = "daemon.toml";
 pub struct Described {
     /// Which column was taken for what.
     pub guess: Guess,
+    /// Which letters the files' bytes are.
+    pub encoding: &'static Encoding,
     /// The runs' files, as the dataset names them.
     pub files: Vec<String>,
     /// What cannot be true of the runs as they were understood, the worst first.

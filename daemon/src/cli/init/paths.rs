@@ -1,10 +1,11 @@
 //! Files as a dataset names them: from its folder.
 
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 use dynocar_analysis::dataset::Place;
 
 use crate::cli::Failure;
+use crate::paths::{self, real};
 
 /// The paths of existing files from a folder that need not be there yet.
 ///
@@ -12,7 +13,6 @@ use crate::cli::Failure;
 ///
 /// A file that is given twice, or whose name no TOML file can hold, is an input failure.
 pub fn from_folder(folder: &Path, files: &[PathBuf]) -> Result<Vec<String>, Failure> {
-    let folder = real(folder);
     let mut seen: Vec<PathBuf> = Vec::new();
     let mut paths = Vec::new();
     for file in files {
@@ -24,33 +24,12 @@ pub fn from_folder(folder: &Path, files: &[PathBuf]) -> Result<Vec<String>, Fail
         if seen.contains(&full) {
             return Err(refuse("expected every run once, found the file twice"));
         }
-        let path = relative(&full, &folder);
+        let path = paths::from_folder(folder, file);
         let text = path.to_str().ok_or_else(|| refuse("expected a name in UTF-8"))?;
         paths.push(text.into());
         seen.push(full);
     }
     Ok(paths)
-}
-
-/// A path without links, as far as it is there.
-fn real(path: &Path) -> PathBuf {
-    let full = std::path::absolute(path).unwrap_or_else(|_| path.into());
-    for known in full.ancestors() {
-        if let Ok(start) = known.canonicalize() {
-            let rest = full.strip_prefix(known).unwrap_or(Path::new(""));
-            return start.join(rest).components().collect();
-        }
-    }
-    full
-}
-
-/// The way from a folder to a file, both in full.
-fn relative(file: &Path, folder: &Path) -> PathBuf {
-    let (file, folder): (Vec<Component>, Vec<Component>) =
-        (file.components().collect(), folder.components().collect());
-    let shared = file.iter().zip(&folder).take_while(|(one, other)| one == other).count();
-    let up = folder[shared..].iter().map(|_| Component::ParentDir);
-    up.chain(file[shared..].iter().copied()).collect()
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use super::described::{DAEMON_FILE, Described};
 use crate::cli::text::{TextTable, entry, for_shell, notes};
 use crate::cli::train_text::{TRAIN_FILE, TrainText};
 use dynocar_analysis::dataset::MANIFEST_FILE;
+use encoding_rs::UTF_8;
 
 /// What was written, understood and is left to do.
 pub fn text(folder: &Path, train: &TrainText, described: Option<&Described>) -> String {
@@ -38,9 +39,22 @@ fn recordings(described: &Described) -> String {
         b'\t' => "a tab".into(),
         mark => format!("'{}'", char::from(mark)),
     };
-    text += &format!("cells end at {delimiter}, decimals at '{}'\n\n", char::from(guess.decimal));
-    let mut table =
-        TextTable::new(&["column", "taken for", "unit", "sure", "since"], &[0, 1, 2, 3, 4]);
+    text += &format!("cells end at {delimiter}, decimals at '{}'\n", char::from(guess.decimal));
+    if described.encoding != UTF_8 {
+        let name = described.encoding.name().to_lowercase();
+        text += &format!("letters are {name}: the files are no UTF-8\n");
+    }
+    if guess.skip_rows > 0 {
+        text += &format!("the names stand in line {}\n", guess.skip_rows + 1);
+    }
+    if guess.units_row {
+        text += "units stand in the line below the names\n";
+    }
+    text.push('\n');
+    let mut table = TextTable::new(
+        &["column", "taken for", "unit or format", "sure", "since"],
+        &[0, 1, 2, 3, 4],
+    );
     for column in &guess.columns {
         let scale = match column.scale {
             1.0 => String::new(),
@@ -49,7 +63,10 @@ fn recordings(described: &Described) -> String {
         table.push(vec![
             format!("'{}'", column.name.shown()),
             column.quantity.to_string(),
-            format!("{scale}{}", column.unit.name()),
+            match &column.format {
+                Some(format) => format.name().to_owned(),
+                None => format!("{scale}{}", column.unit.name()),
+            },
             if column.doubts.is_empty() { "yes".into() } else { "NO".into() },
             column.reasons.join("; "),
         ]);

@@ -8,7 +8,8 @@ use dynocar_analysis::explain::evidence::RunData;
 
 use super::Section;
 use crate::report::Subject;
-use crate::report::html::{Column, Table, count, escape, grouped, tonnes};
+use crate::report::html::{Column, Table, count, escape, grouped};
+use crate::run_facts::{mass_t, recorded, recorded_in_words};
 
 /// The section.
 pub fn section(subject: &Subject) -> Section {
@@ -41,9 +42,10 @@ pub fn section(subject: &Subject) -> Section {
 }
 
 fn runs_table(used: &[(&Run, Option<&RunData>)]) -> String {
-    let head = [
-        ("Run", Column::Numbers),
-        ("File", Column::Names),
+    let has_date = used.iter().any(|(run, _)| recorded(run).is_some());
+    let mut head = vec![("Run", Column::Numbers), ("File", Column::Names)];
+    head.extend(has_date.then_some(("Recorded (UTC)", Column::Words)));
+    head.extend([
         ("Role", Column::Words),
         ("Direction", Column::Numbers),
         ("Mass, t", Column::Numbers),
@@ -56,17 +58,17 @@ fn runs_table(used: &[(&Run, Option<&RunData>)]) -> String {
         ("Outliers replaced", Column::Numbers),
         ("Gaps (longest)", Column::Numbers),
         ("Restarts", Column::Numbers),
-    ];
+    ]);
     let mut table = Table::new("The runs", &head);
     for (run, data) in used {
         let quality = &run.quality;
         let of_data = |value: &dyn Fn(&RunData) -> String| data.map_or("–".into(), value);
-        table.push(vec![
-            run.number.to_string(),
-            escape(&run.file),
+        let mut row = vec![run.number.to_string(), escape(&run.file)];
+        row.extend(has_date.then(|| recorded_in_words(run)));
+        row.extend([
             run.role.name().into(),
             if run.direction > 0 { "+1".into() } else { "−1".into() },
-            tonnes(run.mass_kg),
+            mass_t(run),
             format!("{:.0}", quality.duration_s),
             format!("{:.1}", quality.distance_m / 1000.0),
             quality.speed_range_mps.map_or("–".into(), |(_, high)| format!("{high:.1}")),
@@ -77,6 +79,7 @@ fn runs_table(used: &[(&Run, Option<&RunData>)]) -> String {
             gaps(&quality.order),
             of_data(&|data| count(data.recording.restarts())),
         ]);
+        table.push(row);
     }
     table.html()
 }

@@ -37,7 +37,8 @@ impl<'c> Assignment<'c> {
         };
         for it in told {
             let problem = assignment.take_told(it, columns);
-            problem.map_err(|problem| GuessError::new(Place::line(label, 1), problem))?;
+            let place = || Place::line(label, columns.skip_rows + 1);
+            problem.map_err(|problem| GuessError::new(place(), problem))?;
         }
         for (index, column) in columns.columns.iter().enumerate() {
             if column.unusable.is_some() || assignment.is_taken(index) {
@@ -80,7 +81,7 @@ impl<'c> Assignment<'c> {
         let is_unit_open = told.unit.is_none() && named_unit(&column.name, quantity).is_none();
         let mut guessed = self.guessed(index, quantity, unit);
         guessed.reasons.insert(0, "told on the command line".into());
-        guessed.is_unit_open = is_unit_open;
+        guessed.is_unit_open = is_unit_open && guessed.format.is_none();
         self.taken.push((index, guessed, true));
         Ok(())
     }
@@ -88,7 +89,11 @@ impl<'c> Assignment<'c> {
     fn guessed(&self, index: usize, quantity: Quantity, unit: UnitChoice) -> GuessedColumn {
         let column = &self.columns[index];
         let middle = column.all.middle().unwrap_or(f64::NAN);
-        GuessedColumn::new(quantity, column.name.clone(), unit, middle)
+        let guessed = GuessedColumn::new(quantity, column.name.clone(), unit, middle);
+        match quantity {
+            Quantity::Time => guessed.written_as(&column.all.formats()),
+            _ => guessed,
+        }
     }
 
     /// The best candidate first, then the best of those that are left.
@@ -103,7 +108,7 @@ impl<'c> Assignment<'c> {
             let mut guessed = self.guessed(column, quantity, unit);
             guessed.reasons.insert(0, reason);
             guessed.doubts.splice(0..0, doubt);
-            guessed.is_unit_open = is_unit_open;
+            guessed.is_unit_open = is_unit_open && guessed.format.is_none();
             self.taken.push((column, guessed, false));
         }
     }

@@ -4,10 +4,10 @@ use csv::ByteRecord;
 
 use super::facts::Facts;
 use super::guessed::{GuessResult, Recording};
-use super::layout::{Layout, layout, reader};
+use super::layout::{Layout, layout};
 use super::name::Name;
 use super::problem::{GuessError, GuessProblem};
-use crate::dataset::table::parse_cell;
+use crate::dataset::lines::{below, line_of, reader};
 use crate::dataset::{Place, Problem};
 
 /// A column of the first file's header.
@@ -30,6 +30,10 @@ pub struct Columns {
     pub delimiter: u8,
     /// Between a number and its fraction.
     pub decimal: u8,
+    /// Lines above the names.
+    pub skip_rows: usize,
+    /// True where a line of units stands below the names.
+    pub units_row: bool,
     /// The columns, in the order of the first file's header.
     pub columns: Vec<Column>,
     /// Rows of values in each file.
@@ -50,7 +54,7 @@ impl Columns {
         };
         let decimal = layouts.iter().find_map(|it| it.decimal).unwrap_or(b'.');
         for (file, other) in files.iter().zip(&layouts) {
-            require_alike(file, other, files[0].label, first.delimiter, decimal)?;
+            require_alike(file, other, files[0].label, first, decimal)?;
         }
         let mut columns: Vec<Column> = first
             .header
@@ -80,7 +84,8 @@ impl Columns {
             }
             rows.push(count);
         }
-        Ok(Columns { delimiter: first.delimiter, decimal, columns, rows })
+        let &Layout { delimiter, skip_rows, units_row, .. } = first;
+        Ok(Columns { delimiter, decimal, skip_rows, units_row, columns, rows })
     }
 
     /// Every column's name, for messages.
@@ -108,27 +113,42 @@ fn unusable(name: &Name, files: &[Recording], layouts: &[Layout]) -> Option<Stri
 fn require_alike(
     file: &Recording,
     layout: &Layout,
-    first: &str,
-    delimiter: u8,
+    label: &str,
+    first: &Layout,
     decimal: u8,
 ) -> GuessResult<()> {
-    let refuse = |what, found: u8, expected: u8| {
-        let shown = |mark: u8| format!("{:?}", char::from(mark).to_string());
-        let (found, expected, first) = (shown(found), shown(expected), first.to_string());
-        let problem = GuessProblem::OtherLayout { what, found, expected, first };
-        Err(GuessError::new(Place::whole(file.label), problem))
-    };
-    match layout.decimal {
-        _ if layout.delimiter != delimiter => refuse("the delimiter", layout.delimiter, delimiter),
-        Some(mark) if mark != decimal => refuse("the decimal mark", mark, decimal),
-        _ => Ok(()),
+    let mark = |mark: u8| format!("{:?}", char::from(mark).to_string());
+    let own_decimal = layout.decimal.unwrap_or(decimal);
+    let all = [
+        ("the delimiter", mark(layout.delimiter), mark(first.delimiter)),
+        ("the decimal mark", mark(own_decimal), mark(decimal)),
+        (
+            "the number of lines above the names",
+            layout.skip_rows.to_string(),
+            first.skip_rows.to_string(),
+        ),
+        ("a line of units", shown(layout.units_row), shown(first.units_row)),
+    ];
+    match all.into_iter().find(|(_, found, expected)| found != expected) {
+        None => Ok(()),
+        Some((what, found, expected)) => {
+            let first = label.to_string();
+            let problem = GuessProblem::OtherLayout { what, found, expected, first };
+            Err(GuessError::new(Place::whole(file.label), problem))
+        }
     }
+}
+
+fn shown(is_there: bool) -> String {
+    if is_there { "there".into() } else { "not there".into() }
 }
 
 /// What the values of every column are like, and the number of rows.
 fn read_file(file: &Recording, layout: &Layout, decimal: u8) -> GuessResult<(Vec<Facts>, usize)> {
-    let mut reader = reader(file.text, layout.delimiter);
+    let text = below(file.label, file.text, layout.skip_rows)?;
+    let mut reader = reader(text, layout.delimiter);
     let mut facts = vec![Facts::new(); layout.header.len()];
+    let above = 1 + usize::from(layout.units_row);
     let (mut record, mut rows) = (ByteRecord::new(), 0);
     loop {
         let has_row = reader.read_byte_record(&mut record).map_err(|error| {
@@ -136,20 +156,16 @@ fn read_file(file: &Recording, layout: &Layout, decimal: u8) -> GuessResult<(Vec
             Place::whole(file.label).problem(Problem::Syntax { language: "CSV", message })
         })?;
         if !has_row {
-            // The header is no row of values.
-            return Ok((facts, rows - 1));
+            // Names and units are no rows of values.
+            return Ok((facts, rows - above));
         }
         rows += 1;
-        if rows == 1 {
+        if rows <= above {
             continue;
         }
-        let line = record.position().map_or(0, |position| position.line() as usize);
+        let line = line_of(text, &record) + layout.skip_rows;
         for (facts, cell) in facts.iter_mut().zip(&record) {
-            let cell = cell.trim_ascii();
-            match parse_cell(cell, decimal) {
-                Some(value) => facts.push(value),
-                None => facts.push_text(line, &String::from_utf8_lossy(cell)),
-            }
+            facts.push_cell(line, cell.trim_ascii(), decimal);
         }
     }
 }

@@ -1,5 +1,9 @@
 //! What the values of a column are like.
 
+use crate::dataset::TimeFormat;
+use crate::dataset::cell::parse_cell;
+use crate::dataset::clock::{DayClock, day_of_cell};
+
 /// So many values of a column are kept, evenly spread, to tell its middle and its top.
 const KEPT_MAX: usize = 4096;
 
@@ -16,7 +20,7 @@ impl Spread {
         Spread { values: Vec::new(), every: 1, seen: 0 }
     }
 
-    fn push(&mut self, value: f64) {
+    pub fn push(&mut self, value: f64) {
         if self.seen.is_multiple_of(self.every) {
             self.values.push(value);
         }
@@ -60,6 +64,10 @@ pub struct Facts {
     pub min: f64,
     /// The greatest number.
     pub max: f64,
+    /// The first cell that is a date and nothing else, counted in days from 1970-01-01.
+    pub day: Option<i64>,
+    /// Readers of the formats in which every cell so far is a time, the likeliest first.
+    clocks: Vec<DayClock>,
     first: f64,
     last: f64,
     growing: usize,
@@ -76,6 +84,8 @@ impl Facts {
             text: None,
             min: f64::INFINITY,
             max: f64::NEG_INFINITY,
+            day: None,
+            clocks: Vec::new(),
             first: f64::NAN,
             last: f64::NAN,
             growing: 0,
@@ -83,6 +93,45 @@ impl Facts {
             values: Spread::new(),
             steps: Spread::new(),
         }
+    }
+
+    /// Takes in a trimmed cell of a line: a number, a time, or text.
+    pub fn push_cell(&mut self, line: usize, cell: &[u8], decimal: u8) {
+        match parse_cell(cell, decimal) {
+            Some(value) if value.is_nan() || self.clocks.is_empty() => self.push(value),
+            None if self.may_hold_times() => match self.time_s(cell) {
+                Some(time_s) => self.push(time_s),
+                None => self.push_text(line, &String::from_utf8_lossy(cell)),
+            },
+            _ => self.push_text(line, &String::from_utf8_lossy(cell)),
+        }
+    }
+
+    /// True while every cell so far was empty or a time.
+    fn may_hold_times(&self) -> bool {
+        self.text.is_none() && (self.numbers == 0 || !self.clocks.is_empty())
+    }
+
+    /// A cell's time in the likeliest format that holds for all cells so far.
+    fn time_s(&mut self, cell: &[u8]) -> Option<f64> {
+        if self.clocks.is_empty() {
+            self.day = self.day.or_else(|| day_of_cell(cell));
+            self.clocks = TimeFormat::of_cell(cell).iter().map(DayClock::new).collect();
+        }
+        let mut times_s = Vec::new();
+        let mut clocks = std::mem::take(&mut self.clocks);
+        clocks.retain_mut(|clock| {
+            let time_s = clock.seconds(cell);
+            times_s.extend(time_s);
+            time_s.is_some()
+        });
+        self.clocks = clocks;
+        times_s.first().copied()
+    }
+
+    /// The formats in which every value is a time, the likeliest first; none for numbers.
+    pub fn formats(&self) -> Vec<&TimeFormat> {
+        self.clocks.iter().map(DayClock::format).collect()
     }
 
     /// Takes in a cell's number; what is not finite is missing.
@@ -106,7 +155,7 @@ impl Facts {
     }
 
     /// Takes in a cell that is no number.
-    pub fn push_text(&mut self, line: usize, cell: &str) {
+    fn push_text(&mut self, line: usize, cell: &str) {
         let printable = |letter: char| if letter.is_control() { ' ' } else { letter };
         let cell = || cell.chars().take(40).map(printable).collect();
         self.text.get_or_insert_with(|| Text { line, cell: cell() });
@@ -114,6 +163,13 @@ impl Facts {
 
     /// Takes in what was seen of the same column in another file.
     pub fn merge(&mut self, other: &Facts) {
+        match self.numbers {
+            0 => self.clocks.clone_from(&other.clocks),
+            _ if other.numbers > 0 => {
+                self.clocks.retain(|clock| other.formats().contains(&clock.format()));
+            }
+            _ => {}
+        }
         self.numbers += other.numbers;
         self.min = self.min.min(other.min);
         self.max = self.max.max(other.max);

@@ -5,7 +5,7 @@ use dynocar_core::units::Unit;
 use super::name::Name;
 use super::plausible::UnitChoice;
 use super::problem::GuessError;
-use crate::dataset::Quantity;
+use crate::dataset::{Quantity, TimeFormat};
 
 /// A recording's file.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +34,10 @@ pub struct Guess {
     pub delimiter: u8,
     /// Between a number and its fraction.
     pub decimal: u8,
+    /// Lines above the names.
+    pub skip_rows: usize,
+    /// True where a line of units stands below the names.
+    pub units_row: bool,
     /// The columns that hold a quantity, in the order of [`Quantity::ALL`].
     pub columns: Vec<GuessedColumn>,
     /// The other columns, in the order of the header.
@@ -53,6 +57,8 @@ pub struct GuessedColumn {
     pub unit: Unit,
     /// Factor on the cell.
     pub scale: f64,
+    /// How its cells are written, where they are times and no numbers.
+    pub format: Option<TimeFormat>,
     /// What speaks for it.
     pub reasons: Vec<String>,
     /// What makes it doubtful; empty where header and values agree.
@@ -83,6 +89,8 @@ pub struct GuessedRun {
     pub rows: usize,
     /// -1 where the position falls, else 1.
     pub direction: i8,
+    /// The day in a column of dates beside clock times, counted from 1970-01-01.
+    pub day: Option<i64>,
 }
 
 impl Guess {
@@ -100,12 +108,28 @@ impl GuessedColumn {
             name,
             unit: unit.spelled.unit,
             scale: unit.spelled.scale,
+            format: None,
             reasons: vec![unit.reason],
             doubts: unit.doubt.into_iter().collect(),
             rejected: Vec::new(),
             is_unit_open: false,
             middle,
         }
+    }
+
+    /// The same, its cells times in the first of these formats; in the others they could be, too.
+    pub(super) fn written_as(self, formats: &[&TimeFormat]) -> Self {
+        let [format, others @ ..] = formats else { return self };
+        let unit = Unit::base_of(self.quantity.dimension());
+        let reason = format!("its cells are times as {}", format.example());
+        let names: Vec<&str> = others.iter().map(|it| it.name()).collect();
+        // A day without a leading zero is read where one stands, too.
+        let is_other = |name: &str| name.replace('-', "") != format.name().replace('-', "");
+        let others: Vec<&str> = names.into_iter().filter(|name| is_other(name)).collect();
+        let doubt = format!("they could be {}, too", others.join(" or "));
+        let doubts = if others.is_empty() { Vec::new() } else { vec![doubt] };
+        let format = Some((*format).clone());
+        GuessedColumn { unit, scale: 1.0, format, reasons: vec![reason], doubts, ..self }
     }
 }
 

@@ -48,7 +48,14 @@ pub fn consider(
     facts: &Facts,
     quantity: Quantity,
 ) -> Option<Result<Candidate, String>> {
-    let matched = match by_name(name, quantity)? {
+    let by_name = match quantity {
+        // What stands in brackets behind the name may be the times' form.
+        Quantity::Time if !facts.formats().is_empty() => {
+            by_name(name, quantity).filter(Result::is_ok).or_else(|| Some(Ok(by_cells())))
+        }
+        _ => by_name(name, quantity),
+    };
+    let matched = match by_name? {
         Ok(matched) => matched,
         Err(reason) => return Some(Err(reason)),
     };
@@ -73,6 +80,9 @@ pub fn can_hold(facts: &Facts, quantity: Quantity) -> Result<(), String> {
     let (Some(top), min, max) = (facts.top(), facts.min, facts.max) else {
         return Err("it holds no value".into());
     };
+    if quantity != Quantity::Time && !facts.formats().is_empty() {
+        return Err("it holds times".into());
+    }
     let refuse_beyond = |low: f64, high: f64| match min < low || max > high {
         true => Err(format!("its values, {min} to {max}, leave {low} to {high}")),
         false => Ok(()),
@@ -89,6 +99,11 @@ pub fn can_hold(facts: &Facts, quantity: Quantity) -> Result<(), String> {
         Quantity::Curvature if top > 0.2 => Err("its values are no curvature in 1/m".into()),
         _ => Ok(()),
     }
+}
+
+/// A column of times, whatever its name.
+fn by_cells() -> Match {
+    Match { score: SURE, reason: "what it holds".into(), unit: None }
 }
 
 /// The unit that a column's name gives for a quantity.

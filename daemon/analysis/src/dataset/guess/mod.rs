@@ -7,7 +7,7 @@
 //!
 //! # Layout, in the order of the work
 //!
-//! - `layout`, `columns`, `facts`: delimiter, decimal mark, header; what the values are like
+//! - `layout`, `columns`, `facts`: delimiter, decimal mark, names and units; what the values are like
 //! - `name`, `spelling`, `vocabulary`: a name in words, units as people write them, what recorders
 //!   call the quantities
 //! - `matching`, `plausible`: which quantity a column speaks for, and its likeliest unit
@@ -53,18 +53,23 @@ pub fn guess(files: &[Recording], told: &[Told]) -> Result<Guess, GuessError> {
         if !assignment.has(quantity) {
             let (reasons, columns) = (assignment.near(quantity), read.names());
             let problem = GuessProblem::Missing { quantity, reasons, columns };
-            return Err(GuessError::new(Place::line(label, 1), problem));
+            return Err(GuessError::new(Place::line(label, read.skip_rows + 1), problem));
         }
     }
     let (columns, unmapped) = assignment.finish();
     let position = columns.iter().find(|column| column.quantity == Quantity::Position);
     let position =
         position.and_then(|it| read.columns.iter().find(|column| column.name == it.name));
+    let time = columns.iter().find(|column| column.quantity == Quantity::Time);
+    let lacks_date = time.is_some_and(|it| it.format.as_ref().is_some_and(|it| !it.has_date()));
+    let dates = read.columns.iter().filter(|_| lacks_date);
     let runs = files.iter().zip(&read.rows).enumerate().map(|(index, (file, &rows))| GuessedRun {
         label: file.label.into(),
         rows,
         direction: position.map_or(1, |column| column.facts[index].direction()),
+        day: dates.clone().find_map(|column| column.facts[index].day),
     });
     let runs = runs.collect();
-    Ok(Guess { delimiter: read.delimiter, decimal: read.decimal, columns, unmapped, runs })
+    let columns::Columns { delimiter, decimal, skip_rows, units_row, .. } = read;
+    Ok(Guess { delimiter, decimal, skip_rows, units_row, columns, unmapped, runs })
 }

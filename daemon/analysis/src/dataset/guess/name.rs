@@ -21,6 +21,11 @@ impl Name {
         Name { text: text.into(), words: words(&rest), unit }
     }
 
+    /// The name with a unit that stands elsewhere, unless it has its own.
+    pub fn with_unit(self, unit: Option<String>) -> Self {
+        Name { unit: self.unit.or(unit), ..self }
+    }
+
     /// The name for messages: one line of at most 60 letters.
     pub fn shown(&self) -> String {
         let letters = self.text.chars().take(60);

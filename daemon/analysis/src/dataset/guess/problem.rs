@@ -32,25 +32,16 @@ pub enum GuessProblem {
         /// Its first cell.
         found: String,
     },
-    /// The first line is not the header.
+    /// The names are fewer than the values below them.
     #[error(
-        "expected names of columns, found {found} cells above rows of {usual}: remove the lines \
-         above the names"
+        "expected names of columns, found {found} cells above rows of {usual}: write a name for \
+         every column"
     )]
-    LinesAbove {
-        /// Cells of the first line.
+    FewNames {
+        /// Cells of the line with the names.
         found: usize,
         /// Cells of most rows.
         usual: usize,
-    },
-    /// The second line holds units.
-    #[error(
-        "expected values, found units ('{found}'): write them into the names, as 'v [km/h]', and \
-         remove the line"
-    )]
-    UnitsLine {
-        /// The first of them.
-        found: String,
     },
     /// A file of another layout than the first.
     #[error(

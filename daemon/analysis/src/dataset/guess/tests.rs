@@ -1,6 +1,7 @@
 //! Guesses of whole files.
 
 use super::*;
+use crate::dataset::TimeFormat;
 use Quantity::*;
 
 /// A run that pulls, coasts and brakes, as rows of time, position, speed, traction and brake force
@@ -301,4 +302,45 @@ fn what_is_told_is_taken_for_granted() {
     assert_eq!(message, "a.csv:1: no column 'C' for time; the columns: 'A', 'B', 'v'");
     let message = refused(told(Time, "v", None));
     assert!(message.contains("column 'v' cannot be time: its values do not grow"), "{message}");
+}
+
+#[test]
+fn a_loggers_preamble_units_and_clock_times_are_described() {
+    let text = "Logger;XY 7;;;\nZug;ET 4711;;;\nDatum;Uhrzeit;Geschwindigkeit;Zugkraft;Bemerkung\n\
+                ;hh:mm:ss;km/h;kN;\n\
+                18.03.2026;23:59:59,0;10,5;60;\n18.03.2026;23:59:59,5;11,5;60;x\n\
+                19.03.2026;00:00:00,0;12,5;60;\n19.03.2026;00:00:00,5;13,5;60;\n";
+    let guess = guess(&[Recording { label: "a.csv", text }], &[]).unwrap();
+    assert_eq!((guess.delimiter, guess.decimal), (b';', b','));
+    assert_eq!((guess.skip_rows, guess.units_row), (2, true));
+    let time = guess.column(Quantity::Time).unwrap();
+    assert_eq!((&time.name.text[..], time.format.as_ref()), ("Uhrzeit", Some(&TimeFormat::Clock)));
+    assert!(time.doubts.is_empty(), "{:?}", time.doubts);
+    let speed = guess.column(Quantity::Speed).unwrap();
+    assert_eq!((speed.unit.name(), speed.is_unit_open), ("km/h", false));
+    assert_eq!(guess.column(Quantity::TractionForce).unwrap().unit.name(), "kN");
+    assert_eq!(guess.runs[0].day, Some(20_530));
+    assert_eq!(guess.runs[0].rows, 4);
+}
+
+#[test]
+fn dates_are_recognised_by_their_cells_and_doubtful_where_day_and_month_could_be_exchanged() {
+    let read = |times: [&str; 3]| {
+        let row = |(k, time): (usize, &str)| format!("{time};{}\n", 10 + k);
+        let rows: String = times.into_iter().enumerate().map(row).collect();
+        let text = format!("Zeitpunkt;v [km/h]\n{rows}");
+        let guess = guess(&[Recording { label: "a.csv", text: &text }], &[]).unwrap();
+        let time = guess.column(Quantity::Time).unwrap().clone();
+        (time.format.unwrap().name().to_owned(), time.doubts.join(" "), guess.runs[0].day)
+    };
+    let iso = ["2026-03-18T07:13:20.2", "2026-03-18T07:13:20.4", "2026-03-18T07:13:20.6"];
+    assert_eq!(read(iso), ("iso".into(), String::new(), None));
+    let german = ["18.03.2026 07:13:20", "18.03.2026 07:13:21", "18.03.2026 07:13:22"];
+    assert_eq!(read(german), ("%d.%m.%Y %H:%M:%S".into(), String::new(), None));
+    let american = ["03/18/2026 07:13:20", "03/18/2026 07:13:21", "03/18/2026 07:13:22"];
+    assert_eq!(read(american).0, "%m/%d/%Y %H:%M:%S");
+    let either = ["03/04/2026 07:13:20", "03/04/2026 07:13:21", "03/04/2026 07:13:22"];
+    let (format, doubts, _) = read(either);
+    assert_eq!(format, "%d/%m/%Y %H:%M:%S");
+    assert_eq!(doubts, "they could be %m/%d/%Y %H:%M:%S, too");
 }

@@ -36,7 +36,7 @@ fn every_key_is_read() {
     assert_eq!(manifest.name, "line-01");
     assert_eq!(manifest.description.as_deref(), Some("made by hand"));
     assert_eq!(manifest.position_reference, PositionReference::Head);
-    assert_eq!((manifest.delimiter, manifest.decimal), (b';', b','));
+    assert_eq!((manifest.layout.delimiter, manifest.layout.decimal), (b';', b','));
     assert_eq!(manifest.train_file.path, "train.toml");
     let track = FileEntry { path: "track.toml".into(), place: Place::line("dataset.toml", 10) };
     assert_eq!(manifest.track_file, Some(track));
@@ -47,6 +47,76 @@ fn every_key_is_read() {
     assert_eq!((runs[0].mass_kg, runs[0].start_m), (Some(114_500.0), None));
     assert_eq!((runs[1].role, runs[1].direction), (Role::Fit, 1));
     assert_eq!((runs[1].mass_kg, runs[1].start_m), (None, Some(250.0)));
+}
+
+#[test]
+fn keys_of_other_text_and_times_are_read() {
+    let text = FULL
+        .replace("decimal = \",\"\n", "encoding = \"cp1252\"\nskip_rows = 4\nunits_row = true\n")
+        .replace("unit = \"ms\"", "format = \"clock\"")
+        .replace("role = \"holdout\"", "date = 2026-03-18");
+    let manifest = Manifest::parse("dataset.toml", &text).unwrap();
+    let layout = manifest.layout;
+    assert_eq!(layout.encoding.name(), "windows-1252");
+    assert_eq!((layout.skip_rows, layout.units_row, layout.lines_above()), (4, true, 6));
+    let time = manifest.mapping(Quantity::Time).unwrap();
+    assert_eq!((time.format.as_ref(), time.convert(3.5)), (Some(&TimeFormat::Clock), 3.5));
+    assert_eq!(manifest.runs[0].date_unix_s, Some(20_530 * 86_400));
+    assert_eq!(manifest.runs[1].date_unix_s, None);
+    assert_eq!(manifest.speed_unit().name(), "km/h");
+    let quoted = text.replace("date = 2026-03-18", "date = \"2026-03-18\"");
+    assert_eq!(Manifest::parse("dataset.toml", &quoted).unwrap().runs[0], manifest.runs[0]);
+}
+
+#[test]
+fn wrong_keys_of_other_text_and_times_are_named_with_their_choices() {
+    let cases = [
+        (
+            ("name = \"line-01\"", "name = \"line-01\"\nencoding = \"utf-9\""),
+            "dataset.toml:3: unknown encoding 'utf-9' in dataset.encoding; did you mean 'utf-8'? \
+             (choices: 'utf-8', 'windows-1252', 'iso-8859-2', 'utf-16le', 'utf-16be')",
+        ),
+        (
+            ("decimal = \",\"", "skip_rows = 1.5"),
+            "dataset.toml:6: dataset.skip_rows = 1.5: expected a number of lines, 0 to 10000",
+        ),
+        (
+            ("decimal = \",\"", "units_row = 1"),
+            "dataset.toml:6: dataset.units_row: expected true or false, got 1",
+        ),
+        (
+            ("unit = \"ms\"", "unit = \"s\", format = \"iso\""),
+            "dataset.toml:12: columns.time.format and columns.time.unit exclude each other: give one \
+             of them",
+        ),
+        (
+            ("unit = \"ms\"", "format = \"hh:mm\""),
+            "dataset.toml:12: columns.time.format = \"hh:mm\": expected \"iso\" \
+             (2026-03-18T07:13:20.2), \"clock\" (07:13:20.2) or a pattern of strftime with the hour, \
+             and with the whole date or none of it (%d.%m.%Y %H:%M:%S); a fraction of the second is \
+             read in any case",
+        ),
+        (
+            ("role = \"holdout\"", "date = 07:13:20"),
+            "dataset.toml:17: runs[1].date = 07:13:20: expected a day of the calendar, as 2026-03-18 \
+             or 2026-03-18T07:13:20",
+        ),
+        (
+            ("role = \"holdout\"", "date = \"18.03.2026\""),
+            "dataset.toml:17: runs[1].date: expected a date, as 2026-03-18, got the text \"18.03.2026\"",
+        ),
+    ];
+    for ((from, to), expected) in cases {
+        assert_eq!(refusal(&FULL.replace(from, to)), expected);
+    }
+    let dated = FULL
+        .replace("unit = \"ms\"", "format = \"iso\"")
+        .replace("role = \"holdout\"", "date = 2026-03-18");
+    assert_eq!(
+        refusal(&dated),
+        "dataset.toml:17: runs[1].date and columns.time.format with a date exclude each other: give \
+         one of them"
+    );
 }
 
 #[test]
@@ -65,7 +135,7 @@ fn the_track_and_most_keys_may_be_absent() {
                 [[runs]]\nfile=\"a.csv\"\n";
     let manifest = Manifest::parse("dataset.toml", text).unwrap();
     assert_eq!((manifest.track_file, manifest.description), (None, None));
-    assert_eq!((manifest.delimiter, manifest.decimal), (b',', b'.'));
+    assert_eq!((manifest.layout.delimiter, manifest.layout.decimal), (b',', b'.'));
     assert_eq!(manifest.position_reference, PositionReference::Centre);
 }
 
@@ -89,7 +159,7 @@ fn mistakes_are_named_with_line_and_choices() {
         (
             ("start_m", "start"),
             "dataset.toml:22: unknown key 'start' in [runs[2]]; did you mean 'start_m'? \
-             (choices: 'file', 'role', 'direction', 'mass_t', 'start_m')",
+             (choices: 'file', 'role', 'direction', 'mass_t', 'start_m', 'date')",
         ),
         (
             ("direction = -1", "direction = 2"),

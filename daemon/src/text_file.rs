@@ -1,0 +1,121 @@
+//! Text files from disk, whatever lies in their place.
+
+use std::fs::{File, FileType};
+use std::io::{ErrorKind, Read};
+use std::os::unix::fs::FileTypeExt;
+use std::path::Path;
+
+use dynocar_analysis::dataset::FileProblem;
+use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
+
+/// A longer file is refused instead of filling the memory.
+const BYTES_MAX: u64 = 4 << 30;
+/// What is said of UTF-16 where it is not declared.
+const UTF_16: &str =
+    "UTF-16: save the file as UTF-8, or, for runs, set encoding = \"utf-16le\" in [dataset]";
+/// So many bytes tell other formats from text.
+const HEAD_BYTES: u64 = 1024;
+
+/// What a path leads to that is neither a file nor a folder.
+fn irregular(kind: FileType) -> Option<&'static str> {
+    let kinds = [
+        (kind.is_fifo(), "a pipe"),
+        (kind.is_socket(), "a socket"),
+        (kind.is_char_device() || kind.is_block_device(), "a device"),
+    ];
+    kinds.into_iter().find(|(is_it, _)| *is_it).map(|(_, name)| name)
+}
+
+/// The format of a file that begins so and is no text in the encoding; `None` for what may be.
+fn other_format(head: &[u8], encoding: &'static Encoding) -> Option<&'static str> {
+    if [UTF_16LE, UTF_16BE].contains(&encoding) {
+        return None;
+    }
+    let begins: [(&[u8], &'static str); 5] = [
+        (&[0x1f, 0x8b], "a gzip file: unpack it first"),
+        (b"PK\x03\x04", "a zip file or a workbook: unpack it, or save the sheet as CSV"),
+        (b"\xd0\xcf\x11\xe0", "a workbook: save the sheet as CSV"),
+        (&[0xff, 0xfe], UTF_16),
+        (&[0xfe, 0xff], UTF_16),
+    ];
+    let known = begins.into_iter().find(|(mark, _)| head.starts_with(mark)).map(|(_, name)| name);
+    known.or_else(|| match head.iter().position(|&byte| byte == 0) {
+        Some(0) => Some("binary data"),
+        // Every other byte of letters and digits.
+        Some(1) => Some(UTF_16),
+        _ => None,
+    })
+}
+
+fn unreadable(error: std::io::Error) -> FileProblem {
+    match error.kind() {
+        ErrorKind::NotFound => FileProblem::Missing,
+        ErrorKind::IsADirectory => FileProblem::IsFolder,
+        kind => FileProblem::Unreadable(kind),
+    }
+}
+
+/// Refuses what is no file of a size that can be read, before it is opened: opening a pipe may wait for
+/// ever.
+///
+/// # Errors
+///
+/// When it is something else, or cannot be looked at.
+pub fn require_regular(path: &Path) -> Result<(), FileProblem> {
+    let found = std::fs::metadata(path).map_err(unreadable)?;
+    if let Some(what) = irregular(found.file_type()) {
+        return Err(FileProblem::NotRegular(what));
+    }
+    if found.is_dir() {
+        return Err(FileProblem::IsFolder);
+    }
+    if found.len() > BYTES_MAX {
+        return Err(FileProblem::TooLarge { most: BYTES_MAX, found: found.len() });
+    }
+    Ok(())
+}
+
+/// Reads a text file in UTF-8.
+///
+/// # Errors
+///
+/// When there is none, it is no regular file, too large, of another format, not UTF-8 or not
+/// readable.
+pub fn read_text(path: &Path) -> Result<String, FileProblem> {
+    String::from_utf8(read_bytes(path, UTF_8)?).map_err(|error| {
+        let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        FileProblem::NotUtf8 { line: 1 + good.iter().filter(|&&byte| byte == b'\n').count() }
+    })
+}
+
+/// Reads a file that should be text in an encoding.
+///
+/// # Errors
+///
+/// When there is none, it is no regular file, too large, of another format or not readable.
+pub fn read_bytes(path: &Path, encoding: &'static Encoding) -> Result<Vec<u8>, FileProblem> {
+    let (mut bytes, file) = begin(path, HEAD_BYTES)?;
+    if let Some(what) = other_format(&bytes, encoding) {
+        return Err(FileProblem::NotText(what));
+    }
+    // A file that grows while it is read is no longer than it was said to be by much.
+    file.take(BYTES_MAX).read_to_end(&mut bytes).map_err(unreadable)?;
+    Ok(bytes)
+}
+
+/// The first bytes of a file, at most so many.
+///
+/// # Errors
+///
+/// When there is none, it is no regular file, too large or not readable.
+pub fn read_beginning(path: &Path, bytes_max: u64) -> Result<Vec<u8>, FileProblem> {
+    begin(path, bytes_max).map(|(bytes, _)| bytes)
+}
+
+fn begin(path: &Path, bytes_max: u64) -> Result<(Vec<u8>, File), FileProblem> {
+    require_regular(path)?;
+    let mut file = File::open(path).map_err(unreadable)?;
+    let mut bytes = Vec::new();
+    file.by_ref().take(bytes_max).read_to_end(&mut bytes).map_err(unreadable)?;
+    Ok((bytes, file))
+}
