@@ -95,6 +95,12 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         false
     }
 
+    /// True when it changes what all other effects do: a matter of how the record was made, which comes
+    /// after them.
+    fn is_of_the_whole_record(&self) -> bool {
+        false
+    }
+
     /// Where it acts.
     fn place(&self) -> Place {
         Place::default()

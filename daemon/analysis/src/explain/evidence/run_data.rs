@@ -35,6 +35,8 @@ pub struct RunData {
     /// Way by position over way by integrated speed, with its standard deviation, where
     /// positions are measured.
     pub way_ratio: Option<(f64, f64)>,
+    /// False where positions are integrated from the speed.
+    pub is_position_recorded: bool,
     /// The power from which the force comes.
     pub power: Option<RunPower>,
     /// Samples that validation refused.
@@ -138,10 +140,8 @@ fn prepare_run(
         .collect();
     let smooth_mps = smoothed(&recording);
     let bins = bins::bins(&recording);
-    let way_ratio = match run.position_source {
-        PositionSource::IntegratedSpeed => None,
-        _ => way_ratio(&recording),
-    };
+    let is_position_recorded = run.position_source != PositionSource::IntegratedSpeed;
+    let way_ratio = if is_position_recorded { way_ratio(&recording) } else { None };
     let power = RunPower::of(run, recording.samples());
     Ok(RunData {
         file: run.file.clone(),
@@ -153,6 +153,7 @@ fn prepare_run(
         smooth_mps,
         bins,
         way_ratio,
+        is_position_recorded,
         power,
         rejected,
         replaced,
