@@ -149,6 +149,8 @@ fn put_behind(late: &mut LateSpeed, resolved: &mut ResolvedSample) {
     resolved.gradient_permille = resolved.gradient_permille.map(|_| permille);
     resolved.resistance = resistance;
     resolved.position_m = late.position_m(at, resolved.position_m);
+    resolved.brake_cylinder_pressure_pa =
+        late.cylinder_pressure_pa(at, resolved.brake_cylinder_pressure_pa);
 }
 
 /// Looks up what the declared model knows of the forces at a sample.

@@ -44,6 +44,7 @@ pub struct LateSpeed {
     resisting: DelayLine<RESISTING>,
     position_m: DelayLine<1>,
     specific_force_mps2: DelayLine<1>,
+    cylinder_pressure_pa: DelayLine<1>,
 }
 
 impl LateSpeed {
@@ -54,6 +55,7 @@ impl LateSpeed {
             resisting: DelayLine::new(delay_s, lag_s),
             position_m: DelayLine::new(delay_s, lag_s),
             specific_force_mps2: DelayLine::new(delay_s, lag_s),
+            cylinder_pressure_pa: DelayLine::new(delay_s, lag_s),
         }
     }
 
@@ -79,6 +81,11 @@ impl LateSpeed {
     /// Chainage in m where the train was then; `None` while it is not known.
     pub fn position_m(&mut self, at: (i64, u32), now: Option<f64>) -> Option<f64> {
         self.position_m.acting(at, now.map(|m| [m])).map(|[m]| m)
+    }
+
+    /// Brake-cylinder pressure in Pa then; `None` while it is not known.
+    pub fn cylinder_pressure_pa(&mut self, at: (i64, u32), now: Option<f64>) -> Option<f64> {
+        self.cylinder_pressure_pa.acting(at, now.map(|pa| [pa])).map(|[pa]| pa)
     }
 
     /// What the accelerometer felt then in m/s²; `None` while it is not known.
