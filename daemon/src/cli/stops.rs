@@ -111,7 +111,8 @@ fn text(answer: &Answer) -> String {
 
 /// What the stops by all of the brake say of it.
 fn of_the_brake(study: &Study, law: &Law) -> String {
-    let mut text = String::from("\ndeceleration over speed, the mean of the stops by all of the brake\n");
+    let mut text =
+        String::from("\ndeceleration over speed, the mean of the stops by all of the brake\n");
     let mut table = TextTable::new(&["m/s", "m/s²", "±", "± next stop", "stops"], &[]);
     let step = (law.points.len() / 12).max(1);
     for point in law.points.iter().rev().step_by(step) {
@@ -171,7 +172,8 @@ fn modulated(stops: &[RecordedStop]) -> String {
 }
 
 fn stops(stops: &[RecordedStop]) -> String {
-    let header = ["run", "role", "from s", "m/s", "s", "m", "brake", "found by", "said m", "within m"];
+    let header =
+        ["run", "role", "from s", "m/s", "s", "m", "brake", "found by", "said m", "within m"];
     let mut table = TextTable::new(&header, &[0, 1, 6, 7]);
     for stop in stops {
         let said = |number: Option<f64>| number.map_or("-".into(), |it| format!("{it:.0}"));

@@ -164,7 +164,11 @@ fn figures(subject: &Subject) -> String {
     }
     let mut html = String::from("<dl class=\"figures\">\n");
     for (value, what, more) in list {
-        let what = if what.starts_with("error") { format!("{what}, {runs}{}", judged.predicted()) } else { what.into() };
+        let what = if what.starts_with("error") {
+            format!("{what}, {runs}{}", judged.predicted())
+        } else {
+            what.into()
+        };
         let _ = writeln!(
             html,
             "<div><dt>{what}</dt><dd><b>{value}</b><span class=\"interval\">{more}</span></dd></div>"

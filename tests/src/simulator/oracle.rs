@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use dynocar_core::force::{ForceResolver, ResolvedSample};
 use dynocar_core::simulate::{
-    BridgeLimits, ForceModel, Prediction, QuadraticForces, Recording, Restart, SpeedError,
-    declared_polynomial,
+    BridgeLimits, ForceModel, Prediction, QuadraticForces, Recording, Restart, STANDING_MPS,
+    SpeedError, declared_polynomial,
 };
 use dynocar_core::terms::delay::DelayLine;
 use dynocar_core::terms::{gradient, traction};
@@ -147,6 +147,9 @@ pub fn oracle_forces(
     let behind = samples.zip(recording.samples()).map(|(numbered, sample)| {
         let at = (sample.time_ns, sample.stretch);
         let now = polynomial(numbered);
+        if sample.speed_mps <= STANDING_MPS {
+            late.settle();
+        }
         late.acting(at, Some(now)).unwrap_or(now)
     });
     quadratic.set(behind, disturbances.speed_scale);

@@ -82,8 +82,8 @@ pub fn telling_runs(kind: EffectKind) -> &'static str {
 /// What is known to separate the kinds that are easily confused.
 pub fn separating_run(kind: EffectKind, rivals: &[EffectKind]) -> String {
     use EffectKind::{
-        AmbientTemperature, BearingTemperature, CurveResistance, DraggingBrake, GradientError,
-        ActuatorDelay, GradientShift, LocalResistance, MassChange, RotatingMass, SpeedDelay,
+        ActuatorDelay, AmbientTemperature, BearingTemperature, CurveResistance, DraggingBrake,
+        GradientError, GradientShift, LocalResistance, MassChange, RotatingMass, SpeedDelay,
         TractionGain, TunnelDrag, WheelDiameter, Wind,
     };
     let has = |wanted: EffectKind| kind == wanted || rivals.contains(&wanted);

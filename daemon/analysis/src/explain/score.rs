@@ -4,8 +4,8 @@ use dynocar_core::simulate::{Prediction, Restart, SpeedError};
 
 use super::bootstrap::intervals_95;
 use super::evidence::{Fit, FitProblem, GrownForces, RunData};
-use super::selection::without_each_run;
 use super::judged::Judged;
+use super::selection::without_each_run;
 use super::stop_runs::stop_runs;
 use super::stop_to_stop::{self, StopToStop};
 

@@ -70,12 +70,11 @@ pub fn find(
     let full = applied(samples, brake, settings.share_min);
     let at_all = applied(samples, brake, APPLIED_AT_ALL.min(settings.share_min));
     let found_by = if full.is_some() { FoundBy::Brake } else { FoundBy::Speed };
-    let is_applied = |applied: &Option<Vec<bool>>, index: usize, look_s: f64, least_mps2: f64| {
-        match applied {
+    let is_applied =
+        |applied: &Option<Vec<bool>>, index: usize, look_s: f64, least_mps2: f64| match applied {
             Some(applied) => applied[index] || samples[index].speed_mps < SOFT_MPS,
             None => loses_speed(samples, index, look_s, least_mps2),
-        }
-    };
+        };
     let is_full = |index: usize| is_applied(&full, index, LOOK_BACK_S, BRAKING_MPS2);
     let is_any = |index: usize| is_applied(&at_all, index, EASED_LOOK_S, EASED_MPS2);
     let ends = (1..samples.len()).filter(|&index| {
@@ -171,7 +170,8 @@ mod tests {
     /// Where the brake was applied in full, in s.
     fn starts_s(samples: &[TrainSample]) -> Vec<(f64, FoundBy)> {
         let stops = found(samples);
-        let full = stops.iter().filter_map(|it| Some((time_s(samples, it.full_from?), it.found_by)));
+        let full =
+            stops.iter().filter_map(|it| Some((time_s(samples, it.full_from?), it.found_by)));
         full.collect()
     }
 

@@ -87,8 +87,7 @@ impl Study {
     pub fn of(dataset: &Dataset, settings: &StudySettings, from_mps: &[f64]) -> Self {
         let found: Vec<Found> =
             dataset.runs.iter().flat_map(|run| found_in(dataset, run, settings)).collect();
-        let is_of_law =
-            |it: &&Found| it.stop.role == Role::Fit && it.stop.manner == Manner::Full;
+        let is_of_law = |it: &&Found| it.stop.role == Role::Fit && it.stop.manner == Manner::Full;
         let fit = found.iter().filter(is_of_law);
         let curves: Vec<Curve> = fit.map(|it| it.curve.clone()).collect();
         let law = Law::of(&curves, settings.repeatability);

@@ -139,6 +139,7 @@ impl ResolvedSample {
 /// Puts what acts on the train behind a speed that is late.
 fn put_behind(late: &mut LateSpeed, resolved: &mut ResolvedSample) {
     let at = (resolved.time_ns, resolved.stretch);
+    late.show(resolved.speed_mps);
     let forces = resolved.traction_force_n.zip(resolved.brake_force_n);
     if let Some([traction_n, brake_n]) = late.forces(at, forces.map(Into::into)) {
         resolved.traction_force_n = Some(traction_n);
@@ -317,7 +318,9 @@ impl ForceResolver {
     fn accelerometer_gradient_permille(&mut self, valid: &ValidSample) -> Option<f64> {
         let felt_mps2 = valid.sample.get(SampleField::SpecificForce);
         let specific_force_mps2 = match &mut self.late_speed {
-            Some(late) => late.specific_force_mps2((valid.sample.time_ns, valid.stretch), felt_mps2),
+            Some(late) => {
+                late.specific_force_mps2((valid.sample.time_ns, valid.stretch), felt_mps2)
+            }
             None => felt_mps2,
         }?;
         let (stretch, last_speed_mps) = self.last?;

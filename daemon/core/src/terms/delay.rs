@@ -87,6 +87,11 @@ impl<const N: usize> DelayLine<N> {
         Some(self.lagged(time_s, self.at(time_s - self.delay_s)))
     }
 
+    /// Lets the lag forget what was before: the next numbers hold as they come out of the dead time.
+    pub fn settle(&mut self) {
+        self.last = None;
+    }
+
     /// The reported numbers at a time, linear between samples, the oldest before all of them.
     fn at(&self, time_s: f64) -> [f64; N] {
         let entry = |back: usize| self.past[(self.next + CAPACITY - 1 - back) % CAPACITY];

@@ -26,13 +26,13 @@ pub const LAG: Key = Key {
     of: |train| &mut train.corrections.speed_lag_s,
 };
 /// Delay and lag.
-pub const PARAMETERS: [Parameter; 2] = [
-    Parameter::new("delay_s", (0.0, 4.0), 0.05),
-    Parameter::new("lag_s", (0.0, 4.0), 0.05),
-];
+pub const PARAMETERS: [Parameter; 2] =
+    [Parameter::new("delay_s", (0.0, 4.0), 0.05), Parameter::new("lag_s", (0.0, 4.0), 0.05)];
 /// A shorter delay and lag together in s are within a cycle of most controllers.
 pub const LEAST_S: f64 = 0.15;
 
+/// At most this speed in m/s is standing.
+const STANDING_MPS: f64 = 0.3;
 /// Numbers of a sample that act on the train without being a force of its own: gradient and the parts
 /// of the resistance.
 const RESISTING: usize = 1 + Resistance::PARTS;
@@ -56,6 +56,16 @@ impl LateSpeed {
             position_m: DelayLine::new(delay_s, lag_s),
             specific_force_mps2: DelayLine::new(delay_s, lag_s),
             cylinder_pressure_pa: DelayLine::new(delay_s, lag_s),
+        }
+    }
+
+    /// Takes the speed in m/s that is shown, before what is behind it. What acted on a train that stands
+    /// moved nothing, and no lag remembers it.
+    pub fn show(&mut self, speed_mps: f64) {
+        if speed_mps <= STANDING_MPS {
+            self.forces.settle();
+            self.resisting.settle();
+            self.specific_force_mps2.settle();
         }
     }
 
@@ -97,6 +107,20 @@ impl LateSpeed {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_lag_of_a_departing_train_remembers_no_brake_that_held_it() {
+        let mut late = LateSpeed::new(0.0, 0.8);
+        for k in 0..50 {
+            late.show(0.0);
+            late.forces((k * 100_000_000, 1), Some([0.0, 60e3]));
+        }
+        late.show(0.2);
+        late.forces((5_000_000_000, 1), Some([0.0, 0.0]));
+        late.show(0.4);
+        let [traction_n, brake_n] = late.forces((5_100_000_000, 1), Some([40e3, 0.0])).unwrap();
+        assert!(brake_n == 0.0 && (0.0..4e3).contains(&traction_n), "{traction_n} {brake_n}");
+    }
 
     #[test]
     fn everything_that_acts_is_taken_as_it_was_when_the_speed_was_true() {

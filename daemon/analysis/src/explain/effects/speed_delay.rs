@@ -78,12 +78,17 @@ impl Hypothesis for DelayAndLag {
         let mut late = LateSpeed::new(parameters[0], parameters[1]);
         for (force, sample) in forces.iter_mut().zip(run.samples()) {
             let at = (sample.time_ns, sample.stretch);
+            late.show(sample.speed_mps);
             if let Some(acting) = late.forces(at, Some([force.traction_n, force.brake_n])) {
                 [force.traction_n, force.brake_n] = acting;
             }
             (force.gradient_permille, force.resistance) =
                 late.resisting(at, (force.gradient_permille, force.resistance));
         }
+    }
+
+    fn speed_late_s(&self, parameters: &[f64]) -> Option<f64> {
+        Some(parameters.iter().sum())
     }
 
     fn is_of_the_whole_record(&self) -> bool {
