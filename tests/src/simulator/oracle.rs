@@ -142,15 +142,14 @@ pub fn oracle_forces(
         })
     };
     let mut quadratic = QuadraticForces::default();
-    let mut late = DelayLine::new(disturbances.speed_delay_s, disturbances.speed_lag_s);
+    let mut late = DelayLine::<3>::new(disturbances.speed_delay_s, disturbances.speed_lag_s);
     let samples = recording.samples().iter().enumerate();
     let behind = samples.zip(recording.samples()).map(|(numbered, sample)| {
         let at = (sample.time_ns, sample.stretch);
         let now = polynomial(numbered);
-        if sample.speed_mps <= STANDING_MPS {
-            late.settle();
-        }
-        late.acting(at, Some(now)).unwrap_or(now)
+        let stands = sample.speed_mps <= STANDING_MPS;
+        late.acting_unless(at, Some(now), |net_mps2| stands && net_mps2[0] <= 0.0)
+            .unwrap_or(now)
     });
     quadratic.set(behind, disturbances.speed_scale);
     let first = &recording.samples()[0];

@@ -139,9 +139,9 @@ impl ResolvedSample {
 /// Puts what acts on the train behind a speed that is late.
 fn put_behind(late: &mut LateSpeed, resolved: &mut ResolvedSample) {
     let at = (resolved.time_ns, resolved.stretch);
-    late.show(resolved.speed_mps);
     let forces = resolved.traction_force_n.zip(resolved.brake_force_n);
-    if let Some([traction_n, brake_n]) = late.forces(at, forces.map(Into::into)) {
+    if let Some([traction_n, brake_n]) = late.forces(at, resolved.speed_mps, forces.map(Into::into))
+    {
         resolved.traction_force_n = Some(traction_n);
         resolved.brake_force_n = Some(brake_n);
     }

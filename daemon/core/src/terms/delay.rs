@@ -75,6 +75,17 @@ impl<const N: usize> DelayLine<N> {
         (time_ns, stretch): (i64, u32),
         reported: Option<[f64; N]>,
     ) -> Option<[f64; N]> {
+        self.acting_unless((time_ns, stretch), reported, |_| false)
+    }
+
+    /// The same; what comes out of the dead time and is `held` moves nothing: it holds as it is, and the
+    /// lag begins from none behind it.
+    pub fn acting_unless(
+        &mut self,
+        (time_ns, stretch): (i64, u32),
+        reported: Option<[f64; N]>,
+        held: impl FnOnce(&[f64; N]) -> bool,
+    ) -> Option<[f64; N]> {
         if self.count == 0 || stretch != self.stretch {
             (self.count, self.next, self.last) = (0, 0, None);
             (self.stretch, self.origin_ns) = (stretch, time_ns);
@@ -84,12 +95,12 @@ impl<const N: usize> DelayLine<N> {
         self.past[self.next] = (time_s, reported);
         self.next = (self.next + 1) % CAPACITY;
         self.count = (self.count + 1).min(CAPACITY);
-        Some(self.lagged(time_s, self.at(time_s - self.delay_s)))
-    }
-
-    /// Lets the lag forget what was before: the next numbers hold as they come out of the dead time.
-    pub fn settle(&mut self) {
-        self.last = None;
+        let input = self.at(time_s - self.delay_s);
+        if held(&input) {
+            self.last = Some((time_s, [0.0; N], [0.0; N]));
+            return Some(input);
+        }
+        Some(self.lagged(time_s, input))
     }
 
     /// The reported numbers at a time, linear between samples, the oldest before all of them.

@@ -59,19 +59,17 @@ impl LateSpeed {
         }
     }
 
-    /// Takes the speed in m/s that is shown, before what is behind it. What acted on a train that stands
-    /// moved nothing, and no lag remembers it.
-    pub fn show(&mut self, speed_mps: f64) {
-        if speed_mps <= STANDING_MPS {
-            self.forces.settle();
-            self.resisting.settle();
-            self.specific_force_mps2.settle();
-        }
-    }
-
-    /// The forces in N behind the speed of a time in ns of a stretch; `None` while none are known.
-    pub fn forces(&mut self, at: (i64, u32), now: Option<Forces>) -> Option<Forces> {
-        self.forces.acting(at, now)
+    /// The forces in N behind a speed in m/s of a time in ns of a stretch; `None` while none are known.
+    /// What brakes a train that stands moves nothing, and no lag remembers it.
+    pub fn forces(
+        &mut self,
+        at: (i64, u32),
+        speed_mps: f64,
+        now: Option<Forces>,
+    ) -> Option<Forces> {
+        self.forces.acting_unless(at, now, |[traction_n, brake_n]| {
+            speed_mps <= STANDING_MPS && traction_n <= brake_n
+        })
     }
 
     /// Gradient in ‰ and resistance behind it.
@@ -112,13 +110,11 @@ mod tests {
     fn the_lag_of_a_departing_train_remembers_no_brake_that_held_it() {
         let mut late = LateSpeed::new(0.0, 0.8);
         for k in 0..50 {
-            late.show(0.0);
-            late.forces((k * 100_000_000, 1), Some([0.0, 60e3]));
+            late.forces((k * 100_000_000, 1), 0.0, Some([0.0, 60e3]));
         }
-        late.show(0.2);
-        late.forces((5_000_000_000, 1), Some([0.0, 0.0]));
-        late.show(0.4);
-        let [traction_n, brake_n] = late.forces((5_100_000_000, 1), Some([40e3, 0.0])).unwrap();
+        let mut at = |tenth: i64, forces| late.forces((tenth * 100_000_000, 1), 0.0, Some(forces));
+        at(50, [0.0, 0.0]);
+        let [traction_n, brake_n] = at(51, [40e3, 0.0]).unwrap();
         assert!(brake_n == 0.0 && (0.0..4e3).contains(&traction_n), "{traction_n} {brake_n}");
     }
 
@@ -131,7 +127,7 @@ mod tests {
             let time_s = f64::from(k) * 0.1;
             let at = ((time_s * 1e9).round() as i64, 1);
             let before_s = (time_s - 0.8).max(0.0);
-            let [traction_n, _] = late.forces(at, Some([100.0 * time_s, 0.0])).unwrap();
+            let [traction_n, _] = late.forces(at, 20.0, Some([100.0 * time_s, 0.0])).unwrap();
             let (permille, resistance) = late.resisting(at, (gradient(time_s), curve(time_s)));
             let position_m = late.position_m(at, Some(20.0 * time_s)).unwrap();
             assert!((traction_n - 100.0 * before_s).abs() < 1e-6, "{time_s} s");
@@ -142,7 +138,7 @@ mod tests {
                 assert!((permille - gradient(before_s)).abs() < 1e-6, "{time_s} s: {permille}");
             }
         }
-        assert_eq!(late.forces((11_000_000_000, 1), None), None);
+        assert_eq!(late.forces((11_000_000_000, 1), 20.0, None), None);
         assert_eq!(late.position_m((11_000_000_000, 1), None), None);
     }
 }

@@ -78,8 +78,8 @@ impl Hypothesis for DelayAndLag {
         let mut late = LateSpeed::new(parameters[0], parameters[1]);
         for (force, sample) in forces.iter_mut().zip(run.samples()) {
             let at = (sample.time_ns, sample.stretch);
-            late.show(sample.speed_mps);
-            if let Some(acting) = late.forces(at, Some([force.traction_n, force.brake_n])) {
+            let now = Some([force.traction_n, force.brake_n]);
+            if let Some(acting) = late.forces(at, sample.speed_mps, now) {
                 [force.traction_n, force.brake_n] = acting;
             }
             (force.gradient_permille, force.resistance) =
