@@ -18,7 +18,7 @@ const PARTS_MIN: usize = 5;
 /// Stamps and filters of a position are common to all runs: below this in s nothing is told.
 const COMMON_S: f64 = 0.05;
 /// So many standard deviations make it more than chance.
-const SURE: f64 = 2.0;
+const AHEAD_STDS: f64 = 2.0;
 
 /// Seconds by which the speed is late by the positions of a recording, one for each part from stand to
 /// stand.
@@ -75,7 +75,7 @@ pub(super) fn pooled_s(parts: &[f64]) -> Option<(f64, f64)> {
     let mean_s = parts.iter().sum::<f64>() / count;
     let variance = parts.iter().map(|it| (it - mean_s).powi(2)).sum::<f64>() / (count - 1.0);
     let std_s = (variance / count).sqrt().hypot(COMMON_S);
-    (mean_s - SURE * std_s > speed_delay::LEAST_S).then_some((mean_s, std_s))
+    (mean_s - AHEAD_STDS * std_s > speed_delay::LEAST_S).then_some((mean_s, std_s))
 }
 
 #[cfg(test)]
