@@ -148,8 +148,7 @@ pub fn oracle_forces(
         let at = (sample.time_ns, sample.stretch);
         let now = polynomial(numbered);
         let stands = sample.speed_mps <= STANDING_MPS;
-        late.acting_unless(at, Some(now), |net_mps2| stands && net_mps2[0] <= 0.0)
-            .unwrap_or(now)
+        late.acting_unless(at, Some(now), |net_mps2| stands && net_mps2[0] <= 0.0).unwrap_or(now)
     });
     quadratic.set(behind, disturbances.speed_scale);
     let first = &recording.samples()[0];
