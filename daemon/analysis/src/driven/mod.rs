@@ -100,10 +100,11 @@ impl DrivenTrain {
         shown_mps * self.train.corrections.speed_scale
     }
 
-    /// Dead time in s by which forces act later than they are reported. The train remembers those of
-    /// its last 1000 steps.
+    /// Dead time in s by which forces act later than they are reported, or by which the speed is shown
+    /// late, whichever is longer. The train remembers those of its last 1000 steps.
     pub fn dead_time_s(&self) -> f64 {
-        self.train.corrections.actuator_delay_s
+        let Corrections { actuator_delay_s, speed_delay_s, .. } = self.train.corrections;
+        actuator_delay_s.max(speed_delay_s)
     }
 
     /// What accelerates the train where it was looked at last, at the end of the newest step.
@@ -137,9 +138,9 @@ impl DrivenTrain {
         let part_s = step_s / parts;
         for part in 0..parts as u32 {
             self.drive_part(part_s, |at_s| acting(f64::from(part) * part_s + at_s));
-            if let Some(sensor) = &mut self.sensor {
-                sensor.take(part_s, self.speed_mps);
-            }
+        }
+        if let Some(sensor) = &mut self.sensor {
+            sensor.take(step_s, self.speed_mps);
         }
     }
 
