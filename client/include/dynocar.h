@@ -224,7 +224,8 @@ enum {
     DYNOCAR_EFFECT_LOCAL_RESISTANCE = 13,
     DYNOCAR_EFFECT_LOW_ADHESION = 14,
     DYNOCAR_EFFECT_UNKNOWN = 15, /* a real residual that no known effect explains */
-    DYNOCAR_EFFECT_GRADIENT_ERROR = 16 /* a declared gradient that is wrong along the line */
+    DYNOCAR_EFFECT_GRADIENT_ERROR = 16, /* a declared gradient that is wrong along the line */
+    DYNOCAR_EFFECT_SPEED_DELAY = 17     /* a measured speed that is late */
 };
 
 /* Measured quantities: bits of valid. */

@@ -339,6 +339,8 @@ vocabulary! {
         Unknown = 15 "unknown",
         /// A declared gradient that is wrong by a smooth function of the chainage.
         GradientError = 16 "gradient_error",
+        /// A measured speed that is late.
+        SpeedDelay = 17 "speed_delay",
     }
 }
 

@@ -95,6 +95,7 @@ fn the_grown_files_of_other_kinds_leave_nothing_either() {
         EffectKind::TunnelDrag,
         EffectKind::WheelDiameter,
         EffectKind::ActuatorDelay,
+        EffectKind::SpeedDelay,
         EffectKind::BearingTemperature,
         EffectKind::GradientError,
     ];

@@ -7,4 +7,5 @@ mod explain_again;
 mod forms;
 mod gradient_error;
 mod grown_model;
+mod late_speed;
 mod told_by_data;

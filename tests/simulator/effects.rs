@@ -62,6 +62,9 @@ fn undo(kind: EffectKind, disturbances: &mut Disturbances, neutral: &Disturbance
         }
         EffectKind::TractionGain => d.traction_gain = neutral.traction_gain,
         EffectKind::ActuatorDelay => (d.delay_s, d.lag_s) = (neutral.delay_s, neutral.lag_s),
+        EffectKind::SpeedDelay => {
+            (d.speed_delay_s, d.speed_lag_s) = (neutral.speed_delay_s, neutral.speed_lag_s);
+        }
         EffectKind::RotatingMass => d.rotating_mass_factor = neutral.rotating_mass_factor,
         EffectKind::BearingTemperature => d.cold_bearings = neutral.cold_bearings,
         EffectKind::AmbientTemperature => d.ambient = neutral.ambient,
@@ -95,7 +98,7 @@ fn an_effect_changes_what_it_should_and_nothing_else() {
 
 #[test]
 fn effects_of_sensors_leave_the_motion_as_it_was() {
-    for kind in [EffectKind::WheelDiameter, EffectKind::TractionGain] {
+    for kind in [EffectKind::WheelDiameter, EffectKind::TractionGain, EffectKind::SpeedDelay] {
         let dataset = ideal(&[kind], SEED);
         let null = null_of(&dataset);
         for (run, null_run) in dataset.runs.iter().zip(&null.runs) {

@@ -183,6 +183,7 @@ fn graded(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Vec<Par
     let number = |name: &str| own["parameters"][name].as_f64();
     let deviation = |name: &str| own["std"][name].as_f64();
     let one = |name: &str, truth: f64, none: f64| {
+        (truth != none).then_some(())?;
         let (value, deviation) = (number(name)?, deviation(name)?);
         let error = (value - truth) / (truth - none);
         Some(ParameterGrade { name: name.into(), error, z: (value - truth) / deviation })
@@ -198,7 +199,7 @@ fn graded(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Vec<Par
         Effect::GradientShift { shift_m } => vec![one("shift_m", *shift_m, 0.0)],
         Effect::GradientError { profile } => gradient_errors(profile, own),
         Effect::TractionGain { gain } => vec![one("gain", *gain, 1.0)],
-        Effect::ActuatorDelay { delay_s, lag_s } => {
+        Effect::ActuatorDelay { delay_s, lag_s } | Effect::SpeedDelay { delay_s, lag_s } => {
             vec![one("delay_s", *delay_s, 0.0), one("lag_s", *lag_s, 0.0)]
         }
         Effect::RotatingMass { rotating_mass_factor } => {

@@ -206,6 +206,7 @@ class Effect(_Vocabulary):
     LOW_ADHESION = 14
     UNKNOWN = 15
     GRADIENT_ERROR = 16
+    SPEED_DELAY = 17
 
 
 class Has(IntFlag):

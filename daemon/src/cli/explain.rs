@@ -9,6 +9,7 @@ use clap::Args;
 use dynocar_analysis::dataset::{Dataset, DatasetFiles, Place, Role};
 use dynocar_analysis::explain::answer::{Answer, RunnerUp};
 use dynocar_analysis::explain::evidence::RunDataError;
+use dynocar_analysis::explain::judged::Metric;
 use dynocar_analysis::explain::report::timeline::Timeline;
 use dynocar_analysis::explain::selection::Progress;
 use dynocar_analysis::explain::{Explanation, explain};
@@ -282,6 +283,13 @@ pub fn text(answer: &Answer) -> String {
         "a = {:.3} ± {a:.3} N/kN, b = {:.4} ± {b:.4}, c = {:.6} ± {c:.6} (95 %, v in m/s)\n",
         base.a, base.b, base.c
     );
+    if let Some(judged) = answer.judged.filter(|it| it.metric == Metric::StopToStop) {
+        let [before, after] = judged.error_mps;
+        text += &format!(
+            "holdout runs{}: {before:.3} m/s before, {after:.3} m/s after\n",
+            judged.predicted()
+        );
+    }
     if let (Some(before), Some(after)) = (answer.rmse_before, answer.rmse_after) {
         text += &format!("holdout runs, open loop: {before:.3} m/s before, {after:.3} m/s after\n");
     }

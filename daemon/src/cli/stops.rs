@@ -32,6 +32,9 @@ pub struct StopsArguments {
     pub(super) json: Option<PathBuf>,
 }
 
+/// Speeds in m/s at which the deceleration of a modulated stop is shown.
+const SHOWN_MPS: [f64; 6] = [25.0, 20.0, 15.0, 10.0, 5.0, 3.0];
+
 fn positive(text: &str) -> Result<f64, String> {
     let number = text.parse().map_err(|_| String::from("expected a number"))?;
     if (0.0..=200.0).contains(&number) && number > 0.0 {
@@ -70,30 +73,46 @@ pub fn execute(arguments: &StopsArguments) -> Result<(), Failure> {
     let find = FindSettings { share_min: arguments.applied, ..FindSettings::default() };
     let settings = StudySettings { find, repeatability: arguments.repeatability };
     let study = Study::of(&dataset, &settings, &arguments.from);
-    let Some(law) = study.law.clone() else {
+    if study.stops.is_empty() {
         return Err(Failure::Input(format!(
-            "{}: no run to fit holds a stop from {} m/s or more to standstill: with a brake recorded, \
-             at least {} of its declared effort all the way; else a speed that keeps falling",
+            "{}: no run holds a stop: a brake that is applied, or a speed that falls, from {} m/s or \
+             more to standstill",
             arguments.dataset.display(),
-            find.from_mps,
-            find.share_min
+            find.from_mps
         )));
-    };
-    if let Some(speed_mps) = arguments.from.iter().find(|it| law.stopping_distance(**it).is_none())
-    {
+    }
+    for speed_mps in &arguments.from {
+        let known = match &study.law {
+            Some(law) if law.stopping_distance(*speed_mps).is_some() => continue,
+            Some(law) => format!("the stops were seen from {:.1} m/s down", law.fastest_mps()),
+            None => "no run to fit holds a stop by all of the brake".into(),
+        };
         return Err(Failure::Input(format!(
-            "--from {speed_mps}: the stops were seen from {:.1} m/s down; nothing is told of faster ones",
-            law.fastest_mps()
+            "--from {speed_mps}: {known}; nothing is told of faster ones"
         )));
     }
     let answer = Answer { dataset: dataset.name.clone(), notes: dataset.notes(), study };
-    Ok(give(arguments.json.as_deref(), &answer, || text(&answer, &law))?)
+    Ok(give(arguments.json.as_deref(), &answer, || text(&answer))?)
 }
 
-fn text(answer: &Answer, law: &Law) -> String {
+fn text(answer: &Answer) -> String {
     let study = &answer.study;
     let mut text = format!("{}\n{}\n{}", answer.dataset, notes(&answer.notes), stops(&study.stops));
-    text += "\ndeceleration over speed, the mean of the stops\n";
+    text += &modulated(&study.stops);
+    if let Some(law) = &study.law {
+        text += &of_the_brake(study, law);
+    }
+    text += "\nnot told by these data\n";
+    for line in &study.cannot_tell {
+        text += &format!("  {line}\n");
+    }
+    text + "\n± is the half width of the 95 % interval\n"
+}
+
+/// What the stops by all of the brake say of it.
+fn of_the_brake(study: &Study, law: &Law) -> String {
+    let mut text =
+        String::from("\ndeceleration over speed, the mean of the stops by all of the brake\n");
     let mut table = TextTable::new(&["m/s", "m/s²", "±", "± next stop", "stops"], &[]);
     let step = (law.points.len() / 12).max(1);
     for point in law.points.iter().rev().step_by(step) {
@@ -122,17 +141,40 @@ fn text(answer: &Answer, law: &Law) -> String {
         ]);
     }
     text += &table.to_string();
-    text += &friction(&study.stops);
-    text += "\nnot told by these data\n";
-    for line in &study.cannot_tell {
-        text += &format!("  {line}\n");
+    text + &friction(&study.stops)
+}
+
+/// What the others hold: the driver's deceleration at some speeds, and why it is no law.
+fn modulated(stops: &[RecordedStop]) -> String {
+    let others: Vec<&RecordedStop> = stops.iter().filter(|it| it.no_law.is_some()).collect();
+    let fastest = others.iter().map(|it| it.from_mps).fold(0.0, f64::max);
+    let speeds: Vec<f64> = SHOWN_MPS.into_iter().filter(|it| *it <= fastest).collect();
+    if speeds.is_empty() {
+        return String::new();
     }
-    text + "\n± is the half width of the 95 % interval\n"
+    let mut header = vec!["run".into(), "from s".into()];
+    header.extend(speeds.iter().map(|it| format!("at {it:.0} m/s")));
+    header.push("no law of the brake, since".into());
+    let header: Vec<&str> = header.iter().map(|it: &String| &it[..]).collect();
+    let mut table = TextTable::new(&header, &[0, header.len() - 1]);
+    for stop in others {
+        let mut row = vec![stop.file.clone(), format!("{:.1}", stop.from_s)];
+        row.extend(speeds.iter().map(|speed_mps| {
+            let at = stop.decelerations.iter().find(|it| it.speed_mps == *speed_mps);
+            at.map_or("-".into(), |it| {
+                format!("{:.2} ± {:.2}", it.deceleration_mps2, 1.96 * it.std_mps2)
+            })
+        }));
+        row.push(stop.no_law.clone().unwrap_or_default());
+        table.push(row);
+    }
+    format!("\nstops with a modulated brake: deceleration in m/s² over speed\n{table}")
 }
 
 fn stops(stops: &[RecordedStop]) -> String {
-    let header = ["run", "role", "from s", "m/s", "s", "m", "found by", "said m", "within m"];
-    let mut table = TextTable::new(&header, &[0, 1, 6]);
+    let header =
+        ["run", "role", "from s", "m/s", "s", "m", "brake", "found by", "said m", "within m"];
+    let mut table = TextTable::new(&header, &[0, 1, 6, 7]);
     for stop in stops {
         let said = |number: Option<f64>| number.map_or("-".into(), |it| format!("{it:.0}"));
         table.push(vec![
@@ -142,6 +184,7 @@ fn stops(stops: &[RecordedStop]) -> String {
             format!("{:.1}", stop.from_mps),
             format!("{:.1}", stop.time_s),
             format!("{:.0}", stop.distance_m),
+            format!("{:?}", stop.manner).to_lowercase(),
             format!("{:?}", stop.found_by).to_lowercase(),
             said(stop.predicted.map(|it| it.distance_m)),
             said(stop.predicted.map(|it| it.distance_bound_m)),

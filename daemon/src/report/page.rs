@@ -136,26 +136,27 @@ fn verdict(subject: &Subject) -> String {
 
 /// The figures that matter, large.
 fn figures(subject: &Subject) -> String {
-    let Some((role, pair)) = subject.data.errors.judged() else { return String::new() };
+    let Some((role, judged)) = subject.data.errors.judged() else { return String::new() };
     let runs = if role == Role::Holdout { "holdout runs" } else { "fit runs" };
     let interval = |bounds: Option<[f64; 2]>, shown: &dyn Fn(f64) -> String| match bounds {
         Some([low, high]) => format!("95 % interval {} to {}", shown(low), shown(high)),
-        None => "no interval: one block only".into(),
+        None => "no interval: one run only".into(),
     };
     let speed = |value: f64| format!("{value:.3}");
-    let share = |value: f64| format!("{} %", words::percent(value, pair.reduction.interval));
+    let share = |value: f64| format!("{} %", words::percent(value, judged.reduction_interval_95));
+    let of_side = |side: usize| judged.interval_95_mps.map(|both| both[side]);
     let mut list = vec![(
-        format!("{} <small>m/s</small>", speed(pair.before_mps.value)),
+        format!("{} <small>m/s</small>", speed(judged.error_mps[0])),
         if subject.has_effect() { "error before" } else { "error of the declared model" },
-        interval(pair.before_mps.interval, &speed),
+        interval(of_side(0), &speed),
     )];
     if subject.has_effect() {
-        let after = format!("{} <small>m/s</small>", speed(pair.after_mps.value));
-        list.push((after, "error after", interval(pair.after_mps.interval, &speed)));
+        let after = format!("{} <small>m/s</small>", speed(judged.error_mps[1]));
+        list.push((after, "error after", interval(of_side(1), &speed)));
         list.push((
-            share(pair.reduction.value),
+            share(judged.reduction),
             "of the error taken away",
-            interval(pair.reduction.interval, &share),
+            interval(judged.reduction_interval_95, &share),
         ));
         let p_value = subject.explanation.answer.effects.iter().map(|effect| effect.p_value);
         let worst = p_value.fold(0.0, f64::max);
@@ -164,7 +165,11 @@ fn figures(subject: &Subject) -> String {
     }
     let mut html = String::from("<dl class=\"figures\">\n");
     for (value, what, more) in list {
-        let what = if what.starts_with("error") { format!("{what}, {runs}") } else { what.into() };
+        let what = if what.starts_with("error") {
+            format!("{what}, {runs}{}", judged.predicted())
+        } else {
+            what.into()
+        };
         let _ = writeln!(
             html,
             "<div><dt>{what}</dt><dd><b>{value}</b><span class=\"interval\">{more}</span></dd></div>"

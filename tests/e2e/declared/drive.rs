@@ -14,6 +14,8 @@ pub const PERIOD_S: f64 = 0.2;
 pub const DELAY_S: f64 = 1.0;
 /// First-order lag in s of the actuators.
 pub const LAG_S: f64 = 0.6;
+/// Delay in s of a speed sensor that is late, a multiple of the period.
+pub const SPEED_DELAY_S: f64 = 0.8;
 /// Standard deviation of the measured speed in m/s.
 const NOISE_MPS: f64 = 0.01;
 /// Steps of integration between two samples.
@@ -45,6 +47,8 @@ pub struct Instant {
     pub commanded_n: f64,
     /// Outside temperature in °C.
     pub degc: f64,
+    /// What a sensor measures that is [`SPEED_DELAY_S`] late, in m/s.
+    pub late_mps: f64,
 }
 
 /// Both runs.
@@ -111,6 +115,11 @@ impl Drive {
             let brake_n = sample.brake_force_n;
             sample.set(SampleField::BrakeCylinderPressure, pressure_pa_per_n * brake_n);
         }
+        // Every run begins with a stand that is longer.
+        let late = (SPEED_DELAY_S / PERIOD_S).round() as usize;
+        for (instant, sample) in drive.instants[late..].iter_mut().zip(&drive.samples) {
+            instant.late_mps = if instant.time_s < SPEED_DELAY_S { 0.0 } else { sample.speed_mps };
+        }
         drive
     }
 
@@ -146,6 +155,7 @@ impl Drive {
                 acceleration_mps2,
                 commanded_n: command * weight_n,
                 degc: 3.0 + 0.004 * time_s,
+                late_mps: 0.0,
             });
             let acting_n = actuator.acting * weight_n;
             let sample = TrainSample {

@@ -6,7 +6,7 @@ use dynocar_core::train::TrainModel;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{SampleField, TrainSample};
 
-use super::drive::{DELAY_S, Drive, Instant, LAG_S};
+use super::drive::{DELAY_S, Drive, Instant, LAG_S, SPEED_DELAY_S};
 
 /// A train that declares nothing but what is true of it in any case.
 pub const TRAIN: &str = "
@@ -140,6 +140,7 @@ pub fn declarations(kind: EffectKind) -> Vec<Declaration> {
         EffectKind::MassChange => mass_change(),
         EffectKind::TractionGain => traction_gain(),
         EffectKind::ActuatorDelay => actuator_delay(),
+        EffectKind::SpeedDelay => speed_delay(),
         EffectKind::RotatingMass => rotating_mass(),
         EffectKind::BearingTemperature => bearing_temperature(),
         EffectKind::AmbientTemperature => ambient_temperature(),
@@ -290,6 +291,16 @@ fn actuator_delay() -> Vec<Declaration> {
             sample.traction_force_n = at.commanded_n.max(0.0);
             sample.brake_force_n = (-at.commanded_n).max(0.0);
         },
+        ..NOTHING
+    }]
+}
+
+fn speed_delay() -> Vec<Declaration> {
+    assert_eq!(SPEED_DELAY_S, 0.8);
+    vec![Declaration {
+        name: "speed_delay",
+        train: correction("[corrections]\nspeed_delay_s = 0.8\n"),
+        sample: |sample, at| sample.speed_mps = at.late_mps,
         ..NOTHING
     }]
 }

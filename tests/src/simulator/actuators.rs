@@ -6,7 +6,7 @@ use super::driving::Controls;
 use super::train_maker::TrueTrain;
 
 /// First-order lag over one step.
-fn lagged(value: f64, towards: f64, step_s: f64, lag_s: f64) -> f64 {
+pub(super) fn lagged(value: f64, towards: f64, step_s: f64, lag_s: f64) -> f64 {
     if lag_s <= 0.0 { towards } else { towards + (value - towards) * (-step_s / lag_s).exp() }
 }
 

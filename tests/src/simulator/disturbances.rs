@@ -61,6 +61,10 @@ pub struct Disturbances {
     pub delay_s: f64,
     /// Lag in s between reported and true forces.
     pub lag_s: f64,
+    /// Dead time in s between true and measured speed.
+    pub speed_delay_s: f64,
+    /// Lag in s between true and measured speed.
+    pub speed_lag_s: f64,
     /// True rotating-mass factor.
     pub rotating_mass_factor: f64,
     /// Extra a in N/kN at the start and its time constant in s.
@@ -118,6 +122,8 @@ impl Disturbances {
             traction_gain: 1.0,
             delay_s: 0.0,
             lag_s: 0.0,
+            speed_delay_s: 0.0,
+            speed_lag_s: 0.0,
             rotating_mass_factor: train.declared.rotating_mass_factor,
             cold_bearings: None,
             ambient: None,
@@ -204,6 +210,9 @@ impl Disturbances {
             Effect::TractionGain { gain } => self.traction_gain = *gain,
             Effect::ActuatorDelay { delay_s, lag_s } => {
                 (self.delay_s, self.lag_s) = (*delay_s, *lag_s);
+            }
+            Effect::SpeedDelay { delay_s, lag_s } => {
+                (self.speed_delay_s, self.speed_lag_s) = (*delay_s, *lag_s);
             }
             Effect::RotatingMass { rotating_mass_factor } => {
                 self.rotating_mass_factor = *rotating_mass_factor;

@@ -18,7 +18,9 @@ pub fn suitable_types(kind: EffectKind) -> &'static [TrainType] {
         EffectKind::CurveResistance => &[Freight, Regional, Metro],
         EffectKind::Wind => &[Regional, HighSpeed],
         EffectKind::MassChange => &[Freight, Regional, Metro],
-        EffectKind::RotatingMass | EffectKind::ActuatorDelay => &[Regional, Metro],
+        EffectKind::RotatingMass | EffectKind::ActuatorDelay | EffectKind::SpeedDelay => {
+            &[Regional, Metro]
+        }
         EffectKind::LowAdhesion => &[Regional, Metro, HighSpeed],
         _ => &TrainType::ALL,
     }
@@ -143,6 +145,7 @@ pub fn make_effect(
             delay_s: rounded(random.uniform(0.5, 1.6), 0.05),
             lag_s: random.uniform(0.4, 1.2),
         },
+        EffectKind::SpeedDelay => speed_delay(random),
         EffectKind::RotatingMass => {
             let declared = train.declared.rotating_mass_factor;
             let off = random.sign() * random.uniform(0.03, 0.06);
@@ -175,6 +178,13 @@ pub fn make_effect(
 fn mean_gradient_length_m(scene: &EffectScene<'_>) -> f64 {
     let entries = scene.line.track.gradient().map_or(1, |gradient| gradient.entries().len());
     scene.line.length_m / entries as f64
+}
+
+/// A bus that is late, a filter, or both; 0.4 to 1 s together.
+fn speed_delay(random: &mut Random) -> Effect {
+    let late_s = random.uniform(0.4, 1.0);
+    let share = random.pick(&[0.0, 0.5, 1.0]);
+    Effect::SpeedDelay { delay_s: share * late_s, lag_s: (1.0 - share) * late_s }
 }
 
 /// Three waves of 3 to 9 km, together about 1 ‰.

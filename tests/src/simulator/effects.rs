@@ -92,6 +92,13 @@ pub enum Effect {
         /// First-order lag in s after it.
         lag_s: f64,
     },
+    /// The measured speed is late; the odometer is not.
+    SpeedDelay {
+        /// Dead time in s.
+        delay_s: f64,
+        /// First-order lag in s after it.
+        lag_s: f64,
+    },
     /// Another rotating mass than declared.
     RotatingMass {
         /// True gamma.
@@ -147,6 +154,7 @@ impl Effect {
             Effect::MassChangeSections(_) | Effect::MassChangeWindows(_) => EffectKind::MassChange,
             Effect::TractionGain { .. } => EffectKind::TractionGain,
             Effect::ActuatorDelay { .. } => EffectKind::ActuatorDelay,
+            Effect::SpeedDelay { .. } => EffectKind::SpeedDelay,
             Effect::RotatingMass { .. } => EffectKind::RotatingMass,
             Effect::BearingTemperature { .. } => EffectKind::BearingTemperature,
             Effect::AmbientTemperature { .. } => EffectKind::AmbientTemperature,
@@ -197,7 +205,7 @@ impl Effect {
                 }).collect::<Vec<_>>()
             }),
             Effect::TractionGain { gain } => json!({ "gain": gain }),
-            Effect::ActuatorDelay { delay_s, lag_s } => {
+            Effect::ActuatorDelay { delay_s, lag_s } | Effect::SpeedDelay { delay_s, lag_s } => {
                 json!({ "delay_s": delay_s, "lag_s": lag_s })
             }
             Effect::RotatingMass { rotating_mass_factor } => {

@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use dynocar_core::force::{ForceResolver, ResolvedSample};
 use dynocar_core::simulate::{
-    BridgeLimits, ForceModel, Prediction, QuadraticForces, Recording, Restart, SpeedError,
-    declared_polynomial,
+    BridgeLimits, ForceModel, Prediction, QuadraticForces, Recording, Restart, STANDING_MPS,
+    SpeedError, declared_polynomial,
 };
 use dynocar_core::terms::delay::DelayLine;
 use dynocar_core::terms::{gradient, traction};
@@ -125,7 +125,7 @@ pub fn oracle_forces(
     let inertia_ratio =
         (1.0 + declared.rotating_mass_factor) / (1.0 + disturbances.rotating_mass_factor);
     let mut position_m = run.plan.start_m;
-    let polynomial = |(index, sample): (usize, &ResolvedSample)| {
+    let mut polynomial = |(index, sample): (usize, &ResolvedSample)| {
         let time_s = recording.time_s()[index];
         position_m = sample.position_m.unwrap_or(position_m);
         // Everything but traction and brake is in proportion to the mass.
@@ -142,8 +142,15 @@ pub fn oracle_forces(
         })
     };
     let mut quadratic = QuadraticForces::default();
+    let mut late = DelayLine::<3>::new(disturbances.speed_delay_s, disturbances.speed_lag_s);
     let samples = recording.samples().iter().enumerate();
-    quadratic.set(samples.map(polynomial), disturbances.speed_scale);
+    let behind = samples.zip(recording.samples()).map(|(numbered, sample)| {
+        let at = (sample.time_ns, sample.stretch);
+        let now = polynomial(numbered);
+        let stands = sample.speed_mps <= STANDING_MPS;
+        late.acting_unless(at, Some(now), |net_mps2| stands && net_mps2[0] <= 0.0).unwrap_or(now)
+    });
+    quadratic.set(behind, disturbances.speed_scale);
     let first = &recording.samples()[0];
     OracleForces {
         quadratic,

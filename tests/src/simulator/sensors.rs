@@ -3,6 +3,7 @@
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
+use super::actuators::lagged;
 use super::disturbances::Disturbances;
 use super::line_maker::Line;
 use super::random::Random;
@@ -125,6 +126,7 @@ pub fn measure_run(
     random: &mut Random,
 ) -> Vec<TrainSample> {
     let odometer = read_odometer(states, plan, line, (sensors, disturbances), random);
+    let shown_mps = shown_speeds_mps(states, disturbances);
     let end_s = states[states.len() - 1].time_s;
     let period_s = settings.sample_period_s;
     let count = (end_s / period_s).floor() as usize;
@@ -147,7 +149,8 @@ pub fn measure_run(
             let between = |value: fn(&TrueState) -> f64| instant.of(value);
             let odometer_m =
                 odometer[index] + instant.share * (odometer[index + 1] - odometer[index]);
-            let wheel_mps = disturbances.speed_scale * between(|state| state.wheel_speed_mps);
+            let wheel_mps =
+                shown_mps[index] + instant.share * (shown_mps[index + 1] - shown_mps[index]);
             let speed_mps = if wheel_mps <= sensors.speed_threshold_mps {
                 0.0
             } else {
@@ -180,6 +183,23 @@ pub fn measure_run(
             sample.run = plan.number as u32;
             sample.direction = plan.direction as i8;
             sample
+        })
+        .collect()
+}
+
+/// Speed in m/s that the tacho shows at each true state, noise and steps aside: late, and by its
+/// declared wheel.
+fn shown_speeds_mps(states: &[TrueState], disturbances: &Disturbances) -> Vec<f64> {
+    let late = (disturbances.speed_delay_s / TRUE_STEP_S).max(0.0);
+    let share = late.fract();
+    let mut shown_mps = states[0].wheel_speed_mps;
+    (0..states.len())
+        .map(|index| {
+            let before = |steps: usize| states[index.saturating_sub(steps)].wheel_speed_mps;
+            let steps = late as usize;
+            let reached_mps = before(steps) + share * (before(steps + 1) - before(steps));
+            shown_mps = lagged(shown_mps, reached_mps, TRUE_STEP_S, disturbances.speed_lag_s);
+            disturbances.speed_scale * shown_mps
         })
         .collect()
 }

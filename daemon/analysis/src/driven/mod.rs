@@ -12,8 +12,9 @@ pub use balance::{Balance, ForcePart};
 use dynocar_core::force::ForceResolver;
 use dynocar_core::simulate::is_pulled;
 use dynocar_core::simulate::motion::{Motion, STEP_MAX_S, advance};
+use dynocar_core::terms::delay::DelayLine;
 use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
+use dynocar_core::train::{Corrections, TrainModel};
 use dynocar_core::validation::ValidSample;
 use dynocar_shared::{SampleField, TrainSample};
 
@@ -38,15 +39,49 @@ pub struct DrivenTrain {
     is_held_at_rest: bool,
     position_m: f64,
     speed_mps: f64,
+    /// What a sensor that is late shows of the true speed in m/s.
+    sensor: Option<LateSensor>,
     balance: Option<Balance>,
+}
+
+/// A speed sensor that is late.
+#[derive(Clone, Debug)]
+struct LateSensor {
+    line: DelayLine<1>,
+    time_ns: i64,
+    shown_mps: f64,
+}
+
+impl LateSensor {
+    /// Of a train that has this speed in m/s; `None` where its sensor is on time.
+    fn of(train: &TrainModel, speed_mps: f64) -> Option<Self> {
+        let Corrections { speed_delay_s, speed_lag_s, .. } = train.corrections;
+        let is_late = speed_delay_s > 0.0 || speed_lag_s > 0.0;
+        is_late.then(|| {
+            let mut line = DelayLine::new(speed_delay_s, speed_lag_s);
+            line.acting((0, 1), Some([speed_mps]));
+            LateSensor { line, time_ns: 0, shown_mps: speed_mps }
+        })
+    }
+
+    fn take(&mut self, step_s: f64, speed_mps: f64) {
+        self.time_ns += (step_s * 1e9).round() as i64;
+        if let Some([shown_mps]) = self.line.acting((self.time_ns, 1), Some([speed_mps])) {
+            self.shown_mps = shown_mps;
+        }
+    }
 }
 
 impl DrivenTrain {
     /// A train at its beginning; without a line the gradient comes with what acts.
     pub fn new(train: Arc<TrainModel>, track: Option<Arc<Track>>, beginning: Beginning) -> Self {
         let Beginning { position_m, speed_mps, is_held_at_rest } = beginning;
-        let forces = ForceResolver::new(Arc::clone(&train), track);
-        DrivenTrain { train, forces, is_held_at_rest, position_m, speed_mps, balance: None }
+        let sensor = LateSensor::of(&train, speed_mps);
+        // The train is driven by what acts now, however late its sensor shows it.
+        let on_time = Corrections { speed_delay_s: 0.0, speed_lag_s: 0.0, ..train.corrections };
+        let acting = TrainModel { corrections: on_time, ..TrainModel::clone(&train) };
+        let forces = ForceResolver::new(Arc::new(acting), track);
+        DrivenTrain { train, forces, is_held_at_rest, position_m, speed_mps, sensor, balance: None }
     }
 
     /// Chainage of the train's centre in m, by its own motion.
@@ -61,13 +96,15 @@ impl DrivenTrain {
 
     /// Speed in m/s as the train's own sensor tells it.
     pub fn measured_speed_mps(&self) -> f64 {
-        self.speed_mps * self.train.corrections.speed_scale
+        let shown_mps = self.sensor.as_ref().map_or(self.speed_mps, |sensor| sensor.shown_mps);
+        shown_mps * self.train.corrections.speed_scale
     }
 
-    /// Dead time in s by which forces act later than they are reported. The train remembers those of
-    /// its last 1000 steps.
+    /// Dead time in s by which forces act later than they are reported, or by which the speed is shown
+    /// late, whichever is longer. The train remembers those of its last 1000 steps.
     pub fn dead_time_s(&self) -> f64 {
-        self.train.corrections.actuator_delay_s
+        let Corrections { actuator_delay_s, speed_delay_s, .. } = self.train.corrections;
+        actuator_delay_s.max(speed_delay_s)
     }
 
     /// What accelerates the train where it was looked at last, at the end of the newest step.
@@ -101,6 +138,9 @@ impl DrivenTrain {
         let part_s = step_s / parts;
         for part in 0..parts as u32 {
             self.drive_part(part_s, |at_s| acting(f64::from(part) * part_s + at_s));
+        }
+        if let Some(sensor) = &mut self.sensor {
+            sensor.take(step_s, self.speed_mps);
         }
     }
 

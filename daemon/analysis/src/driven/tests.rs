@@ -145,3 +145,25 @@ fn a_train_towards_falling_chainage_goes_there_and_long_steps_are_divided() {
     long.drive(30.0, acting);
     assert!((short.speed_mps() - long.speed_mps()).abs() < 1e-9);
 }
+
+#[test]
+fn a_late_sensor_shows_the_speed_later_and_moves_nothing() {
+    let late = |speed_delay_s| {
+        let corrections = Corrections { speed_delay_s, ..Corrections::NONE };
+        train_at(TrainModel { corrections, ..level() }, None, 0.0)
+    };
+    let (mut on_time, mut behind) = (late(0.0), late(0.8));
+    let mut shown = Vec::new();
+    for k in 0..200 {
+        let begin_s = 0.2 * f64::from(k);
+        for train in [&mut on_time, &mut behind] {
+            train.drive(0.2, |at_s| acting(begin_s + at_s));
+        }
+        assert_eq!(on_time.speed_mps(), behind.speed_mps());
+        shown.push((on_time.measured_speed_mps(), behind.measured_speed_mps()));
+    }
+    assert!(shown[199].0 > 1.0);
+    for pair in shown.windows(5) {
+        assert!((pair[4].1 - pair[0].0).abs() < 1e-9, "{pair:?}");
+    }
+}

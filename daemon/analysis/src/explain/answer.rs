@@ -6,6 +6,7 @@ use dynocar_core::named;
 use dynocar_core::plausibility::Severity;
 use serde::{Deserialize, Serialize};
 
+use super::judged::Judged;
 use super::stop_to_stop::StopToStop;
 use crate::dataset::Note;
 
@@ -311,6 +312,10 @@ pub struct Answer {
     /// Why nothing was scored, and what the errors on the fit runs are worth; absent when it was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unscored: Option<String>,
+    /// The error of the holdout runs that headlines state: from stop to stop where there are stops;
+    /// absent when nothing was scored.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub judged: Option<Judged>,
     /// RMSE in m/s on the holdout runs without the effects.
     pub rmse_before: Option<f64>,
     /// RMSE in m/s on the holdout runs with the effects.

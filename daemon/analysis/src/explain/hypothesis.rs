@@ -95,6 +95,17 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         false
     }
 
+    /// By how many s the measured speed is late, the sum of its parameters; `None` for what makes none late.
+    fn speed_late_s(&self, _parameters: &[f64]) -> Option<f64> {
+        None
+    }
+
+    /// True when it changes what all other effects do: a matter of how the record was made, which comes
+    /// after them.
+    fn is_of_the_whole_record(&self) -> bool {
+        false
+    }
+
     /// Where it acts.
     fn place(&self) -> Place {
         Place::default()

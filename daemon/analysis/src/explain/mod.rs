@@ -11,7 +11,7 @@
 //!   time, would explain
 //! - [`selection`]: the search for effects, its significance, evidence by run
 //! - [`gradient_prior`], [`map_error`]: how maps err; the finished model beside what the map's own error makes all runs err alike
-//! - [`score`], `stop_runs`, [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
+//! - [`score`], `stop_runs`, [`stop_to_stop`], [`judged`], `bootstrap`: open-loop prediction of fit and holdout runs
 //! - [`unexplained`], [`told`], [`identifiability`], [`rivals`], [`runners_up`], [`verdict`], [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
 //!
@@ -26,6 +26,7 @@ pub mod force_time;
 pub mod gradient_prior;
 pub mod hypothesis;
 pub mod identifiability;
+pub mod judged;
 pub mod map_error;
 pub mod places;
 pub mod report;

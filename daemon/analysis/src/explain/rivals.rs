@@ -82,12 +82,12 @@ pub fn telling_runs(kind: EffectKind) -> &'static str {
 /// What is known to separate the kinds that are easily confused.
 pub fn separating_run(kind: EffectKind, rivals: &[EffectKind]) -> String {
     use EffectKind::{
-        AmbientTemperature, BearingTemperature, CurveResistance, DraggingBrake, GradientError,
-        GradientShift, LocalResistance, MassChange, RotatingMass, TractionGain, TunnelDrag,
-        WheelDiameter, Wind,
+        ActuatorDelay, AmbientTemperature, BearingTemperature, CurveResistance, DraggingBrake,
+        GradientError, GradientShift, LocalResistance, MassChange, RotatingMass, SpeedDelay,
+        TractionGain, TunnelDrag, WheelDiameter, Wind,
     };
     let has = |wanted: EffectKind| kind == wanted || rivals.contains(&wanted);
-    let pairs: [(EffectKind, EffectKind, &str); 12] = [
+    let pairs: [(EffectKind, EffectKind, &str); 13] = [
         (
             GradientError,
             LocalResistance,
@@ -109,6 +109,12 @@ pub fn separating_run(kind: EffectKind, rivals: &[EffectKind]) -> String {
             "Compare accelerating with braking: a gain acts on traction only.",
         ),
         (RotatingMass, WheelDiameter, "Compare the odometer with balises over several kilometres."),
+        (
+            ActuatorDelay,
+            SpeedDelay,
+            "Record a position of its own (GNSS, balises) on steep and changing gradients: the line acts \
+             at once on a train, a late speed shows it late.",
+        ),
         (TunnelDrag, Wind, "Pass the portals in both directions and on another day."),
         (TunnelDrag, LocalResistance, "Pass the place at clearly different speeds."),
         (

@@ -4,9 +4,10 @@ use dynocar_core::simulate::{Prediction, Restart, SpeedError};
 
 use super::bootstrap::intervals_95;
 use super::evidence::{Fit, FitProblem, GrownForces, RunData};
+use super::judged::Judged;
 use super::selection::without_each_run;
 use super::stop_runs::stop_runs;
-use super::stop_to_stop::StopToStop;
+use super::stop_to_stop::{self, StopToStop};
 
 /// Errors of the model without and with the effects.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -161,16 +162,31 @@ impl Score {
         })
     }
 
+    /// The error of the holdout runs by which the model is judged; `None` without motion in them.
+    pub fn judged(&self) -> Option<Judged> {
+        let [before, after] = self.holdout_rmse_mps();
+        let by_full_runs = || {
+            let intervals = self.intervals();
+            Some(Judged::by_full_runs(self.holdout_runs.len(), [before?, after?], intervals))
+        };
+        self.holdout_stop_to_stop.as_ref().map(Judged::from).or_else(by_full_runs)
+    }
+
     /// 95 % interval of 1 - after / before by bootstrap over the holdout runs; `None` with fewer
     /// than two.
     pub fn reduction_interval(&self) -> Option<[f64; 2]> {
-        let [interval] = intervals_95(&self.holdout_runs, |drawn| {
+        self.intervals().map(|it| it[2])
+    }
+
+    /// 95 % intervals of the errors over whole runs in m/s, before and after, and of what is taken
+    /// away.
+    fn intervals(&self) -> Option<[[f64; 2]; 3]> {
+        intervals_95(&self.holdout_runs, |drawn| {
             let sum = drawn
                 .iter()
                 .fold([SpeedError::default(); 2], |sum, run| [sum[0] + run[0], sum[1] + run[1]]);
             let [before, after] = [sum[0].rmse_mps()?, sum[1].rmse_mps()?];
-            (before > 0.0).then(|| [1.0 - after / before])
-        })?;
-        Some(interval)
+            (before > 0.0).then(|| [before, after, stop_to_stop::reduction([before, after])])
+        })
     }
 }

@@ -16,6 +16,9 @@ pub struct StopToStop {
     /// where there is one recorded run only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interval_95_mps: Option<[[f64; 2]; 2]>,
+    /// 95 % interval of 1 - after / before, by the same draws.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reduction_interval_95: Option<[f64; 2]>,
     /// The errors in m/s themselves, before and after, by recorded run.
     #[serde(skip)]
     pub errors_mps: Vec<Vec<[f64; 2]>>,
@@ -37,9 +40,23 @@ impl StopToStop {
         let all: Vec<&Vec<[f64; 2]>> = by_run.iter().collect();
         let median_mps = medians_of(&all);
         let runs = all.iter().map(|errors| errors.len()).sum();
-        let interval_95_mps = intervals_95(&by_run, |drawn| Some(medians_of(drawn)));
-        (runs > 0).then_some(StopToStop { runs, median_mps, interval_95_mps, errors_mps })
+        let intervals = intervals_95(&by_run, |drawn| {
+            let [before, after] = medians_of(drawn);
+            Some([before, after, reduction([before, after])])
+        });
+        (runs > 0).then_some(StopToStop {
+            runs,
+            median_mps,
+            interval_95_mps: intervals.map(|[before, after, _]| [before, after]),
+            reduction_interval_95: intervals.map(|it| it[2]),
+            errors_mps,
+        })
     }
+}
+
+/// 1 - after / before; 0 where there was no error.
+pub fn reduction([before, after]: [f64; 2]) -> f64 {
+    if before > 0.0 { 1.0 - after / before } else { 0.0 }
 }
 
 /// The middle value, the mean of the two middle ones of an even number; 0 of none.

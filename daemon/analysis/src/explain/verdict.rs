@@ -82,6 +82,7 @@ pub fn answer(
         metric: "full_run",
         scored_runs: score.holdout_runs.iter().filter(|run| run[0].count > 0).count(),
         unscored: unscored(search, score),
+        judged: score.judged(),
         rmse_before,
         rmse_after,
         error_reduction_interval: score.reduction_interval(),
@@ -99,14 +100,16 @@ pub fn answer(
 
 /// That the runs held out are predicted worse with what was found; empty when they are not.
 fn worse_held_out(effects: &[EffectAnswer], score: &Score) -> String {
-    let [Some(before), Some(after)] = score.holdout_rmse_mps() else { return String::new() };
+    let Some(judged) = score.judged() else { return String::new() };
+    let [before, after] = judged.error_mps;
     let [shown_before, shown_after] = [before, after].map(|error| format!("{error:.3}"));
     if effects.is_empty() || after <= before || shown_after == shown_before {
         return String::new();
     }
     format!(
-        " The runs held out are predicted worse with it, {shown_before} m/s before and \
-         {shown_after} after: it holds for the runs that were fitted, not for those."
+        " The runs held out{} are predicted worse with it, {shown_before} m/s before and \
+         {shown_after} after: it holds for the runs that were fitted, not for those.",
+        judged.predicted()
     )
 }
 

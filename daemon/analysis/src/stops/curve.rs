@@ -18,6 +18,12 @@ const BUILT_UP: f64 = 0.9;
 const FOLLOWS_S: f64 = 3.0;
 /// ... and is taken for settled this time in s later.
 const SETTLES_S: f64 = 2.0;
+/// A deceleration below this share of an earlier one is that of a brake that was eased...
+const EASED: f64 = 0.7;
+/// ... if it differs by so many standard deviations.
+const EASED_STDS: f64 = 2.0;
+/// Below this speed in m/s a full brake may be let go, too.
+const SOFT_MPS: f64 = 2.0;
 /// Standard deviation in m/s² of the deceleration at the start of a stop.
 const START_STD_MPS2: f64 = 1.0;
 /// Standard deviations in m/s of a measured speed that are tried.
@@ -73,6 +79,24 @@ impl Curve {
     /// The last moment at which the train was at least so fast in m/s.
     pub fn at_speed(&self, speed_mps: f64) -> Option<&Point> {
         self.points.iter().rev().find(|point| point.speed_mps >= speed_mps)
+    }
+
+    /// The moment of the greatest deceleration and a later one at which the brake had been eased; `None`
+    /// where it was not.
+    pub fn eased(&self) -> Option<[Point; 2]> {
+        let points = self.points.get(self.built_up?..)?;
+        let mut most = points.first()?;
+        for point in points.iter().take_while(|it| it.speed_mps >= SOFT_MPS) {
+            let loss = most.deceleration_mps2 - point.deceleration_mps2;
+            let is_less = point.deceleration_mps2 < EASED * most.deceleration_mps2;
+            if is_less && loss > EASED_STDS * most.std_mps2.hypot(point.std_mps2) {
+                return Some([*most, *point]);
+            }
+            if point.deceleration_mps2 > most.deceleration_mps2 {
+                most = point;
+            }
+        }
+        None
     }
 
     /// Speed in m/s at which the brake was applied.

@@ -1,4 +1,4 @@
-//! Where in a run the brake was applied until the train stood.
+//! Where in a run the brake was applied until the train stood: in full, or as a driver wanted.
 
 use std::ops::RangeInclusive;
 
@@ -15,6 +15,13 @@ const SOFT_MPS: f64 = 2.0;
 const BRAKING_MPS2: f64 = 0.2;
 /// Time in s over which the loss of speed is taken.
 const LOOK_BACK_S: f64 = 3.0;
+/// Share of the brake's effort from which on it is applied at all.
+const APPLIED_AT_ALL: f64 = 0.1;
+/// Without a record of the brake, a driver eases and renews it at a platform: it is applied as long as
+/// the train loses this much in m/s²...
+const EASED_MPS2: f64 = 0.1;
+/// ... over this time in s.
+const EASED_LOOK_S: f64 = 10.0;
 /// A longer time in s between two samples ends a stop.
 const GAP_MAX_S: f64 = 3.0;
 
@@ -46,43 +53,57 @@ pub enum FoundBy {
 /// A stop: from the first sample under the brake to the first that stands.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stop {
-    /// Its samples in the run.
+    /// Its samples in the run, from the last application of the brake on.
     pub samples: RangeInclusive<usize>,
+    /// The sample from which on the brake was applied in full; `None` where it never was.
+    pub full_from: Option<usize>,
     /// What told that the brake was applied.
     pub found_by: FoundBy,
 }
 
-/// The stops of a run, in order.
+/// The stops of a run, in order. Recorders may pause while the train stands.
 pub fn find(
     samples: &[TrainSample],
     brake: Option<&EffortCurve>,
     settings: &FindSettings,
 ) -> Vec<Stop> {
-    let applied = applied(samples, brake, settings.share_min);
-    let found_by = if applied.is_some() { FoundBy::Brake } else { FoundBy::Speed };
-    let is_braking = |index: usize| match &applied {
-        Some(applied) => applied[index] || samples[index].speed_mps < SOFT_MPS,
-        None => loses_speed(samples, index),
-    };
-    let follows = |index: usize| time_s(samples, index) - time_s(samples, index - 1) <= GAP_MAX_S;
+    let full = applied(samples, brake, settings.share_min);
+    let at_all = applied(samples, brake, APPLIED_AT_ALL.min(settings.share_min));
+    let found_by = if full.is_some() { FoundBy::Brake } else { FoundBy::Speed };
+    let is_applied =
+        |applied: &Option<Vec<bool>>, index: usize, look_s: f64, least_mps2: f64| match applied {
+            Some(applied) => applied[index] || samples[index].speed_mps < SOFT_MPS,
+            None => loses_speed(samples, index, look_s, least_mps2),
+        };
+    let is_full = |index: usize| is_applied(&full, index, LOOK_BACK_S, BRAKING_MPS2);
+    let is_any = |index: usize| is_applied(&at_all, index, EASED_LOOK_S, EASED_MPS2);
     let ends = (1..samples.len()).filter(|&index| {
         samples[index].speed_mps <= STANDING_MPS && samples[index - 1].speed_mps > STANDING_MPS
     });
-    let mut stops = Vec::new();
-    for end in ends {
-        let mut from = end;
-        while from > 0 && follows(from) && is_braking(from - 1) {
-            from -= 1;
+    let is_fast = |index: &usize| samples[*index].speed_mps >= settings.from_mps;
+    let stop = |end: usize| {
+        let full_from = Some(start(samples, end, is_full)).filter(is_fast);
+        let mut from = start(samples, end, is_any);
+        // A long look sees the brake before it comes.
+        while at_all.is_none() && from < end && !is_full(from) {
+            from += 1;
         }
-        // What is left of an earlier stop at the same place belongs to that.
-        if let Some(stood) = (from..end).rev().find(|&at| samples[at].speed_mps <= STANDING_MPS) {
-            from = stood + 1;
-        }
-        if samples[from].speed_mps >= settings.from_mps {
-            stops.push(Stop { samples: from..=end, found_by });
-        }
+        let from = full_from.map_or(from, |full| full.min(from));
+        is_fast(&from).then_some(Stop { samples: from..=end, full_from, found_by })
+    };
+    ends.filter_map(stop).collect()
+}
+
+/// The first sample from which on the brake is applied until the end of a stop.
+fn start(samples: &[TrainSample], end: usize, is_braking: impl Fn(usize) -> bool) -> usize {
+    let follows = |index: usize| time_s(samples, index) - time_s(samples, index - 1) <= GAP_MAX_S;
+    let mut from = end;
+    while from > 0 && follows(from) && is_braking(from - 1) {
+        from -= 1;
     }
-    stops
+    // What is left of an earlier stop at the same place belongs to that.
+    let stood = (from..end).rev().find(|&at| samples[at].speed_mps <= STANDING_MPS);
+    stood.map_or(from, |stood| stood + 1)
 }
 
 /// Whether the brake is applied at each sample; `None` where no sample tells.
@@ -104,14 +125,14 @@ fn applied(
     is_told.then_some(applied)
 }
 
-/// Whether a train is losing speed as only a brake makes it, over a while before or after.
-fn loses_speed(samples: &[TrainSample], index: usize) -> bool {
+/// Whether a train loses so much in m/s² over a time in s after a sample, or until it stands.
+fn loses_speed(samples: &[TrainSample], index: usize, look_s: f64, least_mps2: f64) -> bool {
     let lost = |from: usize, to: usize| {
         let over_s = time_s(samples, to) - time_s(samples, from);
-        over_s > 0.0 && samples[from].speed_mps - samples[to].speed_mps >= BRAKING_MPS2 * over_s
+        over_s > 0.0 && samples[from].speed_mps - samples[to].speed_mps >= least_mps2 * over_s
     };
     let now_s = time_s(samples, index);
-    let later = (index..samples.len()).find(|&it| time_s(samples, it) >= now_s + LOOK_BACK_S);
+    let later = (index..samples.len()).find(|&it| time_s(samples, it) >= now_s + look_s);
     let later = later.unwrap_or(samples.len() - 1);
     let stands = (index..=later).find(|&it| samples[it].speed_mps <= STANDING_MPS);
     lost(index, stands.unwrap_or(later))
@@ -141,10 +162,17 @@ mod tests {
         (0..450).map(sample).collect()
     }
 
-    fn starts_s(samples: &[TrainSample]) -> Vec<(f64, FoundBy)> {
+    fn found(samples: &[TrainSample]) -> Vec<Stop> {
         let brake = EffortCurve::new(vec![(0.0, 100e3)]);
-        let stops = find(samples, brake.as_ref(), &FindSettings::default());
-        stops.iter().map(|it| (time_s(samples, *it.samples.start()), it.found_by)).collect()
+        find(samples, brake.as_ref(), &FindSettings::default())
+    }
+
+    /// Where the brake was applied in full, in s.
+    fn starts_s(samples: &[TrainSample]) -> Vec<(f64, FoundBy)> {
+        let stops = found(samples);
+        let full =
+            stops.iter().filter_map(|it| Some((time_s(samples, it.full_from?), it.found_by)));
+        full.collect()
     }
 
     #[test]
@@ -157,11 +185,14 @@ mod tests {
     }
 
     #[test]
-    fn half_a_brake_is_no_stop_and_a_soft_end_is_one() {
-        assert!(starts_s(&run(|_| Some(50e3))).is_empty());
+    fn half_a_brake_is_no_full_stop_and_a_soft_end_is_one() {
+        let half = run(|time_s| Some(if time_s > 59.9 { 50e3 } else { 0.0 }));
+        assert!(starts_s(&half).is_empty());
+        let [Stop { samples, full_from: None, .. }] = &found(&half)[..] else { panic!("one stop") };
+        assert!((time_s(&half, *samples.start()) - 60.0).abs() < 0.3);
         let soft = run(|time_s| Some(if (59.9..78.5).contains(&time_s) { 100e3 } else { 0.0 }));
         assert_eq!(starts_s(&soft).len(), 1);
         let released = run(|time_s| Some(if (59.9..70.0).contains(&time_s) { 100e3 } else { 0.0 }));
-        assert!(starts_s(&released).is_empty());
+        assert!(found(&released).is_empty());
     }
 }

@@ -3,7 +3,7 @@
 use dynocar_shared::TrainSample;
 use serde::Serialize;
 
-use super::curve::Curve;
+use super::curve::{Curve, Point};
 use super::find::{FindSettings, FoundBy, find};
 use super::friction::{FrictionPoint, friction};
 use super::law::{Law, StoppingDistance};
@@ -16,6 +16,27 @@ pub struct StudySettings {
     pub find: FindSettings,
     /// Relative standard deviation of a stop's deceleration that is assumed beforehand.
     pub repeatability: f64,
+}
+
+/// How a train was brought to a stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Manner {
+    /// By all of the brake from its command on.
+    Full,
+    /// As the driver wanted: the deceleration is his, and no law of the brake.
+    Modulated,
+}
+
+/// A deceleration at a speed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SpeedDeceleration {
+    /// Speed in m/s.
+    pub speed_mps: f64,
+    /// Deceleration in m/s².
+    pub deceleration_mps2: f64,
+    /// Its standard deviation in m/s².
+    pub std_mps2: f64,
 }
 
 /// A recorded stop.
@@ -35,6 +56,12 @@ pub struct RecordedStop {
     pub time_s: f64,
     /// What told that the brake was applied.
     pub found_by: FoundBy,
+    /// Whether the brake was applied in full.
+    pub manner: Manner,
+    /// Why it tells no law of the brake; `None` for a stop that does.
+    pub no_law: Option<String>,
+    /// Deceleration over speed, from fast to slow, of a stop that tells no law.
+    pub decelerations: Vec<SpeedDeceleration>,
     /// For a stop held out: what the law said of it.
     pub predicted: Option<StoppingDistance>,
     /// The friction behind it.
@@ -60,7 +87,8 @@ impl Study {
     pub fn of(dataset: &Dataset, settings: &StudySettings, from_mps: &[f64]) -> Self {
         let found: Vec<Found> =
             dataset.runs.iter().flat_map(|run| found_in(dataset, run, settings)).collect();
-        let fit = found.iter().filter(|it| it.stop.role == Role::Fit);
+        let is_of_law = |it: &&Found| it.stop.role == Role::Fit && it.stop.manner == Manner::Full;
+        let fit = found.iter().filter(is_of_law);
         let curves: Vec<Curve> = fit.map(|it| it.curve.clone()).collect();
         let law = Law::of(&curves, settings.repeatability);
         let speeds = match (&law, from_mps) {
@@ -75,7 +103,8 @@ impl Study {
         let distances = speeds.into_iter().filter_map(predict).collect();
         let cannot_tell = cannot_tell(dataset, &found, law.as_ref());
         let stops = found.into_iter().map(|Found { mut stop, .. }| {
-            stop.predicted = predict(stop.from_mps).filter(|_| stop.role == Role::Holdout);
+            let is_predicted = stop.role == Role::Holdout && stop.manner == Manner::Full;
+            stop.predicted = predict(stop.from_mps).filter(|_| is_predicted);
             stop
         });
         Study { stops: stops.collect(), distances, cannot_tell, law }
@@ -91,9 +120,19 @@ fn found_in(dataset: &Dataset, run: &Run, settings: &StudySettings) -> Vec<Found
     let samples = usable(&run.samples);
     let stops = find(&samples, dataset.train.brake.as_ref(), &settings.find);
     let studied = stops.into_iter().filter_map(|stop| {
-        let samples = &samples[stop.samples];
-        let curve = Curve::of(samples)?;
-        let friction = friction(samples, &curve, &dataset.train, dataset.track.as_ref());
+        let end = *stop.samples.end();
+        let full = stop.full_from.and_then(|from| Curve::of(&samples[from..=end]));
+        let no_law = why_no_law(full.as_ref(), stop.found_by, settings.find.share_min);
+        let (from, curve) = match (full, stop.full_from, &no_law) {
+            (Some(curve), Some(from), None) => (from, curve),
+            _ => (*stop.samples.start(), Curve::of(&samples[stop.samples])?),
+        };
+        let samples = &samples[from..=end];
+        let is_full = no_law.is_none();
+        let friction = match is_full {
+            true => friction(samples, &curve, &dataset.train, dataset.track.as_ref()),
+            false => Vec::new(),
+        };
         let stop = RecordedStop {
             file: run.file.clone(),
             role: run.role,
@@ -102,12 +141,48 @@ fn found_in(dataset: &Dataset, run: &Run, settings: &StudySettings) -> Vec<Found
             distance_m: curve.distance_m(),
             time_s: curve.points.last()?.time_s,
             found_by: stop.found_by,
+            manner: if is_full { Manner::Full } else { Manner::Modulated },
+            no_law,
+            decelerations: if is_full { Vec::new() } else { decelerations(&curve) },
             predicted: None,
             friction,
         };
         Some(Found { stop, curve })
     });
     studied.collect()
+}
+
+/// Why a stop tells no law of the brake; `full` is its part under all of the brake.
+fn why_no_law(full: Option<&Curve>, found_by: FoundBy, share_min: f64) -> Option<String> {
+    let Some(curve) = full else {
+        return Some(match found_by {
+            FoundBy::Brake => {
+                format!("the brake was not applied by {share_min} of its effort all the way")
+            }
+            FoundBy::Speed => "the speed did not keep falling: the brake was eased".into(),
+        });
+    };
+    if curve.built_up.is_none() {
+        return Some("the brake did not build up".into());
+    }
+    // A record of the brake says itself that it was not eased.
+    let [most, eased] = curve.eased().filter(|_| found_by == FoundBy::Speed)?;
+    Some(format!(
+        "the brake was eased: {:.2} m/s² at {:.1} m/s, {:.2} at {:.1}",
+        most.deceleration_mps2, most.speed_mps, eased.deceleration_mps2, eased.speed_mps
+    ))
+}
+
+/// Deceleration at whole m/s that the train passed.
+fn decelerations(curve: &Curve) -> Vec<SpeedDeceleration> {
+    let fastest = curve.from_mps().floor() as u32;
+    let at = |k: u32| {
+        let speed_mps = f64::from(k);
+        let point = curve.at_speed(speed_mps)?;
+        let Point { deceleration_mps2, std_mps2, .. } = *point;
+        Some(SpeedDeceleration { speed_mps, deceleration_mps2, std_mps2 })
+    };
+    (1..=fastest).rev().filter_map(at).collect()
 }
 
 /// The samples with a speed, each later than the one before.
@@ -130,6 +205,13 @@ fn cannot_tell(dataset: &Dataset, found: &[Found], law: Option<&Law>) -> Vec<Str
              deceleration, and of its friction"
                 .into(),
         );
+    }
+    let without = found.iter().filter(|it| it.stop.no_law.is_some()).count();
+    if without > 0 {
+        said.push(format!(
+            "the law of the brake in {without} of {} stops: how hard it was applied there is the driver's",
+            found.len()
+        ));
     }
     said.push("how friction divides into coefficient, pressure and ratio: only its course over speed is told".into());
     if let Some(Law { stops: 1, .. }) = law {

@@ -8,6 +8,7 @@ use dynocar_shared::{SampleField, TrainSample};
 use crate::terms::bearings::WarmUp;
 use crate::terms::delay::DelayLine;
 use crate::terms::extra::Covariate;
+use crate::terms::speed_delay::LateSpeed;
 use crate::terms::{
     Resistance, ambient, bearings, curve, extra, gradient, place, rotating, traction, tunnel,
     wheel, wind,
@@ -138,12 +139,31 @@ impl ResolvedSample {
     }
 }
 
+/// Puts what acts on the train behind a speed that is late.
+fn put_behind(late: &mut LateSpeed, resolved: &mut ResolvedSample) {
+    let at = (resolved.time_ns, resolved.stretch);
+    let forces = resolved.traction_force_n.zip(resolved.brake_force_n);
+    if let Some([traction_n, brake_n]) = late.forces(at, resolved.speed_mps, forces.map(Into::into))
+    {
+        resolved.traction_force_n = Some(traction_n);
+        resolved.brake_force_n = Some(brake_n);
+    }
+    let now = (resolved.gradient_permille.unwrap_or(0.0), resolved.resistance);
+    let (permille, resistance) = late.resisting(at, now);
+    resolved.gradient_permille = resolved.gradient_permille.map(|_| permille);
+    resolved.resistance = resistance;
+    resolved.position_m = late.position_m(at, resolved.position_m);
+    resolved.brake_cylinder_pressure_pa =
+        late.cylinder_pressure_pa(at, resolved.brake_cylinder_pressure_pa);
+}
+
 /// Looks up what the declared model knows of the forces at a sample.
 #[derive(Clone, Debug)]
 pub struct ForceResolver {
     train: Arc<TrainModel>,
     track: Option<Arc<Track>>,
-    delay: Option<DelayLine>,
+    delay: Option<DelayLine<2>>,
+    late_speed: Option<LateSpeed>,
     warm_up: WarmUp,
     ambient_temperature_degc: Option<f64>,
     last: Option<(u32, f64)>,
@@ -152,12 +172,15 @@ pub struct ForceResolver {
 impl ForceResolver {
     /// A resolver for one train on one line; without a line the gradient comes from the sample.
     pub fn new(train: Arc<TrainModel>, track: Option<Arc<Track>>) -> Self {
-        let Corrections { actuator_delay_s, actuator_lag_s, .. } = train.corrections;
+        let Corrections { actuator_delay_s, actuator_lag_s, speed_delay_s, speed_lag_s, .. } =
+            train.corrections;
         let is_late = actuator_delay_s > 0.0 || actuator_lag_s > 0.0;
+        let is_speed_late = speed_delay_s > 0.0 || speed_lag_s > 0.0;
         ForceResolver {
             train,
             track,
             delay: is_late.then(|| DelayLine::new(actuator_delay_s, actuator_lag_s)),
+            late_speed: is_speed_late.then(|| LateSpeed::new(speed_delay_s, speed_lag_s)),
             warm_up: WarmUp::default(),
             ambient_temperature_degc: None,
             last: None,
@@ -174,6 +197,11 @@ impl ForceResolver {
     /// Bounded work, no allocation.
     pub fn resolve(&mut self, valid: &ValidSample) -> ResolvedSample {
         let sample = valid.sample;
+        let stated_permille = self.stated_gradient_permille(sample);
+        let felt_permille = match stated_permille {
+            Some(_) => None,
+            None => self.accelerometer_gradient_permille(valid),
+        };
         let train = &*self.train;
         let known = &train.corrections;
         let direction = f64::from(sample.direction);
@@ -186,9 +214,6 @@ impl ForceResolver {
             .zip(position_m)
             .map_or(1.0, |(track, position_m)| track.mass_factor(position_m, direction));
         let mass_kg = sample.get(SampleField::Mass).unwrap_or(train.mass_kg) * mass_factor;
-        let gradient_permille = self
-            .stated_gradient_permille(sample)
-            .or_else(|| self.accelerometer_gradient_permille(valid));
         let curvature_per_m = on_track(Track::curvature_per_m).or_else(|| {
             let radius_m = sample.get(SampleField::CurveRadius)?;
             Some(if radius_m > 0.0 { 1.0 / radius_m } else { 0.0 })
@@ -211,7 +236,7 @@ impl ForceResolver {
             weight_kn: TrainModel::weight_kn(mass_kg),
             traction_force_n: traction_n.map(|n| traction::true_force_n(n, known.traction_gain)),
             brake_force_n: sample.get(SampleField::BrakeForce),
-            gradient_permille,
+            gradient_permille: stated_permille,
             gradient_std_permille: on_track(Track::gradient_std_here_permille).unwrap_or(0.0),
             curvature_per_m,
             resistance: Resistance::BASIC,
@@ -231,6 +256,11 @@ impl ForceResolver {
             }
         }
         resolved.resistance = self.declared_resistance(&resolved);
+        if let Some(late) = &mut self.late_speed {
+            put_behind(late, &mut resolved);
+        }
+        // What is felt was compared with the late speed itself.
+        resolved.gradient_permille = resolved.gradient_permille.or(felt_permille);
         resolved.extra_n_per_kn =
             resolved.resistance.extra_n_per_kn(self.train.resistance, resolved.speed_mps);
         resolved
@@ -289,8 +319,14 @@ impl ForceResolver {
 
     /// Gradient in ‰ along the travel from specific force = dv/dt + g * gradient, with dv/dt
     /// over the last step; its noise telescopes away when it is integrated.
-    fn accelerometer_gradient_permille(&self, valid: &ValidSample) -> Option<f64> {
-        let specific_force_mps2 = valid.sample.get(SampleField::SpecificForce)?;
+    fn accelerometer_gradient_permille(&mut self, valid: &ValidSample) -> Option<f64> {
+        let felt_mps2 = valid.sample.get(SampleField::SpecificForce);
+        let specific_force_mps2 = match &mut self.late_speed {
+            Some(late) => {
+                late.specific_force_mps2((valid.sample.time_ns, valid.stretch), felt_mps2)
+            }
+            None => felt_mps2,
+        }?;
         let (stretch, last_speed_mps) = self.last?;
         if stretch != valid.stretch || valid.step_s <= 0.0 {
             return None;

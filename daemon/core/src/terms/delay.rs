@@ -38,28 +38,28 @@ const LAG_MIN_S: f64 = 1e-3;
 /// Traction and brake force in N.
 pub type Forces = [f64; 2];
 
-/// The forces of the last seconds, and what of them acts now.
+/// Numbers of the last seconds, and what of them holds now: a dead time, then a first-order lag.
 #[derive(Clone, Debug)]
-pub struct DelayLine {
+pub struct DelayLine<const N: usize> {
     delay_s: f64,
     lag_s: f64,
-    /// Times in s and forces, a ring.
-    past: Vec<(f64, Forces)>,
+    /// Times in s and numbers, a ring.
+    past: Vec<(f64, [f64; N])>,
     next: usize,
     count: usize,
     stretch: u32,
     origin_ns: i64,
-    /// Time in s, delayed and lagged forces of the last sample.
-    last: Option<(f64, Forces, Forces)>,
+    /// Time in s, delayed and lagged numbers of the last sample.
+    last: Option<(f64, [f64; N], [f64; N])>,
 }
 
-impl DelayLine {
-    /// A line of a dead time and a lag in s, without forces.
+impl<const N: usize> DelayLine<N> {
+    /// A line of a dead time and a lag in s, without numbers.
     pub fn new(delay_s: f64, lag_s: f64) -> Self {
         DelayLine {
             delay_s,
             lag_s,
-            past: vec![(0.0, [0.0; 2]); CAPACITY],
+            past: vec![(0.0, [0.0; N]); CAPACITY],
             next: 0,
             count: 0,
             stretch: 0,
@@ -68,13 +68,24 @@ impl DelayLine {
         }
     }
 
-    /// The forces that act at a time in ns behind those that are reported then; `None` while they
+    /// The numbers that hold at a time in ns behind those that are reported then; `None` while they
     /// are not. A new stretch of motion forgets what was before it.
     pub fn acting(
         &mut self,
         (time_ns, stretch): (i64, u32),
-        reported: Option<Forces>,
-    ) -> Option<Forces> {
+        reported: Option<[f64; N]>,
+    ) -> Option<[f64; N]> {
+        self.acting_unless((time_ns, stretch), reported, |_| false)
+    }
+
+    /// The same; what comes out of the dead time and is `held` moves nothing: it holds as it is, and the
+    /// lag begins from none behind it.
+    pub fn acting_unless(
+        &mut self,
+        (time_ns, stretch): (i64, u32),
+        reported: Option<[f64; N]>,
+        held: impl FnOnce(&[f64; N]) -> bool,
+    ) -> Option<[f64; N]> {
         if self.count == 0 || stretch != self.stretch {
             (self.count, self.next, self.last) = (0, 0, None);
             (self.stretch, self.origin_ns) = (stretch, time_ns);
@@ -84,11 +95,16 @@ impl DelayLine {
         self.past[self.next] = (time_s, reported);
         self.next = (self.next + 1) % CAPACITY;
         self.count = (self.count + 1).min(CAPACITY);
-        Some(self.lagged(time_s, self.at(time_s - self.delay_s)))
+        let input = self.at(time_s - self.delay_s);
+        if held(&input) {
+            self.last = Some((time_s, [0.0; N], [0.0; N]));
+            return Some(input);
+        }
+        Some(self.lagged(time_s, input))
     }
 
-    /// The reported forces at a time, linear between samples, the oldest before all of them.
-    fn at(&self, time_s: f64) -> Forces {
+    /// The reported numbers at a time, linear between samples, the oldest before all of them.
+    fn at(&self, time_s: f64) -> [f64; N] {
         let entry = |back: usize| self.past[(self.next + CAPACITY - 1 - back) % CAPACITY];
         let mut after = entry(0);
         if after.0 <= time_s {
@@ -106,7 +122,7 @@ impl DelayLine {
     }
 
     /// Response of the lag to an input that is linear between samples.
-    fn lagged(&mut self, time_s: f64, input: Forces) -> Forces {
+    fn lagged(&mut self, time_s: f64, input: [f64; N]) -> [f64; N] {
         let output = match self.last {
             Some((last_s, last_input, last_output)) if self.lag_s > LAG_MIN_S => {
                 let step_s = time_s - last_s;
@@ -141,7 +157,7 @@ mod tests {
 
     /// Forces that act at the times of a recording with reported traction and brake forces.
     fn acting(
-        line: &mut DelayLine,
+        line: &mut DelayLine<2>,
         reported: impl Fn(f64) -> Forces,
         count: usize,
     ) -> Vec<(f64, Forces)> {

@@ -21,6 +21,7 @@ pub mod place;
 mod resistance;
 pub mod rotating;
 pub mod speed_band;
+pub mod speed_delay;
 mod suspect;
 pub mod traction;
 pub mod tunnel;
@@ -33,8 +34,10 @@ pub use resistance::Resistance;
 pub use suspect::{Least, Seen, Suspect};
 
 /// Every number of a term that stands in `[corrections]` of `train.toml`.
-pub const CORRECTIONS: [&Key; 11] = [
+pub const CORRECTIONS: [&Key; 13] = [
     &wheel::SPEED_SCALE,
+    &speed_delay::DELAY,
+    &speed_delay::LAG,
     &traction::GAIN,
     &delay::DELAY,
     &delay::LAG,

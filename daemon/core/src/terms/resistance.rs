@@ -53,6 +53,69 @@ impl Resistance {
         outside: 1.0,
     };
 
+    /// Number of its parts.
+    pub const PARTS: usize = 11;
+
+    /// Its parts, in the order of the fields.
+    pub fn parts(&self) -> [f64; Self::PARTS] {
+        let Resistance {
+            curve_n_per_kn,
+            tunnel_n_per_kn,
+            place_n_per_kn,
+            bearing_n_per_kn,
+            other_n_per_kn,
+            other_per_mps,
+            factor,
+            c_share,
+            dc,
+            headwind_mps,
+            outside,
+        } = *self;
+        [
+            curve_n_per_kn,
+            tunnel_n_per_kn,
+            place_n_per_kn,
+            bearing_n_per_kn,
+            other_n_per_kn,
+            other_per_mps,
+            factor,
+            c_share,
+            dc,
+            headwind_mps,
+            outside,
+        ]
+    }
+
+    /// The resistance of these [`parts`](Self::parts).
+    pub fn of_parts(parts: [f64; Self::PARTS]) -> Self {
+        let [
+            curve_n_per_kn,
+            tunnel_n_per_kn,
+            place_n_per_kn,
+            bearing_n_per_kn,
+            other_n_per_kn,
+            other_per_mps,
+            factor,
+            c_share,
+            dc,
+            headwind_mps,
+            outside,
+        ] = parts;
+        Resistance {
+            curve_n_per_kn,
+            tunnel_n_per_kn,
+            place_n_per_kn,
+            bearing_n_per_kn,
+            other_n_per_kn,
+            other_per_mps,
+            factor,
+            c_share,
+            dc,
+            headwind_mps,
+            outside,
+        }
+    }
+
     /// What is there at standstill, in N/kN.
     #[inline]
     fn constant_n_per_kn(&self) -> f64 {
@@ -169,6 +232,11 @@ mod tests {
             let by_slopes = a * DAVIS.a + b * DAVIS.b + c * DAVIS.c + constant + sloped(speed_mps);
             assert!((by_slopes - by_sum).abs() < 1e-12, "{speed_mps}");
         }
+    }
+
+    #[test]
+    fn the_parts_make_the_same_resistance() {
+        assert_eq!(Resistance::of_parts(everything().parts()), everything());
     }
 
     #[test]

@@ -6,6 +6,10 @@
 pub struct Corrections {
     /// Measured over true speed, by another wheel diameter than declared.
     pub speed_scale: f64,
+    /// The measured speed is so many s late.
+    pub speed_delay_s: f64,
+    /// And then follows the true one with this time constant in s.
+    pub speed_lag_s: f64,
     /// Reported over true traction force.
     pub traction_gain: f64,
     /// The reported forces act so many s later.
@@ -32,6 +36,8 @@ impl Corrections {
     /// No correction.
     pub const NONE: Corrections = Corrections {
         speed_scale: 1.0,
+        speed_delay_s: 0.0,
+        speed_lag_s: 0.0,
         traction_gain: 1.0,
         actuator_delay_s: 0.0,
         actuator_lag_s: 0.0,

@@ -115,6 +115,8 @@ struct TrainAnswer<'a> {
 #[derive(Debug, Serialize)]
 struct CorrectionsAnswer {
     speed_scale: f64,
+    speed_delay_s: f64,
+    speed_lag_s: f64,
     traction_gain: f64,
     actuator_delay_s: f64,
     actuator_lag_s: f64,
@@ -251,6 +253,8 @@ fn train_answer(train: &TrainModel) -> TrainAnswer<'_> {
 fn corrections_answer(known: Corrections) -> Option<CorrectionsAnswer> {
     let answer = CorrectionsAnswer {
         speed_scale: known.speed_scale,
+        speed_delay_s: known.speed_delay_s,
+        speed_lag_s: known.speed_lag_s,
         traction_gain: known.traction_gain,
         actuator_delay_s: known.actuator_delay_s,
         actuator_lag_s: known.actuator_lag_s,

@@ -111,6 +111,17 @@ fn corrections(known: &Corrections) -> Vec<String> {
         format!("measured over true speed {}", short(known.speed_scale, 5)),
     );
     say(
+        known.speed_delay_s > 0.0,
+        format!("the measured speed is {} s late", short(known.speed_delay_s, 3)),
+    );
+    say(
+        known.speed_lag_s > 0.0,
+        format!(
+            "the measured speed follows with a time constant of {} s",
+            short(known.speed_lag_s, 3)
+        ),
+    );
+    say(
         known.traction_gain != none.traction_gain,
         format!("reported over true traction {}", short(known.traction_gain, 5)),
     );

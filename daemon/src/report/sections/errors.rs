@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use dynocar_analysis::dataset::Role;
+use dynocar_analysis::explain::judged::Judged;
 use dynocar_analysis::explain::report::Estimate;
 use dynocar_analysis::explain::report::errors::{ErrorPair, Resampling, RunErrors};
 use dynocar_analysis::explain::report::traces::Trace;
@@ -23,7 +24,9 @@ pub fn section(subject: &Subject) -> Result<Section, ReportError> {
     let mut body = String::from(
         "<p>Each model starts at a run’s first measured speed, is driven by the reported forces to \
          the end, and its speed is compared with the measured one (root mean square over moving \
-         samples). Holdout runs took no part in any fit. ",
+         samples). From stop to stop it starts anew at each departure: where runs hold stops, the model \
+         is judged by that, since over a whole run an error at one stop is carried on. Holdout runs took \
+         no part in any fit. ",
     );
     body += if subject.has_effect() {
         "‘Before’ is the declared model with a, b, c refitted on the fit runs, ‘after’ the same \
@@ -58,6 +61,7 @@ fn summary(subject: &Subject) -> String {
         ("Fit, whole runs", errors.fit),
         ("Fit, restarted every 60 s", errors.fit_window60),
     ];
+    let is_by_stops = errors.holdout_stop_to_stop.is_some();
     for (k, (name, pair)) in rows.into_iter().enumerate() {
         let Some(pair) = pair else { continue };
         let mut cells = vec![
@@ -67,7 +71,7 @@ fn summary(subject: &Subject) -> String {
             percent(&pair.reduction),
         ];
         cells.truncate(columns);
-        if k == 0 { table.push_marked(cells) } else { table.push(cells) }
+        if k == 0 && !is_by_stops { table.push_marked(cells) } else { table.push(cells) }
     }
     for (name, found) in
         [("Holdout", &errors.holdout_stop_to_stop), ("Fit", &errors.fit_stop_to_stop)]
@@ -75,7 +79,7 @@ fn summary(subject: &Subject) -> String {
         let Some(found) = found else { continue };
         let mut cells = stop_to_stop(name, found);
         cells.truncate(columns);
-        table.push(cells);
+        if name == "Holdout" { table.push_marked(cells) } else { table.push(cells) }
     }
     let mut html = table.html();
     let _ = writeln!(html, "<p class=\"note\">{}</p>", intervals(errors.holdout, errors.fit));
@@ -88,13 +92,12 @@ fn stop_to_stop(name: &str, found: &StopToStop) -> Vec<String> {
         let interval = found.interval_95_mps.map(|both| both[side]);
         estimate(&Estimate { value: found.median_mps[side], interval })
     };
-    let [before, after] = found.median_mps;
-    let reduction = if before > 0.0 { 1.0 - after / before } else { 0.0 };
+    let judged = Judged::from(found);
     vec![
         format!("{name}, from stop to stop, median of {}", found.runs),
         side(0),
         side(1),
-        percent(&Estimate { value: reduction, interval: None }),
+        percent(&Estimate { value: judged.reduction, interval: judged.reduction_interval_95 }),
     ]
 }
 

@@ -8,14 +8,18 @@ use super::{Candidate, Effect, Hypothesis, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::{Scan, Tuple};
 
+/// Where positions are integrated from the speed, they are late with it, and nothing is on time.
+const NEVER_TOLD: [EffectKind; 1] = [EffectKind::SpeedDelay];
 /// Delay and lag in s that a fit may start from.
 const STARTS: [[f64; 2]; 4] = [[0.3, 0.3], [1.0, 1.0], [0.2, 2.0], [2.0, 0.3]];
 
 /// The kind.
 pub struct ActuatorDelay;
 
-#[derive(Debug)]
-struct DelayAndLag;
+#[derive(Debug, Default)]
+struct DelayAndLag {
+    twins: &'static [EffectKind],
+}
 
 impl Effect for ActuatorDelay {
     fn kind(&self) -> EffectKind {
@@ -27,7 +31,10 @@ impl Effect for ActuatorDelay {
             .into_iter()
             .map(|start| (decrease(scan, start), start))
             .max_by(|one, other| one.0.total_cmp(&other.0));
-        let candidate = |(_, start): (f64, [f64; 2])| Candidate::new(DelayAndLag, start.to_vec());
+        let is_any_recorded = scan.problem.runs.iter().any(|run| run.is_position_recorded);
+        let twins: &[EffectKind] = if is_any_recorded { &[] } else { &NEVER_TOLD };
+        let candidate =
+            |(_, start): (f64, [f64; 2])| Candidate::new(DelayAndLag { twins }, start.to_vec());
         Proposal::Candidates(best.map(candidate).into_iter().collect())
     }
 }
@@ -37,7 +44,7 @@ fn decrease(scan: &Scan, [delay_s, lag_s]: [f64; 2]) -> f64 {
     let mut sum = Tuple::zero(scan.fit.theta.len());
     for (index, run) in scan.problem.runs.iter().enumerate() {
         let mut late = run.declared.clone();
-        DelayAndLag.apply(&[delay_s, lag_s], run, &mut late);
+        DelayAndLag::default().apply(&[delay_s, lag_s], run, &mut late);
         let control_n = |force: &SampleForces| force.traction_n - force.brake_n;
         sum.add(&scan.run_tuple(index, |run, i| {
             let change_n = control_n(&late[i]) - control_n(&run.declared[i]);
@@ -68,6 +75,10 @@ impl Hypothesis for DelayAndLag {
                 [force.traction_n, force.brake_n] = late;
             }
         }
+    }
+
+    fn twins(&self) -> &[EffectKind] {
+        self.twins
     }
 
     fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {

@@ -18,6 +18,7 @@ mod low_adhesion;
 mod mass_change;
 mod proposal;
 mod rotating_mass;
+mod speed_delay;
 mod traction_gain;
 mod tunnel_drag;
 mod unknown;
@@ -30,8 +31,9 @@ pub use proposal::{Candidate, Effect, Proposal};
 
 /// Every kind, in the order of the search: timing, scales, mass and gain, what is tied to a
 /// place, environment, actuators. What is in no library comes last.
-pub const LIBRARY: [&dyn Effect; 16] = [
+pub const LIBRARY: [&dyn Effect; 17] = [
     &actuator_delay::ActuatorDelay,
+    &speed_delay::SpeedDelay,
     &wheel_diameter::WheelDiameter,
     &traction_gain::TractionGain,
     &mass_change::MassChange,

@@ -12,6 +12,7 @@ mod cleaning;
 mod criterion;
 mod fade;
 mod fit;
+mod late_speed;
 mod model;
 mod noise;
 mod noise_search;

@@ -46,9 +46,12 @@ impl GrownModel {
         forces.samples.clear();
         forces.samples.extend_from_slice(&run.declared);
         forces.speed_scale = 1.0;
-        for (effect, range) in self.effects.iter().zip(self.ranges()) {
-            effect.apply(&theta[range.clone()], run, &mut forces.samples);
-            forces.speed_scale *= effect.speed_scale(&theta[range]);
+        for is_last in [false, true] {
+            let effects = self.effects.iter().zip(self.ranges());
+            for (effect, range) in effects.filter(|it| it.0.is_of_the_whole_record() == is_last) {
+                effect.apply(&theta[range.clone()], run, &mut forces.samples);
+                forces.speed_scale *= effect.speed_scale(&theta[range]);
+            }
         }
     }
 

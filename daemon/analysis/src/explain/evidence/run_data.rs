@@ -10,6 +10,7 @@ use crate::dataset::{Dataset, ForceSource, PositionSource, Role, Run};
 
 use super::bins::{self, Bin};
 use super::cleaning;
+use super::late_speed;
 use super::sample_forces::SampleForces;
 use super::way::way_ratio;
 
@@ -35,6 +36,11 @@ pub struct RunData {
     /// Way by position over way by integrated speed, with its standard deviation, where
     /// positions are measured.
     pub way_ratio: Option<(f64, f64)>,
+    /// Seconds by which the speed is late by the position, for each part from stand to stand; empty
+    /// where no positions are measured.
+    pub speed_late_s: Vec<f64>,
+    /// False where positions are integrated from the speed.
+    pub is_position_recorded: bool,
     /// The power from which the force comes.
     pub power: Option<RunPower>,
     /// Samples that validation refused.
@@ -138,9 +144,11 @@ fn prepare_run(
         .collect();
     let smooth_mps = smoothed(&recording);
     let bins = bins::bins(&recording);
-    let way_ratio = match run.position_source {
-        PositionSource::IntegratedSpeed => None,
-        _ => way_ratio(&recording),
+    let is_position_recorded = run.position_source != PositionSource::IntegratedSpeed;
+    let way_ratio = if is_position_recorded { way_ratio(&recording) } else { None };
+    let speed_late_s = match is_position_recorded {
+        true => late_speed::by_part_s(&recording),
+        false => Vec::new(),
     };
     let power = RunPower::of(run, recording.samples());
     Ok(RunData {
@@ -153,6 +161,8 @@ fn prepare_run(
         smooth_mps,
         bins,
         way_ratio,
+        speed_late_s,
+        is_position_recorded,
         power,
         rejected,
         replaced,

@@ -72,7 +72,7 @@ impl Covariate {
             Kind::CurveResistance => Covariate::Curvature,
             Kind::Wind => Covariate::Direction,
             Kind::WheelDiameter => Covariate::Speed,
-            Kind::MassChange | Kind::RotatingMass => Covariate::Acceleration,
+            Kind::MassChange | Kind::RotatingMass | Kind::SpeedDelay => Covariate::Acceleration,
             Kind::TractionGain | Kind::LowAdhesion => Covariate::ControlForce,
             Kind::ActuatorDelay => Covariate::ForceChange,
             Kind::BearingTemperature => Covariate::TimeSinceStart,

@@ -7,8 +7,10 @@ use crate::dataset::Role;
 use crate::explain::Explanation;
 use crate::explain::bootstrap::intervals_95;
 use crate::explain::evidence::{Fit, GrownForces, RunData};
-use crate::explain::score::{run_error, stop_to_stop};
-use crate::explain::stop_to_stop::StopToStop;
+use crate::explain::judged::Judged;
+use crate::explain::score;
+use crate::explain::score::run_error;
+use crate::explain::stop_to_stop::{self, StopToStop};
 
 /// Length in s of the blocks of a single run.
 const BLOCK_S: f64 = 60.0;
@@ -86,15 +88,36 @@ impl Errors {
             fit_window60: pair(fit, Restart::WINDOW_60),
             holdout_window60: pair(holdout, Restart::WINDOW_60),
             holdout_stop_to_stop: explanation.score.holdout_stop_to_stop.clone(),
-            fit_stop_to_stop: stop_to_stop(fit, before, after),
+            fit_stop_to_stop: score::stop_to_stop(fit, before, after),
             by_run: fit.iter().chain(holdout).map(|run| run_errors(run, before, after)).collect(),
         }
     }
 
-    /// The errors that judge the model: those of the holdout runs, else those of the fit runs.
-    pub fn judged(&self) -> Option<(Role, ErrorPair)> {
-        let holdout = self.holdout.map(|pair| (Role::Holdout, pair));
-        holdout.or(self.fit.map(|pair| (Role::Fit, pair)))
+    /// The errors that judge the model: those of the holdout runs, else those of the fit runs; from
+    /// stop to stop where there are stops.
+    pub fn judged(&self) -> Option<(Role, Judged)> {
+        let one = |stops: &Option<StopToStop>, pair: Option<ErrorPair>| {
+            stops.as_ref().map(Judged::from).or(pair.map(|pair| pair.judged()))
+        };
+        let holdout = one(&self.holdout_stop_to_stop, self.holdout);
+        let fit = || Some((Role::Fit, one(&self.fit_stop_to_stop, self.fit)?));
+        holdout.map(|judged| (Role::Holdout, judged)).or_else(fit)
+    }
+}
+
+impl ErrorPair {
+    /// As what judges a model.
+    fn judged(&self) -> Judged {
+        let count = match self.resampling {
+            Resampling::Runs(count) => count,
+            Resampling::Blocks(_) => 1,
+        };
+        let all = [self.before_mps, self.after_mps, self.reduction].map(|it| it.interval);
+        let intervals = match all {
+            [Some(before), Some(after), Some(reduction)] => Some([before, after, reduction]),
+            _ => None,
+        };
+        Judged::by_full_runs(count, [self.before_mps.value, self.after_mps.value], intervals)
     }
 }
 
@@ -154,8 +177,7 @@ fn pooled(units: impl Iterator<Item = [SpeedError; 2]>) -> Option<[f64; 3]> {
     let sum =
         units.fold([SpeedError::default(); 2], |sum, unit| [sum[0] + unit[0], sum[1] + unit[1]]);
     let [before, after] = [sum[0].rmse_mps()?, sum[1].rmse_mps()?];
-    let reduction = if before > 0.0 { 1.0 - after / before } else { 0.0 };
-    Some([before, after, reduction])
+    Some([before, after, stop_to_stop::reduction([before, after])])
 }
 
 /// Percentile bootstrap over units; the two models are always judged on the same draw.

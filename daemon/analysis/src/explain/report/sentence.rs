@@ -1,6 +1,6 @@
 //! The verdict in a plain sentence: kind, where, size with unit and interval, error reduction.
 
-use super::errors::{ErrorPair, Errors};
+use super::errors::Errors;
 use super::words::{self, joined, kind_name, number};
 use crate::dataset::Role;
 use crate::explain::answer::{Answer, EffectAnswer, HALF_95, ParameterValue, Place, Verdict};
@@ -43,18 +43,18 @@ pub fn sentence(answer: &Answer, errors: &Errors) -> String {
 
 /// What the effects take away from the error that judges them.
 fn gained(errors: &Errors) -> String {
-    let Some((role, ErrorPair { before_mps, after_mps, reduction, .. })) = errors.judged() else {
-        return String::new();
-    };
+    let Some((role, judged)) = errors.judged() else { return String::new() };
     let runs = if role == Role::Holdout { "the runs held out" } else { "the fit runs" };
-    let percent = |share: f64| format!("{} %", words::percent(share, reduction.interval));
-    let interval = reduction.interval.map_or(String::new(), |[low, high]| {
+    let runs = format!("{runs}{}", judged.predicted());
+    let interval = judged.reduction_interval_95;
+    let percent = |share: f64| format!("{} %", words::percent(share, interval));
+    let interval = interval.map_or(String::new(), |[low, high]| {
         format!(" (95 % interval {} to {})", percent(low), percent(high))
     });
-    let (before, after) = (before_mps.value, after_mps.value);
+    let [before, after] = judged.error_mps;
     let values = format!("from {before:.3} to {after:.3} m/s");
-    if reduction.value > 0.0 {
-        let share = percent(reduction.value);
+    if judged.reduction > 0.0 {
+        let share = percent(judged.reduction);
         format!(
             "With it, the error of the predicted speed on {runs} falls {values}, by {share}{interval}."
         )
@@ -187,7 +187,8 @@ mod tests {
     use super::*;
     use crate::explain::answer::{BaseAnswer, CovariateRange, DavisDeviations, RunWindow};
     use crate::explain::report::Estimate;
-    use crate::explain::report::errors::Resampling;
+    use crate::explain::report::errors::{ErrorPair, Resampling};
+    use crate::explain::stop_to_stop::StopToStop;
 
     #[test]
     fn places_are_told_in_words() {
@@ -230,9 +231,8 @@ mod tests {
         );
     }
 
-    #[test]
-    fn rivals_and_unknown_causes_are_told_apart_from_findings() {
-        let effect = |kind, parameter: &str| EffectAnswer {
+    fn effect(kind: &'static str, parameter: &str) -> EffectAnswer {
+        EffectAnswer {
             kind,
             place: Place::of_intervals(vec![[5200.0, 6900.0]]),
             parameters: [(parameter.to_string(), ParameterValue::Number(2.5))].into(),
@@ -240,9 +240,13 @@ mod tests {
             p_value: 1e-9,
             error_reduction: 0.8,
             runners_up: Vec::new(),
-        };
+        }
+    }
+
+    /// An ambiguous answer.
+    fn ambiguous() -> Answer {
         let none = DavisDeviations { a: 0.0, b: 0.0, c: 0.0 };
-        let mut answer = Answer {
+        Answer {
             verdict: Verdict::Ambiguous,
             statement: String::new(),
             notes: Vec::new(),
@@ -253,6 +257,7 @@ mod tests {
             metric: "full_run",
             scored_runs: 1,
             unscored: None,
+            judged: None,
             rmse_before: None,
             rmse_after: None,
             error_reduction_interval: None,
@@ -265,7 +270,11 @@ mod tests {
             considered: Vec::new(),
             identifiability: Vec::new(),
             predictions: std::collections::BTreeMap::new(),
-        };
+        }
+    }
+
+    /// Errors over whole runs held out that grow.
+    fn grown_errors() -> Errors {
         let value = |value| Estimate { value, interval: None };
         let pair = ErrorPair {
             before_mps: value(0.8),
@@ -273,7 +282,7 @@ mod tests {
             reduction: value(-0.125),
             resampling: Resampling::Blocks(1),
         };
-        let errors = Errors {
+        Errors {
             fit: None,
             holdout: Some(pair),
             fit_window60: None,
@@ -281,7 +290,12 @@ mod tests {
             holdout_stop_to_stop: None,
             fit_stop_to_stop: None,
             by_run: Vec::new(),
-        };
+        }
+    }
+
+    #[test]
+    fn rivals_and_unknown_causes_are_told_apart_from_findings() {
+        let (mut answer, errors) = (ambiguous(), grown_errors());
         let size = "from km 5.20 to 6.90 – extra resistance 2.50 N/kN (95 % interval 2.30 to 2.70)";
         let gained = "With it, the error of the predicted speed on the runs held out does not \
                       fall (from 0.800 to 0.900 m/s).";
@@ -301,5 +315,16 @@ mod tests {
                  residual {size}. {gained}"
             )
         );
+    }
+
+    #[test]
+    fn a_headline_states_the_error_from_stop_to_stop_where_there_are_stops() {
+        let mut errors = grown_errors();
+        // Stops that were cut off leave an error over whole runs that says nothing of the forces.
+        errors.holdout_stop_to_stop = StopToStop::from_errors(vec![vec![[0.5, 0.06]; 3]; 4]);
+        let said = sentence(&ambiguous(), &errors);
+        let gained = "on the runs held out, from stop to stop (median of 12) falls from 0.500 to \
+                      0.060 m/s, by 88.0 % (95 % interval 88.0 % to 88.0 %).";
+        assert!(said.ends_with(gained), "{said}");
     }
 }

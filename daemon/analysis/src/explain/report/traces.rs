@@ -27,7 +27,7 @@ pub struct TracePoint {
     pub after_mps: f64,
 }
 
-/// One run, open loop from its first sample to its last.
+/// One run, open loop from its first sample to its last and anew from each standstill.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trace {
     /// The run's file.
@@ -36,7 +36,7 @@ pub struct Trace {
     pub role: Role,
     /// Stretches without a break, in order of time.
     pub pieces: Vec<Vec<TracePoint>>,
-    /// RMSE in m/s without and with the effects.
+    /// Root mean square errors of these predictions in m/s without and with the effects.
     pub rmse_mps: Option<[f64; 2]>,
     /// Stretches of time in s in which an effect acts.
     pub acting_s: Vec<[f64; 2]>,
@@ -51,7 +51,7 @@ pub fn traces(explanation: &Explanation) -> Vec<Trace> {
     let mut ranked: Vec<(f64, &RunData)> = runs
         .iter()
         .map(|run| {
-            let error = run_error(&explanation.base, run, Restart::FullRun);
+            let error = run_error(&explanation.base, run, Restart::AtDepartures);
             (error.rmse_mps().unwrap_or(0.0), run)
         })
         .collect();
@@ -59,11 +59,11 @@ pub fn traces(explanation: &Explanation) -> Vec<Trace> {
     ranked.iter().take(TRACES_MAX).map(|(_, run)| trace(explanation, run, &zones)).collect()
 }
 
-/// Speeds of a run predicted open loop from its first sample to its last.
+/// Speeds of a run predicted open loop from its first sample to its last, anew from each standstill.
 pub(super) fn predicted(fit: &Fit, run: &RunData) -> Prediction {
     let (mut forces, mut prediction) = (GrownForces::default(), Prediction::new());
     fit.model.forces(run, &fit.theta, &mut forces);
-    prediction.simulate(&run.recording, &forces, Restart::FullRun);
+    prediction.simulate(&run.recording, &forces, Restart::AtDepartures);
     prediction
 }
 
@@ -90,7 +90,7 @@ fn trace(explanation: &Explanation, run: &RunData, zones: &Zones) -> Trace {
         }
     }
     pieces.retain(|piece| piece.len() > 1);
-    let rmse = |fit: &Fit| run_error(fit, run, Restart::FullRun).rmse_mps();
+    let rmse = |fit: &Fit| run_error(fit, run, Restart::AtDepartures).rmse_mps();
     Trace {
         file: run.file.clone(),
         role: run.role,

@@ -15,6 +15,7 @@ pub fn kind(kind: EffectKind) -> &'static str {
         EffectKind::MassChange => "a changed mass",
         EffectKind::TractionGain => "a wrong scale of the reported traction force",
         EffectKind::ActuatorDelay => "delayed forces",
+        EffectKind::SpeedDelay => "a measured speed that is late",
         EffectKind::RotatingMass => "another rotating mass than declared",
         EffectKind::BearingTemperature => "cold bearings that warm up",
         EffectKind::AmbientTemperature => "resistance that follows the outside temperature",

@@ -57,6 +57,17 @@ impl FitProblem {
             let mut part = score.rows_mut(start, count);
             part -= pull;
         }
+        self.take_positions(model, theta, (&mut information, &mut score, &mut cost));
+        (information, score, cost)
+    }
+
+    /// What positions say of the scale of the speeds and of how late they are.
+    fn take_positions(
+        &self,
+        model: &GrownModel,
+        theta: &[f64],
+        (information, score, cost): (&mut DMatrix<f64>, &mut DVector<f64>, &mut f64),
+    ) {
         if let Some((ratio, deviation)) = self.way_ratio {
             let mut scale = 1.0;
             let mut at = None;
@@ -68,14 +79,30 @@ impl FitProblem {
                 scale *= own;
             }
             let away = (ratio - 1.0 / scale) / deviation;
-            cost += away * away;
+            *cost += away * away;
             if let Some(i) = at {
                 let slope = -1.0 / (scale * scale) / deviation;
                 information[(i, i)] += slope * slope;
                 score[i] += slope * away;
             }
         }
-        (information, score, cost)
+        if let Some((late_s, deviation)) = self.speed_late_s {
+            let effects = model.effects.iter().zip(model.ranges());
+            let late = effects.filter_map(|(effect, range)| {
+                Some((effect.speed_late_s(&theta[range.clone()])?, range))
+            });
+            let late: Vec<_> = late.collect();
+            let known_s: f64 = late.iter().map(|(late_s, _)| late_s).sum();
+            let away = (late_s - known_s) / deviation;
+            *cost += away * away;
+            let numbers: Vec<usize> = late.into_iter().flat_map(|(_, range)| range).collect();
+            for &i in &numbers {
+                score[i] += away / deviation;
+                for &j in &numbers {
+                    information[(i, j)] += deviation.powi(-2);
+                }
+            }
+        }
     }
 
     /// Residuals, regressors and normal equations at given parameters.

@@ -8,6 +8,7 @@ mod robust;
 use dynocar_core::train::Davis;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 
+use super::late_speed;
 use super::model::GrownModel;
 use super::noise::Noise;
 use super::run_data::RunData;
@@ -37,6 +38,8 @@ pub struct FitProblem {
     scatter_columns: Vec<Columns>,
     /// Measured way over way by integrated speed, with its standard deviation.
     pub way_ratio: Option<(f64, f64)>,
+    /// Seconds by which the speed is late by the position, with their standard deviation, where it is.
+    speed_late_s: Option<(f64, f64)>,
 }
 
 /// Normal equations of one run at the fitted parameters.
@@ -135,8 +138,11 @@ impl FitProblem {
         let prior_deviation =
             std::array::from_fn(|i| PRIOR_SHARE[i] * sizes[i].abs().max(least[i]));
         let way_ratio = pooled_way_ratio(&runs);
+        let parts: Vec<f64> =
+            runs.iter().flat_map(|run| run.speed_late_s.iter().copied()).collect();
+        let speed_late_s = late_speed::pooled_s(&parts);
         let scatter_columns = runs.iter().map(|run| scatter_columns(run, declared)).collect();
-        FitProblem { runs, declared, prior_deviation, scatter_columns, way_ratio }
+        FitProblem { runs, declared, prior_deviation, scatter_columns, way_ratio, speed_late_s }
     }
 
     /// Standard deviation of the declared a (0), b (1) or c (2).

@@ -1,0 +1,104 @@
+//! A measured speed that is late. Forces that act late leave the gradient on time, a late speed does
+//! not: what the line does tells the two apart, and so does a position that runs ahead of the speed.
+
+use dynocar_core::terms::speed_delay::{self, LateSpeed};
+use dynocar_core::terms::{Entry, Parameter};
+use dynocar_core::train::Davis;
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Candidate, Effect, Hypothesis, Proposal};
+use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::scan::{Scan, Tuple};
+
+/// Delay and lag in s that a fit may start from.
+const STARTS: [[f64; 2]; 4] = [[0.6, 0.1], [0.1, 0.6], [1.2, 0.3], [0.3, 1.2]];
+
+/// The kind.
+pub struct SpeedDelay;
+
+#[derive(Debug)]
+struct DelayAndLag;
+
+impl Effect for SpeedDelay {
+    fn kind(&self) -> EffectKind {
+        EffectKind::SpeedDelay
+    }
+
+    fn propose(&self, scan: &Scan) -> Proposal {
+        if !scan.problem.runs.iter().any(|run| run.is_position_recorded) {
+            return Proposal::NotTestable(
+                "positions are integrated from the speed and late with it, so that forces that act \
+                 late look the same"
+                    .into(),
+            );
+        }
+        let best = STARTS
+            .into_iter()
+            .map(|start| (decrease(scan, start), start))
+            .max_by(|one, other| one.0.total_cmp(&other.0));
+        let candidate = |(_, start): (f64, [f64; 2])| Candidate::new(DelayAndLag, start.to_vec());
+        Proposal::Candidates(best.map(candidate).into_iter().collect())
+    }
+}
+
+/// Decrease of the cost when the speed is late by this delay and lag.
+fn decrease(scan: &Scan, parameters: [f64; 2]) -> f64 {
+    let theta = &scan.fit.theta;
+    let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
+    let mut sum = Tuple::zero(theta.len());
+    for (index, run) in scan.problem.runs.iter().enumerate() {
+        let mut late = run.declared.clone();
+        DelayAndLag.apply(&parameters, run, &mut late);
+        sum.add(&scan.run_tuple(index, |run, i| {
+            let speed_mps = run.smooth_mps[i];
+            let mps2 = |force: &SampleForces| {
+                let [p0, p1, p2] = force.polynomial(davis, speed_mps);
+                p0 + speed_mps * (p1 + speed_mps * p2)
+            };
+            mps2(&late[i]) - mps2(&run.declared[i])
+        }));
+    }
+    scan.decrease_at_one(&sum)
+}
+
+impl Hypothesis for DelayAndLag {
+    fn kind(&self) -> EffectKind {
+        EffectKind::SpeedDelay
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &speed_delay::PARAMETERS
+    }
+
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        parameters[0] + parameters[1] > speed_delay::LEAST_S
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        let mut late = LateSpeed::new(parameters[0], parameters[1]);
+        for (force, sample) in forces.iter_mut().zip(run.samples()) {
+            let at = (sample.time_ns, sample.stretch);
+            let now = Some([force.traction_n, force.brake_n]);
+            if let Some(acting) = late.forces(at, sample.speed_mps, now) {
+                [force.traction_n, force.brake_n] = acting;
+            }
+            (force.gradient_permille, force.resistance) =
+                late.resisting(at, (force.gradient_permille, force.resistance));
+        }
+    }
+
+    fn speed_late_s(&self, parameters: &[f64]) -> Option<f64> {
+        Some(parameters.iter().sum())
+    }
+
+    fn is_of_the_whole_record(&self) -> bool {
+        true
+    }
+
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        Some(vec![
+            Entry::Number(&speed_delay::DELAY, parameters[0]),
+            Entry::Number(&speed_delay::LAG, parameters[1]),
+        ])
+    }
+}
