@@ -5,6 +5,7 @@
 //! - [`cli`]: the commands of `dynocar`, one file each
 //! - [`config`]: the daemon's configuration
 //! - [`dataset`]: recorded runs from disk
+//! - [`ending`]: when a long-running program ends
 //! - [`identify`]: the pipelines over recorded runs
 //! - [`fmu`]: the estimators as an FMU
 //! - [`annotation`]: an explanation beside the data that it explains
@@ -32,6 +33,7 @@ pub mod cli;
 pub mod config;
 pub mod dataset;
 pub mod demo;
+pub mod ending;
 pub mod fmu;
 pub mod grown;
 pub mod identify;

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use dynocar::cli::Failure;
+use dynocar::ending::is_terminal_gone;
 use dynocar::output::OutputError;
 
 use crate::state::TrainState;
@@ -35,7 +36,9 @@ pub fn run(watcher: &mut Watcher, must_end: &AtomicBool) -> Result<(), Failure> 
             }
             let mut output = std::io::stdout().lock();
             match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
-                Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(()),
+                Err(error) if error.kind() == ErrorKind::BrokenPipe || is_terminal_gone() => {
+                    return Ok(());
+                }
                 Err(error) => return Err(OutputError::StandardOutput(error).into()),
                 Ok(()) => {}
             }
