@@ -12,6 +12,7 @@
 //! - [`learn`]: recorded runs into candidates for the store
 //! - [`models`]: a store of models
 //! - [`grown`]: the model with its effects as train and track files
+//! - [`operator`]: what an operator reads, in one place
 //! - [`output`]: where results go
 //! - [`pipelines`]: the pipelines that a configuration asks for
 //! - [`programs`]: commands that are programs of their own
@@ -39,6 +40,7 @@ pub mod grown;
 pub mod identify;
 pub mod learn;
 pub mod models;
+pub mod operator;
 pub mod output;
 pub mod pipelines;
 pub mod programs;

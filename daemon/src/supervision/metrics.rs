@@ -1,7 +1,8 @@
 //! The daemon's numbers as OpenMetrics text, taken from its snapshots as any client takes them.
 
 use dynocar_client::{Reading, SnapshotReader, monotonic_now_ns};
-use dynocar_shared::{Parameter, PipelineKind, RejectionReason, Status};
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::{Parameter, PipelineKind, Reason, RejectionReason, Status};
 use prometheus_client::encoding::text::encode;
 use prometheus_client::metrics::counter::Counter;
 use prometheus_client::metrics::family::Family;
@@ -9,6 +10,8 @@ use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::registry::Registry;
 use std::sync::atomic::AtomicU64;
 
+use super::health::Verdict;
+use crate::operator::suspicion::Suspicion;
 use crate::shadow::{Pinned, TrialFigures};
 
 /// The content type of [`text`].
@@ -33,6 +36,9 @@ struct Families {
     deviation: Gauges,
     innovation: Gauges,
     unexplained: Gauges,
+    unexplained_std: Gauges,
+    suspected: Gauges,
+    attention: Gauges,
     in_force: Gauges,
     trial_error: Gauges,
     trial_ratio: Gauges,
@@ -62,6 +68,9 @@ impl Families {
             ("parameter_std", "Standard deviation in the parameter's unit", &self.deviation),
             ("innovation_mean_square", "1 when the model holds", &self.innovation),
             ("unexplained_force_newtons", "Force that the model lacks", &self.unexplained),
+            ("unexplained_force_std_newtons", "Its standard deviation", &self.unexplained_std),
+            ("suspected_seconds", "How long the effect has been suspected", &self.suspected),
+            ("attention", "1 where a person is wanted, with the reason", &self.attention),
             ("model_in_force", "1 for the model in force, 0 for one on trial", &self.in_force),
             ("model_error_mps", "Open-loop error of the model over 60 s", &self.trial_error),
             (
@@ -126,6 +135,15 @@ impl Families {
         }
         self.innovation.get_or_create(&labels).set(it.innovation_mean_square);
         self.unexplained.get_or_create(&labels).set(it.unexplained_force_n);
+        self.unexplained_std.get_or_create(&labels).set(it.unexplained_force_std_n);
+        if let Some(suspicion) = Suspicion::of(it) {
+            let labels = with("effect", suspicion.effect.map_or("unknown", EffectKind::name));
+            self.suspected.get_or_create(&labels).set(f64::from(suspicion.age_s));
+        }
+        if Verdict::of(reading.status(), reading.reason()) != Verdict::Ok {
+            let labels = with("reason", reading.reason().map_or("unknown", Reason::name));
+            self.attention.get_or_create(&labels).set(1.0);
+        }
         for (place, number) in it.parameters.iter().enumerate().take(it.parameter_count as usize) {
             let name = Parameter::from_number(*number).map_or("unknown", Parameter::name);
             let labels = with("parameter", name);
