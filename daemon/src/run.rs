@@ -9,7 +9,7 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::thread::JoinHandle;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crossbeam::channel::{Sender, bounded};
 use dynocar_client::channel::SampleCount;
@@ -300,10 +300,11 @@ fn start_keeper(
     stop: &Arc<AtomicBool>,
 ) -> Result<JoinHandle<()>, RunError> {
     let (config, stop, host) = (config.clone(), Arc::clone(stop), host.clone());
-    let (state, stored) = (state.config.clone(), state.stored);
+    let interval = Duration::from_secs(state.config.interval_s);
+    let (directory, stored) = (state.directory, state.stored);
     std::thread::Builder::new()
         .name("state".into())
-        .spawn(move || match Keeper::new(&config, &state, &host, stored, stop) {
+        .spawn(move || match Keeper::new(&config, (directory, interval), &host, stored, stop) {
             Ok(mut keeper) => keeper.run(),
             Err(error) => warn!("no state is kept: {error}"),
         })

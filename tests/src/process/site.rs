@@ -112,7 +112,10 @@ impl Site {
     /// A program on this site that is not started yet.
     pub fn command(&self, program: &str, arguments: &[&str]) -> Command {
         let mut command = Command::new(program);
+        // A place of its own for each process: no daemon starts from what another learned unless a test says so.
+        let states = self.path().join(format!("states-{}", unique_number()));
         command.args(arguments).env(ROOT_VARIABLE, self.root());
+        command.env("XDG_STATE_HOME", states).env_remove("STATE_DIRECTORY");
         command
     }
 
