@@ -227,10 +227,11 @@ fn a_forwarder_ends_by_signals_and_with_its_terminal() {
     ends_cleanly(&FORWARDER);
 }
 
-/// The screen and the lines of `dynocar watch` on a terminal, until it shows that nobody serves a train.
+/// The screen or the lines of `dynocar watch` on a terminal, once they are there.
 fn watching(site: &Site, terminal: &mut Terminal, tie: Tie, arguments: &[&str]) -> Process {
     let process = terminal.start(site.command(WATCH, arguments), tie);
-    terminal.see("o daemon serves any train");
+    // A screen is drawn by cells: words may stand apart.
+    terminal.see(if arguments.is_empty() { "quit" } else { "no daemon serves any train" });
     process
 }
 
