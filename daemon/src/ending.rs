@@ -26,31 +26,54 @@ pub enum EndingError {
 /// Stack of the thread that waits for the terminal's end: it may be locked into memory.
 const STACK_BYTES: usize = 64 * 1024;
 
-/// A flag that is set when the program is to end: by SIGTERM, SIGINT or SIGHUP, or when its terminal is
-/// gone.
+/// When the program ends.
+pub struct Ending {
+    /// Set when it is to end: by SIGTERM, SIGINT or SIGHUP, or when its terminal is gone.
+    pub flag: Arc<AtomicBool>,
+    /// The terminals that it was started on.
+    terminals: Arc<Vec<OwnedFd>>,
+}
+
+/// The flag alone, for a program that shows nothing on its terminal.
 ///
 /// # Errors
 ///
 /// When the system takes no handler, or gives no thread.
 pub fn flag() -> Result<Arc<AtomicBool>, EndingError> {
-    let flag = Arc::new(AtomicBool::new(false));
-    let mut signals = vec![SIGTERM, SIGINT];
-    if !outlives_its_terminal() {
-        signals.push(SIGHUP);
-        let terminals = terminals().map_err(EndingError::Terminal)?;
-        if !terminals.is_empty() {
-            watch(terminals, Arc::clone(&flag)).map_err(EndingError::Terminal)?;
-        }
-    }
-    for signal in signals {
-        signal_hook::flag::register(signal, Arc::clone(&flag)).map_err(EndingError::Signal)?;
-    }
-    Ok(flag)
+    Ok(Ending::begin()?.flag)
 }
 
-/// True when a terminal that the program was started on is gone.
-pub fn is_terminal_gone() -> bool {
-    terminals().is_ok_and(|it| is_one_gone(&it, Some(&Timespec::default())))
+impl Ending {
+    /// Begins to listen for signals, and to watch the terminal.
+    ///
+    /// # Errors
+    ///
+    /// When the system takes no handler, or gives no thread.
+    pub fn begin() -> Result<Self, EndingError> {
+        let flag = Arc::new(AtomicBool::new(false));
+        let terminals = Arc::new(terminals().map_err(EndingError::Terminal)?);
+        let mut signals = vec![SIGTERM, SIGINT];
+        if !outlives_its_terminal() {
+            signals.push(SIGHUP);
+            if !terminals.is_empty() {
+                watch(Arc::clone(&terminals), Arc::clone(&flag)).map_err(EndingError::Terminal)?;
+            }
+        }
+        for signal in signals {
+            signal_hook::flag::register(signal, Arc::clone(&flag)).map_err(EndingError::Signal)?;
+        }
+        Ok(Ending { flag, terminals })
+    }
+
+    /// True when the program is to end.
+    pub fn is_due(&self) -> bool {
+        self.flag.load(Ordering::Relaxed)
+    }
+
+    /// True when the terminal is gone; a program that outlives it sees that here alone.
+    pub fn is_terminal_gone(&self) -> bool {
+        is_one_gone(&self.terminals, Some(&Timespec::default()))
+    }
 }
 
 /// Handles of the terminals among the standard streams, which nobody else closes.
@@ -68,7 +91,7 @@ fn terminals() -> io::Result<Vec<OwnedFd>> {
 }
 
 /// Sets the flag once one of the terminals is gone, on a thread that sleeps until then.
-fn watch(terminals: Vec<OwnedFd>, flag: Arc<AtomicBool>) -> io::Result<()> {
+fn watch(terminals: Arc<Vec<OwnedFd>>, flag: Arc<AtomicBool>) -> io::Result<()> {
     let wait = move || {
         if is_one_gone(&terminals, None) {
             flag.store(true, Ordering::Relaxed);

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use clap::Parser;
 use dynocar::cli::{Failure, parse};
 use dynocar::config::DaemonConfig;
-use dynocar::ending;
+use dynocar::ending::Ending;
 use dynocar_client::Host;
 use dynocar_shared::TrainId;
 
@@ -54,15 +54,15 @@ fn execute(arguments: &Arguments) -> Result<(), Failure> {
         Some(root) => Host::at(root).map_err(work)?,
         None => Host::from_environment().map_err(work)?,
     };
-    let must_end = ending::flag().map_err(|error| Failure::Work(error.to_string()))?;
-    terminal::end_though_stuck(Arc::clone(&must_end))
+    let ending = Ending::begin().map_err(|error| Failure::Work(error.to_string()))?;
+    terminal::end_though_stuck(Arc::clone(&ending.flag))
         .map_err(|error| Failure::Work(format!("watching for the end: {error}")))?;
     let mut watcher = Watcher::new(host, wanted, config);
     if arguments.plain || !std::io::stdout().is_terminal() {
-        return plain::run(&mut watcher, &must_end);
+        return plain::run(&mut watcher, &ending);
     }
     let has_colour = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-    terminal::run(&mut watcher, &must_end, has_colour)
+    terminal::run(&mut watcher, &ending, has_colour)
 }
 
 /// The trains to show; empty for all there are.

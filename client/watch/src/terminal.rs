@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use crossterm::terminal::disable_raw_mode;
 use dynocar::cli::Failure;
-use dynocar::ending::is_terminal_gone;
+use dynocar::ending::Ending;
 use ratatui::DefaultTerminal;
 
 use crate::screen::{Choice, Palette, View, draw};
@@ -27,17 +27,18 @@ const END_WITHIN: Duration = Duration::from_secs(2);
 /// # Errors
 ///
 /// When the terminal cannot be used.
-pub fn run(watcher: &mut Watcher, must_end: &AtomicBool, has_colour: bool) -> Result<(), Failure> {
+pub fn run(watcher: &mut Watcher, ending: &Ending, has_colour: bool) -> Result<(), Failure> {
     let failed = |error: io::Error| Failure::Work(format!("the terminal cannot be used: {error}"));
     let mut terminal = ratatui::try_init().map_err(failed)?;
-    let result = show(&mut terminal, watcher, must_end, Palette::new(has_colour));
-    if is_terminal_gone() {
+    let result = show(&mut terminal, watcher, ending, Palette::new(has_colour));
+    let restored = result.and(ratatui::try_restore());
+    if restored.is_err() && ending.is_terminal_gone() {
         // Dropped, it shows the cursor again; where that fails it says so on standard error, the same
         // terminal, and panics.
         std::mem::forget(terminal);
         return Ok(());
     }
-    result.and(ratatui::try_restore()).map_err(failed)
+    restored.map_err(failed)
 }
 
 /// Ends the program when it does not end by itself: who writes on a terminal that takes nothing, as over
@@ -62,12 +63,12 @@ pub fn end_though_stuck(must_end: Arc<AtomicBool>) -> io::Result<()> {
 fn show(
     terminal: &mut DefaultTerminal,
     watcher: &mut Watcher,
-    must_end: &AtomicBool,
+    ending: &Ending,
     palette: Palette,
 ) -> io::Result<()> {
     let mut choice = Choice::default();
     let mut drawn: Option<Instant> = None;
-    while !must_end.load(Ordering::Relaxed) {
+    while !ending.is_due() {
         watcher.look();
         if drawn.is_none_or(|drawn| drawn.elapsed() >= DRAW_EVERY) {
             let (trains, place) = (watcher.trains(), watcher.place());
