@@ -27,7 +27,7 @@ PATIENCE_S = 240
 
 place, programs = Path(sys.argv[1]), Path(sys.argv[2])
 project = Path(__file__).resolve().parent.parent
-environment = dict(os.environ, DYNOCAR_ROOT=str(place / "root"))
+environment = dict(os.environ, DYNOCAR_ROOT=str(place / "root"), STATE_DIRECTORY=str(place / "state"))
 processes = []
 begun = time.monotonic()
 

@@ -19,7 +19,7 @@ cp tests/live.mjs "$place/live.mjs"
 
 cargo build --release --workspace --bin dynocar --bin dynocar-recording --bin dynocar-live
 dynocar=${CARGO_TARGET_DIR:-target}/release/dynocar
-export DYNOCAR_ROOT=$place/root
+export DYNOCAR_ROOT=$place/root STATE_DIRECTORY=$place/state
 
 . tests/await.sh
 begin() { # NAME COMMAND...: in the background, its words in a file of that name

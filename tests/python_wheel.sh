@@ -25,4 +25,6 @@ cargo build --release --workspace --bin dynocar --bin dynocar-played-daemon
 environment empty "$wheel[fleet]" ipykernel mypy nbclient pandas polars pyarrow pytest
 # In another folder, so that nothing but the wheel is imported.
 project=$PWD
+# The daemons of the tests keep their states where everything else goes.
+export STATE_DIRECTORY=$folder/state
 (cd "$folder" && "$folder/empty/bin/python" -m pytest --quiet -p no:cacheprovider "$project/client/python/tests")

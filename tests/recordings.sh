@@ -21,7 +21,7 @@ python3 -m venv "$place/venv"
 
 cargo build --release --workspace --bin dynocar --bin dynocar-recording --bin dynocar-parquet
 dynocar=${CARGO_TARGET_DIR:-target}/release/dynocar
-export DYNOCAR_ROOT=$place/root
+export DYNOCAR_ROOT=$place/root STATE_DIRECTORY=$place/state
 
 . tests/await.sh
 

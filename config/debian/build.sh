@@ -59,7 +59,7 @@ for companion in dynocar-watch dynocar-recording dynocar-live dynocar-forward dy
         echo "build.sh: no $companion beside the program: the package goes without it" >&2
     fi
 done
-for layout in foxglove_layout.json plotjuggler_layout.xml grafana_dashboard.json; do
+for layout in foxglove_layout.json plotjuggler_layout.xml grafana_dashboard.json prometheus_alerts.yml; do
     put "$project/config/live/$layout" "usr/share/dynocar/live/$layout"
 done
 completions() { # SHELL TARGET

@@ -5,12 +5,14 @@
 //! - [`cli`]: the commands of `dynocar`, one file each
 //! - [`config`]: the daemon's configuration
 //! - [`dataset`]: recorded runs from disk
+//! - [`ending`]: when a long-running program ends
 //! - [`identify`]: the pipelines over recorded runs
 //! - [`fmu`]: the estimators as an FMU
 //! - [`annotation`]: an explanation beside the data that it explains
 //! - [`learn`]: recorded runs into candidates for the store
 //! - [`models`]: a store of models
 //! - [`grown`]: the model with its effects as train and track files, and a dataset of them
+//! - [`operator`]: what an operator reads, in one place
 //! - [`output`]: where results go
 //! - [`paths`]: files as seen from a folder
 //! - [`pipelines`]: the pipelines that a configuration asks for
@@ -35,11 +37,13 @@ pub mod cli;
 pub mod config;
 pub mod dataset;
 pub mod demo;
+pub mod ending;
 pub mod fmu;
 pub mod grown;
 pub mod identify;
 pub mod learn;
 pub mod models;
+pub mod operator;
 pub mod output;
 pub mod paths;
 pub mod pipelines;

@@ -9,7 +9,7 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::thread::JoinHandle;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crossbeam::channel::{Sender, bounded};
 use dynocar_client::channel::SampleCount;
@@ -19,6 +19,7 @@ use dynocar_shared::{Quantity, TrainId};
 use tracing::{info, warn};
 
 use crate::config::{DaemonConfig, IdleStrategy, ModelsConfig, ThreadConfig};
+use crate::ending::{self, EndingError};
 use crate::models::Store;
 use crate::pipelines::{SettingRefused, build_pipeline};
 use crate::runtime::affinity::pin_to_core;
@@ -43,7 +44,10 @@ pub enum RunError {
     /// A setting of a pipeline is out of range.
     #[error(transparent)]
     Setting(#[from] SettingRefused),
-    /// The system gives no thread or no signal handler.
+    /// The daemon could not learn when to end.
+    #[error(transparent)]
+    Ending(#[from] EndingError),
+    /// The system gives no thread.
     #[error("{what}: {source}")]
     System {
         /// What was asked for.
@@ -56,7 +60,7 @@ pub enum RunError {
     ThreadEnded(String),
 }
 
-/// Serves the configured trains until SIGTERM or SIGINT.
+/// Serves the configured trains until it is to end ([`ending`]).
 ///
 /// # Errors
 ///
@@ -69,7 +73,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
         Some(root) => Host::at(root)?,
         None => Host::from_environment()?,
     };
-    let stop = stop_on_signals()?;
+    let stop = ending::flag()?;
     let trains: Vec<TrainId> = config.trains.iter().map(|train| train.id).collect();
     let _roles = trains
         .iter()
@@ -145,20 +149,6 @@ fn tell_who_answers(config: &DaemonConfig) {
             "answers"
         );
     }
-}
-
-/// A flag that SIGTERM and SIGINT set.
-///
-/// # Errors
-///
-/// When the system takes no handler.
-pub fn stop_on_signals() -> Result<Arc<AtomicBool>, RunError> {
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
-        signal_hook::flag::register(signal, Arc::clone(&stop))
-            .map_err(|source| RunError::System { what: "signal handler", source })?;
-    }
-    Ok(stop)
 }
 
 /// Builds every pipeline and deals them out to the threads.
@@ -310,10 +300,11 @@ fn start_keeper(
     stop: &Arc<AtomicBool>,
 ) -> Result<JoinHandle<()>, RunError> {
     let (config, stop, host) = (config.clone(), Arc::clone(stop), host.clone());
-    let (state, stored) = (state.config.clone(), state.stored);
+    let interval = Duration::from_secs(state.config.interval_s);
+    let (directory, stored) = (state.directory, state.stored);
     std::thread::Builder::new()
         .name("state".into())
-        .spawn(move || match Keeper::new(&config, &state, &host, stored, stop) {
+        .spawn(move || match Keeper::new(&config, (directory, interval), &host, stored, stop) {
             Ok(mut keeper) => keeper.run(),
             Err(error) => warn!("no state is kept: {error}"),
         })

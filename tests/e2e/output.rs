@@ -35,8 +35,8 @@ const COMMANDS: [(&str, &[&str]); 16] = [
 ];
 
 fn command(site: &Site, (program, arguments): (&str, &[&str])) -> Command {
-    let mut command = Command::new(program);
-    command.args(arguments).env("DYNOCAR_ROOT", site.path().join("root")).stdin(Stdio::null());
+    let mut command = site.command(program, arguments);
+    command.stdin(Stdio::null());
     command
 }
 

@@ -8,6 +8,7 @@ mod golden;
 mod hostile;
 mod identical;
 mod implausible;
+mod operator;
 mod properties;
 mod replay;
 mod restart;

@@ -215,3 +215,69 @@ fn a_writer_killed_at_any_moment_leaves_a_whole_state() {
     let states = kill_writers(Path::new(PEER), 30, 1);
     println!("30 kills among {states} writes");
 }
+
+/// The shipped configuration, with these lines before it.
+fn shipped(cast: &Cast, lines: &str) -> PathBuf {
+    let demo = cast.site.path().join("demo");
+    std::fs::create_dir_all(&demo).unwrap();
+    for file in ["train.toml", "track.toml"] {
+        std::fs::copy(demo_folder().join(file), demo.join(file)).unwrap();
+    }
+    let text = std::fs::read_to_string(demo_folder().join("../daemon.toml")).unwrap();
+    cast.site.write("shipped.toml", &(lines.to_owned() + &text))
+}
+
+/// A daemon of a user whose states lie here.
+fn daemon_of_user(cast: &Cast, config: &Path, states: &str) -> Process {
+    let arguments = ["run", "--config", config.to_str().unwrap()];
+    let daemon = cast.site.start_with(DYNOCAR, &arguments, &[("XDG_STATE_HOME", states)]);
+    daemon.await_error("serving");
+    daemon
+}
+
+#[test]
+fn killed_after_learning_the_next_daemon_of_the_shipped_configuration_starts_warm() {
+    use std::os::unix::fs::PermissionsExt;
+    let cast = Cast::new();
+    let states = cast.site.path().join("home/states");
+    let states_text = states.to_str().unwrap();
+    // Only sooner than by default, so that the test need not wait for half a minute.
+    let daemon = daemon_of_user(&cast, &shipped(&cast, "state.interval_s = 1\n"), states_text);
+    cast.replay();
+    let file = states.join("dynocar/train-1.state");
+    let kept = || std::fs::read_to_string(&file).unwrap_or_default();
+    let is_kept = || ["trajectory_kalman", "mass_kalman"].iter().all(|it| kept().contains(it));
+    await_true(is_kept, || format!("both estimates in the state: {}", kept()));
+    daemon.kill();
+    let mode = std::fs::metadata(states.join("dynocar")).unwrap().permissions().mode();
+    assert_eq!(mode & 0o777, 0o700);
+
+    let daemon = daemon_of_user(&cast, &shipped(&cast, ""), states_text);
+    let first = cast.first_snapshot(PipelineKind::MassKalman);
+    let log = stop(daemon);
+    for pipeline in ["trajectory_kalman", "mass_kalman"] {
+        let is_warm = |line: &&str| line.contains("warm start") && line.contains(pipeline);
+        assert!(log.lines().any(|line| is_warm(&line)), "{pipeline} in\n{log}");
+    }
+    assert!(first.std(Parameter::Mass).is_some_and(f64::is_finite), "a mass that is known");
+}
+
+#[test]
+fn a_state_directory_that_cannot_be_used_is_a_warning_and_one_that_is_not_wanted_is_not_made() {
+    let cast = Cast::new();
+    let log = stop(daemon_of_user(&cast, &shipped(&cast, ""), "/proc/nowhere"));
+    assert!(
+        log.contains("no state is kept, a restart learns anew: /proc/nowhere/dynocar"),
+        "{log}"
+    );
+    let states = cast.site.path().join("unwanted");
+    let config = shipped(&cast, "state.keep = false\n");
+    let log = stop(daemon_of_user(&cast, &config, states.to_str().unwrap()));
+    assert!(!states.exists() && !log.contains("no state is kept"), "{log}");
+    let open = cast.site.path().join("open/dynocar");
+    std::fs::create_dir_all(&open).unwrap();
+    std::fs::set_permissions(&open, std::os::unix::fs::PermissionsExt::from_mode(0o777)).unwrap();
+    let open = open.parent().unwrap().to_str().unwrap();
+    let log = stop(daemon_of_user(&cast, &shipped(&cast, ""), open));
+    assert!(log.contains("chmod 700 it"), "{log}");
+}

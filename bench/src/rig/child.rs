@@ -46,6 +46,7 @@ impl Peer {
         let child = command
             .current_dir(site.path())
             .env(ROOT_VARIABLE, site.host().root())
+            .env("STATE_DIRECTORY", site.path().join("states"))
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .spawn()

@@ -7,8 +7,8 @@ use std::time::Duration;
 use clap::Parser;
 use dynocar::cli::{Failure, parse};
 use dynocar::dataset::read_text;
+use dynocar::ending;
 use dynocar::output::tell;
-use dynocar::run::stop_on_signals;
 use dynocar_client::{ChannelError, Host};
 use dynocar_shared::TrainId;
 
@@ -22,7 +22,8 @@ const PORT: &str = "1883";
 /// Forward what the daemon knows of its trains to an MQTT 5 broker, as Sparkplug B: one edge node for this
 /// host, a device for each train. Without options it forwards all trains that any daemon of this host serves to
 /// a broker on this host. Whatever the broker does, no controller and no daemon waits for it: what it does not take
-/// waits in a bounded queue, and what the queue cannot hold is dropped and counted. SIGINT and SIGTERM end it
+/// waits in a bounded queue, and what the queue cannot hold is dropped and counted. SIGINT, SIGTERM
+/// and SIGHUP end it
 #[derive(Debug, Parser)]
 #[command(name = "dynocar forward", version)]
 struct Arguments {
@@ -84,7 +85,7 @@ fn execute(arguments: &Arguments) -> Result<(), Failure> {
         every: Duration::from_millis(arguments.every_ms),
         queue: arguments.queue as usize,
     };
-    let must_end = stop_on_signals().map_err(|error| Failure::Work(error.to_string()))?;
+    let must_end = ending::flag().map_err(|error| Failure::Work(error.to_string()))?;
     let counts = forward(&settings, &must_end);
     tell(&format!(
         "dynocar forward: {} publications made: {} taken by the broker, {} dropped, {} not sent",

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use dynocar::cli::{Failure, parse};
-use dynocar::run::stop_on_signals;
+use dynocar::ending;
 use dynocar_recording::cli::WantedArguments;
 
 use crate::live::{Settings, live};
@@ -49,6 +49,6 @@ fn execute(arguments: &Arguments) -> Result<(), Failure> {
         samples_hz: arguments.samples_hz,
         address: SocketAddr::new(arguments.host, arguments.port),
     };
-    let stop = stop_on_signals().map_err(|error| Failure::Work(error.to_string()))?;
+    let stop = ending::flag().map_err(|error| Failure::Work(error.to_string()))?;
     live(&settings, &stop).map_err(|error| Failure::Work(error.to_string()))
 }

@@ -4,14 +4,13 @@ use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 use clap::Parser;
 use dynocar::cli::{Failure, parse};
 use dynocar::config::DaemonConfig;
+use dynocar::ending::Ending;
 use dynocar_client::Host;
 use dynocar_shared::TrainId;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use crate::watcher::Watcher;
 use crate::{plain, terminal};
@@ -55,17 +54,15 @@ fn execute(arguments: &Arguments) -> Result<(), Failure> {
         Some(root) => Host::at(root).map_err(work)?,
         None => Host::from_environment().map_err(work)?,
     };
-    let must_end = Arc::new(AtomicBool::new(false));
-    for signal in [SIGTERM, SIGINT, SIGHUP] {
-        signal_hook::flag::register(signal, Arc::clone(&must_end))
-            .map_err(|error| Failure::Work(format!("signal {signal}: {error}")))?;
-    }
+    let ending = Ending::begin().map_err(|error| Failure::Work(error.to_string()))?;
+    terminal::end_though_stuck(Arc::clone(&ending.flag))
+        .map_err(|error| Failure::Work(format!("watching for the end: {error}")))?;
     let mut watcher = Watcher::new(host, wanted, config);
     if arguments.plain || !std::io::stdout().is_terminal() {
-        return plain::run(&mut watcher, &must_end);
+        return plain::run(&mut watcher, &ending);
     }
     let has_colour = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-    terminal::run(&mut watcher, &must_end, has_colour)
+    terminal::run(&mut watcher, &ending, has_colour)
 }
 
 /// The trains to show; empty for all there are.

@@ -1,10 +1,10 @@
 //! Lines where there is no terminal: one a second for each train.
 
 use std::io::{ErrorKind, Write};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use dynocar::cli::Failure;
+use dynocar::ending::Ending;
 use dynocar::output::OutputError;
 
 use crate::state::TrainState;
@@ -16,15 +16,15 @@ const POLL_EVERY: Duration = Duration::from_millis(100);
 /// How often lines are written.
 const WRITE_EVERY: Duration = Duration::from_secs(1);
 
-/// Writes lines until a signal or until nobody reads them any more.
+/// Writes lines until the program is to end, or until nobody reads them any more.
 ///
 /// # Errors
 ///
 /// When standard output cannot be written.
-pub fn run(watcher: &mut Watcher, must_end: &AtomicBool) -> Result<(), Failure> {
+pub fn run(watcher: &mut Watcher, ending: &Ending) -> Result<(), Failure> {
     // The first look takes what is there; a heartbeat brings it.
     let mut next = Instant::now() + WRITE_EVERY / 2;
-    while !must_end.load(Ordering::Relaxed) {
+    while !ending.is_due() {
         watcher.look();
         if Instant::now() >= next {
             next += WRITE_EVERY;
@@ -35,7 +35,11 @@ pub fn run(watcher: &mut Watcher, must_end: &AtomicBool) -> Result<(), Failure> 
             }
             let mut output = std::io::stdout().lock();
             match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
-                Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(()),
+                Err(error)
+                    if error.kind() == ErrorKind::BrokenPipe || ending.is_terminal_gone() =>
+                {
+                    return Ok(());
+                }
                 Err(error) => return Err(OutputError::StandardOutput(error).into()),
                 Ok(()) => {}
             }

@@ -1,12 +1,15 @@
-//! Keys and signals, and a terminal that is left as it was.
+//! Keys, a terminal that is left as it was, and one that is gone or takes nothing more.
 
 use std::io;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use crossterm::terminal::disable_raw_mode;
 use dynocar::cli::Failure;
+use dynocar::ending::Ending;
 use ratatui::DefaultTerminal;
-use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 
 use crate::screen::{Choice, Palette, View, draw};
 use crate::watcher::Watcher;
@@ -15,30 +18,57 @@ use crate::watcher::Watcher;
 const POLL_EVERY: Duration = Duration::from_millis(100);
 /// How often the screen is drawn without a key: slow lines carry it.
 const DRAW_EVERY: Duration = Duration::from_millis(500);
+/// How long the end may take: nothing is lost with a screen.
+const END_WITHIN: Duration = Duration::from_secs(2);
 
-/// Shows the screen until a key or a signal ends it; a panic restores the terminal too.
+/// Shows the screen until a key, a signal or the terminal's end ends it; a panic restores the terminal
+/// too.
 ///
 /// # Errors
 ///
 /// When the terminal cannot be used.
-pub fn run(watcher: &mut Watcher, must_end: &AtomicBool, has_colour: bool) -> Result<(), Failure> {
+pub fn run(watcher: &mut Watcher, ending: &Ending, has_colour: bool) -> Result<(), Failure> {
     let failed = |error: io::Error| Failure::Work(format!("the terminal cannot be used: {error}"));
     let mut terminal = ratatui::try_init().map_err(failed)?;
-    let result = show(&mut terminal, watcher, must_end, Palette::new(has_colour));
-    let restored = ratatui::try_restore();
-    // A terminal that was hung up needs no restoring.
-    if must_end.load(Ordering::Relaxed) { Ok(()) } else { result.and(restored).map_err(failed) }
+    let result = show(&mut terminal, watcher, ending, Palette::new(has_colour));
+    let restored = result.and(ratatui::try_restore());
+    if restored.is_err() && ending.is_terminal_gone() {
+        // Dropped, it shows the cursor again; where that fails it says so on standard error, the same
+        // terminal, and panics.
+        std::mem::forget(terminal);
+        return Ok(());
+    }
+    restored.map_err(failed)
+}
+
+/// Ends the program when it does not end by itself: who writes on a terminal that takes nothing, as over
+/// a connection that hangs, waits there and sees no flag.
+///
+/// # Errors
+///
+/// When the system gives no thread.
+pub fn end_though_stuck(must_end: Arc<AtomicBool>) -> io::Result<()> {
+    let watch = move || {
+        while !must_end.load(Ordering::Relaxed) {
+            std::thread::sleep(POLL_EVERY);
+        }
+        std::thread::sleep(END_WITHIN);
+        // Only what needs no writing can be restored.
+        let _ = disable_raw_mode();
+        std::process::exit(0);
+    };
+    std::thread::Builder::new().name("end".into()).spawn(watch).map(drop)
 }
 
 fn show(
     terminal: &mut DefaultTerminal,
     watcher: &mut Watcher,
-    must_end: &AtomicBool,
+    ending: &Ending,
     palette: Palette,
 ) -> io::Result<()> {
     let mut choice = Choice::default();
     let mut drawn: Option<Instant> = None;
-    while !must_end.load(Ordering::Relaxed) {
+    while !ending.is_due() {
         watcher.look();
         if drawn.is_none_or(|drawn| drawn.elapsed() >= DRAW_EVERY) {
             let (trains, place) = (watcher.trains(), watcher.place());

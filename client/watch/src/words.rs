@@ -1,12 +1,10 @@
 //! Numbers with intervals and units, and what is said of a train, for screen and lines alike.
 
-use dynocar_shared::vocabulary::EffectKind;
-use dynocar_shared::{Parameter, Quantity, RejectionReason, Status};
+use dynocar::operator::suspicion::{INTERVAL_95, Suspicion, force_words};
+use dynocar::operator::{duration, refusals};
+use dynocar_shared::{Parameter, Quantity, Status};
 
 use crate::state::{Daemon, PipelineState, TrainState};
-
-/// Half width of a 95 % interval over the standard deviation.
-pub const INTERVAL_95: f64 = 1.96;
 
 /// A quantity or one of its parameters in a table.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -118,17 +116,6 @@ fn digits(half: f64) -> usize {
     if half > 0.0 { (1.0 - half.log10().floor()).clamp(0.0, 7.0) as usize } else { 3 }
 }
 
-/// A duration as people say it.
-pub fn duration(seconds: f64) -> String {
-    match seconds {
-        s if s < 10.0 => format!("{s:.1} s"),
-        s if s < 120.0 => format!("{s:.0} s"),
-        s if s < 7200.0 => format!("{:.0} min", s / 60.0),
-        s if s < 172_800.0 => format!("{:.0} h", s / 3600.0),
-        s => format!("{:.0} days", s / 86_400.0),
-    }
-}
-
 /// Who serves a train.
 pub fn daemon(daemon: &Daemon, up_s: Option<f64>) -> String {
     match daemon {
@@ -151,40 +138,16 @@ pub fn samples(train: &TrainState) -> String {
     let rate = train.pipelines.iter().filter_map(|it| it.history.rate_hz()).reduce(f64::max);
     let rate = rate.map_or("…".to_owned(), |rate| format!("{rate:.1}"));
     let most = train.pipelines.iter().max_by_key(|it| it.snapshot.samples_rejected);
-    let why = most.and_then(|it| refusals(it).into_iter().next());
+    let why = most.and_then(|it| refusals(&it.snapshot.rejected_by_reason).into_iter().next());
     let why = why.map_or(String::new(), |(reason, _)| format!(" (most: {reason})"));
     format!("{rate} samples/s, used {used}, rejected {rejected}{why}, lost {lost}")
 }
 
-/// Why a pipeline refused samples, the most frequent first.
-pub fn refusals(pipeline: &PipelineState) -> Vec<(&'static str, u32)> {
-    let count = |&reason: &RejectionReason| (reason.name(), pipeline.snapshot.rejected(reason));
-    let mut all: Vec<_> = RejectionReason::ALL.iter().map(count).filter(|it| it.1 > 0).collect();
-    all.sort_by_key(|it| std::cmp::Reverse(it.1));
-    all
-}
-
-/// The unexplained force with its interval, and the suspect with what is hardly told from it.
+/// The unexplained force with its interval, and the suspect with its rivals.
 pub fn residual(train: &TrainState) -> Option<(String, String)> {
     let snapshot = &train.residual()?.snapshot;
-    let force_kn = 1e-3 * snapshot.unexplained_force_n;
-    let half_kn = 1e-3 * INTERVAL_95 * snapshot.unexplained_force_std_n;
-    let force = format!("{force_kn:+.2} ± {half_kn:.2} kN");
-    let kind = EffectKind::from_number(snapshot.suspected_effect);
-    let suspect = match kind {
-        Some(EffectKind::None) => "none".to_owned(),
-        None => "an effect that is unknown here: a newer daemon".to_owned(),
-        Some(kind) => {
-            let since = duration(f64::from(snapshot.suspicion_age_s));
-            let evidence = snapshot.suspicion_evidence;
-            let others: Vec<&str> = snapshot.alternatives().map(|it| it.name()).collect();
-            let others = match others.is_empty() {
-                true => String::new(),
-                false => format!(", hardly told from {}", others.join(", ")),
-            };
-            format!("{kind} for {since}, evidence {evidence:.0}{others}")
-        }
-    };
+    let force = force_words(snapshot.unexplained_force_n, snapshot.unexplained_force_std_n);
+    let suspect = Suspicion::of(snapshot).map_or("none".to_owned(), |it| it.to_string());
     Some((force, suspect))
 }
 
@@ -202,11 +165,5 @@ mod tests {
         assert_eq!(told(1697.4, 6.0, "t"), "1697 ± 12 t");
         assert_eq!(told(0.000_861, 0.000_013, ""), "0.000861 ± 0.000025");
         assert_eq!(told(0.094, 0.0, ""), "0.094");
-    }
-
-    #[test]
-    fn durations_are_said_as_people_say_them() {
-        let all = [0.04, 45.0, 600.0, 9000.0, 864_000.0].map(duration);
-        assert_eq!(all, ["0.0 s", "45 s", "10 min", "2 h", "10 days"]);
     }
 }

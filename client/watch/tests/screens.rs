@@ -135,7 +135,7 @@ fn a_larger_terminal_gets_more_speeds_and_plots() {
 fn a_suspect_is_told_with_what_is_hardly_told_from_it() {
     let drawn = screen(&[&suspected()], Choice::default(), (80, 24));
     assert!(
-        drawn.contains("dragging_brake for 2 min, evidence 46, hardly told from wind"),
+        drawn.contains("dragging_brake for 2 min, evidence 46, hardly distinguished from wind"),
         "{drawn}"
     );
 }

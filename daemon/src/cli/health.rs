@@ -8,6 +8,7 @@ use dynocar_shared::TrainId;
 
 use super::Failure;
 use crate::config::DaemonConfig;
+use crate::operator::refused_words;
 use crate::output::{print, tell};
 use crate::supervision::health::{TrainHealth, Verdict, look_at};
 
@@ -44,8 +45,9 @@ pub fn execute(arguments: &HealthArguments) -> Result<(), Failure> {
     let (mut worst, mut text) = (Verdict::Ok, String::new());
     if trains.is_empty() {
         let root = host.root().display();
-        text = format!("no daemon: nobody serves any train under {root}\n");
         worst = Verdict::NoDaemon;
+        let remedy = worst.remedy();
+        text = format!("no daemon: nobody serves any train under {root}\n  to do: {remedy}\n");
     }
     for train in trains {
         let health = look_at(&host, train).map_err(work)?;
@@ -66,9 +68,16 @@ fn told(health: &TrainHealth) -> String {
         let reason = it.reason.map_or("unknown", dynocar_shared::Reason::name);
         let (kind, status, age_ms) = (it.kind, it.status, it.age_ms);
         text += &format!(
-            "  pipeline {} ({kind}): {status} ({reason}), vouched {age_ms} ms ago\n",
+            "  pipeline {} ({kind}): {status} ({reason}), vouched {age_ms} ms ago",
             it.index
         );
+        if let Some(suspicion) = it.suspicion {
+            text += &format!("; suspected: {suspicion}, {}", suspicion.force());
+        }
+        if !it.refused.is_empty() {
+            text += &format!("; refused: {}", refused_words(&it.refused));
+        }
+        text.push('\n');
     }
-    text
+    text + &format!("  to do: {}\n", health.remedy())
 }

@@ -10,12 +10,12 @@ use dynocar_client::{Host, SnapshotReader};
 use super::Failure;
 use super::run::start_log;
 use crate::config::DaemonConfig;
+use crate::ending;
 use crate::learn::watch::{Suspicions, TimeOfDay, watch};
 use crate::learn::{Bounds, page};
 use crate::learn::{LearnError, Learner, LearnerSettings, Outcome, Round, TrainRound};
 use crate::output::{OutputError, print, require_file, write_file};
 use crate::report::provenance::own_command_line;
-use crate::run::stop_on_signals;
 use crate::unpacking::UnpackError;
 
 /// Learn from recorded runs what the model in force lacks, and put it into the store as a candidate: at the
@@ -42,7 +42,7 @@ pub struct LearnArguments {
     report: Option<PathBuf>,
 }
 
-/// Learns until SIGTERM or SIGINT, or once.
+/// Learns until it is asked to end or its terminal is gone, or once.
 ///
 /// # Errors
 ///
@@ -60,7 +60,7 @@ pub fn execute(arguments: &LearnArguments) -> Result<(), Failure> {
     let store = super::models::store(arguments.models.as_deref(), Some(&config))?;
     start_log(&config)?;
     let work = |error: &dyn std::fmt::Display| Failure::Work(error.to_string());
-    let stop = stop_on_signals().map_err(|error| work(&error))?;
+    let stop = ending::flag().map_err(|error| work(&error))?;
     let settings = LearnerSettings {
         store,
         runs: arguments.runs.clone(),

@@ -19,7 +19,7 @@ pub struct RunArguments {
     config: PathBuf,
 }
 
-/// Runs the daemon until SIGTERM or SIGINT.
+/// Runs the daemon until it is asked to end, or its terminal is gone.
 ///
 /// # Errors
 ///

@@ -65,7 +65,7 @@ pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
         heartbeat_ms: checker.range("daemon.heartbeat_ms", raw.daemon.heartbeat_ms, 5, 100)?,
         lock_memory: raw.daemon.lock_memory,
         metrics: raw.metrics.map(|metrics| check_metrics(&checker, metrics)).transpose()?,
-        state: raw.state.map(|state| check_state(&checker, state)).transpose()?,
+        state: check_state(&checker, raw.state)?,
         models,
         trains,
         threads,
@@ -84,18 +84,19 @@ fn check_metrics(checker: &Checker, raw: RawMetrics) -> Result<SocketAddr, Confi
     }
 }
 
-/// Checks where estimates are kept; the directory must be there when the daemon starts.
-fn check_state(checker: &Checker, raw: RawState) -> Result<StateConfig, ConfigError> {
+/// Checks where estimates are kept, if they are; a directory that is named must be there.
+fn check_state(checker: &Checker, raw: RawState) -> Result<Option<StateConfig>, ConfigError> {
     let folder = checker.path.parent().unwrap_or(Path::new("."));
-    let directory = folder.join(&raw.directory);
-    if !directory.is_dir() {
-        return checker.refuse("state.directory", raw.directory.display(), "an existing directory");
+    let directory = raw.directory.as_ref().map(|named| folder.join(named));
+    if let Some(named) = directory.as_ref().filter(|it| !it.is_dir()) {
+        return checker.refuse("state.directory", named.display(), "an existing directory");
     }
-    Ok(StateConfig {
+    let state = StateConfig {
         directory,
         interval_s: checker.range("state.interval_s", raw.interval_s, 1, 3_600)?,
         age_max_h: checker.range("state.age_max_h", raw.age_max_h, 1, 10_000)?,
-    })
+    };
+    Ok(raw.keep.then_some(state))
 }
 
 /// Checks the trains; which pipelines answer for them is known only with the pipelines.

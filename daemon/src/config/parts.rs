@@ -43,8 +43,8 @@ pub enum LogFormat {
 /// Where and how estimates are kept over restarts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StateConfig {
-    /// Directory of the state files.
-    pub directory: PathBuf,
+    /// Directory of the state files; the usual one of the service or user when absent.
+    pub directory: Option<PathBuf>,
     /// How often they are written, in s.
     pub interval_s: u64,
     /// An older estimate is not taken up, in h.

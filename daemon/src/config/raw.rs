@@ -21,7 +21,8 @@ pub struct RawConfig {
     pub pipelines: Vec<RawPipeline>,
     #[serde(default)]
     pub quantities: RawQuantities,
-    pub state: Option<RawState>,
+    #[serde(default)]
+    pub state: RawState,
     pub metrics: Option<RawMetrics>,
     pub models: Option<RawModels>,
 }
@@ -75,13 +76,23 @@ pub struct RawTrain {
 pub type RawQuantities = BTreeMap<String, String>;
 
 #[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct RawState {
-    pub directory: PathBuf,
-    #[serde(default = "default_interval_s")]
+    pub keep: bool,
+    pub directory: Option<PathBuf>,
     pub interval_s: u64,
-    #[serde(default = "default_age_max_h")]
     pub age_max_h: u64,
+}
+
+impl Default for RawState {
+    fn default() -> Self {
+        RawState {
+            keep: true,
+            directory: None,
+            interval_s: default_interval_s(),
+            age_max_h: 7 * 24,
+        }
+    }
 }
 
 #[derive(Debug, Deserialize)]
@@ -122,10 +133,6 @@ const fn default_candidates_max() -> u64 {
 
 const fn default_interval_s() -> u64 {
     30
-}
-
-const fn default_age_max_h() -> u64 {
-    7 * 24
 }
 
 #[derive(Debug, Deserialize)]

@@ -21,7 +21,7 @@ pub use summary::{DemoAnswer, Summary};
 use dynocar_analysis::dataset::Dataset;
 
 use crate::dataset::{self, LoadError};
-use crate::run::{RunError, stop_on_signals};
+use crate::ending::{self, EndingError};
 use stage::{Stage, StageError};
 use view::View;
 
@@ -44,9 +44,9 @@ pub enum DemoError {
     /// A channel could not be opened.
     #[error(transparent)]
     Channel(#[from] dynocar_client::ChannelError),
-    /// The system gives no signal handler.
+    /// It could not learn when to end.
     #[error(transparent)]
-    Signals(#[from] RunError),
+    Ending(#[from] EndingError),
     /// Somebody wanted it to end; daemon and controller have ended, too.
     #[error("interrupted")]
     Interrupted,
@@ -59,7 +59,7 @@ pub enum DemoError {
 /// See [`DemoError`].
 pub fn play(rate: f64) -> Result<Summary, DemoError> {
     // Else the two other processes and the temporary folder would stay.
-    let stop = stop_on_signals()?;
+    let stop = ending::flag()?;
     let mut stage = Stage::build()?;
     let dataset = dataset::load(stage.dataset())?;
     let mut reader = SnapshotReader::open(stage.host(), TRAIN)?;

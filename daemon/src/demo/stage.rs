@@ -110,6 +110,8 @@ impl Stage {
         Command::new(program)
             .args(arguments)
             .env(ROOT_VARIABLE, self.host.root())
+            // A show leaves nothing behind.
+            .env("STATE_DIRECTORY", self.folder.path().join("state"))
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(log)

@@ -6,7 +6,8 @@
 //! - [`affinity`]: binding it to a core
 //! - [`scheduling`]: its real-time priority
 //! - [`memory`]: keeping its memory resident
-//! - [`status_log`]: which changes of status the log tells
+//! - [`status_log`]: which changes of status and suspicion the log tells
+//! - [`refusal_log`]: which refused samples it names
 //! - [`tally`]: what it tells the main thread without waiting for it
 //! - [`watch`]: what the main thread does meanwhile: signals, peers, the log
 
@@ -14,6 +15,7 @@ pub mod affinity;
 pub mod exchange;
 pub mod idle;
 pub mod memory;
+pub mod refusal_log;
 pub mod scheduling;
 pub mod status_log;
 pub mod tally;

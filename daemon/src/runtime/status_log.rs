@@ -1,4 +1,4 @@
-//! Which changes of a pipeline's status the log tells.
+//! Which changes of a pipeline's status, or of what it suspects, the log tells.
 //!
 //! A status that was not told lately is told at once. One that comes back is told when it has
 //! stayed for a while, and the longer the oftener it came back: an estimate at the edge of a
@@ -7,7 +7,7 @@
 use std::time::{Duration, Instant};
 
 /// Status and reason by number.
-type State = (u32, u32);
+pub type State = (u32, u32);
 
 /// How long a status that comes back has to stay until it is told, at first.
 const STAY_MIN: Duration = Duration::from_secs(2);
@@ -24,8 +24,8 @@ pub struct StatusLog {
     seen: State,
     since: Instant,
     stay: Duration,
-    /// Changes since the last one that was told.
-    untold: u64,
+    /// Statuses that came since the last one that was told, with how often each did.
+    untold: Vec<(State, u64)>,
     changes: u64,
 }
 
@@ -37,17 +37,20 @@ impl StatusLog {
             seen: (0, 0),
             since: now,
             stay: STAY_MIN,
-            untold: 0,
+            untold: Vec::new(),
             changes: 0,
         }
     }
 
-    /// Looks at the status; when it is to be told, the number of changes since the last that were
-    /// not.
-    pub fn look(&mut self, state: State, now: Instant) -> Option<u64> {
+    /// Looks at the status; when it is to be told, the statuses that came since the last that was
+    /// and were not, with how often each did.
+    pub fn look(&mut self, state: State, now: Instant) -> Option<Vec<(State, u64)>> {
         if state != self.seen {
             (self.seen, self.since) = (state, now);
-            self.untold += 1;
+            match self.untold.iter_mut().find(|it| it.0 == state) {
+                Some(it) => it.1 += 1,
+                None => self.untold.push((state, 1)),
+            }
             self.changes += 1;
         }
         self.told.retain(|it| now.duration_since(it.1) < STAY_MAX);
@@ -69,12 +72,16 @@ impl StatusLog {
         self.changes
     }
 
-    fn tell(&mut self, now: Instant) -> Option<u64> {
+    fn tell(&mut self, now: Instant) -> Option<Vec<(State, u64)>> {
         if self.told.len() == REMEMBERED {
             self.told.remove(0);
         }
         self.told.push((self.seen, now));
-        Some(std::mem::take(&mut self.untold).saturating_sub(1))
+        let mut untold = std::mem::take(&mut self.untold);
+        // The last of them is the one that is told.
+        untold.iter_mut().filter(|it| it.0 == self.seen).for_each(|it| it.1 -= 1);
+        untold.retain(|it| it.1 > 0);
+        Some(untold)
     }
 }
 
@@ -93,7 +100,7 @@ mod tests {
         (0..10 * seconds)
             .filter_map(|tenth| {
                 let now = start + Duration::from_millis(100 * tenth);
-                let untold = log.look(state_at(tenth), now)?;
+                let untold = log.look(state_at(tenth), now)?.iter().map(|it| it.1).sum();
                 Some((tenth as f64 / 10.0, state_at(tenth), untold))
             })
             .collect()
@@ -115,6 +122,17 @@ mod tests {
         assert_eq!(told(state, 100), first, "what was told last holds again");
         let ends_good = |tenth| if tenth < 600 { state(tenth) } else { GOOD };
         assert_eq!(told(ends_good, 100), [first[0], first[1], (62.0, GOOD, 198)]);
+    }
+
+    #[test]
+    fn what_was_not_told_is_named_with_how_often_it_came() {
+        let start = Instant::now();
+        let mut log = StatusLog::new(start);
+        let mut at = |tenth, state| log.look(state, start + Duration::from_millis(100 * tenth));
+        assert_eq!(at(0, GOOD), Some(vec![]));
+        assert_eq!(at(1, AT_BOUND), Some(vec![]));
+        assert_eq!((at(2, GOOD), at(3, AT_BOUND), at(4, GOOD)), (None, None, None));
+        assert_eq!(at(5, INVALID), Some(vec![(GOOD, 2), (AT_BOUND, 1)]));
     }
 
     #[test]

@@ -8,11 +8,17 @@ use std::time::{Duration, Instant};
 use dynocar_client::channel::SampleCount;
 use dynocar_client::{Announcement, ChannelError, Host, Peer, Role};
 use dynocar_core::plausibility::Slip;
-use dynocar_shared::{Reason, Status, TrainId};
+use dynocar_shared::snapshot::REJECTION_REASONS;
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::{Reason, RejectionReason, Status, TrainId};
 use tracing::{info, warn};
 
-use super::status_log::StatusLog;
+use super::refusal_log::RefusalLog;
+use super::status_log::{State, StatusLog};
 use super::tally::{Tally, TallyReading};
+use crate::operator::remedy::{of_reason, of_refusal, of_suspect};
+use crate::operator::{refusals, refused_words};
+use crate::supervision::health::Verdict;
 
 /// How often the main thread looks around.
 const ROUND: Duration = Duration::from_millis(100);
@@ -29,13 +35,20 @@ pub struct WatchedPipeline {
     pub tally: Arc<Tally>,
 }
 
+/// What the log has said of one pipeline.
+struct PipelineLog {
+    statuses: StatusLog,
+    suspects: StatusLog,
+}
+
 /// Watches signals, peers and tallies, and writes what changes into the log.
 pub struct Watch {
     host: Host,
     trains: Vec<(TrainId, Arc<SampleCount>)>,
     pipelines: Vec<WatchedPipeline>,
     readings: Vec<TallyReading>,
-    statuses: Vec<StatusLog>,
+    logs: Vec<PipelineLog>,
+    refusals: HashMap<TrainId, RefusalLog>,
     controllers: HashMap<TrainId, Option<Announcement>>,
 }
 
@@ -47,8 +60,9 @@ impl Watch {
         pipelines: Vec<WatchedPipeline>,
     ) -> Self {
         let readings = vec![TallyReading::default(); pipelines.len()];
-        let statuses = pipelines.iter().map(|_| StatusLog::new(Instant::now())).collect();
-        Watch { host, trains, pipelines, readings, statuses, controllers: HashMap::new() }
+        let logs = pipelines.iter().map(|_| PipelineLog::new(Instant::now())).collect();
+        let (refusals, controllers) = (HashMap::new(), HashMap::new());
+        Watch { host, trains, pipelines, readings, logs, refusals, controllers }
     }
 
     /// Watches until a signal asks the daemon to stop, or a pipeline thread has ended.
@@ -66,7 +80,7 @@ impl Watch {
 
     /// Logs the final counts.
     pub fn report_totals(&self) {
-        for (pipeline, log) in self.pipelines.iter().zip(&self.statuses) {
+        for (pipeline, log) in self.pipelines.iter().zip(&self.logs) {
             let reading = pipeline.tally.read();
             info!(
                 pipeline = pipeline.name,
@@ -74,7 +88,8 @@ impl Watch {
                 used = reading.used,
                 rejected = reading.rejected,
                 lost = reading.lost,
-                status_changes = log.changes(),
+                refused = refused_words(&refusals(&reading.refused)),
+                status_changes = log.statuses.changes(),
                 "stopped"
             );
         }
@@ -111,17 +126,12 @@ impl Watch {
         let mut told: Vec<(u64, Slip)> =
             self.pipelines.iter().zip(&self.readings).filter_map(known).collect();
         let now = Instant::now();
-        let known = self.readings.iter_mut().zip(&mut self.statuses);
+        let mut refused: HashMap<TrainId, [u32; REJECTION_REASONS]> = HashMap::new();
+        let known = self.readings.iter_mut().zip(&mut self.logs);
         for (pipeline, (last, log)) in self.pipelines.iter().zip(known) {
             let reading = pipeline.tally.read();
             let (name, train) = (pipeline.name.as_str(), pipeline.train.0);
-            if let Some(untold) = log.look(reading.status, now) {
-                let status = Status::from_number(reading.status.0).unwrap_or(Status::Invalid);
-                let reason = Reason::from_number(reading.status.1).unwrap_or(Reason::None);
-                // Changes to and fro that no line tells.
-                let untold = (untold > 0).then_some(untold);
-                info!(pipeline = name, train, %status, %reason, untold, "status");
-            }
+            log.report(name, train, &reading, now);
             if let Some(finding) = reading.implausible
                 && !told.contains(&(train, finding.slip))
             {
@@ -137,9 +147,78 @@ impl Watch {
                 let unsent = reading.unsent - last.unsent;
                 warn!(pipeline = name, train, unsent, "snapshots the transport did not take");
             }
+            let most = refused.entry(pipeline.train).or_insert([0; REJECTION_REASONS]);
+            most.iter_mut().zip(reading.refused).for_each(|(most, it)| *most = it.max(*most));
             *last = reading;
         }
+        for (train, counts) in refused {
+            let new = self.refusals.entry(train).or_default().look(&counts, now);
+            report_refusals(train, &new);
+        }
     }
+}
+
+impl PipelineLog {
+    fn new(now: Instant) -> Self {
+        PipelineLog { statuses: StatusLog::new(now), suspects: StatusLog::new(now) }
+    }
+
+    /// Logs what is new of a pipeline's status and of what it suspects.
+    fn report(&mut self, pipeline: &str, train: u64, reading: &TallyReading, now: Instant) {
+        if let Some(untold) = self.statuses.look(reading.status, now) {
+            report_status(pipeline, train, reading, &untold);
+        }
+        let suspect = reading.suspicion.map_or(0, |it| it.effect.map_or(u32::MAX, |it| it as u32));
+        // Nothing suspected is no news before something is.
+        if self.suspects.look((suspect, 0), now).is_none()
+            || (suspect == 0 && self.suspects.changes() == 0)
+        {
+            return;
+        }
+        let Some(suspicion) = reading.suspicion else {
+            info!(pipeline, train, "nothing is suspected any more");
+            return;
+        };
+        let (suspect, force) = (suspicion.name(), suspicion.force());
+        let near_km = reading.position_m.is_finite().then_some(1e-3 * reading.position_m);
+        let near_km = near_km.map(|it| format!("{it:.3}"));
+        let remedy = of_suspect(suspicion.effect.unwrap_or(EffectKind::Unknown));
+        warn!(
+            pipeline,
+            train, suspect, force, near_km, "the model lacks a force: {suspicion}; to do: {remedy}"
+        );
+    }
+}
+
+/// A status that wants a person is a warning, with what to do; any other is a remark.
+fn report_status(pipeline: &str, train: u64, reading: &TallyReading, untold: &[(State, u64)]) {
+    let words = |(status, reason): State| {
+        let status = Status::from_number(status).unwrap_or(Status::Invalid);
+        (status, Reason::from_number(reason).unwrap_or(Reason::None))
+    };
+    let (status, reason) = words(reading.status);
+    // Changes to and fro that no line of their own tells.
+    let untold: Vec<String> = untold
+        .iter()
+        .map(|&(state, count)| (words(state), count))
+        .map(|((status, reason), count)| format!("{status} ({reason}) {count}"))
+        .collect();
+    let untold = (!untold.is_empty()).then(|| untold.join(", "));
+    if Verdict::of(status, Some(reason)) == Verdict::Ok {
+        info!(pipeline, train, %status, %reason, untold, "status");
+        return;
+    }
+    let refused = refused_words(&refusals(&reading.refused));
+    let refused = (reason == Reason::BadInput && !refused.is_empty()).then_some(refused);
+    let (meaning, remedy) = (reason.meaning().trim().trim_end_matches('.'), of_reason(reason));
+    warn!(pipeline, train, %status, %reason, untold, refused, "not to be relied on: {meaning}; to do: {remedy}");
+}
+
+/// Samples of a train that were refused since the last such line.
+fn report_refusals(train: TrainId, new: &[(RejectionReason, u32)]) {
+    let Some(remedy) = new.first().and_then(|it| of_refusal(it.0)) else { return };
+    let refused = refused_words(new);
+    warn!(train = train.0, refused, "samples refused; to do: {remedy}");
 }
 
 fn report_controller(train: TrainId, controller: Option<&Announcement>) {

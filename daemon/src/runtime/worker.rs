@@ -7,7 +7,7 @@ use dynocar_client::channel::{Receiver, SampleCount, Sender, Sleeper, Transport}
 use dynocar_client::{ChannelError, Host, monotonic_now_ns};
 use dynocar_core::pipeline::Pipeline;
 use dynocar_core::pipeline::motion::STANDING_MPS;
-use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
+use dynocar_shared::{ParameterSnapshot, SampleField, TrainId, TrainSample};
 
 use super::exchange::Exchange;
 use super::idle::Idler;
@@ -224,6 +224,7 @@ impl Lane {
 impl Slot {
     fn process(&mut self, sample: &TrainSample, epoch: u64) {
         self.pipeline.process(sample);
+        self.tally.note_position(sample.get(SampleField::Position).unwrap_or(f64::NAN));
         let now_ns = monotonic_now_ns();
         self.publish(epoch, now_ns);
     }

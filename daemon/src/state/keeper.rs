@@ -1,5 +1,6 @@
 //! The thread that writes the states: a client of the daemon's own snapshots.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -11,7 +12,7 @@ use tracing::{info, warn};
 
 use super::entry::{ModelKey, StateContent, StoredEstimate, settings_hash};
 use super::{StateError, file, path_of, unix_now_s};
-use crate::config::{DaemonConfig, StateConfig};
+use crate::config::DaemonConfig;
 
 /// How often the keeper looks whether to stop.
 const ROUND: Duration = Duration::from_millis(50);
@@ -25,7 +26,8 @@ struct KeptTrain {
 
 /// Keeps the states of all trains.
 pub struct Keeper {
-    state: StateConfig,
+    directory: PathBuf,
+    interval: Duration,
     /// Name and settings hash by number of the pipeline.
     pipelines: Vec<(String, u64)>,
     trains: Vec<KeptTrain>,
@@ -33,14 +35,14 @@ pub struct Keeper {
 }
 
 impl Keeper {
-    /// A keeper; `stored` is what the trains' states held at the start, by place of the train.
+    /// A keeper that writes into the directory so often; `stored` is what the trains' states held at the start, by place of the train.
     ///
     /// # Errors
     ///
     /// When the snapshots cannot be read.
     pub fn new(
         config: &DaemonConfig,
-        state: &StateConfig,
+        (directory, interval): (PathBuf, Duration),
         host: &Host,
         stored: Vec<Vec<StoredEstimate>>,
         stop: Arc<AtomicBool>,
@@ -60,16 +62,15 @@ impl Keeper {
         let name =
             |it: &crate::config::PipelineConfig| (it.name.clone(), settings_hash(&it.estimator));
         let pipelines = config.pipelines.iter().map(name).collect();
-        Ok(Keeper { state: state.clone(), pipelines, trains, stop })
+        Ok(Keeper { directory, interval, pipelines, trains, stop })
     }
 
     /// Writes what is validated, every so often and at the end.
     pub fn run(&mut self) {
-        let interval = Duration::from_secs(self.state.interval_s);
         let mut last = Instant::now();
         while !self.stop.load(Ordering::Relaxed) {
             std::thread::sleep(ROUND);
-            if last.elapsed() >= interval {
+            if last.elapsed() >= self.interval {
                 last = Instant::now();
                 self.gather();
                 self.write();
@@ -105,8 +106,7 @@ impl Keeper {
 
     fn write(&mut self) {
         for train in self.trains.iter_mut().filter(|train| train.is_changed) {
-            let path =
-                path_of(&self.state.directory, dynocar_shared::TrainId(train.content.key.train));
+            let path = path_of(&self.directory, dynocar_shared::TrainId(train.content.key.train));
             let written = train
                 .content
                 .to_text()

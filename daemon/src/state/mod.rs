@@ -7,6 +7,7 @@
 //!
 //! # Layout
 //!
+//! - [`place`]: where it lies
 //! - [`mod@file`]: the bytes: header, checksum, atomic replacement
 //! - [`entry`]: the content: keys and estimates
 //! - [`keeper`]: the thread that writes
@@ -17,6 +18,7 @@ pub mod entry;
 mod error;
 pub mod file;
 pub mod keeper;
+pub mod place;
 
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -54,9 +56,9 @@ pub fn load(directory: &Path, train: &TrainConfig) -> Result<Vec<StoredEstimate>
 }
 
 /// The states of all trains, taken up or refused; each refusal is logged.
-pub fn load_all(state: &StateConfig, trains: &[TrainConfig]) -> Vec<Vec<StoredEstimate>> {
+pub fn load_all(directory: &Path, trains: &[TrainConfig]) -> Vec<Vec<StoredEstimate>> {
     let take_up = |train: &TrainConfig| {
-        load(&state.directory, train).unwrap_or_else(|error| {
+        load(directory, train).unwrap_or_else(|error| {
             warn!(train = train.id.0, "state refused, cold start: {error}");
             Vec::new()
         })
@@ -96,14 +98,26 @@ const CLOCK_TOLERANCE_S: f64 = 60.0;
 pub struct Taken<'a> {
     /// The configuration.
     pub config: &'a StateConfig,
+    /// Where the states lie.
+    pub directory: PathBuf,
     /// Stored estimates by place of the train in the configuration.
     pub stored: Vec<Vec<StoredEstimate>>,
 }
 
 impl<'a> Taken<'a> {
-    /// Takes the states up; `None` when the daemon is to keep none.
+    /// Takes the states up; `None` when the daemon is to keep none, or cannot, which the log says.
     pub fn up(config: &'a DaemonConfig) -> Option<Self> {
         let state = config.state.as_ref()?;
-        Some(Taken { config: state, stored: load_all(state, &config.trains) })
+        match place::prepare(state.directory.as_deref()) {
+            Ok(directory) => {
+                info!(directory = %directory.display(), "state");
+                let stored = load_all(&directory, &config.trains);
+                Some(Taken { config: state, directory, stored })
+            }
+            Err(error) => {
+                warn!("no state is kept, a restart learns anew: {error}");
+                None
+            }
+        }
     }
 }

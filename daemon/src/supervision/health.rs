@@ -4,7 +4,11 @@ use std::fmt;
 use std::time::{Duration, Instant};
 
 use dynocar_client::{ChannelError, Host, Peer, Role, SnapshotReader, monotonic_now_ns};
-use dynocar_shared::{PipelineKind, Reason, Status, TrainId};
+use dynocar_shared::{PipelineKind, Reason, RejectionReason, Status, TrainId};
+
+use crate::operator::refusals;
+use crate::operator::remedy::{of_reason, of_refusal, of_suspect};
+use crate::operator::suspicion::Suspicion;
 
 /// How long a first snapshot is waited for; a daemon vouches for its snapshots each 0.1 s.
 const PATIENCE: Duration = Duration::from_millis(1_500);
@@ -25,6 +29,32 @@ pub enum Verdict {
 }
 
 impl Verdict {
+    /// The verdict on a pipeline that is vouched for.
+    ///
+    /// A bound of adhesion, or adhesion of an earlier braking, is what every train has that brakes well
+    /// on a good rail: nothing is amiss.
+    pub const fn of(status: Status, reason: Option<Reason>) -> Self {
+        match (status, reason) {
+            (Status::Degraded, Some(Reason::OnlyLowerBound | Reason::EstimateStale)) => Verdict::Ok,
+            (Status::Degraded | Status::Invalid, _) => Verdict::Degraded,
+            (_, Some(reason)) if reason.is_implausible_input() => Verdict::Degraded,
+            (Status::Estimated | Status::Unestimated, _) => Verdict::Ok,
+        }
+    }
+
+    /// What a person does about it, whatever the pipelines say.
+    pub const fn remedy(self) -> &'static str {
+        match self {
+            Verdict::Ok => "nothing",
+            Verdict::Degraded => "look at the reasons of the pipelines in docs/guides/reading.md",
+            Verdict::Stale => "the daemon hangs or was stopped: look at its log, and restart it",
+            Verdict::Incompatible => {
+                "install the same release of Dynocar everywhere, and restart what is older"
+            }
+            Verdict::NoDaemon => "start it: `dynocar run --config FILE`; its log says why it ended",
+        }
+    }
+
     /// The exit status of `dynocar health`.
     pub const fn exit_status(self) -> u8 {
         match self {
@@ -50,7 +80,7 @@ impl fmt::Display for Verdict {
 }
 
 /// One pipeline as a client sees it.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PipelineHealth {
     /// Number in the daemon's configuration.
     pub index: u32,
@@ -64,10 +94,20 @@ pub struct PipelineHealth {
     pub age_ms: i64,
     /// True when that is too long ago.
     pub is_stale: bool,
+    /// What it suspects.
+    pub suspicion: Option<Suspicion>,
+    /// Why it refused samples, the most frequent first.
+    pub refused: Vec<(RejectionReason, u32)>,
+}
+
+impl PipelineHealth {
+    fn verdict(&self) -> Verdict {
+        if self.is_stale { Verdict::Stale } else { Verdict::of(self.status, self.reason) }
+    }
 }
 
 /// A train's daemon with its pipelines.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TrainHealth {
     /// The train.
     pub train: TrainId,
@@ -77,6 +117,34 @@ pub struct TrainHealth {
     pub daemon: Option<String>,
     /// Its pipelines.
     pub pipelines: Vec<PipelineHealth>,
+}
+
+impl TrainHealth {
+    /// What a person does about it, in one plain line.
+    pub fn remedy(&self) -> &'static str {
+        match self.verdict {
+            Verdict::Degraded => self.remedy_of_pipelines(),
+            verdict => verdict.remedy(),
+        }
+    }
+
+    /// A suspect says more than that the model lacks something, and a reason for refusals more than
+    /// that the input is bad.
+    fn remedy_of_pipelines(&self) -> &'static str {
+        let mut amiss = self.pipelines.iter().filter(|it| it.verdict() == Verdict::Degraded);
+        let suspect = self.pipelines.iter().find_map(|it| it.suspicion?.effect);
+        if let Some(effect) = suspect {
+            return of_suspect(effect);
+        }
+        let Some(first) = amiss.next() else { return Verdict::Degraded.remedy() };
+        match first.reason {
+            Some(Reason::BadInput) => {
+                let refusal = first.refused.iter().find_map(|it| of_refusal(it.0));
+                refusal.unwrap_or(of_reason(Reason::BadInput))
+            }
+            reason => of_reason(reason.unwrap_or(Reason::None)),
+        }
+    }
 }
 
 /// Looks at the daemon of a train.
@@ -94,20 +162,8 @@ pub fn look_at(host: &Host, train: TrainId) -> Result<TrainHealth, ChannelError>
         return Ok(TrainHealth { train, verdict, daemon, pipelines: Vec::new() });
     }
     let pipelines = pipelines_of(&mut SnapshotReader::open(host, train)?);
-    let verdict = pipelines.iter().map(verdict_of).max().unwrap_or(Verdict::Stale);
+    let verdict = pipelines.iter().map(PipelineHealth::verdict).max().unwrap_or(Verdict::Stale);
     Ok(TrainHealth { train, verdict, daemon, pipelines })
-}
-
-/// A bound of adhesion, or adhesion of an earlier braking, is what every train has that brakes well on
-/// a good rail: nothing is amiss.
-fn verdict_of(it: &PipelineHealth) -> Verdict {
-    match (it.status, it.reason) {
-        _ if it.is_stale => Verdict::Stale,
-        (Status::Degraded, Some(Reason::OnlyLowerBound | Reason::EstimateStale)) => Verdict::Ok,
-        (Status::Degraded | Status::Invalid, _) => Verdict::Degraded,
-        (_, Some(reason)) if reason.is_implausible_input() => Verdict::Degraded,
-        (Status::Estimated | Status::Unestimated, _) => Verdict::Ok,
-    }
 }
 
 /// The pipelines that speak up within [`PATIENCE`]; all of them do within a heartbeat.
@@ -133,25 +189,66 @@ fn pipelines_of(reader: &mut SnapshotReader) -> Vec<PipelineHealth> {
         reason: reading.reason(),
         age_ms: reading.age_ns / 1_000_000,
         is_stale: reading.is_stale,
+        suspicion: Suspicion::of(reading.snapshot),
+        refused: refusals(&reading.snapshot.rejected_by_reason),
     };
     reader.readings(monotonic_now_ns()).map(of_reading).collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use dynocar_shared::vocabulary::EffectKind;
+
     use super::*;
 
     #[test]
     fn good_brakes_on_a_good_rail_are_no_degradation() {
-        let verdict = |status, reason, is_stale| {
-            let (reason, age_ms) = (Some(reason), 0);
-            let kind = "adhesion_law";
-            verdict_of(&PipelineHealth { index: 0, kind, status, reason, age_ms, is_stale })
+        let verdict = |reason| Verdict::of(Status::Degraded, Some(reason));
+        assert_eq!(verdict(Reason::OnlyLowerBound), Verdict::Ok);
+        assert_eq!(verdict(Reason::EstimateStale), Verdict::Ok);
+        assert_eq!(verdict(Reason::InnovationsTooLarge), Verdict::Degraded);
+        let silent = PipelineHealth { is_stale: true, ..pipeline(Reason::DaemonSilent) };
+        assert_eq!(silent.verdict(), Verdict::Stale);
+    }
+
+    fn pipeline(reason: Reason) -> PipelineHealth {
+        PipelineHealth {
+            index: 0,
+            kind: "adhesion_law",
+            status: Status::Degraded,
+            reason: Some(reason),
+            age_ms: 0,
+            is_stale: false,
+            suspicion: None,
+            refused: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn what_to_do_follows_what_is_known_best() {
+        let train = |verdict, pipelines| {
+            let health = TrainHealth { train: TrainId(1), verdict, daemon: None, pipelines };
+            health.remedy()
         };
-        let degraded = Status::Degraded;
-        assert_eq!(verdict(degraded, Reason::OnlyLowerBound, false), Verdict::Ok);
-        assert_eq!(verdict(degraded, Reason::EstimateStale, false), Verdict::Ok);
-        assert_eq!(verdict(degraded, Reason::InnovationsTooLarge, false), Verdict::Degraded);
-        assert_eq!(verdict(Status::Invalid, Reason::DaemonSilent, true), Verdict::Stale);
+        let mut snapshot = dynocar_shared::ParameterSnapshot::empty();
+        snapshot.suspected_effect = EffectKind::DraggingBrake as u32;
+        let monitor = PipelineHealth {
+            suspicion: Suspicion::of(&snapshot),
+            ..pipeline(Reason::InnovationsNotWhite)
+        };
+        let refusing = PipelineHealth {
+            refused: vec![(RejectionReason::WheelSlide, 9), (RejectionReason::SpeedJump, 4)],
+            ..pipeline(Reason::BadInput)
+        };
+        let large = pipeline(Reason::InnovationsTooLarge);
+        let degraded = |pipelines| train(Verdict::Degraded, pipelines);
+        assert!(degraded(vec![large.clone(), monitor]).contains("every brake releases"));
+        assert!(degraded(vec![large.clone(), refusing]).contains("explain"), "the first");
+        assert!(degraded(vec![pipeline(Reason::BadInput)]).contains("mend the samples"));
+        let fine = pipeline(Reason::OnlyLowerBound);
+        let slips = pipeline(Reason::ImplausibleForces);
+        assert!(degraded(vec![fine, slips]).contains("units and signs"));
+        assert_eq!(train(Verdict::Ok, vec![large]), "nothing");
+        assert!(train(Verdict::NoDaemon, vec![]).contains("dynocar run"));
     }
 }

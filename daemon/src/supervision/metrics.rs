@@ -1,7 +1,8 @@
 //! The daemon's numbers as OpenMetrics text, taken from its snapshots as any client takes them.
 
 use dynocar_client::{Reading, SnapshotReader, monotonic_now_ns};
-use dynocar_shared::{Parameter, PipelineKind, RejectionReason, Status};
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::{Parameter, PipelineKind, Reason, RejectionReason, Status};
 use prometheus_client::encoding::text::encode;
 use prometheus_client::metrics::counter::Counter;
 use prometheus_client::metrics::family::Family;
@@ -9,6 +10,8 @@ use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::registry::Registry;
 use std::sync::atomic::AtomicU64;
 
+use super::health::Verdict;
+use crate::operator::suspicion::Suspicion;
 use crate::shadow::{Pinned, TrialFigures};
 
 /// The content type of [`text`].
@@ -33,6 +36,8 @@ struct Families {
     deviation: Gauges,
     innovation: Gauges,
     unexplained: Gauges,
+    suspected: Gauges,
+    attention: Gauges,
     in_force: Gauges,
     trial_error: Gauges,
     trial_ratio: Gauges,
@@ -42,19 +47,21 @@ struct Families {
 }
 
 impl Families {
-    fn register(&self, registry: &mut Registry) {
-        let counters = [
+    /// Name without the prefix, help and family of what only grows.
+    fn counters(&self) -> [(&'static str, &'static str, &Counters); 6] {
+        [
             ("samples_used", "Samples that entered the estimate", &self.used),
             ("samples_rejected", "Samples refused, by reason", &self.rejected),
             ("samples_lost", "Samples that never arrived", &self.lost),
             ("updates", "Windows or segments that updated the estimate", &self.updates),
             ("resets", "Resets of the estimate", &self.resets),
             ("maintenance_events", "Maintenance events, by kind", &self.maintenance),
-        ];
-        for (name, help, family) in counters {
-            registry.register(name, help, family.clone());
-        }
-        let gauges = [
+        ]
+    }
+
+    /// The same of what goes up and down.
+    fn gauges(&self) -> [(&'static str, &'static str, &Gauges); 14] {
+        [
             ("status", "1 for the status that holds", &self.status),
             ("vouched_age_seconds", "Time since the snapshot was vouched for", &self.vouched_age),
             ("latency_seconds", "From sample to snapshot, the newest", &self.latency),
@@ -62,6 +69,12 @@ impl Families {
             ("parameter_std", "Standard deviation in the parameter's unit", &self.deviation),
             ("innovation_mean_square", "1 when the model holds", &self.innovation),
             ("unexplained_force_newtons", "Force that the model lacks", &self.unexplained),
+            ("suspected_seconds", "How long the effect has been suspected", &self.suspected),
+            (
+                "attention",
+                "1 where a person is wanted, 0 where not, with the reason",
+                &self.attention,
+            ),
             ("model_in_force", "1 for the model in force, 0 for one on trial", &self.in_force),
             ("model_error_mps", "Open-loop error of the model over 60 s", &self.trial_error),
             (
@@ -71,8 +84,14 @@ impl Families {
             ),
             ("model_evidence", "Evidence that the model is better", &self.trial_evidence),
             ("model_trips", "Trips over which the model was compared", &self.trial_trips),
-        ];
-        for (name, help, family) in gauges {
+        ]
+    }
+
+    fn register(&self, registry: &mut Registry) {
+        for (name, help, family) in self.counters() {
+            registry.register(name, help, family.clone());
+        }
+        for (name, help, family) in self.gauges() {
             registry.register(name, help, family.clone());
         }
     }
@@ -126,6 +145,16 @@ impl Families {
         }
         self.innovation.get_or_create(&labels).set(it.innovation_mean_square);
         self.unexplained.get_or_create(&labels).set(it.unexplained_force_n);
+        let suspicion = Suspicion::of(it);
+        if suspicion.is_some() || it.pipeline_kind() == Some(PipelineKind::ResidualMonitor) {
+            let effect =
+                suspicion.map_or("none", |it| it.effect.map_or("unknown", EffectKind::name));
+            let age_s = suspicion.map_or(0, |it| it.age_s);
+            self.suspected.get_or_create(&with("effect", effect)).set(f64::from(age_s));
+        }
+        let is_wanted = Verdict::of(reading.status(), reading.reason()) != Verdict::Ok;
+        let labels = with("reason", reading.reason().map_or("unknown", Reason::name));
+        self.attention.get_or_create(&labels).set(f64::from(u8::from(is_wanted)));
         for (place, number) in it.parameters.iter().enumerate().take(it.parameter_count as usize) {
             let name = Parameter::from_number(*number).map_or("unknown", Parameter::name);
             let labels = with("parameter", name);
@@ -158,4 +187,58 @@ pub fn text(readers: &mut [SnapshotReader], names: &[String], pinned: &Pinned) -
     // Writing into a String cannot fail.
     let _ = encode(&mut text, &registry);
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::path::Path;
+
+    use super::*;
+
+    /// The metrics that a shipped file names.
+    fn named(file: &str) -> BTreeSet<String> {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/live").join(file);
+        let text = std::fs::read_to_string(path).expect("a shipped file");
+        let is_part = |it: char| it.is_ascii_alphanumeric() || it == '_';
+        let words = text.split(|it| !is_part(it)).filter_map(|it| it.strip_prefix("dynocar_"));
+        words.map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn every_metric_that_alerts_and_dashboard_name_is_given_and_the_dashboard_names_all() {
+        let families = Families::default();
+        let counters = families.counters().map(|it| format!("{}_total", it.0));
+        let gauges = families.gauges().map(|it| it.0.to_owned());
+        let given: BTreeSet<String> = counters.into_iter().chain(gauges).collect();
+        let (alerts, shown) = (named("prometheus_alerts.yml"), named("grafana_dashboard.json"));
+        assert!(alerts.len() > 4 && alerts.is_subset(&given), "{alerts:?}");
+        assert!(shown.is_subset(&given), "{shown:?}");
+        let hidden: Vec<_> = given.difference(&shown).collect();
+        // Models on trial have pages of their own.
+        let is_trial = |it: &&&String| it.starts_with("model_") || it.starts_with("maintenance_");
+        assert_eq!(hidden.iter().filter(|it| !is_trial(it)).count(), 0, "{hidden:?}");
+    }
+
+    #[test]
+    fn a_suspect_and_a_wanted_person_are_labelled() {
+        let mut snapshot = dynocar_shared::ParameterSnapshot::empty();
+        snapshot.status = Status::Degraded as u32;
+        snapshot.reason = Reason::InnovationsNotWhite as u32;
+        snapshot.suspected_effect = EffectKind::DraggingBrake as u32;
+        snapshot.suspicion_age_s = 23;
+        let families = Families::default();
+        families.take(&Reading { snapshot: &snapshot, age_ns: 0, is_stale: false }, "monitor");
+        let mut registry = Registry::with_prefix("dynocar");
+        families.register(&mut registry);
+        let mut text = String::new();
+        encode(&mut text, &registry).unwrap();
+        let has = |name: &str, label: &str, value: &str| {
+            text.lines().any(|it| {
+                it.starts_with(name) && it.contains(label) && it.ends_with(&format!("}} {value}"))
+            })
+        };
+        assert!(has("dynocar_suspected_seconds", "effect=\"dragging_brake\"", "23.0"), "{text}");
+        assert!(has("dynocar_attention", "reason=\"innovations_not_white\"", "1.0"), "{text}");
+    }
 }

@@ -35,6 +35,7 @@ pub fn run(site: &Site, line: &str) -> String {
         .current_dir(site.path())
         .env("PATH", format!("{}:{path}", site.path().join("bin").display()))
         .env("DYNOCAR_ROOT", site.host().root())
+        .env("STATE_DIRECTORY", site.path().join("states"))
         .stdin(Stdio::null())
         .output()
         .unwrap();

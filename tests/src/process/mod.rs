@@ -1,6 +1,7 @@
 //! Real processes with a run-time directory of their own.
 
 mod site;
+mod terminal;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -12,6 +13,7 @@ use std::time::{Duration, Instant};
 use rustix::process::{Pid, Signal, kill_process};
 
 pub use site::Site;
+pub use terminal::{Terminal, Tie};
 
 /// How long a test waits for what must happen before it calls it a hang.
 pub const WATCHDOG: Duration = Duration::from_secs(30);
@@ -41,6 +43,12 @@ impl Process {
             }
         });
         Process { child, lines, errors }
+    }
+
+    /// Starts a program whose streams go elsewhere.
+    fn of(mut command: Command) -> Process {
+        let child = command.spawn().expect("the program to start");
+        Process { child, lines: Arc::default(), errors: PathBuf::new() }
     }
 
     /// Its process number.

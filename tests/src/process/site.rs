@@ -2,7 +2,7 @@
 
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use dynocar_client::Host;
 use dynocar_shared::services::ROOT_VARIABLE;
@@ -109,10 +109,30 @@ impl Site {
         self.start_command(command)
     }
 
-    fn command(&self, program: &str, arguments: &[&str]) -> Command {
+    /// A program on this site that is not started yet.
+    pub fn command(&self, program: &str, arguments: &[&str]) -> Command {
         let mut command = Command::new(program);
+        // A place of its own for each process: no daemon starts from what another learned unless a test says so.
+        let states = self.path().join(format!("states-{}", unique_number()));
         command.args(arguments).env(ROOT_VARIABLE, self.root());
+        command.env("XDG_STATE_HOME", states).env_remove("STATE_DIRECTORY");
         command
+    }
+
+    /// Starts a program on this site whose standard input is empty and whose other streams these are.
+    ///
+    /// # Panics
+    ///
+    /// When it cannot be started.
+    pub fn start_into(
+        &self,
+        program: &str,
+        arguments: &[&str],
+        [output, errors]: [Stdio; 2],
+    ) -> Process {
+        let mut command = self.command(program, arguments);
+        command.stdin(Stdio::null()).stdout(output).stderr(errors);
+        Process::of(command)
     }
 
     fn start_command(&self, command: Command) -> Process {

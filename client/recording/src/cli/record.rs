@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use clap::{ArgGroup, Args};
 use dynocar::cli::Failure;
+use dynocar::ending;
 use dynocar::output::tell;
-use dynocar::run::stop_on_signals;
 use dynocar_client::Host;
 use dynocar_shared::TrainId;
 
@@ -119,7 +119,7 @@ pub fn execute(arguments: &RecordArguments) -> Result<(), Failure> {
 ///
 /// As above.
 pub fn run(settings: &Settings) -> Result<(), Failure> {
-    let stop = stop_on_signals().map_err(|error| Failure::Work(error.to_string()))?;
+    let stop = ending::flag().map_err(|error| Failure::Work(error.to_string()))?;
     let recorded = record(settings, &stop).map_err(|error| match error {
         RecordError::Taken { .. } | RecordError::Ring(KeepError::Taken { .. }) => {
             Failure::Input(error.to_string())

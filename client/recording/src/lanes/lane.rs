@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
+use dynocar::operator::suspicion::Suspicion;
 use dynocar::output::tell;
 use dynocar_client::channel::{Receiver, Transport};
 use dynocar_client::{ChannelError, Host, Peer, Role, SnapshotReader, monotonic_now_ns};
 use dynocar_shared::services::{PIPELINES_MAX, SAMPLE_BUFFER};
-use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, Status, TrainId, TrainSample};
 
 use super::sink::{Sink, event};
@@ -240,16 +240,9 @@ fn model_event(train: TrainId, it: &ParameterSnapshot) -> Event {
 }
 
 fn suspicion_event(train: TrainId, it: &ParameterSnapshot) -> Event {
-    let (kind, text) = match EffectKind::from_number(it.suspected_effect) {
-        Some(EffectKind::None) => (EventKind::SuspicionEnded, "nothing is suspected".to_owned()),
-        suspect => {
-            let name = suspect.map_or("unknown", EffectKind::name);
-            let others: Vec<_> = it.alternatives().map(EffectKind::name).collect();
-            let others = if others.is_empty() { "no other" } else { &others.join(", ") };
-            let evidence = it.suspicion_evidence;
-            let text = format!("{name}, evidence {evidence:.0}, hardly told from: {others}");
-            (EventKind::SuspicionRaised, text)
-        }
+    let (kind, text) = match Suspicion::of(it) {
+        None => (EventKind::SuspicionEnded, "nothing is suspected".to_owned()),
+        Some(suspicion) => (EventKind::SuspicionRaised, suspicion.to_string()),
     };
     let pipeline_index = Some(it.pipeline_index);
     Event { pipeline_index, ..event(train, kind, text) }

@@ -37,7 +37,7 @@ impl Place {
         let place = Place { folder };
         let pipelines = kinds.iter().map(|kind| format!("[[pipelines]]\nkind = \"{kind}\"\n"));
         let config = format!(
-            "[daemon]\nroot = {:?}\nidle = \"event\"\n[[trains]]\nid = 1\nfile = \"train.toml\"\n{}",
+            "[daemon]\nroot = {:?}\nidle = \"event\"\n[state]\nkeep = false\n[[trains]]\nid = 1\nfile = \"train.toml\"\n{}",
             place.at("root"),
             pipelines.collect::<String>()
         );

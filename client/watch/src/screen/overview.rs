@@ -1,5 +1,6 @@
 //! Quantities, residual, what to drive next; plots where there is room.
 
+use dynocar::operator::duration;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
@@ -9,7 +10,7 @@ use super::plots::{self, sparkline};
 use super::style::{Palette, heading};
 use crate::history::Point;
 use crate::state::TrainState;
-use crate::words::{Row, duration, residual, rows};
+use crate::words::{Row, residual, rows};
 
 /// Columns of the table after the number: interval and unit, status, reason; the age takes the rest.
 const COLUMNS: [usize; 3] = [20, 15, 26];

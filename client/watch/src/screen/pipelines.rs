@@ -1,5 +1,6 @@
 //! Every pipeline with its samples.
 
+use dynocar::operator::{duration, refusals, refused_words};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
@@ -7,7 +8,6 @@ use ratatui::widgets::{Paragraph, Wrap};
 
 use super::style::{Palette, heading};
 use crate::state::{PipelineState, TrainState};
-use crate::words::{duration, refusals};
 
 /// Draws the view.
 pub fn draw(frame: &mut Frame<'_>, area: Rect, train: &TrainState, palette: Palette) {
@@ -41,10 +41,9 @@ fn told(pipeline: &PipelineState, palette: Palette) -> Vec<Line<'static>> {
             it.samples_used, it.samples_rejected, it.samples_lost
         )),
     ];
-    let why: Vec<String> =
-        refusals(pipeline).iter().map(|(reason, count)| format!("{reason} {count}")).collect();
+    let why = refused_words(&refusals(&it.rejected_by_reason));
     if !why.is_empty() {
-        lines.push(Line::raw(format!("  rejected: {}", why.join(", "))));
+        lines.push(Line::raw(format!("  rejected: {why}")));
     }
     lines
 }

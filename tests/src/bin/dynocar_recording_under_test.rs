@@ -1,0 +1,7 @@
+//! `dynocar-recording` as the tests start it.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    dynocar_recording::cli::main()
+}
