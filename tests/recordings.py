@@ -46,9 +46,9 @@ for name, found in [("killed", killed), ("recovered", recovered)]:
 first, topics = expected[0], {topic for topic, _, _ in whole}
 assert first.HasField("speed_mps") and first.HasField("traction_force_n")
 assert not first.HasField("acceleration_mps2"), "missing is missing"
-assert {"/train/1/0_trajectory_kalman", "/train/1/1_mass_kalman", "/events"} <= topics, topics
+assert {"/train/1/0_train_kalman", "/train/1/1_adhesion_law", "/events"} <= topics, topics
 
-mass = [value for topic, _, value in whole if topic == "/train/1/1_mass_kalman"][-1]
+mass = [value for topic, _, value in whole if topic == "/train/1/0_train_kalman"][-1]
 assert 1_600 < mass.estimate.mass_t < 1_800 and mass.estimate.mass_std_t > 0, mass
 assert mass.estimate.mass_t in mass.values
 assert not mass.estimate.HasField("adhesion")

@@ -120,11 +120,11 @@ fn a_field_or_topic_that_is_not_there_is_found() {
             has_field(&file, topic.schema, &fields)
         })
     };
-    assert!(is_shown("/train/1/1_mass_kalman.estimate.mass_low_t"));
+    assert!(is_shown("/train/1/0_train_kalman.estimate.mass_low_t"));
     for wrong in [
-        "/train/1/1_mass_kalman.estimate.mass_low",
-        "/train/1/1_mass_kalman.estimate",
-        "/train/1/1_trajectory_kalman.status",
+        "/train/1/0_train_kalman.estimate.mass_low",
+        "/train/1/0_train_kalman.estimate",
+        "/train/1/0_trajectory_kalman.status",
         "/train/1/samples.speed",
     ] {
         assert!(!is_shown(wrong), "{wrong}");

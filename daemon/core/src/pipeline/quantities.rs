@@ -8,7 +8,8 @@ use super::braking::settings::BrakeFactor;
 /// The kinds that can answer a quantity, the best measured first: the first of them that a train's
 /// configuration has is the one that answers unless the configuration names another.
 ///
-/// The order is that of the errors in `docs/papers.md` and of the misled looks in `docs/trust.md`;
+/// The order is that of `docs/scenarios.md`, then of the errors in `docs/papers.md` and of the misled
+/// looks in `docs/trust.md`;
 /// `docs/guides/reading.md` gives the figures.
 pub const fn candidates(quantity: Quantity) -> &'static [PipelineKind] {
     use PipelineKind as Kind;
