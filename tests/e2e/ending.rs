@@ -2,7 +2,7 @@
 //! readers have gone: cleanly, with what it writes whole.
 
 use std::net::{TcpListener, TcpStream};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{ExitStatus, Stdio};
 use std::time::Duration;
 
@@ -115,8 +115,8 @@ const RECORD: Program = Program {
 const FLIGHT_RECORDER: Program = Program {
     name: RECORDING,
     words: "flight-recorder {site}/ring",
-    is_at_work: |it| ring(it).iter().any(has_samples),
-    left: |it| ring(it).iter().for_each(assert_whole),
+    is_at_work: |it| ring(it).iter().any(|file| has_samples(file)),
+    left: |it| ring(it).iter().for_each(|file| assert_whole(file)),
 };
 
 const SERVE: Program = Program {
@@ -143,12 +143,12 @@ fn ring(place: &Place) -> Vec<PathBuf> {
     paths.filter(|it| it.extension().is_some_and(|it| it == "mcap")).collect()
 }
 
-fn has_samples(file: &PathBuf) -> bool {
+fn has_samples(file: &Path) -> bool {
     let mut recording = Recording::default();
     read(file, &mut recording).is_ok() && !recording.samples.is_empty()
 }
 
-fn assert_whole(file: &PathBuf) {
+fn assert_whole(file: &Path) {
     let mut recording = Recording::default();
     assert_eq!(read(file, &mut recording).unwrap(), Ending::Whole, "{}", file.display());
     assert!(!recording.samples.is_empty(), "{}", file.display());

@@ -128,7 +128,8 @@ mod tests {
     fn what_was_not_told_is_named_with_how_often_it_came() {
         let start = Instant::now();
         let mut log = StatusLog::new(start);
-        let mut at = |tenth, state| log.look(state, start + Duration::from_millis(100 * tenth));
+        let mut at =
+            |tenth: u64, state| log.look(state, start + Duration::from_millis(100 * tenth));
         assert_eq!(at(0, GOOD), Some(vec![]));
         assert_eq!(at(1, AT_BOUND), Some(vec![]));
         assert_eq!((at(2, GOOD), at(3, AT_BOUND), at(4, GOOD)), (None, None, None));
