@@ -102,7 +102,7 @@ fn recordings_without_a_stop_and_speeds_never_seen_are_refused_in_words() {
     let refused = stops(&without, &[]);
     assert_eq!(refused.status.code(), Some(2));
     let words = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(words.contains("no run to fit holds a stop"), "{words}");
+    assert!(words.contains("no run holds a stop"), "{words}");
     let with = site(&[("fit", recording(1.0, 20.0).0)], COLUMNS);
     for (options, expected) in [
         (["--from", "50"], "nothing is told of faster ones"),
@@ -114,4 +114,31 @@ fn recordings_without_a_stop_and_speeds_never_seen_are_refused_in_words() {
         let words = String::from_utf8_lossy(&refused.stderr).into_owned();
         assert!(words.contains(expected), "{words}");
     }
+}
+
+#[test]
+fn a_modulated_stop_is_told_with_what_it_holds_and_gives_no_law() {
+    let recorded = recording(1.0, 25.0).0;
+    let halved = recorded.lines().enumerate().map(|(index, row)| match row.strip_suffix(",1") {
+        Some(rest) if index > 0 => format!("{rest},0.5\n"),
+        _ => format!("{row}\n"),
+    });
+    let site = site(&[("fit", halved.collect())], COLUMNS);
+    let output = stops(&site, &["--json", "-"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(answer["law"].is_null(), "{answer}");
+    let stop = &answer["stops"][0];
+    assert_eq!(
+        (&stop["manner"], stop["from_s"].as_f64().unwrap().round()),
+        (&"modulated".into(), 30.0)
+    );
+    assert!(stop["no_law"].as_str().unwrap().contains("0.85 of its effort"), "{stop}");
+    assert!(stop["decelerations"].as_array().unwrap().len() > 20, "{stop}");
+    let text = String::from_utf8(stops(&site, &[]).stdout).unwrap();
+    assert!(text.contains("stops with a modulated brake") && text.contains("at 15 m/s"), "{text}");
+    let refused = stops(&site, &["--from", "20"]);
+    assert_eq!(refused.status.code(), Some(2));
+    let words = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(words.contains("no run to fit holds a stop by all of the brake"), "{words}");
 }

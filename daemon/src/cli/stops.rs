@@ -82,14 +82,15 @@ pub fn execute(arguments: &StopsArguments) -> Result<(), Failure> {
         )));
     }
     for speed_mps in &arguments.from {
-        let known = match &study.law {
+        let why = match &study.law {
             Some(law) if law.stopping_distance(*speed_mps).is_some() => continue,
-            Some(law) => format!("the stops were seen from {:.1} m/s down", law.fastest_mps()),
-            None => "no run to fit holds a stop by all of the brake".into(),
+            Some(law) => format!(
+                "--from {speed_mps}: the stops were seen from {:.1} m/s down; nothing is told of faster ones",
+                law.fastest_mps()
+            ),
+            None => format!("--from {speed_mps}: no run to fit holds a stop by all of the brake"),
         };
-        return Err(Failure::Input(format!(
-            "--from {speed_mps}: {known}; nothing is told of faster ones"
-        )));
+        return Err(Failure::Input(why));
     }
     let answer = Answer { dataset: dataset.name.clone(), notes: dataset.notes(), study };
     Ok(give(arguments.json.as_deref(), &answer, || text(&answer))?)

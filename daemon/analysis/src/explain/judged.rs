@@ -12,7 +12,7 @@ use super::stop_to_stop::{StopToStop, reduction};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Metric {
-    /// Each part from a departure to the next standstill, from rest: the median of their errors.
+    /// Each part from a departure to the next standstill, from rest: root mean square of their errors.
     StopToStop,
     /// Whole runs from their first sample to their end, pooled.
     FullRun,
@@ -59,7 +59,7 @@ impl Judged {
         match (self.metric, self.count) {
             (Metric::FullRun, _) => String::new(),
             (Metric::StopToStop, 1) => ", from stop to stop".into(),
-            (Metric::StopToStop, count) => format!(", from stop to stop (median of {count})"),
+            (Metric::StopToStop, count) => format!(", from stop to stop ({count} times)"),
         }
     }
 }
@@ -69,9 +69,9 @@ impl From<&StopToStop> for Judged {
         Judged {
             metric: Metric::StopToStop,
             count: found.runs,
-            error_mps: found.median_mps,
-            interval_95_mps: found.interval_95_mps,
-            reduction: reduction(found.median_mps),
+            error_mps: found.rms_mps,
+            interval_95_mps: found.rms_interval_95_mps,
+            reduction: reduction(found.rms_mps),
             reduction_interval_95: found.reduction_interval_95,
         }
     }

@@ -16,7 +16,13 @@ pub struct StopToStop {
     /// where there is one recorded run only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interval_95_mps: Option<[[f64; 2]; 2]>,
-    /// 95 % interval of 1 - after / before, by the same draws.
+    /// Root mean square of their errors in m/s, each as much as any other: before and after. What acts at
+    /// few places moves no median.
+    pub rms_mps: [f64; 2],
+    /// 95 % intervals of the two by the same draws.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_interval_95_mps: Option<[[f64; 2]; 2]>,
+    /// 95 % interval of 1 - after / before of that.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reduction_interval_95: Option<[f64; 2]>,
     /// The errors in m/s themselves, before and after, by recorded run.
@@ -32,23 +38,24 @@ impl StopToStop {
         if let [only] = &by_run[..] {
             by_run = only.iter().map(|pair| vec![*pair]).collect();
         }
-        let medians_of = |drawn: &[&Vec<[f64; 2]>]| {
+        let sides_of = |drawn: &[&Vec<[f64; 2]>], of: fn(Vec<f64>) -> f64| {
             [0, 1].map(|side| {
-                median(drawn.iter().flat_map(|errors| errors.iter().map(|it| it[side])).collect())
+                of(drawn.iter().flat_map(|errors| errors.iter().map(|it| it[side])).collect())
             })
         };
         let all: Vec<&Vec<[f64; 2]>> = by_run.iter().collect();
-        let median_mps = medians_of(&all);
         let runs = all.iter().map(|errors| errors.len()).sum();
         let intervals = intervals_95(&by_run, |drawn| {
-            let [before, after] = medians_of(drawn);
-            Some([before, after, reduction([before, after])])
+            let ([median, median_after], rms) = (sides_of(drawn, median), sides_of(drawn, rms));
+            Some([median, median_after, rms[0], rms[1], reduction(rms)])
         });
         (runs > 0).then_some(StopToStop {
             runs,
-            median_mps,
-            interval_95_mps: intervals.map(|[before, after, _]| [before, after]),
-            reduction_interval_95: intervals.map(|it| it[2]),
+            median_mps: sides_of(&all, median),
+            interval_95_mps: intervals.map(|[before, after, ..]| [before, after]),
+            rms_mps: sides_of(&all, rms),
+            rms_interval_95_mps: intervals.map(|[_, _, before, after, _]| [before, after]),
+            reduction_interval_95: intervals.map(|it| it[4]),
             errors_mps,
         })
     }
@@ -57,6 +64,12 @@ impl StopToStop {
 /// 1 - after / before; 0 where there was no error.
 pub fn reduction([before, after]: [f64; 2]) -> f64 {
     if before > 0.0 { 1.0 - after / before } else { 0.0 }
+}
+
+/// Root mean square; 0 of none.
+fn rms(values: Vec<f64>) -> f64 {
+    let squares: f64 = values.iter().map(|value| value * value).sum();
+    (squares / values.len().max(1) as f64).sqrt()
 }
 
 /// The middle value, the mean of the two middle ones of an even number; 0 of none.
@@ -78,6 +91,8 @@ mod tests {
         let found = StopToStop::from_errors(by_run.chain([Vec::new()]).collect()).unwrap();
         assert_eq!((found.runs, found.median_mps[1]), (18, 0.2));
         assert!((found.median_mps[0] - 0.35).abs() < 1e-12, "{found:?}");
+        // The three metres a second of one part in three are in the root mean square.
+        assert!((found.rms_mps[0] - 1.761).abs() < 0.001, "{found:?}");
         let [low, high] = found.interval_95_mps.unwrap()[0];
         assert!(low < 0.35 && 0.35 < high && high < 3.0, "{found:?}");
     }

@@ -7,7 +7,7 @@ use dynocar_analysis::explain::judged::Judged;
 use dynocar_analysis::explain::report::Estimate;
 use dynocar_analysis::explain::report::errors::{ErrorPair, Resampling, RunErrors};
 use dynocar_analysis::explain::report::traces::Trace;
-use dynocar_analysis::explain::stop_to_stop::StopToStop;
+use dynocar_analysis::explain::stop_to_stop::{StopToStop, reduction};
 
 use super::{Section, legend};
 use crate::report::html::{Column, Table, escape, estimate, percent};
@@ -77,27 +77,33 @@ fn summary(subject: &Subject) -> String {
         [("Holdout", &errors.holdout_stop_to_stop), ("Fit", &errors.fit_stop_to_stop)]
     {
         let Some(found) = found else { continue };
-        let mut cells = stop_to_stop(name, found);
-        cells.truncate(columns);
-        if name == "Holdout" { table.push_marked(cells) } else { table.push(cells) }
+        for (k, mut cells) in stop_to_stop(name, found).into_iter().enumerate() {
+            cells.truncate(columns);
+            if k == 0 && name == "Holdout" { table.push_marked(cells) } else { table.push(cells) }
+        }
     }
     let mut html = table.html();
     let _ = writeln!(html, "<p class=\"note\">{}</p>", intervals(errors.holdout, errors.fit));
     html
 }
 
-/// The row of the errors from stop to stop.
-fn stop_to_stop(name: &str, found: &StopToStop) -> Vec<String> {
-    let side = |side: usize| {
-        let interval = found.interval_95_mps.map(|both| both[side]);
-        estimate(&Estimate { value: found.median_mps[side], interval })
-    };
+/// The rows of the errors from stop to stop: the one that judges, and the middle one.
+fn stop_to_stop(name: &str, found: &StopToStop) -> [Vec<String>; 2] {
+    let row =
+        |what: &str, errors_mps: [f64; 2], intervals: Option<[[f64; 2]; 2]>, taken: String| {
+            let side = |side: usize| {
+                let interval = intervals.map(|both| both[side]);
+                estimate(&Estimate { value: errors_mps[side], interval })
+            };
+            vec![format!("{name}, from stop to stop, {what}"), side(0), side(1), taken]
+        };
     let judged = Judged::from(found);
-    vec![
-        format!("{name}, from stop to stop, median of {}", found.runs),
-        side(0),
-        side(1),
-        percent(&Estimate { value: judged.reduction, interval: judged.reduction_interval_95 }),
+    let taken = Estimate { value: judged.reduction, interval: judged.reduction_interval_95 };
+    let of_median = Estimate { value: reduction(found.median_mps), interval: None };
+    let (all, middle) = (format!("all {}", found.runs), format!("median of {}", found.runs));
+    [
+        row(&all, judged.error_mps, judged.interval_95_mps, percent(&taken)),
+        row(&middle, found.median_mps, found.interval_95_mps, percent(&of_median)),
     ]
 }
 
