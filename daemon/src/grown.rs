@@ -7,6 +7,7 @@
 //! needs one. What belongs to certain runs is an event and no property of a train or a line: it is
 //! listed, so that nobody takes the files for more than they are.
 
+mod error;
 mod runs;
 
 use std::path::{Path, PathBuf};
@@ -17,31 +18,12 @@ use dynocar_core::terms::extra::{self, Extra, Factor};
 use dynocar_core::terms::{Entry, Key};
 use toml::{Table, Value};
 
-use crate::dataset::{LoadError, open};
+use crate::dataset::open;
 use crate::models::text::{TRACK_FILE, TRAIN_FILE};
-use crate::output::{OutputError, write_in_folder};
+use crate::output::write_in_folder;
 
-/// Why the grown files cannot be written.
-#[derive(Debug, thiserror::Error)]
-pub enum GrownError {
-    /// The dataset cannot be read.
-    #[error(transparent)]
-    Load(#[from] LoadError),
-    /// A declared file is not there any more or is no TOML.
-    #[error("{label}: expected a TOML file, got {problem}")]
-    Declared {
-        /// The file.
-        label: String,
-        /// What is wrong.
-        problem: String,
-    },
-    /// A file cannot be written.
-    #[error(transparent)]
-    Output(#[from] OutputError),
-}
+pub use error::{GROWN_MARK, GrownError};
 
-/// How a grown file begins.
-pub const GROWN_MARK: &str = "# Grown from ";
 /// The files of a grown model: the train, the line where something is known of it, and the dataset.
 pub const GROWN_FILES: [&str; 3] = [TRAIN_FILE, TRACK_FILE, MANIFEST_FILE];
 

@@ -6,7 +6,7 @@ use toml::{Table, Value};
 
 use dynocar_analysis::dataset::DatasetFiles;
 
-use super::{GROWN_MARK, GrownError};
+use super::error::{GROWN_MARK, GrownError};
 use crate::dataset::{DatasetFolder, read_text};
 use crate::models::text::{TRACK_FILE, TRAIN_FILE};
 use crate::output::{OutputError, require_new, write_in_folder};
