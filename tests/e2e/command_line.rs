@@ -8,6 +8,7 @@ mod guide;
 mod support;
 
 mod careless;
+mod explain_again;
 mod fmu;
 mod import;
 mod init;

@@ -10,9 +10,7 @@ use dynocar_tests::simulator::{
     Defects, Effect, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate,
 };
 
-#[path = "init/commands.rs"]
-mod commands;
-use commands::{dynocar, said};
+use super::commands::{dynocar, said};
 
 const SEED: u64 = 31;
 

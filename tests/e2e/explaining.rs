@@ -3,7 +3,6 @@
 mod declared_terms;
 mod every_kind;
 mod explain;
-mod explain_again;
 mod forms;
 mod gradient_error;
 mod grown_model;

@@ -8,9 +8,7 @@ use dynocar::dataset::load;
 use dynocar_shared::SampleField;
 use dynocar_tests::process::Site;
 
-#[path = "init/commands.rs"]
-mod commands;
-use commands::{done, dynocar, said};
+use super::commands::{done, dynocar, said};
 
 /// Seconds from midnight at which the run begins: it ends on the next day.
 const START_S: u32 = 86_400 - 200;

@@ -60,9 +60,6 @@ fn of(traffic_name: &str, traffic: Traffic) -> Vec<NamedScenario> {
     loads
         .into_iter()
         .chain(varied)
-        .map(|(name, scenario)| NamedScenario {
-            name: format!("{traffic_name}, {name}"),
-            scenario,
-        })
+        .map(|(name, scenario)| NamedScenario { name: format!("{traffic_name}, {name}"), scenario })
         .collect()
 }

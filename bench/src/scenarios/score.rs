@@ -46,7 +46,8 @@ impl Score {
         self.covered += u64::from(error.abs() <= 1.96 * deviation);
         self.error_square += error * error;
         self.deviation_square += deviation * deviation;
-        self.wrong_now_s = if error.abs() > WRONG * deviation { self.wrong_now_s + cycle_s } else { 0.0 };
+        self.wrong_now_s =
+            if error.abs() > WRONG * deviation { self.wrong_now_s + cycle_s } else { 0.0 };
         self.wrong_s = self.wrong_s.max(self.wrong_now_s);
     }
 
@@ -72,11 +73,7 @@ pub struct Answer {
 }
 
 /// The resistance at the speed driven or the mass, if a snapshot may be used for it.
-pub fn answer(
-    snapshot: &ParameterSnapshot,
-    quantity: Quantity,
-    moment: &Moment,
-) -> Option<Answer> {
+pub fn answer(snapshot: &ParameterSnapshot, quantity: Quantity, moment: &Moment) -> Option<Answer> {
     if !snapshot.is_usable_for(quantity) {
         return None;
     }

@@ -68,13 +68,8 @@ pub struct Habits {
 impl Traffic {
     /// Its habits.
     pub fn habits(self) -> Habits {
-        let habits = |stop_m, top_mps, acceleration_mps2, standing_s, line_m, steep_permille| Habits {
-            stop_m,
-            top_mps,
-            acceleration_mps2,
-            standing_s,
-            line_m,
-            steep_permille,
+        let habits = |stop_m, top_mps, acceleration_mps2, standing_s, line_m, steep_permille| {
+            Habits { stop_m, top_mps, acceleration_mps2, standing_s, line_m, steep_permille }
         };
         match self {
             Traffic::Metro => habits((900.0, 1700.0), 20.0, (1.0, 0.9), 30.0, 16e3, 15.0),
@@ -154,7 +149,17 @@ impl World {
         }
         let end_m = stops_m[stops_m.len() - 1] + 1000.0;
         let gradient = profile(&scenario, &habits, declared.length_m, end_m, &mut random);
-        World { scenario, declared, truth, force_scale, speed_scale, delay_s, gradient, stops_m, random }
+        World {
+            scenario,
+            declared,
+            truth,
+            force_scale,
+            speed_scale,
+            delay_s,
+            gradient,
+            stops_m,
+            random,
+        }
     }
 
     /// Gradient in ‰ along growing chainage by the map and in truth, under a train whose centre is here.

@@ -44,7 +44,7 @@ fn snapshot() -> ParameterSnapshot {
 }
 
 fn take(train: &mut Train, snapshots: &[ParameterSnapshot], is_stale: bool, now_ms: u64) {
-    let reading = |snapshot| Reading { snapshot, age_ns: 0, is_stale };
+    let reading = |snapshot| Reading { snapshot, age_ns: 0, is_stale, quantity: None };
     train.take(snapshots.iter().map(reading), NOW_NS, now_ms);
 }
 

@@ -66,6 +66,7 @@ pub const fn of_suspect(effect: EffectKind) -> &'static str {
         EffectKind::WheelDiameter => "check the wheel diameter set in the speed sensor",
         EffectKind::TractionGain => "check the scale of the reported forces",
         EffectKind::ActuatorDelay => "check how late forces act after they are reported",
+        EffectKind::SpeedDelay => "check how old a speed is when the controller reads it",
         EffectKind::RotatingMass => "check the declared rotating mass",
         EffectKind::LowAdhesion => {
             "expect long braking distances: the rail carries less than the brake asks"

@@ -228,7 +228,10 @@ mod tests {
         snapshot.suspected_effect = EffectKind::DraggingBrake as u32;
         snapshot.suspicion_age_s = 23;
         let families = Families::default();
-        families.take(&Reading { snapshot: &snapshot, age_ns: 0, is_stale: false }, "monitor");
+        families.take(
+            &Reading { snapshot: &snapshot, age_ns: 0, is_stale: false, quantity: None },
+            "monitor",
+        );
         let mut registry = Registry::with_prefix("dynocar");
         families.register(&mut registry);
         let mut text = String::new();

@@ -119,10 +119,8 @@ fn case(
     let is_impossible = counts && estimate.coefficient.value <= 0.0;
     let is_too_large = circumstances.are_innovations_too_large;
     // The event that would say more has not come: nothing is wrong, and nothing may be used yet.
-    let awaited = [
-        (circumstances.is_stale, Reason::EstimateStale),
-        (!is_number, Reason::OnlyLowerBound),
-    ];
+    let awaited =
+        [(circumstances.is_stale, Reason::EstimateStale), (!is_number, Reason::OnlyLowerBound)];
     let awaited = awaited.into_iter().find(|(is_so, _)| counts && !is_too_large && *is_so);
     let fault = match is_impossible {
         true => Some((Status::Invalid, Reason::AtBound)),
