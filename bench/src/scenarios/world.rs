@@ -162,6 +162,17 @@ impl World {
         }
     }
 
+    /// The same world with everything as declared.
+    #[must_use]
+    pub fn without_mistakes(mut self) -> Self {
+        self.truth = self.declared.clone();
+        self.force_scale = [1.0, 1.0];
+        self.speed_scale = 1.0;
+        self.delay_s = 0.0;
+        self.gradient.iter_mut().for_each(|[map, truth]| *truth = *map);
+        self
+    }
+
     /// Gradient in ‰ along growing chainage by the map and in truth, under a train whose centre is here.
     pub fn gradient_permille(&self, centre_m: f64) -> [f64; 2] {
         let place = (centre_m / PIECE_M).clamp(0.0, (self.gradient.len() - 2) as f64);

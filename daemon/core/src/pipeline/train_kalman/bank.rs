@@ -4,7 +4,7 @@ use nalgebra::{Matrix4, Vector4};
 
 use super::behaviour::{BEHAVIOURS, behaviours};
 use super::motion_filter::{
-    DISTURBANCE, LOAD, MotionFilter, RESISTANCE, SPEED, State, StateCovariance, Step,
+    DISTURBANCE, LOAD, MotionFilter, RESISTANCE, SPEED, STATES, State, StateCovariance, Step,
 };
 use crate::filter::bank::{Bank, Nats};
 use crate::filter::mixture::Mixture;
@@ -72,7 +72,7 @@ impl MotionBank {
     }
 
     /// Changes what every filter believes.
-    pub fn each(&mut self, change: impl Fn(&mut Gaussian<{ super::motion_filter::STATES }>)) {
+    pub fn each(&mut self, change: impl Fn(&mut Gaussian<STATES>)) {
         self.rivals.hypotheses_mut().iter_mut().for_each(|it| change(&mut it.filter.belief));
     }
 
@@ -180,7 +180,13 @@ impl MotionBank {
 
     /// True while every filter is sound.
     pub fn is_sound(&self) -> bool {
-        self.rivals.hypotheses().iter().all(|it| it.filter.belief.is_sound())
+        // What is unsound elsewhere comes to the variances with the next step.
+        let is_sound = |belief: &Gaussian<STATES>| {
+            belief.mean.sum().is_finite()
+                && (0..STATES).all(|i| belief.covariance[(i, i)] >= 0.0)
+                && belief.covariance.trace().is_finite()
+        };
+        self.rivals.hypotheses().iter().all(|it| is_sound(&it.filter.belief))
             && self.rivals.weights().iter().all(|weight| weight.is_finite())
     }
 }

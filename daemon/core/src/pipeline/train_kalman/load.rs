@@ -28,6 +28,8 @@ pub struct LoadWatch {
     declared_kg: Option<f64>,
     is_weighed: bool,
     has_departed: bool,
+    /// True when the load was weighed since the last departure.
+    is_fresh: bool,
 }
 
 impl LoadWatch {
@@ -41,6 +43,7 @@ impl LoadWatch {
             declared_kg: None,
             is_weighed: false,
             has_departed: false,
+            is_fresh: false,
         }
     }
 
@@ -73,11 +76,64 @@ impl LoadWatch {
         let Some(before_kg) = before_kg else { return Some(anew) };
         let is_same = (sample.mass_kg / before_kg - 1.0).abs() <= SAME_SHARE;
         if !is_same && self.is_weighed {
+            self.is_fresh = !self.has_departed;
             return Some(anew);
         }
+        let was_fresh = self.has_departed && std::mem::take(&mut self.is_fresh);
         // A weighing that is exact leaves nothing open.
         let is_exact = self.is_weighed && self.mass_std == 0.0;
-        (self.has_departed && !is_exact)
+        (self.has_departed && !is_exact && !was_fresh)
             .then(|| Change::Opened(self.load_change_std.powi(2), self.load_std.powi(2)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND_NS: i64 = 1_000_000_000;
+
+    /// What a train that stands from 10 to 40 s changes, with the mass that its samples carry.
+    fn changes(settings: &TrainKalmanSettings, mass_kg: impl Fn(i64) -> Option<f64>) -> Vec<Change> {
+        let mut load = LoadWatch::new(settings);
+        let seen = (0..60).filter_map(|second| {
+            let mass = mass_kg(second);
+            load.see(&ResolvedSample {
+                time_ns: second * SECOND_NS,
+                speed_mps: if (10..40).contains(&second) { 0.0 } else { 15.0 },
+                mass_kg: mass.unwrap_or(100e3),
+                is_mass_measured: mass.is_some(),
+                ..ResolvedSample::coasting()
+            })
+        });
+        seen.collect()
+    }
+
+    #[test]
+    fn a_load_is_opened_at_a_stop_and_anew_where_it_was_weighed_again() {
+        let settings = TrainKalmanSettings::default();
+        let (weighed, declared) = (Change::Anew(0.03 * 0.03), Change::Anew(0.15 * 0.15));
+        let opened = Change::Opened(0.1 * 0.1, 0.15 * 0.15);
+        let same = |one: &[Change], other: &[Change]| {
+            assert_eq!(one.len(), other.len(), "{one:?}");
+            for pair in one.iter().zip(other) {
+                let (Change::Anew(a), Change::Anew(b))
+                | (Change::Opened(a, _), Change::Opened(b, _)) = pair
+                else {
+                    panic!("{pair:?}")
+                };
+                assert!((a / b - 1.0).abs() < 1e-12, "{pair:?}");
+            }
+        };
+        same(&changes(&settings, |_| None), &[declared, opened]);
+        same(&changes(&settings, |_| Some(100e3)), &[weighed, opened]);
+        let boarded = |second| Some(if second < 20 { 100e3 } else { 108e3 });
+        same(&changes(&settings, boarded), &[weighed, weighed]);
+    }
+
+    #[test]
+    fn a_mass_that_is_exact_is_never_opened() {
+        let exact = TrainKalmanSettings { mass_std_percent: 0.0, ..Default::default() };
+        assert_eq!(changes(&exact, |_| Some(100e3)), [Change::Anew(0.0)]);
     }
 }

@@ -166,3 +166,70 @@ impl MotionFilter {
         (0.5 * square * step.force_rate / step.inertia).powi(2)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::train_kalman::behaviour::behaviours;
+
+    fn step() -> Step {
+        Step {
+            duration_s: 0.2,
+            way_m: 4.0,
+            inertia: 108.0,
+            traction: 11.0,
+            brake: 3.0,
+            known: 0.9,
+            traction_change: 4.0,
+            brake_change: -1.5,
+            place_variance: 0.0,
+            jump_share: 0.0,
+            force_rate: 0.0,
+            map_std_permille: 0.0,
+            drift_variance: 0.0,
+        }
+    }
+
+    fn filter() -> MotionFilter {
+        let mean = State::from([21.0, 0.3, 0.95, 1.6, 0.4, 0.9, 0.01, -0.02, 0.15]);
+        let belief = Gaussian { mean, covariance: StateCovariance::zeros() };
+        MotionFilter { behaviour: behaviours()[0], belief, jump_variance: 0.0 }
+    }
+
+    /// The speed after a step from a state.
+    fn speed_after(mean: State) -> f64 {
+        let mut moved = filter();
+        moved.belief.mean = mean;
+        moved.predict(&step());
+        moved.belief.mean[SPEED]
+    }
+
+    #[test]
+    fn the_covariance_moves_by_the_derivatives_of_the_speed() {
+        for place in 0..STATES {
+            let mut certain = filter();
+            certain.predict(&step());
+            let mut uncertain = filter();
+            uncertain.belief.covariance[(place, place)] = 1.0;
+            uncertain.predict(&step());
+            let gained = uncertain.belief.covariance[(SPEED, SPEED)]
+                - certain.belief.covariance[(SPEED, SPEED)];
+            let mut ahead = filter().belief.mean;
+            let mut behind = ahead;
+            ahead[place] += 1e-5;
+            behind[place] -= 1e-5;
+            let slope = (speed_after(ahead) - speed_after(behind)) / 2e-5;
+            // Heun's rule takes the resistance half way: its slope is off in the second order.
+            assert!((gained.sqrt() - slope.abs()).abs() < 1e-4 + 1e-3 * slope.abs(), "{place}");
+        }
+    }
+
+    #[test]
+    fn only_as_much_of_a_jump_is_doubted_as_forces_of_this_train_bring() {
+        let mut doubting = filter();
+        doubting.predict(&Step { jump_share: 1.0, ..step() });
+        let whole = doubting.jump_variance;
+        doubting.predict(&Step { jump_share: 0.25, ..step() });
+        assert!(whole > 0.0 && (doubting.jump_variance / whole - 0.25).abs() < 0.01);
+    }
+}

@@ -81,3 +81,29 @@ impl Systematic {
         covariance[(0, 0)] += of_line;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn passing_a_line_again_makes_nothing_better_known_and_more_line_does() {
+        let widened = |lengths_m: &[f64]| {
+            let mut systematic = Systematic::new(0.1, 0.0);
+            for length_m in lengths_m {
+                systematic.start();
+                systematic.see(*length_m, Some(0.0), 20.0);
+                systematic.see(0.0, Some(*length_m), 20.0);
+            }
+            let mut covariance = Matrix4::zeros();
+            systematic.widen(&Vector4::zeros(), &mut covariance);
+            // w0 at the highest speed, where only the line counts.
+            let top = Vector4::new(1.0, 1.0, 1.0, 0.0);
+            top.dot(&(covariance * top))
+        };
+        let once = widened(&[10e3]);
+        assert!((once - 0.01 / 50.0).abs() < 1e-12);
+        assert!((widened(&[10e3; 7]) - once).abs() < 1e-12);
+        assert!((widened(&[40e3]) - once / 4.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,87 @@
+//! Ordinary driving with ordinary mistakes: what may be used is right, and changes seldom.
+
+use std::sync::Arc;
+
+use dynocar_bench::scenarios::drive::Drive;
+use dynocar_bench::scenarios::rows::{self, NamedScenario};
+use dynocar_bench::scenarios::table::{self, Plan};
+use dynocar_bench::scenarios::world::World;
+use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::{ParameterSnapshot, PipelineKind, Status, TrainId};
+
+fn named(names: &[&str]) -> Vec<NamedScenario> {
+    let mut rows = rows::all();
+    rows.retain(|row| names.contains(&row.name.as_str()));
+    assert_eq!(rows.len(), names.len());
+    rows
+}
+
+#[test]
+fn in_an_hour_of_ordinary_driving_what_may_be_used_is_right_and_changes_seldom() {
+    let scenarios = named(&[
+        "metro, weighed 2 % wrong",
+        "metro, load changes at stops",
+        "EMU, load unknown",
+        "EMU, forces jump",
+        "high speed, weighed 5 % wrong",
+    ]);
+    let lines = table::run(&Plan {
+        scenarios: &scenarios,
+        kinds: &[PipelineKind::TrainKalman],
+        seeds: 4,
+        first_seed: 501,
+        hours: 1.0,
+        threads: 2,
+    })
+    .unwrap();
+    assert_eq!(lines.len(), 2 * scenarios.len());
+    for line in lines {
+        println!("{line:?}");
+        assert!(line.usable_percent > 80.0, "{line:?}");
+        assert!(line.changes_per_h <= 6.0, "{line:?}");
+        assert!(line.wrong_s <= 1.0, "{line:?}");
+        assert!(line.covered_percent > 90.0, "{line:?}");
+    }
+}
+
+/// Every snapshot of the recommended pipelines over an hour of a healthy train.
+fn each_snapshot(mut look: impl FnMut(f64, &ParameterSnapshot)) {
+    let mut scenario = named(&["EMU, load exact"])[0].scenario;
+    scenario.position_noise_m = 0.5;
+    let world = World::draw(scenario, 77).without_mistakes();
+    let train = Arc::new(world.declared.clone());
+    let kinds = [
+        PipelineKind::TrainKalman,
+        PipelineKind::AdhesionLaw,
+        PipelineKind::AdhesionSmoother,
+        PipelineKind::ResidualMonitor,
+    ];
+    let mut pipelines = kinds.map(|kind| {
+        let estimator = EstimatorSettings::default_of(kind).unwrap().build(&train).unwrap();
+        Pipeline::new(TrainId(1), 0, Arc::clone(&train), None, estimator)
+    });
+    let mut drive = Drive::new(world);
+    for cycle in 0..36_000_u32 {
+        let moment = drive.advance();
+        for pipeline in &mut pipelines {
+            look(0.1 * f64::from(cycle), pipeline.process(&moment.sample));
+        }
+    }
+}
+
+#[test]
+fn no_pipeline_of_a_healthy_train_is_degraded_by_noise_of_its_position() {
+    let mut degraded_s = 0.0;
+    each_snapshot(|time_s, snapshot| {
+        let kind = snapshot.pipeline_kind().unwrap();
+        if matches!(snapshot.status(), Status::Degraded | Status::Invalid) {
+            degraded_s += 0.1;
+            println!("{time_s:.1} s: {kind} {:?} {:?}", snapshot.status(), snapshot.reason());
+        }
+        let suspect = EffectKind::from_number(snapshot.suspected_effect);
+        assert_eq!(suspect, Some(EffectKind::None), "{kind} at {time_s} s");
+    });
+    // White noise is beyond four deviations of its own statistics now and then.
+    assert!(degraded_s < 10.0, "degraded for {degraded_s:.1} s");
+}
