@@ -46,8 +46,8 @@ pub fn execute(arguments: &HealthArguments) -> Result<(), Failure> {
     if trains.is_empty() {
         let root = host.root().display();
         worst = Verdict::NoDaemon;
-        let remedy = worst.remedy();
-        text = format!("no daemon: nobody serves any train under {root}\n  to do: {remedy}\n");
+        text = format!("no daemon: nobody serves any train under {root}\n");
+        text += &to_do(worst.remedy());
     }
     for train in trains {
         let health = look_at(&host, train).map_err(work)?;
@@ -79,5 +79,9 @@ fn told(health: &TrainHealth) -> String {
         }
         text.push('\n');
     }
-    text + &format!("  to do: {}\n", health.remedy())
+    text + &to_do(health.remedy())
+}
+
+fn to_do(remedy: &str) -> String {
+    format!("  to do: {remedy}\n")
 }
