@@ -25,6 +25,7 @@ use crate::track_text::TRACK_FILE;
 pub use arguments::InitArguments;
 use described::{DAEMON_FILE, Described};
 use draft::Draft;
+use letters::Letters;
 
 const WRITER: &str = "dynocar init";
 /// Units that the values did not tell are set right so many times at most.
@@ -68,7 +69,7 @@ fn describe(
     train: &mut TrainText,
     has_track: bool,
 ) -> Result<Described, Failure> {
-    let (texts, encoding) = letters::texts(&arguments.csv)?;
+    let Letters { files: texts, encoding } = letters::texts(&arguments.csv)?;
     let files = paths::from_folder(arguments.folder(), &arguments.csv)?;
     let recordings: Vec<Recording> =
         texts.iter().map(|(label, text)| Recording { label, text }).collect();

@@ -1,7 +1,5 @@
 //! Which letters a text file's bytes are.
 
-use std::borrow::Cow;
-
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
 use super::error::FileProblem;
@@ -50,7 +48,7 @@ pub fn decoded(bytes: Vec<u8>, encoding: &'static Encoding) -> Result<String, Fi
 }
 
 /// The line, from 1, of the first letter that stands for what could not be read.
-fn line_of_first_loss(text: &Cow<str>) -> usize {
+fn line_of_first_loss(text: &str) -> usize {
     let good = text.split('\u{fffd}').next().unwrap_or_default();
     1 + good.matches('\n').count()
 }

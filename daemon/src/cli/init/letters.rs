@@ -10,12 +10,20 @@ use crate::cli::Failure;
 use crate::dataset::file_error;
 use crate::text_file::{read_beginning, read_bytes};
 
-/// The files' names and texts, and the encoding that they share.
+/// Files as text.
+pub struct Letters {
+    /// Name and text of each.
+    pub files: Vec<(String, String)>,
+    /// The encoding that they share.
+    pub encoding: &'static Encoding,
+}
+
+/// Reads files in the encoding that they share.
 ///
 /// # Errors
 ///
 /// When one cannot be read, or is written in other letters than the others.
-pub fn texts(paths: &[PathBuf]) -> Result<(Vec<(String, String)>, &'static Encoding), Failure> {
+pub fn texts(paths: &[PathBuf]) -> Result<Letters, Failure> {
     let mut files = Vec::new();
     for path in paths {
         let label = path.display().to_string();
@@ -45,5 +53,5 @@ pub fn texts(paths: &[PathBuf]) -> Result<(Vec<(String, String)>, &'static Encod
         let text = decoded(bytes, encoding).map_err(|problem| file_error(&label, problem))?;
         texts.push((label, text));
     }
-    Ok((texts, encoding))
+    Ok(Letters { files: texts, encoding })
 }
