@@ -21,7 +21,11 @@ fn named(answer: &Answer) -> Vec<&str> {
 
 fn simulated(seed: u64, effect: Effect, is_level_and_straight: bool) -> SimulatedDataset {
     simulate(&SimulatorSettings {
-        train_type: Some(if seed % 2 == 0 { TrainType::Metro } else { TrainType::Regional }),
+        train_type: Some(if seed.is_multiple_of(2) {
+            TrainType::Metro
+        } else {
+            TrainType::Regional
+        }),
         is_level_and_straight,
         ..SimulatorSettings::new(seed, EffectRequest::Exactly(vec![effect]))
     })

@@ -107,7 +107,7 @@ fn worse_held_out(effects: &[EffectAnswer], score: &Score) -> String {
         return String::new();
     }
     format!(
-        " The runs held out{} are predicted worse with it, {shown_before} m/s before and \
+        " The runs held out are predicted worse with it{}, {shown_before} m/s before and \
          {shown_after} after: it holds for the runs that were fitted, not for those.",
         judged.predicted()
     )

@@ -324,7 +324,7 @@ mod tests {
         errors.holdout_stop_to_stop = StopToStop::from_errors(vec![vec![[0.5, 0.06]; 3]; 4]);
         let said = sentence(&ambiguous(), &errors);
         let gained = "on the runs held out, from stop to stop (12 times) falls from 0.500 to \
-                      0.060 m/s, by 88.0 % (95 % interval 88.0 % to 88.0 %).";
+                      0.060 m/s, by 88 % (95 % interval 88 % to 88 %).";
         assert!(said.ends_with(gained), "{said}");
     }
 }
