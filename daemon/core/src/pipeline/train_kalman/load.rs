@@ -94,7 +94,10 @@ mod tests {
     const SECOND_NS: i64 = 1_000_000_000;
 
     /// What a train that stands from 10 to 40 s changes, with the mass that its samples carry.
-    fn changes(settings: &TrainKalmanSettings, mass_kg: impl Fn(i64) -> Option<f64>) -> Vec<Change> {
+    fn changes(
+        settings: &TrainKalmanSettings,
+        mass_kg: impl Fn(i64) -> Option<f64>,
+    ) -> Vec<Change> {
         let mut load = LoadWatch::new(settings);
         let seen = (0..60).filter_map(|second| {
             let mass = mass_kg(second);
@@ -117,10 +120,10 @@ mod tests {
         let same = |one: &[Change], other: &[Change]| {
             assert_eq!(one.len(), other.len(), "{one:?}");
             for pair in one.iter().zip(other) {
-                let (Change::Anew(a), Change::Anew(b))
-                | (Change::Opened(a, _), Change::Opened(b, _)) = pair
-                else {
-                    panic!("{pair:?}")
+                let (a, b) = match pair {
+                    (Change::Anew(a), Change::Anew(b)) => (a, b),
+                    (Change::Opened(a, _), Change::Opened(b, _)) => (a, b),
+                    _ => panic!("{pair:?}"),
                 };
                 assert!((a / b - 1.0).abs() < 1e-12, "{pair:?}");
             }
