@@ -57,7 +57,7 @@ fn train() -> TrainState {
     let mass = [(Parameter::Mass, 1697.4, 6.1), (Parameter::AccelerationBias, 1e-4, 1e-4)];
     let mut mass = pipeline(1, PipelineKind::MassKalman, good, &mass);
     mass.snapshot.quantities = Quantity::Mass.bit();
-    let bound = (Status::Degraded, Reason::OnlyLowerBound);
+    let bound = (Status::Unestimated, Reason::OnlyLowerBound);
     let adhesion = [(Parameter::AdhesionLowerBound, 0.0943, 0.0)];
     let mut adhesion = pipeline(2, PipelineKind::AdhesionLaw, bound, &adhesion);
     adhesion.snapshot.quantities = Quantity::Adhesion.bit();

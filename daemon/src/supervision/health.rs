@@ -30,12 +30,8 @@ pub enum Verdict {
 
 impl Verdict {
     /// The verdict on a pipeline that is vouched for.
-    ///
-    /// A bound of adhesion, or adhesion of an earlier braking, is what every train has that brakes well
-    /// on a good rail: nothing is amiss.
     pub const fn of(status: Status, reason: Option<Reason>) -> Self {
         match (status, reason) {
-            (Status::Degraded, Some(Reason::OnlyLowerBound | Reason::EstimateStale)) => Verdict::Ok,
             (Status::Degraded | Status::Invalid, _) => Verdict::Degraded,
             (_, Some(reason)) if reason.is_implausible_input() => Verdict::Degraded,
             (Status::Estimated | Status::Unestimated, _) => Verdict::Ok,
@@ -203,10 +199,11 @@ mod tests {
 
     #[test]
     fn good_brakes_on_a_good_rail_are_no_degradation() {
-        let verdict = |reason| Verdict::of(Status::Degraded, Some(reason));
-        assert_eq!(verdict(Reason::OnlyLowerBound), Verdict::Ok);
-        assert_eq!(verdict(Reason::EstimateStale), Verdict::Ok);
-        assert_eq!(verdict(Reason::InnovationsTooLarge), Verdict::Degraded);
+        let waiting = |reason| Verdict::of(Status::Unestimated, Some(reason));
+        assert_eq!(waiting(Reason::OnlyLowerBound), Verdict::Ok);
+        assert_eq!(waiting(Reason::EstimateStale), Verdict::Ok);
+        let large = Verdict::of(Status::Degraded, Some(Reason::InnovationsTooLarge));
+        assert_eq!(large, Verdict::Degraded);
         let silent = PipelineHealth { is_stale: true, ..pipeline(Reason::DaemonSilent) };
         assert_eq!(silent.verdict(), Verdict::Stale);
     }
@@ -245,7 +242,8 @@ mod tests {
         assert!(degraded(vec![large.clone(), monitor]).contains("every brake releases"));
         assert!(degraded(vec![large.clone(), refusing]).contains("explain"), "the first");
         assert!(degraded(vec![pipeline(Reason::BadInput)]).contains("mend the samples"));
-        let fine = pipeline(Reason::OnlyLowerBound);
+        let fine =
+            PipelineHealth { status: Status::Unestimated, ..pipeline(Reason::OnlyLowerBound) };
         let slips = pipeline(Reason::ImplausibleForces);
         assert!(degraded(vec![fine, slips]).contains("units and signs"));
         assert_eq!(train(Verdict::Ok, vec![large]), "nothing");

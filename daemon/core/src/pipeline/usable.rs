@@ -111,7 +111,7 @@ mod tests {
     fn a_good_estimate_is_usable_after_two_seconds_and_doubted_after_half_a_second() {
         assert_eq!(changes(2, |_| true), (0, 0));
         assert_eq!(changes(3, |_| true), (1, MASS));
-        assert_eq!(changes(10, |tick| tick < 94), (1, MASS), "half a second of doubt");
+        assert_eq!(changes(10, |tick| tick < 96), (1, MASS), "less than half a second of doubt");
         assert_eq!(changes(10, |tick| tick < 90), (2, 0));
     }
 

@@ -91,7 +91,7 @@ fn an_estimate_is_held_after_the_braking_and_grows_stale() {
         match moment.time_s {
             15.0..49.0 => assert_eq!(snapshot.status(), Status::Estimated, "{}", moment.time_s),
             50.5..60.0 => {
-                assert_eq!(snapshot.status(), Status::Degraded);
+                assert_eq!(snapshot.status(), Status::Unestimated);
                 assert_eq!(snapshot.reason(), Some(Reason::EstimateStale));
                 assert!(snapshot.value(Parameter::Adhesion).is_some());
             }
