@@ -10,8 +10,8 @@ from fmpy.util import read_csv
 from fmpy.validation import validate_fmu
 
 ESTIMATORS = {
-    "resistance": "trajectory_kalman",
-    "mass": "mass_kalman",
+    "resistance": "train_kalman",
+    "mass": "train_kalman",
     "adhesion": "adhesion_law",
     "brake_friction": "brake_smoother",
     "monitor": "residual_monitor",
@@ -78,6 +78,6 @@ for group, estimator in ESTIMATORS.items():
 
 assert compared > 25, compared
 estimated = [group for group in ESTIMATORS if identified[ESTIMATORS[group]]["status"] == "estimated"]
-assert "resistance" in estimated, identified["trajectory_kalman"]
+assert "resistance" in estimated, identified["train_kalman"]
 print(f"FMPy: the FMU is valid; {len(signals)} steps, {compared} outputs as identified")
 print(f"estimated: {', '.join(estimated)}")

@@ -7,6 +7,7 @@
 //! published covariance, gives d, with all that widens the published covariance in it. The noise of
 //! the measured speed follows from the deviation of the unexplained force.
 
+use dynocar_core::pipeline::train_kalman::TrainKalmanSettings;
 use dynocar_core::pipeline::trajectory::index::A;
 use dynocar_core::pipeline::trajectory::kalman::TrajectoryKalmanSettings;
 use dynocar_core::pipeline::trajectory::quality::prior_std;
@@ -118,24 +119,28 @@ impl NoiseSeen {
             let before = declared_std(train)[A].powi(-2);
             (information_on_a(newest)? - before) / (newest.samples_used as f64 * step_s)
         };
-        let noise = Noise {
-            speed_noise_mps: speed_noise_mps(
-                newest.unexplained_force_std_n,
-                inertial_mass_kg,
-                step_s,
-            ),
-            disturbance_n_per_kn_sqrt_s: rate.sqrt().recip(),
-            step_s,
+        // Only of `trajectory_kalman` does the deviation of the unexplained force show the speed's noise.
+        let speed_noise_mps = match newest.pipeline_kind() {
+            Some(PipelineKind::TrajectoryKalman) => {
+                speed_noise_mps(newest.unexplained_force_std_n, inertial_mass_kg, step_s)
+            }
+            _ => TrainKalmanSettings::default().speed_noise_mps,
         };
+        let noise =
+            Noise { speed_noise_mps, disturbance_n_per_kn_sqrt_s: rate.sqrt().recip(), step_s };
         let is_told = noise.speed_noise_mps > 0.0 && noise.disturbance_n_per_kn_sqrt_s > 0.0;
         (is_told && (noise.speed_noise_mps + noise.disturbance_n_per_kn_sqrt_s).is_finite())
             .then_some(noise)
     }
 }
 
-/// Information on a for given b and c; of `trajectory_kalman` alone, whose law this is.
+/// Information on a for given b and c, of the pipelines that learn it from every sample.
 fn information_on_a(snapshot: &ParameterSnapshot) -> Option<f64> {
-    if snapshot.pipeline_kind() != Some(PipelineKind::TrajectoryKalman) {
+    let learns = matches!(
+        snapshot.pipeline_kind()?,
+        PipelineKind::TrajectoryKalman | PipelineKind::TrainKalman
+    );
+    if !learns {
         return None;
     }
     let (_, covariance) = davis_of(snapshot)?;

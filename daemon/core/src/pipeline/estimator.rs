@@ -1,6 +1,6 @@
 //! The interface of every estimator.
 
-use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason};
+use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason, Status};
 
 use super::KeptEstimate;
 use crate::force::ResolvedSample;
@@ -40,9 +40,10 @@ pub trait Estimator: Send {
     /// Allocates nothing, locks nothing, reads no clock.
     fn write(&self, snapshot: &mut ParameterSnapshot);
 
-    /// Of the quantities that it answers, one bit for each that is known while the status is estimated.
-    fn known(&self) -> u32 {
-        u32::MAX
+    /// Of the quantities that it answers, one bit for each that is known well enough under its status:
+    /// all of them while that is estimated. One may be known before the others are.
+    fn known(&self, status: Status) -> u32 {
+        if status == Status::Estimated { u32::MAX } else { 0 }
     }
 
     /// Takes an estimate kept from earlier as its prior, before the first sample; false when

@@ -188,8 +188,9 @@ impl Pipeline {
         } else if is_estimated && self.refused_share > REFUSED_SHARE_MAX {
             output::write_status(&mut self.snapshot, (Status::Degraded, Reason::BadInput));
         }
-        let is_estimated = self.snapshot.status() == Status::Estimated;
-        let good = if is_estimated { self.estimator.known() & self.answerable } else { 0 };
+        let is_doubted = self.refused_share > REFUSED_SHARE_MAX || self.implausible().is_some();
+        let known = self.estimator.known(self.snapshot.status()) & self.answerable;
+        let good = if is_doubted { 0 } else { known };
         self.snapshot.usable_quantities = self.usable.see(good, sample.time_ns);
         &self.snapshot
     }

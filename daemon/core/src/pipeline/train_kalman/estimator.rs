@@ -9,6 +9,7 @@ use dynocar_shared::{
 use nalgebra::{SMatrix, Vector3};
 
 use super::bank::{Measured, MotionBank};
+use super::jump_share::JumpShare;
 use super::load::{Change, LoadWatch};
 use super::motion_filter::{
     BRAKE_SCALE, COEFFICIENTS, FORCE_DELAY, LOAD, RESISTANCE, SPEED, State, StateCovariance, Step,
@@ -33,6 +34,8 @@ const INNOVATION_MEMORY: u32 = 1000;
 /// Motion in s before anything is called known; after a warm start, before it is confirmed.
 const MOVED_MIN_S: f64 = 20.0;
 const CONFIRMED_S: f64 = 3.0;
+/// Deviations by which a first sample may differ from a kept mass that still counts.
+const KEPT_DEVIATIONS: f64 = 3.0;
 /// Motion in s before the mass is called known.
 const MASS_MOVED_MIN_S: f64 = 3.0;
 /// All that this estimator answers.
@@ -42,11 +45,8 @@ const FORCE_RATE_MEMORY_S: f64 = 0.5;
 /// Share of a declared coefficient's standard deviation that comes from w0 at 20 m/s: a declared zero
 /// is no knowledge.
 const PRIOR_FLOOR_SHARE: f64 = 0.3;
-/// Weight that the first share of jumps counts for, and what is looked back over.
-const JUMP_WEIGHT_FIRST: f64 = 3.0;
-const JUMP_WEIGHT_MAX: f64 = 300.0;
-/// Share of an innovation's variance from which a jump says something of jumps.
-const JUMP_SEEN_SHARE: f64 = 0.1;
+/// Innovations before they are judged to be alike.
+const JUDGED_MIN: f64 = 100.0;
 /// The greatest factor on the covariance by innovations that are larger or more alike than it says;
 /// beyond it they contradict the estimate.
 const INFLATION_MAX: f64 = 4.0;
@@ -68,8 +68,7 @@ pub struct TrainKalman {
     /// True when the speed of the newest sample was at least the lowest that is used.
     is_fast: bool,
     noise: SpeedNoise,
-    /// Share of the variance that jumping forces bring, by the innovations, and its weight.
-    jump_share: (f64, f64),
+    jumps: JumpShare,
     force_rate: f64,
     monitor: InnovationMonitor,
     systematic: Systematic,
@@ -77,6 +76,8 @@ pub struct TrainKalman {
     health: InputHealth,
     moved_s: f64,
     moved_min_s: f64,
+    /// Mass in kg kept from earlier, with its relative variance, until the first sample.
+    kept_mass: Option<(f64, f64)>,
     report: Report,
     is_fresh_reset: bool,
     resets: u64,
@@ -109,7 +110,7 @@ impl TrainKalman {
             last_time_ns: None,
             is_fast: false,
             noise: SpeedNoise::guessed(settings.speed_noise_mps),
-            jump_share: (1.0, JUMP_WEIGHT_FIRST),
+            jumps: JumpShare::default(),
             force_rate: 0.0,
             monitor: InnovationMonitor::new(INNOVATION_MEMORY),
             systematic: Systematic::new(
@@ -120,6 +121,7 @@ impl TrainKalman {
             health: InputHealth::default(),
             moved_s: 0.0,
             moved_min_s: MOVED_MIN_S,
+            kept_mass: None,
             report: Report::new(&bank.published()),
             bank,
             is_fresh_reset: false,
@@ -153,7 +155,7 @@ impl TrainKalman {
         let drift = self.settings.drift_n_per_kn_per_sqrt_h.powi(2) * duration_s / 3600.0;
         Step {
             place_variance: steps * (place_s * (to.known - from.known)).powi(2),
-            jump_share: self.jump_share.0,
+            jump_share: self.jumps.share(),
             force_rate: self.force_rate,
             map_std_permille: sample.gradient_std_permille,
             drift_variance: drift,
@@ -193,30 +195,35 @@ impl TrainKalman {
         let residual_mps = speed_mps - belief.mean[SPEED];
         let filtered_variance = belief.covariance[(SPEED, SPEED)];
         self.noise.take_residual(residual_mps, filtered_variance, measured.trust.weight);
-        let (share, weight) = &mut self.jump_share;
-        let of_variance = measured.jump_variance / measured.variance;
-        if of_variance > JUMP_SEEN_SHARE * share.min(1.0) && *share > 0.0 {
-            let whole = measured.jump_variance / *share;
-            let rest = measured.variance - measured.jump_variance;
-            let seen = (measured.innovation_mps.powi(2) - rest) / whole;
-            let weight_now = (whole / measured.variance).powi(2).min(1.0);
-            *weight = (*weight + weight_now).min(JUMP_WEIGHT_MAX);
-            *share += (seen.clamp(-4.0, 12.0) - *share) * weight_now / *weight;
-            *share = share.clamp(1e-3, 12.0);
+        self.jumps.learn(measured);
+    }
+
+    /// Variance of sums of innovations over that of as many white ones of the expected size, if their
+    /// correlation fades from lag to lag as over the first.
+    fn long_run(&self) -> f64 {
+        let (mean_square, correlation) = (self.monitor.mean_square(), self.monitor.correlation());
+        mean_square * (1.0 + correlation) / (1.0 - correlation).max(f64::EPSILON)
+    }
+
+    /// Innovations that are alike are made up for by wider intervals, up to a bound.
+    fn contradiction(&self) -> Option<Reason> {
+        if self.monitor.are_too_large() {
+            return Some(Reason::InnovationsTooLarge);
         }
+        let is_alike =
+            self.monitor.effective_count() >= JUDGED_MIN && self.long_run() > INFLATION_MAX;
+        is_alike.then_some(Reason::InnovationsNotWhite)
     }
 
     fn judge(&mut self) {
-        let (mean_square, correlation) = (self.monitor.mean_square(), self.monitor.correlation());
-        let long_run = mean_square * (1.0 + correlation) / (1.0 - correlation).max(f64::EPSILON);
-        let inflation = long_run.clamp(1.0, INFLATION_MAX);
+        let inflation = self.long_run().clamp(1.0, INFLATION_MAX);
         self.report.take(&self.bank.published(), inflation, &self.systematic, &self.speeds);
     }
 
     fn reset(&mut self) {
         self.bank = first_bank(&self.settings, &self.first);
         self.noise.reset();
-        self.jump_share = (1.0, JUMP_WEIGHT_FIRST);
+        self.jumps = JumpShare::default();
         self.moved_s = 0.0;
         self.moved_min_s = MOVED_MIN_S;
         self.report = Report::new(&self.bank.published());
@@ -240,7 +247,16 @@ impl TrainKalman {
 
     /// Follows the load from sample to sample.
     fn follow_load(&mut self, sample: &ResolvedSample) {
-        match self.load.see(sample) {
+        let change = self.load.see(sample);
+        if let Some((mass_kg, relative_variance)) = self.kept_mass.take() {
+            let load = sample.mass_kg / mass_kg;
+            let variance = load * load * relative_variance;
+            let allowed = KEPT_DEVIATIONS.powi(2) * (variance + self.load.prior_variance());
+            if (load - 1.0).powi(2) <= allowed {
+                return self.bank.each(|it| it.replace(LOAD, load, variance));
+            }
+        }
+        match change {
             Some(Change::Anew(variance)) => self.bank.each(|it| it.replace(LOAD, 1.0, variance)),
             Some(Change::Opened(variance, most)) => self.bank.each(|it| {
                 let now = it.covariance[(LOAD, LOAD)];
@@ -280,13 +296,10 @@ impl TrainKalman {
             fault: self.is_fresh_reset.then_some(failure),
             input: self.health.complaint().or(self.gate.complaint()),
             is_ready: self.moved_s >= self.moved_min_s.min(MASS_MOVED_MIN_S),
-            is_known: self.known_now() != 0,
+            is_known: self.known_now() == COMPLETE,
             lacking: Status::Unestimated,
-            contradiction: self.monitor.contradiction(),
-            remark: match self.known_now() {
-                COMPLETE => Reason::None,
-                _ => Reason::WeakExcitation,
-            },
+            contradiction: self.contradiction(),
+            remark: Reason::None,
         }
     }
 }
@@ -355,8 +368,8 @@ impl Estimator for TrainKalman {
         self.pass(sample)
     }
 
-    fn known(&self) -> u32 {
-        self.known_now()
+    fn known(&self, status: Status) -> u32 {
+        if matches!(status, Status::Estimated | Status::Unestimated) { self.known_now() } else { 0 }
     }
 
     fn write(&self, snapshot: &mut ParameterSnapshot) {
@@ -368,7 +381,7 @@ impl Estimator for TrainKalman {
         snapshot.generation = self.resets;
     }
 
-    /// Takes up the kept resistance; the load is another one after the next stop.
+    /// Takes up the kept resistance, and the mass unless the first sample contradicts it.
     fn warm_start(&mut self, kept: &KeptEstimate) -> bool {
         let davis = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
         let Some((mean, covariance)) = kept.moments(davis) else { return false };
@@ -378,6 +391,11 @@ impl Estimator for TrainKalman {
         self.bank = first_bank(&self.settings, &self.first);
         self.report = Report::new(&self.bank.published());
         self.moved_min_s = CONFIRMED_S;
+        self.kept_mass = kept.moments([Parameter::Mass]).and_then(|(mass_kg, variance)| {
+            let relative_variance = variance[(0, 0)] / (mass_kg[0] * mass_kg[0]);
+            (mass_kg[0] > 0.0 && relative_variance.is_finite())
+                .then_some((mass_kg[0], relative_variance))
+        });
         true
     }
 }

@@ -13,11 +13,14 @@
 mod bank;
 mod behaviour;
 mod estimator;
+mod jump_share;
 mod load;
 mod motion_filter;
 mod report;
 mod settings;
 mod systematic;
+#[cfg(test)]
+mod tests;
 
 pub use estimator::TrainKalman;
 pub use settings::TrainKalmanSettings;

@@ -1,0 +1,65 @@
+//! The estimator across a restart of the daemon.
+
+use std::sync::Arc;
+
+use dynocar_shared::snapshot::packed_index;
+use dynocar_shared::{ParameterSnapshot, Status};
+use rand::{RngExt, SeedableRng};
+
+use super::{TrainKalman, TrainKalmanSettings};
+use crate::force::ResolvedSample;
+use crate::pipeline::{Estimator, KeptEstimate};
+use crate::train::{Davis, TrainModel};
+
+/// A train of 100 t declared and 110 t true that drives about for so many s; what is said of it.
+fn driven(estimator: &mut TrainKalman, from_s: u32, duration_s: u32) -> ParameterSnapshot {
+    let (w0, gain) = (2.0, 9.806_65e-3 / 1.06);
+    let push = |second: f64| [40.0, 0.0, -40.0, 0.0][(second / 15.0) as usize % 4];
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(u64::from(from_s));
+    let mut speed_mps = 20.0;
+    let mut snapshot = ParameterSnapshot::empty();
+    for tick in 10 * from_s..10 * (from_s + duration_s) {
+        let second = 0.1 * f64::from(tick);
+        let force = push(second) / 1.1;
+        speed_mps += 0.1 * gain * (force - w0);
+        let coasting = ResolvedSample::coasting();
+        estimator.update(&ResolvedSample {
+            time_ns: i64::from(tick) * 100_000_000,
+            step_s: 0.1,
+            speed_mps: speed_mps + 0.07 * (random.random::<f64>() - 0.5),
+            traction_force_n: Some(push(second).max(0.0) * coasting.weight_kn),
+            brake_force_n: Some((-push(second)).max(0.0) * coasting.weight_kn),
+            ..coasting
+        });
+        estimator.write(&mut snapshot);
+    }
+    snapshot
+}
+
+fn estimator() -> TrainKalman {
+    let davis = Davis { a: 1.8, b: 0.0, c: 0.0 };
+    let train = TrainModel { rotating_mass_factor: 0.06, ..TrainModel::bare("t", 100e3, davis) };
+    TrainKalman::new(TrainKalmanSettings::default(), &Arc::new(train)).unwrap()
+}
+
+#[test]
+fn after_a_restart_the_mass_and_the_resistance_are_known_with_the_first_seconds() {
+    let mut first = estimator();
+    let before = driven(&mut first, 0, 300);
+    assert_eq!(before.status(), Status::Estimated);
+    assert!((before.values[3] / 110.0 - 1.0).abs() < 0.01, "{}", before.values[3]);
+    let kept = KeptEstimate::of(&before).unwrap().after(2.0);
+    let mut cold = estimator();
+    assert_eq!(driven(&mut cold, 300, 5).status(), Status::Unestimated);
+    let mut warm = estimator();
+    assert!(warm.warm_start(&kept));
+    let after = driven(&mut warm, 300, 5);
+    assert_eq!(after.status(), Status::Estimated, "{:?}", after.reason());
+    let std = |it: &ParameterSnapshot, i: usize| it.covariance[packed_index(i, i)].sqrt();
+    for i in [0, 3] {
+        assert!((after.values[i] - before.values[i]).abs() < 2.0 * std(&before, i), "{i}");
+    }
+    assert!(std(&after, 0) < 1.5 * std(&before, 0));
+    // Between the two somebody may have boarded.
+    assert!(std(&after, 3) < 0.015 * after.values[3]);
+}
