@@ -28,6 +28,7 @@ fn snapshot(epoch: u64, sequence: u64) -> ParameterSnapshot {
     let mut snapshot = ParameterSnapshot::empty();
     (snapshot.epoch, snapshot.sequence, snapshot.train_id) = (epoch, sequence, TRAIN.0);
     snapshot.pipeline_kind = PipelineKind::Rls as u32;
+    snapshot.usable_quantities = dynocar_shared::Quantity::Resistance.bit();
     snapshot.status = Status::Estimated as u32;
     snapshot.published_ns = monotonic_now_ns();
     snapshot.vouched_ns = snapshot.published_ns;

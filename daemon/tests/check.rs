@@ -138,7 +138,7 @@ sources
 
 notes
   run 1: cells missing: traction_force 1, brake_force 1
-  run 1: refused by validation: time_not_increasing 1
+  run 1: refused by validation: time_not_increasing 1 (in 1.csv:6, at 3 s)
 ";
 
 #[test]
@@ -217,7 +217,8 @@ fn a_broken_run_is_named_and_the_others_are_still_reported() {
     let folder = dataset("t,s,v,F,B\n0,0,x,0,0\n1,0,0,0,0\n");
     let output = check(folder.path(), &["."]);
     assert_eq!(output.status.code(), Some(2));
-    let message = "./2.csv:2: column 'v': expected a number or an empty cell, got 'x'";
+    let message = "./2.csv:2: column 'v': expected a number or an empty cell, got 'x'; for a line of units \
+                   below the names set units_row = true in [dataset]";
     assert_eq!(text(&output.stderr), format!("dynocar: {message}\n"));
     let report = text(&output.stdout);
     assert!(report.contains("    1  1.csv  fit       +1  100.0"), "{report}");

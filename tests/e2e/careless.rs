@@ -99,7 +99,7 @@ fn a_file_of_another_format_is_named_with_what_to_do() {
     let cases: [(&[u8], &str); 6] = [
         (&[0x1f, 0x8b, 8, 0, 0, 0, 0], "a gzip file: unpack it first"),
         (b"PK\x03\x04abc", "a zip file or a workbook: unpack it, or save the sheet as CSV"),
-        (&with_mark, "UTF-16: save the file as UTF-8"),
+        (&with_mark, "set encoding = \"utf-16le\" in [dataset]"),
         (&utf16, "UTF-16: save the file as UTF-8"),
         (&[0; 5000], "binary data"),
         (b"t,v\n0,\xb0\n", "not UTF-8: save the file as UTF-8"),

@@ -253,7 +253,7 @@ fn a_flight_recorder_keeps_what_lies_around_a_suspicion() {
         }
     }
     await_true("a stretch that is kept", || accounts().contains("suspicion_raised"));
-    assert!(accounts().contains("dragging_brake, evidence 35"), "{}", accounts());
+    assert!(accounts().contains("dragging_brake for 0.0 s, evidence 35"), "{}", accounts());
     signal(recorder.id(), Signal::INT);
     assert!(recorder.wait().unwrap().success());
     let recording = Recording::load(&ring.join("ring-000001.mcap")).unwrap();

@@ -21,7 +21,7 @@ fn a_recording_from_the_daemons_start_on_is_the_same_to_the_bit() {
     let samples = samples();
     let told = snapshots(&samples, 40);
     let verified = verified(&samples, &told);
-    assert_eq!(verified.len(), 4, "the shipped pipelines");
+    assert_eq!(verified.len(), 3, "the shipped pipelines");
     for it in &verified {
         assert_eq!((it.same, &it.outcome), (it.recorded, &Outcome::Same), "{}", it.name);
         assert!(it.recorded > 30, "{}: {} snapshots", it.name, it.recorded);
@@ -90,7 +90,7 @@ fn one_bit_that_is_another_is_found_with_field_and_sample() {
         }
         other => panic!("expected a difference, found {other:?}"),
     }
-    for place in [0, 2, 3] {
+    for place in [0, 2] {
         assert_eq!(verified[place].outcome, Outcome::Same);
     }
 }
@@ -101,7 +101,7 @@ fn a_sample_that_is_another_is_found() {
     let told = snapshots(&samples, 40);
     let changed = samples.iter().position(|it| it.speed_mps > 5.0).unwrap();
     samples[changed].speed_mps += 0.01;
-    for it in verified(&samples, &told).iter().filter(|it| it.name == "mass_kalman") {
+    for it in verified(&samples, &told).iter().filter(|it| it.name == "train_kalman") {
         let Outcome::Differs(found) = &it.outcome else { panic!("{:?}", it.outcome) };
         assert!(found.sample >= samples[changed].sequence, "{found:?}");
     }

@@ -66,12 +66,13 @@ fn watch(kind: PipelineKind, drives: &[Drive]) -> Found {
 
 #[test]
 fn a_trusted_mass_is_right_from_any_start_at_any_step_by_any_sensor() {
-    for kind in [PipelineKind::TrainKalman, PipelineKind::MassKalman] {
+    // The one is trusted once the resistance is known too.
+    for (kind, least) in [(PipelineKind::TrainKalman, 0.75), (PipelineKind::MassKalman, 0.85)] {
         let found = watch(kind, &drives(&Forces::ALL));
         assert_eq!(found.wrong, 0, "{kind} is trusted and wrong");
         // Refusing to estimate would keep the promise as well.
         let share = found.trusted as f64 / found.looks as f64;
-        assert!(share > 0.85, "{kind} is trusted at {share:.2} of the samples");
+        assert!(share > least, "{kind} is trusted at {share:.2} of the samples");
     }
 }
 

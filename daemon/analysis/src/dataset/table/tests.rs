@@ -148,7 +148,7 @@ fn lines_above_the_names_and_units_below_them_are_passed_over() {
     let message = refused("skip_rows = 1", "t,v\n0,1\n1,2\n");
     assert_eq!(
         message,
-        "a.csv:2: unknown column 't' (for time in dataset.toml:8; the names stand in line 1: set \
+        "a.csv:2: unknown column 't' (for time in dataset.toml:7; the names stand in line 1: set \
          skip_rows = 0 in [dataset]) (choices: '0', '1')"
     );
     assert_eq!(
