@@ -121,8 +121,8 @@ fn what_the_reading_guide_recommends_is_the_default_and_what_is_shipped() {
     }
     let recommended = guide.matches("**recommended**").count();
     assert_eq!(
-        recommended, 5,
-        "one for each quantity, the two of the brake alike, and the monitor"
+        recommended, 4,
+        "one for each quantity, those of the train and of the brake alike, and the monitor"
     );
 }
 

@@ -180,6 +180,7 @@ fn a_warm_start_is_sooner_estimated_and_no_less_right_than_a_cold_one() {
         PipelineKind::ResistanceKalman,
         PipelineKind::TrajectoryKalman,
         PipelineKind::MassKalman,
+        PipelineKind::TrainKalman,
     ];
     for kind in kinds {
         let (cold_first, cold) = feed(&mut pipeline(&dataset, kind), &samples);
@@ -246,19 +247,17 @@ fn killed_after_learning_the_next_daemon_of_the_shipped_configuration_starts_war
     cast.replay();
     let file = states.join("dynocar/train-1.state");
     let kept = || std::fs::read_to_string(&file).unwrap_or_default();
-    let is_kept = || ["trajectory_kalman", "mass_kalman"].iter().all(|it| kept().contains(it));
-    await_true(is_kept, || format!("both estimates in the state: {}", kept()));
+    let is_kept = || ["\"train_kalman\"", "mass_t"].iter().all(|it| kept().contains(it));
+    await_true(is_kept, || format!("the estimate in the state: {}", kept()));
     daemon.kill();
     let mode = std::fs::metadata(states.join("dynocar")).unwrap().permissions().mode();
     assert_eq!(mode & 0o777, 0o700);
 
     let daemon = daemon_of_user(&cast, &shipped(&cast, ""), states_text);
-    let first = cast.first_snapshot(PipelineKind::MassKalman);
+    let first = cast.first_snapshot(PipelineKind::TrainKalman);
     let log = stop(daemon);
-    for pipeline in ["trajectory_kalman", "mass_kalman"] {
-        let is_warm = |line: &&str| line.contains("warm start") && line.contains(pipeline);
-        assert!(log.lines().any(|line| is_warm(&line)), "{pipeline} in\n{log}");
-    }
+    let is_warm = |line: &str| line.contains("warm start") && line.contains("train_kalman");
+    assert!(log.lines().any(is_warm), "{log}");
     assert!(first.std(Parameter::Mass).is_some_and(f64::is_finite), "a mass that is known");
 }
 

@@ -197,7 +197,7 @@ fn a_line_says_all_of_a_train() {
         "resistance estimated (weak_excitation)",
         "a 1.498 ± 0.053 N/kN",
         "mass 1697 ± 12 t estimated (none)",
-        "adhesion ≥ 0.094 degraded (only_lower_bound)",
+        "adhesion ≥ 0.094 unestimated (only_lower_bound)",
         "suspect dragging_brake",
         "used 20310, rejected 2 (most: outlier), lost 0",
         "next: 60 s coasting from 25 m/s (90 km/h) halves the interval of c",

@@ -3,6 +3,7 @@
 //! A [`Pipeline`] is one estimator for one train with its own validation: the daemon feeds it
 //! from the channel, `dynocar identify` from a file, and both get the same bits.
 
+mod answers;
 pub mod braking;
 mod echo;
 mod estimator;

@@ -6,15 +6,12 @@ use dynocar_shared::{
     MassSource, Parameter, ParameterSnapshot, PipelineKind, Quantity, Reason, RejectionReason,
     Status,
 };
-use nalgebra::{SMatrix, Vector3};
 
 use super::bank::{Measured, MotionBank};
 use super::jump_share::JumpShare;
 use super::load::{Change, LoadWatch};
-use super::motion_filter::{
-    BRAKE_SCALE, COEFFICIENTS, FORCE_DELAY, LOAD, RESISTANCE, SPEED, State, StateCovariance, Step,
-    TRACTION_SCALE,
-};
+use super::motion_filter::{LOAD, SPEED, Step};
+use super::prior::Resistance;
 use super::report::Report;
 use super::settings::TrainKalmanSettings;
 use super::systematic::Systematic;
@@ -22,12 +19,11 @@ use crate::force::ResolvedSample;
 use crate::pipeline::judge::{Case, InputHealth};
 use crate::pipeline::motion::{BRIDGED_MAX_S, STANDING_MPS, SpeedNoise, SpeedRange};
 use crate::pipeline::output::{write_innovations, write_status};
-use crate::pipeline::resistance::regression::{scaled, unscaling};
 use crate::pipeline::resistance::sample::UnitSample;
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
-use crate::train::{Davis, TrainModel};
+use crate::train::TrainModel;
 
 /// Innovations that the published statistics look back over.
 const INNOVATION_MEMORY: u32 = 1000;
@@ -42,9 +38,6 @@ const MASS_MOVED_MIN_S: f64 = 3.0;
 const COMPLETE: u32 = Quantity::Resistance.bit() | Quantity::Mass.bit();
 /// How long a change of force is remembered, in s.
 const FORCE_RATE_MEMORY_S: f64 = 0.5;
-/// Share of a declared coefficient's standard deviation that comes from w0 at 20 m/s: a declared zero
-/// is no knowledge.
-const PRIOR_FLOOR_SHARE: f64 = 0.3;
 /// Innovations before they are judged to be alike.
 const JUDGED_MIN: f64 = 100.0;
 /// The greatest factor on the covariance by innovations that are larger or more alike than it says;
@@ -58,7 +51,7 @@ pub struct TrainKalman {
     train_kg: f64,
     train_length_m: f64,
     /// Resistance as declared or kept, scaled, with its covariance.
-    first: (Vector3<f64>, SMatrix<f64, COEFFICIENTS, COEFFICIENTS>),
+    first: Resistance,
     gate: SampleGate,
     bank: MotionBank,
     load: LoadWatch,
@@ -94,11 +87,8 @@ impl TrainKalman {
         train: &Arc<TrainModel>,
     ) -> Result<Self, SettingError> {
         settings.check_ranges()?;
-        let declared = scaled(&train.resistance);
-        let floor = PRIOR_FLOOR_SHARE * train.resistance.w0_n_per_kn(20.0).abs();
-        let stds = declared.map(|value| settings.prior_relative_std * (value.abs() + floor));
-        let first = (declared, SMatrix::from_diagonal(&stds.component_mul(&stds)));
-        let bank = first_bank(&settings, &first);
+        let first = Resistance::declared(&train.resistance, settings.prior_relative_std);
+        let bank = first.bank(&settings);
         Ok(TrainKalman {
             settings,
             train_kg: train.mass_kg,
@@ -221,7 +211,7 @@ impl TrainKalman {
     }
 
     fn reset(&mut self) {
-        self.bank = first_bank(&self.settings, &self.first);
+        self.bank = self.first.bank(&self.settings);
         self.noise.reset();
         self.jumps = JumpShare::default();
         self.moved_s = 0.0;
@@ -304,24 +294,6 @@ impl TrainKalman {
     }
 }
 
-/// The declared or kept resistance, forces and load as the settings trust them.
-fn first_bank(
-    settings: &TrainKalmanSettings,
-    (resistance, covariance): &(Vector3<f64>, SMatrix<f64, COEFFICIENTS, COEFFICIENTS>),
-) -> MotionBank {
-    let mut mean = State::zeros();
-    mean[LOAD] = 1.0;
-    mean.fixed_rows_mut::<COEFFICIENTS>(RESISTANCE).copy_from(resistance);
-    let mut all = StateCovariance::zeros();
-    all[(SPEED, SPEED)] = 1.0;
-    all[(LOAD, LOAD)] = (0.01 * settings.load_std_percent).powi(2);
-    all.fixed_view_mut::<COEFFICIENTS, COEFFICIENTS>(RESISTANCE, RESISTANCE).copy_from(covariance);
-    all[(TRACTION_SCALE, TRACTION_SCALE)] = settings.force_scale_std.powi(2);
-    all[(BRAKE_SCALE, BRAKE_SCALE)] = settings.force_scale_std.powi(2);
-    all[(FORCE_DELAY, FORCE_DELAY)] = settings.force_delay_std_s.powi(2);
-    MotionBank::new(&mean, &all)
-}
-
 impl Gated for TrainKalman {
     fn gate(&mut self) -> &mut SampleGate {
         &mut self.gate
@@ -385,10 +357,8 @@ impl Estimator for TrainKalman {
     fn warm_start(&mut self, kept: &KeptEstimate) -> bool {
         let davis = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
         let Some((mean, covariance)) = kept.moments(davis) else { return false };
-        let scale = SMatrix::from_diagonal(&unscaling().map(|factor| 1.0 / factor));
-        let davis = Davis { a: mean[0], b: mean[1], c: mean[2] };
-        self.first = (scaled(&davis), scale * covariance * scale);
-        self.bank = first_bank(&self.settings, &self.first);
+        self.first = Resistance::kept(&mean, &covariance);
+        self.bank = self.first.bank(&self.settings);
         self.report = Report::new(&self.bank.published());
         self.moved_min_s = CONFIRMED_S;
         self.kept_mass = kept.moments([Parameter::Mass]).and_then(|(mass_kg, variance)| {

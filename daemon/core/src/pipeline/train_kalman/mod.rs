@@ -16,6 +16,7 @@ mod estimator;
 mod jump_share;
 mod load;
 mod motion_filter;
+mod prior;
 mod report;
 mod settings;
 mod systematic;
