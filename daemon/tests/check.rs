@@ -223,7 +223,8 @@ fn a_broken_run_is_named_and_the_others_are_still_reported() {
     let report = text(&output.stdout);
     assert!(report.contains("    1  1.csv  fit       +1  100.0"), "{report}");
     assert!(report.contains("    2  2.csv  holdout   -1  error\n"), "{report}");
-    assert!(report.ends_with(&format!("  run 2: {message}\n")), "{report}");
+    let note = message.replace("units below", "units\n    below");
+    assert!(report.ends_with(&format!("  run 2: {note}\n")), "{report}");
 }
 
 #[test]

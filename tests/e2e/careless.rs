@@ -100,9 +100,9 @@ fn a_file_of_another_format_is_named_with_what_to_do() {
         (&[0x1f, 0x8b, 8, 0, 0, 0, 0], "a gzip file: unpack it first"),
         (b"PK\x03\x04abc", "a zip file or a workbook: unpack it, or save the sheet as CSV"),
         (&with_mark, "set encoding = \"utf-16le\" in [dataset]"),
-        (&utf16, "UTF-16: save the file as UTF-8"),
+        (&utf16, "set encoding = \"utf-16le\" in [dataset]"),
         (&[0; 5000], "binary data"),
-        (b"t,v\n0,\xb0\n", "not UTF-8: save the file as UTF-8"),
+        (b"t,v\n0,\xb0\n", "set its own encoding in [dataset], as encoding = \"windows-1252\""),
     ];
     for (bytes, words) in cases {
         let folder = dataset(&site, MANIFEST, bytes);
