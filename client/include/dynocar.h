@@ -49,7 +49,7 @@ extern "C" {
 
 #define DYNOCAR_SCHEMA 1u
 #define DYNOCAR_SAMPLE_LAYOUT UINT64_C(0xdc0c8856b34a4c70)
-#define DYNOCAR_SNAPSHOT_LAYOUT UINT64_C(0x09393d79d82bbec6)
+#define DYNOCAR_SNAPSHOT_LAYOUT UINT64_C(0x9393d79d82bbec6)
 
 #define DYNOCAR_PIPELINES_MAX 32      /* pipelines of one train */
 #define DYNOCAR_PARAMETERS_MAX 6      /* parameters that one pipeline estimates together */

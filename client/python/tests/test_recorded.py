@@ -115,7 +115,7 @@ def test_answers_are_those_of_the_commands(
     assert usual.to_dict() == answer_of("identify", recordings)
     every = dynocar.identify(recordings, all=True)
     names = [it.name for it in usual.estimators]
-    assert names[0] == "trajectory_kalman" and not every.not_run
+    assert names[0] == "train_kalman" and not every.not_run
     assert sorted(names + usual.not_run) == sorted(it.name for it in every.estimators)
     expected = answer_of("explain", recordings)
     assert expected.pop("predictions") == {}
