@@ -91,7 +91,7 @@ function compare(file, recording) {
 
   // Recorder and live view look at different moments, the recorder at nearly every one; of what both saw
   // each bit is the same.
-  const mass = "/train/1/1_mass_kalman";
+  const mass = "/train/1/0_train_kalman";
   const known = new Set(of(other, mass));
   const both = of(messages, mass).filter((it) => known.has(it)).length;
   assert.ok(both > 20, `${both} of ${of(messages, mass).length} snapshots are recorded too`);

@@ -57,7 +57,7 @@ await "$place/live" "a viewer has gone: 1 now"
 await "$place/viewer" "unadvertised /train/1/samples"
 node "$place/live.mjs" dashboard config/live/grafana_dashboard.json "http://127.0.0.1:$metrics/metrics"
 end daemon TERM
-await "$place/viewer" "unadvertised /train/1/3_residual_monitor"
+await "$place/viewer" "unadvertised /train/1/2_residual_monitor"
 end viewer INT
 end record INT
 end live INT
