@@ -14,7 +14,7 @@ pub const fn remedy(status: Status, reason: Option<Reason>) -> Option<&'static s
         Reason::NotIdentifiable => "other values fit as well: give one of them in the train's file",
         Reason::AtBound => "the data contradict the model: check forces and pressures",
         Reason::InnovationsTooLarge | Reason::InnovationsNotWhite => {
-            "the model lacks a force: see the suspect, then dynocar explain"
+            "the model lacks a force: record a run, dynocar explain says which"
         }
         Reason::BadInput => "many samples are refused: see the reasons by pipeline",
         Reason::MissingQuantity => "the controller must send what the pipeline's page asks for",
