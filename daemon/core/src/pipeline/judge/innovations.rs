@@ -23,8 +23,14 @@ pub fn are_too_large(mean_square: f64) -> bool {
 /// covariance, or by the variance of their sums over that of as many white ones of the expected
 /// size, if the correlation fades from lag to lag as it does over the first.
 pub fn are_alike(mean_square: f64, correlation: f64) -> bool {
-    let long_run = mean_square * (1.0 + correlation) / (1.0 - correlation).max(f64::EPSILON);
-    correlation * mean_square > COVARIANCE_MAX || long_run > LONG_RUN_MAX
+    correlation * mean_square > COVARIANCE_MAX
+        || long_run_variance(mean_square, correlation) > LONG_RUN_MAX
+}
+
+/// Variance of sums of innovations over that of as many white ones of the expected size, if their
+/// correlation fades from lag to lag as it does over the first.
+pub fn long_run_variance(mean_square: f64, correlation: f64) -> f64 {
+    mean_square * (1.0 + correlation) / (1.0 - correlation).max(f64::EPSILON)
 }
 
 /// Exponentially forgotten mean square and lag-1 correlation of normalised innovations.

@@ -9,7 +9,9 @@ mod innovations;
 mod input;
 mod lack_of_fit;
 
-pub use innovations::{InnovationMonitor, LONG_RUN_MAX, are_alike, are_too_large};
+pub use innovations::{
+    InnovationMonitor, LONG_RUN_MAX, are_alike, are_too_large, long_run_variance,
+};
 pub use input::{InputHealth, missing};
 pub use lack_of_fit::LackOfFit;
 

@@ -16,7 +16,7 @@ use super::report::Report;
 use super::settings::TrainKalmanSettings;
 use super::systematic::Systematic;
 use crate::force::ResolvedSample;
-use crate::pipeline::judge::{Case, InputHealth};
+use crate::pipeline::judge::{Case, InputHealth, LONG_RUN_MAX, long_run_variance};
 use crate::pipeline::motion::{BRIDGED_MAX_S, STANDING_MPS, SpeedNoise, SpeedRange};
 use crate::pipeline::output::{write_innovations, write_status};
 use crate::pipeline::resistance::sample::UnitSample;
@@ -40,10 +40,6 @@ const COMPLETE: u32 = Quantity::Resistance.bit() | Quantity::Mass.bit();
 const FORCE_RATE_MEMORY_S: f64 = 0.5;
 /// Innovations before they are judged to be alike.
 const JUDGED_MIN: f64 = 100.0;
-/// The greatest factor on the covariance by innovations that are larger or more alike than it says;
-/// beyond it they contradict the estimate.
-const INFLATION_MAX: f64 = 4.0;
-
 /// Resistance and mass of a train by Kalman filters over every sample.
 #[derive(Clone, Debug)]
 pub struct TrainKalman {
@@ -188,11 +184,8 @@ impl TrainKalman {
         self.jumps.learn(measured);
     }
 
-    /// Variance of sums of innovations over that of as many white ones of the expected size, if their
-    /// correlation fades from lag to lag as over the first.
     fn long_run(&self) -> f64 {
-        let (mean_square, correlation) = (self.monitor.mean_square(), self.monitor.correlation());
-        mean_square * (1.0 + correlation) / (1.0 - correlation).max(f64::EPSILON)
+        long_run_variance(self.monitor.mean_square(), self.monitor.correlation())
     }
 
     /// Innovations that are alike are made up for by wider intervals, up to a bound.
@@ -201,17 +194,19 @@ impl TrainKalman {
             return Some(Reason::InnovationsTooLarge);
         }
         let is_alike =
-            self.monitor.effective_count() >= JUDGED_MIN && self.long_run() > INFLATION_MAX;
+            self.monitor.effective_count() >= JUDGED_MIN && self.long_run() > LONG_RUN_MAX;
         is_alike.then_some(Reason::InnovationsNotWhite)
     }
 
     fn judge(&mut self) {
-        let inflation = self.long_run().clamp(1.0, INFLATION_MAX);
+        let inflation = self.long_run().clamp(1.0, LONG_RUN_MAX);
         self.report.take(&self.bank.published(), inflation, &self.systematic, &self.speeds);
     }
 
     fn reset(&mut self) {
         self.bank = self.first.bank(&self.settings);
+        let load_variance = self.load.prior_variance();
+        self.bank.each(|it| it.replace(LOAD, 1.0, load_variance));
         self.noise.reset();
         self.jumps = JumpShare::default();
         self.moved_s = 0.0;
@@ -280,11 +275,16 @@ impl TrainKalman {
         }
     }
 
+    /// What is wrong with the samples lately.
+    fn complaint(&self) -> Option<Reason> {
+        self.health.complaint().or(self.gate.complaint())
+    }
+
     fn case(&self) -> Case {
         let failure = (Status::Invalid, Reason::NumericalFailure);
         Case {
             fault: self.is_fresh_reset.then_some(failure),
-            input: self.health.complaint().or(self.gate.complaint()),
+            input: self.complaint(),
             is_ready: self.moved_s >= self.moved_min_s.min(MASS_MOVED_MIN_S),
             is_known: self.known_now() == COMPLETE,
             lacking: Status::Unestimated,
@@ -340,8 +340,12 @@ impl Estimator for TrainKalman {
         self.pass(sample)
     }
 
+    /// Before all is known, the status does not show what speaks against the part that is.
     fn known(&self, status: Status) -> u32 {
-        if matches!(status, Status::Estimated | Status::Unestimated) { self.known_now() } else { 0 }
+        let is_sound = matches!(status, Status::Estimated | Status::Unestimated)
+            && self.complaint().is_none()
+            && self.contradiction().is_none();
+        if is_sound { self.known_now() } else { 0 }
     }
 
     fn write(&self, snapshot: &mut ParameterSnapshot) {
