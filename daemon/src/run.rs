@@ -11,7 +11,7 @@ use std::sync::atomic::AtomicBool;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use crossbeam::channel::{Sender, bounded};
+use crossbeam_channel::{Sender, bounded};
 use dynocar_client::channel::SampleCount;
 use dynocar_client::peer::RoleLock;
 use dynocar_client::{ChannelError, Host, Role, SnapshotReader, monotonic_now_ns};

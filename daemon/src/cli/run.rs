@@ -34,7 +34,7 @@ pub fn execute(arguments: &RunArguments) -> Result<(), Failure> {
 }
 
 /// Starts the log as the configuration wants it.
-pub(super) fn start_log(config: &DaemonConfig) -> Result<(), Failure> {
+pub fn start_log(config: &DaemonConfig) -> Result<(), Failure> {
     let log = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         // A log that cannot be written is told nowhere, and ends no daemon.

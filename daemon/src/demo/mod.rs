@@ -18,7 +18,7 @@ use hdrhistogram::Histogram;
 
 pub use summary::{DemoAnswer, Summary};
 
-use dynocar_analysis::dataset::Dataset;
+use dynocar_dataset::Dataset;
 
 use crate::dataset::{self, LoadError};
 use crate::ending::{self, EndingError};

@@ -4,7 +4,7 @@ use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Quantity, Reaso
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
-use dynocar_analysis::dataset::Dataset;
+use dynocar_dataset::Dataset;
 
 /// The demo's result for machines.
 #[derive(Clone, Debug, Serialize)]

@@ -7,7 +7,7 @@ use dynocar_client::{Reading, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, PipelineKind};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
-use dynocar_analysis::dataset::Dataset;
+use dynocar_dataset::Dataset;
 
 use crate::output::tell;
 
