@@ -12,6 +12,7 @@
 //! - [`pipelines`]: the pipelines that a configuration asks for
 //! - [`programs`]: commands that are programs of their own
 //! - [`demo`]: the main job as a show
+//! - [`redrawn`]: lines on a terminal that later ones are written over
 //! - [`run`]: the daemon, every stage on one screen
 //! - [`runtime`]: its threads
 //! - [`shadow`]: models on trial, and the change from one to another
@@ -32,6 +33,7 @@ pub mod operator;
 pub mod output;
 pub mod pipelines;
 pub mod programs;
+pub mod redrawn;
 pub mod replay;
 pub mod run;
 pub mod runtime;

@@ -84,7 +84,7 @@ fn digests(path: &Path) -> Result<Vec<FileDigest>, LoadError> {
 
 /// SHA-256 of some bytes, in hexadecimal digits.
 pub fn hex(bytes: &[u8]) -> String {
-    format!("{:x}", Sha256::digest(bytes))
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// The command line of this process, as one would type it.
