@@ -4,12 +4,12 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-use dynocar::survey::read::{recordings, vehicle};
 use dynocar_analysis::survey::survey;
 use dynocar_tests::simulator::dataset_writer::write_dataset;
 use dynocar_tests::simulator::{
     EffectRequest, GnssReceiver, SimulatorSettings, TrainType, simulate,
 };
+use dynocar_workshop::survey::read::{recordings, vehicle};
 use serde::Serialize;
 
 use crate::output::give;

@@ -1,23 +1,33 @@
 //! Programs beside this one: what they are built on is nothing that a daemon needs.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::io;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+/// The program of what is done away from the controller.
+pub const WORKSHOP: &str = "dynocar-workshop";
 /// The program of everything about recordings.
 pub const RECORDING: &str = "dynocar-recording";
 /// The program of everything about Parquet.
 pub const PARQUET: &str = "dynocar-parquet";
 /// The program of the live screen.
 pub const WATCH: &str = "dynocar-watch";
+/// The program that serves viewers.
+pub const LIVE: &str = "dynocar-live";
+/// The program that forwards to a broker.
+pub const FORWARD: &str = "dynocar-forward";
+
+/// All of them.
+const PROGRAMS: [&str; 7] = [USUAL, WORKSHOP, RECORDING, PARQUET, WATCH, LIVE, FORWARD];
 
 /// What a user calls who calls a program through this one.
 const USUAL: &str = "dynocar";
 
 /// A call of a program that lies where this one lies; else the search path has it. It bears the name
-/// of the package that it is built from.
+/// of the package that it is built from, with the ending of this one's: `dynocar-2` calls
+/// `dynocar-workshop-2`.
 pub fn call(package: &str) -> Command {
     let mut command = Command::new(beside_this(package).unwrap_or_else(|| package.into()));
     command.arg0(USUAL);
@@ -66,8 +76,15 @@ pub fn output_of(package: &str, command: &mut Command) -> Result<(Vec<u8>, Strin
 
 fn beside_this(package: &str) -> Option<OsString> {
     let this: PathBuf = std::env::current_exe().ok()?;
-    let program = this.parent()?.join(package);
+    let ending = this.file_name().and_then(OsStr::to_str).map_or("", ending);
+    let program = this.parent()?.join(format!("{package}{ending}"));
     program.is_file().then(|| program.into_os_string())
+}
+
+/// What follows the name of a program of the project in a file's name; nothing for another file.
+fn ending(file: &str) -> &str {
+    let endings = PROGRAMS.iter().filter_map(|program| file.strip_prefix(program));
+    endings.min_by_key(|ending| ending.len()).unwrap_or("")
 }
 
 /// Why a program does not start, in words.
@@ -79,4 +96,16 @@ pub fn not_started(package: &str, error: &io::Error) -> String {
         );
     }
     format!("{package} cannot be started: {error}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn programs_of_one_ending_find_each_other() {
+        assert_eq!(["dynocar", "dynocar-workshop"].map(ending), ["", ""]);
+        assert_eq!(["dynocar-2", "dynocar-workshop-2"].map(ending), ["-2", "-2"]);
+        assert_eq!(ending("python3"), "");
+    }
 }

@@ -8,10 +8,10 @@
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use crossbeam::channel::{Sender, bounded};
 use dynocar_client::channel::SampleCount;
 use dynocar_client::peer::RoleLock;
 use dynocar_client::{ChannelError, Host, Role, SnapshotReader, monotonic_now_ns};
@@ -248,7 +248,7 @@ fn number_lanes(plans: &mut [WorkerPlan], train: TrainId, count: &SampleCount) {
 
 /// Starts one thread for each plan and waits until all of them have their ports open.
 fn start_workers(plans: Vec<WorkerPlan>) -> Result<Vec<JoinHandle<()>>, RunError> {
-    let (told, started) = bounded(plans.len());
+    let (told, started) = sync_channel(plans.len());
     let workers = plans
         .into_iter()
         .map(|plan| {
@@ -311,7 +311,7 @@ fn start_keeper(
         .map_err(|source| RunError::System { what: "state thread", source })
 }
 
-fn work(plan: WorkerPlan, told: Sender<Result<(), ChannelError>>) {
+fn work(plan: WorkerPlan, told: SyncSender<Result<(), ChannelError>>) {
     prepare_thread(&plan.thread);
     match Worker::start(plan) {
         Ok(mut worker) => {

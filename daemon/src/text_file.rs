@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Read};
 use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 
-use dynocar_analysis::dataset::FileProblem;
+use dynocar_dataset::FileProblem;
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
 /// A longer file is refused instead of filling the memory.

@@ -5,7 +5,7 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use dynocar_analysis::dataset::ColumnMapping;
+use dynocar_dataset::ColumnMapping;
 use dynocar_shared::TrainId;
 use tempfile::TempDir;
 

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use dynocar::config::is_slow;
-use dynocar::identify::default_estimators;
+use dynocar_analysis::identify::default_estimators;
 use dynocar_client::channel::SampleCount;
 use dynocar_client::{Host, SamplePublisher, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, SampleField, TrainId, TrainSample};

@@ -7,7 +7,7 @@ mod terms;
 
 use std::sync::Arc;
 
-use dynocar::identify::default_estimators;
+use dynocar_analysis::identify::default_estimators;
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Status, TrainSample};

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use dynocar::dataset;
-use dynocar::grown::write_grown;
 use dynocar_analysis::dataset::parse_train;
 use dynocar_analysis::explain::answer::{ParameterValue, Verdict};
 use dynocar_analysis::explain::effects::LIBRARY;
@@ -16,6 +15,7 @@ use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{
     Effect, EffectRequest, Law, SimulatedDataset, SimulatorSettings, TrainType, Unlisted, simulate,
 };
+use dynocar_workshop::grown::write_grown;
 
 const SEED: u64 = 23;
 

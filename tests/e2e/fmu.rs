@@ -5,8 +5,8 @@ use std::fs::{read, read_to_string, write};
 use std::path::{Path, PathBuf};
 
 use dynocar::dataset;
-use dynocar::identify::{identify, published_samples};
 use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::identify::{identify, published_samples};
 use dynocar_core::pipeline::EstimatorSettings;
 use dynocar_fmu::estimators::PIPELINES;
 use dynocar_fmu::ffi::Status;
@@ -122,7 +122,7 @@ fn every_output_has_the_bits_of_identify_at_every_moment_looked_at() {
     for run in 1..=dataset.runs.len() {
         let name = format!("inputs/run_{run:02}.csv");
         let text = read_to_string(site.path().join(name)).unwrap();
-        assert!(text.starts_with(dynocar::fmu::INPUTS_MARK));
+        assert!(text.starts_with(dynocar_workshop::fmu::INPUTS_MARK));
         let mut lines = text.lines();
         let header: Vec<&str> = lines.next().unwrap().split(',').collect();
         for row in lines {
@@ -262,7 +262,8 @@ fn a_library_that_is_not_there_or_another_is_refused_in_words() {
     };
     refusal("nowhere.so", "nowhere.so: cannot be read: No such file");
     refusal("other.so", "other.so: expected the libdynocar_fmu.so of this release");
-    let error = dynocar::fmu::find_library(Path::new("/nowhere/dynocar")).unwrap_err().to_string();
+    let error =
+        dynocar_workshop::fmu::find_library(Path::new("/nowhere/dynocar")).unwrap_err().to_string();
     assert!(error.starts_with("no libdynocar_fmu.so of this release in /nowhere/deps"), "{error}");
     assert!(error.contains("`cargo build --release -p dynocar-fmu`"), "{error}");
 }

@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use dynocar::config::is_slow;
 use dynocar::dataset;
-use dynocar::identify::{default_estimators, identify, published_samples};
 use dynocar::replay::{Rate, Replayer};
 use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::identify::{default_estimators, identify, published_samples};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId};
 use dynocar_tests::golden::{self, Golden, TOLERANCE, without_stamps};
 use dynocar_tests::process::Site;

@@ -1,6 +1,5 @@
 //! What `explain` fits, written as files, is what the daemon then applies, to the bit.
 
-use dynocar::grown::grow;
 use dynocar_analysis::dataset::{Dataset, parse_track, parse_train};
 use dynocar_analysis::explain::effects::{Candidate, LIBRARY, Proposal, UNKNOWN};
 use dynocar_analysis::explain::evidence::prepare;
@@ -14,6 +13,7 @@ use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{
     Effect, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate,
 };
+use dynocar_workshop::grown::grow;
 
 /// A dataset on which every kind can be tried, without wheel slip and outliers.
 fn simulated() -> SimulatedDataset {

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use dynocar::config::is_slow;
 use dynocar::dataset;
-use dynocar::identify::{default_estimators, identify, published_samples};
 use dynocar::replay::{Rate, ReplayReport, Replayer};
+use dynocar_analysis::identify::{default_estimators, identify, published_samples};
 use dynocar_shared::{ParameterSnapshot, TrainId};
 use dynocar_tests::golden::without_stamps;
 use dynocar_tests::process::Site;

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
-use dynocar::learn::{Bounds, LearnError, Learner, LearnerSettings};
 use dynocar::models::{ModelText, Store, TrainModels};
 use dynocar_client::channel::Transport;
 use dynocar_client::peer::RoleLock;
@@ -15,6 +14,7 @@ use dynocar_shared::{ParameterSnapshot, PipelineKind, Status, TrainId};
 use dynocar_tests::process::{Process, Site};
 use dynocar_tests::simulator::dataset_writer::dataset_files;
 use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
+use dynocar_workshop::learn::{Bounds, LearnError, Learner, LearnerSettings};
 use rustix::process::Signal;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");

@@ -7,8 +7,8 @@ use std::cell::Cell;
 use std::path::Path;
 use std::sync::Arc;
 
-use dynocar::identify::published_samples;
 use dynocar::runtime::exchange::Exchange;
+use dynocar_analysis::identify::published_samples;
 use dynocar_client::channel::{Sender, Transport};
 use dynocar_client::{NoAnswer, SamplePublisher, SnapshotReader, monotonic_now_ns};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};

@@ -133,6 +133,8 @@ fn every_unsafe_block_is_counted_and_justified() {
         "client/src",
         "client/python/src",
         "daemon/src",
+        "daemon/workshop/src",
+        "daemon/dataset/src",
         "daemon/core/src",
         "daemon/analysis/src",
         "daemon/fmu/src",

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use dynocar::dataset;
-use dynocar::identify::published_samples;
 use dynocar::replay::{Rate, Replayer};
 use dynocar::state::{entry::StateContent, file};
 use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::identify::published_samples;
 use dynocar_client::{SnapshotReader, monotonic_now_ns};
 use dynocar_core::pipeline::{EstimatorSettings, KeptEstimate, Pipeline};
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Status, TrainId, TrainSample};

@@ -2,13 +2,13 @@
 //! what the time offset of a survey says of them, and what is then explained.
 
 use dynocar::dataset;
-use dynocar::survey::survey_folder;
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::explain;
 use dynocar_tests::simulator::dataset_writer::write_dataset;
 use dynocar_tests::simulator::{
     EffectRequest, ForceSampling, GnssReceiver, SimulatorSettings, TrainType, simulate,
 };
+use dynocar_workshop::survey::survey_folder;
 
 /// Seeds of which none took part in a choice.
 const SEEDS: std::ops::Range<u64> = 65_000..65_004;

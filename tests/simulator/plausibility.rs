@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use dynocar::dataset;
-use dynocar::identify::{default_estimators, identify, published_samples};
+use dynocar_analysis::identify::{default_estimators, identify, published_samples};
 use dynocar_core::plausibility::Severity;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Reason, Status, TrainId};

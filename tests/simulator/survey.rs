@@ -1,8 +1,6 @@
 //! A simulated railway with GNSS and without a line file, surveyed and explained.
 
 use dynocar::dataset;
-use dynocar::survey::answer::Answer;
-use dynocar::survey::survey_folder;
 use dynocar_analysis::explain::answer::Verdict;
 use dynocar_analysis::explain::{Explanation, explain};
 use dynocar_shared::vocabulary::EffectKind;
@@ -10,6 +8,8 @@ use dynocar_tests::simulator::dataset_writer::write_dataset;
 use dynocar_tests::simulator::{
     Effect, EffectRequest, GnssReceiver, SimulatedDataset, SimulatorSettings, TrainType, simulate,
 };
+use dynocar_workshop::survey::answer::Answer;
+use dynocar_workshop::survey::survey_folder;
 
 /// A regional railway of about 30 km: six runs to fit and two held out, each over the whole line.
 fn railway(seed: u64, effects: EffectRequest) -> SimulatorSettings {

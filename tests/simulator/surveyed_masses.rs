@@ -3,15 +3,15 @@
 use std::path::Path;
 
 use dynocar::dataset;
-use dynocar::identify::identify;
-use dynocar::survey::survey_folder;
 use dynocar_analysis::dataset::{Dataset, Role, Run};
+use dynocar_analysis::identify::identify;
 use dynocar_core::pipeline::EstimatorSettings;
 use dynocar_shared::{Parameter, PipelineKind, SampleField, TrainSample};
 use dynocar_tests::simulator::dataset_writer::write_dataset;
 use dynocar_tests::simulator::{
     EffectRequest, GnssReceiver, SimulatorSettings, TrainType, simulate,
 };
+use dynocar_workshop::survey::survey_folder;
 
 /// Samples of a piece of a run, at 5 Hz.
 const PIECE: usize = 600;

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use dynocar::dataset;
-use dynocar::identify::{default_estimators, published_samples};
+use dynocar_analysis::identify::{default_estimators, published_samples};
 use dynocar_core::pipeline::Pipeline;
 use dynocar_shared::{ParameterSnapshot, TrainId};
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// The source folders of all packages.
-pub const FOLDERS: [&str; 14] = [
+pub const FOLDERS: [&str; 16] = [
     "shared/src",
     "client/src",
     "client/forward/src",
@@ -13,9 +13,11 @@ pub const FOLDERS: [&str; 14] = [
     "client/recording/src",
     "client/watch/src",
     "daemon/core/src",
+    "daemon/dataset/src",
     "daemon/analysis/src",
     "daemon/fmu/src",
     "daemon/src",
+    "daemon/workshop/src",
     "bench/src",
     "tests/src",
 ];

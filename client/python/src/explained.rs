@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use dynocar::cli::Failure;
-use dynocar::cli::explain as command;
-use dynocar::report::images::images;
-use dynocar::report::provenance::command_line;
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::score::PredictedRun;
+use dynocar_workshop::cli::explain as command;
+use dynocar_workshop::report::images::images;
+use dynocar_workshop::report::provenance::command_line;
 use pyo3::prelude::*;
 
 use crate::background::in_background;

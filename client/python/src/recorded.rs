@@ -2,9 +2,11 @@
 
 use std::path::PathBuf;
 
-use dynocar::cli::check::{self as checking, Understood};
-use dynocar::cli::{Failure, identify as identifying};
+use dynocar::cli::Failure;
+use dynocar::cli::check::refusal;
 use dynocar::output::OutputError;
+use dynocar_workshop::cli::check::{self as checking, Understood};
+use dynocar_workshop::cli::identify as identifying;
 use pyo3::prelude::*;
 use serde::Serialize;
 
@@ -28,7 +30,7 @@ pub(crate) fn check(py: Python<'_>, path: PathBuf) -> PyResult<Answer> {
         Err(failure) => match failure.answer() {
             Some(error) => {
                 let words = error.message.clone();
-                Ok((json(&checking::refusal(&path, error))?, words))
+                Ok((json(&refusal(&path, error))?, words))
             }
             None => Err(failure),
         },

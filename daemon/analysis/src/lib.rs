@@ -7,7 +7,8 @@
 //! # Layout, in the order of the work
 //!
 //! - [`import`]: trains and lines from other projects' files
-//! - [`dataset`]: recorded runs, from texts to the samples that a controller would publish
+//! - [`dataset`]: recorded runs, from texts to the samples that a controller would publish; a library of its own
+//! - [`identify`]: the daemon's pipelines over recorded runs
 //! - [`survey`]: a line and its gradient from recordings with GNSS
 //! - [`stops`]: what recorded stops say of a brake of unknown force
 //! - [`explain`]: which undeclared effect explains what the declared model leaves
@@ -15,9 +16,11 @@
 //! - [`advice`]: what to drive next, so that the estimates become sharper
 
 pub mod advice;
-pub mod dataset;
 pub mod driven;
 pub mod explain;
+pub mod identify;
 pub mod import;
 pub mod stops;
 pub mod survey;
+
+pub use dynocar_dataset as dataset;

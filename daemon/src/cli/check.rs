@@ -1,135 +1,133 @@
-//! `dynocar check`: reads a dataset, a train, a track or a daemon configuration and says what it
-//! understood.
+//! `dynocar check` of a daemon's configuration; what else can be checked, the workshop checks.
 
 mod daemon;
-mod draw;
-mod json;
-mod report;
-mod runs;
-mod understood;
-
-pub use understood::Understood;
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use dynocar_analysis::dataset::{Place, parse_track, parse_train, top_keys};
+use dynocar_dataset::{Note, top_keys};
 use serde::Serialize;
 
+pub use daemon::{DaemonAnswer, answer, read, report};
+
+use super::companion::{become_it, words_of_command};
 use super::{ErrorAnswer, Failure};
-use crate::dataset::{self, FileKind, LoadError, file_error, kind_of, read_text};
-use crate::output::{give, require_file, require_folder, tell, write_json};
+use crate::config::DaemonConfig;
+use crate::dataset::{FileKind, file_error, is_recording, kind_of, read_text};
+use crate::output::{give, require_file, tell, write_json};
+use crate::programs::WORKSHOP;
 
 /// Validate a dataset, train, track or daemon configuration and say what was understood.
 #[derive(Clone, Debug, Args)]
 pub struct CheckArguments {
     /// A dataset's folder or its dataset.toml, a recording, a train.toml, a track.toml or a daemon.toml.
-    path: PathBuf,
+    pub path: PathBuf,
     /// Also write the result as JSON; '-' for standard output.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    pub json: Option<PathBuf>,
     /// Also draw the line's profile and the train's effort curves as SVG into this folder.
     #[arg(long, value_name = "FOLDER")]
-    draw: Option<PathBuf>,
+    pub draw: Option<PathBuf>,
 }
 
-/// Runs `dynocar check`.
+/// The answer of `dynocar check --json`, whatever was checked.
+#[derive(Debug, Serialize)]
+pub struct CheckAnswer<C> {
+    /// What was checked.
+    pub path: String,
+    /// What it is; `null` when nothing could be understood.
+    pub kind: Option<FileKind>,
+    /// True without errors.
+    pub valid: bool,
+    /// What is wrong.
+    pub errors: Vec<String>,
+    /// The first of them, as every command gives it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<ErrorAnswer>,
+    /// What may spoil results, the worst first.
+    pub notes: Vec<Note>,
+    /// What was understood.
+    #[serde(flatten)]
+    pub content: Option<C>,
+}
+
+/// What was understood of a daemon's configuration.
+#[derive(Debug, Serialize)]
+struct Content<'a> {
+    daemon: DaemonAnswer<'a>,
+}
+
+/// Checks a daemon's configuration, or becomes the workshop, which checks everything else.
 ///
 /// # Errors
 ///
-/// When the path leads to nothing known or a file is wrong; everything that could be read has
-/// been reported by then.
-pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
+/// When the file is wrong, or there is no workshop.
+pub fn execute(arguments: &CheckArguments) -> Result<(), Failure> {
     let (path, json) = (&arguments.path, arguments.json.as_deref());
     if let Some(file) = json {
         require_file(file, "{")?;
     }
-    if let Some(folder) = &arguments.draw {
-        require_folder(folder)?;
+    let is_ours = or_refused(path, json, may_be_configuration(path))?;
+    if !is_ours || arguments.draw.is_some() {
+        return become_it(WORKSHOP, Some("check"), &words_of_command());
     }
-    let understood = match understand(path) {
-        Ok(understood) => understood,
-        Err(failure) => {
-            if let (Some(file), Some(error)) = (json, failure.answer()) {
-                // The exit status is that of what is wrong with the input.
-                if let Err(error) = write_json(file, &refusal(path, error)) {
-                    tell(&format!("dynocar: {error}"));
-                }
-            }
-            return Err(failure);
-        }
-    };
-    give(json, &understood.answer(path), || understood.text())?;
-    if let Some(folder) = &arguments.draw {
-        draw::draw(&understood, folder)?;
-    }
-    let errors: Vec<_> = understood.errors().map(ToString::to_string).collect();
-    if errors.is_empty() { Ok(()) } else { Err(Failure::Input(errors.join("\ndynocar: "))) }
+    let config = or_refused(path, json, read(path))?;
+    give(json, &understood(path, &config), || report(&config))?;
+    Ok(())
 }
 
-/// The answer, for machines, where nothing could be understood.
-pub fn refusal(path: &Path, error: ErrorAnswer) -> impl Serialize {
-    json::refusal(path, error)
-}
-
-impl Understood {
-    /// The answer for machines.
-    pub fn answer(&self, path: &Path) -> impl Serialize {
-        json::answer(path, self)
-    }
-
-    /// The answer for people.
-    pub fn text(&self) -> String {
-        report::report(self)
+/// What there is to say, for machines, where nothing could be understood.
+pub fn refusal(path: &Path, error: ErrorAnswer) -> CheckAnswer<()> {
+    CheckAnswer {
+        path: path.display().to_string(),
+        kind: None,
+        valid: false,
+        errors: vec![error.message.clone()],
+        error: Some(error),
+        notes: Vec::new(),
+        content: None,
     }
 }
 
-/// Reads whatever a path leads to; the errors of single runs are within.
+/// A result, or its failure once machines know it.
 ///
 /// # Errors
 ///
-/// When the path leads to nothing known, or a file that everything rests on is wrong.
-pub fn understand(path: &Path) -> Result<Understood, Failure> {
-    if !path.is_file() || dataset::is_recording(path) {
-        return read_dataset(path);
+/// That failure.
+pub fn or_refused<T>(
+    path: &Path,
+    json: Option<&Path>,
+    result: Result<T, Failure>,
+) -> Result<T, Failure> {
+    if let Err(failure) = &result
+        && let (Some(file), Some(error)) = (json, failure.answer())
+        // The exit status is that of what is wrong with the input.
+        && let Err(error) = write_json(file, &refusal(path, error))
+    {
+        tell(&format!("dynocar: {error}"));
+    }
+    result
+}
+
+fn understood<'a>(path: &Path, config: &'a DaemonConfig) -> CheckAnswer<Content<'a>> {
+    CheckAnswer {
+        path: path.display().to_string(),
+        kind: Some(FileKind::Daemon),
+        valid: true,
+        errors: Vec::new(),
+        error: None,
+        notes: Vec::new(),
+        content: Some(Content { daemon: answer(config) }),
+    }
+}
+
+/// True for a configuration, by its tables; a TOML file that cannot be read is refused here.
+fn may_be_configuration(path: &Path) -> Result<bool, Failure> {
+    let is_toml = path.extension().is_some_and(|extension| extension == "toml");
+    if !is_toml || !path.is_file() || is_recording(path) {
+        return Ok(false);
     }
     let label = path.display().to_string();
-    let refuse = |message| Err(Failure::At(Place::whole(&label), message));
     let text = read_text(path).map_err(|problem| file_error(&label, problem))?;
-    if path.extension().is_none_or(|extension| extension != "toml") {
-        return refuse(format!("{label}: not a TOML file; {EXPECTED}"));
-    }
-    let keys = top_keys(&label, &text)?;
-    Ok(match kind_of(&keys) {
-        Some(FileKind::Dataset) => return read_dataset(path),
-        Some(FileKind::Train) => Understood::Train(Box::new(parse_train(&label, &text)?)),
-        Some(FileKind::Track) => Understood::Track(Box::new(parse_track(&label, &text)?)),
-        Some(FileKind::Daemon) => return daemon::read(path),
-        None => return refuse(format!("{label}: {}; {EXPECTED}", found(&keys))),
-    })
-}
-
-const EXPECTED: &str = "expected a dataset's folder or its dataset.toml (with a table [dataset]), \
-                        a train.toml ([train]), a track.toml ([track]) or a daemon.toml ([trains] \
-                        and [pipelines])";
-
-fn found(keys: &[String]) -> String {
-    if keys.is_empty() {
-        return "the file is empty".into();
-    }
-    let names: Vec<_> = keys.iter().take(8).map(|key| format!("[{key}]")).collect();
-    let more = if keys.len() > names.len() { ", …" } else { "" };
-    format!("not a file that can be checked: it holds {}{more}", names.join(", "))
-}
-
-fn read_dataset(path: &Path) -> Result<Understood, Failure> {
-    let (folder, head) = dataset::open(path).map_err(|error| match error {
-        LoadError::NotADataset { .. } => {
-            let place = Place::whole(&path.display().to_string());
-            Failure::At(place, format!("{error}; {EXPECTED}"))
-        }
-        other => other.into(),
-    })?;
-    let runs = (0..head.manifest.runs.len()).map(|index| head.read_run(&folder, index)).collect();
-    Ok(Understood::Dataset(Box::new(head), runs))
+    Ok(kind_of(&top_keys(&label, &text)?) == Some(FileKind::Daemon))
 }

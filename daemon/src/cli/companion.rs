@@ -30,6 +30,11 @@ impl From<Vec<OsString>> for Passed {
     }
 }
 
+/// What the user wrote after the command.
+pub fn words_of_command() -> Passed {
+    Passed { words: std::env::args_os().skip(2).collect() }
+}
+
 /// Becomes the program that carries out a command, with the command's words.
 ///
 /// `package` is the program's name and that of the package it is built from; `command` is the word that

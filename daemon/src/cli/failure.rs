@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use dynocar_analysis::dataset::{DatasetError, Place};
+use dynocar_dataset::{DatasetError, Place};
 use serde::Serialize;
 
 use crate::config::ConfigError;

@@ -1,29 +1,18 @@
-//! The commands of `dynocar`, one file each; what `check`, `explain` and `identify` answer is there for
-//! other callers, too.
+//! The commands of `dynocar`, one file each. What is not needed beside a controller, the workshop and
+//! other programs carry out; a user calls them all by this name.
 //!
 //! Messages for people go to standard error, results to standard output. Exit status: 0 done,
 //! 1 the work failed, 2 the command line or an input file is wrong; `health` has some of its own.
 
 pub mod check;
 mod companion;
-mod completions;
 mod demo;
-pub mod explain;
 mod failure;
-mod fmu;
 mod health;
-pub mod identify;
-mod import;
-mod init;
-mod learn;
-mod man;
-mod models;
+pub mod models;
 mod replay;
-mod run;
-mod stops;
-mod survey;
-mod text;
-mod train_text;
+pub mod run;
+pub mod text;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -32,8 +21,9 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 pub use failure::{ErrorAnswer, Failure};
 
+use self::companion::{Passed, become_it};
 use crate::output::{OutputError, write_json};
-use crate::programs::RECORDING;
+use crate::programs::{FORWARD, LIVE, RECORDING, WATCH, WORKSHOP};
 use crate::unpacking::program_for;
 
 /// Dynocar, a dynamometer car in software.
@@ -44,63 +34,107 @@ struct Arguments {
     command: Command,
 }
 
+/// In the order of the help; what `Passed` follows is another program's, whose help says the same in
+/// one line (`tests/e2e/two_programs.rs`).
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::DemoArguments),
-    Init(init::InitArguments),
-    Import(import::ImportArguments),
-    Explain(explain::ExplainArguments),
+    /// Write a first train.toml and daemon.toml and, from recordings, a dataset.toml that says of every
+    /// column what it was taken for and why. Nothing is overwritten. On a terminal, without a folder, it
+    /// asks for all that is not said.
+    Init(Passed),
+    /// Write a train.toml and a track.toml out of files of railtoolkit, TTOBench or OSRD, and say of every
+    /// field what became of it. Nothing is overwritten.
+    Import(Passed),
+    /// Find what the declared model leaves, trace it to an effect, and score the grown model.
+    Explain(Passed),
     Run(run::RunArguments),
     Health(health::HealthArguments),
     Check(check::CheckArguments),
     Replay(replay::ReplayArguments),
-    Identify(identify::IdentifyArguments),
-    Stops(stops::StopsArguments),
-    Survey(survey::SurveyArguments),
-    Fmu(fmu::FmuArguments),
-    Learn(learn::LearnArguments),
+    /// Learn the train's parameters from recorded runs with the daemon's own pipelines.
+    Identify(Passed),
+    /// Deceleration over speed, friction and stopping distance from recorded stops: from speed alone,
+    /// and the command of the brake where it is recorded.
+    Stops(Passed),
+    /// Find the line that raw recordings drive, its gradient from the forces, and cut them into trips.
+    Survey(Passed),
+    /// Write the estimators, or the train itself, as an FMU for co-simulation (FMI 2.0), for Simulink,
+    /// OpenModelica, Dymola or FMPy.
+    Fmu(Passed),
+    /// Learn from recorded runs what the model in force lacks, and put it into the store as a candidate: at the
+    /// start, when the daemon's residual monitor suspects something new, and at an hour
+    Learn(Passed),
     Models(models::ModelsArguments),
     /// Record what a controller and the daemon write, as MCAP
-    Record(companion::Passed),
+    Record(Passed),
     /// Keep the last hours in a ring on disk, and for good what lies around a suspicion or a fault
-    FlightRecorder(companion::Passed),
+    FlightRecorder(Passed),
     /// Ask a flight recorder to keep this moment for good
-    Keep(companion::Passed),
+    Keep(Passed),
     /// Make a recording whole whose recorder died
-    Recover(companion::Passed),
+    Recover(Passed),
     /// Change recordings between MCAP, CSV datasets and Parquet
-    Convert(companion::Passed),
+    Convert(Passed),
     /// See in the terminal what the daemon knows of a train, and what to drive next
-    Watch(companion::Passed),
+    Watch(Passed),
     /// Serve samples, snapshots and events live to Foxglove or Lichtblick
-    Live(companion::Passed),
+    Live(Passed),
     /// Forward what the daemon knows to an MQTT broker, as Sparkplug B
-    Forward(companion::Passed),
-    Completions(completions::CompletionsArguments),
-    Man(man::ManArguments),
+    Forward(Passed),
+    /// Print the completions of all commands and options for a shell.
+    Completions(Passed),
+    /// Write the pages of the manual, one for every command.
+    Man(Passed),
 }
 
 impl Command {
-    /// Where machines want the result.
+    /// Carries the command out, or becomes the program that does.
+    fn execute(&self) -> Result<(), Failure> {
+        let workshop = |command, passed| become_it(WORKSHOP, Some(command), passed);
+        let recording = |command, passed| become_it(RECORDING, Some(command), passed);
+        match self {
+            Command::Demo(arguments) => demo::execute(arguments),
+            Command::Run(arguments) => run::execute(arguments),
+            Command::Health(arguments) => health::execute(arguments),
+            Command::Check(arguments) => check::execute(arguments),
+            Command::Replay(arguments) => replay::execute(arguments),
+            Command::Models(arguments) => models::execute(arguments),
+            Command::Init(passed) => workshop("init", passed),
+            Command::Import(passed) => workshop("import", passed),
+            Command::Explain(passed) => workshop("explain", passed),
+            Command::Identify(passed) => workshop("identify", passed),
+            Command::Stops(passed) => workshop("stops", passed),
+            Command::Survey(passed) => workshop("survey", passed),
+            Command::Fmu(passed) => workshop("fmu", passed),
+            Command::Learn(passed) => workshop("learn", passed),
+            Command::Completions(passed) => workshop("completions", passed),
+            Command::Man(passed) => workshop("man", passed),
+            Command::Record(passed) => recording("record", passed),
+            Command::FlightRecorder(passed) => recording("flight-recorder", passed),
+            Command::Keep(passed) => recording("keep", passed),
+            Command::Recover(passed) => recording("recover", passed),
+            Command::Convert(passed) => {
+                become_it(program_for(passed.words()), Some("convert"), passed)
+            }
+            Command::Watch(passed) => become_it(WATCH, None, passed),
+            Command::Live(passed) => become_it(LIVE, None, passed),
+            Command::Forward(passed) => become_it(FORWARD, None, passed),
+        }
+    }
+
+    /// Where machines want the result; `check` has an answer of its own for what is wrong.
     fn json(&self) -> Option<&Path> {
         match self {
             Command::Demo(arguments) => arguments.json.as_deref(),
-            Command::Explain(arguments) => arguments.json.as_deref(),
-            Command::Identify(arguments) => arguments.json.as_deref(),
-            Command::Stops(arguments) => arguments.json.as_deref(),
-            Command::Survey(arguments) => arguments.json.as_deref(),
-            // `check` has an answer of its own for what is wrong.
-            Command::Check(_) | Command::Run(_) | Command::Health(_) | Command::Replay(_) => None,
-            Command::Init(_) | Command::Import(_) | Command::Fmu(_) => None,
-            Command::Learn(_) | Command::Models(_) => None,
-            Command::FlightRecorder(_) | Command::Keep(_) => None,
-            Command::Record(_) | Command::Recover(_) | Command::Convert(_) | Command::Watch(_) => {
-                None
-            }
-            Command::Live(_) | Command::Forward(_) => None,
-            Command::Completions(_) | Command::Man(_) => None,
+            _ => None,
         }
     }
+}
+
+/// All commands, with the options of those that this program carries out itself.
+pub fn commands() -> clap::Command {
+    Arguments::command()
 }
 
 /// Parses the command line, runs the command, reports a failure on standard error.
@@ -109,37 +143,7 @@ pub fn main() -> ExitCode {
         Ok(arguments) => arguments,
         Err(status) => return status,
     };
-    let result: Result<(), Failure> = match &arguments.command {
-        Command::Demo(arguments) => demo::execute(arguments),
-        Command::Init(arguments) => init::execute(arguments),
-        Command::Import(arguments) => import::execute(arguments),
-        Command::Explain(arguments) => explain::execute(arguments),
-        Command::Run(arguments) => run::execute(arguments),
-        Command::Health(arguments) => health::execute(arguments),
-        Command::Check(arguments) => check::run(arguments),
-        Command::Replay(arguments) => replay::execute(arguments),
-        Command::Identify(arguments) => identify::execute(arguments),
-        Command::Stops(arguments) => stops::execute(arguments),
-        Command::Survey(arguments) => survey::execute(arguments),
-        Command::Fmu(arguments) => fmu::execute(arguments),
-        Command::Learn(arguments) => learn::execute(arguments),
-        Command::Models(arguments) => models::execute(arguments),
-        Command::Record(passed) => companion::become_it(RECORDING, Some("record"), passed),
-        Command::FlightRecorder(passed) => {
-            companion::become_it(RECORDING, Some("flight-recorder"), passed)
-        }
-        Command::Keep(passed) => companion::become_it(RECORDING, Some("keep"), passed),
-        Command::Recover(passed) => companion::become_it(RECORDING, Some("recover"), passed),
-        Command::Convert(passed) => {
-            companion::become_it(program_for(passed.words()), Some("convert"), passed)
-        }
-        Command::Watch(passed) => companion::become_it("dynocar-watch", None, passed),
-        Command::Live(passed) => companion::become_it("dynocar-live", None, passed),
-        Command::Forward(passed) => companion::become_it("dynocar-forward", None, passed),
-        Command::Completions(arguments) => completions::execute(arguments, Arguments::command()),
-        Command::Man(arguments) => man::execute(arguments, Arguments::command()),
-    };
-    match result {
+    match arguments.command.execute() {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report("dynocar", arguments.command.json()),
     }

@@ -10,7 +10,6 @@ use dynocar_shared::TrainId;
 use super::Failure;
 use super::text::short;
 use crate::config::DaemonConfig;
-use crate::learn::finding::shown_figure;
 use crate::models::decision::Choice;
 use crate::models::difference::differences;
 use crate::models::history::{History, State};
@@ -133,7 +132,7 @@ fn failure(error: ModelsError) -> Failure {
 /// # Errors
 ///
 /// When the configuration names none.
-pub(super) fn store(named: Option<&Path>, config: Option<&DaemonConfig>) -> Result<Store, Failure> {
+pub fn store(named: Option<&Path>, config: Option<&DaemonConfig>) -> Result<Store, Failure> {
     let of_config = config.map(|config| config.models.as_ref().map(|it| it.directory.as_path()));
     match (named, of_config) {
         (Some(directory), _) | (None, Some(Some(directory))) => Ok(Store::at(directory)),
@@ -241,7 +240,7 @@ fn show(models: &TrainModels, stored: &Stored, state: State) -> String {
             effect.intervals_m.iter().map(|[from, to]| format!("{from:.0}–{to:.0} m")).collect();
         row("adds", [effect.kind.replace('_', " "), places.join(", ")].join(" ").trim_end());
         for (name, figure) in &effect.parameters {
-            row("", &shown_figure(name, *figure));
+            row("", &figure.shown(name));
         }
     }
     if let Some(sha256) = &origin.dataset_sha256 {
@@ -272,7 +271,7 @@ fn trial(trials: &Trials, hash: ModelHash) -> String {
         let values = estimate
             .values
             .iter()
-            .map(|(name, value, std)| shown_figure(name, Figure { value: *value, std: *std }));
+            .map(|(name, value, std)| Figure { value: *value, std: *std }.shown(name));
         let values = values.collect::<Vec<_>>().join(", ");
         let suspects = match estimate.suspects.as_str() {
             "" => String::new(),

@@ -1,20 +1,27 @@
 //! `dynocar replay`: recorded runs into the sample channel, as a controller would.
 
 use std::ffi::OsString;
+use std::io::IsTerminal;
 use std::path::PathBuf;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use dynocar_client::Host;
+use dynocar_dataset::Run;
 use dynocar_shared::{PipelineKind, TrainId};
-use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Failure;
 use super::companion::{self, Passed};
 use crate::dataset;
 use crate::output::tell;
+use crate::redrawn::{Redrawn, bar};
 use crate::replay::{Rate, ReplayReport, Replayer};
 use crate::unpacking::program_for;
+
+/// How often progress is shown.
+const SHOW_EVERY: Duration = Duration::from_millis(100);
+/// Letters of the bar of samples.
+const BAR_LETTERS: usize = 40;
 
 /// Play recorded runs into the sample channel, as a controller would.
 #[derive(Debug, Args)]
@@ -83,9 +90,8 @@ pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
         ));
     }
     for run in runs {
-        let bar = progress_bar(run.samples.len(), &run.file);
-        replayer.play(&run.samples, |count| bar.set_position(count as u64));
-        bar.finish();
+        let mut progress = Progress::of(run);
+        replayer.play(&run.samples, |count| progress.show(count));
     }
     let report = replayer.finish();
     tell_report(&report);
@@ -104,10 +110,28 @@ pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
     )))
 }
 
-fn progress_bar(samples: usize, file: &str) -> ProgressBar {
-    let style = ProgressStyle::with_template("{msg:20} {wide_bar} {pos}/{len} {eta}")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(samples as u64).with_style(style).with_message(file.to_owned())
+/// How far a run is played, on a terminal.
+struct Progress<'r> {
+    run: &'r Run,
+    redrawn: Option<Redrawn>,
+    shown: Option<Instant>,
+}
+
+impl<'r> Progress<'r> {
+    fn of(run: &'r Run) -> Self {
+        let redrawn = std::io::stderr().is_terminal().then(Redrawn::default);
+        Progress { run, redrawn, shown: None }
+    }
+
+    fn show(&mut self, count: usize) {
+        let Some(redrawn) = &mut self.redrawn else { return };
+        let total = self.run.samples.len();
+        if count == total || self.shown.is_none_or(|last| last.elapsed() >= SHOW_EVERY) {
+            self.shown = Some(Instant::now());
+            let bar = bar(count as f64 / total.max(1) as f64, BAR_LETTERS);
+            redrawn.draw(&[format!("{:20} {bar} {count}/{total}", self.run.file)]);
+        }
+    }
 }
 
 fn tell_report(report: &ReplayReport) {

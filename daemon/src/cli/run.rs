@@ -1,6 +1,5 @@
 //! `dynocar run`: the daemon.
 
-use std::io::IsTerminal;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -34,12 +33,11 @@ pub fn execute(arguments: &RunArguments) -> Result<(), Failure> {
 }
 
 /// Starts the log as the configuration wants it.
-pub(super) fn start_log(config: &DaemonConfig) -> Result<(), Failure> {
+pub fn start_log(config: &DaemonConfig) -> Result<(), Failure> {
     let log = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         // A log that cannot be written is told nowhere, and ends no daemon.
-        .log_internal_errors(false)
-        .with_ansi(std::io::stderr().is_terminal());
+        .log_internal_errors(false);
     let log = match config.log_format {
         LogFormat::Text => log.with_target(false).boxed(),
         LogFormat::Json => log.json().boxed(),

@@ -1,8 +1,5 @@
 //! Aligned text for people.
 
-use dynocar_analysis::dataset::Note;
-use dynocar_core::plausibility::Severity;
-
 /// Widest line of running text.
 pub const WIDTH: usize = 96;
 /// Width of the keys of an entry.
@@ -55,18 +52,6 @@ impl std::fmt::Display for TextTable {
     }
 }
 
-/// Notes on a dataset, each from a line of its own; those by which it cannot be true say so.
-pub fn notes(notes: &[Note]) -> String {
-    let line = |note: &Note| {
-        let head = match note.severity {
-            Severity::Fundamental => "cannot be true",
-            _ => "note",
-        };
-        format!("{}\n", wrap(&format!("{head}: {note}"), WIDTH).join("\n  "))
-    };
-    notes.iter().map(line).collect()
-}
-
 /// Breaks words into lines of at most `width` letters (a longer word has its own line).
 pub fn wrap(text: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
@@ -90,32 +75,6 @@ pub fn short(value: f64, decimals: usize) -> String {
         false => &text,
     };
     if text == "-0" { "0".into() } else { text.into() }
-}
-
-/// Words without line breaks and other marks that would end a line.
-pub fn on_one_line(words: &str) -> String {
-    words.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
-}
-
-/// A comment of a TOML file, in lines that begin alike.
-pub fn comment(indent: &str, words: &str) -> String {
-    let lines = wrap(&on_one_line(words), WIDTH - indent.len());
-    lines.iter().map(|line| format!("# {indent}{line}\n")).collect()
-}
-
-/// A sentence that begins with its subject, the lines after the first further in.
-pub fn entry(indent: &str, words: &str) -> String {
-    let lines = wrap(words, WIDTH - indent.len());
-    format!("{indent}{}\n", lines.join(&format!("\n{indent}  ")))
-}
-
-/// A path as a shell takes it.
-pub fn for_shell(path: &str) -> String {
-    let is_plain = |letter: char| letter.is_alphanumeric() || "/._-+@%:,".contains(letter);
-    if !path.is_empty() && path.chars().all(is_plain) {
-        return path.into();
-    }
-    format!("'{}'", path.replace('\'', "'\\''"))
 }
 
 /// An entry: a key and what is said of it, broken into lines.
@@ -145,13 +104,6 @@ mod tests {
     fn text_is_wrapped_between_words() {
         assert_eq!(wrap("a bb ccc  dddd", 6), ["a bb", "ccc", "dddd"]);
         assert_eq!(wrap("", 10), [] as [String; 0]);
-    }
-
-    #[test]
-    fn paths_are_quoted_for_a_shell_where_they_must_be() {
-        assert_eq!(for_shell("a/b-1.toml"), "a/b-1.toml");
-        assert_eq!(for_shell("my train"), "'my train'");
-        assert_eq!(for_shell("it's"), "'it'\\''s'");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use dynocar_analysis::dataset::FileProblem;
+use dynocar_dataset::FileProblem;
 
 /// Why a configuration is refused.
 #[derive(Debug, thiserror::Error)]

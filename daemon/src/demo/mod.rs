@@ -4,6 +4,7 @@
 //! estimates, and this process is the client that polls each control cycle.
 
 mod embedded;
+mod latency;
 mod stage;
 mod summary;
 mod view;
@@ -12,16 +13,15 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use dynocar_client::{SnapshotReader, monotonic_now_ns};
-use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::{ParameterSnapshot, TrainId};
-use hdrhistogram::Histogram;
 
 pub use summary::{DemoAnswer, Summary};
 
-use dynocar_analysis::dataset::Dataset;
+use dynocar_dataset::Dataset;
 
 use crate::dataset::{self, LoadError};
 use crate::ending::{self, EndingError};
+use latency::Latencies;
 use stage::{Stage, StageError};
 use view::View;
 
@@ -70,7 +70,7 @@ pub fn play(rate: f64) -> Result<Summary, DemoError> {
     let cycle = control_cycle(&dataset, rate);
     let total = dataset.runs.iter().map(|run| run.samples.len() as u64).sum();
     let mut view = View::new(&dataset, total, rate);
-    let mut latency = Latency::new();
+    let mut latency = Latencies::default();
     let mut last_draw = Instant::now();
     let mut ended: Option<Instant> = None;
     loop {
@@ -98,11 +98,9 @@ pub fn play(rate: f64) -> Result<Summary, DemoError> {
         std::thread::sleep(cycle);
     }
     view.draw(&reader, monotonic_now_ns());
-    view.finish();
     let snapshots: Vec<ParameterSnapshot> =
         reader.readings(monotonic_now_ns()).map(|reading| *reading.snapshot).collect();
     stage.stop_daemon()?;
-    let latency = latency.histogram;
     Ok(Summary { dataset, published: total, rate, snapshots, latency })
 }
 
@@ -125,31 +123,4 @@ fn control_cycle(dataset: &Dataset, rate: f64) -> Duration {
         _ => 200_000_000,
     };
     Duration::from_nanos((recorded_ns as f64 / rate).max(1e5) as u64)
-}
-
-/// Times from a sample's publishing to the publishing of the snapshot that it gave.
-struct Latency {
-    histogram: Histogram<u64>,
-    last_sequence: [u64; PIPELINES_MAX],
-}
-
-impl Latency {
-    fn new() -> Self {
-        // Up to a minute, to three digits; what takes longer counts as a minute.
-        let histogram = Histogram::new_with_bounds(1, 60_000_000_000, 3).expect("valid bounds");
-        Latency { histogram, last_sequence: [0; PIPELINES_MAX] }
-    }
-
-    /// Takes in each snapshot that is new since the last call.
-    fn record(&mut self, reader: &SnapshotReader, now_ns: i64) {
-        for reading in reader.readings(now_ns) {
-            let snapshot = reading.snapshot;
-            let last = &mut self.last_sequence[snapshot.pipeline_index as usize];
-            if snapshot.sequence > *last {
-                *last = snapshot.sequence;
-                let taken_ns = snapshot.published_ns - snapshot.sample_published_ns;
-                self.histogram.saturating_record(u64::try_from(taken_ns).unwrap_or(0));
-            }
-        }
-    }
 }

@@ -1,10 +1,11 @@
 //! What the demo found.
 
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Quantity, Reason, SampleField};
-use hdrhistogram::Histogram;
 use serde::Serialize;
 
-use dynocar_analysis::dataset::Dataset;
+use dynocar_dataset::Dataset;
+
+use super::latency::Latencies;
 
 /// The demo's result for machines.
 #[derive(Clone, Debug, Serialize)]
@@ -70,8 +71,8 @@ pub struct Summary {
     pub rate: f64,
     /// The last snapshot of each pipeline.
     pub snapshots: Vec<ParameterSnapshot>,
-    /// Time from sample to snapshot in ns.
-    pub latency: Histogram<u64>,
+    /// Times from sample to snapshot.
+    pub latency: Latencies,
 }
 
 impl Summary {
@@ -86,9 +87,9 @@ impl Summary {
             lost: worst(|it| it.lost).max().unwrap_or(self.published),
         };
         let latency = LatencyAnswer {
-            p50_ns: self.latency.value_at_quantile(0.5),
-            p99_ns: self.latency.value_at_quantile(0.99),
-            count: self.latency.len(),
+            p50_ns: self.latency.quantile_ns(0.5),
+            p99_ns: self.latency.quantile_ns(0.99),
+            count: self.latency.count(),
         };
         DemoAnswer { pipelines, samples, latency }
     }

@@ -5,26 +5,24 @@ use std::time::{Duration, Instant};
 
 use dynocar_client::{Reading, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, PipelineKind};
-use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
-use dynocar_analysis::dataset::Dataset;
+use dynocar_dataset::Dataset;
 
 use crate::output::tell;
+use crate::redrawn::{Redrawn, bar};
 
 /// How often a plain line is written for each pipeline.
 const PLAIN_EVERY: Duration = Duration::from_secs(3);
 
+/// Letters of the bar of samples.
+const BAR_LETTERS: usize = 40;
+
 /// Shows the estimates as they come.
 pub struct View {
     total: u64,
-    bars: Option<Bars>,
+    /// On a terminal.
+    redrawn: Option<Redrawn>,
     last_plain: Option<Instant>,
-}
-
-struct Bars {
-    all: MultiProgress,
-    samples: ProgressBar,
-    pipelines: Vec<ProgressBar>,
 }
 
 impl View {
@@ -36,28 +34,20 @@ impl View {
             dataset.runs.len()
         ));
         tell("controller, daemon and client are three processes; ± is a 95 % interval");
-        let bars = std::io::stderr().is_terminal().then(|| Bars::new(total));
-        View { total, bars, last_plain: None }
+        let redrawn = std::io::stderr().is_terminal().then(Redrawn::default);
+        View { total, redrawn, last_plain: None }
     }
 
     /// Shows what the reader knows.
     pub fn draw(&mut self, reader: &SnapshotReader, now_ns: i64) {
-        match &mut self.bars {
-            Some(bars) => bars.draw(reader, now_ns),
+        match &mut self.redrawn {
+            Some(redrawn) => redrawn.draw(&lines(reader, now_ns, self.total)),
             None => {
                 if self.last_plain.is_none_or(|last| last.elapsed() >= PLAIN_EVERY) {
                     self.last_plain = Some(Instant::now());
                     self.write_lines(reader, now_ns);
                 }
             }
-        }
-    }
-
-    /// Leaves the last state on the screen.
-    pub fn finish(&mut self) {
-        if let Some(bars) = &self.bars {
-            bars.samples.abandon();
-            bars.pipelines.iter().for_each(ProgressBar::abandon);
         }
     }
 
@@ -69,27 +59,12 @@ impl View {
     }
 }
 
-impl Bars {
-    fn new(total: u64) -> Self {
-        let all = MultiProgress::new();
-        let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} samples, {eta} left")
-            .unwrap_or_else(|_| ProgressStyle::default_bar());
-        let samples = all.add(ProgressBar::new(total).with_style(style));
-        Bars { all, samples, pipelines: Vec::new() }
-    }
-
-    fn draw(&mut self, reader: &SnapshotReader, now_ns: i64) {
-        for (place, reading) in reader.readings(now_ns).enumerate() {
-            if place == self.pipelines.len() {
-                let style = ProgressStyle::with_template("{msg}")
-                    .unwrap_or_else(|_| ProgressStyle::default_spinner());
-                let line = ProgressBar::new_spinner().with_style(style);
-                self.pipelines.push(self.all.insert_before(&self.samples, line));
-            }
-            self.pipelines[place].set_message(describe(&reading));
-            self.samples.set_position(reading.snapshot.sample_sequence);
-        }
-    }
+/// A line for each pipeline, and one for the samples.
+fn lines(reader: &SnapshotReader, now_ns: i64, total: u64) -> Vec<String> {
+    let done = reader.readings(now_ns).map(|it| it.snapshot.sample_sequence).max().unwrap_or(0);
+    let bar = bar(done as f64 / total.max(1) as f64, BAR_LETTERS);
+    let pipelines = reader.readings(now_ns).map(|reading| describe(&reading));
+    pipelines.chain([format!("{bar} {done}/{total} samples")]).collect()
 }
 
 /// One line: kind, status, resistance at three speeds with the half width of its 95 % interval.

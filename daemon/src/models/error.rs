@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use dynocar_analysis::dataset::{DatasetError, FileProblem};
+use dynocar_dataset::{DatasetError, FileProblem};
 use dynocar_shared::TrainId;
 
 use super::text::ModelHash;

@@ -3,7 +3,7 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use dynocar_analysis::dataset::FileProblem;
+use dynocar_dataset::FileProblem;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 

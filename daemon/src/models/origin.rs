@@ -26,6 +26,13 @@ impl Figure {
     pub fn agrees_with(self, other: Figure) -> bool {
         (self.value - other.value).abs() <= self.half_width() + other.half_width()
     }
+
+    /// The number under its name, with its 95 % interval.
+    pub fn shown(self, name: &str) -> String {
+        let half = self.half_width();
+        let decimals = (1.0 - half.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
+        format!("{name} = {:.decimals$} ± {half:.decimals$}", self.value)
+    }
 }
 
 /// An effect that a model adds.

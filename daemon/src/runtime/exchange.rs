@@ -7,7 +7,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crossbeam::queue::ArrayQueue;
+use crossbeam_queue::ArrayQueue;
 use dynocar_core::pipeline::Pipeline;
 
 /// The pipelines of one train on one thread, in the order of its slots.

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 
-use crossbeam::utils::CachePadded;
+use crossbeam_utils::CachePadded;
 use dynocar_core::plausibility::{Finding, Slip};
 use dynocar_shared::ParameterSnapshot;
 use dynocar_shared::snapshot::REJECTION_REASONS;

@@ -5,9 +5,9 @@ use std::io::BufWriter;
 use std::path::{Component, Path, PathBuf};
 
 use dynocar::dataset::{self, LoadError};
-use dynocar::identify::published_samples;
 use dynocar::storage::{Disk, settle};
 use dynocar_analysis::dataset::{Dataset, DatasetFiles, MANIFEST_FILE};
+use dynocar_analysis::identify::published_samples;
 use dynocar_shared::{TrainId, TrainSample};
 use mcap::McapError;
 

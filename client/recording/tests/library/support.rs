@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use dynocar::config::DaemonConfig;
 use dynocar::dataset;
-use dynocar::identify::published_samples;
 use dynocar::pipelines::build_pipeline;
+use dynocar_analysis::identify::published_samples;
 use dynocar_recording::writing::{
     CONFIGURATION, RecordingWriter, WallClock, folder_of_configuration,
 };

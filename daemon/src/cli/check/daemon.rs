@@ -3,11 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use dynocar_analysis::dataset::Place;
+use dynocar_dataset::Place;
 use dynocar_shared::Quantity;
 use serde::Serialize;
 
-use super::Understood;
 use crate::cli::Failure;
 use crate::cli::text::{TextTable, line, short};
 use crate::config::{DaemonConfig, TrainConfig};
@@ -15,7 +14,11 @@ use crate::shadow::rule::Adopt;
 
 /// Reads a configuration with the train and track files it names, and builds every estimator, so
 /// that a setting out of range is found here and not when the daemon starts.
-pub(super) fn read(path: &Path) -> Result<Understood, Failure> {
+///
+/// # Errors
+///
+/// The first mistake.
+pub fn read(path: &Path) -> Result<DaemonConfig, Failure> {
     let config = DaemonConfig::load(path)?;
     for pipeline in &config.pipelines {
         for train in config.trains.iter().filter(|train| pipeline.trains.contains(&train.id)) {
@@ -26,11 +29,11 @@ pub(super) fn read(path: &Path) -> Result<Understood, Failure> {
             })?;
         }
     }
-    Ok(Understood::Daemon(Box::new(config)))
+    Ok(config)
 }
 
 /// The configuration in words and columns.
-pub(super) fn report(config: &DaemonConfig) -> String {
+pub fn report(config: &DaemonConfig) -> String {
     let mut text = String::from("daemon\n");
     let root = config.root.as_ref().map(|root| root.display().to_string());
     text += &line("root", root.as_deref().unwrap_or("DYNOCAR_ROOT, else /tmp/dynocar-<user>"));
@@ -101,7 +104,7 @@ fn answers_of<'a>(
 
 /// A daemon configuration, machine-readable.
 #[derive(Debug, Serialize)]
-pub(super) struct DaemonAnswer<'a> {
+pub struct DaemonAnswer<'a> {
     trains: Vec<DaemonTrainAnswer<'a>>,
     pipelines: Vec<PipelineAnswer<'a>>,
 }
@@ -126,7 +129,7 @@ struct PipelineAnswer<'a> {
 }
 
 /// The machine-readable form of a configuration.
-pub(super) fn answer(config: &DaemonConfig) -> DaemonAnswer<'_> {
+pub fn answer(config: &DaemonConfig) -> DaemonAnswer<'_> {
     DaemonAnswer {
         trains: config
             .trains

@@ -4,13 +4,13 @@
 use std::path::Path;
 
 use dynocar::dataset;
-use dynocar::survey::answer::Answer;
-use dynocar::survey::survey_folder;
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::answer::Answer as ExplainAnswer;
 use dynocar_analysis::explain::explain;
 use dynocar_analysis::explain::stop_to_stop::StopToStop;
 use dynocar_shared::PipelineKind;
+use dynocar_workshop::survey::answer::Answer;
+use dynocar_workshop::survey::survey_folder;
 
 use super::bus_variants::{self, ByPower, OtherDay};
 use super::report::Report;

@@ -4,12 +4,12 @@
 use std::path::Path;
 
 use dynocar::dataset;
-use dynocar::survey::survey_folder;
 use dynocar_analysis::dataset::{Dataset, Role};
 use dynocar_analysis::explain::answer::Told;
 use dynocar_analysis::explain::{drive, explain};
 use dynocar_core::train::Drive;
 use dynocar_shared::SampleField;
+use dynocar_workshop::survey::survey_folder;
 
 /// By how much in m/s the error of mapped recordings, over all pairs of trips, may be greater than when
 /// they were surveyed with the others.

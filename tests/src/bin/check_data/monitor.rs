@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use dynocar::dataset;
-use dynocar::identify::published_samples;
 use dynocar_analysis::dataset::{Dataset, Run};
+use dynocar_analysis::identify::published_samples;
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{PipelineKind, TrainId};

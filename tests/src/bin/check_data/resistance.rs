@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use dynocar::dataset;
-use dynocar::identify::{default_estimators, identify, published_samples};
+use dynocar_analysis::identify::{default_estimators, identify, published_samples};
 use dynocar_core::train::{Davis, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Status, TrainId};
 use serde_json::Value;

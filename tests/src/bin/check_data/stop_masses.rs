@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use dynocar::identify::identify;
 use dynocar_analysis::dataset::{Dataset, Role, Run};
+use dynocar_analysis::identify::identify;
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
 use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, SampleField, Status, TrainId, TrainSample,

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use dynocar::config::{DaemonConfig, TrainConfig};
-use dynocar::learn::{Bounds, Learner, LearnerSettings};
 use dynocar::models::{ModelHash, ModelText, Moment, NewModel, Origin, Store, TrainModels};
 use dynocar::pipelines::build_pipeline;
 use dynocar::runtime::exchange::Exchange;
@@ -13,6 +12,7 @@ use dynocar::shadow::in_force::with_model;
 use dynocar::shadow::{ShadowTrain, record};
 use dynocar_core::pipeline::Pipeline;
 use dynocar_shared::{TrainId, TrainSample};
+use dynocar_workshop::learn::{Bounds, Learner, LearnerSettings};
 
 use super::story::{LifeSettings, Story};
 use super::table::{Adoption, Outcome};

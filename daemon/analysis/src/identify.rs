@@ -1,0 +1,86 @@
+//! The daemon's own pipelines over recorded runs, offline and deterministic.
+
+use std::sync::Arc;
+
+use dynocar_core::pipeline::braking::gear::DeclaredGear;
+use dynocar_core::pipeline::quantities::candidates;
+use dynocar_core::pipeline::{EstimatorSettings, Pipeline, SettingError};
+use dynocar_shared::{
+    ParameterSnapshot, PipelineKind, Quantity, SampleField, TrainId, TrainSample,
+};
+
+use crate::dataset::{Dataset, Run};
+
+/// The samples of all runs, in file order, as a controller publishes them: numbered on without
+/// a gap, each run under a number of its own.
+pub fn published_samples(dataset: &Dataset, train: TrainId) -> Vec<TrainSample> {
+    samples_of_runs(&dataset.runs, train)
+}
+
+/// The samples of some runs, as a controller publishes them that drove no others.
+pub fn samples_of_runs<'a>(
+    runs: impl IntoIterator<Item = &'a Run>,
+    train: TrainId,
+) -> Vec<TrainSample> {
+    let mut samples = Vec::new();
+    for run in runs {
+        for sample in &run.samples {
+            let sequence = samples.len() as u64 + 1;
+            samples.push(TrainSample { sequence, run: run.number, train_id: train.0, ..*sample });
+        }
+    }
+    samples
+}
+
+/// Runs one estimator with its settings over the samples; gives the last snapshot.
+///
+/// # Errors
+///
+/// When a setting is out of range.
+pub fn identify(
+    dataset: &Dataset,
+    samples: &[TrainSample],
+    settings: &EstimatorSettings,
+) -> Result<ParameterSnapshot, SettingError> {
+    let train = Arc::clone(&dataset.train);
+    let estimator = settings.build(&train)?;
+    let train_id = samples.first().map_or(TrainId(1), |sample| TrainId(sample.train_id));
+    let mut pipeline = Pipeline::new(train_id, 0, train, dataset.track.clone(), estimator);
+    for sample in samples {
+        pipeline.process(sample);
+    }
+    Ok(*pipeline.snapshot())
+}
+
+/// Every kind of estimator that learns something, with its default settings.
+pub fn default_estimators() -> Vec<EstimatorSettings> {
+    PipelineKind::ALL
+        .iter()
+        .filter(|&&kind| kind != PipelineKind::Echo)
+        .filter_map(|&kind| EstimatorSettings::default_of(kind))
+        .collect()
+}
+
+/// The recommended estimators: the best measured one for each quantity that the train's file and the
+/// recordings permit, and the monitor of the model.
+pub fn recommended_estimators(dataset: &Dataset) -> Vec<EstimatorSettings> {
+    let best = Quantity::ALL.iter().filter(|&&quantity| is_permitted(quantity, dataset));
+    let mut kinds: Vec<_> = best.map(|&quantity| candidates(quantity)[0]).collect();
+    kinds.push(PipelineKind::ResidualMonitor);
+    kinds.dedup();
+    kinds.into_iter().filter_map(EstimatorSettings::default_of).collect()
+}
+
+/// Brake coefficients need the pressure and what the gear makes of it; the others at most wait.
+fn is_permitted(quantity: Quantity, dataset: &Dataset) -> bool {
+    let has_pressure = |run: &Run| {
+        run.samples.iter().any(|it| it.get(SampleField::BrakeCylinderPressure).is_some())
+    };
+    match quantity {
+        Quantity::BrakeFriction | Quantity::BrakingRatio => {
+            DeclaredGear::of(&dataset.train.brake_gear).is_some()
+                && dataset.runs.iter().any(has_pressure)
+        }
+        Quantity::Resistance | Quantity::Mass | Quantity::Adhesion => true,
+    }
+}

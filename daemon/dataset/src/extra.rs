@@ -1,0 +1,98 @@
+//! `[[extra]]` of a `train.toml`: resistances of forms of their own.
+
+use dynocar_core::terms::extra::{
+    Covariate, Extra, FACTORS, FACTORS_MAX, FORCE, FORCE_MAX_N_PER_KN, Factor, Form, TABLES,
+};
+
+use super::document::Section;
+use super::error::DatasetError;
+
+/// Reads the tables of a train file; none where none stand there.
+pub(super) fn read_extra(root: &Section) -> Result<Vec<Extra>, DatasetError> {
+    root.tables(TABLES)?.iter().map(extra).collect()
+}
+
+fn extra(section: &Section) -> Result<Extra, DatasetError> {
+    section.allow(&[FORCE, FACTORS])?;
+    let is_force = |force: f64| force.abs() <= FORCE_MAX_N_PER_KN;
+    let n_per_kn = section.required_number(FORCE, "N/kN, from -100 to 100", is_force)?;
+    let tables = section.tables(FACTORS)?;
+    if tables.is_empty() || tables.len() > FACTORS_MAX {
+        let found = format!("{} of them", tables.len());
+        return Err(section.out_of_range(FACTORS, &found, "one or two tables"));
+    }
+    let factors = tables.iter().map(factor).collect::<Result<_, _>>()?;
+    Ok(Extra { n_per_kn, factors })
+}
+
+fn factor(section: &Section) -> Result<Factor, DatasetError> {
+    let covariates = Covariate::ALL.map(Covariate::name);
+    let of = section.required_text("of", "a covariate")?;
+    let of = Covariate::from_name(of)
+        .ok_or_else(|| section.unknown("of", "covariate", of, &covariates))?;
+    let word = section.required_text("form", "a form")?;
+    let form = Form::from_name(word)
+        .ok_or_else(|| section.unknown("form", "form", word, &Form::ALL.map(Form::name)))?;
+    let keys: Vec<&str> = ["of", "form"].iter().chain(form.numbers()).copied().collect();
+    section.allow(&keys)?;
+    let mut numbers = [0.0; 2];
+    for (number, name) in numbers.iter_mut().zip(form.numbers()) {
+        *number = section.required_number(name, "a number", f64::is_finite)?;
+    }
+    match form.refusal(numbers) {
+        None => Ok(Factor { of, form, numbers }),
+        Some(expected) => {
+            let named = form.numbers().iter().zip(numbers);
+            let found: Vec<String> =
+                named.map(|(name, number)| format!("{name} = {number}")).collect();
+            Err(section.out_of_range(
+                "form",
+                &format!("{word} with {}", found.join(", ")),
+                expected,
+            ))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::parse_train;
+    use dynocar_core::terms::extra::{Covariate, Extra, Factor, Form};
+
+    const TRAIN: &str = "[train]\nmass_t = 10\nlength_m = 1\nrotating_mass_factor = 0\n\
+                         [resistance]\na = 1\nb = 0\nc = 0\n[[extra]]\nn_per_kn = 0.8\n";
+
+    fn refusal(extra: &str) -> String {
+        parse_train("train.toml", &format!("{TRAIN}{extra}")).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_force_with_two_factors_is_read() {
+        let text = "[[extra.factor]]\nof = \"speed_mps\"\nform = \"hyperbola\"\nbelow = 15\n\
+                    least = 3\n[[extra.factor]]\nof = \"ambient_temperature_degc\"\n\
+                    form = \"below\"\nuntil = 5\nspan = 10\n";
+        let train = parse_train("train.toml", &format!("{TRAIN}{text}")).unwrap();
+        let hyperbola =
+            Factor { of: Covariate::Speed, form: Form::Hyperbola, numbers: [15.0, 3.0] };
+        let below = Factor { of: Covariate::Temperature, form: Form::Below, numbers: [5.0, 10.0] };
+        assert_eq!(train.extra, [Extra { n_per_kn: 0.8, factors: vec![hyperbola, below] }]);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_line_and_choices() {
+        let no_factor = refusal("");
+        assert!(no_factor.contains("train.toml:"), "{no_factor}");
+        assert!(no_factor.contains("expected one or two tables"), "{no_factor}");
+        let factor = "[[extra.factor]]\nof = \"speed_mps\"\n";
+        let misspelt = refusal(&factor.replace("speed_mps", "sped_mps"));
+        assert!(misspelt.contains("did you mean 'speed_mps'?"), "{misspelt}");
+        let form = refusal(&format!("{factor}form = \"sine\"\n"));
+        assert!(form.contains("unknown form 'sine'"), "{form}");
+        let number = refusal(&format!("{factor}form = \"hyperbola\"\nbelow = 15\n"));
+        assert!(number.contains("least"), "{number}");
+        let order = refusal(&format!("{factor}form = \"hyperbola\"\nbelow = 2\nleast = 3\n"));
+        assert!(order.contains("below = 2, least = 3"), "{order}");
+        let further = refusal(&format!("{factor}form = \"decay\"\nover = 2\nleast = 3\n"));
+        assert!(further.contains("unknown key 'least'"), "{further}");
+    }
+}

@@ -1,0 +1,171 @@
+//! The columns of all files together, with what their values are like.
+
+use csv::ByteRecord;
+
+use super::facts::Facts;
+use super::guessed::{GuessResult, Recording};
+use super::layout::{Layout, layout};
+use super::name::Name;
+use super::problem::{GuessError, GuessProblem};
+use crate::lines::{below, line_of, reader};
+use crate::{Place, Problem};
+
+/// A column of the first file's header.
+#[derive(Clone, Debug)]
+pub struct Column {
+    /// Its name.
+    pub name: Name,
+    /// What its values are like in each file.
+    pub facts: Vec<Facts>,
+    /// What its values are like in all.
+    pub all: Facts,
+    /// Why it can be mapped to nothing, whatever it holds.
+    pub unusable: Option<String>,
+}
+
+/// All files, read through.
+#[derive(Clone, Debug)]
+pub struct Columns {
+    /// Between the cells of a row.
+    pub delimiter: u8,
+    /// Between a number and its fraction.
+    pub decimal: u8,
+    /// Lines above the names.
+    pub skip_rows: usize,
+    /// True where a line of units stands below the names.
+    pub units_row: bool,
+    /// The columns, in the order of the first file's header.
+    pub columns: Vec<Column>,
+    /// Rows of values in each file.
+    pub rows: Vec<usize>,
+}
+
+impl Columns {
+    /// Reads files that are laid out alike.
+    ///
+    /// # Errors
+    ///
+    /// Where one of them has no header or no rows, or another layout than the first.
+    pub fn read(files: &[Recording]) -> GuessResult<Self> {
+        let layouts: Vec<Layout> =
+            files.iter().map(|file| layout(file.label, file.text)).collect::<Result<_, _>>()?;
+        let Some(first) = layouts.first() else {
+            return Err(Place::whole("no file").problem(Problem::NoHeader).into());
+        };
+        let decimal = layouts.iter().find_map(|it| it.decimal).unwrap_or(b'.');
+        for (file, other) in files.iter().zip(&layouts) {
+            require_alike(file, other, files[0].label, first, decimal)?;
+        }
+        let mut columns: Vec<Column> = first
+            .header
+            .iter()
+            .map(|name| Column {
+                name: name.clone(),
+                facts: Vec::new(),
+                all: Facts::new(),
+                unusable: unusable(name, files, &layouts),
+            })
+            .collect();
+        let mut rows = Vec::new();
+        for (file, layout) in files.iter().zip(&layouts) {
+            let (facts, count) = read_file(file, layout, decimal)?;
+            for column in &mut columns {
+                let place = layout.header.iter().position(|name| *name == column.name);
+                let of_file = place.map_or_else(Facts::new, |index| facts[index].clone());
+                column.all.merge(&of_file);
+                if column.unusable.is_none() && files.len() > 1 {
+                    column.unusable = of_file.text.as_ref().map(|text| {
+                        let (label, line, cell) = (file.label, text.line, &text.cell);
+                        format!("it holds text in {label}, line {line}: '{cell}'")
+                    });
+                }
+                column.all.text = column.all.text.take().or_else(|| of_file.text.clone());
+                column.facts.push(of_file);
+            }
+            rows.push(count);
+        }
+        let &Layout { delimiter, skip_rows, units_row, .. } = first;
+        Ok(Columns { delimiter, decimal, skip_rows, units_row, columns, rows })
+    }
+
+    /// Every column's name, for messages.
+    pub fn names(&self) -> String {
+        let names: Vec<String> =
+            self.columns.iter().map(|column| format!("'{}'", column.name.shown())).collect();
+        names.join(", ")
+    }
+}
+
+/// Why no dataset can map a column of this name.
+fn unusable(name: &Name, files: &[Recording], layouts: &[Layout]) -> Option<String> {
+    if name.text.is_empty() {
+        return Some("it has no name".into());
+    }
+    files.iter().zip(layouts).find_map(|(file, layout)| {
+        match layout.header.iter().filter(|other| *other == name).count() {
+            0 => Some(format!("{} has no such column", file.label)),
+            1 => None,
+            count => Some(format!("its name occurs {count} times in {}", file.label)),
+        }
+    })
+}
+
+fn require_alike(
+    file: &Recording,
+    layout: &Layout,
+    label: &str,
+    first: &Layout,
+    decimal: u8,
+) -> GuessResult<()> {
+    let mark = |mark: u8| format!("{:?}", char::from(mark).to_string());
+    let own_decimal = layout.decimal.unwrap_or(decimal);
+    let all = [
+        ("the delimiter", mark(layout.delimiter), mark(first.delimiter)),
+        ("the decimal mark", mark(own_decimal), mark(decimal)),
+        (
+            "the number of lines above the names",
+            layout.skip_rows.to_string(),
+            first.skip_rows.to_string(),
+        ),
+        ("a line of units", shown(layout.units_row), shown(first.units_row)),
+    ];
+    match all.into_iter().find(|(_, found, expected)| found != expected) {
+        None => Ok(()),
+        Some((what, found, expected)) => {
+            let first = label.to_string();
+            let problem = GuessProblem::OtherLayout { what, found, expected, first };
+            Err(GuessError::new(Place::whole(file.label), problem))
+        }
+    }
+}
+
+fn shown(is_there: bool) -> String {
+    if is_there { "there".into() } else { "not there".into() }
+}
+
+/// What the values of every column are like, and the number of rows.
+fn read_file(file: &Recording, layout: &Layout, decimal: u8) -> GuessResult<(Vec<Facts>, usize)> {
+    let text = below(file.label, file.text, layout.skip_rows)?;
+    let mut reader = reader(text, layout.delimiter);
+    let mut facts = vec![Facts::new(); layout.header.len()];
+    let above = 1 + usize::from(layout.units_row);
+    let (mut record, mut rows) = (ByteRecord::new(), 0);
+    loop {
+        let has_row = reader.read_byte_record(&mut record).map_err(|error| {
+            let message = error.to_string();
+            Place::whole(file.label).problem(Problem::Syntax { language: "CSV", message })
+        })?;
+        if !has_row {
+            // Names and units are no rows of values.
+            return Ok((facts, rows - above));
+        }
+        rows += 1;
+        if rows <= above {
+            continue;
+        }
+        let line = line_of(text, &record) + layout.skip_rows;
+        for (facts, cell) in facts.iter_mut().zip(&record) {
+            facts.push_cell(line, cell.trim_ascii(), decimal);
+        }
+    }
+}

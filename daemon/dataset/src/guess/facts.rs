@@ -1,0 +1,274 @@
+//! What the values of a column are like.
+
+use crate::TimeFormat;
+use crate::cell::parse_cell;
+use crate::clock::{DayClock, day_of_cell};
+
+/// So many values of a column are kept, evenly spread, to tell its middle and its top.
+const KEPT_MAX: usize = 4096;
+
+/// Values spread evenly over all that came.
+#[derive(Clone, Debug, PartialEq)]
+struct Spread {
+    values: Vec<f64>,
+    every: usize,
+    seen: usize,
+}
+
+impl Spread {
+    fn new() -> Self {
+        Spread { values: Vec::new(), every: 1, seen: 0 }
+    }
+
+    pub fn push(&mut self, value: f64) {
+        if self.seen.is_multiple_of(self.every) {
+            self.values.push(value);
+        }
+        self.seen += 1;
+        if self.values.len() > KEPT_MAX {
+            let mut index = 0;
+            self.values.retain(|_| {
+                index += 1;
+                index % 2 == 1
+            });
+            self.every *= 2;
+        }
+    }
+
+    /// The value below which this share of the values' magnitudes lies.
+    fn quantile(&self, share: f64, of: impl Fn(f64) -> f64) -> Option<f64> {
+        let mut sorted: Vec<f64> = self.values.iter().map(|&value| of(value)).collect();
+        sorted.sort_by(f64::total_cmp);
+        let last = sorted.len().checked_sub(1)?;
+        sorted.get((share * last as f64).round() as usize).copied()
+    }
+}
+
+/// A cell that holds text where numbers were expected.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Text {
+    /// Line in the file, from 1.
+    pub line: usize,
+    /// The cell, on one line.
+    pub cell: String,
+}
+
+/// What was seen of a column's values, cell by cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Facts {
+    /// Cells with a finite number.
+    pub numbers: usize,
+    /// The first cell that is neither empty nor a number.
+    pub text: Option<Text>,
+    /// The least number.
+    pub min: f64,
+    /// The greatest number.
+    pub max: f64,
+    /// The first cell that is a date and nothing else, counted in days from 1970-01-01.
+    pub day: Option<i64>,
+    /// Readers of the formats in which every cell so far is a time, the likeliest first.
+    clocks: Vec<DayClock>,
+    first: f64,
+    last: f64,
+    growing: usize,
+    pairs: usize,
+    values: Spread,
+    steps: Spread,
+}
+
+impl Facts {
+    /// Nothing seen yet.
+    pub fn new() -> Self {
+        Facts {
+            numbers: 0,
+            text: None,
+            min: f64::INFINITY,
+            max: f64::NEG_INFINITY,
+            day: None,
+            clocks: Vec::new(),
+            first: f64::NAN,
+            last: f64::NAN,
+            growing: 0,
+            pairs: 0,
+            values: Spread::new(),
+            steps: Spread::new(),
+        }
+    }
+
+    /// Takes in a trimmed cell of a line: a number, a time, or text.
+    pub fn push_cell(&mut self, line: usize, cell: &[u8], decimal: u8) {
+        match parse_cell(cell, decimal) {
+            Some(value) if value.is_nan() || self.clocks.is_empty() => self.push(value),
+            None if self.may_hold_times() => match self.time_s(cell) {
+                Some(time_s) => self.push(time_s),
+                None => self.push_text(line, &String::from_utf8_lossy(cell)),
+            },
+            _ => self.push_text(line, &String::from_utf8_lossy(cell)),
+        }
+    }
+
+    /// True while every cell so far was empty or a time.
+    fn may_hold_times(&self) -> bool {
+        self.text.is_none() && (self.numbers == 0 || !self.clocks.is_empty())
+    }
+
+    /// A cell's time in the likeliest format that holds for all cells so far.
+    fn time_s(&mut self, cell: &[u8]) -> Option<f64> {
+        if self.clocks.is_empty() {
+            self.day = self.day.or_else(|| day_of_cell(cell));
+            self.clocks = TimeFormat::of_cell(cell).iter().map(DayClock::new).collect();
+        }
+        let mut times_s = Vec::new();
+        let mut clocks = std::mem::take(&mut self.clocks);
+        clocks.retain_mut(|clock| {
+            let time_s = clock.seconds(cell);
+            times_s.extend(time_s);
+            time_s.is_some()
+        });
+        self.clocks = clocks;
+        times_s.first().copied()
+    }
+
+    /// The formats in which every value is a time, the likeliest first; none for numbers.
+    pub fn formats(&self) -> Vec<&TimeFormat> {
+        self.clocks.iter().map(DayClock::format).collect()
+    }
+
+    /// Takes in a cell's number; what is not finite is missing.
+    pub fn push(&mut self, value: f64) {
+        if !value.is_finite() {
+            return;
+        }
+        if self.numbers > 0 {
+            let step = value - self.last;
+            self.growing += usize::from(step > 0.0);
+            self.pairs += 1;
+            self.steps.push(step.abs());
+        } else {
+            self.first = value;
+        }
+        self.last = value;
+        self.numbers += 1;
+        self.min = self.min.min(value);
+        self.max = self.max.max(value);
+        self.values.push(value);
+    }
+
+    /// Takes in a cell that is no number.
+    fn push_text(&mut self, line: usize, cell: &str) {
+        let printable = |letter: char| if letter.is_control() { ' ' } else { letter };
+        let cell = || cell.chars().take(40).map(printable).collect();
+        self.text.get_or_insert_with(|| Text { line, cell: cell() });
+    }
+
+    /// Takes in what was seen of the same column in another file.
+    pub fn merge(&mut self, other: &Facts) {
+        match self.numbers {
+            0 => self.clocks.clone_from(&other.clocks),
+            _ if other.numbers > 0 => {
+                self.clocks.retain(|clock| other.formats().contains(&clock.format()));
+            }
+            _ => {}
+        }
+        self.numbers += other.numbers;
+        self.min = self.min.min(other.min);
+        self.max = self.max.max(other.max);
+        self.growing += other.growing;
+        self.pairs += other.pairs;
+        for &value in &other.values.values {
+            self.values.push(value);
+        }
+        for &step in &other.steps.values {
+            self.steps.push(step);
+        }
+    }
+
+    /// The greatest magnitude, single spikes left out; `None` without a number.
+    pub fn top(&self) -> Option<f64> {
+        self.values.quantile(0.99, f64::abs)
+    }
+
+    /// The middle value; `None` without a number.
+    pub fn middle(&self) -> Option<f64> {
+        self.values.quantile(0.5, |value| value)
+    }
+
+    /// The middle of the steps between rows; `None` with less than two numbers.
+    pub fn step(&self) -> Option<f64> {
+        self.steps.quantile(0.5, |step| step)
+    }
+
+    /// From the least to the greatest number.
+    pub fn span(&self) -> Option<f64> {
+        (self.numbers > 0).then_some(self.max - self.min)
+    }
+
+    /// True where nearly every number is greater than the one before.
+    pub fn grows(&self) -> bool {
+        self.growing > 0 && self.growing * 10 >= self.pairs * 8
+    }
+
+    /// -1 where the last number is less than the first, else 1.
+    pub fn direction(&self) -> i8 {
+        if self.last < self.first { -1 } else { 1 }
+    }
+
+    /// The shares of the values that are above and below zero by more than noise.
+    pub fn signs(&self) -> (f64, f64) {
+        let least = 0.02 * self.top().unwrap_or(0.0);
+        let share = |is_it: &dyn Fn(f64) -> bool| {
+            let count = self.values.values.iter().filter(|&&value| is_it(value)).count();
+            count as f64 / self.values.values.len().max(1) as f64
+        };
+        (share(&|value| value > least), share(&|value| value < -least))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn facts(values: impl IntoIterator<Item = f64>) -> Facts {
+        let mut facts = Facts::new();
+        values.into_iter().for_each(|value| facts.push(value));
+        facts
+    }
+
+    #[test]
+    fn middle_top_and_step_are_told_of_columns_of_any_length() {
+        for count in [3_usize, 100, 50_000] {
+            let seen = facts((0..count).map(|row| row as f64 * 0.5));
+            let end = (count - 1) as f64 * 0.5;
+            assert_eq!(seen.span(), Some(end));
+            assert_eq!(seen.step(), Some(0.5));
+            let middle = seen.middle().unwrap();
+            assert!((middle - end / 2.0).abs() < 0.01 * end + 0.5, "{count}: {middle}");
+            assert!(seen.top().unwrap() >= 0.97 * end && seen.grows(), "{count}");
+            assert!(seen.values.values.len() <= KEPT_MAX);
+        }
+    }
+
+    #[test]
+    fn one_spike_makes_no_top() {
+        let seen = facts((0..1000).map(|row| if row == 500 { 1e6 } else { 30.0 }));
+        assert_eq!((seen.top(), seen.max), (Some(30.0), 1e6));
+    }
+
+    #[test]
+    fn directions_and_signs_are_told() {
+        assert_eq!(facts([5.0, 4.0, 3.0]).direction(), -1);
+        assert_eq!(facts([5.0, 4.0, 6.0]).direction(), 1);
+        assert!(!facts([3.0, 2.0, 1.0]).grows() && !facts([1.0, 1.0]).grows());
+        let (up, down) = facts([100.0, 100.0, -100.0, 0.5]).signs();
+        assert_eq!((up, down), (0.5, 0.25));
+    }
+
+    #[test]
+    fn without_numbers_nothing_is_told() {
+        let mut seen = facts([f64::NAN, f64::INFINITY]);
+        seen.push_text(3, "a\tb");
+        seen.push_text(4, "c");
+        assert_eq!((seen.top(), seen.middle(), seen.step(), seen.span()), (None, None, None, None));
+        assert_eq!(seen.text, Some(Text { line: 3, cell: "a b".into() }));
+    }
+}

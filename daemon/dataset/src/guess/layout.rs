@@ -1,0 +1,287 @@
+//! How a file's text falls into cells: delimiter, decimal mark, the lines above the names, names and units.
+
+use csv::ByteRecord;
+
+use super::name::Name;
+use super::problem::{GuessError, GuessProblem};
+use super::spelling;
+use crate::cell::parse_cell;
+use crate::lines::{line_of, reader};
+use crate::{Place, Problem, TimeFormat};
+
+/// What may separate cells, in the order of preference.
+const DELIMITERS: [u8; 4] = *b";\t|,";
+/// So many rows show the layout.
+const ROWS_MAX: usize = 200;
+
+/// How a file's text falls into cells.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Layout {
+    /// Between the cells of a row.
+    pub delimiter: u8,
+    /// Between a number and its fraction; `None` where no number has one.
+    pub decimal: Option<u8>,
+    /// Lines above that with the names.
+    pub skip_rows: usize,
+    /// True where a line of units stands below the names.
+    pub units_row: bool,
+    /// The columns' names, with the units that stand below them.
+    pub header: Vec<Name>,
+}
+
+/// A row of the file.
+struct Row {
+    line: usize,
+    cells: Vec<String>,
+}
+
+/// Where names, units and values stand among the rows.
+#[derive(Clone, Copy)]
+struct Block {
+    header: usize,
+    units: Option<usize>,
+}
+
+impl Block {
+    fn first_values(self) -> usize {
+        self.units.unwrap_or(self.header) + 1
+    }
+}
+
+/// Tells the layout of a file.
+///
+/// # Errors
+///
+/// Where no line above the values holds names of columns, or no values follow.
+pub fn layout(label: &str, text: &str) -> Result<Layout, GuessError> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let readings = DELIMITERS.map(|delimiter| {
+        let rows = first_rows(text, delimiter);
+        (delimiter, block(&rows), rows)
+    });
+    let [(.., rows), ..] = &readings;
+    if rows.iter().all(|row| row.filled().next().is_none()) {
+        return Err(Place::whole(label).problem(Problem::NoHeader).into());
+    }
+    let best =
+        readings.iter().max_by(|one, other| fit(one.1, &one.2).total_cmp(&fit(other.1, &other.2)));
+    let Some((delimiter, block, rows)) =
+        best.filter(|(.., rows)| rows.iter().any(|row| row.cells.len() > 1))
+    else {
+        let found = Name::parse(&rows[0].cells.join(",")).shown();
+        return Err(GuessError::new(Place::line(label, 1), GuessProblem::OneColumn { found }));
+    };
+    let Some(block) = *block else {
+        let (line, found) = (rows[0].line, rows[0].cells[0].trim().to_string());
+        return Err(GuessError::new(Place::line(label, line), GuessProblem::NoNames { found }));
+    };
+    let decimal = decimal(&rows[block.first_values().min(rows.len())..]);
+    judge_header(label, rows, block)?;
+    let (named, units) = (&rows[block.header], block.units.map(|units| &rows[units]));
+    let name = |(index, cell): (usize, &String)| {
+        let unit = units.and_then(|row| row.cells.get(index)).map(|cell| without_brackets(cell));
+        Name::parse(cell).with_unit(unit.filter(|unit| !unit.is_empty() && spelling::is_unit(unit)))
+    };
+    Ok(Layout {
+        delimiter: *delimiter,
+        decimal,
+        skip_rows: named.line - 1,
+        units_row: units.is_some(),
+        header: named.cells.iter().enumerate().map(name).collect(),
+    })
+}
+
+fn first_rows(text: &str, delimiter: u8) -> Vec<Row> {
+    let mut reader = reader(text, delimiter);
+    let (mut rows, mut record) = (Vec::new(), ByteRecord::new());
+    while rows.len() <= ROWS_MAX && matches!(reader.read_byte_record(&mut record), Ok(true)) {
+        let line = line_of(text, &record);
+        let cells = record.iter().map(|cell| String::from_utf8_lossy(cell).into()).collect();
+        rows.push(Row { line, cells });
+    }
+    rows
+}
+
+impl Row {
+    fn filled(&self) -> impl Iterator<Item = &str> {
+        self.cells.iter().map(|cell| cell.trim()).filter(|cell| !cell.is_empty())
+    }
+
+    /// Cells that hold a number or a time.
+    fn values(&self) -> usize {
+        self.filled().filter(|cell| is_value(cell)).count()
+    }
+
+    /// True where most cells hold values.
+    fn is_of_values(&self) -> bool {
+        2 * self.values() > self.filled().count()
+    }
+
+    /// True for words: names, units. The unit of a share is 1.
+    fn is_of_words(&self) -> bool {
+        let mut own = self.filled().filter(|cell| *cell != "1").peekable();
+        own.peek().is_some() && !own.any(is_value)
+    }
+
+    /// True where at least half of the cells are units and none is a value. Letters alone are as well the
+    /// names of columns: t, v, F.
+    fn is_of_units(&self) -> bool {
+        let cells: Vec<String> = self.filled().map(without_brackets).collect();
+        let units: Vec<&String> = cells.iter().filter(|cell| spelling::is_unit(cell)).collect();
+        let is_plain = units.iter().any(|unit| unit.chars().count() > 1);
+        self.is_of_words() && is_plain && 2 * units.len() >= cells.len()
+    }
+}
+
+fn is_value(cell: &str) -> bool {
+    let cell = cell.as_bytes();
+    parse_cell(cell, b'.').or(parse_cell(cell, b',')).is_some()
+        || !TimeFormat::of_cell(cell).is_empty()
+}
+
+fn without_brackets(cell: &str) -> String {
+    cell.trim().trim_matches(['[', ']', '(', ')']).to_string()
+}
+
+/// Where names and units stand: in the words above the first two rows of values that follow each other;
+/// `None` where there are values and no words above them.
+fn block(rows: &[Row]) -> Option<Block> {
+    let is_start = |index: &usize| {
+        let next = rows.get(index + 1);
+        rows[*index].is_of_values() && next.is_none_or(|row| row.values() > 0)
+    };
+    let Some(values) = (0..rows.len()).find(is_start) else {
+        return Some(Block { header: 0, units: None });
+    };
+    let words = (0..values).rev().find(|&index| rows[index].is_of_words())?;
+    let above = words.checked_sub(1).filter(|&above| {
+        let (names, units) = (&rows[above], &rows[words]);
+        units.is_of_units()
+            && names.is_of_words()
+            && names.filled().count() >= units.filled().count()
+    });
+    match above {
+        Some(header) => Some(Block { header, units: Some(words) }),
+        None => Some(Block { header: words, units: None }),
+    }
+}
+
+/// How well the rows fall into columns: the more columns the better, where rows agree on them with
+/// each other and with the header.
+fn fit(block: Option<Block>, rows: &[Row]) -> f64 {
+    let rows = &rows[block.map_or(0, |block| block.header)..];
+    let Some(width) = usual_width(rows).filter(|width| *width > 1) else { return 0.0 };
+    let agree = rows.iter().filter(|row| row.cells.len() == width).count();
+    let of_header = if rows[0].cells.len() == width { 1.0 } else { 0.05 };
+    of_header * width as f64 * (agree as f64 / rows.len() as f64).powi(2)
+}
+
+/// The number of cells that most rows have.
+fn usual_width(rows: &[Row]) -> Option<usize> {
+    let mut widths: Vec<usize> = rows.iter().map(|row| row.cells.len()).collect();
+    widths.sort_unstable();
+    widths.get(widths.len() / 2).copied()
+}
+
+/// The decimal mark: what stands within most of the numbers that have one.
+fn decimal(rows: &[Row]) -> Option<u8> {
+    let (mut commas, mut points) = (0, 0);
+    for cell in rows.iter().flat_map(Row::filled).map(str::as_bytes) {
+        let is_number = |mark| parse_cell(cell, mark).is_some();
+        commas += usize::from(cell.contains(&b',') && is_number(b','));
+        points += usize::from(cell.contains(&b'.') && is_number(b'.'));
+    }
+    match (commas, points) {
+        (0, 0) => None,
+        _ if commas > points => Some(b','),
+        _ => Some(b'.'),
+    }
+}
+
+fn judge_header(label: &str, rows: &[Row], block: Block) -> Result<(), GuessError> {
+    let values = &rows[block.first_values().min(rows.len())..];
+    if values.is_empty() {
+        return Err(Place::whole(label).problem(Problem::NoRows).into());
+    }
+    let (header, usual) = (&rows[block.header], usual_width(values).unwrap_or(0));
+    let found = header.cells.len();
+    if found < usual {
+        let place = Place::line(label, header.line);
+        return Err(GuessError::new(place, GuessProblem::FewNames { found, usual }));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(text: &str) -> (char, Option<char>, usize) {
+        let layout = layout("a.csv", text).unwrap();
+        let decimal = layout.decimal.map(char::from);
+        (char::from(layout.delimiter), decimal, layout.header.len())
+    }
+
+    fn refusal(text: &str) -> String {
+        layout("a.csv", text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn delimiter_and_decimal_mark_are_told_apart() {
+        assert_eq!(told("t,v\n0,1.5\n1,2.5\n"), (',', Some('.'), 2));
+        assert_eq!(told("t;v\n0;1,5\n1;2,5\n"), (';', Some(','), 2));
+        assert_eq!(told("t;v\n0,5;1,5\n1;2,5\n"), (';', Some(','), 2));
+        assert_eq!(told("t\tv\tF\n0\t1\t3\n"), ('\t', None, 3));
+        assert_eq!(told("t|v\n0|1.5\n"), ('|', Some('.'), 2));
+        assert_eq!(told("t,v\n\"0,5\",\"1,5\"\n"), (',', Some(','), 2));
+        assert_eq!(told("\u{feff}t;v, measured\n0;1.0\n"), (';', Some('.'), 2));
+        assert_eq!(told("t,v,note\n0,1.5,\"a;b\"\n1,1.5,\"c;d\"\n"), (',', Some('.'), 3));
+    }
+
+    #[test]
+    fn what_has_no_header_or_no_rows_is_refused_with_its_line() {
+        assert!(refusal("").contains("a.csv: expected a header line"));
+        assert!(refusal("\n\n").contains("expected a header line"));
+        assert!(refusal("t,v\n").contains("a.csv: expected rows of values below the header"));
+        assert!(refusal("hello\nworld\n").starts_with("a.csv:1: expected names of columns"));
+        assert!(refusal("0,1\n1,2\n").starts_with("a.csv:1: expected names of columns, found '0'"));
+        let message = refusal("t,v\n0,1,2\n1,2,3\n2,3,4\n");
+        assert!(
+            message.contains("a.csv:1") && message.contains("2 cells above rows of 3"),
+            "{message}"
+        );
+        assert!(refusal("Logger\n0,1\n1,2\n").contains("1 cells above rows of 2"));
+    }
+
+    #[test]
+    fn lines_above_the_names_and_units_below_them_are_distinguished() {
+        let read = |text: &str| {
+            let layout = layout("a.csv", text).unwrap();
+            let names: Vec<String> = layout.header.iter().map(|name| name.text.clone()).collect();
+            let units: Vec<Option<String>> =
+                layout.header.iter().map(|it| it.unit.clone()).collect();
+            (layout.skip_rows, layout.units_row, names.join(" "), units)
+        };
+        let unit = |text: &str| Some(text.to_string());
+        let (none, plain) = (vec![None, None, None], "t v F".to_string());
+        let rows = "0,1,2\n1,2,3\n2,3,4\n";
+        assert_eq!(read(&format!("t,v,F\n{rows}")), (0, false, plain.clone(), none.clone()));
+        assert_eq!(
+            read(&format!("Recorder X,v2\nt,v,F\n{rows}")),
+            (1, false, plain.clone(), none.clone())
+        );
+        let padded =
+            format!("Logger;XY 7;\nSerial;1234;\n\nt;v;F\ns;km/h;[kN]\n{rows}").replace(',', ";");
+        let units = vec![unit("s"), unit("km/h"), unit("kN")];
+        assert_eq!(read(&padded), (3, true, plain.clone(), units), "a blank line counts, too");
+        let tabular = format!("Zug;Fahrer;Strecke\nET 1;X;Y\nt;v;F\n{rows}").replace(',', ";");
+        assert_eq!(read(&tabular), (2, false, plain.clone(), none.clone()), "letters are names");
+        assert_eq!(read(&padded.replace('\n', "\r\n")).0, 3, "as Windows ends lines");
+        let timed =
+            "Messung vom 18.03.2026\nZeit;v;F\n;km/h;kN\n07:13:20,2;1,5;\n07:13:20,4;1,6;\n";
+        let (skip_rows, units_row, names, _) = read(timed);
+        assert_eq!((skip_rows, units_row, &names[..]), (1, true, "Zeit v F"));
+        let missing = format!("t,v,F\n0,n/a,n/a\n{rows}");
+        assert_eq!(read(&missing), (0, false, plain, none), "text among the values is no header");
+    }
+}

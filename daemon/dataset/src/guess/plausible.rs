@@ -1,0 +1,279 @@
+//! Which unit makes a column's values those of a train.
+
+use dynocar_core::units::Unit;
+
+use super::facts::Facts;
+use super::spelling::Spelled;
+use crate::Quantity;
+
+/// Values so many times beyond the usual ones are none of a quantity in a unit.
+const FAR: f64 = 20.0;
+/// The factor of recorders that write counts of a thousandth.
+const RAW_COUNT: f64 = 1e-3;
+
+/// A unit for a column, and how sure it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UnitChoice {
+    /// The unit and the factor that leads to it.
+    pub spelled: Spelled,
+    /// What speaks for it.
+    pub reason: String,
+    /// What makes it doubtful; `None` where the header says it and the values agree.
+    pub doubt: Option<String>,
+}
+
+/// Which figure of a column tells its unit.
+#[derive(Clone, Copy)]
+enum Measure {
+    /// The greatest magnitude.
+    Top,
+    /// The middle value.
+    Middle,
+    /// The middle of the steps.
+    Step,
+    /// From the least to the greatest.
+    Span,
+}
+
+/// What a train's values usually are, in the base unit, and the units that recorders use, the
+/// likeliest first.
+struct Usual {
+    measure: Measure,
+    low: f64,
+    high: f64,
+    units: &'static [&'static str],
+}
+
+/// What is usual of a quantity; `None` where its values tell no unit.
+fn usual(quantity: Quantity) -> Option<Usual> {
+    use Measure::{Middle, Span, Step, Top};
+    let usual = |measure, low, high, units| Some(Usual { measure, low, high, units });
+    match quantity {
+        Quantity::Time => usual(Step, 0.004, 20.0, &["s", "ms", "us", "ns"]),
+        Quantity::Position => usual(Span, 300.0, 1e6, &["m", "km", "mm"]),
+        Quantity::Speed => usual(Top, 3.0, 45.0, &["m/s", "km/h"]),
+        Quantity::WindSpeed => usual(Top, 0.5, 30.0, &["m/s", "km/h"]),
+        Quantity::Acceleration | Quantity::SpecificForce => usual(Top, 0.05, 3.0, &["m/s2"]),
+        Quantity::TractionForce | Quantity::BrakeForce | Quantity::ControlForce => {
+            usual(Top, 5e3, 3e6, &["N", "kN", "MN"])
+        }
+        Quantity::BrakeCylinderPressure => usual(Top, 0.4e5, 8e5, &["bar", "kPa", "Pa"]),
+        Quantity::TrainMass => usual(Top, 5e3, 1e7, &["t", "kg"]),
+        Quantity::AmbientTemperature => usual(Middle, -45.0, 55.0, &["degC", "K"]),
+        Quantity::Gradient => usual(Top, 0.002, 0.07, &["permille", "%", "1"]),
+        Quantity::TractionHandle | Quantity::BrakeHandle => usual(Top, 0.02, 1.05, &["1", "%"]),
+        Quantity::RelativeHumidity => usual(Top, 0.05, 1.05, &["%", "1"]),
+        Quantity::TractionPower | Quantity::LinePower => usual(Top, 2e4, 3e7, &["kW", "W"]),
+        Quantity::LineVoltage => usual(Middle, 300.0, 3e4, &["V", "kV"]),
+        Quantity::LineCurrent => usual(Top, 20.0, 1e4, &["A", "kA"]),
+        Quantity::Altitude
+        | Quantity::CurveRadius
+        | Quantity::Passengers
+        | Quantity::WheelSlide
+        | Quantity::DoorOpen
+        | Quantity::Latitude
+        | Quantity::Longitude
+        | Quantity::Course
+        | Quantity::Curvature => None,
+    }
+}
+
+impl Usual {
+    fn figure(&self, facts: &Facts) -> Option<f64> {
+        match self.measure {
+            Measure::Top => facts.top(),
+            Measure::Middle => facts.middle(),
+            Measure::Step => facts.step(),
+            Measure::Span => facts.span(),
+        }
+    }
+
+    fn words(&self, figure: f64) -> String {
+        let figure = number(figure);
+        match self.measure {
+            Measure::Top => format!("values up to {figure}"),
+            Measure::Middle => format!("values about {figure}"),
+            Measure::Step => format!("steps of {figure}"),
+            Measure::Span => format!("values over {figure}"),
+        }
+    }
+
+    /// How far a value in the base unit is from what is usual, as a factor's logarithm; 0 within.
+    fn distance(&self, base: f64) -> f64 {
+        if (self.low..=self.high).contains(&base) {
+            return 0.0;
+        }
+        if self.low <= 0.0 || base <= 0.0 {
+            let room = self.high - self.low;
+            return ((self.low - base).max(base - self.high) / room + 1.0).ln();
+        }
+        (self.low / base).max(base / self.high).ln()
+    }
+}
+
+/// The unit of a column: the one that its name gives, else the likeliest by its values.
+pub fn choose_unit(quantity: Quantity, facts: &Facts, named: Option<Spelled>) -> UnitChoice {
+    let usual = usual(quantity);
+    let figure = usual.as_ref().and_then(|usual| usual.figure(facts)).filter(|it| *it != 0.0);
+    match (named, usual.zip(figure)) {
+        (Some(spelled), None) => said(spelled),
+        (Some(spelled), Some((usual, figure))) => judge(spelled, &usual, figure),
+        (None, Some((usual, figure))) => by_values(quantity, &usual, figure),
+        (None, None) => {
+            let unit = quantity.unit();
+            let counts = unit.name() == "1";
+            let doubt = (!counts).then(|| format!("the name gives no unit; {}", unit.name()));
+            let reason = String::from("the unit that is usual");
+            UnitChoice { spelled: Spelled { unit, scale: 1.0 }, reason, doubt }
+        }
+    }
+}
+
+fn said(spelled: Spelled) -> UnitChoice {
+    UnitChoice { spelled, reason: "the unit that the name gives".into(), doubt: None }
+}
+
+/// Whether values can be in the unit that the name gives.
+fn judge(spelled: Spelled, usual: &Usual, figure: f64) -> UnitChoice {
+    let base = |scale: f64| spelled.unit.to_base(figure * spelled.scale * scale);
+    let distance = usual.distance(base(1.0));
+    if distance <= FAR.ln() {
+        return said(spelled);
+    }
+    let words = usual.words(figure);
+    let name = spelled.unit.name();
+    if distance > 100.0_f64.ln() && usual.distance(base(RAW_COUNT)) == 0.0 {
+        let doubt = format!("{words} are no {name} of a train; read as thousandths of {name}");
+        let spelled = Spelled { scale: spelled.scale * RAW_COUNT, ..spelled };
+        return UnitChoice { doubt: Some(doubt), ..said(spelled) };
+    }
+    let doubt = format!("{words} are unusual in {name}, the unit that the name gives");
+    UnitChoice { doubt: Some(doubt), ..said(spelled) }
+}
+
+/// The likeliest unit where the name gives none.
+fn by_values(quantity: Quantity, usual: &Usual, figure: f64) -> UnitChoice {
+    let units = usual.units.iter().filter_map(|name| Unit::find(quantity.dimension(), name));
+    let mut fits: Vec<(f64, Unit)> =
+        units.map(|unit| (usual.distance(unit.to_base(figure)), unit)).collect();
+    // Stable: of units that fit alike, the likelier comes first.
+    fits.sort_by(|one, other| one.0.total_cmp(&other.0));
+    let (distance, unit) = fits.first().copied().unwrap_or((0.0, quantity.unit()));
+    let words = usual.words(figure);
+    let others: Vec<&str> = fits[1.min(fits.len())..]
+        .iter()
+        .filter(|(distance, _)| *distance <= 3.0_f64.ln())
+        .map(|(_, unit)| unit.name())
+        .collect();
+    let name = unit.name();
+    let doubt = match (distance == 0.0, others.is_empty()) {
+        (false, _) => format!("the name gives no unit, and {words} are usual in none; {name}?"),
+        (true, true) => format!("the name gives no unit; {words} are {name} for a train"),
+        (true, false) => format!(
+            "the name gives no unit; {words} are taken for {name}, but could be {}",
+            others.join(" or ")
+        ),
+    };
+    let reason = format!("{words} are usual in {name}");
+    UnitChoice { spelled: Spelled { unit, scale: 1.0 }, reason, doubt: Some(doubt) }
+}
+
+/// A number in few letters.
+fn number(value: f64) -> String {
+    let size = value.abs();
+    if !(0.01..1e6).contains(&size) {
+        return format!("{value:.1e}");
+    }
+    let decimals = (2 - size.log10().floor() as i32).clamp(0, 4) as usize;
+    let text = format!("{value:.decimals$}");
+    if !text.contains('.') {
+        return text;
+    }
+    text.trim_end_matches('0').trim_end_matches('.').into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::guess::spelling::find;
+
+    /// Values from 0 up to a top.
+    fn ramp(top: f64) -> Facts {
+        let mut facts = Facts::new();
+        (0..=100).for_each(|row| facts.push(f64::from(row) * top / 100.0));
+        facts
+    }
+
+    fn unit_of(quantity: Quantity, top: f64) -> (&'static str, Option<String>) {
+        let choice = choose_unit(quantity, &ramp(top), None);
+        (choice.spelled.unit.name(), choice.doubt)
+    }
+
+    #[test]
+    fn the_likeliest_unit_is_taken_by_the_range_of_values_and_said_to_be_a_guess() {
+        use Quantity::*;
+        let cases = [
+            (Speed, 120.0, "km/h"),
+            (Speed, 305.0, "km/h"),
+            (Speed, 33.0, "m/s"),
+            (TractionForce, 300.0, "kN"),
+            (TractionForce, 300_000.0, "N"),
+            (BrakeForce, 0.4, "MN"),
+            (BrakeCylinderPressure, 3.8, "bar"),
+            (BrakeCylinderPressure, 380.0, "kPa"),
+            (BrakeCylinderPressure, 380_000.0, "Pa"),
+            (TrainMass, 114.5, "t"),
+            (TrainMass, 114_500.0, "kg"),
+            (Position, 25_000.0, "m"),
+            (Position, 25.0, "km"),
+            (Gradient, 12.5, "permille"),
+            (Gradient, 1.2, "%"),
+            (Gradient, 0.0125, "1"),
+            (TractionHandle, 1.0, "1"),
+            (TractionHandle, 100.0, "%"),
+            (TractionPower, 4000.0, "kW"),
+            (TractionPower, 4e6, "W"),
+        ];
+        for (quantity, top, expected) in cases {
+            let (unit, doubt) = unit_of(quantity, top);
+            assert_eq!(unit, expected, "{quantity} up to {top}");
+            assert!(doubt.is_some(), "{quantity} up to {top}: a guess is said to be one");
+        }
+        let (_, doubt) = unit_of(Speed, 33.0);
+        assert!(doubt.unwrap().contains("could be km/h"));
+    }
+
+    #[test]
+    fn time_is_told_by_its_step_and_temperature_by_its_middle() {
+        let time = |step: f64| {
+            let mut facts = Facts::new();
+            (0..500).for_each(|row| facts.push(1.7e9 + f64::from(row) * step));
+            choose_unit(Quantity::Time, &facts, None).spelled.unit.name()
+        };
+        assert_eq!((time(1.0), time(0.2), time(200.0), time(2e5)), ("s", "s", "ms", "us"));
+        let mut kelvin = Facts::new();
+        (0..50).for_each(|row| kelvin.push(280.0 + 0.1 * f64::from(row)));
+        let choice = choose_unit(Quantity::AmbientTemperature, &kelvin, None);
+        assert_eq!(choice.spelled.unit.name(), "K");
+    }
+
+    #[test]
+    fn a_named_unit_is_taken_and_doubted_where_no_train_has_such_values() {
+        let named = |text: &str, top: f64| {
+            let dimension = Quantity::BrakeCylinderPressure.dimension();
+            choose_unit(Quantity::BrakeCylinderPressure, &ramp(top), find(dimension, text))
+        };
+        assert_eq!(named("bar", 3.8).doubt, None);
+        let odd = named("bar", 380.0);
+        assert!(odd.spelled.scale == 1.0 && odd.doubt.unwrap().contains("unusual in bar"));
+        let raw = named("bar", 3800.0);
+        assert!(raw.doubt.unwrap().contains("thousandths of bar"));
+        assert_eq!(raw.spelled.scale, 1e-3);
+    }
+
+    #[test]
+    fn a_column_of_zeros_takes_the_usual_unit() {
+        let (unit, doubt) = unit_of(Quantity::Speed, 0.0);
+        assert!(unit == "m/s" && doubt.is_some());
+    }
+}

@@ -1,0 +1,105 @@
+//! `dynocar check`: reads a dataset, a train, a track or a daemon configuration and says what it
+//! understood.
+
+mod draw;
+mod json;
+mod report;
+mod runs;
+mod understood;
+
+pub use understood::Understood;
+
+use std::path::Path;
+
+use dynocar::cli::check::{self as daemon_check, CheckArguments, or_refused};
+use dynocar_analysis::dataset::{Place, parse_track, parse_train, top_keys};
+use serde::Serialize;
+
+use dynocar::cli::Failure;
+use dynocar::dataset::{self, FileKind, LoadError, file_error, kind_of, read_text};
+use dynocar::output::{give, require_file, require_folder};
+
+/// Runs `dynocar check`.
+///
+/// # Errors
+///
+/// When the path leads to nothing known or a file is wrong; everything that could be read has
+/// been reported by then.
+pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
+    let (path, json) = (&arguments.path, arguments.json.as_deref());
+    if let Some(file) = json {
+        require_file(file, "{")?;
+    }
+    if let Some(folder) = &arguments.draw {
+        require_folder(folder)?;
+    }
+    let understood = or_refused(path, json, understand(path))?;
+    give(json, &understood.answer(path), || understood.text())?;
+    if let Some(folder) = &arguments.draw {
+        draw::draw(&understood, folder)?;
+    }
+    let errors: Vec<_> = understood.errors().map(ToString::to_string).collect();
+    if errors.is_empty() { Ok(()) } else { Err(Failure::Input(errors.join("\ndynocar: "))) }
+}
+
+impl Understood {
+    /// The answer for machines.
+    pub fn answer(&self, path: &Path) -> impl Serialize {
+        json::answer(path, self)
+    }
+
+    /// The answer for people.
+    pub fn text(&self) -> String {
+        report::report(self)
+    }
+}
+
+/// Reads whatever a path leads to; the errors of single runs are within.
+///
+/// # Errors
+///
+/// When the path leads to nothing known, or a file that everything rests on is wrong.
+pub fn understand(path: &Path) -> Result<Understood, Failure> {
+    if !path.is_file() || dataset::is_recording(path) {
+        return read_dataset(path);
+    }
+    let label = path.display().to_string();
+    let refuse = |message| Err(Failure::At(Place::whole(&label), message));
+    let text = read_text(path).map_err(|problem| file_error(&label, problem))?;
+    if path.extension().is_none_or(|extension| extension != "toml") {
+        return refuse(format!("{label}: not a TOML file; {EXPECTED}"));
+    }
+    let keys = top_keys(&label, &text)?;
+    Ok(match kind_of(&keys) {
+        Some(FileKind::Dataset) => return read_dataset(path),
+        Some(FileKind::Train) => Understood::Train(Box::new(parse_train(&label, &text)?)),
+        Some(FileKind::Track) => Understood::Track(Box::new(parse_track(&label, &text)?)),
+        Some(FileKind::Daemon) => Understood::Daemon(Box::new(daemon_check::read(path)?)),
+        None => return refuse(format!("{label}: {}; {EXPECTED}", found(&keys))),
+    })
+}
+
+const EXPECTED: &str = "expected a dataset's folder or its dataset.toml (with a table [dataset]), \
+                        a train.toml ([train]), a track.toml ([track]) or a daemon.toml ([trains] \
+                        and [pipelines])";
+
+fn found(keys: &[String]) -> String {
+    if keys.is_empty() {
+        return "the file is empty".into();
+    }
+    let names: Vec<_> = keys.iter().take(8).map(|key| format!("[{key}]")).collect();
+    let more = if keys.len() > names.len() { ", …" } else { "" };
+    format!("not a file that can be checked: it holds {}{more}", names.join(", "))
+}
+
+fn read_dataset(path: &Path) -> Result<Understood, Failure> {
+    let (folder, head) = dataset::open(path).map_err(|error| match error {
+        LoadError::NotADataset { .. } => {
+            let place = Place::whole(&path.display().to_string());
+            Failure::At(place, format!("{error}; {EXPECTED}"))
+        }
+        other => other.into(),
+    })?;
+    let runs = (0..head.manifest.runs.len()).map(|index| head.read_run(&folder, index)).collect();
+    Ok(Understood::Dataset(Box::new(head), runs))
+}

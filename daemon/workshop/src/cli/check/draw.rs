@@ -1,0 +1,48 @@
+//! The line and the train as drawings.
+
+use std::path::Path;
+
+use dynocar_analysis::explain::report::line::AlongLine;
+
+use super::Understood;
+use crate::report::plots::speeds::Width;
+use crate::report::plots::{as_file, effort, line};
+use dynocar::cli::Failure;
+use dynocar::output::{tell, write_in_folder};
+
+/// Draws the line's profile and the train's effort curves into a folder, as far as they are known.
+///
+/// # Errors
+///
+/// An input failure for what has neither; a failure of the work where a drawing cannot be made or
+/// written.
+pub(super) fn draw(understood: &Understood, folder: &Path) -> Result<(), Failure> {
+    let (train, track) = match understood {
+        Understood::Dataset(head, _) => (Some(&*head.train), head.track.as_deref()),
+        Understood::Train(train) => (Some(&**train), None),
+        Understood::Track(track) => (None, Some(&**track)),
+        Understood::Daemon(_) => {
+            return Err(Failure::Input(
+                "--draw: expected a dataset, a train or a track, not a daemon's configuration"
+                    .into(),
+            ));
+        }
+    };
+    let failed = |error| Failure::Work(format!("the drawing failed: {error}"));
+    let line = line::draw(track, &AlongLine::default(), false, Width::Wide).map_err(failed)?;
+    let line = line.map(|plot| plot.svg);
+    let effort = train.map(effort::draw).transpose().map_err(failed)?.flatten();
+    let drawn = [("line.svg", line), ("effort.svg", effort)];
+    if drawn.iter().all(|(_, plot)| plot.is_none()) {
+        tell(
+            "nothing drawn: no gradient, curves or permitted speed of a line, no effort of a train",
+        );
+    }
+    for (name, plot) in drawn {
+        if let Some(plot) = plot {
+            let path = write_in_folder(folder, name, &as_file(&plot))?;
+            tell(&format!("drawn: {}", path.display()));
+        }
+    }
+    Ok(())
+}

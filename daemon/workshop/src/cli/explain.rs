@@ -1,0 +1,309 @@
+//! `dynocar explain`: which undeclared effect explains what the declared model leaves.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use clap::Args;
+use dynocar_analysis::dataset::{Dataset, DatasetFiles, Place, Role};
+use dynocar_analysis::explain::answer::{Answer, RunnerUp};
+use dynocar_analysis::explain::evidence::RunDataError;
+use dynocar_analysis::explain::judged::Metric;
+use dynocar_analysis::explain::report::timeline::Timeline;
+use dynocar_analysis::explain::selection::Progress;
+use dynocar_analysis::explain::{Explanation, explain};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::text::{for_shell, notes};
+use crate::annotation::{AnnotationError, annotate};
+use crate::grown::{GROWN_FILES, GROWN_MARK, GrownError, GrownFiles, write_grown};
+use crate::report;
+use crate::report::provenance::{Provenance, own_command_line};
+use dynocar::cli::Failure;
+use dynocar::dataset::{self, DatasetFolder};
+use dynocar::output::{
+    OutputError, give, require_file, require_folder, require_new, tell, write_file, write_in_folder,
+};
+
+/// First line of a file with predictions.
+const PREDICTIONS_HEADER: &str = "time_s,speed_mps\n";
+/// Why nothing is grown from data that cannot be true.
+const IMPOSSIBLE: &str = "no grown model is written: the data cannot be true";
+
+/// Find what the declared model leaves, trace it to an effect, and score the grown model.
+#[derive(Debug, Args)]
+pub struct ExplainArguments {
+    /// The dataset's folder, or a recording
+    dataset: PathBuf,
+    /// Use the forces under traction only: for recordings without the friction brake's force
+    #[arg(long)]
+    traction_only: bool,
+    /// Write the answer for machines; - for standard output
+    #[arg(long, value_name = "FILE")]
+    pub(super) json: Option<PathBuf>,
+    /// Write the speeds that the model with the effect predicts for the holdout runs
+    #[arg(long, value_name = "DIR")]
+    predictions: Option<PathBuf>,
+    /// Write the grown model, and a dataset of it and the runs, into this folder
+    #[arg(long, value_name = "DIR")]
+    grown: Option<PathBuf>,
+    /// Write a report for people: one HTML page that needs nothing else
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+    /// Write a recording with verdict, effects, residual and predicted speeds beside the data
+    #[arg(long, value_name = "FILE.mcap")]
+    annotate: Option<PathBuf>,
+    /// Write the report's plots as SVG files into this folder
+    #[arg(long, value_name = "DIR")]
+    plots: Option<PathBuf>,
+}
+
+/// Explains a dataset and prints the answer.
+///
+/// # Errors
+///
+/// A wrong dataset or name of a result is an input failure.
+pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
+    require_names(arguments)?;
+    let path = &arguments.dataset;
+    let dataset = read(path, arguments.traction_only)?;
+    if let Some(folder) = &arguments.predictions {
+        for name in prediction_names(&dataset).values() {
+            require_replaceable(&folder.join(name), PREDICTIONS_HEADER)?;
+        }
+    }
+    let bar = progress_bar();
+    let progress = |share: f64, what: &str| {
+        // Looking again at an earlier choice is no step back.
+        bar.set_position(bar.position().max((1000.0 * share) as u64));
+        bar.set_message(what.replace('_', " "));
+    };
+    let explained = explain(&dataset, &progress);
+    bar.finish_and_clear();
+    let mut explanation = explained.map_err(|error| unusable(path, &dataset, error))?;
+    if let Some(folder) = &arguments.predictions {
+        explanation.answer.predictions = write_predictions(folder, &dataset, &explanation)?;
+    }
+    if let Some(folder) = &arguments.grown {
+        if explanation.answer.impossibilities().next().is_none() {
+            tell_grown(&grow(folder, path, &explanation)?);
+            let again = if arguments.traction_only { " --traction-only" } else { "" };
+            let folder = for_shell(&folder.display().to_string());
+            tell(&format!("what is left with it: dynocar explain {folder}{again}"));
+        } else {
+            tell(IMPOSSIBLE);
+        }
+    }
+    if let Some(file) = &arguments.report {
+        let page = page(path, &dataset, &explanation, own_command_line())?;
+        write_file(file, &page)?;
+        tell(&format!("report: {}", file.display()));
+    }
+    if let Some(folder) = &arguments.plots {
+        write_plots(folder, &dataset, &explanation)?;
+    }
+    if let Some(file) = &arguments.annotate {
+        let timeline = Timeline::of(&dataset, &explanation);
+        annotate(path, &timeline, file).map_err(|error| match error {
+            AnnotationError::Input(_) => Failure::Input(error.to_string()),
+            AnnotationError::Failed { .. } => Failure::Work(error.to_string()),
+        })?;
+    }
+    Ok(give(arguments.json.as_deref(), &explanation.answer, || text(&explanation.answer))?)
+}
+
+/// Explains the dataset at a path; `progress` is told how far that is, and may unwind to end it.
+///
+/// # Errors
+///
+/// A wrong dataset is an input failure.
+pub fn answer(
+    path: &Path,
+    traction_only: bool,
+    progress: Progress,
+) -> Result<(Dataset, Explanation), Failure> {
+    let dataset = read(path, traction_only)?;
+    let explanation =
+        explain(&dataset, progress).map_err(|error| unusable(path, &dataset, error))?;
+    Ok((dataset, explanation))
+}
+
+fn read(path: &Path, traction_only: bool) -> Result<Dataset, Failure> {
+    let mut dataset = dataset::load(path)?;
+    if traction_only {
+        dataset.keep_traction_only();
+    }
+    Ok(dataset)
+}
+
+/// Refuses wrong names of results before the work begins.
+fn require_names(arguments: &ExplainArguments) -> Result<(), Failure> {
+    let files = [(&arguments.json, "{"), (&arguments.report, "<!DOCTYPE html>")];
+    for (file, mark) in files {
+        file.as_deref().map_or(Ok(()), |file| require_file(file, mark))?;
+    }
+    for folder in [&arguments.plots, &arguments.predictions] {
+        folder.as_deref().map_or(Ok(()), require_folder)?;
+    }
+    arguments.grown.as_deref().map_or(Ok(()), require_growable)?;
+    arguments.annotate.as_deref().map_or(Ok(()), require_new)?;
+    match (&arguments.json, &arguments.report) {
+        (Some(json), Some(report)) if json == report => Err(Failure::Output(OutputError::Name {
+            path: report.clone(),
+            problem: "expected another file for --report than for --json",
+        })),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses a file in a folder for results that is there and is none of ours.
+fn require_replaceable(file: &Path, mark: &str) -> Result<(), OutputError> {
+    if file.exists() { require_file(file, mark) } else { Ok(()) }
+}
+
+/// The failure of a run that cannot be used, with what may be the matter.
+fn unusable(path: &Path, dataset: &Dataset, error: RunDataError) -> Failure {
+    let RunDataError::Simulate { file, source } = error;
+    let label = DatasetFolder::at(path).map_or(file.clone(), |folder| folder.label(&file));
+    let notes: String = dataset.notes().iter().map(|note| format!("; {note}")).collect();
+    Failure::At(Place::whole(&label), format!("{label}: {source}{notes}"))
+}
+
+/// Writes the grown model of the dataset at a path into a folder.
+///
+/// # Errors
+///
+/// When the data cannot be true, or a file cannot be written or would take the place of another.
+pub fn grow(folder: &Path, path: &Path, explanation: &Explanation) -> Result<GrownFiles, Failure> {
+    require_growable(folder)?;
+    if explanation.answer.impossibilities().next().is_some() {
+        return Err(Failure::Work(IMPOSSIBLE.into()));
+    }
+    write_grown(path, explanation, folder).map_err(|error| match error {
+        GrownError::Output(error) => error.into(),
+        error => Failure::Work(error.to_string()),
+    })
+}
+
+/// Refuses a folder in which the files of a grown model would take the place of others.
+fn require_growable(folder: &Path) -> Result<(), OutputError> {
+    require_folder(folder)?;
+    GROWN_FILES.iter().try_for_each(|name| require_replaceable(&folder.join(name), GROWN_MARK))
+}
+
+fn tell_grown(grown: &GrownFiles) {
+    for file in &grown.files {
+        tell(&format!("grown model: {}", file.display()));
+    }
+    if !grown.not_expressed.is_empty() {
+        let kinds = grown.not_expressed.join(", ");
+        tell(&format!("the files cannot express {kinds}: use the answer of --json for it"));
+    }
+}
+
+/// A bar on standard error while that is a terminal; nothing otherwise.
+fn progress_bar() -> ProgressBar {
+    let bar = ProgressBar::new(1000);
+    let template = "{bar:40} {percent:>3} %  {elapsed:>3}  {msg}";
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
+}
+
+/// The report on an explanation of the dataset at a path; `command` makes the same one.
+///
+/// # Errors
+///
+/// When a file of the dataset cannot be read any more, or a plot cannot be drawn.
+pub fn page(
+    path: &Path,
+    dataset: &Dataset,
+    explanation: &Explanation,
+    command: String,
+) -> Result<String, Failure> {
+    let provenance = Provenance::of(path, command)?;
+    report::page(dataset, explanation, provenance).map_err(|error| Failure::Work(error.to_string()))
+}
+
+fn write_plots(folder: &Path, dataset: &Dataset, explanation: &Explanation) -> Result<(), Failure> {
+    let images = report::images::images(dataset, explanation)
+        .map_err(|error| Failure::Work(error.to_string()))?;
+    for image in images {
+        let path = write_in_folder(folder, &image.name, &image.svg)?;
+        tell(&format!("plot: {}", path.display()));
+    }
+    Ok(())
+}
+
+/// Names of the files with predictions by the holdout run's file: the same name, with its folders
+/// where several runs would share it.
+fn prediction_names(dataset: &Dataset) -> BTreeMap<String, String> {
+    let last = |file: &str| file.rsplit('/').next().unwrap_or(file).to_string();
+    let holdout: Vec<&str> = dataset.with_role(Role::Holdout).map(|run| &run.file[..]).collect();
+    let name = |file: &str| match holdout.iter().filter(|it| last(it) == last(file)).count() {
+        1 => last(file),
+        _ => file.replace('/', "_"),
+    };
+    holdout.iter().map(|file| ((*file).into(), name(file))).collect()
+}
+
+/// Writes one file for each holdout run; gives the files by run.
+fn write_predictions(
+    folder: &Path,
+    dataset: &Dataset,
+    explanation: &Explanation,
+) -> Result<BTreeMap<String, String>, OutputError> {
+    let names = prediction_names(dataset);
+    let mut files = BTreeMap::new();
+    for run in &explanation.predictions {
+        let Some(name) = names.get(&run.file) else { continue };
+        let mut text = String::from(PREDICTIONS_HEADER);
+        for (time_s, speed_mps) in run.time_s.iter().zip(&run.speed_mps) {
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "{time_s:.3},{speed_mps:.4}");
+        }
+        let path = write_in_folder(folder, name, &text)?;
+        files.insert(run.file.clone(), path.display().to_string());
+    }
+    Ok(files)
+}
+
+/// The answer for people.
+pub fn text(answer: &Answer) -> String {
+    let mut text = notes(&answer.notes) + &format!("{}\n", answer.statement);
+    if let Some(experiment) = &answer.experiment {
+        text += &format!("To settle it: {experiment}\n");
+    }
+    let (base, std) = (&answer.base, &answer.base.std);
+    let [a, b, c] = [std.a, std.b, std.c].map(|deviation| 1.96 * deviation);
+    text += &format!(
+        "a = {:.3} ± {a:.3} N/kN, b = {:.4} ± {b:.4}, c = {:.6} ± {c:.6} (95 %, v in m/s)\n",
+        base.a, base.b, base.c
+    );
+    if let Some(judged) = answer.judged.filter(|it| it.metric == Metric::StopToStop) {
+        let [before, after] = judged.error_mps;
+        text += &format!(
+            "holdout runs{}: {before:.3} m/s before, {after:.3} m/s after\n",
+            judged.predicted()
+        );
+    }
+    if let (Some(before), Some(after)) = (answer.rmse_before, answer.rmse_after) {
+        text += &format!("holdout runs, open loop: {before:.3} m/s before, {after:.3} m/s after\n");
+    }
+    if let Some(unscored) = &answer.unscored {
+        text += &format!("{unscored}\n");
+    }
+    for other in answer.effects.iter().flat_map(|effect| &effect.runners_up) {
+        let RunnerUp { formula, evidence_less } = other;
+        text += &format!("another form, evidence less by {evidence_less:.0}: {formula}\n");
+    }
+    for considered in &answer.considered {
+        let evidence =
+            considered.evidence.map_or("     -".into(), |evidence| format!("{evidence:6.0}"));
+        text += &format!("  {evidence}  {:20} {}\n", considered.kind, considered.remark);
+    }
+    text
+}

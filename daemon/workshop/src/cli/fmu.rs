@@ -1,0 +1,137 @@
+//! `dynocar fmu`: the estimators, or the train itself, as an FMU.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use dynocar_analysis::dataset::{DatasetError, DatasetFiles, FileProblem};
+use dynocar_fmu::variables::ModelFile;
+use dynocar_fmu::{ESTIMATORS, PLANT};
+
+use crate::fmu::{FmuError, INPUTS_MARK, archive, find_library, inputs, read_library};
+use dynocar::cli::Failure;
+use dynocar::dataset;
+use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
+use dynocar::output::{require_file, require_folder, tell, write_file, write_in_folder};
+
+/// Write the estimators, or the train itself, as an FMU for co-simulation (FMI 2.0), for Simulink,
+/// OpenModelica, Dymola or FMPy.
+#[derive(Debug, Args)]
+pub struct FmuArguments {
+    /// The train itself instead of the estimators: traction and brake force in, speed out
+    #[arg(long)]
+    plant: bool,
+    /// The FMU
+    #[arg(short, long, value_name = "FILE.fmu")]
+    out: PathBuf,
+    /// The train that the FMU brings along; else its parameter train_file names one
+    #[arg(long, value_name = "train.toml", conflicts_with = "dataset")]
+    train: Option<PathBuf>,
+    /// The line that it brings along
+    #[arg(long, value_name = "track.toml", conflicts_with = "dataset")]
+    track: Option<PathBuf>,
+    /// Bring along the train and the line that `explain --grown` wrote into this folder
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["train", "track"])]
+    grown: Option<PathBuf>,
+    /// Bring along the train and the line of this dataset, unless --grown names others
+    #[arg(long, value_name = "FOLDER")]
+    dataset: Option<PathBuf>,
+    /// Write the dataset's runs as inputs of the FMU into this folder, a CSV file each
+    #[arg(long, value_name = "FOLDER", requires = "dataset")]
+    inputs: Option<PathBuf>,
+    /// The library inside the FMU, where it does not lie beside the program
+    #[arg(long, value_name = "FILE.so")]
+    library: Option<PathBuf>,
+}
+
+/// Packs the FMU.
+///
+/// # Errors
+///
+/// A wrong train, line, dataset or library is an input failure; a library that was not built and a
+/// file that cannot be written are ones of work.
+pub fn execute(arguments: &FmuArguments) -> Result<(), Failure> {
+    require_file(&arguments.out, "PK")?;
+    arguments.inputs.as_deref().map_or(Ok(()), require_folder)?;
+    let files = match (&arguments.grown, &arguments.dataset) {
+        (Some(grown), _) => files_of_grown(grown)?,
+        (None, Some(dataset)) => files_of_dataset(dataset)?,
+        (None, None) => named_files(arguments.train.as_deref(), arguments.track.as_deref())?,
+    };
+    let model = if arguments.plant { &PLANT } else { &ESTIMATORS };
+    let library = match &arguments.library {
+        Some(path) => read_library(path),
+        None => find_library(&std::env::current_exe().unwrap_or_default()),
+    };
+    let fmu = library.and_then(|library| archive(model, &library, &files)).map_err(failure)?;
+    if let (Some(dataset), Some(folder)) = (&arguments.dataset, &arguments.inputs) {
+        write_inputs(dataset, folder)?;
+    }
+    write_file(&arguments.out, &fmu)?;
+    tell(&format!("FMU: {}", arguments.out.display()));
+    Ok(())
+}
+
+fn failure(error: FmuError) -> Failure {
+    match error {
+        FmuError::Unreadable { .. } | FmuError::OtherLibrary(_) => {
+            Failure::Input(error.to_string())
+        }
+        FmuError::NoLibrary(_) | FmuError::Archive(_) => Failure::Work(error.to_string()),
+    }
+}
+
+/// The texts of the files that were named, each understood before it is packed.
+fn named_files(
+    train: Option<&Path>,
+    track: Option<&Path>,
+) -> Result<Vec<(ModelFile, String)>, Failure> {
+    let text = |path: &Path| {
+        dataset::read_text(path)
+            .map_err(|problem| dataset::file_error(&path.display().to_string(), problem))
+    };
+    let mut files = Vec::new();
+    if let Some(path) = train {
+        dataset::load_train(path)?;
+        files.push((ModelFile::Train, text(path)?));
+    }
+    if let Some(path) = track {
+        dataset::load_track(path)?;
+        files.push((ModelFile::Track, text(path)?));
+    }
+    Ok(files)
+}
+
+/// The texts of a grown train and, where it is known, its line.
+fn files_of_grown(folder: &Path) -> Result<Vec<(ModelFile, String)>, Failure> {
+    let [train, track] = [TRAIN_FILE, TRACK_FILE].map(|name| folder.join(name));
+    named_files(Some(&train), track.exists().then_some(&*track))
+}
+
+/// The texts of a dataset's train and line.
+fn files_of_dataset(path: &Path) -> Result<Vec<(ModelFile, String)>, Failure> {
+    let (folder, head) = dataset::open(path)?;
+    let text = |path: &str| -> Result<String, DatasetError> {
+        let unreadable = |problem: FileProblem| dataset::file_error(&folder.label(path), problem);
+        folder.read(path).map_err(unreadable)
+    };
+    let mut files = vec![(ModelFile::Train, text(&head.manifest.train_file.path)?)];
+    if let Some(track) = &head.manifest.track_file {
+        files.push((ModelFile::Track, text(&track.path)?));
+    }
+    Ok(files)
+}
+
+/// Writes each run of a dataset as inputs.
+fn write_inputs(path: &Path, folder: &Path) -> Result<(), Failure> {
+    let dataset = dataset::load(path)?;
+    let names: Vec<_> =
+        dataset.runs.iter().map(|run| format!("run_{:02}.csv", run.number)).collect();
+    for path in names.iter().map(|name| folder.join(name)).filter(|path| path.exists()) {
+        require_file(&path, INPUTS_MARK)?;
+    }
+    for (run, name) in dataset.runs.iter().zip(&names) {
+        write_in_folder(folder, name, &inputs(run))?;
+    }
+    tell(&format!("inputs: {} runs in {}", dataset.runs.len(), folder.display()));
+    Ok(())
+}

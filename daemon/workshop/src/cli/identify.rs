@@ -1,0 +1,243 @@
+//! `dynocar identify`: the daemon's pipelines over recorded runs.
+
+mod answer;
+mod runs;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use dynocar_analysis::dataset::{Dataset, Note};
+use dynocar_core::pipeline::EstimatorSettings;
+use dynocar_core::units::Unit;
+use dynocar_shared::TrainId;
+use serde::Serialize;
+
+use self::answer::EstimatorAnswer;
+use self::runs::{EstimatorSpread, RunAnswer};
+use super::text::notes;
+use dynocar::cli::Failure;
+use dynocar::dataset;
+use dynocar::output::{give, require_file};
+use dynocar_analysis::identify::{
+    default_estimators, identify, recommended_estimators, samples_of_runs,
+};
+
+/// Learn the train's parameters from recorded runs with the daemon's own pipelines.
+#[derive(Debug, Args)]
+pub struct IdentifyArguments {
+    /// The dataset's folder, or a recording
+    dataset: PathBuf,
+    /// This estimator, as v_mils; may be given several times [default: the recommended ones]
+    #[arg(long, value_name = "NAME")]
+    estimator: Vec<String>,
+    /// All estimators, the papers' methods too
+    #[arg(long)]
+    all: bool,
+    /// Learn from each run alone, too, and say how much the runs differ
+    #[arg(long)]
+    per_run: bool,
+    /// Use the forces under traction only: for recordings without the friction brake's force
+    #[arg(long)]
+    traction_only: bool,
+    /// Write the result for machines; - for standard output
+    #[arg(long, value_name = "FILE")]
+    pub(super) json: Option<PathBuf>,
+}
+
+/// Which estimators are asked.
+#[derive(Clone, Copy, Debug)]
+pub enum Asked<'a> {
+    /// The recommended ones that the train and the recordings permit.
+    Recommended,
+    /// All of them.
+    All,
+    /// These, in this order.
+    Named(&'a [String]),
+}
+
+impl<'a> Asked<'a> {
+    /// As it is said: all, by name, or nothing said.
+    ///
+    /// # Errors
+    ///
+    /// All and some by name exclude each other.
+    pub fn of(all: bool, names: &'a [String]) -> Result<Self, Failure> {
+        match (all, names) {
+            (true, []) => Ok(Asked::All),
+            (true, names) => Err(Failure::Input(format!(
+                "--all: expected no --estimator beside it, got {}",
+                names.join(", ")
+            ))),
+            (false, []) => Ok(Asked::Recommended),
+            (false, names) => Ok(Asked::Named(names)),
+        }
+    }
+}
+
+/// What is to be learned from.
+#[derive(Clone, Copy, Debug)]
+pub struct Question<'a> {
+    /// The dataset's folder.
+    pub dataset: &'a Path,
+    /// By which estimators.
+    pub asked: Asked<'a>,
+    /// From each run alone, too.
+    pub per_run: bool,
+    /// Use the forces under traction only.
+    pub traction_only: bool,
+}
+
+/// What was learned.
+#[derive(Debug, Serialize)]
+pub struct Answer {
+    dataset: String,
+    /// The unit in which the runs hold the speed.
+    #[serde(skip)]
+    speed_unit: Unit,
+    /// What may spoil the results, the worst first.
+    notes: Vec<Note>,
+    /// From all runs, one after the other.
+    estimators: Vec<EstimatorAnswer>,
+    /// Estimators beside the recommended ones, where nobody chose.
+    not_run: Vec<&'static str>,
+    /// From each run alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    runs: Option<Vec<RunAnswer>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    between_runs: Option<Vec<EstimatorSpread>>,
+}
+
+/// Runs the estimators and prints what they learned.
+///
+/// # Errors
+///
+/// A wrong dataset or estimator name is an input failure.
+pub fn execute(arguments: &IdentifyArguments) -> Result<(), Failure> {
+    if let Some(file) = &arguments.json {
+        require_file(file, "{")?;
+    }
+    let answer = answer(Question {
+        dataset: &arguments.dataset,
+        asked: Asked::of(arguments.all, &arguments.estimator)?,
+        per_run: arguments.per_run,
+        traction_only: arguments.traction_only,
+    })?;
+    Ok(give(arguments.json.as_deref(), &answer, || text(&answer))?)
+}
+
+/// Runs the estimators over a dataset.
+///
+/// # Errors
+///
+/// A wrong dataset or estimator name is an input failure.
+pub fn answer(question: Question) -> Result<Answer, Failure> {
+    let named = match question.asked {
+        Asked::Named(names) => Some(named_estimators(names)?),
+        Asked::All => Some(default_estimators()),
+        Asked::Recommended => None,
+    };
+    let (mut dataset, speed_unit) = dataset::load_with_speed_unit(question.dataset)?;
+    let is_chosen = named.is_some();
+    let estimators = named.unwrap_or_else(|| recommended_estimators(&dataset));
+    if question.traction_only {
+        dataset.keep_traction_only();
+    }
+    let all: Vec<usize> = (0..dataset.runs.len()).collect();
+    let learned = learned(&dataset, &all, (&estimators, speed_unit))?;
+    let by_run = || by_run(&dataset, (&estimators, speed_unit));
+    let runs = if question.per_run { Some(by_run()?) } else { None };
+    Ok(Answer {
+        dataset: dataset.name.clone(),
+        speed_unit,
+        notes: dataset.notes(),
+        estimators: learned,
+        not_run: if is_chosen { Vec::new() } else { others(&estimators) },
+        between_runs: runs.as_deref().map(runs::spreads),
+        runs,
+    })
+}
+
+/// What every estimator learns from some runs, one after the other.
+fn learned(
+    dataset: &Dataset,
+    runs: &[usize],
+    (estimators, speed_unit): (&[EstimatorSettings], Unit),
+) -> Result<Vec<EstimatorAnswer>, Failure> {
+    let samples = samples_of_runs(runs.iter().map(|&index| &dataset.runs[index]), TrainId(1));
+    let snapshots: Vec<_> = std::thread::scope(|scope| {
+        let threads: Vec<_> = estimators
+            .iter()
+            .map(|settings| scope.spawn(|| identify(dataset, &samples, settings)))
+            .collect();
+        threads.into_iter().map(|thread| thread.join().expect("an estimator")).collect()
+    });
+    let answer = |(settings, snapshot): (&EstimatorSettings, Result<_, _>)| match snapshot {
+        Ok(snapshot) => Ok(EstimatorAnswer::of(settings.kind(), &snapshot, speed_unit)),
+        Err(error) => Err(Failure::Input(format!("{error}"))),
+    };
+    estimators.iter().zip(snapshots).map(answer).collect()
+}
+
+fn by_run(
+    dataset: &Dataset,
+    learners: (&[EstimatorSettings], Unit),
+) -> Result<Vec<RunAnswer>, Failure> {
+    let one = |(index, run)| Ok(RunAnswer::of(run, learned(dataset, &[index], learners)?));
+    dataset.runs.iter().enumerate().map(one).collect()
+}
+
+fn named_estimators(names: &[String]) -> Result<Vec<EstimatorSettings>, Failure> {
+    let all = default_estimators();
+    let mut chosen: Vec<EstimatorSettings> = Vec::new();
+    for name in names {
+        let Some(settings) = all.iter().find(|it| it.kind().name() == name) else {
+            let names: Vec<_> = all.iter().map(|settings| settings.kind().name()).collect();
+            let names = names.join(", ");
+            return Err(Failure::Input(format!("--estimator {name}: expected one of {names}")));
+        };
+        if chosen.iter().all(|it| it.kind() != settings.kind()) {
+            chosen.push(settings.clone());
+        }
+    }
+    Ok(chosen)
+}
+
+/// The names of all but some estimators.
+fn others(estimators: &[EstimatorSettings]) -> Vec<&'static str> {
+    let is_other =
+        |it: &EstimatorSettings| estimators.iter().all(|other| other.kind() != it.kind());
+    default_estimators().iter().filter(|it| is_other(it)).map(|it| it.kind().name()).collect()
+}
+
+/// The answer for people.
+pub fn text(answer: &Answer) -> String {
+    let mut text = format!("{}\n{}", answer.dataset, notes(&answer.notes));
+    for it in &answer.estimators {
+        let reason = if it.reason == "none" { String::new() } else { format!(", {}", it.reason) };
+        let rejected: u32 = it.samples.rejected.values().sum();
+        text += &format!(
+            "\n{} ({}{reason}): {} samples used, {rejected} rejected, {} lost, {} updates\n",
+            it.name, it.status, it.samples.used, it.samples.lost, it.updates
+        );
+        for (reason, count) in &it.samples.rejected {
+            text += &format!("    rejected as {reason}: {count}\n");
+        }
+        for (name, value) in &it.values {
+            let std = it.std.get(name).copied().unwrap_or(f64::NAN);
+            text += &format!("    {name:<24} {value:>12.6} ± {:.6}\n", 1.96 * std);
+        }
+        for point in &it.resistance_shown {
+            let at = answer.speed_unit.from_base(point.speed_mps);
+            let name = format!("w0 at {at:>4.0} {}", answer.speed_unit.name());
+            let (w0, half) = (point.w0_n_per_kn, 1.96 * point.std);
+            text += &format!("    {name:<24} {w0:>12.4} ± {half:.4} N/kN\n");
+        }
+    }
+    if let Some(runs) = &answer.runs {
+        text += &runs::report(runs, answer.speed_unit);
+    }
+    if !answer.not_run.is_empty() {
+        text += &format!("\nnot run: {}; --all runs them too\n", answer.not_run.join(", "));
+    }
+    text + "\n± is the half width of the 95 % interval\n"
+}

@@ -1,0 +1,84 @@
+//! What was imported as the texts of `train.toml` and `track.toml`.
+
+use dynocar_analysis::import::{Account, ImportedLine, ImportedTrain, Remark};
+use toml::Value;
+
+use crate::cli::text::comment;
+use crate::cli::train_text::{Found, TrainArguments, TrainText, converted};
+use crate::track_text::TrackText;
+use dynocar::cli::Failure;
+
+/// The `train.toml`; what the file does not tell and nobody says is a marked default.
+///
+/// # Errors
+///
+/// A figure that no train has is an input failure.
+pub fn train(train: &ImportedTrain, told: &TrainArguments) -> Result<TrainText, Failure> {
+    let from = |key: &str| origin(&train.account, key);
+    let mut figures = vec![
+        ("name", Value::String(train.name.clone()), "as the file names it".to_string()),
+        ("mass_t", converted(train.mass_kg / 1000.0), from("mass_t")),
+    ];
+    let mut number = |key: &'static str, value: Option<f64>| {
+        figures.extend(value.map(|value| (key, converted(value), from(key))));
+    };
+    number("length_m", train.length_m);
+    number("rotating_mass_factor", train.rotating_mass_factor);
+    number("a", train.resistance.map(|davis| davis.a));
+    number("b", train.resistance.map(|davis| davis.b));
+    number("c", train.resistance.map(|davis| davis.c));
+    figures.extend(train.cars.map(|cars| ("cars", Value::Integer(cars.into()), from("cars"))));
+    let writer = format!("dynocar import from {}", train.place);
+    told.text(&writer, &Found { figures, traction: train.traction.clone() })
+}
+
+/// From which field a key is.
+fn origin(account: &Account, wanted: &str) -> String {
+    let fields = account.remarks().iter().filter_map(|remark| match remark {
+        Remark::Taken { field, key, .. } if key.split(", ").any(|key| key == wanted) => {
+            Some(field.as_str())
+        }
+        _ => None,
+    });
+    format!("from {}", fields.collect::<Vec<_>>().join(" and "))
+}
+
+/// The `track.toml`; a list that the file does not tell is left out, with the reason.
+pub fn track(line: &ImportedLine) -> String {
+    let words = format!(
+        "The line. Written by dynocar import from {}. A list that is left out is not known; an empty \
+         one says that nothing is there. `dynocar check track.toml` reads it back.",
+        line.place
+    );
+    let mut head = comment("", &words);
+    for remark in line.account.remarks() {
+        if let Remark::Unknown { key, why } = remark {
+            head += &comment("  ", &format!("{key} is not known: {why}."));
+        }
+    }
+    let mut text = TrackText::new(&head);
+    text.value("name", Value::String(line.name.clone()));
+    text.value("length_m", converted(line.length_m));
+    let pair = |&(at_m, value): &(f64, f64)| format!("{}, {}", converted(at_m), converted(value));
+    if let Some(gradient) = &line.gradient {
+        text.list("gradient", gradient.iter().map(pair));
+    }
+    if let Some(curves) = &line.curves {
+        let ends =
+            |start_m: f64, end_m: f64| format!("{}, {}", converted(start_m), converted(end_m));
+        let entry = |it: &dynocar_core::track::Curve| {
+            format!("{}, {}", ends(it.start_m, it.end_m), converted(it.radius_m))
+        };
+        text.list("curves", curves.iter().map(entry));
+    }
+    if !line.stops.is_empty() {
+        let stop = |(at_m, name): &(f64, String)| {
+            format!("{}, {}", converted(*at_m), Value::String(name.clone()))
+        };
+        text.list("stops", line.stops.iter().map(stop));
+    }
+    if let Some(permitted) = &line.permitted_speed {
+        text.list("permitted_speed", permitted.iter().map(pair));
+    }
+    text.into_text()
+}

@@ -1,0 +1,130 @@
+//! `dynocar init`: the first description of a train and of its recordings.
+
+mod arguments;
+mod ask;
+mod daemon_text;
+mod dataset_text;
+mod described;
+mod draft;
+mod letters;
+mod paths;
+mod summary;
+
+use std::path::Path;
+
+use dynocar_analysis::dataset::guess::{Guess, GuessError, GuessProblem, Recording, guess};
+use dynocar_analysis::dataset::note::notes;
+use dynocar_analysis::dataset::{MANIFEST_FILE, Place, Quantity};
+use toml::Value;
+
+use super::train_text::{Found, TRAIN_FILE, TrainText};
+use crate::track_text::TRACK_FILE;
+pub use arguments::InitArguments;
+use described::{DAEMON_FILE, Described};
+use draft::Draft;
+use dynocar::cli::Failure;
+use dynocar::dataset::{file_error, read_text};
+use dynocar::output::{print, require_folder, require_new, write_new_in_folder};
+use letters::Letters;
+
+const WRITER: &str = "dynocar init";
+/// Units that the values did not tell are set right so many times at most.
+const CORRECTIONS_MAX: usize = 4;
+
+/// Writes the first description.
+///
+/// # Errors
+///
+/// An input failure where a recording or a figure of the train is wrong, or a file is there already;
+/// a failure of the work where a file cannot be written.
+pub fn execute(arguments: &InitArguments) -> Result<(), Failure> {
+    let arguments = &ask::complete(arguments)?;
+    let folder = arguments.folder();
+    require_folder(folder)?;
+    let with_dataset = !arguments.csv.is_empty();
+    if !with_dataset && !arguments.column.is_empty() {
+        return Err(Failure::Input("--column: expected recordings beside it: --csv FILE".into()));
+    }
+    let mut names = vec![TRAIN_FILE, DAEMON_FILE];
+    names.extend(with_dataset.then_some(MANIFEST_FILE));
+    for name in names {
+        require_new(&folder.join(name))?;
+    }
+    let has_track = folder.join(TRACK_FILE).is_file();
+    let mut train = arguments.train.text(WRITER, &Found::default())?;
+    let described = match with_dataset {
+        true => Some(describe(arguments, &mut train, has_track)?),
+        false => None,
+    };
+    let daemon = daemon_text::daemon(has_track);
+    let mut files = vec![(TRAIN_FILE, train.text.as_str()), (DAEMON_FILE, daemon.as_str())];
+    files.extend(described.as_ref().map(|it| (MANIFEST_FILE, it.text.as_str())));
+    write_new_in_folder(folder, &files)?;
+    Ok(print(&summary::text(folder, &train, described.as_ref()))?)
+}
+
+/// Reads the recordings, guesses what they hold, and reads them once more as that.
+fn describe(
+    arguments: &InitArguments,
+    train: &mut TrainText,
+    has_track: bool,
+) -> Result<Described, Failure> {
+    let Letters { files: texts, encoding } = letters::texts(&arguments.csv)?;
+    let files = paths::from_folder(arguments.folder(), &arguments.csv)?;
+    let recordings: Vec<Recording> =
+        texts.iter().map(|(label, text)| Recording { label, text }).collect();
+    let mut guess = guess(&recordings, &arguments.column).map_err(failure)?;
+    let track = match has_track {
+        true => Some(read_track(&arguments.folder().join(TRACK_FILE))?),
+        false => None,
+    };
+    if let Some(mass_t) = recorded_mass_t(&guess) {
+        let from = "t, the middle of the mass that the recordings hold".into();
+        let figures = vec![("mass_t", Value::Float(mass_t), from)];
+        *train = arguments.train.text(WRITER, &Found { figures, traction: None })?;
+    }
+    let name = dataset_text::name_of(arguments.folder());
+    let mut corrections = 0;
+    loop {
+        let text = dataset_text::dataset(&guess, &name, (&files, encoding), has_track);
+        let csv = files.iter().map(String::as_str).zip(recordings.iter().copied());
+        let draft = Draft {
+            folder: arguments.folder(),
+            dataset: &text,
+            train: &train.text,
+            track: track.as_deref(),
+            csv: csv.collect(),
+        };
+        let (head, runs) = draft.read()?;
+        let is_corrected = corrections < CORRECTIONS_MAX
+            && guess.correct(&runs, arguments.train.knows_mass()).is_some();
+        corrections += 1;
+        if !is_corrected {
+            let notes = notes(&head.train, head.track.as_deref(), &runs);
+            return Ok(Described { guess, encoding, files, notes, text });
+        }
+    }
+}
+
+/// The middle of a recorded mass in t.
+fn recorded_mass_t(guess: &Guess) -> Option<f64> {
+    let column = guess.column(Quantity::TrainMass)?;
+    let mass_t = column.unit.to_base(column.middle * column.scale) / 1000.0;
+    (mass_t > 0.0 && mass_t.is_finite()).then_some((mass_t * 10.0).round() / 10.0)
+}
+
+fn read_track(path: &Path) -> Result<String, Failure> {
+    Ok(read_text(path).map_err(|problem| file_error(&path.display().to_string(), problem))?)
+}
+
+/// A guess that failed, with what helps.
+fn failure(error: GuessError) -> Failure {
+    let message = match *error.problem {
+        GuessProblem::Missing { quantity, .. } => format!(
+            "{error}; say which it is: --column {quantity}=COLUMN:UNIT{}",
+            if quantity == Quantity::Time { " (numbers or times that grow)" } else { "" }
+        ),
+        _ => error.to_string(),
+    };
+    Failure::At(Place { file: error.place.file, line: error.place.line }, message)
+}

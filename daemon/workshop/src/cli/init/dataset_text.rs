@@ -1,0 +1,182 @@
+//! `dataset.toml` of a first description: every guess with what speaks for it and what was left.
+
+use std::path::Path;
+
+use dynocar_analysis::dataset::Quantity;
+use dynocar_analysis::dataset::guess::{Guess, GuessedColumn, GuessedRun};
+use encoding_rs::{Encoding, UTF_8};
+use toml::Value;
+
+use crate::cli::text::comment;
+use crate::cli::train_text::TRAIN_FILE;
+use crate::track_text::TRACK_FILE;
+use dynocar::models::Moment;
+
+/// A name for a dataset: its folder's.
+pub fn name_of(folder: &Path) -> String {
+    let full = std::path::absolute(folder).unwrap_or_else(|_| folder.into());
+    let name = full.file_name().map(|name| name.to_string_lossy().into_owned());
+    name.filter(|name| !name.is_empty()).unwrap_or_else(|| "recordings".into())
+}
+
+/// The text of `dataset.toml`; `files` are the runs' paths from its folder, in this encoding.
+pub fn dataset(
+    guess: &Guess,
+    name: &str,
+    (files, encoding): (&[String], &'static Encoding),
+    has_track: bool,
+) -> String {
+    let mut text = comment(
+        "",
+        "Recorded runs of one train. Written by dynocar init: every line under [columns] is a guess \
+         from header and values, with what speaks for it and what was not taken. Set right what is \
+         wrong; `dynocar check` then says what it understood.",
+    );
+    text += &format!("[dataset]\nname = {}\n", quoted(name));
+    text += &layout_text(guess, encoding);
+    text += "# position_reference = \"head\"    # where the recorded position is the head's, not the \
+             centre's\n";
+    text += &format!("\n[train]\nfile = {}\n\n", quoted(TRAIN_FILE));
+    text += &match has_track {
+        true => format!("[track]\nfile = {}\n", quoted(TRACK_FILE)),
+        false => format!(
+            "# Without a line, gradients must come with the recordings, or are unknown.\n\
+             # [track]\n# file = {}\n",
+            quoted(TRACK_FILE)
+        ),
+    };
+    text += "\n[columns]\n";
+    for column in &guess.columns {
+        text += &column_text(column);
+    }
+    if !guess.unmapped.is_empty() {
+        text += "\n# Taken for nothing:\n";
+        for column in &guess.unmapped {
+            text += &comment("  ", &format!("'{}': {}", column.name.shown(), column.reason));
+        }
+    }
+    let count = guess.runs.len();
+    for (index, (run, file)) in guess.runs.iter().zip(files).enumerate() {
+        let is_held_out = count > 1 && index + 1 == count;
+        let (role, why) = match is_held_out {
+            true => ("holdout", "only scores what the others teach"),
+            false => ("fit", "models learn from it"),
+        };
+        text += &format!("\n[[runs]]\nfile = {}\n", quoted(file));
+        text += &format!("role = {:<24}# {why}\n", quoted(role));
+        let falls = match run.direction {
+            -1 => "the recorded position falls",
+            _ => "1: the chainage grows; -1: it falls",
+        };
+        text += &format!("direction = {:<19}# {falls}\n", run.direction);
+        text += "# mass_t = 100.0               # where this run's load is known\n";
+        text += &date_text(guess, run);
+    }
+    text
+}
+
+/// How the files' text falls into cells.
+fn layout_text(guess: &Guess, encoding: &'static Encoding) -> String {
+    let mut text = String::new();
+    if encoding != UTF_8 {
+        text += &format!("encoding = {}\n", quoted(&encoding.name().to_lowercase()));
+    }
+    let delimiter = char::from(guess.delimiter).to_string();
+    text += &format!("delimiter = {}\n", quoted(&delimiter));
+    text += &format!("decimal = {}\n", quoted(&char::from(guess.decimal).to_string()));
+    if guess.skip_rows > 0 {
+        text += &format!("skip_rows = {:<19}# lines above the names\n", guess.skip_rows);
+    }
+    if guess.units_row {
+        text += "units_row = true               # a line of units below the names\n";
+    }
+    text
+}
+
+/// The day of a run, where its times do not hold it.
+fn date_text(guess: &Guess, run: &GuessedRun) -> String {
+    let format = guess.column(Quantity::Time).and_then(|time| time.format.as_ref());
+    match (format, run.day) {
+        (Some(format), _) if format.has_date() => String::new(),
+        (_, Some(day)) => {
+            let day = Moment { unix_s: 86_400 * u64::try_from(day).unwrap_or(0) }.day();
+            format!("date = {day:<24}# as the column of dates says\n")
+        }
+        _ => "# date = 2026-03-18            # where the day is known\n".into(),
+    }
+}
+
+fn column_text(column: &GuessedColumn) -> String {
+    let mut text = comment("", &format!("{}: {}.", column.quantity, column.reasons.join("; ")));
+    for doubt in &column.doubts {
+        text += &comment("  ", &format!("DOUBTFUL: {doubt}"));
+    }
+    for rejected in &column.rejected {
+        text += &comment("  ", rejected);
+    }
+    let scale = match column.scale {
+        1.0 => String::new(),
+        scale => format!(", scale = {}", Value::Float(scale)),
+    };
+    let name = quoted(&column.name.text);
+    let read_as = match &column.format {
+        Some(format) => format!("format = {}", quoted(format.name())),
+        None => format!("unit = {}{scale}", quoted(column.unit.name())),
+    };
+    text + &format!("{} = {{ column = {name}, {read_as} }}\n", column.quantity)
+}
+
+/// A text as TOML writes it, on one line.
+fn quoted(text: &str) -> String {
+    let mut quoted = String::from("\"");
+    for letter in text.chars() {
+        match letter {
+            '"' => quoted.push_str("\\\""),
+            '\\' => quoted.push_str("\\\\"),
+            '\t' => quoted.push_str("\\t"),
+            letter if letter.is_control() => {
+                quoted.push_str(&format!("\\u{:04X}", u32::from(letter)));
+            }
+            letter => quoted.push(letter),
+        }
+    }
+    quoted + "\""
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynocar_analysis::dataset::guess::{Recording, guess};
+    use dynocar_analysis::dataset::manifest::{Manifest, Role};
+
+    #[test]
+    fn names_with_any_marks_lead_back_to_their_column() {
+        let text = "\"t \"\"s\"\" [s]\";\"v\t\\x [km/h]\";\"a\nb\"\n0;1;2\n1;50;3\n2;90;4\n";
+        let files = [Recording { label: "a.csv", text }];
+        let guess = guess(&files, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let files = ["da\"y\\1.csv".to_string()];
+        let text = dataset(&guess, "x\n[y]", (&files, UTF_8), true);
+        let manifest = Manifest::parse("dataset.toml", &text).unwrap_or_else(|it| panic!("{it}"));
+        let columns: Vec<&str> = manifest.columns.iter().map(|it| it.column.as_str()).collect();
+        assert_eq!(columns, ["t \"s\" [s]", "v\t\\x [km/h]"]);
+        assert_eq!((manifest.layout.delimiter, manifest.name.as_str()), (b';', "x\n[y]"));
+        assert_eq!(manifest.runs[0].file, files[0]);
+        assert!(manifest.track_file.is_some() && text.contains("# Taken for nothing:"));
+    }
+
+    #[test]
+    fn of_several_runs_the_last_is_held_out() {
+        let text = "t,v\n0,1\n1,2\n";
+        let recording = Recording { label: "a.csv", text };
+        for count in 1..4 {
+            let guess = guess(&vec![recording; count], &[]).unwrap();
+            let files: Vec<String> = (0..count).map(|index| format!("{index}.csv")).collect();
+            let text = dataset(&guess, "x", (&files, UTF_8), false);
+            let manifest = Manifest::parse("dataset.toml", &text).unwrap();
+            let roles: Vec<Role> = manifest.runs.iter().map(|run| run.role).collect();
+            assert_eq!(roles.contains(&Role::Holdout), count > 1);
+            assert!(roles[0] == Role::Fit || count > 1);
+            assert!(roles[..count.saturating_sub(1)].iter().all(|role| *role == Role::Fit));
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! `dynocar learn`: a companion of the daemon that learns from recorded runs.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+use std::time::SystemTime;
+
+use clap::Args;
+use dynocar_client::{Host, SnapshotReader};
+
+use crate::learn::watch::{Suspicions, TimeOfDay, watch};
+use crate::learn::{Bounds, page};
+use crate::learn::{LearnError, Learner, LearnerSettings, Outcome, Round, TrainRound};
+use crate::report::provenance::own_command_line;
+use dynocar::cli::Failure;
+use dynocar::cli::run::start_log;
+use dynocar::config::DaemonConfig;
+use dynocar::ending;
+use dynocar::output::{OutputError, print, require_file, write_file};
+use dynocar::unpacking::UnpackError;
+
+/// Learn from recorded runs what the model in force lacks, and put it into the store as a candidate: at the
+/// start, when the daemon's residual monitor suspects something new, and at an hour
+#[derive(Debug, Args)]
+pub struct LearnArguments {
+    /// The daemon's configuration: the trains, what is declared of them, the log
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+    /// The folder of recorded runs: datasets and recordings at any depth, a flight recorder's ring too
+    #[arg(long, value_name = "DIR")]
+    runs: PathBuf,
+    /// The store of models, made when it is not there; else that of the configuration
+    #[arg(long, value_name = "DIR")]
+    models: Option<PathBuf>,
+    /// Learn once and end
+    #[arg(long)]
+    once: bool,
+    /// Learn at this time of each day, in UTC
+    #[arg(long, value_name = "HH:MM", conflicts_with = "once")]
+    at: Option<TimeOfDay>,
+    /// Write the history of all models after each round: one HTML page that needs nothing else
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+}
+
+/// Learns until it is asked to end or its terminal is gone, or once.
+///
+/// # Errors
+///
+/// A wrong configuration or name of a result is an input failure; what goes wrong at work ends a round, and
+/// the command only where it was to learn once.
+pub fn execute(arguments: &LearnArguments) -> Result<(), Failure> {
+    let config = DaemonConfig::load(&arguments.config)?;
+    if let Some(file) = &arguments.report {
+        require_file(file, "<!DOCTYPE html>")?;
+    }
+    if !arguments.runs.is_dir() {
+        let runs = arguments.runs.display();
+        return Err(Failure::Input(format!("{runs}: expected the folder of recorded runs")));
+    }
+    let store = dynocar::cli::models::store(arguments.models.as_deref(), Some(&config))?;
+    start_log(&config)?;
+    let work = |error: &dyn std::fmt::Display| Failure::Work(error.to_string());
+    let stop = ending::flag().map_err(|error| work(&error))?;
+    let settings = LearnerSettings {
+        store,
+        runs: arguments.runs.clone(),
+        trains: config.trains.iter().map(|train| (train.id, train.text.clone())).collect(),
+        bounds: Bounds::default(),
+        command: own_command_line(),
+    };
+    let mut learner = Learner::open(settings).map_err(failure)?;
+    let report = arguments.report.as_deref();
+    if arguments.once {
+        let round =
+            learner.round(SystemTime::now(), &|| stop.load(Ordering::Relaxed)).map_err(failure)?;
+        write_report(report, &learner)?;
+        return Ok(print(&told(&round))?);
+    }
+    let host = match &config.root {
+        Some(root) => Host::at(root),
+        None => Host::from_environment(),
+    };
+    let host = host.map_err(|error| work(&error))?;
+    let suspicions = config.trains.iter().map(|train| {
+        let reader = SnapshotReader::open(&host, train.id).map_err(|error| work(&error))?;
+        Ok(Suspicions::new(train.id, reader))
+    });
+    let mut suspicions = suspicions.collect::<Result<Vec<_>, Failure>>()?;
+    watch(&mut learner, &mut suspicions, arguments.at, &stop, &mut |learner, round| {
+        // That there was nothing new is no news to a log.
+        let is_new = |it: &TrainRound| it.outcome != Outcome::NothingNew;
+        for line in round.trains.iter().filter(|it| is_new(it)).map(of_train) {
+            tracing::info!("{}", line.trim_end());
+        }
+        write_report(report, learner)
+    })
+}
+
+fn failure(error: LearnError) -> Failure {
+    match error {
+        LearnError::Unpack(error @ UnpackError::Content { .. }) => {
+            Failure::Input(error.to_string())
+        }
+        error => Failure::Work(error.to_string()),
+    }
+}
+
+fn write_report(file: Option<&Path>, learner: &Learner) -> Result<(), Failure> {
+    let Some(file) = file else { return Ok(()) };
+    let page =
+        page::html(learner, SystemTime::now()).map_err(|error| Failure::Work(error.to_string()))?;
+    write_file(file, &page).map_err(|error: OutputError| error.into())
+}
+
+/// A line for each train.
+fn told(round: &Round) -> String {
+    let mut text: String = round.trains.iter().map(of_train).collect();
+    if round.is_stopped {
+        text += "stopped before the end; what was not concluded is looked at again\n";
+    }
+    text
+}
+
+fn of_train(round: &TrainRound) -> String {
+    let TrainRound { train, runs, in_force, outcome } = round;
+    let plural = if *runs == 1 { "" } else { "s" };
+    let head = format!("train {train}: {runs} run{plural}, model {in_force} in force: ");
+    let found = match outcome {
+        Outcome::NothingNew => "nothing new since the last time".into(),
+        Outcome::TooFewRuns => "too few runs to learn from".into(),
+        Outcome::Explained(it) => {
+            let mut parts = vec![it.statement.clone()];
+            parts.extend(it.candidate.map(|hash| format!("new candidate {hash}")));
+            parts.extend(it.same_as.map(|hash| format!("model {hash} says so already")));
+            if !it.events.is_empty() {
+                parts.push(format!("new maintenance events: {}", it.events.len()));
+            }
+            parts.join(" | ")
+        }
+    };
+    format!("{head}{found}\n")
+}

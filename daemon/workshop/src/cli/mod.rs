@@ -1,0 +1,98 @@
+//! The commands of the workshop, one file each; what `check`, `explain` and `identify` answer is there for
+//! other callers, too. A user calls them as `dynocar`'s.
+
+pub mod check;
+mod completions;
+pub mod explain;
+mod fmu;
+pub mod identify;
+mod import;
+mod init;
+mod learn;
+mod man;
+mod stops;
+mod survey;
+mod text;
+mod train_text;
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::{CommandFactory, Parser, Subcommand};
+use dynocar::cli::check::CheckArguments;
+use dynocar::cli::{Failure, parse};
+
+/// Dynocar, a dynamometer car in software: the workshop, which `dynocar` calls.
+#[derive(Debug, Parser)]
+#[command(name = "dynocar", version, about)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Init(init::InitArguments),
+    Import(import::ImportArguments),
+    Explain(explain::ExplainArguments),
+    Check(CheckArguments),
+    Identify(identify::IdentifyArguments),
+    Stops(stops::StopsArguments),
+    Survey(survey::SurveyArguments),
+    Fmu(fmu::FmuArguments),
+    Learn(learn::LearnArguments),
+    Completions(completions::CompletionsArguments),
+    Man(man::ManArguments),
+}
+
+impl Command {
+    fn execute(&self) -> Result<(), Failure> {
+        match self {
+            Command::Init(arguments) => init::execute(arguments),
+            Command::Import(arguments) => import::execute(arguments),
+            Command::Explain(arguments) => explain::execute(arguments),
+            Command::Check(arguments) => check::run(arguments),
+            Command::Identify(arguments) => identify::execute(arguments),
+            Command::Stops(arguments) => stops::execute(arguments),
+            Command::Survey(arguments) => survey::execute(arguments),
+            Command::Fmu(arguments) => fmu::execute(arguments),
+            Command::Learn(arguments) => learn::execute(arguments),
+            Command::Completions(arguments) => completions::execute(arguments, all_commands()),
+            Command::Man(arguments) => man::execute(arguments, all_commands()),
+        }
+    }
+
+    /// Where machines want the result.
+    fn json(&self) -> Option<&Path> {
+        match self {
+            Command::Explain(arguments) => arguments.json.as_deref(),
+            Command::Identify(arguments) => arguments.json.as_deref(),
+            Command::Stops(arguments) => arguments.json.as_deref(),
+            Command::Survey(arguments) => arguments.json.as_deref(),
+            // `check` has an answer of its own for what is wrong.
+            Command::Check(_) => None,
+            Command::Init(_) | Command::Import(_) | Command::Fmu(_) | Command::Learn(_) => None,
+            Command::Completions(_) | Command::Man(_) => None,
+        }
+    }
+}
+
+/// The commands of `dynocar`, those of the workshop with their own options.
+fn all_commands() -> clap::Command {
+    let own = Arguments::command();
+    own.get_subcommands().fold(dynocar::cli::commands(), |all, command| {
+        all.mut_subcommand(command.get_name(), |_| command.clone())
+    })
+}
+
+/// Parses the command line, runs the command, reports a failure on standard error.
+pub fn main() -> ExitCode {
+    let arguments = match parse::<Arguments>("dynocar") {
+        Ok(arguments) => arguments,
+        Err(status) => return status,
+    };
+    match arguments.command.execute() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report("dynocar", arguments.command.json()),
+    }
+}

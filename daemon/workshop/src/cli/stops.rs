@@ -1,0 +1,219 @@
+//! `dynocar stops`: what recorded stops say of a brake whose force nobody measured.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use dynocar_analysis::dataset::{Note, Role};
+use dynocar_analysis::stops::{FindSettings, Law, RecordedStop, Study, StudySettings};
+use serde::Serialize;
+
+use super::text::{TextTable, notes};
+use dynocar::cli::Failure;
+use dynocar::dataset;
+use dynocar::output::{give, require_file};
+
+/// Deceleration over speed, friction and stopping distance from recorded stops: from speed alone,
+/// and the command of the brake where it is recorded.
+#[derive(Debug, Args)]
+pub struct StopsArguments {
+    /// The dataset's folder
+    dataset: PathBuf,
+    /// Predict the next stop from this speed in m/s; may be given several times
+    #[arg(long, value_name = "MPS", value_parser = positive)]
+    from: Vec<f64>,
+    /// How well stops repeat, as relative standard deviation, until enough of them tell
+    #[arg(long, value_name = "SHARE", default_value = "0.03", value_parser = share)]
+    repeatability: f64,
+    /// Least share of the declared brake effort that counts as applied
+    #[arg(long, value_name = "SHARE", default_value = "0.85", value_parser = share)]
+    applied: f64,
+    /// Write the result for machines; - for standard output
+    #[arg(long, value_name = "FILE")]
+    pub(super) json: Option<PathBuf>,
+}
+
+/// Speeds in m/s at which the deceleration of a modulated stop is shown.
+const SHOWN_MPS: [f64; 6] = [25.0, 20.0, 15.0, 10.0, 5.0, 3.0];
+
+fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse().map_err(|_| String::from("expected a number"))?;
+    if (0.0..=200.0).contains(&number) && number > 0.0 {
+        return Ok(number);
+    }
+    Err("expected a speed above 0 and up to 200 m/s".into())
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    let number = text.parse().map_err(|_| String::from("expected a number"))?;
+    if number > 0.0 && number <= 1.0 {
+        return Ok(number);
+    }
+    Err("expected a share above 0 and up to 1".into())
+}
+
+#[derive(Debug, Serialize)]
+struct Answer {
+    dataset: String,
+    /// What may spoil the results, the worst first.
+    notes: Vec<Note>,
+    #[serde(flatten)]
+    study: Study,
+}
+
+/// Studies the stops and prints what they say.
+///
+/// # Errors
+///
+/// A wrong dataset is an input failure; so is one without a stop.
+pub fn execute(arguments: &StopsArguments) -> Result<(), Failure> {
+    if let Some(file) = &arguments.json {
+        require_file(file, "{")?;
+    }
+    let dataset = dataset::load(&arguments.dataset)?;
+    let find = FindSettings { share_min: arguments.applied, ..FindSettings::default() };
+    let settings = StudySettings { find, repeatability: arguments.repeatability };
+    let study = Study::of(&dataset, &settings, &arguments.from);
+    if study.stops.is_empty() {
+        return Err(Failure::Input(format!(
+            "{}: no run holds a stop: a brake that is applied, or a speed that falls, from {} m/s or \
+             more to standstill",
+            arguments.dataset.display(),
+            find.from_mps
+        )));
+    }
+    for speed_mps in &arguments.from {
+        let why = match &study.law {
+            Some(law) if law.stopping_distance(*speed_mps).is_some() => continue,
+            Some(law) => format!(
+                "--from {speed_mps}: the stops were seen from {:.1} m/s down; nothing is told of faster ones",
+                law.fastest_mps()
+            ),
+            None => format!("--from {speed_mps}: no run to fit holds a stop by all of the brake"),
+        };
+        return Err(Failure::Input(why));
+    }
+    let answer = Answer { dataset: dataset.name.clone(), notes: dataset.notes(), study };
+    Ok(give(arguments.json.as_deref(), &answer, || text(&answer))?)
+}
+
+fn text(answer: &Answer) -> String {
+    let study = &answer.study;
+    let mut text = format!("{}\n{}\n{}", answer.dataset, notes(&answer.notes), stops(&study.stops));
+    text += &modulated(&study.stops);
+    if let Some(law) = &study.law {
+        text += &of_the_brake(study, law);
+    }
+    text += "\nnot told by these data\n";
+    for line in &study.cannot_tell {
+        text += &format!("  {line}\n");
+    }
+    text + "\n± is the half width of the 95 % interval\n"
+}
+
+/// What the stops by all of the brake say of it.
+fn of_the_brake(study: &Study, law: &Law) -> String {
+    let mut text =
+        String::from("\ndeceleration over speed, the mean of the stops by all of the brake\n");
+    let mut table = TextTable::new(&["m/s", "m/s²", "±", "± next stop", "stops"], &[]);
+    let step = (law.points.len() / 12).max(1);
+    for point in law.points.iter().rev().step_by(step) {
+        table.push(vec![
+            format!("{:.0}", point.speed_mps),
+            format!("{:.3}", point.deceleration_mps2),
+            format!("{:.3}", 1.96 * point.std_mps2),
+            format!("{:.3}", 1.96 * point.next_std_mps2),
+            format!("{}", point.stops),
+        ]);
+    }
+    text += &table.to_string();
+    text += &format!(
+        "builds up in {:.2} s; stops repeat within {:.1} % (standard deviation)\n",
+        law.response_s,
+        100.0 * law.repeatability
+    );
+    text += "\nthe next stop, from command to standstill\n";
+    let mut table = TextTable::new(&["from m/s", "s", "m", "95 % within m"], &[]);
+    for it in &study.distances {
+        table.push(vec![
+            format!("{:.1}", it.from_mps),
+            format!("{:.1}", it.time_s),
+            format!("{:.0}", it.distance_m),
+            format!("{:.0}", it.distance_bound_m),
+        ]);
+    }
+    text += &table.to_string();
+    text + &friction(&study.stops)
+}
+
+/// What the others hold: the driver's deceleration at some speeds, and why it is no law.
+fn modulated(stops: &[RecordedStop]) -> String {
+    let others: Vec<&RecordedStop> = stops.iter().filter(|it| it.no_law.is_some()).collect();
+    let fastest = others.iter().map(|it| it.from_mps).fold(0.0, f64::max);
+    let speeds: Vec<f64> = SHOWN_MPS.into_iter().filter(|it| *it <= fastest).collect();
+    if speeds.is_empty() {
+        return String::new();
+    }
+    let mut header = vec!["run".into(), "from s".into()];
+    header.extend(speeds.iter().map(|it| format!("at {it:.0} m/s")));
+    header.push("no law of the brake, since".into());
+    let header: Vec<&str> = header.iter().map(|it: &String| &it[..]).collect();
+    let mut table = TextTable::new(&header, &[0, header.len() - 1]);
+    for stop in others {
+        let mut row = vec![stop.file.clone(), format!("{:.1}", stop.from_s)];
+        row.extend(speeds.iter().map(|speed_mps| {
+            let at = stop.decelerations.iter().find(|it| it.speed_mps == *speed_mps);
+            at.map_or("-".into(), |it| {
+                format!("{:.2} ± {:.2}", it.deceleration_mps2, 1.96 * it.std_mps2)
+            })
+        }));
+        row.push(stop.no_law.clone().unwrap_or_default());
+        table.push(row);
+    }
+    format!("\nstops with a modulated brake: deceleration in m/s² over speed\n{table}")
+}
+
+fn stops(stops: &[RecordedStop]) -> String {
+    let header =
+        ["run", "role", "from s", "m/s", "s", "m", "brake", "found by", "said m", "within m"];
+    let mut table = TextTable::new(&header, &[0, 1, 6, 7]);
+    for stop in stops {
+        let said = |number: Option<f64>| number.map_or("-".into(), |it| format!("{it:.0}"));
+        table.push(vec![
+            stop.file.clone(),
+            if stop.role == Role::Fit { "fit".into() } else { "holdout".into() },
+            format!("{:.1}", stop.from_s),
+            format!("{:.1}", stop.from_mps),
+            format!("{:.1}", stop.time_s),
+            format!("{:.0}", stop.distance_m),
+            format!("{:?}", stop.manner).to_lowercase(),
+            format!("{:?}", stop.found_by).to_lowercase(),
+            said(stop.predicted.map(|it| it.distance_m)),
+            said(stop.predicted.map(|it| it.distance_bound_m)),
+        ]);
+    }
+    table.to_string()
+}
+
+/// The friction behind the longest stop.
+fn friction(stops: &[RecordedStop]) -> String {
+    let by_length =
+        |one: &&RecordedStop, other: &&RecordedStop| one.friction.len().cmp(&other.friction.len());
+    let Some(stop) = stops.iter().max_by(by_length).filter(|it| !it.friction.is_empty()) else {
+        return String::new();
+    };
+    let mut table = TextTable::new(&["m/s", "friction", "±", "adhesion ≥"], &[]);
+    let step = (stop.friction.len() / 8).max(1);
+    for point in stop.friction.iter().step_by(step) {
+        table.push(vec![
+            format!("{:.0}", point.speed_mps),
+            format!("{:.2}", point.share),
+            format!("{:.2}", 1.96 * point.share_std),
+            point.adhesion_at_least.map_or("-".into(), |it| format!("{it:.3}")),
+        ]);
+    }
+    format!(
+        "\nfriction over its mean in the stop of {} at {:.1} s, by brake_smoother and \
+         adhesion_smoother\n{table}",
+        stop.file, stop.from_s
+    )
+}

@@ -1,0 +1,98 @@
+//! `dynocar survey`: a line that nobody surveyed, from raw recordings with GNSS.
+
+use std::path::PathBuf;
+
+use crate::report::provenance::{Provenance, own_command_line};
+use crate::survey::answer::Answer;
+use crate::survey::{SurveyFailure, page, survey_folder};
+use clap::Args;
+use dynocar::cli::Failure;
+use dynocar::output::{give, require_file, require_folder, tell, write_file};
+
+/// Find the line that raw recordings drive, its gradient from the forces, and cut them into trips.
+#[derive(Debug, Args)]
+pub struct SurveyArguments {
+    /// The folder of the raw recordings, or its dataset.toml under any name
+    dataset: PathBuf,
+    /// Write the dataset of trips into this folder
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+    /// Only map the recordings on a line surveyed before
+    #[arg(long, value_name = "track.toml")]
+    line: Option<PathBuf>,
+    /// Write the result for machines; - for standard output
+    #[arg(long, value_name = "FILE")]
+    pub(super) json: Option<PathBuf>,
+    /// Write a report for people: one HTML page that needs nothing else
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+}
+
+/// Surveys and writes the dataset.
+///
+/// # Errors
+///
+/// A wrong dataset or line is an input failure; a file that cannot be written one of work.
+pub fn execute(arguments: &SurveyArguments) -> Result<(), Failure> {
+    for (file, mark) in [(&arguments.json, "{"), (&arguments.report, "<!DOCTYPE html>")] {
+        file.as_deref().map_or(Ok(()), |file| require_file(file, mark))?;
+    }
+    require_folder(&arguments.out)?;
+    let (source, line) = (&arguments.dataset, arguments.line.as_deref());
+    let made = survey_folder(source, line, &arguments.out).map_err(failure)?;
+    tell(&format!("dataset: {} files in {}", made.files.len(), arguments.out.display()));
+    if let Some(file) = &arguments.report {
+        let provenance = Provenance::of(source, own_command_line())
+            .map_err(|error| Failure::Input(error.to_string()))?;
+        let page = page::html(&made.raw, &made.survey, &made.answer, &provenance)
+            .map_err(|error| Failure::Work(format!("{}: {error}", file.display())))?;
+        write_file(file, &page)?;
+        tell(&format!("report: {}", file.display()));
+    }
+    Ok(give(arguments.json.as_deref(), &made.answer, || summary(&made.answer))?)
+}
+
+fn failure(failure: SurveyFailure) -> Failure {
+    match failure {
+        SurveyFailure::Output(error) => Failure::from(error),
+        SurveyFailure::Load(error) => Failure::from(error),
+        _ => Failure::Input(failure.to_string()),
+    }
+}
+
+fn summary(answer: &Answer) -> String {
+    let mut text = format!(
+        "line of {:.1} m, {} stops, {} trips, {} parts not used\n",
+        answer.line.length_m,
+        answer.line.stops.len(),
+        answer.trips.len(),
+        answer.not_used.len()
+    );
+    if let Some(std) = answer.line.gradient_std_permille {
+        text += &format!(
+            "gradient from {} passes, ± {:.2} ‰ over 100 m\n",
+            answer.line.passes,
+            1.96 * std
+        );
+    }
+    if let Some(learned) = &answer.learned {
+        let mut row = |name: &str, it: &crate::survey::answer::Value, unit: &str| {
+            text += &format!("    {name:<22} {:>10.4} ± {:.4} {unit}\n", it.value, 1.96 * it.std);
+        };
+        row("mass", &learned.mass_t, "t");
+        row("with rotating parts", &learned.inertial_mass_t, "t");
+        if let Some(mass) = &learned.passenger_mass_kg {
+            row("passenger", mass, "kg");
+        }
+        row("recorded / true speed", &learned.speed_scale, "");
+        row("forces stamped late", &learned.force_late_s, "s");
+        row("positions late", &learned.position_late_s, "s");
+        if let Some(gain) = &learned.friction_brake_n_per_pa {
+            row("friction brake", gain, "N/Pa");
+        }
+    }
+    for open in &answer.cannot_tell {
+        text += &format!("these recordings cannot tell {open}\n");
+    }
+    text + "± is the half width of the 95 % interval\n"
+}

@@ -1,0 +1,291 @@
+//! The grown model as files: a train and a line that the daemon loads, and a dataset of both and of
+//! the declared runs.
+//!
+//! The declared files are taken as they are, with every key that somebody wrote into them, and
+//! only what the data changed is replaced: a, b, c always, and what holds an effect that was found:
+//! a constant, a profile, a correction. A line's file is made where none was declared and an effect
+//! needs one. What belongs to certain runs is an event and no property of a train or a line: it is
+//! listed, so that nobody takes the files for more than they are.
+
+mod error;
+mod runs;
+
+use std::path::{Path, PathBuf};
+
+use dynocar_analysis::dataset::{DatasetFiles, FileProblem, MANIFEST_FILE};
+use dynocar_analysis::explain::{Explanation, evidence::Fit};
+use dynocar_core::terms::extra::{self, Extra, Factor};
+use dynocar_core::terms::{Entry, Key};
+use toml::{Table, Value};
+
+use dynocar::dataset::open;
+use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
+use dynocar::output::write_in_folder;
+
+pub use error::{GROWN_MARK, GrownError};
+
+/// The files of a grown model: the train, the line where something is known of it, and the dataset.
+pub const GROWN_FILES: [&str; 3] = [TRAIN_FILE, TRACK_FILE, MANIFEST_FILE];
+
+/// What was written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GrownFiles {
+    /// The files of the model and its dataset.
+    pub files: Vec<PathBuf>,
+    /// Kinds of effects that the formats cannot express.
+    pub not_expressed: Vec<String>,
+}
+
+/// Writes the grown model of a dataset into a folder as a dataset that can be explained again:
+/// `train.toml`, `track.toml` where something is known of the line, and a `dataset.toml` that names
+/// both and the runs where they lie. The runs of a recording are written beside it.
+///
+/// # Errors
+///
+/// When the declared files cannot be read or the grown ones not written.
+pub fn write_grown(
+    dataset: &Path,
+    explanation: &Explanation,
+    folder: &Path,
+) -> Result<GrownFiles, GrownError> {
+    let (source, head) = open(dataset)?;
+    let read = |path: &str| {
+        source.read(path).map_err(|problem: FileProblem| GrownError::Declared {
+            label: source.label(path),
+            problem: problem.to_string(),
+        })
+    };
+    let (train, track) = (&head.manifest.train_file, head.manifest.track_file.as_ref());
+    let texts = (read(&train.path)?, track.map(|file| read(&file.path)).transpose()?);
+    let labels = (&train.path[..], track.map_or(TRACK_FILE, |file| &file.path));
+    let declared = (&texts.0[..], texts.1.as_deref());
+    let mut grown = GrownTables::of(explanation, declared, labels)?;
+    if let (Some(declared), Some(track)) = (track, &mut grown.track) {
+        runs::keep_alignments(track, &source.path_of(&declared.path), folder);
+    }
+    let mut manifest = table(&read(MANIFEST_FILE)?, &source.label(MANIFEST_FILE))?;
+    runs::keep_runs(&mut manifest, &source, folder)?;
+    runs::name_model(&mut manifest, grown.track.is_some());
+    let texts = grown.texts(explanation, labels, MANIFEST_FILE);
+    let dataset = grown_text(explanation, MANIFEST_FILE, &dataset.display().to_string(), &manifest);
+    if texts.track.is_none() {
+        runs::forget(&folder.join(TRACK_FILE))?;
+    }
+    let all = [Some(texts.train), texts.track, Some(dataset)];
+    let named = GROWN_FILES.into_iter().zip(all).filter_map(|(name, text)| Some((name, text?)));
+    let files = named.map(|(name, text)| write_in_folder(folder, name, &text));
+    Ok(GrownFiles { files: files.collect::<Result<_, _>>()?, not_expressed: texts.not_expressed })
+}
+
+/// A grown model as texts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GrownTexts {
+    /// Of the train.
+    pub train: String,
+    /// Of the line, where something is known of it.
+    pub track: Option<String>,
+    /// Kinds of effects that the formats cannot express.
+    pub not_expressed: Vec<String>,
+}
+
+/// The texts of a model that grew from declared ones of a train and a line; `labels` and `source` say in
+/// their first lines what they grew from.
+///
+/// # Errors
+///
+/// When a declared text is no TOML.
+pub fn grown_texts(
+    explanation: &Explanation,
+    (train, track): (&str, Option<&str>),
+    labels: (&str, &str),
+    source: &str,
+) -> Result<GrownTexts, GrownError> {
+    Ok(GrownTables::of(explanation, (train, track), labels)?.texts(explanation, labels, source))
+}
+
+/// A grown model as tables.
+struct GrownTables {
+    train: Table,
+    track: Option<Table>,
+    not_expressed: Vec<String>,
+}
+
+impl GrownTables {
+    fn of(
+        explanation: &Explanation,
+        (train, track): (&str, Option<&str>),
+        labels: (&str, &str),
+    ) -> Result<Self, GrownError> {
+        let mut train = table(train, labels.0)?;
+        let declared = track.map(|text| table(text, labels.1)).transpose()?;
+        let is_declared = declared.is_some();
+        let mut track = declared.unwrap_or_default();
+        let not_expressed = grow(&explanation.grown, &mut train, &mut track);
+        if let Some(drive) = explanation.answer.drive.as_ref().filter(|it| it.at_bound.is_none()) {
+            set(&mut train, "traction", "efficiency", drive.efficiency.value);
+            if let Some(known) = drive.auxiliary_power_kw {
+                set(&mut train, "traction", "auxiliary_power_kw", known.value);
+            }
+        }
+        let track = (is_declared || !track.is_empty()).then_some(track);
+        Ok(GrownTables { train, track, not_expressed })
+    }
+
+    fn texts(self, explanation: &Explanation, labels: (&str, &str), source: &str) -> GrownTexts {
+        GrownTexts {
+            train: grown_text(explanation, labels.0, source, &self.train),
+            track: self.track.map(|track| grown_text(explanation, labels.1, source, &track)),
+            not_expressed: self.not_expressed,
+        }
+    }
+}
+
+fn grown_text(explanation: &Explanation, label: &str, source: &str, keys: &Table) -> String {
+    let statement = &explanation.answer.statement;
+    format!("{GROWN_MARK}{label} of {source} by `dynocar explain`.\n# {statement}\n{keys}")
+}
+
+fn table(text: &str, label: &str) -> Result<Table, GrownError> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    text.parse().map_err(|error: toml::de::Error| GrownError::Declared {
+        label: label.into(),
+        problem: error.message().to_string(),
+    })
+}
+
+/// Changes the tables of a declared train and line to those of a fitted model; gives the kinds
+/// that they cannot express.
+pub fn grow(fit: &Fit, train: &mut Table, track: &mut Table) -> Vec<String> {
+    let mut not_expressed = Vec::new();
+    for (key, value) in ["a", "b", "c"].into_iter().zip(&fit.theta) {
+        set(train, "resistance", key, *value);
+    }
+    for (effect, range) in fit.model.effects.iter().zip(fit.model.ranges()) {
+        let entries = effect.entries(&fit.theta[range]);
+        let is_held = entries
+            .as_ref()
+            .is_some_and(|entries| entries.iter().all(|entry| can_hold(entry, train, track)));
+        if !is_held {
+            not_expressed.push(effect.kind().to_string());
+            continue;
+        }
+        for entry in entries.into_iter().flatten() {
+            write_entry(entry, train, track);
+        }
+    }
+    not_expressed
+}
+
+/// True for an entry that the files may hold beside what they hold already.
+fn can_hold(entry: &Entry, train: &Table, track: &Table) -> bool {
+    match entry {
+        Entry::Number(key, found) => key.allows(joined(key, train, *found)),
+        Entry::Extra(_) | Entry::TrackNumber(..) | Entry::Rows(..) => true,
+        // Such a list stands alone.
+        Entry::List(name, _) => track.get("track").and_then(|own| own.get(name)).is_none(),
+    }
+}
+
+fn write_entry(entry: Entry, train: &mut Table, track: &mut Table) {
+    match entry {
+        Entry::Number(key, found) => {
+            let value = joined(key, train, found);
+            set(train, key.table, key.name, value);
+        }
+        Entry::Extra(found) => {
+            let tables = train.entry(extra::TABLES).or_insert_with(|| Value::Array(Vec::new()));
+            if let Some(tables) = tables.as_array_mut() {
+                tables.push(Value::Table(extra_table(&found)));
+            }
+        }
+        Entry::TrackNumber(name, found) => {
+            let declared = number(track, "track", name).unwrap_or(0.0);
+            set(track, "track", name, declared + found);
+        }
+        Entry::Rows(name, rows) | Entry::List(name, rows) => {
+            if let Some(list) = track_list(track, name) {
+                list.extend(rows.into_iter().map(Value::from));
+            }
+        }
+    }
+}
+
+/// A table of `[[extra]]`.
+fn extra_table(found: &Extra) -> Table {
+    let factor = |factor: &Factor| {
+        let mut table = Table::new();
+        table.insert("of".into(), factor.of.name().into());
+        table.insert("form".into(), factor.form.name().into());
+        for (name, number) in factor.form.numbers().iter().zip(factor.numbers) {
+            table.insert((*name).into(), Value::Float(number));
+        }
+        Value::Table(table)
+    };
+    let mut table = Table::new();
+    table.insert(extra::FORCE.into(), Value::Float(found.n_per_kn));
+    let factors: Vec<Value> = found.factors.iter().map(factor).collect();
+    table.insert(extra::FACTORS.into(), Value::Array(factors));
+    table
+}
+
+/// A number that was found with the one that stands in the file.
+fn joined(key: &Key, train: &Table, found: f64) -> f64 {
+    number(train, key.table, key.name).map_or(found, |declared| key.join(declared, found))
+}
+
+/// A list of `[track]`, made when absent.
+fn track_list<'t>(track: &'t mut Table, key: &str) -> Option<&'t mut Vec<Value>> {
+    let section = track.entry("track").or_insert_with(|| Value::Table(Table::new()));
+    section.as_table_mut()?.entry(key).or_insert_with(|| Value::Array(Vec::new())).as_array_mut()
+}
+
+fn number(table: &Table, section: &str, key: &str) -> Option<f64> {
+    let value = table.get(section)?.get(key)?;
+    value.as_float().or_else(|| value.as_integer().map(|it| it as f64))
+}
+
+fn set(table: &mut Table, section: &str, key: &str, value: f64) {
+    let entry = table.entry(section).or_insert_with(|| Value::Table(Table::new()));
+    if let Value::Table(section) = entry {
+        section.insert(key.into(), Value::Float(value));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use dynocar_core::terms::{gradient, place, traction, wind};
+
+    use super::*;
+
+    #[test]
+    fn a_finding_joins_what_is_declared_by_the_rule_of_its_key() {
+        let declared = "[corrections]\ntraction_gain = 1.1\nwind_plus_mps = 2";
+        let (mut train, mut track): (Table, Table) = (declared.parse().unwrap(), Table::new());
+        write_entry(Entry::Number(&traction::GAIN, 0.9), &mut train, &mut track);
+        write_entry(Entry::Number(&wind::WIND_PLUS, 3.0), &mut train, &mut track);
+        assert_eq!(train["corrections"]["traction_gain"], Value::Float(1.1 * 0.9));
+        assert_eq!(train["corrections"]["wind_plus_mps"], Value::Float(5.0));
+        assert!(track.is_empty());
+    }
+
+    #[test]
+    fn what_belongs_to_the_line_makes_its_file_where_there_is_none() {
+        let (mut train, mut track) = (Table::new(), Table::new());
+        let entry = Entry::Rows(place::LIST, vec![vec![1000.0, 2000.0, 1.5]]);
+        assert!(can_hold(&entry, &train, &track));
+        write_entry(entry, &mut train, &mut track);
+        let expected: Table = "[track]\nresistance = [[1000.0, 2000.0, 1.5]]".parse().unwrap();
+        assert_eq!(track, expected);
+    }
+
+    #[test]
+    fn what_no_file_may_hold_is_not_written() {
+        let (train, track) = (Table::new(), Table::new());
+        assert!(can_hold(&Entry::Number(&traction::GAIN, 1.4), &train, &track));
+        assert!(!can_hold(&Entry::Number(&traction::GAIN, 2.4), &train, &track));
+        let list = Entry::List(gradient::ERROR, Vec::new());
+        assert!(can_hold(&list, &train, &track));
+        let track = "[track]\ngradient_error = [[0.0, 1.0]]".parse().unwrap();
+        assert!(!can_hold(&list, &train, &track));
+    }
+}

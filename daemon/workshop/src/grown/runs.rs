@@ -1,0 +1,88 @@
+//! The runs of a grown dataset, and what else it names: where they lie, seen from its folder.
+
+use std::path::Path;
+
+use toml::{Table, Value};
+
+use dynocar_analysis::dataset::DatasetFiles;
+
+use super::error::{GROWN_MARK, GrownError};
+use crate::paths::from_folder;
+use dynocar::dataset::{DatasetFolder, read_text};
+use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
+use dynocar::output::{OutputError, require_new, write_in_folder};
+
+/// Names the grown train and, where there is one, its line.
+pub fn name_model(manifest: &mut Table, has_track: bool) {
+    let file = |name: &str| Value::Table(Table::from_iter([("file".into(), name.into())]));
+    manifest.insert("train".into(), file(TRAIN_FILE));
+    match has_track {
+        true => manifest.insert("track".into(), file(TRACK_FILE)),
+        false => manifest.remove("track"),
+    };
+}
+
+/// Names the runs where they lie; those of a recording, which is unpacked for as long as it is read,
+/// are written into the folder.
+///
+/// # Errors
+///
+/// When a run cannot be written, or would take the place of another file.
+pub fn keep_runs(
+    manifest: &mut Table,
+    source: &DatasetFolder,
+    folder: &Path,
+) -> Result<(), GrownError> {
+    let runs = manifest.get_mut("runs").and_then(Value::as_array_mut);
+    for run in runs.into_iter().flatten() {
+        let Some(Value::String(file)) = run.get_mut("file") else { continue };
+        if !source.is_unpacked() {
+            *file = seen_from(folder, &source.path_of(file));
+            continue;
+        }
+        let target = folder.join(&*file);
+        // Runs have no mark of their own.
+        if !is_grown(&folder.join(TRAIN_FILE)) {
+            require_new(&target)?;
+        }
+        let text = source.read(file).map_err(|problem| GrownError::Declared {
+            label: source.label(file),
+            problem: problem.to_string(),
+        })?;
+        let (parent, name) = (target.parent().unwrap_or(folder), target.file_name());
+        let name = name.unwrap_or_default().to_string_lossy();
+        write_in_folder(parent, &name, &text)?;
+    }
+    Ok(())
+}
+
+/// Names the ways on the map, which lie beside the declared line's file.
+pub fn keep_alignments(track: &mut Table, declared: &Path, folder: &Path) {
+    let beside = declared.parent().unwrap_or(Path::new(""));
+    let section = track.get_mut("track").and_then(Value::as_table_mut);
+    for (key, value) in section.into_iter().flatten() {
+        if let ("alignment" | "alignment_falling", Value::String(file)) = (&key[..], value) {
+            *file = seen_from(folder, &beside.join(&*file));
+        }
+    }
+}
+
+/// Removes a file that an earlier explanation wrote and this one does not: the model lacks it.
+///
+/// # Errors
+///
+/// When it is there and cannot be removed.
+pub fn forget(file: &Path) -> Result<(), OutputError> {
+    if !is_grown(file) {
+        return Ok(());
+    }
+    std::fs::remove_file(file).map_err(|source| OutputError::File { path: file.into(), source })
+}
+
+fn is_grown(file: &Path) -> bool {
+    read_text(file).is_ok_and(|text| text.starts_with(GROWN_MARK))
+}
+
+fn seen_from(folder: &Path, file: &Path) -> String {
+    from_folder(folder, file).display().to_string()
+}

@@ -1,0 +1,284 @@
+//! A round of learning.
+
+use std::fs::{File, TryLockError};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::SystemTime;
+
+use dynocar_analysis::explain::answer::Verdict;
+use dynocar_analysis::explain::evidence::RunDataError;
+use dynocar_analysis::explain::{Explanation, explain};
+use dynocar_shared::TrainId;
+use tracing::warn;
+
+use super::conclusion::{Conclusion, Explained};
+use super::error::LearnError;
+use super::memory::Memory;
+use super::pool::{self, Bounds, Pool};
+use super::source::{FoundRun, Places, runs_of, tell_unusable};
+use crate::report::provenance::hex;
+use dynocar::models::{Action, ModelHash, ModelText, Moment, Store, TrainModels};
+use dynocar::storage::{Disk, Storage, StorageError};
+
+/// In the store's directory: what is the learner's own.
+const OWN_FOLDER: &str = "learn";
+/// Held by the learner that works on a store.
+const LOCK_FILE: &str = "learner.lock";
+
+/// What a learner works on.
+#[derive(Clone, Debug)]
+pub struct LearnerSettings {
+    /// The store of models.
+    pub store: Store,
+    /// The folder of datasets and recordings.
+    pub runs: PathBuf,
+    /// The trains, each with the model that the configuration declares.
+    pub trains: Vec<(TrainId, ModelText)>,
+    /// Bounds of what is explained together.
+    pub bounds: Bounds,
+    /// The command, as the origin of a model tells it.
+    pub command: String,
+}
+
+/// Learns from recorded runs, round by round.
+#[derive(Debug)]
+pub struct Learner {
+    settings: LearnerSettings,
+    own: PathBuf,
+    memory: Memory,
+    _lock: File,
+}
+
+/// What a round came to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Round {
+    /// By train.
+    pub trains: Vec<TrainRound>,
+    /// True where it was stopped before its end.
+    pub is_stopped: bool,
+}
+
+/// What a round came to for a train.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrainRound {
+    /// The train.
+    pub train: TrainId,
+    /// The model in force.
+    pub in_force: ModelHash,
+    /// The runs that there are.
+    pub runs: usize,
+    /// What they came to.
+    pub outcome: Outcome,
+}
+
+/// What the runs of a train came to.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// The same runs and model as the last time.
+    NothingNew,
+    /// Fewer than two runs.
+    TooFewRuns,
+    /// The runs were explained.
+    Explained(Box<Explained>),
+}
+
+/// Ends an explanation from within.
+struct Stopped;
+
+impl Learner {
+    /// The learner of a store; there is one for each.
+    ///
+    /// # Errors
+    ///
+    /// When another learner is at work, or the store's directory cannot be written.
+    pub fn open(settings: LearnerSettings) -> Result<Self, LearnError> {
+        let own = settings.store.directory().join(OWN_FOLDER);
+        let system = |path: &Path, action, source| {
+            LearnError::Storage(StorageError { path: path.into(), action, source })
+        };
+        Disk.make_folder(&own).map_err(|it| system(&own, "making the folder", it))?;
+        let path = own.join(LOCK_FILE);
+        let lock = File::create(&path).map_err(|it| system(&path, "locking", it))?;
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(LearnError::Taken { path }),
+            Err(TryLockError::Error(source)) => return Err(system(&path, "locking", source)),
+        }
+        let memory = Memory::load(&own);
+        Ok(Learner { settings, own, memory, _lock: lock })
+    }
+
+    /// What it works on.
+    pub fn settings(&self) -> &LearnerSettings {
+        &self.settings
+    }
+
+    /// What it remembers.
+    pub fn memory(&self) -> &Memory {
+        &self.memory
+    }
+
+    /// Looks at all runs that there are at an instant, and explains those of each train that has new ones
+    /// or another model in force. `stop` is asked all the while, and ends the round when it says so; the
+    /// next one begins where nothing was concluded.
+    ///
+    /// # Errors
+    ///
+    /// See [`LearnError`]; what was put into the store before is there for good.
+    pub fn round(&mut self, now: SystemTime, stop: &dyn Fn() -> bool) -> Result<Round, LearnError> {
+        let mut round = Round { trains: Vec::new(), is_stopped: false };
+        for (train, declared) in self.settings.trains.clone() {
+            match self.train_round(train, &declared, Moment::of(now), stop)? {
+                Some(of_train) => round.trains.push(of_train),
+                None => return Ok(Round { is_stopped: true, ..round }),
+            }
+        }
+        Ok(round)
+    }
+
+    /// `None` where it was stopped.
+    fn train_round(
+        &mut self,
+        train: TrainId,
+        declared: &ModelText,
+        now: Moment,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Option<TrainRound>, LearnError> {
+        let models = self.settings.store.train(train);
+        let in_force = self.in_force(&models, declared, now)?;
+        let bounds = self.settings.bounds;
+        let trains: Vec<TrainId> = self.settings.trains.iter().map(|it| it.0).collect();
+        let places = Places { runs: &self.settings.runs, own: &self.own, trains: &trains };
+        let mut runs = runs_of(train, places, &mut self.memory, (now, bounds.horizon))?;
+        self.memory.save(&self.own)?;
+        if let Some(since) = since_adopted(&models)? {
+            runs.retain(|run| run.recorded >= since);
+        }
+        let told = |outcome| TrainRound { train, in_force, runs: runs.len(), outcome };
+        let choices = pool::choices(&runs, &bounds);
+        let digest = digest(in_force, &choices);
+        if self.memory.explained.get(&train.to_string()) == Some(&digest) {
+            return Ok(Some(told(Outcome::NothingNew)));
+        }
+        let outcome = match self.explained(&models, in_force, &choices, now, stop)? {
+            Some(outcome) => outcome,
+            None => return Ok(None),
+        };
+        self.memory.explained.insert(train.to_string(), digest);
+        self.memory.save(&self.own)?;
+        Ok(Some(told(outcome)))
+    }
+
+    /// The model in force; what the configuration declares is put into the store, so that what grows from
+    /// it has a parent there.
+    fn in_force(
+        &self,
+        models: &TrainModels,
+        declared: &ModelText,
+        now: Moment,
+    ) -> Result<ModelHash, LearnError> {
+        if let Some(hash) = models.in_force()? {
+            return Ok(hash);
+        }
+        Ok(models.put_declared(declared, now)?)
+    }
+
+    /// Explains one choice of runs after the other until one tells an effect.
+    fn explained(
+        &mut self,
+        models: &TrainModels,
+        in_force: ModelHash,
+        choices: &[Vec<FoundRun>],
+        now: Moment,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Option<Outcome>, LearnError> {
+        let text = models.text(in_force)?;
+        let (model, track) = models.load(in_force)?;
+        let (model, track) = (Arc::new(model), track.map(Arc::new));
+        let mut outcome = Outcome::TooFewRuns;
+        for choice in choices {
+            let declared = (&text, &model, track.as_ref());
+            let read = pool::read(choice, declared, &self.settings.bounds, &mut self.memory);
+            let Some(pool) = read else { continue };
+            let found = match explain_pool(pool, &mut self.memory, stop) {
+                Ok(found) => found,
+                Err(Stopped) => return Ok(None),
+            };
+            let Some((pool, explanation)) = found else { continue };
+            let verdict = explanation.answer.verdict;
+            let conclusion = Conclusion {
+                models,
+                in_force,
+                text: &text,
+                pool: &pool,
+                explanation: &explanation,
+                command: &self.settings.command,
+                now,
+            };
+            let explained = conclusion.draw(&self.memory)?;
+            // The first words on what is open stand; more runs may only settle it.
+            if verdict == Verdict::Effect || outcome == Outcome::TooFewRuns {
+                outcome = Outcome::Explained(Box::new(explained));
+            }
+            if verdict == Verdict::Effect {
+                break;
+            }
+        }
+        if let Outcome::Explained(explained) = &outcome
+            && let Some(question) = &explained.question
+            && self.memory.ask(question)
+        {
+            let experiment = question.experiment.as_deref().unwrap_or("more runs");
+            let statement = &question.statement;
+            warn!(train = question.train, "open: {statement} To settle it: {experiment}");
+        }
+        Ok(Some(outcome))
+    }
+}
+
+/// Explains a pool; a run that cannot be used is told once and left out. `None` where too few are left.
+fn explain_pool(
+    mut pool: Pool,
+    memory: &mut Memory,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<(Pool, Explanation)>, Stopped> {
+    let progress = |_: f64, _: &str| {
+        if stop() {
+            resume_unwind(Box::new(Stopped));
+        }
+    };
+    loop {
+        let work = AssertUnwindSafe(|| explain(&pool.dataset, &progress));
+        let explained = match catch_unwind(work) {
+            Ok(explained) => explained,
+            Err(cause) if cause.is::<Stopped>() => return Err(Stopped),
+            Err(cause) => resume_unwind(cause),
+        };
+        let RunDataError::Simulate { file, source } = match explained {
+            Ok(explanation) => return Ok(Some((pool, explanation))),
+            Err(error) => error,
+        };
+        if let Some(run) = pool.runs.iter().find(|run| run.name == file) {
+            tell_unusable(memory, &run.key(), &format!("{file}: {source}"));
+        }
+        match pool.without(&file) {
+            Some(rest) => pool = rest,
+            None => return Ok(None),
+        }
+    }
+}
+
+/// When the model in force came to be so; `None` while nothing was decided. Only runs since then are
+/// runs that it was meant for.
+fn since_adopted(models: &TrainModels) -> Result<Option<Moment>, LearnError> {
+    let decisions = models.decisions()?;
+    let mut changes = decisions.iter().filter(|(_, it)| it.action != Action::Rejected);
+    Ok(changes.next_back().map(|(_, decision)| decision.at))
+}
+
+/// What is explained, as a hash: the model and the runs.
+fn digest(in_force: ModelHash, choices: &[Vec<FoundRun>]) -> String {
+    let runs: String = choices.iter().flatten().map(|run| format!("{}\n", run.key())).collect();
+    hex(format!("{in_force}\n{runs}").as_bytes())
+}

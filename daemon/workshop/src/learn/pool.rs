@@ -1,0 +1,211 @@
+//! Which runs are explained together, within bounds of memory and time.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use dynocar_analysis::dataset::{Dataset, DatasetHead, Role, Run};
+use dynocar_core::track::Track;
+use dynocar_core::train::TrainModel;
+
+use super::memory::Memory;
+use super::overlay::Overlay;
+use super::source::{FoundRun, tell_unusable};
+use dynocar::models::ModelText;
+
+/// Bounds of what is explained together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// The most runs.
+    pub runs: usize,
+    /// Their longest time in all.
+    pub time: Duration,
+    /// Their most samples, which bound the memory.
+    pub samples: usize,
+    /// Runs so recent, counted from the newest, are explained by themselves first.
+    pub recent: Duration,
+    /// Runs older than this, counted from the newest, are not looked at.
+    pub horizon: Duration,
+}
+
+impl Default for Bounds {
+    fn default() -> Self {
+        let days = |days: u64| Duration::from_secs(86_400 * days);
+        Bounds {
+            runs: 40,
+            time: Duration::from_secs(12 * 3600),
+            samples: 2_000_000,
+            recent: days(2),
+            horizon: days(30),
+        }
+    }
+}
+
+/// Share of the runs, the last ones, that judge.
+const HELD_OUT_SHARE: f64 = 0.2;
+
+/// Runs that are explained together.
+#[derive(Debug)]
+pub struct Pool {
+    /// The runs as one dataset.
+    pub dataset: Dataset,
+    /// Where they lie, in the same order.
+    pub runs: Vec<FoundRun>,
+}
+
+/// The choices of runs that are explained, one after the other until one tells an effect: the recent ones, in
+/// which something new shows undiluted, then these with a sample of all before.
+pub fn choices(runs: &[FoundRun], bounds: &Bounds) -> Vec<Vec<FoundRun>> {
+    let Some(newest) = runs.last() else { return Vec::new() };
+    let since_s = newest.recorded.unix_s.saturating_sub(bounds.recent.as_secs());
+    let begin = runs.partition_point(|run| run.recorded.unix_s < since_s);
+    let (older, recent) = runs.split_at(begin);
+    let recent = &recent[recent.len().saturating_sub(bounds.runs)..];
+    let mut choices = vec![recent.to_vec()];
+    // A quarter is for the older ones in any case: they tell what is new.
+    let own = recent.len().min(bounds.runs - bounds.runs / 4);
+    let places = spread(older.len(), bounds.runs - own);
+    if !places.is_empty() {
+        let mut mixed: Vec<FoundRun> = places.into_iter().map(|it| older[it].clone()).collect();
+        mixed.extend_from_slice(&recent[recent.len() - own..]);
+        choices.push(mixed);
+    }
+    choices
+}
+
+/// At most so many places of a list, evenly spread over it.
+fn spread(length: usize, most: usize) -> BTreeSet<usize> {
+    let count = length.min(most);
+    (0..count).map(|k| (2 * k + 1) * length / (2 * count)).collect()
+}
+
+/// Reads runs under a model, the newest first until the bounds are reached; what cannot be read is told once
+/// and left out. `None` where fewer than two are left: one to fit, one to judge.
+pub fn read(
+    chosen: &[FoundRun],
+    (text, train, track): (&ModelText, &Arc<TrainModel>, Option<&Arc<Track>>),
+    bounds: &Bounds,
+    memory: &mut Memory,
+) -> Option<Pool> {
+    let mut kept: Vec<(FoundRun, Run)> = Vec::new();
+    let (mut time_s, mut samples) = (0.0, 0);
+    let mut head: Option<(PathBuf, Overlay, DatasetHead)> = None;
+    for found in chosen.iter().rev() {
+        if memory.unusable.contains_key(&found.key()) {
+            continue;
+        }
+        let run = match read_run(found, text, &mut head) {
+            Ok(run) => run,
+            Err(problem) => {
+                tell_unusable(memory, &found.key(), &problem);
+                continue;
+            }
+        };
+        time_s += duration_s(&run);
+        samples += run.samples.len();
+        let is_within = time_s <= bounds.time.as_secs_f64() && samples <= bounds.samples;
+        if !is_within && kept.len() > 1 {
+            break;
+        }
+        kept.push((found.clone(), run));
+    }
+    kept.reverse();
+    let dataset = Dataset {
+        name: format!("train {}", train.name),
+        description: None,
+        train: Arc::clone(train),
+        track: track.map(Arc::clone),
+        runs: Vec::new(),
+    };
+    let (runs, read) = kept.into_iter().unzip();
+    Pool { dataset: Dataset { runs: read, ..dataset }, runs }.in_order()
+}
+
+impl Pool {
+    /// The pool with its runs numbered, the last ones held out; `None` where fewer than two are left.
+    pub fn in_order(mut self) -> Option<Self> {
+        let count = self.runs.len();
+        if count < 2 {
+            return None;
+        }
+        let held_out = ((HELD_OUT_SHARE * count as f64).ceil() as usize).min(count - 1);
+        for (place, (found, run)) in self.runs.iter().zip(&mut self.dataset.runs).enumerate() {
+            run.file.clone_from(&found.name);
+            run.role = if place + held_out < count { Role::Fit } else { Role::Holdout };
+            run.number = place as u32 + 1;
+            run.samples.iter_mut().for_each(|sample| sample.run = run.number);
+        }
+        Some(self)
+    }
+
+    /// The pool without a run; `None` where too few are left.
+    pub fn without(mut self, name: &str) -> Option<Self> {
+        let place = self.runs.iter().position(|run| run.name == name)?;
+        self.runs.remove(place);
+        self.dataset.runs.remove(place);
+        self.in_order()
+    }
+}
+
+fn read_run<'m>(
+    found: &FoundRun,
+    text: &'m ModelText,
+    head: &mut Option<(PathBuf, Overlay<'m>, DatasetHead)>,
+) -> Result<Run, String> {
+    if head.as_ref().is_none_or(|(folder, ..)| *folder != found.dataset) {
+        let files = Overlay::at(&found.dataset, text).map_err(|error| error.to_string())?;
+        let opened = DatasetHead::open(&files).map_err(|error| error.to_string())?;
+        *head = Some((found.dataset.clone(), files, opened));
+    }
+    match head {
+        // The description may have changed since the runs were found.
+        Some((_, files, head)) if found.place < head.manifest.runs.len() => {
+            head.read_run(files, found.place).map_err(|error| error.to_string())
+        }
+        _ => Err(format!("{}: no longer described", found.name)),
+    }
+}
+
+fn duration_s(run: &Run) -> f64 {
+    match (run.samples.first(), run.samples.last()) {
+        (Some(first), Some(last)) => (last.time_ns - first.time_ns) as f64 * 1e-9,
+        _ => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynocar::models::Moment;
+
+    fn run(day: u64, number: usize) -> FoundRun {
+        FoundRun {
+            name: format!("{day}/{number}"),
+            dataset: PathBuf::new(),
+            place: 0,
+            path: PathBuf::new(),
+            recorded: Moment { unix_s: 86_400 * (20_000 + day) + number as u64 },
+            sha256: format!("{day}-{number}"),
+            described: String::new(),
+        }
+    }
+
+    #[test]
+    fn the_recent_runs_come_alone_first_and_then_with_a_sample_of_all_before() {
+        let runs: Vec<FoundRun> =
+            (0..28).flat_map(|day| (0..4).map(move |k| run(day, k))).collect();
+        let bounds = Bounds { runs: 20, ..Bounds::default() };
+        let choices = choices(&runs, &bounds);
+        assert_eq!(choices.len(), 2);
+        assert_eq!(choices[0].len(), 9, "those of 2 days, to the second");
+        assert_eq!(choices[1].len(), 20);
+        let days: BTreeSet<&str> =
+            choices[1].iter().map(|run| run.name.split('/').next().unwrap()).collect();
+        assert!(days.len() >= 12, "over the weeks: {days:?}");
+        assert!(choices[1].windows(2).all(|pair| pair[0].recorded <= pair[1].recorded));
+        assert_eq!(super::choices(&runs[100..], &bounds).len(), 1 + 1);
+        assert_eq!(super::choices(&runs[106..], &bounds).len(), 1, "no older ones");
+        assert!(super::choices(&[], &bounds).is_empty());
+    }
+}

@@ -1,0 +1,136 @@
+//! Recordings, unpacked once into a folder of the learner's own: the ring that they come from forgets.
+
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use dynocar_shared::TrainId;
+use serde::{Deserialize, Serialize};
+use tracing::info;
+
+use super::error::LearnError;
+use super::memory::Memory;
+use dynocar::models::Moment;
+use dynocar::storage::{Disk, Storage, StorageError, part_of};
+use dynocar::unpacking::{UnpackError, unpack};
+
+/// How a finished recording ends.
+const MCAP_END: &[u8] = b"\x89MCAP0\r\n";
+/// In an unpacked recording: where it came from.
+const SOURCE_FILE: &str = "recording.toml";
+/// The most bytes that the unpacked recordings of a train take.
+const BYTES_MAX: u64 = 4 << 30;
+
+/// Where an unpacked recording came from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Source {
+    /// The recording's name.
+    pub name: String,
+    /// When it was finished.
+    pub recorded: Moment,
+}
+
+/// A recording that is unpacked.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnpackedRecording {
+    /// The dataset's folder.
+    pub folder: PathBuf,
+    /// Where it came from.
+    pub source: Source,
+}
+
+/// True for a recording that is no longer written.
+pub fn is_finished(path: &Path) -> bool {
+    let end = || -> io::Result<Vec<u8>> {
+        let mut file = File::open(path)?;
+        file.seek(SeekFrom::End(-(MCAP_END.len() as i64)))?;
+        let mut end = Vec::new();
+        file.read_to_end(&mut end)?;
+        Ok(end)
+    };
+    end().is_ok_and(|end| end == MCAP_END)
+}
+
+/// Unpacks what a recording holds of a train, unless that was done before; `sha256` is that of its content.
+/// What cannot be used is told once.
+///
+/// # Errors
+///
+/// When nothing can be unpacked, whatever it holds.
+pub fn take_up(
+    (recording, sha256): (&Path, &str),
+    train: TrainId,
+    (folder, memory): (&Path, &mut Memory),
+    recorded: Moment,
+) -> Result<(), LearnError> {
+    let key = format!("{train}:{sha256}");
+    let unpacked = folder.join(&sha256[..16]);
+    if unpacked.exists() || memory.unusable.contains_key(&key) {
+        return Ok(());
+    }
+    let failed = |action| {
+        move |source| LearnError::Storage(StorageError { path: folder.into(), action, source })
+    };
+    Disk.make_folder(folder).map_err(failed("making the folder"))?;
+    let part = part_of(&unpacked);
+    if let Err(error) = unpack(recording, &part, Some(train)) {
+        let _ = std::fs::remove_dir_all(&part);
+        return match error {
+            UnpackError::Content { .. } => {
+                info!(train = train.0, "a recording is not used: {error}");
+                memory.unusable.insert(key, error.to_string());
+                Ok(())
+            }
+            error => Err(error.into()),
+        };
+    }
+    let name = recording.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let source = toml::to_string(&Source { name, recorded }).unwrap_or_default();
+    std::fs::write(part.join(SOURCE_FILE), source)
+        .and_then(|()| Disk.rename_new(&part, &unpacked))
+        .map_err(failed("unpacking a recording into the folder"))
+}
+
+/// The unpacked recordings in a folder, the oldest first. What is older than the horizon goes, and the
+/// oldest go until the rest takes no more than it may.
+pub fn unpacked_in(folder: &Path, now: Moment, horizon: Duration) -> Vec<UnpackedRecording> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut found: Vec<UnpackedRecording> = Vec::new();
+    for folder in entries.map(|entry| entry.path()) {
+        let source = std::fs::read_to_string(folder.join(SOURCE_FILE)).ok();
+        match source.and_then(|text| toml::from_str(&text).ok()) {
+            Some(source) => found.push(UnpackedRecording { folder, source }),
+            // What a learner left that died; nobody else works here.
+            None => remove(&folder),
+        }
+    }
+    found.sort_by_key(|it| (it.source.recorded, it.folder.clone()));
+    let oldest = Moment { unix_s: now.unix_s.saturating_sub(horizon.as_secs()) };
+    let (mut kept, mut bytes) = (Vec::new(), 0);
+    for recording in found.into_iter().rev() {
+        bytes += bytes_in(&recording.folder);
+        if recording.source.recorded < oldest || bytes > BYTES_MAX {
+            remove(&recording.folder);
+        } else {
+            kept.push(recording);
+        }
+    }
+    kept.reverse();
+    kept
+}
+
+fn remove(folder: &Path) {
+    // What cannot be removed is looked at again in the next round.
+    let _ = std::fs::remove_dir_all(folder);
+}
+
+fn bytes_in(folder: &Path) -> u64 {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let bytes = entries.map(|entry| match entry.metadata() {
+        Ok(known) if known.is_dir() => bytes_in(&entry.path()),
+        Ok(known) => known.len(),
+        Err(_) => 0,
+    });
+    bytes.sum()
+}

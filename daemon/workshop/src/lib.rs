@@ -1,0 +1,28 @@
+//! The workshop: what is done with recorded runs and files, away from the controller.
+//!
+//! It reads and writes through the daemon's library, so that both understand a file alike; the daemon
+//! knows nothing of it but its program's name.
+//!
+//! # Layout
+//!
+//! - [`cli`]: its commands, one file each
+//! - [`fmu`]: the estimators as an FMU
+//! - [`annotation`]: an explanation beside the data that it explains
+//! - [`learn`]: recorded runs into candidates for the store
+//! - [`grown`]: the model with its effects as train and track files, and a dataset of them
+//! - [`paths`]: files as seen from a folder
+//! - [`report`]: an explanation as a page of HTML
+//! - [`run_facts`]: what is shown of a recorded run
+//! - [`survey`]: raw recordings to a dataset on a surveyed line
+//! - [`track_text`]: the text of a line's file
+
+pub mod annotation;
+pub mod cli;
+pub mod fmu;
+pub mod grown;
+pub mod learn;
+pub mod paths;
+pub mod report;
+pub mod run_facts;
+pub mod survey;
+pub mod track_text;

@@ -1,0 +1,125 @@
+//! Where a report comes from: command, versions, content of the dataset.
+
+use std::path::Path;
+use std::time::SystemTime;
+
+use dynocar_analysis::dataset::MANIFEST_FILE;
+use sha2::{Digest, Sha256};
+
+use dynocar::dataset::{self, LoadError};
+use dynocar::models::moment::Moment;
+
+/// A file and what is in it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FileDigest {
+    /// Its path in the dataset.
+    pub path: String,
+    /// Its size.
+    pub bytes: usize,
+    /// SHA-256 of its content.
+    pub sha256: String,
+}
+
+/// Where a report comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Provenance {
+    /// The command line.
+    pub command: String,
+    /// Version of the program.
+    pub version: &'static str,
+    /// Kind of machine.
+    pub machine: String,
+    /// Day, in UTC.
+    pub day: String,
+    /// The files that were read: manifest, train, line, runs.
+    pub files: Vec<FileDigest>,
+    /// SHA-256 of the lines `<sha256>  <path>` of all files in this order.
+    pub sha256: String,
+}
+
+impl Provenance {
+    /// Of a report on a dataset made now; `command` makes the same report.
+    ///
+    /// # Errors
+    ///
+    /// When a file of the dataset cannot be read.
+    pub fn of(path: &Path, command: String) -> Result<Self, LoadError> {
+        Ok(Provenance::of_files(digests(path)?, command, SystemTime::now()))
+    }
+
+    /// Of a report on these files made at an instant.
+    pub fn of_files(files: Vec<FileDigest>, command: String, made: SystemTime) -> Self {
+        let lines: String =
+            files.iter().map(|file| format!("{}  {}\n", file.sha256, file.path)).collect();
+        Provenance {
+            command,
+            version: env!("CARGO_PKG_VERSION"),
+            machine: format!("{} on {}", std::env::consts::OS, std::env::consts::ARCH),
+            day: Moment::of(made).day(),
+            files,
+            sha256: hex(lines.as_bytes()),
+        }
+    }
+
+    /// A shell command that gives the same hash in the dataset's folder.
+    pub fn check_command(&self) -> String {
+        let paths: Vec<String> = self.files.iter().map(|file| quoted(&file.path)).collect();
+        format!("sha256sum {} | sha256sum", paths.join(" "))
+    }
+}
+
+fn digests(path: &Path) -> Result<Vec<FileDigest>, LoadError> {
+    let (folder, head) = dataset::open(path)?;
+    let manifest = &head.manifest;
+    let mut paths = vec![MANIFEST_FILE.to_string(), manifest.train_file.path.clone()];
+    paths.extend(manifest.track_file.as_ref().map(|file| file.path.clone()));
+    paths.extend(manifest.runs.iter().map(|run| run.file.clone()));
+    let digest = |path: String| {
+        // A file that was read a moment ago and is gone now has no content to state.
+        let content = std::fs::read(folder.path_of(&path)).unwrap_or_default();
+        FileDigest { bytes: content.len(), sha256: hex(&content), path }
+    };
+    Ok(paths.into_iter().map(digest).collect())
+}
+
+/// SHA-256 of some bytes, in hexadecimal digits.
+pub fn hex(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The command line of this process, as one would type it.
+pub fn own_command_line() -> String {
+    command_line(std::env::args().skip(1))
+}
+
+/// A command line of the program with these arguments, as one would type it.
+pub fn command_line(arguments: impl IntoIterator<Item = String>) -> String {
+    let words = arguments.into_iter().map(|argument| quoted(&argument));
+    std::iter::once("dynocar".to_string()).chain(words).collect::<Vec<_>>().join(" ")
+}
+
+/// A word for a shell.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        return word.into();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_line_can_be_typed_again() {
+        let arguments = ["explain", "my data", "it's", "--report", "a.html"].map(String::from);
+        assert_eq!(command_line(arguments), r"dynocar explain 'my data' 'it'\''s' --report a.html");
+    }
+
+    #[test]
+    fn hashes_are_those_of_the_standard() {
+        let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(hex(b"abc"), abc);
+    }
+}

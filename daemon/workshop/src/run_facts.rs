@@ -1,0 +1,82 @@
+//! What is shown of a recorded run wherever it is listed.
+
+use dynocar_analysis::dataset::Run;
+
+use dynocar::models::Moment;
+
+/// A run's mass in t: the declared one, or the mean of what its samples carry, with the range where they
+/// carry several.
+pub fn mass_t(run: &Run) -> String {
+    let Some(spread) = run.quality.mass_kg else { return tonnes(run.mass_kg) };
+    let [mean, low, high] = [spread.mean, spread.low, spread.high].map(tonnes);
+    if low == high { mean } else { format!("{mean} ({low}–{high})") }
+}
+
+/// A mass in t: to the kilogram for a light vehicle, else to 100 kg.
+pub fn tonnes(mass_kg: f64) -> String {
+    let decimals = if mass_kg < 10e3 { 3 } else { 1 };
+    format!("{:.decimals$}", mass_kg / 1000.0)
+}
+
+/// When a run was recorded, where that is known.
+pub fn recorded(run: &Run) -> Option<Moment> {
+    let unix_s = run.recorded_unix_s?.try_into().ok()?;
+    Some(Moment { unix_s })
+}
+
+/// The same in words, as people write it.
+pub fn recorded_in_words(run: &Run) -> String {
+    recorded(run).map_or_else(|| "–".into(), |at| at.to_string().replace('T', " ").replace('Z', ""))
+}
+
+#[cfg(test)]
+mod tests {
+    use dynocar_analysis::dataset::Dataset;
+
+    use super::*;
+
+    fn run(columns: &str, keys: &str, csv: &str) -> Run {
+        let manifest = format!(
+            "[dataset]\nname='x'\n[train]\nfile='train.toml'\n[columns]\nspeed={{column='v',unit='km/h'}}\n\
+             {columns}\n[[runs]]\nfile='1.csv'\n{keys}\n"
+        );
+        let train = "[train]\nmass_t=100\nlength_m=80\nrotating_mass_factor=0.05\n[resistance]\n\
+                     a=1\nb=0\nc=0\n";
+        let files = [("dataset.toml", &manifest[..]), ("train.toml", train), ("1.csv", csv)];
+        Dataset::load(&files[..]).unwrap().runs.remove(0)
+    }
+
+    #[test]
+    fn a_mass_has_the_decimals_that_its_size_deserves() {
+        assert_eq!([tonnes(1443.0), tonnes(407_122.0)], ["1.443", "407.1"]);
+    }
+
+    #[test]
+    fn a_recorded_mass_is_shown_with_its_range() {
+        let seconds = "time={column='t',unit='s'}";
+        let with_mass = format!("{seconds}\ntrain_mass={{column='m',unit='t'}}");
+        let of = |columns: &str, keys: &str, csv: &str| mass_t(&run(columns, keys, csv));
+        assert_eq!(of(&with_mass, "", "t,v,m\n0,1,198\n1,2,222\n2,3,210\n"), "210.0 (198.0–222.0)");
+        assert_eq!(of(&with_mass, "", "t,v,m\n0,1,198\n1,2,198\n"), "198.0");
+        assert_eq!(of(seconds, "mass_t=120", "t,v\n0,1\n1,2\n"), "120.0");
+        assert_eq!(of(seconds, "", "t,v\n0,1\n1,2\n"), "100.0");
+    }
+
+    #[test]
+    fn a_run_is_of_the_day_that_its_file_or_the_dataset_says() {
+        let of = |columns: &str, keys: &str, csv: &str| recorded_in_words(&run(columns, keys, csv));
+        let (iso, clock) = ("time={column='t',format='iso'}", "time={column='t',format='clock'}");
+        let dated = "t,v\n2026-03-18T23:59:59.5,1\n2026-03-19T00:00:00.5,2\n";
+        assert_eq!(of(iso, "", dated), "2026-03-18 23:59:59");
+        let timed = "t,v\n23:59:59.5,1\n00:00:00.5,2\n";
+        assert_eq!(of(clock, "date=2026-03-18", timed), "2026-03-18 23:59:59");
+        assert_eq!(of(clock, "", timed), "–");
+        let seconds = "time={column='t',unit='s'}";
+        assert_eq!(
+            of(seconds, "date=2026-03-18T07:13:20", "t,v\n0,1\n1,2\n"),
+            "2026-03-18 07:13:20"
+        );
+        let samples = run(iso, "", dated).samples;
+        assert_eq!(samples[1].time_ns - samples[0].time_ns, 1_000_000_000);
+    }
+}

@@ -1,0 +1,228 @@
+//! The dataset that a survey makes.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use dynocar_analysis::dataset::DatasetFiles;
+use dynocar_analysis::survey::layout::HEIGHT_STEP_M;
+use dynocar_analysis::survey::{Survey, SurveyedProfile};
+use toml::{Table, Value};
+
+use super::failure::SurveyFailure;
+use super::material::Material;
+use super::trip_rows::{Column, columns, run_csv};
+use crate::track_text::TrackText;
+use dynocar::dataset::open;
+use dynocar::output::{require_file, write_in_folder};
+
+/// Length of the beginning by which a file of a survey is known.
+const MARK_LENGTH: usize = 20;
+/// What a survey's TOML files begin with.
+const MARK: &str = "# By `dynocar survey`";
+/// A profile reaches beyond its way by so many m.
+const BEYOND_M: f64 = 60.0;
+
+/// The file of a trip, from its number from 0.
+pub fn trip_file(number: usize) -> String {
+    format!("runs/{:03}.csv", number + 1)
+}
+
+/// Writes the whole folder; gives its files.
+///
+/// # Errors
+///
+/// When a declared file cannot be read or one cannot be written.
+pub fn write(material: &Material, folder: &Path) -> Result<Vec<PathBuf>, SurveyFailure> {
+    let mut files: Vec<(String, String)> = vec![
+        ("train.toml".into(), train_toml(material)?),
+        ("dataset.toml".into(), dataset_toml(material)),
+    ];
+    match material.line {
+        Some(line) => files.extend(copied_line(line)?),
+        None => {
+            files.push(("track.toml".into(), track_toml(material)));
+            files.push(("alignment.csv".into(), alignment(material.survey, 1)));
+            if !material.survey.ways.is_one_track() {
+                files.push(("alignment_falling.csv".into(), alignment(material.survey, -1)));
+            }
+        }
+    }
+    for (number, trip) in material.survey.trips.iter().enumerate() {
+        files.push((trip_file(number), run_csv(material, trip)));
+    }
+    for (name, text) in &files {
+        // What is there and begins otherwise is no survey's: the raw recordings, most likely.
+        let mark = text.get(..MARK_LENGTH.min(text.len())).unwrap_or_default();
+        let path = folder.join(name);
+        if path.exists() {
+            require_file(&path, mark)?;
+        }
+    }
+    let written = files.iter().map(|(name, text)| {
+        let path = folder.join(name);
+        let parent = path.parent().unwrap_or(folder);
+        let file = path.file_name().and_then(|name| name.to_str()).unwrap_or(name);
+        Ok(write_in_folder(parent, file, text)?)
+    });
+    written.collect()
+}
+
+/// A known line with its alignments, under their own names.
+fn copied_line(line: &Path) -> Result<Vec<(String, String)>, SurveyFailure> {
+    let read = |path: &Path| {
+        dynocar::dataset::read_text(path).map_err(|problem| SurveyFailure::Line {
+            path: path.into(),
+            problem: problem.to_string(),
+        })
+    };
+    let track = dynocar::dataset::load_track(line)?;
+    let mut files = vec![("track.toml".to_string(), read(line)?)];
+    for name in [&track.survey.alignment, &track.survey.alignment_falling].into_iter().flatten() {
+        files.push((name.clone(), read(&line.parent().unwrap_or(Path::new(".")).join(name))?));
+    }
+    Ok(files)
+}
+
+/// The declared train with what was learned.
+fn train_toml(material: &Material) -> Result<String, SurveyFailure> {
+    let (files, head) = open(material.source)?;
+    let path = &head.manifest.train_file.path;
+    let wrong = |problem: String| SurveyFailure::Line { path: path.into(), problem };
+    let text = files.read(path).map_err(|problem| wrong(problem.to_string()))?;
+    let Some(profile) = &material.survey.profile else {
+        return Ok(format!("{MARK}: {path} as declared.\n{text}"));
+    };
+    let mut train: Table =
+        text.parse().map_err(|error: toml::de::Error| wrong(error.message().to_string()))?;
+    let common = &profile.learned.profile.common;
+    let mut set = |section: &str, key: &str, value: f64| {
+        let entry = train.entry(section).or_insert_with(|| Value::Table(Table::new()));
+        if let Value::Table(section) = entry {
+            section.insert(key.into(), Value::Float(value));
+        }
+    };
+    for (key, value) in ["a", "b", "c"].into_iter().zip(common.davis()) {
+        set("resistance", key, rounded(value, 1e-6));
+    }
+    let prior = &material.vehicle.prior;
+    if !prior.is_weighed {
+        set("train", "mass_t", rounded(prior.mass_kg * (1.0 + common.mass_share()) / 1e3, 1e-4));
+    }
+    if prior.has_passengers {
+        set("train", "passenger_mass_kg", rounded(common.passenger_kg(), 0.01));
+    }
+    if let Some(brake) = &profile.learned.brake {
+        set("brake", "force_per_pressure_n_per_pa", rounded(brake.gain_n_per_pa.value, 1e-5));
+        set("brake", "release_pressure_pa", rounded(brake.release_pa, 1.0));
+    }
+    let inertial_t =
+        prior.mass_kg * (1.0 + common.mass_share()) * (1.0 + prior.rotating_mass_factor) / 1e3;
+    Ok(format!(
+        "{MARK} from {path}: mass, resistance and brake as the balance of forces has them.\n\
+         # Rotating parts inside, the vehicle weighs {inertial_t:.2} t; the rotating share stays as declared.\n{train}"
+    ))
+}
+
+fn rounded(value: f64, step: f64) -> f64 {
+    (value / step).round() / (1.0 / step).round()
+}
+
+fn dataset_toml(material: &Material) -> String {
+    let dataset = material.dataset;
+    let quoted = |text: &str| Value::String(text.into()).to_string();
+    let mut text = format!("{MARK}.\n[dataset]\nname = {}\n", quoted(&dataset.name));
+    if let Some(description) = &dataset.description {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "description = {}", quoted(description));
+    }
+    text += "[train]\nfile = \"train.toml\"\n[track]\nfile = \"track.toml\"\n[columns]\n";
+    for Column { quantity, unit, .. } in columns(dataset) {
+        let name = quantity.name();
+        let _ = writeln!(text, "{name} = {{ column = \"{name}\", unit = \"{unit}\" }}");
+    }
+    for (number, trip) in material.survey.trips.iter().enumerate() {
+        let role = dataset.runs[trip.recording].role.name();
+        let direction = trip.direction;
+        let _ = writeln!(
+            text,
+            "[[runs]]\nfile = \"{}\"\nrole = \"{role}\"\ndirection = {direction}",
+            trip_file(number)
+        );
+    }
+    text
+}
+
+/// Entries of (chainage in m, gradient and its standard deviation in ‰) of a direction's profile,
+/// climbing positive as the chainage grows.
+pub fn gradient_entries(
+    survey: &Survey,
+    profile: &SurveyedProfile,
+    direction: i8,
+) -> Vec<(f64, f64, f64)> {
+    let ways = &survey.ways;
+    let block = usize::from(direction < 0);
+    let length_m = ways.of(direction).map_or(0.0, |way| way.length_m());
+    let entries = profile.learned.profile.gradient_permille(block);
+    let inside = entries
+        .into_iter()
+        .filter(|(at_m, ..)| (-BEYOND_M - HEIGHT_STEP_M..length_m + BEYOND_M).contains(at_m));
+    let mut list: Vec<(f64, f64, f64)> = inside
+        .map(|(at_m, gradient, std)| match direction {
+            1 => (ways.chainage_m(1, at_m), gradient, std),
+            // The cell's end along the way is its start by chainage.
+            _ => (ways.chainage_m(-1, at_m + HEIGHT_STEP_M), -gradient, std),
+        })
+        .collect();
+    list.sort_by(|one, other| one.0.total_cmp(&other.0));
+    list
+}
+
+fn track_toml(material: &Material) -> String {
+    let survey = material.survey;
+    let Some(profile) = &survey.profile else { return String::new() };
+    let ways = &survey.ways;
+    let length_m = ways.chainage_per_m * ways.growing.length_m();
+    let name = Value::String(format!("{}, surveyed", material.dataset.name));
+    let mut text = TrackText::new(&format!("{MARK} from {} passes.\n", profile.trips.len()));
+    text.value("name", name);
+    text.value("length_m", format!("{length_m:.1}"));
+    text.value("alignment", "\"alignment.csv\"");
+    let growing = gradient_entries(survey, profile, 1);
+    let bounded = |gradient: f64| gradient.clamp(-149.0, 149.0);
+    let entry = |it: &(f64, f64, f64)| format!("{:.2}, {:.3}", it.0, bounded(it.1));
+    text.list("gradient", growing.iter().map(entry));
+    let stds = growing.iter().step_by(5);
+    text.list("gradient_std", stds.map(|it| format!("{:.2}, {:.3}", it.0, it.2.min(149.0))));
+    if !ways.is_one_track() {
+        let falling = gradient_entries(survey, profile, -1);
+        text.list("gradient_falling", falling.iter().map(entry));
+    }
+    if ways.is_one_track() {
+        let per_m = ways.chainage_per_m;
+        let entry = |curve: &dynocar_analysis::survey::curves::FoundCurve| {
+            let (from_m, to_m) = (per_m * curve.from_m, per_m * curve.to_m);
+            format!("{from_m:.1}, {to_m:.1}, {:.1}", curve.radius_m)
+        };
+        text.list("curves", profile.curves.iter().map(entry));
+    }
+    let stop = |stop: &dynocar_analysis::survey::stops::Stop| {
+        let name = Value::String(stop.name.clone()).to_string();
+        format!("{:.1}, {name}", stop.chainage_m.value)
+    };
+    text.list("stops", survey.stops.iter().map(stop));
+    if !ways.is_one_track() {
+        text.value("alignment_falling", "\"alignment_falling.csv\"");
+    }
+    text.into_text()
+}
+
+fn alignment(survey: &Survey, direction: i8) -> String {
+    let mut text = String::from("chainage_m,latitude_deg,longitude_deg\n");
+    let Some(way) = survey.ways.of(direction) else { return text };
+    for (node, &at_m) in way.nodes_m().iter().enumerate() {
+        let chainage_m = survey.ways.chainage_m(direction, node as f64 * way.step_m());
+        let [latitude, longitude] = survey.plane.unproject(at_m);
+        let _ = writeln!(text, "{chainage_m:.3},{latitude:.8},{longitude:.8}");
+    }
+    text
+}

@@ -1,0 +1,7 @@
+//! The program `dynocar-workshop`, built where the end-to-end tests can find it.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    dynocar_workshop::cli::main()
+}
