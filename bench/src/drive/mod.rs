@@ -1,0 +1,20 @@
+//! What a controller gains: an automatic driver with declared parameters, with the daemon's answers, and
+//! with the true ones.
+//!
+//! - [`knowledge`]: what a driver holds for true of its train, and what the train can do
+//! - [`leg`]: the way from stop to stop as the map has it
+//! - [`braking`]: the braking curve to the stopping point
+//! - [`plan`]: the speed profile for the timetable with the least energy
+//! - [`driver`]: tracking the plan and the braking curve
+//! - [`line`]: brakes, rails, wind, tunnels, curves and loads beside the world of ordinary mistakes
+//! - [`train`]: the train, whose truth nobody knows
+//! - [`journey`]: a train and its driver from stop to stop
+
+pub mod braking;
+pub mod driver;
+pub mod journey;
+pub mod knowledge;
+pub mod leg;
+pub mod line;
+pub mod plan;
+pub mod train;
