@@ -209,11 +209,11 @@ impl Driver {
             self.knowledge.acceleration_mps2(0.0, speed_mps, slope) + self.unexplained_mps2;
         let towards = |target_mps: f64| (gain * (target_mps - speed_mps)).max(-REGULATING_MPS2);
         match self.phase {
-            Phase::Driving => towards(self.plan.cruise_mps),
-            Phase::Coasting => {
-                let least = towards(COASTING_MIN_SHARE * self.plan.cruise_mps);
-                let most = towards(self.leg.top_mps);
-                free_mps2.clamp(least.min(most), most)
+            // Whoever is too fast coasts, and brakes only for the highest speed.
+            Phase::Driving | Phase::Coasting => {
+                let share = if self.phase == Phase::Driving { 1.0 } else { COASTING_MIN_SHARE };
+                let least = towards(share * self.plan.cruise_mps);
+                free_mps2.max(least).min(towards(self.leg.top_mps))
             }
             Phase::Braking => {
                 let target_mps = self.curve.speed_mps(self.leg.length_m - at_m);

@@ -14,11 +14,12 @@ use super::train::Train;
 const TIMETABLE: (f64, f64) = (1.08, 3.0);
 /// Confidence of the bounds.
 pub const CONFIDENCE: f64 = 0.99;
-/// What a controller presumes of the rail where it knows nothing: a wet one.
+/// What a controller presumes of the rail where it knows nothing: a wet one, and mostly more slippery
+/// than the law says.
 const UNKNOWN_RAIL: RailAdhesion =
-    RailAdhesion::Law(RailCondition::Wet, Uncertain::new(1.0, 0.15));
+    RailAdhesion::Law(RailCondition::Wet, Uncertain::new(0.8, 0.12));
 /// Brake and rail of the fixed worst case.
-const WORST: (f64, f64) = (0.75, 0.55);
+const WORST: (f64, f64) = (0.7, 0.45);
 /// Greatest mass over the declared one in the fixed worst case.
 const WORST_LOAD: f64 = 1.35;
 /// Time in s over which a change of acceleration is felt.
@@ -109,9 +110,9 @@ impl Journey {
         }
     }
 
-    /// True where the train moves.
-    pub fn is_moving(&self) -> bool {
-        self.state == State::Running
+    /// True where the driver brakes to the stopping point.
+    pub fn is_braking(&self) -> bool {
+        self.driver.as_ref().is_some_and(|driver| driver.phase() == Phase::Braking)
     }
 
     /// Time in s since the train left its stop.
@@ -120,7 +121,9 @@ impl Journey {
     }
 
     /// One cycle by what is known.
-    pub fn proceed(&mut self, sample: &TrainSample, knowledge: &Knowledge) {
+    ///
+    /// The driver drives by `knowledge`; `sure` is what bounds a stop.
+    pub fn proceed(&mut self, sample: &TrainSample, knowledge: &Knowledge, sure: &Knowledge) {
         let cycle_s = f64::from(self.train.service().cycle_ms) * 1e-3;
         match &mut self.state {
             State::Standing { left_s } => {
@@ -131,7 +134,7 @@ impl Journey {
                     self.depart(sample, knowledge, cycle_s);
                 }
             }
-            State::Running => self.run(sample, knowledge, cycle_s),
+            State::Running => self.run(sample, (knowledge, sure), cycle_s),
         }
     }
 
@@ -159,7 +162,12 @@ impl Journey {
         self.accelerations.clear();
     }
 
-    fn run(&mut self, sample: &TrainSample, knowledge: &Knowledge, cycle_s: f64) {
+    fn run(
+        &mut self,
+        sample: &TrainSample,
+        (knowledge, sure): (&Knowledge, &Knowledge),
+        cycle_s: f64,
+    ) {
         let Some(driver) = &mut self.driver else { return };
         self.running_s += cycle_s;
         let measured = Measured {
@@ -174,7 +182,7 @@ impl Journey {
                 || (self.braking_s < SECOND_LOOK_S && self.braking_s + cycle_s >= SECOND_LOOK_S);
             self.braking_s += cycle_s;
             if is_look && self.train.speed_mps() > 2.0 {
-                let look = self.look(knowledge);
+                let look = self.look(sure);
                 self.looks.push(look);
             }
         }
@@ -245,7 +253,7 @@ mod tests {
         while journey.ways.len() < stops {
             let sample = journey.train.sample();
             let knowledge = if knows { journey.train.truth() } else { journey.declared(&sample) };
-            journey.proceed(&sample, &knowledge);
+            journey.proceed(&sample, &knowledge, &knowledge);
         }
         journey.ways
     }

@@ -128,13 +128,15 @@ pub fn ability(traffic: Traffic) -> Ability {
     };
     Ability {
         traction: EffortCurve::new(points).expect("rising speeds"),
-        brake_max_n: 1.4 * inertial_kg * braking_mps2,
+        brake_max_n: FULL_BRAKE * inertial_kg * braking_mps2,
         braking_mps2,
         jerk_mps3,
         lag_s,
     }
 }
 
+/// Full over ordinary braking: as much as brings a full train to a stop.
+const FULL_BRAKE: f64 = 1.7;
 /// Cylinder pressure in Pa of a full braking.
 const FULL_PRESSURE_PA: f64 = 400e3;
 
@@ -181,7 +183,7 @@ impl Hidden {
         let end_m = world.stops_m[world.stops_m.len() - 1];
         let rail = match service.condition {
             Condition::WetRail => {
-                (RailCondition::Wet, (0.75 + 0.1 * normal(random)).clamp(0.5, 1.0))
+                (RailCondition::Wet, (0.75 + 0.1 * normal(random)).clamp(0.55, 1.0))
             }
             _ => (RailCondition::Dry, 1.0 + 0.05 * normal(random)),
         };

@@ -3,6 +3,7 @@
 //!
 //! - [`knowledge`]: what a driver holds for true of its train, and what the train can do
 //! - [`leg`]: the way from stop to stop as the map has it
+//! - [`answers`]: from the daemon's answers to what the driver drives by, and whether they were right
 //! - [`braking`]: the braking curve to the stopping point
 //! - [`plan`]: the speed profile for the timetable with the least energy
 //! - [`driver`]: tracking the plan and the braking curve
@@ -10,6 +11,7 @@
 //! - [`train`]: the train, whose truth nobody knows
 //! - [`journey`]: a train and its driver from stop to stop
 
+pub mod answers;
 pub mod braking;
 pub mod driver;
 pub mod journey;

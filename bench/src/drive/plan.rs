@@ -130,13 +130,13 @@ impl Planner<'_> {
         let slope = self.leg.slope_permille(at_m + 0.5 * way_m);
         let is_coasting = at_m >= coast_from_m && speed_mps > COASTING_MIN_SHARE * cruise_mps;
         let most_n = self.ability.traction.force_n(speed_mps);
-        let held_n = self.knowledge.resisting_n(speed_mps, slope).min(most_n);
-        let limit_mps = if is_coasting { self.leg.top_mps } else { cruise_mps };
-        let force_n = match () {
-            () if is_coasting => 0.0,
-            () if speed_mps < cruise_mps && at_m < coast_from_m => most_n,
-            () => held_n,
+        let is_pulled = speed_mps < cruise_mps && at_m < coast_from_m;
+        let limit_mps = if is_pulled { cruise_mps } else { self.leg.top_mps };
+        let held_n = match is_coasting || speed_mps > cruise_mps {
+            true => 0.0,
+            false => self.knowledge.resisting_n(speed_mps, slope).clamp(0.0, most_n),
         };
+        let force_n = if is_pulled { most_n } else { held_n };
         let acceleration = self.knowledge.acceleration_mps2(force_n, speed_mps, slope);
         let free_mps = (speed_mps * speed_mps + 2.0 * way_m * acceleration).max(1e-4).sqrt();
         let next_mps = free_mps.min(limit_mps.max(speed_mps));
