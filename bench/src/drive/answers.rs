@@ -41,10 +41,11 @@ pub fn learned<'a>(
         known.w0_std_n_per_kn = at.w0_std_n_per_kn;
     }
     // Where the rail carries less than the brake exerts, the brake shows nothing of itself.
-    let adhesion = usable(Quantity::Adhesion).and_then(|it| value(it, Parameter::Adhesion));
-    let friction = usable(Quantity::BrakeFriction).and_then(|it| value(it, Parameter::DiscFriction));
-    if let Some(adhesion) = adhesion {
-        known.rail = Some(RailAdhesion::Coefficient(adhesion));
+    let rail = usable(Quantity::Adhesion).and_then(RailAdhesion::learned);
+    let friction =
+        usable(Quantity::BrakeFriction).and_then(|it| value(it, Parameter::DiscFriction));
+    if rail.is_some() {
+        known.rail = rail;
     } else if let Some(friction) = friction {
         // Only brake force over mass slows the train, and the friction presumes the declared mass.
         let share = known.mass_kg.value / (declared.mass_kg.value * declared_friction);
@@ -156,7 +157,10 @@ pub fn count(
     }
     let w0 = |davis: &Davis| davis.w0_n_per_kn(speed_mps);
     let adhesion = match learned.rail {
-        Some(RailAdhesion::Coefficient(it)) => it,
+        Some(RailAdhesion::Law(law, scale)) => {
+            let at = law.adhesion(speed_mps);
+            Uncertain::new(at * scale.value, at * scale.std)
+        }
         _ => Uncertain::exact(f64::NAN),
     };
     let scale = learned.brake_scale;

@@ -1,8 +1,8 @@
 //! A train and its driver from stop to stop, and what each way was worth.
 
 use dynocar_core::simulate::STANDING_MPS;
-use dynocar_shared::{RailCondition, TrainSample, Uncertain};
 use dynocar_shared::stopping::RailAdhesion;
+use dynocar_shared::{RailCondition, TrainSample, Uncertain};
 
 use super::driver::{Driver, Measured, Phase};
 use super::knowledge::Knowledge;
@@ -16,8 +16,7 @@ const TIMETABLE: (f64, f64) = (1.08, 3.0);
 pub const CONFIDENCE: f64 = 0.99;
 /// What a controller presumes of the rail where it knows nothing: a wet one, and mostly more slippery
 /// than the law says.
-const UNKNOWN_RAIL: RailAdhesion =
-    RailAdhesion::Law(RailCondition::Wet, Uncertain::new(0.8, 0.12));
+const UNKNOWN_RAIL: RailAdhesion = RailAdhesion::Law(RailCondition::Wet, Uncertain::new(0.8, 0.12));
 /// Brake and rail of the fixed worst case.
 const WORST: (f64, f64) = (0.7, 0.45);
 /// Greatest mass over the declared one in the fixed worst case.
@@ -142,10 +141,8 @@ impl Journey {
         let (leg, ability) = (self.train.leg(), self.train.ability().clone());
         let declared = self.declared(sample);
         // The timetable is that of the declared load, whatever it weighs today.
-        let usual = Knowledge {
-            mass_kg: Uncertain::exact(self.train.declared.mass_kg),
-            ..declared
-        };
+        let usual =
+            Knowledge { mass_kg: Uncertain::exact(self.train.declared.mass_kg), ..declared };
         let start = (0.0, 0.0);
         let shortest = Planner { leg: &leg, knowledge: &usual, ability: &ability };
         let shortest_s = shortest.plan(start, 0.0).time_s;
@@ -153,9 +150,9 @@ impl Journey {
         let leg = Leg { due_s, ..leg };
         let truth = self.train.truth();
         let true_planner = Planner { leg: &leg, knowledge: &truth, ability: &ability };
-        let [in_time, later] =
-            [due_s, 1.03 * due_s].map(|left_s| true_planner.plan(start, left_s));
-        self.saved_w = (in_time.energy_j - later.energy_j) / (later.time_s - in_time.time_s).max(0.1);
+        let [in_time, later] = [due_s, 1.03 * due_s].map(|left_s| true_planner.plan(start, left_s));
+        self.saved_w =
+            (in_time.energy_j - later.energy_j) / (later.time_s - in_time.time_s).max(0.1);
         self.driver = Some(Driver::new(leg, ability, cycle_s, *knowledge));
         self.state = State::Running;
         (self.running_s, self.braking_s) = (0.0, 0.0);
@@ -202,7 +199,8 @@ impl Journey {
         };
         let true_m = self.train.full_braking_m();
         let bound = |knowledge: &Knowledge, rail: RailAdhesion| {
-            let level_m = 0.5 * speed_mps * speed_mps / knowledge.braking_max_mps2(ability, speed_mps);
+            let level_m =
+                0.5 * speed_mps * speed_mps / knowledge.braking_max_mps2(ability, speed_mps);
             let at = (speed_mps, slope(level_m));
             knowledge.bound_m(ability, at, rail, CONFIDENCE).ok()
         };

@@ -58,8 +58,8 @@ impl Knowledge {
 
     /// The force in N, braking negative, that gives an acceleration in m/s².
     pub fn force_n(&self, acceleration_mps2: f64, speed_mps: f64, slope_permille: f64) -> f64 {
-        let exerted_n = self.inertial_kg() * acceleration_mps2
-            + self.resisting_n(speed_mps, slope_permille);
+        let exerted_n =
+            self.inertial_kg() * acceleration_mps2 + self.resisting_n(speed_mps, slope_permille);
         match exerted_n < 0.0 {
             true => exerted_n / self.brake_scale.value.max(0.1),
             false => exerted_n,

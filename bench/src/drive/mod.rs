@@ -10,13 +10,23 @@
 //! - [`line`]: brakes, rails, wind, tunnels, curves and loads beside the world of ordinary mistakes
 //! - [`train`]: the train, whose truth nobody knows
 //! - [`journey`]: a train and its driver from stop to stop
+//! - [`link`]: channels to a daemon of its own, in lock-step
+//! - [`run`]: all trains of a service with one kind of parameters
+//! - [`score`], [`table`], [`picture`]: what it comes to
+//! - [`command`]: the command line
 
 pub mod answers;
 pub mod braking;
+pub mod command;
 pub mod driver;
 pub mod journey;
 pub mod knowledge;
 pub mod leg;
 pub mod line;
+pub mod link;
+pub mod picture;
 pub mod plan;
+pub mod run;
+pub mod score;
+pub mod table;
 pub mod train;

@@ -89,7 +89,12 @@ impl Planner<'_> {
     }
 
     /// The run at a cruising speed with coasting from a distance on.
-    pub fn run(&self, (mut at_m, mut speed_mps): (f64, f64), cruise_mps: f64, coast_from_m: f64) -> Plan {
+    pub fn run(
+        &self,
+        (mut at_m, mut speed_mps): (f64, f64),
+        cruise_mps: f64,
+        coast_from_m: f64,
+    ) -> Plan {
         let curve = BrakingCurve::of(self.knowledge, self.ability, cruise_mps.max(speed_mps));
         let step_m = (self.leg.length_m - at_m).max(1.0) / STEPS as f64;
         let (mut time_s, mut energy_j) = (0.0, 0.0);
@@ -101,8 +106,7 @@ impl Planner<'_> {
             }
             let spare_m = self.leg.length_m - at_m - curve.distance_m(speed_mps);
             let (force_n, next_mps) = self.step((at_m, speed_mps), way_m, cruise_mps, coast_from_m);
-            let next_spare_m =
-                self.leg.length_m - at_m - way_m - curve.distance_m(next_mps);
+            let next_spare_m = self.leg.length_m - at_m - way_m - curve.distance_m(next_mps);
             let share = match next_spare_m < 0.0 {
                 true => (spare_m / (spare_m - next_spare_m)).clamp(0.0, 1.0),
                 false => 1.0,

@@ -7,7 +7,7 @@ use dynocar_core::simulate::motion::{Motion, advance};
 use dynocar_core::train::{Davis, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample, Uncertain};
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::knowledge::{Ability, Knowledge};
@@ -129,8 +129,8 @@ impl Train {
         let pieces = (length_m / PIECE_M) as usize + 2;
         let slope = |piece: usize| {
             let chainage_m = self.start_m + self.direction * PIECE_M * piece as f64;
-            let curve = self.declared.curve_constant_n_per_kn_m
-                * self.hidden.curvature_per_m(chainage_m);
+            let curve =
+                self.declared.curve_constant_n_per_kn_m * self.hidden.curvature_per_m(chainage_m);
             self.direction * self.world.gradient_permille(chainage_m)[0] + curve
         };
         let slopes_permille = (0..pieces).map(slope).collect();
@@ -141,6 +141,11 @@ impl Train {
     /// What it can do, as declared.
     pub fn ability(&self) -> &Ability {
         &self.ability
+    }
+
+    /// Disc friction as declared.
+    pub fn declared_friction(&self) -> f64 {
+        self.gear.friction
     }
 
     /// Its service.
@@ -268,8 +273,8 @@ impl Train {
         let noise_m = scenario.position_noise_m * normal(&mut self.random);
         let place_m = self.chainage_m() + self.balise_m + noise_m;
         let mut sample = TrainSample::empty(TrainId(1));
-        sample.time_ns = 1_000_000_000
-            + 1_000_000 * i64::from(self.service.cycle_ms) * self.cycles as i64;
+        sample.time_ns =
+            1_000_000_000 + 1_000_000 * i64::from(self.service.cycle_ms) * self.cycles as i64;
         sample.direction = if self.direction > 0.0 { 1 } else { -1 };
         let brake_n = (-self.reported_n).max(0.0);
         sample.set(SampleField::Speed, speed_mps);
@@ -299,10 +304,5 @@ impl Train {
     /// Standing time at a stop in s: shortened, for nothing is learned meanwhile.
     pub fn standing_s(&self) -> f64 {
         self.service.traffic.habits().standing_s.min(30.0)
-    }
-
-    /// A uniform number of this way.
-    pub fn chance(&mut self) -> f64 {
-        self.random.random()
     }
 }
