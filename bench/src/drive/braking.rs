@@ -14,6 +14,8 @@ const PLANNED_SHARE: f64 = 0.85;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrakingCurve {
     full_mps2: f64,
+    /// Distance in m from where it eases off.
+    soft_m: f64,
 }
 
 impl BrakingCurve {
@@ -21,13 +23,19 @@ impl BrakingCurve {
     /// brake or rail are known to carry less.
     pub fn of(knowledge: &Knowledge, ability: &Ability, from_mps: f64) -> Self {
         let possible = PLANNED_SHARE * knowledge.braking_max_mps2(ability, from_mps);
-        BrakingCurve { full_mps2: ability.braking_mps2.min(possible).max(0.05) }
+        BrakingCurve::with(ability.braking_mps2.min(possible).max(0.05))
     }
 
     /// This curve, or a weaker one.
     #[must_use]
     pub fn no_steeper_than(self, other: BrakingCurve) -> Self {
-        BrakingCurve { full_mps2: self.full_mps2.min(other.full_mps2) }
+        if other.full_mps2 < self.full_mps2 { other } else { self }
+    }
+
+    fn with(full_mps2: f64) -> Self {
+        let mut curve = BrakingCurve { full_mps2, soft_m: 0.0 };
+        curve.soft_m = curve.distance_m(SOFT_MPS);
+        curve
     }
 
     /// Deceleration in m/s² at a speed in m/s.
@@ -38,11 +46,12 @@ impl BrakingCurve {
 
     /// Distance in m to standstill from a speed in m/s.
     pub fn distance_m(&self, speed_mps: f64) -> f64 {
+        if speed_mps > SOFT_MPS {
+            let sharp = speed_mps * speed_mps - SOFT_MPS * SOFT_MPS;
+            return self.soft_m + sharp / (2.0 * self.full_mps2);
+        }
         let (end, growth) = self.soft();
-        let soft_mps = speed_mps.min(SOFT_MPS);
-        let ratio = growth * soft_mps / end;
-        let soft_m = soft_mps / growth - end / (growth * growth) * ratio.ln_1p();
-        soft_m + (speed_mps * speed_mps - soft_mps * soft_mps) / (2.0 * self.full_mps2)
+        speed_mps / growth - end / (growth * growth) * (growth * speed_mps / end).ln_1p()
     }
 
     /// Time in s to standstill from a speed in m/s.
@@ -55,9 +64,8 @@ impl BrakingCurve {
     /// The speed in m/s from which the train stands after a distance in m.
     pub fn speed_mps(&self, left_m: f64) -> f64 {
         let left_m = left_m.max(0.0);
-        let soft_m = self.distance_m(SOFT_MPS);
-        if left_m >= soft_m {
-            return (SOFT_MPS * SOFT_MPS + 2.0 * self.full_mps2 * (left_m - soft_m)).sqrt();
+        if left_m >= self.soft_m {
+            return (SOFT_MPS * SOFT_MPS + 2.0 * self.full_mps2 * (left_m - self.soft_m)).sqrt();
         }
         let (mut low, mut high) = (0.0, SOFT_MPS);
         for _ in 0..40 {

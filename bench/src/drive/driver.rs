@@ -18,7 +18,7 @@ const PLACE_PER_S: f64 = 1.0;
 /// Share of the inverse of the lag that corrects an error of the speed, per s.
 const SPEED_GAIN: f64 = 0.4;
 /// Plans on a way, and the shortest time in s between two.
-const PLANS: f64 = 20.0;
+const PLANS: f64 = 12.0;
 const REPLAN_MIN_S: f64 = 5.0;
 /// Lateness in s from which a coasting train is pulled again, and as a share of the running time.
 const LATE: (f64, f64) = (1.5, 0.01);
