@@ -1,8 +1,9 @@
 //! A train and its driver from stop to stop, and what each way was worth.
 
 use dynocar_core::simulate::STANDING_MPS;
+use dynocar_core::train::Davis;
 use dynocar_shared::stopping::RailAdhesion;
-use dynocar_shared::{RailCondition, TrainSample, Uncertain};
+use dynocar_shared::{RailCondition, SampleField, TrainSample, Uncertain};
 
 use super::driver::{Driver, Measured, Phase};
 use super::knowledge::Knowledge;
@@ -94,7 +95,7 @@ impl Journey {
     /// What is declared, with the load as it was weighed.
     pub fn declared(&self, sample: &TrainSample) -> Knowledge {
         let declared = &self.train.declared;
-        let weighed = sample.get(dynocar_shared::SampleField::Mass);
+        let weighed = sample.get(SampleField::Mass);
         let mass_kg = match weighed {
             Some(mass_kg) => Uncertain::new(mass_kg, 0.03 * mass_kg),
             None => Uncertain::new(declared.mass_kg, 0.08 * declared.mass_kg),
@@ -204,7 +205,7 @@ impl Journey {
         let worst = Knowledge {
             mass_kg: Uncertain::exact(WORST_LOAD * self.train.declared.mass_kg),
             rotating_mass_factor: knowledge.rotating_mass_factor,
-            davis: dynocar_core::train::Davis { a: 0.0, b: 0.0, c: 0.0 },
+            davis: Davis { a: 0.0, b: 0.0, c: 0.0 },
             w0_std_n_per_kn: 0.0,
             brake_scale: Uncertain::exact(WORST.0),
             rail: None,

@@ -2,6 +2,7 @@
 
 use dynocar_core::pipeline::braking::gear::DeclaredGear;
 use dynocar_core::train::{BrakeGear, EffortCurve, TrainModel};
+use dynocar_shared::stopping::RailAdhesion;
 use dynocar_shared::{RailCondition, Uncertain};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -231,9 +232,9 @@ impl Hidden {
     }
 
     /// The adhesion's law with the exact scale.
-    pub fn adhesion(&self) -> dynocar_shared::stopping::RailAdhesion {
+    pub fn adhesion(&self) -> RailAdhesion {
         let (law, scale) = self.rail;
-        dynocar_shared::stopping::RailAdhesion::Law(law, Uncertain::exact(scale))
+        RailAdhesion::Law(law, Uncertain::exact(scale))
     }
 }
 

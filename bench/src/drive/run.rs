@@ -4,7 +4,7 @@ use dynocar_shared::TrainSample;
 
 use super::answers::{self, ASKED, Memory, Use};
 use super::journey::{Journey, Way};
-use super::line::Service;
+use super::line::{Condition, Service};
 use super::link::Link;
 use super::train::Train;
 use crate::rig::RigError;
@@ -157,7 +157,7 @@ fn with_daemon(
         }
     }
     let lost = link.lost();
-    if lost > 0 && service.condition != super::line::Condition::DaemonDies {
+    if lost > 0 && service.condition != Condition::DaemonDies {
         return Err(RigError::Daemon(format!("{lost} samples were lost in lock-step")));
     }
     Ok(asking.into_iter().map(|it| Driven { ways: it.journey.ways, uses: it.uses }).collect())
