@@ -8,6 +8,7 @@ use dynocar::cli::parse;
 use dynocar::output::{tell, write_file};
 use serde::Serialize;
 
+use crate::drive::command::{DriveArguments, drive};
 use crate::estimators::measure::Effort;
 use crate::estimators::{self, beside, report};
 use crate::explain::command::{ExplainArguments, explain};
@@ -30,6 +31,7 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Drive(DriveArguments),
     Estimators(EstimatorsArguments),
     Explain(ExplainArguments),
     Latency(LatencyArguments),
@@ -108,6 +110,7 @@ pub fn main() -> ExitCode {
         Err(status) => return status,
     };
     let result = match &arguments.command {
+        Command::Drive(arguments) => drive(arguments),
         Command::Estimators(arguments) => estimators(arguments),
         Command::Explain(arguments) => explain(arguments),
         Command::Latency(arguments) => latency(arguments),
