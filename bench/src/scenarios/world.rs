@@ -1,6 +1,7 @@
 //! A train, its line, and the ordinary mistakes in what is declared of them.
 
 use dynocar_core::train::{Davis, TrainModel};
+use dynocar_tests::simulator::Deviations;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -133,8 +134,9 @@ impl World {
             b: near(declared.resistance.b, 0.3).max(0.0),
             c: near(declared.resistance.c, 0.3).max(1e-5),
         };
-        let force_scale = [near(1.0, 0.006), near(1.0, 0.006)];
-        let speed_scale = near(1.0, 0.0015);
+        let usual = Deviations::ROUGH;
+        let force_scale = [near(1.0, usual.force_share), near(1.0, usual.force_share)];
+        let speed_scale = near(1.0, usual.wheel_share);
         let delay_s = near(0.1, 0.5).clamp(0.0, 0.25);
         truth.rotating_mass_factor += near(1.0, 0.002) - 1.0;
         truth.mass_kg *= match scenario.load {
