@@ -5,12 +5,13 @@
 //! every knot. What measured speeds say of them follows from how the true motion would differ.
 
 use dynocar_core::force::balance::mps2_per_n_per_kn;
+use dynocar_tests::simulator::Deviations;
 use nalgebra::{DMatrix, DVector, Matrix4};
 
 use super::drive::Truth;
 use super::world::{
-    COEFFICIENT_SHARE, DELAY_STD_S, FORCE_SCALE_STD, KNOT_M, LoadTold, ROTATING_MASS_STD,
-    WEIGHING_STD, WHEEL_STD, World, knot_std_permille,
+    COEFFICIENT_SHARE, DELAY_STD_S, KNOT_M, LoadTold, ROTATING_MASS_STD, WEIGHING_STD, World,
+    knot_std_permille,
 };
 
 /// Places of the unknowns that every run shares; loads and knots follow.
@@ -70,11 +71,12 @@ impl Bound {
         for (place, value) in [declared.a, declared.b, declared.c].into_iter().enumerate() {
             prior[place] = (COEFFICIENT_SHARE * value).powi(2);
         }
-        prior[TRACTION_SCALE] = FORCE_SCALE_STD.powi(2);
-        prior[BRAKE_SCALE] = FORCE_SCALE_STD.powi(2);
+        let usual = Deviations::ROUGH;
+        prior[TRACTION_SCALE] = usual.force_share.powi(2);
+        prior[BRAKE_SCALE] = usual.force_share.powi(2);
         prior[DELAY] = DELAY_STD_S.powi(2);
         prior[ROTATING_MASS] = ROTATING_MASS_STD.powi(2);
-        prior[WHEEL] = WHEEL_STD.powi(2);
+        prior[WHEEL] = usual.wheel_share.powi(2);
         prior[SHARED..knots_from].fill((load_std * load_std).max(EXACT));
         let map_variance = knot_std_permille(scenario.map_std_permille).powi(2).max(EXACT);
         prior[knots_from..].fill(map_variance);

@@ -1,6 +1,7 @@
 //! A train, its line, and the ordinary mistakes in what is declared of them.
 
 use dynocar_core::train::{Davis, TrainModel};
+use dynocar_tests::simulator::Deviations;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -97,10 +98,6 @@ impl Traffic {
 
 /// Standard deviation of a, b, c as a share of what is declared.
 pub const COEFFICIENT_SHARE: f64 = 0.3;
-/// Standard deviation of the scales of traction and brake force.
-pub const FORCE_SCALE_STD: f64 = 0.006;
-/// Standard deviation of the wheels' scale.
-pub const WHEEL_STD: f64 = 0.0015;
 /// Standard deviation of the rotating mass as a share of the mass.
 pub const ROTATING_MASS_STD: f64 = 0.002;
 /// Mean and standard deviation in s of the delay of forces.
@@ -156,8 +153,9 @@ impl World {
             b: near(declared.resistance.b, COEFFICIENT_SHARE).max(0.0),
             c: near(declared.resistance.c, COEFFICIENT_SHARE).max(1e-5),
         };
-        let force_scale = [near(1.0, FORCE_SCALE_STD), near(1.0, FORCE_SCALE_STD)];
-        let speed_scale = near(1.0, WHEEL_STD);
+        let usual = Deviations::ROUGH;
+        let force_scale = [near(1.0, usual.force_share), near(1.0, usual.force_share)];
+        let speed_scale = near(1.0, usual.wheel_share);
         let delay_s = near(DELAY_S, DELAY_STD_S / DELAY_S).clamp(0.0, 0.25);
         truth.rotating_mass_factor += near(1.0, ROTATING_MASS_STD) - 1.0;
         truth.mass_kg *= match scenario.load {
