@@ -11,6 +11,7 @@ mod demo;
 pub mod explain;
 mod failure;
 mod fmu;
+mod groups;
 mod health;
 pub mod identify;
 mod import;
@@ -62,19 +63,19 @@ enum Command {
     Models(models::ModelsArguments),
     /// Record what a controller and the daemon write, as MCAP
     Record(companion::Passed),
-    /// Keep the last hours in a ring on disk, and for good what lies around a suspicion or a fault
+    /// Keep the last hours on disk, and for good what lies around a suspicion or a fault
     FlightRecorder(companion::Passed),
     /// Ask a flight recorder to keep this moment for good
     Keep(companion::Passed),
-    /// Make a recording whole whose recorder died
+    /// Repair a truncated recording
     Recover(companion::Passed),
-    /// Change recordings between MCAP, CSV datasets and Parquet
+    /// Convert recordings between MCAP, CSV datasets and Parquet
     Convert(companion::Passed),
-    /// See in the terminal what the daemon knows of a train, and what to drive next
+    /// Show in the terminal what is estimated of a train, and what to drive next
     Watch(companion::Passed),
     /// Serve samples, snapshots and events live to Foxglove or Lichtblick
     Live(companion::Passed),
-    /// Forward what the daemon knows to an MQTT broker, as Sparkplug B
+    /// Forward estimates and events to an MQTT broker, as Sparkplug B
     Forward(companion::Passed),
     Completions(completions::CompletionsArguments),
     Man(man::ManArguments),
@@ -103,9 +104,14 @@ impl Command {
     }
 }
 
+/// The command line of `dynocar`.
+pub fn command() -> clap::Command {
+    groups::grouped(Arguments::command())
+}
+
 /// Parses the command line, runs the command, reports a failure on standard error.
 pub fn main() -> ExitCode {
-    let arguments = match parse::<Arguments>("dynocar") {
+    let arguments = match parse_by::<Arguments>(command(), "dynocar") {
         Ok(arguments) => arguments,
         Err(status) => return status,
     };
@@ -136,8 +142,8 @@ pub fn main() -> ExitCode {
         Command::Watch(passed) => companion::become_it("dynocar-watch", None, passed),
         Command::Live(passed) => companion::become_it("dynocar-live", None, passed),
         Command::Forward(passed) => companion::become_it("dynocar-forward", None, passed),
-        Command::Completions(arguments) => completions::execute(arguments, Arguments::command()),
-        Command::Man(arguments) => man::execute(arguments, Arguments::command()),
+        Command::Completions(arguments) => completions::execute(arguments, command()),
+        Command::Man(arguments) => man::execute(arguments, command()),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -152,9 +158,14 @@ pub fn main() -> ExitCode {
 ///
 /// The exit status.
 pub fn parse<A: Parser>(program: &str) -> Result<A, ExitCode> {
-    let error = match A::try_parse() {
+    parse_by(A::command(), program)
+}
+
+fn parse_by<A: Parser>(mut command: clap::Command, program: &str) -> Result<A, ExitCode> {
+    let matches = command.try_get_matches_from_mut(std::env::args_os());
+    let error = match matches.and_then(|mut it| A::from_arg_matches_mut(&mut it)) {
         Ok(arguments) => return Ok(arguments),
-        Err(error) => error,
+        Err(error) => error.format(&mut command),
     };
     let printed = error.print().and_then(|()| std::io::Write::flush(&mut std::io::stdout()));
     if error.use_stderr() {

@@ -16,7 +16,7 @@ use crate::output::tell;
 use crate::replay::{Rate, ReplayReport, Replayer};
 use crate::unpacking::program_for;
 
-/// Play recorded runs into the sample channel, as a controller would.
+/// Play recorded runs to the daemon as a controller would, or verify a recording.
 #[derive(Debug, Args)]
 pub struct ReplayArguments {
     /// The dataset's folder, or a recording; with --verify the files of one that rotated, in order
