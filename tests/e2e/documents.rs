@@ -38,10 +38,13 @@ fn every_link_leads_to_a_file_and_a_heading_in_it() {
         for link in page.links().into_iter().filter(|it| !it.starts_with("http")) {
             count += 1;
             let (file, anchor) = link.split_once('#').unwrap_or((link, ""));
-            let target = if file.is_empty() { page.path.clone() } else { plain(&folder.join(file)) };
+            let target =
+                if file.is_empty() { page.path.clone() } else { plain(&folder.join(file)) };
             let found: Option<&Page> = pages.iter().find(|it| it.path == target);
             let has_anchor = |it: &Page| it.anchors().iter().any(|name| name == anchor);
-            if !workspace().join(&target).exists() || !anchor.is_empty() && !found.is_some_and(has_anchor) {
+            if !workspace().join(&target).exists()
+                || !anchor.is_empty() && !found.is_some_and(has_anchor)
+            {
                 wrong.push(format!("{}: {link}", page.path.display()));
             }
         }
@@ -53,7 +56,9 @@ fn every_link_leads_to_a_file_and_a_heading_in_it() {
 /// The command line that takes these words: `dynocar` hands some of its commands to other programs.
 fn command_line(words: &[String]) -> (clap::Command, usize) {
     match words.first().map(String::as_str) {
-        Some("record" | "flight-recorder" | "keep" | "recover" | "convert") => (dynocar_recording::cli::command(), 0),
+        Some("record" | "flight-recorder" | "keep" | "recover" | "convert") => {
+            (dynocar_recording::cli::command(), 0)
+        }
         Some("watch") => (dynocar_watch::cli::command(), 1),
         Some("live") => (dynocar_live::cli::command(), 1),
         Some("forward") => (dynocar_forward::cli::command(), 1),
@@ -101,7 +106,10 @@ fn every_package_program_and_test_that_a_page_has_cargo_run_is_there() {
     assert!(shown.len() > 20, "the commands are found: {}", shown.len());
     for it in &shown {
         let own = it.words.split(|word| word == "--").next().unwrap_or_default();
-        for pair in own.windows(2).filter(|pair| ["-p", "--bin", "--test", "--bench"].contains(&pair[0].as_str())) {
+        for pair in own
+            .windows(2)
+            .filter(|pair| ["-p", "--bin", "--test", "--bench"].contains(&pair[0].as_str()))
+        {
             if !targets.contains(&(pair[0].clone(), pair[1].clone())) {
                 wrong.push(format!("{}: no {}", it.place, pair[1]));
             }

@@ -55,16 +55,18 @@ impl Page {
     /// The page's lines outside blocks of code, and those in them with the block's language.
     fn lines(&self) -> impl Iterator<Item = (Option<&str>, &str)> {
         let mut language = None;
-        self.text.lines().filter_map(move |line| match (line.trim_start().strip_prefix("```"), language) {
-            (Some(_), Some(_)) => {
-                language = None;
-                None
+        self.text.lines().filter_map(move |line| {
+            match (line.trim_start().strip_prefix("```"), language) {
+                (Some(_), Some(_)) => {
+                    language = None;
+                    None
+                }
+                (Some(name), None) => {
+                    language = Some(name);
+                    None
+                }
+                (None, language) => Some((language, line)),
             }
-            (Some(name), None) => {
-                language = Some(name);
-                None
-            }
-            (None, language) => Some((language, line)),
         })
     }
 
@@ -95,8 +97,11 @@ impl Page {
         let mut found = vec![String::new()];
         for (language, line) in self.lines() {
             let begins = line.trim_start();
-            let is_text = language.is_none() && !begins.is_empty() && !begins.starts_with(['|', '#', '<', '!']);
-            let is_numbered = begins.split_once(". ").is_some_and(|(it, _)| it.parse::<u32>().is_ok());
+            let is_text = language.is_none()
+                && !begins.is_empty()
+                && !begins.starts_with(['|', '#', '<', '!']);
+            let is_numbered =
+                begins.split_once(". ").is_some_and(|(it, _)| it.parse::<u32>().is_ok());
             if !is_text || begins.starts_with("- ") || is_numbered {
                 found.push(String::new());
             }
@@ -192,15 +197,17 @@ impl Shown {
     /// Why a command line does not take these words; what a mention leaves out is no reason.
     pub fn refusal(&self, command: clap::Command) -> Option<String> {
         use ErrorKind::{
-            DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion, MissingRequiredArgument,
-            MissingSubcommand,
+            DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion,
+            MissingRequiredArgument, MissingSubcommand,
         };
         let name = command.get_name().to_owned();
         let words = std::iter::once(&name).chain(&self.words);
         let error = command.try_get_matches_from(words).err()?;
         match error.kind() {
             DisplayHelp | DisplayVersion => None,
-            MissingRequiredArgument | MissingSubcommand | DisplayHelpOnMissingArgumentOrSubcommand
+            MissingRequiredArgument
+            | MissingSubcommand
+            | DisplayHelpOnMissingArgumentOrSubcommand
                 if self.is_mention =>
             {
                 None
@@ -218,7 +225,8 @@ impl Shown {
 }
 
 fn is_placeholder(word: &str) -> bool {
-    word.len() > 1 && word.chars().all(|it| it.is_ascii_uppercase() || "_:.|".contains(it)) || word.contains('…')
+    word.len() > 1 && word.chars().all(|it| it.is_ascii_uppercase() || "_:.|".contains(it))
+        || word.contains('…')
 }
 
 #[cfg(test)]
@@ -241,7 +249,8 @@ mod tests {
         let text = "Say `dynocar check PATH`, not `dynocar`.\n```sh\ncargo run --release -- demo\ndynocar run \\\n  --config x\n```\n\
                     ```text\n$ dynocar health\ndynocar never\n```\n";
         let page = page(text);
-        let found: Vec<String> = page.commands("dynocar").iter().map(|it| it.words.join(" ")).collect();
+        let found: Vec<String> =
+            page.commands("dynocar").iter().map(|it| it.words.join(" ")).collect();
         assert_eq!(found, ["check PATH", "demo", "run --config x", "health"]);
         let bench = "cargo run --release -p dynocar-bench -- papers";
         assert!(shown(String::new(), bench, "dynocar", false).is_none());
@@ -250,7 +259,10 @@ mod tests {
 
     #[test]
     fn anchors_are_those_of_github() {
-        assert_eq!(anchor("What runs add: `[corrections]`, `masses`"), "what-runs-add-corrections-masses");
+        assert_eq!(
+            anchor("What runs add: `[corrections]`, `masses`"),
+            "what-runs-add-corrections-masses"
+        );
         assert_eq!(page("# A\n```\n# no heading\n```\n## B c\n").anchors(), ["a", "b-c"]);
     }
 

@@ -50,7 +50,8 @@ mod tests {
         let command = crate::cli::command();
         for it in command.get_subcommands().filter(|it| !it.is_hide_set()) {
             let name = it.get_name();
-            let count = GROUPS.iter().flat_map(|(_, names)| *names).filter(|it| **it == name).count();
+            let count =
+                GROUPS.iter().flat_map(|(_, names)| *names).filter(|it| **it == name).count();
             assert_eq!(count, 1, "{name} is in {count} groups");
         }
         for line in list(&command).lines() {
