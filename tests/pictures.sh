@@ -22,6 +22,6 @@ cp "$place/plots/errors_holdout.svg" docs/images/example_errors.svg
 cp "$place/plots/line.svg" docs/images/example_line.svg
 
 "$programs/dynocar" explain "$place/tunnel_drag-9001" --report "$place/report.html"
-"$browser" --headless --no-sandbox --disable-gpu --hide-scrollbars --window-size=870,1330 \
+"$browser" --headless --no-sandbox --disable-gpu --hide-scrollbars --window-size=870,655 \
   --screenshot="$place/report.png" "file://$place/report.html" 2> "$place/browser.txt"
 cp "$place/report.png" docs/explain_report.png

@@ -7,10 +7,10 @@ use clap::Command;
 /// Headings and their commands, in the order in which they are printed.
 const GROUPS: [(&str, &[&str]); 5] = [
     ("Begin", &["demo", "init", "import", "check"]),
-    ("Drive: beside a controller", &["run", "health", "replay"]),
-    ("Learn: from recorded runs", &["identify", "explain", "survey", "stops", "learn", "models"]),
-    ("Look: see and keep", &["watch", "record", "flight-recorder", "keep", "recover", "convert"]),
-    ("Connect: with other programs", &["live", "forward", "fmu", "completions", "man"]),
+    ("Drive, with a controller", &["run", "health", "replay"]),
+    ("Learn, from recorded runs", &["identify", "explain", "survey", "stops", "learn", "models"]),
+    ("Look, and keep", &["watch", "record", "flight-recorder", "keep", "recover", "convert"]),
+    ("Connect, with other programs", &["live", "forward", "fmu", "completions", "man"]),
 ];
 
 /// The program's command line with a help that lists its commands in groups.
