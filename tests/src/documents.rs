@@ -154,7 +154,11 @@ fn anchor(heading: &str) -> String {
 
 /// A line as a command of a program, if it is one.
 fn shown(place: String, line: &str, program: &str, is_mention: bool) -> Option<Shown> {
-    let line = if is_mention { line.replace(['[', ']'], " ") } else { line.to_owned() };
+    let line = if is_mention {
+        line.replace(" [", " ").replace("] ", " ").trim_end_matches(']').to_owned()
+    } else {
+        line.to_owned()
+    };
     let mut words = words(&line);
     if words.first()? == "cargo" && program != "cargo" {
         // `cargo run … -p PROGRAM -- …`; without a package it is `dynocar`.
@@ -212,11 +216,10 @@ impl Shown {
             {
                 None
             }
-            // A name in capitals stands for a value: `--train ID`.
-            kind @ (ErrorKind::InvalidValue | ErrorKind::ValueValidation)
+            // A name in capitals stands for what a reader puts in: `--train ID`, `help COMMAND`.
+            ErrorKind::InvalidValue | ErrorKind::ValueValidation | ErrorKind::InvalidSubcommand
                 if self.is_mention && self.words.iter().any(|it| is_placeholder(it)) =>
             {
-                let _ = kind;
                 None
             }
             _ => Some(format!("{}\n    {error}", self.place)),
