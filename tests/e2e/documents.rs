@@ -110,7 +110,9 @@ fn every_package_program_and_test_that_a_page_has_cargo_run_is_there() {
             .windows(2)
             .filter(|pair| ["-p", "--bin", "--test", "--bench"].contains(&pair[0].as_str()))
         {
-            if !targets.contains(&(pair[0].clone(), pair[1].clone())) {
+            // `‹name›` stands for any of them.
+            if !pair[1].starts_with('‹') && !targets.contains(&(pair[0].clone(), pair[1].clone()))
+            {
                 wrong.push(format!("{}: no {}", it.place, pair[1]));
             }
         }
