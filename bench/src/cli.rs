@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use dynocar::cli::parse;
 use dynocar::output::{tell, write_file};
 use serde::Serialize;
@@ -102,6 +102,11 @@ struct JudgedRow<'a> {
 
 /// Seeded runs of a quick check.
 const QUICK_SEEDS: usize = 8;
+
+/// The command line of `dynocar-bench`.
+pub fn command() -> clap::Command {
+    Arguments::command()
+}
 
 /// Parses the command line, runs the command, reports a failure on standard error.
 pub fn main() -> ExitCode {
