@@ -12,7 +12,8 @@ use super::pressure::ReleasedPressure;
 use super::rows::{Parameters, Row, Rows};
 use super::settings::MonitorSettings;
 use super::suspects::{
-    BANK, BASE, COVARIATES, CURVE, DAY_WIND, FIRST_ONSET, LOAD, ONSETS, SUSPECTS, WARMING, suspect_of,
+    BANK, BASE, COVARIATES, CURVE, DAY_WIND, FIRST_ONSET, LOAD, ONSETS, SUSPECTS, WARMING,
+    suspect_of,
 };
 use super::verdict::{Evidence, Verdict};
 use super::wheel_scale::WheelScale;
@@ -22,8 +23,8 @@ use crate::pipeline::motion::{STANDING_MPS, SpeedRange};
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::resistance::momentum::MomentumBlocks;
 use crate::pipeline::resistance::regression::{
-    BRAKE_SCALE, FORCE_DELAY, MomentumBlock, PARAMETERS as DAVIS, TRACTION_SCALE, UNKNOWNS,
-    SPEED_SCALE_MPS, regressors, scaled, unscaling,
+    BRAKE_SCALE, FORCE_DELAY, MomentumBlock, PARAMETERS as DAVIS, SPEED_SCALE_MPS, TRACTION_SCALE,
+    UNKNOWNS, regressors, scaled, unscaling,
 };
 use crate::pipeline::resistance::sample::UnitSample;
 use crate::pipeline::settings::SettingError;
@@ -262,7 +263,12 @@ impl ResidualMonitor {
     }
 
     /// Notes what the base model leaves at this place, unless another suspect explains it.
-    fn remember_place(&mut self, block: &MomentumBlock, units: &Parameters, sample: &ResolvedSample) {
+    fn remember_place(
+        &mut self,
+        block: &MomentumBlock,
+        units: &Parameters,
+        sample: &ResolvedSample,
+    ) {
         let before = self.last_block.replace((sample.position_m, block.momentum));
         let has_other_suspect = self.verdict.naming().named().is_some_and(|named| {
             use EffectKind::{DraggingBrake, GradientError, LocalResistance, Unknown};

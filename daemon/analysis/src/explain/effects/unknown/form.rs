@@ -159,7 +159,9 @@ impl Hypothesis for FormForce {
             factor.multiply(run.covariate(factor.of), n_per_kn, &mut slopes);
         }
         let away = run.smooth_mps.iter().zip(run.covariate(Covariate::Speed));
-        for ((n_per_kn, slope), (smooth_mps, speed_mps)) in n_per_kn.iter_mut().zip(slopes).zip(away) {
+        for ((n_per_kn, slope), (smooth_mps, speed_mps)) in
+            n_per_kn.iter_mut().zip(slopes).zip(away)
+        {
             *n_per_kn += slope * (smooth_mps - speed_mps);
         }
     }
