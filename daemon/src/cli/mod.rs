@@ -134,7 +134,7 @@ pub fn commands() -> clap::Command {
 
 /// Parses the command line, runs the command, reports a failure on standard error.
 pub fn main() -> ExitCode {
-    let arguments = match parse_by::<Arguments>(command(), "dynocar") {
+    let arguments = match parse_by::<Arguments>(commands(), "dynocar") {
         Ok(arguments) => arguments,
         Err(status) => return status,
     };
