@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use dynocar_core::filter::random::Random;
-use dynocar_core::pipeline::mass::MassKalmanSettings;
-use dynocar_core::pipeline::mass::bias_bank::{
+use dynocar_core::pipeline::papers::wang::MassKalmanSettings;
+use dynocar_core::pipeline::papers::wang::bias_bank::{
     BIAS, BiasBank, Dynamics, INVERSE_MASS, MODELS, SPEED,
 };
-use dynocar_core::pipeline::mass::bias_model::BiasModel;
-use dynocar_core::pipeline::mass::inertia::Inertia;
-use dynocar_core::pipeline::mass::line_resistance::LineResistance;
-use dynocar_core::pipeline::mass::motion::Motion;
+use dynocar_core::pipeline::papers::wang::bias_model::BiasModel;
+use dynocar_core::pipeline::papers::wang::inertia::Inertia;
+use dynocar_core::pipeline::papers::wang::line_resistance::LineResistance;
+use dynocar_core::pipeline::papers::wang::motion::Motion;
 use dynocar_core::simulate::motion as simulate;
 use dynocar_core::train::TrainModel;
 use nalgebra::{Matrix3, RowVector3, Vector3};

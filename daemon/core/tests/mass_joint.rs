@@ -3,8 +3,8 @@
 mod mass_common;
 
 use dynocar_core::force::ResolvedSample;
-use dynocar_core::pipeline::mass::section::Section;
-use dynocar_core::pipeline::mass::{JointLeastSquares, JointLeastSquaresSettings};
+use dynocar_core::pipeline::papers::wang::section::Section;
+use dynocar_core::pipeline::papers::wang::{JointLeastSquares, JointLeastSquaresSettings};
 use dynocar_core::pipeline::{Estimator, EstimatorSettings, Outcome};
 use dynocar_core::train::{Davis, TrainModel};
 use dynocar_shared::{Manoeuvre, Parameter, PipelineKind, Reason, RejectionReason, Status};

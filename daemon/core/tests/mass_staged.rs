@@ -5,7 +5,7 @@ mod mass_common;
 use std::sync::Arc;
 
 use dynocar_core::force::ResolvedSample;
-use dynocar_core::pipeline::mass::line_resistance::LineResistance;
+use dynocar_core::pipeline::papers::wang::line_resistance::LineResistance;
 use dynocar_core::pipeline::papers::wang::{MassRegression, StagedDescent, StagedDescentSettings};
 use dynocar_core::pipeline::{Estimator, EstimatorSettings};
 use dynocar_core::train::{Davis, TrainModel};

@@ -1,8 +1,8 @@
 //! The rides: crossings of the line, the leg on which masses are learned, and the estimators that
 //! learn them.
 
-use dynocar_core::pipeline::mass::line_resistance::LineResistance;
-use dynocar_core::pipeline::mass::{MassKalman, MassKalmanSettings};
+use dynocar_core::pipeline::papers::wang::line_resistance::LineResistance;
+use dynocar_core::pipeline::papers::wang::{MassKalman, MassKalmanSettings};
 use dynocar_core::pipeline::papers::wang::{MassRegression, StagedDescent, StagedDescentSettings};
 
 use super::driver::{Driver, LimitDriver};

@@ -2,8 +2,8 @@
 
 use dynocar_core::force::ResolvedSample;
 use dynocar_core::pipeline::Estimator;
-use dynocar_core::pipeline::mass::line_resistance::LineResistance;
 use dynocar_core::pipeline::papers::wang::MassRegression;
+use dynocar_core::pipeline::papers::wang::line_resistance::LineResistance;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

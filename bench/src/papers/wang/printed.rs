@@ -1,8 +1,8 @@
 //! The descent as Wang 2022 prints it: raw features, one step a sample, learning rate 1e-7.
 
 use dynocar_core::force::ResolvedSample;
-use dynocar_core::pipeline::mass::motion::Motion;
-use dynocar_core::pipeline::mass::section::Section;
+use dynocar_core::pipeline::papers::wang::motion::Motion;
+use dynocar_core::pipeline::papers::wang::section::Section;
 use dynocar_core::train::TrainModel;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use nalgebra::Vector3;

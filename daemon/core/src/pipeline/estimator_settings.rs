@@ -11,9 +11,11 @@ use super::Estimator;
 use super::braking::intake::Quantity;
 use super::braking::settings::{EkfSettings, EmSettings, LawSettings, SmootherSettings};
 use super::echo::Echo;
-use super::mass::{JointLeastSquares, JointLeastSquaresSettings, MassKalman, MassKalmanSettings};
 use super::monitor::{MonitorSettings, ResidualMonitor};
-use super::papers::wang::{StagedDescent, StagedDescentSettings};
+use super::papers::wang::{
+    JointLeastSquares, JointLeastSquaresSettings, MassKalman, MassKalmanSettings, StagedDescent,
+    StagedDescentSettings,
+};
 use super::papers::xia::newton::TrajectoryNewton;
 use super::papers::xia::newton_settings::TrajectoryNewtonSettings;
 use super::resistance;

@@ -10,7 +10,6 @@ mod estimator;
 mod estimator_settings;
 pub mod judge;
 mod kept;
-pub mod mass;
 pub mod monitor;
 pub mod motion;
 pub mod output;

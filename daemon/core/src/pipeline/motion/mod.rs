@@ -6,6 +6,7 @@
 //! - [`Rounding`], [`SpeedNoise`]: the steps that a speed is told in, and its noise
 //! - [`PositionNoise`]: the noise of a measured position
 //! - [`SpeedRange`]: the speeds driven
+//! - [`StopWatch`]: when the mass may have changed
 
 mod missed;
 mod outlier;
@@ -13,6 +14,7 @@ mod position_noise;
 mod rounding;
 mod speed_noise;
 mod speed_range;
+mod stop_watch;
 
 pub use missed::{jump_variance, kink_variance};
 pub use outlier::{OutlierRow, Trust};
@@ -20,6 +22,7 @@ pub use position_noise::PositionNoise;
 pub use rounding::Rounding;
 pub use speed_noise::SpeedNoise;
 pub use speed_range::SpeedRange;
+pub use stop_watch::StopWatch;
 
 /// Speed in m/s up to which a train counts as standing; below it a wheel sensor sees nothing.
 pub const STANDING_MPS: f64 = 0.3;

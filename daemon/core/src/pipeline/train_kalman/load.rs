@@ -1,7 +1,7 @@
 //! What is known of the load, and when it may have become another one.
 
 use crate::force::ResolvedSample;
-use crate::pipeline::mass::motion::StopWatch;
+use crate::pipeline::motion::StopWatch;
 
 use super::settings::TrainKalmanSettings;
 

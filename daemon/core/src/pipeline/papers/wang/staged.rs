@@ -7,15 +7,16 @@ use dynocar_shared::{Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Reas
 use nalgebra::{Matrix4, SVector, Vector4};
 
 use super::descent::MeanSquare;
+use super::inertia::Inertia;
+use super::line_resistance::LineResistance;
+use super::motion::Motion;
+use super::section::Section;
+use super::speed_basis::SpeedBasis;
 use super::staged_settings::{MassRegression, StagedDescentSettings};
 use crate::force::ResolvedSample;
 use crate::pipeline::judge::{Case, InputHealth};
-use crate::pipeline::mass::inertia::Inertia;
-use crate::pipeline::mass::line_resistance::LineResistance;
-use crate::pipeline::mass::motion::{Motion, StopWatch};
-use crate::pipeline::mass::section::Section;
-use crate::pipeline::mass::speed_basis::SpeedBasis;
 use crate::pipeline::motion::SpeedRange;
+use crate::pipeline::motion::StopWatch;
 use crate::pipeline::output::{write_parameters, write_status};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, Outcome};

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use crate::pipeline::mass::line_resistance::DEFAULT_REFERENCE_RADIUS_M;
+use super::line_resistance::DEFAULT_REFERENCE_RADIUS_M;
 use crate::pipeline::motion::MOVING_MPS;
 use crate::pipeline::settings::settings;
 

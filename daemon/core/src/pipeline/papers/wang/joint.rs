@@ -10,13 +10,15 @@ use super::hypothesis::{Hypothesis, Step};
 use super::integrals::{INVERSE_MASS, Integrals, POLYNOMIALS, Regressors, Row, UNKNOWNS};
 use super::joint_settings::{JOINT_MODELS, JointLeastSquaresSettings};
 use super::line_resistance::LineResistance;
-use super::motion::{Motion, StopWatch};
+use super::motion::Motion;
 use super::section::Section;
 use crate::filter::bank::{Bank, Nats};
 use crate::filter::drifting_level::BIAS;
 use crate::force::ResolvedSample;
 use crate::pipeline::judge::{InputHealth, LackOfFit};
-use crate::pipeline::motion::{OutlierRow, SpeedNoise, SpeedRange, Trust, kink_variance};
+use crate::pipeline::motion::{
+    OutlierRow, SpeedNoise, SpeedRange, StopWatch, Trust, kink_variance,
+};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 use crate::train::{Davis, TrainModel};
