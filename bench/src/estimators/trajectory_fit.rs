@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use dynocar_core::filter::random::Random;
 use dynocar_core::force::balance::mps2_per_n_per_kn;
-use dynocar_core::pipeline::trajectory::fit::{
+use dynocar_core::pipeline::papers::xia::trajectory::fit::{
     DavisPrior, FitSettings, Stretch, TrajectoryFit, TrajectoryFitter,
 };
-use dynocar_core::pipeline::trajectory::step::{Step, StepRule};
+use dynocar_core::pipeline::papers::xia::trajectory::step::{Step, StepRule};
 use dynocar_core::train::Davis;
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::Vector3;

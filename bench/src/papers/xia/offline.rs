@@ -4,13 +4,13 @@ use dynocar_core::filter::levenberg_marquardt::{
     LeastSquares, Linearisation, ParameterBox, SolverSettings, minimise,
 };
 use dynocar_core::filter::triangular::{TriangularAccumulator, TriangularSystem};
+use dynocar_core::pipeline::papers::xia::trajectory::fit::{
+    FitSettings, Stretch, TrajectoryFit, TrajectoryFitter,
+};
+use dynocar_core::pipeline::papers::xia::trajectory::step::StepRule;
 use dynocar_core::pipeline::papers::xia::wolfe_newton::{
     NewtonResult, NewtonSettings, RestartSource, Restarts, wolfe_newton,
 };
-use dynocar_core::pipeline::trajectory::fit::{
-    FitSettings, Stretch, TrajectoryFit, TrajectoryFitter,
-};
-use dynocar_core::pipeline::trajectory::step::StepRule;
 use dynocar_core::train::Davis;
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};

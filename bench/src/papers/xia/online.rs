@@ -6,14 +6,14 @@
 
 use dynocar_core::filter::levenberg_marquardt::ParameterBox;
 use dynocar_core::force::balance::mps2_per_n_per_kn;
+use dynocar_core::pipeline::papers::xia::trajectory::bank::JumpModel;
+use dynocar_core::pipeline::papers::xia::trajectory::hypothesis::{Hypothesis, OutlierModel};
+use dynocar_core::pipeline::papers::xia::trajectory::noise::{LearnedNoise, NoiseModel};
+use dynocar_core::pipeline::papers::xia::trajectory::online::{OnlineFilter, OnlineSettings};
+use dynocar_core::pipeline::papers::xia::trajectory::step::StepRule;
 use dynocar_core::pipeline::papers::xia::wolfe_newton::{
     NewtonSettings, RestartSource, wolfe_newton,
 };
-use dynocar_core::pipeline::trajectory::bank::JumpModel;
-use dynocar_core::pipeline::trajectory::hypothesis::{Hypothesis, OutlierModel};
-use dynocar_core::pipeline::trajectory::noise::{LearnedNoise, NoiseModel};
-use dynocar_core::pipeline::trajectory::online::{OnlineFilter, OnlineSettings};
-use dynocar_core::pipeline::trajectory::step::StepRule;
 use dynocar_core::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 use rand::SeedableRng;

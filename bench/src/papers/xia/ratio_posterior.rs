@@ -6,7 +6,7 @@
 //! no disturbance at all is far too sure. The covariance is therefore averaged over the ratios by
 //! their restricted likelihood, every decade being as likely beforehand.
 
-use dynocar_core::pipeline::trajectory::fit::{
+use dynocar_core::pipeline::papers::xia::trajectory::fit::{
     FitError, FitSettings, Stretch, TrajectoryFit, TrajectoryFitter,
 };
 use dynocar_core::train::Davis;
@@ -176,7 +176,7 @@ impl RatioPosterior {
 mod tests {
     use dynocar_core::filter::levenberg_marquardt::ParameterBox;
     use dynocar_core::force::balance::mps2_per_n_per_kn;
-    use dynocar_core::pipeline::trajectory::step::{Step, StepRule};
+    use dynocar_core::pipeline::papers::xia::trajectory::step::{Step, StepRule};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 

@@ -5,7 +5,7 @@
 //! just that). The truth moves by eq. 7, as the paper's own data do (mean squares of 1e-9).
 
 use dynocar_core::force::balance::mps2_per_n_per_kn;
-use dynocar_core::pipeline::trajectory::step::Step;
+use dynocar_core::pipeline::papers::xia::trajectory::step::Step;
 use dynocar_core::track::{Curve, Track};
 use dynocar_core::train::Davis;
 use rand::{RngExt, SeedableRng};

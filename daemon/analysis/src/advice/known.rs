@@ -3,7 +3,7 @@
 use dynocar_shared::ParameterSnapshot;
 use nalgebra::Matrix3;
 
-use dynocar_core::pipeline::trajectory::index::DAVIS;
+use dynocar_core::pipeline::papers::xia::trajectory::index::DAVIS;
 use dynocar_core::train::Davis;
 
 /// Coefficients and their covariance out of a snapshot that has all three.

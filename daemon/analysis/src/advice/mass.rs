@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use dynocar_core::force::balance::mps2_per_n_per_kn;
 use dynocar_core::pipeline::papers::wang::{MassKalman, MassKalmanSettings};
-use dynocar_core::pipeline::trajectory::step::{Step, StepRule};
+use dynocar_core::pipeline::papers::xia::trajectory::step::{Step, StepRule};
 use dynocar_core::pipeline::{KeptEstimate, Pipeline};
 use dynocar_core::train::{Davis, TrainModel};
 use dynocar_shared::{Parameter, ParameterSnapshot, SampleField, TrainId, TrainSample};

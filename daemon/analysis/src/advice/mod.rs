@@ -16,7 +16,7 @@ use dynocar_shared::{Parameter, ParameterSnapshot};
 use nalgebra::Vector3;
 
 use drive::{DriveKind, Scene};
-use dynocar_core::pipeline::trajectory::index::DAVIS;
+use dynocar_core::pipeline::papers::xia::trajectory::index::DAVIS;
 use dynocar_core::train::TrainModel;
 use known::davis_of;
 use noise::Noise;

@@ -7,11 +7,11 @@
 //! published covariance, gives d, with all that widens the published covariance in it. The noise of
 //! the measured speed follows from the deviation of the unexplained force.
 
+use dynocar_core::pipeline::papers::xia::trajectory::index::A;
+use dynocar_core::pipeline::papers::xia::trajectory::kalman::TrajectoryKalmanSettings;
+use dynocar_core::pipeline::papers::xia::trajectory::quality::prior_std;
+use dynocar_core::pipeline::papers::xia::trajectory::unexplained::speed_noise_mps;
 use dynocar_core::pipeline::train_kalman::TrainKalmanSettings;
-use dynocar_core::pipeline::trajectory::index::A;
-use dynocar_core::pipeline::trajectory::kalman::TrajectoryKalmanSettings;
-use dynocar_core::pipeline::trajectory::quality::prior_std;
-use dynocar_core::pipeline::trajectory::unexplained::speed_noise_mps;
 use dynocar_core::train::TrainModel;
 use dynocar_shared::{ParameterSnapshot, PipelineKind};
 use nalgebra::Vector3;
@@ -158,7 +158,7 @@ fn median(values: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use dynocar_core::pipeline::output::write_parameters;
-    use dynocar_core::pipeline::trajectory::index::DAVIS;
+    use dynocar_core::pipeline::papers::xia::trajectory::index::DAVIS;
     use dynocar_core::train::Davis;
     use nalgebra::{Matrix3, Vector3};
 

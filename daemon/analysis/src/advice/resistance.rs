@@ -5,11 +5,11 @@
 //! covariance, with the present noise, measuring just what it expects.
 
 use dynocar_core::force::balance::mps2_per_n_per_kn;
-use dynocar_core::pipeline::trajectory::hypothesis::Hypothesis;
-use dynocar_core::pipeline::trajectory::index::SPEED;
-use dynocar_core::pipeline::trajectory::noise::{LearnedNoise, NoiseModel};
-use dynocar_core::pipeline::trajectory::online::OUTLIERS;
-use dynocar_core::pipeline::trajectory::step::{Step, StepRule};
+use dynocar_core::pipeline::papers::xia::trajectory::hypothesis::Hypothesis;
+use dynocar_core::pipeline::papers::xia::trajectory::index::SPEED;
+use dynocar_core::pipeline::papers::xia::trajectory::noise::{LearnedNoise, NoiseModel};
+use dynocar_core::pipeline::papers::xia::trajectory::online::OUTLIERS;
+use dynocar_core::pipeline::papers::xia::trajectory::step::{Step, StepRule};
 use nalgebra::{Matrix3, Vector3};
 
 use super::drive::{Drive, Scene};

@@ -18,11 +18,11 @@ use super::papers::wang::{
 };
 use super::papers::xia::newton::TrajectoryNewton;
 use super::papers::xia::newton_settings::TrajectoryNewtonSettings;
+use super::papers::xia::trajectory::kalman::TrajectoryKalmanSettings;
 use super::resistance;
 use super::resistance::settings::{KalmanSettings, LsSettings, MilsSettings, RlsSettings};
 use super::settings::SettingError;
 use super::train_kalman::{TrainKalman, TrainKalmanSettings};
-use super::trajectory::kalman::TrajectoryKalmanSettings;
 use crate::train::TrainModel;
 
 /// The settings of a kind without settings.

@@ -19,7 +19,6 @@ pub mod resistance;
 pub mod sample_gate;
 pub mod settings;
 pub mod train_kalman;
-pub mod trajectory;
 mod usable;
 
 pub use echo::Echo;

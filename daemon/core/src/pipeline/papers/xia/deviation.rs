@@ -10,7 +10,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::pipeline::trajectory::step::{Step, StepRule};
+use crate::pipeline::papers::xia::trajectory::step::{Step, StepRule};
 use crate::train::Davis;
 
 /// f(θ) of eq. 8 with derivatives with respect to (a, b, c).

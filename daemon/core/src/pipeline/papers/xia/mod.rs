@@ -3,9 +3,11 @@
 //! - [`deviation`], [`wolfe_newton`]: the paper's method, with its formulas corrected
 //! - [`window`]: even distances from samples in time
 //! - [`newton`]: the pipeline, with the paper's search or with ours
+//! - [`trajectory`]: ours, over windows and sample by sample
 
 pub mod deviation;
 pub mod newton;
 pub mod newton_settings;
+pub mod trajectory;
 pub mod window;
 pub mod wolfe_newton;

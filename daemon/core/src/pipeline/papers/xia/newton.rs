@@ -11,15 +11,17 @@ use crate::force::ResolvedSample;
 use crate::pipeline::judge::InputHealth;
 use crate::pipeline::motion::SpeedRange;
 use crate::pipeline::output::write_parameters;
+use crate::pipeline::papers::xia::trajectory::fit::{
+    FitError, FitSettings, TrajectoryFit, TrajectoryFitter,
+};
+use crate::pipeline::papers::xia::trajectory::index::DAVIS;
+use crate::pipeline::papers::xia::trajectory::long_run::LongRunVariance;
+use crate::pipeline::papers::xia::trajectory::motion::{Motion, MotionTracker};
+use crate::pipeline::papers::xia::trajectory::quality::Estimate;
+use crate::pipeline::papers::xia::trajectory::step::StepRule;
+use crate::pipeline::papers::xia::trajectory::unexplained::UnexplainedForce;
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::SettingError;
-use crate::pipeline::trajectory::fit::{FitError, FitSettings, TrajectoryFit, TrajectoryFitter};
-use crate::pipeline::trajectory::index::DAVIS;
-use crate::pipeline::trajectory::long_run::LongRunVariance;
-use crate::pipeline::trajectory::motion::{Motion, MotionTracker};
-use crate::pipeline::trajectory::quality::Estimate;
-use crate::pipeline::trajectory::step::StepRule;
-use crate::pipeline::trajectory::unexplained::UnexplainedForce;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 use crate::train::{Davis, TrainModel};
 

@@ -5,9 +5,9 @@ use serde::Deserialize;
 
 use crate::filter::levenberg_marquardt::ParameterBox;
 use crate::force::balance::mps2_per_n_per_kn;
+use crate::pipeline::papers::xia::trajectory::fit::DavisPrior;
+use crate::pipeline::papers::xia::trajectory::quality::prior_std;
 use crate::pipeline::settings::{SettingError, require, settings};
-use crate::pipeline::trajectory::fit::DavisPrior;
-use crate::pipeline::trajectory::quality::prior_std;
 use crate::train::TrainModel;
 
 /// Speed noise before the first window, in m/s.

@@ -1,9 +1,9 @@
 //! The sliding window of Xia 2023: points at even distances, steps between them.
 
 use crate::pipeline::motion::jump_variance;
-use crate::pipeline::trajectory::fit::Stretch;
-use crate::pipeline::trajectory::motion::MotionStep;
-use crate::pipeline::trajectory::step::{Step, StepRule};
+use crate::pipeline::papers::xia::trajectory::fit::Stretch;
+use crate::pipeline::papers::xia::trajectory::motion::MotionStep;
+use crate::pipeline::papers::xia::trajectory::step::{Step, StepRule};
 
 /// The newest steps of unbroken motion, each about as long as the sampling distance.
 ///

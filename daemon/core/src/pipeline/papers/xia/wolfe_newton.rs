@@ -1,6 +1,6 @@
 //! Newton's method with Wolfe steps at the bounds and random restarts: Algorithm 1 of Xia 2023.
 //!
-//! Kept faithful, weaknesses included, as the yardstick for [`crate::pipeline::trajectory::fit`]: the Hessian is
+//! Kept faithful, weaknesses included, as the yardstick for [`crate::pipeline::papers::xia::trajectory::fit`]: the Hessian is
 //! positive definite at none (cruise) to a fifth (full speed profile) of random parameters, so
 //! that eq. 10 often climbs; v_0 is the first measured speed with its noise; restarts are a
 //! lottery. Where the paper leaves things open:
@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 
 use super::deviation::{Deviation, deviation};
 use crate::filter::levenberg_marquardt::ParameterBox;
-use crate::pipeline::trajectory::step::Step;
+use crate::pipeline::papers::xia::trajectory::step::Step;
 use crate::train::Davis;
 
 /// When Algorithm 1 draws new parameters at random.
@@ -214,7 +214,7 @@ fn newton_step(
 mod tests {
     use super::*;
     use crate::force::balance::mps2_per_n_per_kn;
-    use crate::pipeline::trajectory::step::StepRule;
+    use crate::pipeline::papers::xia::trajectory::step::StepRule;
 
     const TRUTH: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
 

@@ -1,5 +1,5 @@
 //! Davis coefficients by fitting a computed speed trajectory to the measured one; the paper's method is in
-//! [`super::papers::xia`].
+//! [`super`].
 //!
 //! - [`step`]: how a train moves over one step, with derivatives
 //! - [`motion`]: from resolved samples to steps
