@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use dynocar::cli::parse;
 use dynocar::output::{tell, write_file};
 use serde::Serialize;
 
+use crate::drive::command::{DriveArguments, drive};
 use crate::estimators::measure::Effort;
 use crate::estimators::{self, beside, report};
 use crate::explain::command::{ExplainArguments, explain};
@@ -30,6 +31,7 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Drive(DriveArguments),
     Estimators(EstimatorsArguments),
     Explain(ExplainArguments),
     Latency(LatencyArguments),
@@ -101,6 +103,11 @@ struct JudgedRow<'a> {
 /// Seeded runs of a quick check.
 const QUICK_SEEDS: usize = 8;
 
+/// The command line of `dynocar-bench`.
+pub fn command() -> clap::Command {
+    Arguments::command()
+}
+
 /// Parses the command line, runs the command, reports a failure on standard error.
 pub fn main() -> ExitCode {
     let arguments = match parse::<Arguments>("dynocar-bench") {
@@ -108,6 +115,7 @@ pub fn main() -> ExitCode {
         Err(status) => return status,
     };
     let result = match &arguments.command {
+        Command::Drive(arguments) => drive(arguments),
         Command::Estimators(arguments) => estimators(arguments),
         Command::Explain(arguments) => explain(arguments),
         Command::Latency(arguments) => latency(arguments),

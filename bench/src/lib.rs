@@ -1,6 +1,7 @@
 //! The measurements behind every figure that Dynocar's documents state.
 //!
 //! - [`cli`]: the commands of `dynocar-bench`
+//! - [`drive`]: what an automatic driver gains
 //! - [`estimators`]: speed of every estimator beside peers
 //! - [`explain`]: the search for undeclared effects on simulated datasets
 //! - [`latency`]: sample → snapshot through real processes, beside the floor and alternatives
@@ -14,6 +15,7 @@
 //! - [`survey`](mod@survey): how the work of a survey grows with passes
 
 pub mod cli;
+pub mod drive;
 pub mod estimators;
 pub mod explain;
 pub mod latency;

@@ -55,6 +55,12 @@ static void listen_to(dynocar_reader *reader)
     }
 }
 
+/* The law behind DYNOCAR_RAIL_WET_LAW. */
+static double wet_adhesion(double speed_mps)
+{
+    return 0.04 + 13.7 / (120.0 + 3.6 * speed_mps);
+}
+
 static dynocar_stop built_in_stop(double speed_mps)
 {
     dynocar_stop stop;
@@ -98,9 +104,11 @@ static void take_what_is_learned(dynocar_reader *reader, dynocar_stop *stop)
     if (learned(reader, DYNOCAR_QUANTITY_ADHESION, &reading)
         && dynocar_snapshot_value(snapshot, DYNOCAR_PARAMETER_ADHESION, &value, &std)
                == DYNOCAR_OK) {
-        stop->rail = DYNOCAR_RAIL_COEFFICIENT;
-        stop->adhesion = value;
-        stop->adhesion_std = std;
+        /* The rail carries less at this speed than where the last braking ended: along the wet law. */
+        double there = wet_adhesion(snapshot->speed_min_mps);
+        stop->rail = DYNOCAR_RAIL_WET_LAW;
+        stop->adhesion = value / there;
+        stop->adhesion_std = std / there;
     }
 }
 

@@ -64,10 +64,11 @@ fn stop(reader: &SnapshotReader, speed_mps: f64) -> Stop<'static> {
         let share = 1.0 / DECLARED_FRICTION;
         stop.brake_scale = Uncertain::new(share * friction.value, share * friction.std);
     }
+    // The rail carries less at this speed than where the last braking ended.
     if let Some(snapshot) = learned(reader, Quantity::Adhesion)
-        && let Some(adhesion) = value_of(snapshot, Parameter::Adhesion)
+        && let Some(adhesion) = RailAdhesion::learned(snapshot)
     {
-        stop.adhesion = RailAdhesion::Coefficient(adhesion);
+        stop.adhesion = adhesion;
     }
     stop
 }

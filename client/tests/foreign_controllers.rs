@@ -213,3 +213,25 @@ fn the_stopping_examples_in_c_and_rust_say_the_same() {
     assert_eq!(from_mps, 40.0);
     assert!(distance_m > 500.0 && bound_m > distance_m && bound_s > time_s, "{}", said[0]);
 }
+
+/// With nobody on the channel both drive by their built-in values, and both come late: their train is
+/// heavier than that.
+#[test]
+fn the_driver_examples_in_c_and_rust_drive_the_same() {
+    let directory = tempfile::tempdir().unwrap();
+    let daemon = PlayedDaemon::start();
+    let in_c = c_program(&example("driver.c"), Link::Static, &directory);
+    let in_rust = Command::new(library_directory().join("../examples/driver"));
+    let said = [in_c, in_rust].map(|mut program| {
+        program.env(ROOT_VARIABLE, daemon.root()).args([TRAIN.to_string(), "2".into()]);
+        support::must_succeed(&mut program)
+    });
+    assert_eq!(said[0], said[1]);
+    let lines: Vec<&str> = said[0].lines().collect();
+    assert_eq!(lines.len(), 2, "{}", said[0]);
+    for (line, way) in lines.iter().zip(1..) {
+        let late = line.strip_prefix(&format!("way {way}: +")).unwrap_or_else(|| panic!("{line}"));
+        let late_s: f64 = late.split(' ').next().unwrap().parse().unwrap();
+        assert!(late_s > 10.0 && line.ends_with("by the built-in parameters (1799 t)"), "{line}");
+    }
+}

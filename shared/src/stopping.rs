@@ -8,6 +8,8 @@
 use crate::adhesion::{RailCondition, Uncertain};
 use crate::quantile::normal_quantile;
 use crate::resistance::STANDARD_GRAVITY_MPS2;
+use crate::snapshot::ParameterSnapshot;
+use crate::vocabulary::Parameter;
 
 /// A point of a brake-effort curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,6 +30,25 @@ pub enum RailAdhesion {
     Coefficient(Uncertain),
     /// A known law times a scale.
     Law(RailCondition, Uncertain),
+}
+
+impl RailAdhesion {
+    /// The rail of a snapshot that gives `adhesion`; of a lower bound, and without a speed, none.
+    ///
+    /// The coefficient is that of the speed at which the braking was last seen, which is its lowest, and a
+    /// rail carries less at higher speeds. So it is taken along the wet law, the steeper of the two: a
+    /// stop from a higher speed is not reckoned with what the rail carried at the end of the last one.
+    pub fn learned(snapshot: &ParameterSnapshot) -> Option<Self> {
+        let value = snapshot.value(Parameter::Adhesion)?;
+        let std = snapshot.std(Parameter::Adhesion)?;
+        let speed_mps = snapshot.speed_min_mps;
+        if !(speed_mps.is_finite() && speed_mps >= 0.0) {
+            return None;
+        }
+        let share = 1.0 / RailCondition::Wet.adhesion(speed_mps);
+        let scale = Uncertain::new(share * value, share * std);
+        Some(RailAdhesion::Law(RailCondition::Wet, scale))
+    }
 }
 
 /// The stop that is asked about.

@@ -1,8 +1,10 @@
 //! Stopping distances against closed forms, the papers' figures and sampled stops.
 
 use dynocar_shared::quantile::normal_quantile;
+use dynocar_shared::snapshot::packed_index;
 use dynocar_shared::{
-    EffortPoint, RailAdhesion, RailCondition, Stop, StoppingError, StoppingEstimate, Uncertain,
+    EffortPoint, Parameter, ParameterSnapshot, RailAdhesion, RailCondition, Stop, StoppingError,
+    StoppingEstimate, Uncertain,
 };
 
 const NO_RESISTANCE: [f64; 3] = [0.0, 0.0, 0.0];
@@ -172,4 +174,34 @@ fn a_train_that_does_not_slow_down_has_no_stopping_distance() {
         error.to_string(),
         "the train does not slow down at 0 m/s at the edge of the confidence bound"
     );
+}
+
+#[test]
+fn adhesion_learned_at_the_end_of_a_braking_does_not_shorten_the_next_one_from_full_speed() {
+    let (law, share) = (RailCondition::Wet, 0.7);
+    let end_mps = 4.0;
+    let mut snapshot = ParameterSnapshot::empty();
+    snapshot.parameter_count = 1;
+    snapshot.parameters[0] = Parameter::Adhesion as u32;
+    snapshot.values[0] = share * law.adhesion(end_mps);
+    snapshot.covariance[packed_index(0, 0)] = 1e-6;
+    snapshot.speed_min_mps = end_mps;
+    let effort = constant(1e9);
+    let from = |adhesion: RailAdhesion| {
+        let stop = Stop { adhesion, ..Stop::level(40.0, 1e5, NO_RESISTANCE, &effort) };
+        stop.estimate(0.99).unwrap()
+    };
+    let truth = from(RailAdhesion::Law(law, Uncertain::exact(share)));
+    let learned = from(RailAdhesion::learned(&snapshot).unwrap());
+    assert!((learned.distance_m / truth.distance_m - 1.0).abs() < 1e-9, "{learned:?} {truth:?}");
+    assert!(learned.distance_bound_m > truth.distance_m);
+    // Read as one coefficient at all speeds it is a promise that the rail does not keep.
+    let naive = from(RailAdhesion::Coefficient(Uncertain::new(snapshot.values[0], 1e-3)));
+    assert!(naive.distance_bound_m < 0.85 * truth.distance_m, "{naive:?}");
+    // Along the wet law a dry rail carries less than it does.
+    snapshot.values[0] = RailCondition::Dry.adhesion(end_mps);
+    let dry = from(RailAdhesion::Law(RailCondition::Dry, Uncertain::exact(1.0)));
+    assert!(from(RailAdhesion::learned(&snapshot).unwrap()).distance_m > dry.distance_m);
+    snapshot.parameters[0] = Parameter::AdhesionLowerBound as u32;
+    assert_eq!(RailAdhesion::learned(&snapshot), None);
 }

@@ -173,10 +173,8 @@ fn completions_and_manual_tell_of_every_command() {
     let help = done(&site, &["--help"]);
     let commands: Vec<&str> = help
         .lines()
-        .skip_while(|line| *line != "Commands:")
-        .skip(1)
-        .map_while(|line| line.strip_prefix("  ")?.split(' ').next())
-        .filter(|name| !name.is_empty() && *name != "help")
+        .take_while(|line| *line != "Options:")
+        .filter_map(|line| line.strip_prefix("  ")?.split(' ').next())
         .collect();
     assert!(commands.len() > 10 && commands.contains(&"init"), "{help}");
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {

@@ -62,3 +62,24 @@ fn every_shipped_example_comes_to_a_usable_resistance_from_the_shipped_daemon() 
         assert!(is_answered, "{name} said {said:#?}; the daemon said:\n{}", daemon.errors());
     }
 }
+
+#[test]
+fn the_driver_example_keeps_the_timetable_once_the_shipped_daemon_has_learned() {
+    let site = Site::new();
+    let daemon = site.start(DYNOCAR, &["run", "--config", &shipped("config/daemon.toml")]);
+    daemon.await_error("serving");
+    let folder = tempfile::tempdir().expect("a folder for programs");
+    let program = folder.path().join("driver");
+    let source = support::client_directory().join("examples/driver.c");
+    support::build_c(&source, "c99", Link::Static, &program);
+    let mut command = Command::new(program);
+    command.env(ROOT_VARIABLE, site.host().root()).args(["1", "4"]);
+    let said = support::must_succeed(&mut command);
+    let late_s = |line: &str| -> f64 {
+        let words = line.split_once(": ").expect("a way").1;
+        words.split(' ').next().expect("a time").parse().expect("a number")
+    };
+    assert!(late_s(said.lines().next().expect("a way")) > 10.0, "{said}");
+    let is_learned = |line: &str| line.contains("by the daemon") && late_s(line).abs() < 5.0;
+    assert!(said.lines().any(is_learned), "{said}; the daemon said:\n{}", daemon.errors());
+}

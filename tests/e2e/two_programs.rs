@@ -26,16 +26,15 @@ fn words(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap()
 }
 
-/// The commands of a program with what its help says of each.
+/// The commands of a program with what its help says of each, whatever heading they stand under.
 fn commands(program: &str) -> Vec<(String, String)> {
     let help = words(&Command::new(program).arg("--help").output().unwrap().stdout);
-    let lines = help.lines().skip_while(|line| *line != "Commands:").skip(1);
-    let lines = lines.map_while(|line| line.strip_prefix("  "));
+    let is_name = |name: &str| name.starts_with(|letter: char| letter.is_ascii_lowercase());
     let split = |line: &str| {
-        let (name, about) = line.split_once(' ')?;
-        Some((name.to_owned(), about.trim().to_owned()))
+        let (name, about) = line.strip_prefix("  ")?.split_once("  ")?;
+        (is_name(name) && name != "help").then(|| (name.to_owned(), about.trim().to_owned()))
     };
-    lines.filter_map(split).filter(|(name, _)| name != "help").collect()
+    help.lines().filter_map(split).collect()
 }
 
 #[test]

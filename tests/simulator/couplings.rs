@@ -3,7 +3,9 @@
 use dynocar_analysis::explain::explain;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
-use dynocar_tests::simulator::{Effect, EffectRequest, SimulatorSettings, TrainType, simulate};
+use dynocar_tests::simulator::{
+    Deviations, Effect, EffectRequest, SimulatorSettings, TrainType, simulate,
+};
 
 /// Largest error of a gain as share of the force, as a root mean square.
 const ERROR_MAX: f64 = 0.005;
@@ -16,7 +18,7 @@ fn a_locomotive_that_leaps_ahead_of_its_wagons_does_not_pull_harder() {
         .map(|seed| {
             let simulated = simulate(&SimulatorSettings {
                 train_type: Some(TrainType::Freight),
-                has_couplings: true,
+                deviations: Deviations { has_couplings: true, ..Deviations::PLAIN },
                 ..SimulatorSettings::new(seed, EffectRequest::Kinds(vec![EffectKind::TractionGain]))
             });
             let [Effect::TractionGain { gain: truth }] = simulated.effects[..] else {

@@ -216,7 +216,7 @@ fn every_combination_of_two_kinds_can_be_simulated() {
 }
 
 #[test]
-fn hidden_variation_differs_from_run_to_run_and_stays_small() {
+fn what_nobody_declares_differs_from_run_to_run_and_stays_small() {
     let settings = SimulatorSettings {
         train_type: Some(TrainType::Regional),
         ..SimulatorSettings::new(SEED, EffectRequest::none())

@@ -3,6 +3,7 @@
 //! # Layout
 //!
 //! - [`browser`]: a headless browser that says what a page did
+//! - [`documents`]: the pages, their links and the commands that they show
 //! - [`fuzz`]: mutations of a corpus thrown at everything that reads foreign bytes
 //! - [`golden`]: what every estimator makes of the recorded runs, bit for bit
 //! - [`power_cut`]: a disk that loses what was not brought to it
@@ -13,6 +14,7 @@
 //! - [`sources`]: the project's own sources
 
 pub mod browser;
+pub mod documents;
 pub mod fuzz;
 pub mod golden;
 pub mod power_cut;

@@ -7,9 +7,10 @@ use dynocar_analysis::explain::{Explanation, explain};
 use dynocar_tests::simulator::dataset_writer::{
     dataset_files, read_files, write_dataset, write_truth,
 };
-use dynocar_tests::simulator::{SimulatedDataset, simulate};
+use dynocar_tests::simulator::{SimulatedDataset, SimulatorSettings, simulate};
 
 use super::scenario::Scenario;
+use super::world::World;
 
 /// What is simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,15 +19,19 @@ pub struct Case {
     pub scenario: Scenario,
     /// The seed.
     pub seed: u64,
-    /// Trains of cars on couplings, in a wind of each day that nobody declares.
-    pub is_coupled: bool,
+    /// The world it happens in.
+    pub world: World,
 }
 
 impl Case {
     /// Simulates the case.
     pub fn simulate(&self) -> SimulatedDataset {
-        let ordinary = self.scenario.settings(self.seed);
-        simulate(&if self.is_coupled { ordinary.coupled() } else { ordinary })
+        simulate(&self.settings())
+    }
+
+    /// What the simulator is asked for.
+    pub fn settings(&self) -> SimulatorSettings {
+        self.scenario.settings(self.seed, self.world)
     }
 
     /// Writes the dataset, with its truth beside it, as `<kind>-<seed>` into a folder.

@@ -7,6 +7,7 @@ use clap::Args;
 use super::case::Case;
 use super::grade::Grade;
 use super::scenario::Scenario;
+use super::world::World;
 use super::{growth, matrix};
 use crate::output::give;
 use dynocar_shared::vocabulary::EffectKind;
@@ -24,15 +25,15 @@ pub struct ExplainArguments {
     /// Only this kind, as tunnel_drag, or none, two_effects, poor_recording; may be repeated
     #[arg(long = "kind", value_name = "NAME")]
     kinds: Vec<String>,
-    /// Trains of cars on couplings instead of rigid ones, in a wind of each day that nobody declares
-    #[arg(long)]
-    coupled: bool,
+    /// What is a little wrong beside the effect
+    #[arg(long, value_enum, default_value_t = World::Plain)]
+    world: World,
     /// Datasets at a time
     #[arg(long, default_value_t = 2)]
     threads: usize,
     /// Instead of the matrix, the time for 1, 4 and 16 times the data: one dataset of each kind
     /// (none, tunnel_drag, dragging_brake and wind unless chosen) with more runs, then longer ones
-    #[arg(long, conflicts_with_all = ["seeds", "threads", "write", "verbose", "coupled"])]
+    #[arg(long, conflicts_with_all = ["seeds", "threads", "write", "verbose", "world"])]
     growth: bool,
     /// Tell the outcome of every dataset on standard error
     #[arg(long)]
@@ -71,10 +72,7 @@ pub fn explain(arguments: &ExplainArguments) -> Result<(), (String, u8)> {
         });
         return give(&arguments.json, &sizes, || growth::table(&sizes));
     }
-    let mut cases = matrix::cases(&scenarios, seeds, first);
-    for case in &mut cases {
-        case.is_coupled = arguments.coupled;
-    }
+    let cases = matrix::cases(&scenarios, seeds, first, arguments.world);
     if let Some(folder) = &arguments.write {
         for case in &cases {
             case.write(folder).map_err(|error| (format!("{}: {error}", folder.display()), 1))?;

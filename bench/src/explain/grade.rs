@@ -8,6 +8,7 @@ use dynocar_tests::simulator::{Effect, SimulatedDataset};
 use serde_json::Value;
 
 use super::attainable::attainable_mps;
+use super::case::Case;
 use super::place::{ends_within, place_iou};
 use super::scenario::Rival;
 
@@ -18,8 +19,11 @@ pub struct Grade {
     pub named: Vec<String>,
     /// The verdict in a word.
     pub verdict: String,
-    /// True when verdict and kinds are right.
+    /// True when verdict and kinds are right; where everything is a little wrong, small things that
+    /// are in the world may be named too.
     pub is_right: bool,
+    /// Kinds that are named and are not in the world.
+    pub invented: Vec<String>,
     /// Intersection over union of the places, where the effect has one.
     pub iou: Option<f64>,
     /// For every end of a place with a 95 % interval, whether that holds the true end.
@@ -56,27 +60,28 @@ impl ParameterGrade {
     }
 }
 
-/// Grades an explanation; `rival` is a kind that is hardly told from the one that acts.
-pub fn grade(
-    simulated: &SimulatedDataset,
-    rival: Option<Rival>,
-    explanation: &Explanation,
-) -> Grade {
+/// Grades the explanation of a case.
+pub fn grade(simulated: &SimulatedDataset, case: &Case, explanation: &Explanation) -> Grade {
     let answer = &explanation.answer;
     let named: Vec<String> = answer.effects.iter().map(|effect| effect.kind.into()).collect();
-    let mut expected: Vec<&str> =
-        simulated.effects.iter().map(|effect| effect.kind().name()).collect();
-    let mut found: Vec<&str> = named.iter().map(String::as_str).collect();
     let verdict = answer.verdict.name();
-    if let Some(rival) = rival.filter(|rival| rival.is_never_told || verdict == "ambiguous") {
-        expected.push(rival.kind.name());
-    }
+    let truth: Vec<&str> = simulated.effects.iter().map(|effect| effect.kind().name()).collect();
+    let mut found: Vec<&str> = named.iter().map(String::as_str).collect();
     found.extend(&answer.ambiguous_with);
-    expected.sort_unstable();
-    found.sort_unstable();
-    let right =
-        if expected.len() > simulated.effects.len() { "ambiguous" } else { simulated.verdict() };
-    let is_right = verdict == right && (right == "unknown" || expected == found);
+    let everyday: Vec<&str> = case.world.everyday().iter().map(|kind| kind.name()).collect();
+    let rival = case.scenario.rival();
+    let invented: Vec<String> = found
+        .iter()
+        .filter(|kind| !truth.contains(kind) && !everyday.contains(kind))
+        .filter(|kind| rival.is_none_or(|rival| rival.kind.name() != **kind))
+        .map(|kind| (*kind).to_string())
+        .collect();
+    let is_right = if everyday.is_empty() {
+        is_exactly(simulated, rival, verdict, &found)
+    } else {
+        let is_found = truth.iter().all(|kind| found.contains(kind));
+        is_found && invented.is_empty() && (verdict != "unknown" || truth.contains(&"unknown"))
+    };
     let attained = attained(simulated, explanation);
     let json = serde_json::to_value(answer).unwrap_or(Value::Null);
     let details = details(simulated, answer, attained);
@@ -93,6 +98,7 @@ pub fn grade(
     Grade {
         details,
         named,
+        invented,
         verdict: verdict.into(),
         is_right,
         iou,
@@ -103,6 +109,26 @@ pub fn grade(
         attainable_ratio: attained.and_then(|attained| attained.attainable_ratio),
         strength: explanation.strength,
     }
+}
+
+/// Whether the answer names what acts, and nothing else.
+fn is_exactly(
+    simulated: &SimulatedDataset,
+    rival: Option<Rival>,
+    verdict: &str,
+    found: &[&str],
+) -> bool {
+    let mut expected: Vec<&str> =
+        simulated.effects.iter().map(|effect| effect.kind().name()).collect();
+    if let Some(rival) = rival.filter(|rival| rival.is_never_told || verdict == "ambiguous") {
+        expected.push(rival.kind.name());
+    }
+    let mut found = found.to_vec();
+    expected.sort_unstable();
+    found.sort_unstable();
+    let right =
+        if expected.len() > simulated.effects.len() { "ambiguous" } else { simulated.verdict() };
+    verdict == right && (right == "unknown" || expected == found)
 }
 
 /// What the answer says, for people, and what it was if that is in no library.

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::case::{explained, read};
 use super::scenario::Scenario;
+use super::world::World;
 use dynocar_tests::simulator::{SimulatorSettings, simulate};
 
 /// The data are made so many times more.
@@ -76,7 +77,7 @@ pub fn measure(scenarios: &[Scenario], seed: u64, tell: &dyn Fn(&Size)) -> Vec<S
             let mut size =
                 Size { axis, factor, runs: 0, duration_s: 0.0, samples: 0, seconds: 0.0 };
             for scenario in scenarios {
-                let settings = axis.grown(scenario.settings(seed), factor);
+                let settings = axis.grown(scenario.settings(seed, World::Plain), factor);
                 (size.runs, size.duration_s) = (settings.runs, settings.duration_s);
                 let dataset = read(&simulate(&settings));
                 size.samples += dataset.runs.iter().map(|run| run.samples.len()).sum::<usize>();

@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::case::{Case, explained, read};
 use super::grade::{Grade, grade};
 use super::scenario::Scenario;
+use super::world::World;
 use crate::parallel::over;
 
 /// An error at most so many times another is as good.
@@ -83,11 +84,11 @@ pub fn median(mut values: Vec<f64>) -> Option<f64> {
     Some(values[values.len() / 2])
 }
 
-/// Every scenario with every seed, scenario by scenario; with rigid trains.
-pub fn cases(scenarios: &[Scenario], seeds: usize, first_seed: u64) -> Vec<Case> {
+/// Every scenario with every seed, scenario by scenario.
+pub fn cases(scenarios: &[Scenario], seeds: usize, first_seed: u64, world: World) -> Vec<Case> {
     let of = |scenario: Scenario| {
         let seeds = first_seed..first_seed + seeds as u64;
-        seeds.map(move |seed| Case { scenario, seed, is_coupled: false })
+        seeds.map(move |seed| Case { scenario, seed, world })
     };
     scenarios.iter().flat_map(|&scenario| of(scenario)).collect()
 }
@@ -104,7 +105,7 @@ pub fn run(
     let grades = over(cases, threads, |case| {
         let simulated = case.simulate();
         let explanation = explained(&read(&simulated));
-        let graded = grade(&simulated, case.scenario.rival(), &explanation);
+        let graded = grade(&simulated, case, &explanation);
         tell(case, &graded);
         graded
     });

@@ -1,7 +1,11 @@
 //! What is simulated: one kind, two at once, or a poor recording.
 
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_tests::simulator::{Defects, Effect, EffectRequest, Law, SimulatorSettings, Unlisted};
+use dynocar_tests::simulator::{
+    Defects, Deviations, Effect, EffectRequest, Law, SimulatorSettings, TrainType, Unlisted,
+};
+
+use super::world::World;
 
 /// A kind that is hardly told from the one that acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,6 +31,8 @@ pub enum Scenario {
     SlowForce,
     /// A force by a law drawn from the seed, which no library holds.
     AnyLaw,
+    /// Another load between every two stations, and each a little different from run to run.
+    LoadsByStop,
     /// A null recorded with gaps, repeats and heavy outliers.
     PoorNull,
     /// One effect of a kind drawn from the seed, recorded so.
@@ -63,6 +69,9 @@ const POOR: [EffectKind; 6] = [
     EffectKind::Wind,
 ];
 
+/// Standard deviation of a load from run to run where loads change at every stop.
+const LOAD_SCATTER: f64 = 0.012;
+
 /// One row in fifty wildly wrong, beside a little of everything else.
 const HEAVY: Defects = Defects { outliers: 0.02, ..Defects::ALL };
 
@@ -76,6 +85,7 @@ impl Scenario {
             Scenario::UnmappedTunnel,
             Scenario::SlowForce,
             Scenario::AnyLaw,
+            Scenario::LoadsByStop,
             Scenario::PoorNull,
             Scenario::Poor,
         ];
@@ -111,6 +121,7 @@ impl Scenario {
             Scenario::UnmappedTunnel => "unmapped_tunnel",
             Scenario::SlowForce => "slow_force",
             Scenario::AnyLaw => "any_law",
+            Scenario::LoadsByStop => "loads_by_stop",
             Scenario::PoorNull => "none_poor_recording",
             Scenario::Poor => "poor_recording",
         }
@@ -130,13 +141,14 @@ impl Scenario {
             Scenario::Alike => vec![EffectKind::RotatingMass],
             Scenario::UnmappedTunnel => vec![EffectKind::TunnelDrag],
             Scenario::SlowForce | Scenario::AnyLaw => vec![EffectKind::Unknown],
+            Scenario::LoadsByStop => vec![EffectKind::MassChange],
             Scenario::Two => PAIRS[drawn(PAIRS.len())].to_vec(),
             Scenario::Poor => vec![POOR[drawn(POOR.len())]],
         }
     }
 
-    /// What the simulator is asked for.
-    pub fn settings(self, seed: u64) -> SimulatorSettings {
+    /// What the simulator is asked for in a world.
+    pub fn settings(self, seed: u64, world: World) -> SimulatorSettings {
         let effects = match self {
             // 0.5 to 1.1 N/kN at half the speed below which it acts.
             Scenario::SlowForce => EffectRequest::Exactly(vec![Effect::Unlisted(Unlisted {
@@ -144,15 +156,24 @@ impl Scenario {
                 n_per_kn: 0.5 + 0.1 * (seed % 7) as f64,
             })]),
             Scenario::AnyLaw => EffectRequest::AnyLaw,
+            Scenario::LoadsByStop => EffectRequest::LoadsByStop,
             _ => EffectRequest::Kinds(self.kinds(seed)),
         };
         let ordinary = SimulatorSettings::new(seed, effects);
         let is_poor = matches!(self, Scenario::PoorNull | Scenario::Poor);
+        let by_stop = self == Scenario::LoadsByStop;
+        let load_share = if by_stop { LOAD_SCATTER } else { 0.0 };
+        let deviations = Deviations { load_share, ..world.deviations() };
+        // Trains that stop often; elsewhere there are hardly any loads.
+        let stopping = [TrainType::Regional, TrainType::Metro][(seed % 2) as usize];
+        let train_type = by_stop.then_some(stopping);
         let defects = if is_poor { HEAVY } else { Defects::NONE };
         SimulatorSettings {
             defects,
             is_level_and_straight: self == Scenario::Alike,
             maps_tunnels: self != Scenario::UnmappedTunnel,
+            deviations,
+            train_type,
             ..ordinary
         }
     }

@@ -28,7 +28,7 @@ fn one_acts(
         Effect::CurveResistance { .. } => track.curvature_per_m(at_m, length_m) > Some(0.0),
         Effect::DraggingBrake { .. } => disturbances.drag_n(state.time_s) > 0.0,
         Effect::MassChangeSections(_) | Effect::MassChangeWindows(_) => {
-            disturbances.mass_factor(state.time_s, at_m) != 1.0
+            disturbances.effect_mass_factor(state.time_s, at_m) != 1.0
         }
         Effect::LocalResistance { intervals_m, .. } => {
             let is_near = |&(from_m, to_m): &(f64, f64)| {

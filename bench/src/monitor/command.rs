@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::matrix;
 use crate::explain::scenario::Scenario;
+use crate::explain::world::World;
 use crate::output::give;
 
 /// The live monitor on every kind of undeclared effect, and on nulls: seconds of motion from onset
@@ -18,6 +19,9 @@ pub struct MonitorArguments {
     /// The first seed
     #[arg(long, default_value_t = 1)]
     first_seed: u64,
+    /// What is a little wrong beside the effect
+    #[arg(long, value_enum, default_value_t = World::Plain)]
+    world: World,
     /// Runs of a quarter of an hour in each dataset
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u16).range(2..))]
     runs: u16,
@@ -43,6 +47,7 @@ pub fn monitor(arguments: &MonitorArguments) -> Result<(), (String, u8)> {
             scenarios: &scenarios,
             seeds: arguments.seeds,
             first_seed: arguments.first_seed,
+            world: arguments.world,
             runs: usize::from(arguments.runs),
             threads: arguments.threads,
         },

@@ -9,6 +9,7 @@ use super::watch::{Watched, watch};
 use crate::explain::case::Case;
 use crate::explain::matrix::{cases, median};
 use crate::explain::scenario::Scenario;
+use crate::explain::world::World;
 use crate::parallel::over;
 
 /// What is run.
@@ -20,6 +21,8 @@ pub struct Plan<'a> {
     pub seeds: usize,
     /// The first seed.
     pub first_seed: u64,
+    /// What is a little wrong beside the effect.
+    pub world: World,
     /// Runs of each dataset.
     pub runs: usize,
     /// Datasets at a time.
@@ -72,10 +75,9 @@ pub struct Matrix {
 
 /// Runs the matrix. Every finished case is told to `tell`.
 pub fn run(plan: &Plan<'_>, tell: &(dyn Fn(&Case, &Watched) + Sync)) -> Matrix {
-    let cases = cases(plan.scenarios, plan.seeds, plan.first_seed);
+    let cases = cases(plan.scenarios, plan.seeds, plan.first_seed, plan.world);
     let watched = over(&cases, plan.threads, |case| {
-        let settings = case.scenario.settings(case.seed);
-        let watched = watch(&simulate(&SimulatorSettings { runs: plan.runs, ..settings }));
+        let watched = watch(&simulate(&SimulatorSettings { runs: plan.runs, ..case.settings() }));
         tell(case, &watched);
         watched
     });

@@ -93,29 +93,31 @@ pub fn for_terminal(rows: &[Row]) -> String {
     text
 }
 
+/// What stands above the tables of the page.
+const INTRODUCTION: &str = "\
+# The papers' tables, measured
+
+Made by `cargo run --release -p dynocar-bench -- papers --markdown docs/papers.md`: errors over seeded runs.
+
+| column | meaning |
+| --- | --- |
+| paper's method, baseline | the corrected formulas, faithfully, on the same data as ours |
+| bound | the Cramér–Rao or posterior Cramér–Rao bound of the scenario, computed in the same run |
+| coverage | share of our 95 % intervals that hold the truth |
+| NEES | mean normalised estimation error squared per degree of freedom, 1 when the covariance is right, with the band that holds it in 99 % of such measurements; where all runs share one curve (Xie 2019 and Jin 2020 but for *drawn coefficients*) the band is as wide as one draw leaves it |
+| promise | whether what the project promises of the row was kept |
+
+Where the paper's method differs from its paper:
+
+- Liu: segments end where a noisy speed first reaches a bound, which biases w0 by -1.7 %. V-MILS has no printed rule for bad data; the gate used here acts on rows that a spike has already spoilt.
+  The size of the outliers (here 1 to 5 km/h) is not given.
+- Xia: windows of 2 km settle late to 0.1 N/kN, since Newton's method seldom reaches the printed tolerance within 100 iterations where the Hessian is not positive definite; to 0.2 N/kN
+  they settle within 1 to 2 km.
+";
+
 /// A page of the documentation: one table for each paper.
 pub fn for_documentation(rows: &[Row]) -> String {
-    let mut text = String::from(
-        "# The papers' tables, measured\n\n\
-         Made by `cargo run --release -p dynocar-bench -- papers --markdown docs/papers.md`. Errors\n\
-         over seeded runs; *paper's method* and *baseline* are faithful to the corrected formulas and\n\
-         run on the same data as *ours*; *bound* is the Cramér–Rao or posterior Cramér–Rao bound of\n\
-         the scenario, computed in the same run; *coverage* is the share of our 95 % intervals that\n\
-         hold the truth; *NEES* is the mean normalised estimation error squared per degree of freedom\n\
-         (1 when the stated covariance is right) with the band that holds it in 99 % of such\n\
-         measurements; *promise* says whether what the project promises of the row was kept. Where\n\
-         all runs share one curve (Xie 2019 and Jin 2020 but for *drawn coefficients*) that curve is\n\
-         one draw of what the estimator presumes, and the band is as wide as one draw leaves it.\n\n\
-         \n\
-         Where the paper's method comes out otherwise than its paper says: Liu's segments end where a\n\
-         noisy speed first reaches a bound, which biases w0 by -1.7 %; V-MILS has no printed rule for\n\
-         bad data, and the gate used here acts on rows that a spike has already spoilt. The error of\n\
-         plain least squares under outliers is that of their size (here 1 to 5 km/h, either way), which\n\
-         the paper does not give. Xia's windows\n\
-         of 2 km settle late to 0.1 N/kN, since Newton's method seldom reaches the printed tolerance\n\
-         within 100 iterations where the Hessian is not positive definite, and the best of the random\n\
-         restarts stands; to 0.2 N/kN they settle within 1 to 2 km.\n",
-    );
+    let mut text = INTRODUCTION.to_owned();
     let mut paper = "";
     for row in rows {
         if row.paper != paper {

@@ -12,7 +12,7 @@ use tempfile::TempDir;
 
 use super::{RigError, system};
 
-/// The train that every measurement drives; its brake gear is declared, so that every pipeline
+/// The train that latency and load drive; its brake gear is declared, so that every pipeline
 /// has what it needs.
 const TRAIN: &str = r#"[train]
 name = "measured train"
@@ -99,19 +99,28 @@ pub struct Site {
 }
 
 impl Site {
-    /// A new site with the train's file.
+    /// A new site with the train that latency and load drive.
     ///
     /// # Errors
     ///
     /// When no temporary folder can be had.
     pub fn new() -> Result<Self, RigError> {
+        Site::with_train(TRAIN)
+    }
+
+    /// A new site with a train's file of this text.
+    ///
+    /// # Errors
+    ///
+    /// When no temporary folder can be had.
+    pub fn with_train(text: &str) -> Result<Self, RigError> {
         let folder = tempfile::Builder::new()
             .prefix("dynocar-bench-")
             .tempdir()
             .map_err(system("a temporary folder"))?;
         let host = Host::at(&folder.path().join("root"))?;
         let site = Site { folder, host };
-        std::fs::write(site.train_file(), TRAIN).map_err(system("writing the train's file"))?;
+        std::fs::write(site.train_file(), text).map_err(system("writing the train's file"))?;
         Ok(site)
     }
 

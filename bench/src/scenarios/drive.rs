@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use rand::RngExt;
 
-use super::world::{Habits, LoadTold, World, normal};
+use super::world::{Habits, LoadTold, WEIGHING_STD, World, normal};
 
 /// Steps of the simulation per cycle of the controller.
 const STEPS: u32 = 10;
@@ -31,6 +31,21 @@ pub struct Moment {
     pub w0_n_per_kn: f64,
     /// Speed in m/s.
     pub speed_mps: f64,
+}
+
+/// How the train truly moves.
+#[derive(Clone, Copy, Debug)]
+pub struct Truth {
+    /// True while it stands at a stop.
+    pub is_standing: bool,
+    /// Speed in m/s.
+    pub speed_mps: f64,
+    /// Acceleration in m/s² that the forces give.
+    pub push_mps2: f64,
+    /// Chainage in m of the train's centre.
+    pub place_m: f64,
+    /// 1 along growing chainage, else -1.
+    pub direction: f64,
 }
 
 /// A train on its way.
@@ -90,6 +105,17 @@ impl Drive {
         &self.world
     }
 
+    /// How the train moves now.
+    pub fn truth(&self) -> Truth {
+        Truth {
+            is_standing: matches!(self.phase, Phase::Standing { .. }),
+            speed_mps: self.speed_mps,
+            push_mps2: self.acting_mps2,
+            place_m: self.place_m,
+            direction: self.direction,
+        }
+    }
+
     fn weigh(&mut self) {
         let World { scenario, random, .. } = &mut self.world;
         self.told_kg = match scenario.load {
@@ -103,7 +129,7 @@ impl Drive {
                     self.told_kg
                 }
             }
-            LoadTold::Changing => self.mass_kg * (1.0 + 0.03 * normal(random)),
+            LoadTold::Changing => self.mass_kg * (1.0 + WEIGHING_STD * normal(random)),
         };
     }
 

@@ -2,6 +2,8 @@
 
 use dynocar_shared::{Parameter, ParameterSnapshot, Quantity};
 
+use nalgebra::{Matrix4, Vector4};
+
 use super::drive::Moment;
 
 /// Deviations beyond which an answer is wrong.
@@ -27,6 +29,8 @@ pub struct Score {
     pub error_square: f64,
     /// See `error_square`.
     pub deviation_square: f64,
+    /// Sums of squares of errors and of least deviations at the instants where both are compared.
+    at_instants: [f64; 2],
     was_usable: bool,
 }
 
@@ -60,7 +64,32 @@ impl Score {
         self.wrong_s = self.wrong_s.max(other.wrong_s);
         self.error_square += other.error_square;
         self.deviation_square += other.deviation_square;
+        for (sum, more) in self.at_instants.iter_mut().zip(other.at_instants) {
+            *sum += more;
+        }
     }
+
+    /// Takes in a usable answer's error and the least deviation, both relative to the truth.
+    pub fn compare(&mut self, error: f64, least: f64) {
+        self.at_instants[0] += error * error;
+        self.at_instants[1] += least * least;
+    }
+
+    /// Errors over the least deviations; `None` where they were never compared.
+    pub fn over_bound(&self) -> Option<f64> {
+        let [error, least] = self.at_instants;
+        (least > 0.0).then(|| (error / least).sqrt())
+    }
+}
+
+/// The least relative deviation of a quantity by the bound of the drive.
+pub fn least_deviation(bound: &Matrix4<f64>, quantity: Quantity, moment: &Moment) -> f64 {
+    let v = moment.speed_mps;
+    let row = match quantity {
+        Quantity::Resistance => Vector4::new(1.0, v, v * v, 0.0) / moment.w0_n_per_kn,
+        _ => Vector4::new(0.0, 0.0, 0.0, 1.0),
+    };
+    row.dot(&(bound * row)).max(0.0).sqrt()
 }
 
 /// A usable answer: error and standard deviation, both relative to the truth.

@@ -7,14 +7,18 @@ use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
 use dynocar_shared::{PipelineKind, Quantity, TrainId};
 use serde::Serialize;
 
+use super::bound::Bound;
 use super::drive::Drive;
 use super::rows::NamedScenario;
-use super::score::{Score, answer};
+use super::score::{Score, answer, least_deviation};
 use super::world::{LoadTold, Scenario, World};
 use crate::parallel;
 
 /// Speed in m/s from which an answer counts.
 const COUNTS_MPS: f64 = 2.0;
+/// Time in s from which errors are compared with the bound, and how much later each next time.
+const COMPARED_FIRST_S: f64 = 60.0;
+const COMPARED_GROWTH: f64 = 1.35;
 /// What is asked for.
 const QUANTITIES: [Quantity; 2] = [Quantity::Resistance, Quantity::Mass];
 
@@ -57,6 +61,8 @@ pub struct Line {
     pub error_percent: f64,
     /// The same over the root of the mean square of their standard deviations.
     pub error_over_deviation: f64,
+    /// Errors at some instants of the drive over the joint Cramér–Rao bound there.
+    pub error_over_bound: Option<f64>,
 }
 
 /// Measures everything.
@@ -74,13 +80,14 @@ pub fn run(plan: &Plan<'_>) -> Result<Vec<Line>, SettingError> {
     Ok(lines.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
 }
 
-/// The settings that a user of the scenario has: the load is known exactly where it is.
+/// The settings that a user of the scenario has: load and map are known exactly where they are.
 fn settings(kind: PipelineKind, scenario: &Scenario) -> Option<EstimatorSettings> {
     let mut settings = EstimatorSettings::default_of(kind)?;
-    if let EstimatorSettings::TrainKalman(own) = &mut settings
-        && scenario.load == LoadTold::Exact
-    {
-        own.mass_std_percent = 0.0;
+    if let EstimatorSettings::TrainKalman(own) = &mut settings {
+        if scenario.load == LoadTold::Exact {
+            own.mass_std_percent = 0.0;
+        }
+        own.gradient_std_permille = scenario.map_std_permille;
     }
     Some(settings)
 }
@@ -110,16 +117,31 @@ fn measure(
 /// One drive.
 fn driven(mut pipeline: Pipeline, world: World, hours: f64) -> [Score; 2] {
     let cycle_s = 1.0 / f64::from(world.scenario.rate_hz);
+    let mut bound = (world.scenario.speed_noise_mps > 0.0).then(|| Bound::new(&world, hours));
+    let mut next_s = COMPARED_FIRST_S;
     let mut drive = Drive::new(world);
     let mut scores = QUANTITIES.map(|_| Score::default());
     for cycle in 0..(3600.0 * hours / cycle_s) as u64 {
-        let moment = drive.advance();
+        let (time_s, moment) = (cycle as f64 * cycle_s, drive.advance());
+        if let Some(bound) = &mut bound {
+            bound.see(drive.world(), &drive.truth(), cycle_s);
+        }
         let snapshot = pipeline.process(&moment.sample);
         if moment.speed_mps < COUNTS_MPS {
             continue;
         }
-        for (score, quantity) in scores.iter_mut().zip(QUANTITIES) {
-            score.push(cycle as f64 * cycle_s, cycle_s, answer(snapshot, quantity, &moment));
+        let answers = QUANTITIES.map(|quantity| answer(snapshot, quantity, &moment));
+        for (score, answer) in scores.iter_mut().zip(answers) {
+            score.push(time_s, cycle_s, answer);
+        }
+        if time_s >= next_s {
+            next_s = COMPARED_GROWTH * time_s;
+            let Some(least) = bound.as_ref().and_then(Bound::covariance) else { continue };
+            for ((score, answer), quantity) in scores.iter_mut().zip(answers).zip(QUANTITIES) {
+                if let Some(answer) = answer {
+                    score.compare(answer.error, least_deviation(&least, quantity, &moment));
+                }
+            }
         }
     }
     scores
@@ -147,6 +169,7 @@ fn line(
         error_percent: 100.0 * (total.error_square / usable).sqrt(),
         error_over_deviation: (total.error_square / total.deviation_square.max(f64::MIN_POSITIVE))
             .sqrt(),
+        error_over_bound: total.over_bound(),
     }
 }
 
@@ -154,8 +177,8 @@ fn line(
 pub fn table(lines: &[Line]) -> String {
     let mut text = String::from(
         "| scenario | pipeline | quantity | usable % | truth within 95 % | first use s | changes per h \
-         | longest wrong s | error % | error / deviation |\n\
-         | --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n",
+         | longest wrong s | error % | error / deviation | error / bound |\n\
+         | --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n",
     );
     for line in lines {
         let first = line.first_s.map_or("never".into(), |first_s| format!("{first_s:.0}"));
@@ -165,7 +188,7 @@ pub fn table(lines: &[Line]) -> String {
             false => "–".into(),
         };
         text += &format!(
-            "| {} | `{}` | {} | {:.1} | {} | {first} | {:.1} | {:.1} | {} | {} |\n",
+            "| {} | `{}` | {} | {:.1} | {} | {first} | {:.1} | {:.1} | {} | {} | {} |\n",
             line.scenario,
             line.pipeline,
             line.quantity,
@@ -175,6 +198,7 @@ pub fn table(lines: &[Line]) -> String {
             line.wrong_s,
             number(line.error_percent, 2),
             number(line.error_over_deviation, 2),
+            line.error_over_bound.map_or("–".into(), |ratio| format!("{ratio:.2}")),
         );
     }
     text

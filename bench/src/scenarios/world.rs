@@ -1,6 +1,7 @@
 //! A train, its line, and the ordinary mistakes in what is declared of them.
 
 use dynocar_core::train::{Davis, TrainModel};
+use dynocar_tests::simulator::Deviations;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -95,6 +96,25 @@ impl Traffic {
     }
 }
 
+/// Standard deviation of a, b, c as a share of what is declared.
+pub const COEFFICIENT_SHARE: f64 = 0.3;
+/// Standard deviation of the rotating mass as a share of the mass.
+pub const ROTATING_MASS_STD: f64 = 0.002;
+/// Mean and standard deviation in s of the delay of forces.
+const DELAY_S: f64 = 0.1;
+/// See [`DELAY_S`].
+pub const DELAY_STD_S: f64 = 0.05;
+/// Standard deviation of a weighing as a share of the mass, where the load changes.
+pub const WEIGHING_STD: f64 = 0.03;
+/// Distance in m between the knots of the map's error.
+pub const KNOT_M: f64 = 200.0;
+
+/// Standard deviation in ‰ of the map's error at a knot where it is that much on the average: straight
+/// lines between knots vary less.
+pub fn knot_std_permille(map_std_permille: f64) -> f64 {
+    1.22 * map_std_permille
+}
+
 /// A seeded draw of a scenario.
 pub struct World {
     /// The scenario.
@@ -129,14 +149,15 @@ impl World {
         let mut truth = declared.clone();
         let mut near = |value: f64, share: f64| value * (1.0 + share * normal(&mut random));
         truth.resistance = Davis {
-            a: near(declared.resistance.a, 0.3).max(0.3),
-            b: near(declared.resistance.b, 0.3).max(0.0),
-            c: near(declared.resistance.c, 0.3).max(1e-5),
+            a: near(declared.resistance.a, COEFFICIENT_SHARE).max(0.3),
+            b: near(declared.resistance.b, COEFFICIENT_SHARE).max(0.0),
+            c: near(declared.resistance.c, COEFFICIENT_SHARE).max(1e-5),
         };
-        let force_scale = [near(1.0, 0.006), near(1.0, 0.006)];
-        let speed_scale = near(1.0, 0.0015);
-        let delay_s = near(0.1, 0.5).clamp(0.0, 0.25);
-        truth.rotating_mass_factor += near(1.0, 0.002) - 1.0;
+        let usual = Deviations::ROUGH;
+        let force_scale = [near(1.0, usual.force_share), near(1.0, usual.force_share)];
+        let speed_scale = near(1.0, usual.wheel_share);
+        let delay_s = near(DELAY_S, DELAY_STD_S / DELAY_S).clamp(0.0, 0.25);
+        truth.rotating_mass_factor += near(1.0, ROTATING_MASS_STD) - 1.0;
         truth.mass_kg *= match scenario.load {
             LoadTold::Exact | LoadTold::Weighed(_) => 1.0 + 0.3 * (random.random::<f64>() - 0.5),
             LoadTold::Unknown | LoadTold::Changing => 1.0 + 0.24 * (random.random::<f64>() - 0.5),
@@ -202,12 +223,11 @@ fn profile(
         }
         left_m -= PIECE_M;
         map.push(steep);
-        // Knots every 200 m, joined by straight lines of the same variance on average.
-        let at = (piece as f64 * PIECE_M / 200.0).fract();
-        if piece > 0 && at < PIECE_M / 200.0 - 1e-9 {
+        let at = (piece as f64 * PIECE_M / KNOT_M).fract();
+        if piece > 0 && at < PIECE_M / KNOT_M - 1e-9 {
             (from, to) = (to, normal(random));
         }
-        error.push(scenario.map_std_permille * 1.22 * (from + at * (to - from)));
+        error.push(knot_std_permille(scenario.map_std_permille) * (from + at * (to - from)));
     }
     let half = (0.5 * train_length_m / PIECE_M) as usize;
     let mean = |values: &[f64], at: usize| {

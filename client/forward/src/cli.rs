@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use dynocar::cli::{Failure, parse};
 use dynocar::dataset::read_text;
 use dynocar::ending;
@@ -48,6 +48,11 @@ struct Arguments {
     /// The most publications that wait for the broker; the oldest go
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
     queue: u32,
+}
+
+/// The command line of `dynocar forward`.
+pub fn command() -> clap::Command {
+    Arguments::command()
 }
 
 /// Parses the command line, forwards until told to end, reports a failure on standard error.

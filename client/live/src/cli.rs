@@ -3,7 +3,7 @@
 use std::net::{IpAddr, SocketAddr};
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use dynocar::cli::{Failure, parse};
 use dynocar::ending;
 use dynocar_recording::cli::WantedArguments;
@@ -29,6 +29,11 @@ struct Arguments {
     /// The port; 0 for any that is free
     #[arg(long, value_name = "PORT", default_value_t = 8765)]
     port: u16,
+}
+
+/// The command line of `dynocar live`.
+pub fn command() -> clap::Command {
+    Arguments::command()
 }
 
 /// Parses the command line, serves until told to end, reports a failure on standard error.

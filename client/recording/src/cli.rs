@@ -8,7 +8,7 @@ mod record;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use dynocar::cli::{Failure, parse};
 use dynocar::config::DaemonConfig;
 use dynocar::output::{print, require_new, tell};
@@ -48,7 +48,7 @@ enum Command {
     Fields,
 }
 
-/// Make a recording whole whose recorder died, or one recording of the files of one that rotated.
+/// Repair a truncated recording, or join the files of one that rotated.
 #[derive(Debug, Args)]
 struct RecoverArguments {
     /// The broken file, or all files of a recording in their order; they stay as they are
@@ -128,6 +128,11 @@ pub struct VerifyArguments {
 /// The name by which messages call this program.
 fn program() -> &'static str {
     called_as(RECORDING)
+}
+
+/// The command line of the recording's commands.
+pub fn command() -> clap::Command {
+    Arguments::command()
 }
 
 /// Parses the command line, runs the command, reports a failure on standard error.

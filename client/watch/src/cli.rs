@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use dynocar::cli::{Failure, parse};
 use dynocar::config::DaemonConfig;
 use dynocar::ending::Ending;
@@ -32,6 +32,11 @@ struct Arguments {
     /// A line a second for each train, on a terminal too
     #[arg(long)]
     plain: bool,
+}
+
+/// The command line of `dynocar watch`.
+pub fn command() -> clap::Command {
+    Arguments::command()
 }
 
 /// Parses the command line, watches until told to end, reports a failure on standard error.

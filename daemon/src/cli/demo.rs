@@ -8,7 +8,7 @@ use super::Failure;
 use crate::demo::{DemoError, play};
 use crate::output::{give, require_file};
 
-/// Show the whole way of a sample: controller, daemon and client on embedded recorded runs.
+/// Show controller, daemon and client at work on recorded runs, in 20 seconds.
 #[derive(Debug, Args)]
 pub struct DemoArguments {
     /// How many times as fast as recorded

@@ -12,9 +12,10 @@ use crate::operator::refused_words;
 use crate::output::{print, tell};
 use crate::supervision::health::{TrainHealth, Verdict, look_at};
 
-/// Say how well trains are served: without options, all that any daemon of this host serves; the
-/// exit status is the worst verdict: 0 ok, 3 degraded, 4 stale, 5 incompatible daemon, 6 no daemon
-/// (1 and 2 as for every command)
+/// Report whether the daemon is well, by an exit status for each verdict.
+///
+/// Without options it asks about all trains that any daemon of this host serves. The exit status is the
+/// worst verdict: 0 ok, 3 degraded, 4 stale, 5 incompatible daemon, 6 no daemon (1 and 2 as for every command).
 #[derive(Debug, Args)]
 pub struct HealthArguments {
     /// The daemon's configuration: its root, all its trains

@@ -8,6 +8,7 @@ pub mod check;
 mod companion;
 mod demo;
 mod failure;
+mod groups;
 mod health;
 pub mod models;
 mod replay;
@@ -39,52 +40,46 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::DemoArguments),
-    /// Write a first train.toml and daemon.toml and, from recordings, a dataset.toml that says of every
-    /// column what it was taken for and why. Nothing is overwritten. On a terminal, without a folder, it
-    /// asks for all that is not said.
+    /// Describe your train and your CSV recordings: write train.toml, daemon.toml, dataset.toml.
     Init(Passed),
-    /// Write a train.toml and a track.toml out of files of railtoolkit, TTOBench or OSRD, and say of every
-    /// field what became of it. Nothing is overwritten.
+    /// Import trains and lines of railtoolkit, TTOBench or OSRD.
     Import(Passed),
-    /// Find what the declared model leaves, trace it to an effect, and score the grown model.
+    /// Find the effect that the declared model lacks, add it, and report the error before and after.
     Explain(Passed),
     Run(run::RunArguments),
     Health(health::HealthArguments),
     Check(check::CheckArguments),
     Replay(replay::ReplayArguments),
-    /// Learn the train's parameters from recorded runs with the daemon's own pipelines.
+    /// Estimate resistance, mass, adhesion and friction from recorded runs, as the daemon does.
     Identify(Passed),
-    /// Deceleration over speed, friction and stopping distance from recorded stops: from speed alone,
-    /// and the command of the brake where it is recorded.
+    /// Estimate deceleration and stopping distance from recorded stops, without any force.
     Stops(Passed),
-    /// Find the line that raw recordings drive, its gradient from the forces, and cut them into trips.
+    /// Survey a line from recordings with GNSS: trips, chainage, stops, gradient from the forces.
     Survey(Passed),
-    /// Write the estimators, or the train itself, as an FMU for co-simulation (FMI 2.0), for Simulink,
-    /// OpenModelica, Dymola or FMPy.
+    /// Write the estimators, or the train itself, as an FMU for a simulator.
     Fmu(Passed),
-    /// Learn from recorded runs what the model in force lacks, and put it into the store as a candidate: at the
-    /// start, when the daemon's residual monitor suspects something new, and at an hour
+    /// Turn recorded runs into candidate models, while trains run.
     Learn(Passed),
     Models(models::ModelsArguments),
     /// Record what a controller and the daemon write, as MCAP
     Record(Passed),
-    /// Keep the last hours in a ring on disk, and for good what lies around a suspicion or a fault
+    /// Keep the last hours on disk, and for good what lies around a suspicion or a fault
     FlightRecorder(Passed),
     /// Ask a flight recorder to keep this moment for good
     Keep(Passed),
-    /// Make a recording whole whose recorder died
+    /// Repair a truncated recording
     Recover(Passed),
-    /// Change recordings between MCAP, CSV datasets and Parquet
+    /// Convert recordings between MCAP, CSV datasets and Parquet
     Convert(Passed),
-    /// See in the terminal what the daemon knows of a train, and what to drive next
+    /// Show in the terminal what is estimated of a train, and what to drive next
     Watch(Passed),
     /// Serve samples, snapshots and events live to Foxglove or Lichtblick
     Live(Passed),
-    /// Forward what the daemon knows to an MQTT broker, as Sparkplug B
+    /// Forward estimates and events to an MQTT broker, as Sparkplug B
     Forward(Passed),
-    /// Print the completions of all commands and options for a shell.
+    /// Print the completions for a shell.
     Completions(Passed),
-    /// Write the pages of the manual, one for every command.
+    /// Write the manual pages, one for every command.
     Man(Passed),
 }
 
@@ -134,12 +129,12 @@ impl Command {
 
 /// All commands, with the options of those that this program carries out itself.
 pub fn commands() -> clap::Command {
-    Arguments::command()
+    groups::grouped(Arguments::command())
 }
 
 /// Parses the command line, runs the command, reports a failure on standard error.
 pub fn main() -> ExitCode {
-    let arguments = match parse::<Arguments>("dynocar") {
+    let arguments = match parse_by::<Arguments>(commands(), "dynocar") {
         Ok(arguments) => arguments,
         Err(status) => return status,
     };
@@ -156,9 +151,14 @@ pub fn main() -> ExitCode {
 ///
 /// The exit status.
 pub fn parse<A: Parser>(program: &str) -> Result<A, ExitCode> {
-    let error = match A::try_parse() {
+    parse_by(A::command(), program)
+}
+
+fn parse_by<A: Parser>(mut command: clap::Command, program: &str) -> Result<A, ExitCode> {
+    let matches = command.try_get_matches_from_mut(std::env::args_os());
+    let error = match matches.and_then(|mut it| A::from_arg_matches_mut(&mut it)) {
         Ok(arguments) => return Ok(arguments),
-        Err(error) => error,
+        Err(error) => error.format(&mut command),
     };
     let printed = error.print().and_then(|()| std::io::Write::flush(&mut std::io::stdout()));
     if error.use_stderr() {

@@ -22,7 +22,7 @@ use crate::shadow::record::{Trials, Tried, ratio_in_words};
 /// The store where none is named.
 const DEFAULT_STORE: &str = "models";
 
-/// See the models that were learned, and decide which is in force
+/// List, compare, adopt and take back models
 #[derive(Debug, Args)]
 pub struct ModelsArguments {
     #[command(subcommand)]

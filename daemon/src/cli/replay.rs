@@ -23,7 +23,7 @@ const SHOW_EVERY: Duration = Duration::from_millis(100);
 /// Letters of the bar of samples.
 const BAR_LETTERS: usize = 40;
 
-/// Play recorded runs into the sample channel, as a controller would.
+/// Play recorded runs to the daemon as a controller would, or verify a recording.
 #[derive(Debug, Args)]
 pub struct ReplayArguments {
     /// The dataset's folder, or a recording; with --verify the files of one that rotated, in order

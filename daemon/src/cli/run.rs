@@ -10,7 +10,7 @@ use super::Failure;
 use crate::config::{DaemonConfig, LogFormat};
 use crate::run::{RunError, run};
 
-/// Serve trains: read their samples, estimate, publish snapshots.
+/// Run the daemon: read samples, estimate, publish snapshots.
 #[derive(Debug, Args)]
 pub struct RunArguments {
     /// The daemon's configuration

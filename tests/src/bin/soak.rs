@@ -259,3 +259,18 @@ fn print_tallies(tallies: &Tallies) {
         ));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+    use dynocar_tests::documents::{Shown, pages};
+
+    #[test]
+    fn every_soak_that_a_page_shows_is_one_that_this_program_takes() {
+        let shown: Vec<Shown> = pages().iter().flat_map(|it| it.commands("dynocar-soak")).collect();
+        assert!(shown.len() > 5, "the commands are found: {}", shown.len());
+        let command = super::Arguments::command;
+        let refusals: Vec<String> = shown.iter().filter_map(|it| it.refusal(command())).collect();
+        assert!(refusals.is_empty(), "{}", refusals.join("\n"));
+    }
+}

@@ -5,6 +5,7 @@ use dynocar_core::terms::{
 };
 use dynocar_core::track::{GradientError, LinearProfile, StepProfile};
 
+use super::deviations::CommonDeviations;
 use super::effects::{Effect, MassSection, RunWindow};
 use super::line_maker::Line;
 use super::random::{Random, Stream};
@@ -25,6 +26,8 @@ pub struct AdhesionCap {
 /// Everything undeclared in one run; [`Disturbances::none`] leaves the declared model true.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disturbances {
+    /// +1 while the chainage grows in the direction of travel, -1 while it falls.
+    pub direction: f64,
     /// The true gradient in ‰ by chainage.
     pub gradient: StepProfile,
     /// How far in m the true gradient lies towards +chainage of the map's.
@@ -35,6 +38,8 @@ pub struct Disturbances {
     pub resistance_factor: f64,
     /// Reading of the force sensors of this run over the reported forces.
     pub force_reading_factor: f64,
+    /// True over declared mass of this run, from the start on and then from each stop in m.
+    pub loads: Vec<(f64, f64)>,
     /// k of the curve resistance k/R in N/kN m.
     pub curve_constant_n_per_kn_m: f64,
     /// Factor on c v² in tunnels.
@@ -57,6 +62,8 @@ pub struct Disturbances {
     pub mass_windows: Vec<(RunWindow, f64)>,
     /// Reported over true traction force.
     pub traction_gain: f64,
+    /// Reported over true brake force.
+    pub brake_gain: f64,
     /// Dead time in s between reported and true forces.
     pub delay_s: f64,
     /// Lag in s between reported and true forces.
@@ -104,11 +111,13 @@ impl Disturbances {
     /// When the line has no gradient, which generated lines have.
     pub fn none(train: &TrueTrain, line: &Line) -> Self {
         Disturbances {
+            direction: 1.0,
             gradient: line.track.gradient().expect("a generated line has a gradient").clone(),
             gradient_shift_m: 0.0,
             gradient_error: None,
             resistance_factor: 1.0,
             force_reading_factor: 1.0,
+            loads: Vec::new(),
             curve_constant_n_per_kn_m: train.declared.curve_constant_n_per_kn_m,
             tunnel_c_factor: 1.0,
             headwind_mps: 0.0,
@@ -120,6 +129,7 @@ impl Disturbances {
             mass_sections: Vec::new(),
             mass_windows: Vec::new(),
             traction_gain: 1.0,
+            brake_gain: 1.0,
             delay_s: 0.0,
             lag_s: 0.0,
             speed_delay_s: 0.0,
@@ -143,6 +153,7 @@ impl Disturbances {
     ) -> Self {
         let mut disturbances = Disturbances::none(train, line);
         disturbances.vary(plan, settings);
+        disturbances.deviate(train, line, plan, settings);
         for effect in effects {
             disturbances.apply(effect, plan, settings.seed);
         }
@@ -151,21 +162,50 @@ impl Disturbances {
 
     /// Small differences that no effect describes.
     fn vary(&mut self, plan: &RunPlan, settings: &SimulatorSettings) {
-        let factor = settings.hidden_variation;
+        let deviations = &settings.deviations;
         let mut of_run = Random::new(settings.seed, Stream::Variation(plan.number));
-        self.resistance_factor = 1.0 + 0.01 * factor * of_run.gaussian();
-        self.force_reading_factor = 1.0 + 0.002 * factor * of_run.gaussian();
-        let daily_mps = settings.daily_wind_sd_mps;
-        self.headwind_mps =
-            daily_mps * Random::new(settings.seed, Stream::Day(plan.number)).gaussian();
-        self.gust_sd_mps = daily_mps;
+        self.resistance_factor = 1.0 + deviations.run_resistance_share * of_run.gaussian();
+        self.force_reading_factor = 1.0 + deviations.run_force_share * of_run.gaussian();
+        let mass = 1.0 + deviations.mass_share * of_run.gaussian();
+        let stops_m = std::iter::once(plan.start_m).chain(plan.stops_m.iter().copied());
+        self.loads = stops_m
+            .map(|stop_m| (stop_m, mass * (1.0 + deviations.load_share * of_run.gaussian())))
+            .collect();
+        self.headwind_mps = deviations.day_wind_mps
+            * Random::new(settings.seed, Stream::Day(plan.number)).gaussian();
+        self.gust_sd_mps = deviations.gust_mps;
         let mut survey = Random::new(settings.seed, Stream::Survey);
         let surveyed: Vec<(f64, f64)> = self
             .gradient
             .entries()
-            .map(|(m, permille)| (m, permille + 0.05 * factor * survey.gaussian()))
+            .map(|(m, permille)| (m, permille + deviations.survey_permille * survey.gaussian()))
             .collect();
         self.gradient = StepProfile::new(&surveyed).expect("the chainages are the map's");
+    }
+
+    /// What is wrong in all runs alike.
+    fn deviate(
+        &mut self,
+        train: &TrueTrain,
+        line: &Line,
+        plan: &RunPlan,
+        settings: &SimulatorSettings,
+    ) {
+        let common = CommonDeviations::draw(&settings.deviations, settings.seed);
+        self.direction = plan.direction;
+        self.curve_constant_n_per_kn_m *= common.curve_constant;
+        [self.traction_gain, self.brake_gain] = common.force_gains;
+        self.delay_s = common.force_late_s;
+        self.speed_scale = common.speed_scale;
+        let (share, tau_s) = common.warming;
+        if share > 0.0 {
+            self.cold_bearings = Some((share * train.ordinary_w0_n_per_kn(), tau_s));
+        }
+        let profile = common.map_error(line.length_m);
+        if !profile.is_empty() {
+            let error = LinearProfile::new(profile.clone()).expect("ascending chainages");
+            self.gradient = with_error(&self.gradient, &profile, &error);
+        }
     }
 
     fn apply(&mut self, effect: &Effect, plan: &RunPlan, seed: u64) {
@@ -260,6 +300,13 @@ impl Disturbances {
 
     /// True over declared mass at a time in s from the start and a chainage in m.
     pub fn mass_factor(&self, time_s: f64, centre_m: f64) -> f64 {
+        let is_behind = |(stop_m, _): &&(f64, f64)| self.direction * (centre_m - stop_m) > 0.0;
+        let last = self.loads.iter().take_while(is_behind).last().or(self.loads.first());
+        last.map_or(1.0, |(_, load)| *load) * self.effect_mass_factor(time_s, centre_m)
+    }
+
+    /// The part of it that is an undeclared effect.
+    pub fn effect_mass_factor(&self, time_s: f64, centre_m: f64) -> f64 {
         let by_time = self
             .mass_windows
             .iter()

@@ -2,6 +2,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
+use super::deviations::wavy;
 use super::effects::{Effect, MassSection, RunWindow};
 use super::line_maker::Line;
 use super::random::Random;
@@ -38,17 +39,27 @@ pub struct EffectScene<'a> {
 }
 
 impl EffectScene<'_> {
-    /// Unit basic resistance in N/kN at an ordinary speed.
-    fn ordinary_w0_n_per_kn(&self) -> f64 {
-        self.train.resistance.w0_n_per_kn(0.65 * self.train.handling.speed_max_mps)
-    }
-
     /// A resistance by any law outside the library.
     pub fn any_law(&self, duration_s: f64, random: &mut Random) -> Effect {
-        let sizes = (self.train.handling.speed_max_mps, self.ordinary_w0_n_per_kn());
+        let sizes = (self.train.handling.speed_max_mps, self.train.ordinary_w0_n_per_kn());
         let degc = self.plans.iter().map(|plan| plan.temperature_degc);
         let warmest_degc = degc.fold(f64::NEG_INFINITY, f64::max);
         Effect::Unlisted(Unlisted::draw(sizes, warmest_degc, duration_s, random))
+    }
+
+    /// Loads up to an eighth off between every two stations, another one in each direction.
+    pub fn loads_by_stop(&self, random: &mut Random) -> Effect {
+        const MOST: f64 = 0.12;
+        let mut sections = Vec::new();
+        for direction in [1.0, -1.0] {
+            sections.extend(self.line.stations_m.windows(2).map(|pair| MassSection {
+                from_m: pair[0],
+                to_m: pair[1],
+                direction,
+                mass_factor: 1.0 + random.uniform(-MOST, MOST),
+            }));
+        }
+        Effect::MassChangeSections(sections)
     }
 
     /// About half of the fit runs and half of the holdout runs.
@@ -115,7 +126,7 @@ pub fn make_effect(
     random: &mut Random,
 ) -> Option<Effect> {
     let train = scene.train;
-    let w0_n_per_kn = scene.ordinary_w0_n_per_kn();
+    let w0_n_per_kn = train.ordinary_w0_n_per_kn();
     Some(match kind {
         EffectKind::None => return None,
         EffectKind::TunnelDrag => Effect::TunnelDrag { c_factor: random.uniform(1.4, 2.3) },
@@ -189,22 +200,13 @@ fn speed_delay(random: &mut Random) -> Effect {
 
 /// Three waves of 3 to 9 km, together about 1 ‰.
 fn gradient_error(scene: &EffectScene<'_>, random: &mut Random) -> Effect {
-    const APART_M: f64 = 100.0;
     let waves: Vec<[f64; 3]> = (0..3)
         .map(|_| {
             let wave_m = random.uniform(3000.0, 9000.0);
             [random.uniform(0.6, 1.1), wave_m, random.uniform(0.0, std::f64::consts::TAU)]
         })
         .collect();
-    let at = |chainage_m: f64| {
-        let wave = |[permille, wave_m, phase]: &[f64; 3]| {
-            permille * (std::f64::consts::TAU * chainage_m / wave_m + phase).sin()
-        };
-        waves.iter().map(wave).sum::<f64>()
-    };
-    let count = (scene.line.length_m / APART_M).ceil() as usize;
-    let chainages = (0..=count).map(|k| APART_M * k as f64);
-    Effect::GradientError { profile: chainages.map(|m| (m, rounded(at(m), 0.001))).collect() }
+    Effect::GradientError { profile: wavy(&waves, scene.line.length_m) }
 }
 
 /// In half of the runs, from somewhere in their first half to the end.

@@ -10,6 +10,7 @@
 //!
 //! - [`settings`]: what is asked of a dataset; [`random`]: a stream of numbers per subject
 //! - [`train_maker`], [`line_maker`], [`run_maker`]: what there is
+//! - [`deviations`]: what is a little wrong in everything declared
 //! - [`effects`], [`unlisted`], [`effect_maker`], [`disturbances`]: what is undeclared, and what it
 //!   changes
 //! - [`driving`], [`permitted_speed`], [`driver`], [`actuators`], [`dynamics`], [`true_run`],
@@ -23,6 +24,7 @@ pub mod columns;
 pub mod couplings;
 pub mod dataset_writer;
 pub mod defects;
+pub mod deviations;
 pub mod disturbances;
 pub mod driver;
 pub mod driving;
@@ -48,6 +50,7 @@ use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
 use dynocar_shared::TrainSample;
 
+pub use deviations::Deviations;
 pub use effects::Effect;
 pub use settings::{
     Defects, EffectRequest, ForceSampling, GnssReceiver, SimulatorSettings, TrainType,
@@ -197,6 +200,10 @@ fn fitting_types(request: &EffectRequest) -> Vec<TrainType> {
 fn draw_effects(settings: &SimulatorSettings, scene: &EffectScene<'_>) -> Vec<Effect> {
     match &settings.effects {
         EffectRequest::Exactly(effects) => effects.clone(),
+        EffectRequest::LoadsByStop => {
+            let mut random = Random::new(settings.seed, Stream::Effects);
+            vec![scene.loads_by_stop(&mut random)]
+        }
         EffectRequest::AnyLaw => {
             let mut random = Random::new(settings.seed, Stream::Effects);
             vec![scene.any_law(settings.duration_s, &mut random)]
@@ -223,7 +230,7 @@ fn simulate_run(
     let disturbances = Disturbances::of(effects, train, line, &plan, settings);
     let physics = TruePhysics { train, line, plan: &plan, disturbances: &disturbances };
     let mut states = drive_run(&physics, settings);
-    if settings.has_couplings {
+    if settings.deviations.has_couplings {
         couplings::move_leading_car(&physics, &mut states);
     }
     let clean = measure_run(

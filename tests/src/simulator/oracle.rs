@@ -208,6 +208,7 @@ fn acting_forces_n(recording: &Recording, disturbances: &Disturbances) -> Vec<f6
         let reported = [force(sample.traction_force_n), force(sample.brake_force_n)];
         let at = (sample.time_ns, sample.stretch);
         let [traction_n, brake_n] = late.acting(at, Some(reported)).unwrap_or(reported);
+        let brake_n = brake_n / disturbances.brake_gain;
         let carried_n = match (&disturbances.adhesion, sample.position_m) {
             (Some(cap), Some(position_m)) => {
                 cap.carried_n(brake_n, 1000.0 * sample.weight_kn, position_m)

@@ -25,6 +25,8 @@ pub enum Stream {
     SensorTypes,
     /// The survey's errors.
     Survey,
+    /// What is a little wrong in all runs alike.
+    Deviations,
     /// What differs from run to run without being planned.
     Variation(usize),
     /// The wind of a run's day.
@@ -54,6 +56,7 @@ impl Stream {
             Stream::Files => 5,
             Stream::SensorTypes => 11,
             Stream::Survey => 12,
+            Stream::Deviations => 10,
             Stream::Variation(run) => of_run(13, run),
             Stream::Day(run) => of_run(15, run),
             Stream::Gusts(run) => of_run(6, run),

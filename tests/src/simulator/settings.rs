@@ -2,6 +2,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
+use super::deviations::Deviations;
 use super::effects::Effect;
 
 /// A kind of train.
@@ -41,6 +42,8 @@ pub enum EffectRequest {
     Kinds(Vec<EffectKind>),
     /// Exactly these.
     Exactly(Vec<Effect>),
+    /// Another load between every two stations, in each direction.
+    LoadsByStop,
     /// One resistance by a law outside the library, drawn from the seed.
     AnyLaw,
 }
@@ -55,6 +58,7 @@ impl EffectRequest {
     pub fn kinds(&self) -> Vec<EffectKind> {
         match self {
             EffectRequest::Kinds(kinds) => kinds.clone(),
+            EffectRequest::LoadsByStop => vec![EffectKind::MassChange],
             EffectRequest::AnyLaw => vec![EffectKind::Unknown],
             EffectRequest::Exactly(effects) => effects.iter().map(Effect::kind).collect(),
         }
@@ -131,15 +135,8 @@ pub struct SimulatorSettings {
     pub is_level_and_straight: bool,
     /// Whether the map holds the line's tunnels; else its list of them is empty.
     pub maps_tunnels: bool,
-    /// Factor on the small things that nobody declares and no library holds: the survey's error of
-    /// each gradient (standard deviation 0.05 ‰), and from run to run the calibration of the
-    /// forces (0.2 %) and the basic resistance (1 %).
-    pub hidden_variation: f64,
-    /// Cars on couplings instead of a rigid train: the leading one, which carries the tacho, moves
-    /// against the others.
-    pub has_couplings: bool,
-    /// Spread in m/s of a wind of each run that nobody declares; its gusts spread as much.
-    pub daily_wind_sd_mps: f64,
+    /// What is a little wrong in everything that is declared.
+    pub deviations: Deviations,
     /// Wheel-slip events that a run has on average, where traction allows.
     pub wheel_slips_per_run: f64,
     /// What goes wrong between sensors and file.
@@ -199,9 +196,7 @@ impl SimulatorSettings {
             resistance_spread: 1.0,
             is_level_and_straight: false,
             maps_tunnels: true,
-            hidden_variation: 1.0,
-            has_couplings: false,
-            daily_wind_sd_mps: 0.0,
+            deviations: Deviations::PLAIN,
             wheel_slips_per_run: 0.25,
             defects: Defects::NONE,
             gnss: None,
@@ -210,21 +205,15 @@ impl SimulatorSettings {
         }
     }
 
-    /// The same with ideal sensors, declared Davis coefficients that are the true ones, no hidden
-    /// variation and no wheel slip: what is left of an error is the effect's or the predictor's.
+    /// The same with ideal sensors, declared Davis coefficients that are the true ones, no
+    /// deviations and no wheel slip: what is left of an error is the effect's or the predictor's.
     pub fn ideal(seed: u64, effects: EffectRequest) -> Self {
         SimulatorSettings {
             sensor_noise: 0.0,
             resistance_spread: 0.0,
-            hidden_variation: 0.0,
+            deviations: Deviations::NONE,
             wheel_slips_per_run: 0.0,
             ..SimulatorSettings::new(seed, effects)
         }
-    }
-
-    /// The same with cars on couplings, and winds that nobody declares: 0.4 m/s, seldom above the least that
-    /// is an effect.
-    pub fn coupled(self) -> Self {
-        SimulatorSettings { has_couplings: true, daily_wind_sd_mps: 0.4, ..self }
     }
 }

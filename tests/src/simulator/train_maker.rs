@@ -57,6 +57,11 @@ pub struct TrueTrain {
 }
 
 impl TrueTrain {
+    /// Unit basic resistance in N/kN at an ordinary speed.
+    pub fn ordinary_w0_n_per_kn(&self) -> f64 {
+        self.resistance.w0_n_per_kn(0.65 * self.handling.speed_max_mps)
+    }
+
     /// Greatest declared traction force in N at a speed in m/s.
     pub fn traction_max_n(&self, speed_mps: f64) -> f64 {
         self.declared.traction.as_ref().map_or(0.0, |effort| effort.force_n(speed_mps))

@@ -86,7 +86,7 @@ pub fn drive_run(physics: &TruePhysics<'_>, settings: &SimulatorSettings) -> Vec
         }
         let reported = Controls {
             traction_force_n: disturbances.traction_gain * forces.traction_force_n,
-            ..forces
+            brake_force_n: disturbances.brake_gain * forces.brake_force_n,
         };
         let under = physics.line_under(position_m);
         let inertial_mass_kg = mass_kg * (1.0 + disturbances.rotating_mass_factor);

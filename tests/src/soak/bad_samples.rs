@@ -9,7 +9,9 @@ use dynocar_shared::{Parameter, ParameterSnapshot, Status, TrainSample};
 
 use crate::sensor_failures::{SensorFailure, Spoiled};
 use crate::simulator::sensors::SIMULATED_TRAIN;
-use crate::simulator::{EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate};
+use crate::simulator::{
+    Deviations, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate,
+};
 
 /// Standard deviations within which a trusted value must lie.
 const STDS_MAX: f64 = 4.0;
@@ -88,7 +90,7 @@ impl Scene {
         settings.runs = 2;
         settings.holdout_runs = 0;
         settings.duration_s = 400.0;
-        settings.hidden_variation = 0.0;
+        settings.deviations = Deviations::NONE;
         settings.resistance_spread = 0.5;
         let data = simulate(&settings);
         let mut samples: Vec<TrainSample> = Vec::new();

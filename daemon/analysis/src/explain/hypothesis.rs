@@ -85,6 +85,29 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         permille.resize(run.samples().len(), 0.0);
     }
 
+    /// True where it changes what other effects do that only add a resistance or a gradient, or takes
+    /// their place.
+    fn changes_others(&self) -> bool {
+        false
+    }
+
+    /// True when it adds a resistance in proportion to its first parameter, and nothing else.
+    fn only_resists(&self) -> bool {
+        false
+    }
+
+    /// That resistance in N/kN at each sample of a run, for a first parameter of 1 and given others.
+    fn unit_n_per_kn(&self, _others: &[f64], run: &RunData, n_per_kn: &mut Vec<f64>) {
+        n_per_kn.clear();
+        n_per_kn.resize(run.samples().len(), 0.0);
+    }
+
+    /// A function of each parameter in which the declared forces with this effect are affine, each by
+    /// itself; `None` where there is none.
+    fn affine_in(&self) -> Option<fn(f64) -> f64> {
+        None
+    }
+
     /// Measured over true speed.
     fn speed_scale(&self, _parameters: &[f64]) -> f64 {
         1.0

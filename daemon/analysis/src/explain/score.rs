@@ -1,6 +1,7 @@
 //! Open-loop prediction: the judge of a finished model.
 
 use dynocar_core::simulate::{Prediction, Restart, SpeedError};
+use rayon::prelude::*;
 
 use super::bootstrap::intervals_95;
 use super::evidence::{Fit, FitProblem, GrownForces, RunData};
@@ -35,15 +36,23 @@ pub struct PredictedRun {
 
 /// Error of a model over one run.
 pub fn run_error(fit: &Fit, run: &RunData, restart: Restart) -> SpeedError {
-    error_at(fit, &fit.theta, run, restart)
+    let [error] = errors_at(fit, &fit.theta, run, [restart]);
+    error
 }
 
-/// The same with other parameters.
-fn error_at(fit: &Fit, theta: &[f64], run: &RunData, restart: Restart) -> SpeedError {
+/// Errors with other parameters, restarted in some ways.
+fn errors_at<const N: usize>(
+    fit: &Fit,
+    theta: &[f64],
+    run: &RunData,
+    restarts: [Restart; N],
+) -> [SpeedError; N] {
     let (mut forces, mut prediction) = (GrownForces::default(), Prediction::new());
     fit.model.forces(run, theta, &mut forces);
-    prediction.simulate(&run.recording, &forces, restart);
-    SpeedError::of(&run.recording, &prediction)
+    restarts.map(|restart| {
+        prediction.simulate(&run.recording, &forces, restart);
+        SpeedError::of(&run.recording, &prediction)
+    })
 }
 
 /// Errors of recorded runs from stop to stop, by the models without and with the effects; `None`
@@ -80,10 +89,13 @@ impl FitErrors {
     pub fn of(problem: &FitProblem, fit: &Fit) -> Self {
         let fitted = vec![fit.theta.clone(); problem.runs.len()];
         let speed_mps = [fitted, without_each_run(problem, fit)].map(|theta| {
-            [Restart::FullRun, Restart::WINDOW_60].map(|restart| {
-                let each = problem.runs.iter().zip(&theta);
-                let each = each.map(|(run, theta)| error_at(fit, theta, run, restart));
-                each.sum::<SpeedError>().rmse_mps().unwrap_or(0.0)
+            let restarts = [Restart::FullRun, Restart::WINDOW_60];
+            let each = problem.runs.par_iter().zip(&theta);
+            let each: Vec<[SpeedError; 2]> =
+                each.map(|(run, theta)| errors_at(fit, theta, run, restarts)).collect();
+            [0, 1].map(|restart| {
+                let errors = each.iter().map(|of_run| of_run[restart]);
+                errors.sum::<SpeedError>().rmse_mps().unwrap_or(0.0)
             })
         });
         let missed =

@@ -3,7 +3,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Joined, Key, Least, Parameter, Resistance, Suspect};
+use super::{Joined, Key, Least, Parameter, Resistance, Seen, Suspect};
 
 /// Headwind in m/s for the direction of growing chainage.
 pub const WIND_PLUS: Key = Key {
@@ -32,13 +32,19 @@ pub const SUSPECT: Suspect = Suspect {
     is_positive: false,
     least: Least::Share(1.0),
     changes_at_stops: false,
-    unit: |seen| {
-        let blows = |wind_plus_mps: f64| {
-            let mut air = Resistance::BASIC;
-            super::tunnel::enter(seen.tunnel_share, &mut air);
-            act(wind_plus_mps, seen.direction, &mut air);
-            air.extra_n_per_kn(seen.davis, seen.speed_mps)
-        };
-        0.5 * (blows(1.0) - blows(-1.0))
-    },
+    unit: |seen| unit(seen, seen.direction),
 };
+
+/// The wind of one day: a headwind in one run, whichever way it goes.
+pub const OF_THE_DAY: Suspect = Suspect { unit: |seen| unit(seen, 1.0), ..SUSPECT };
+
+/// What 1 m/s along the line adds, in N/kN.
+fn unit(seen: &Seen, direction: f64) -> f64 {
+    let blows = |wind_plus_mps: f64| {
+        let mut air = Resistance::BASIC;
+        super::tunnel::enter(seen.tunnel_share, &mut air);
+        act(wind_plus_mps, direction, &mut air);
+        air.extra_n_per_kn(seen.davis, seen.speed_mps)
+    };
+    0.5 * (blows(1.0) - blows(-1.0))
+}

@@ -6,7 +6,7 @@ use clap_complete::Shell;
 use dynocar::cli::Failure;
 use dynocar::output::print;
 
-/// Print the completions of all commands and options for a shell.
+/// Print the completions for a shell.
 #[derive(Debug, Args)]
 pub struct CompletionsArguments {
     /// The shell

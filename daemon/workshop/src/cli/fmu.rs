@@ -13,8 +13,9 @@ use dynocar::dataset;
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::{require_file, require_folder, tell, write_file, write_in_folder};
 
-/// Write the estimators, or the train itself, as an FMU for co-simulation (FMI 2.0), for Simulink,
-/// OpenModelica, Dymola or FMPy.
+/// Write the estimators, or the train itself, as an FMU for a simulator.
+///
+/// FMI 2.0 for co-simulation, as Simulink, OpenModelica, Dymola and FMPy take it.
 #[derive(Debug, Args)]
 pub struct FmuArguments {
     /// The train itself instead of the estimators: traction and brake force in, speed out

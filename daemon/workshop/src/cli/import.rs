@@ -16,8 +16,9 @@ use dynocar::cli::Failure;
 use dynocar::dataset::{file_error, read_text};
 use dynocar::output::{print, require_folder, require_new, write_new_in_folder};
 
-/// Write a train.toml and a track.toml out of files of railtoolkit, TTOBench or OSRD, and say of every
-/// field what became of it. Nothing is overwritten.
+/// Import trains and lines of railtoolkit, TTOBench or OSRD.
+///
+/// It writes train.toml and track.toml, and reports what became of every field. Nothing is overwritten.
 #[derive(Debug, Args)]
 pub struct ImportArguments {
     /// The files: YAML of railtoolkit, JSON of TTOBench or OSRD

@@ -18,8 +18,10 @@ use dynocar::ending;
 use dynocar::output::{OutputError, print, require_file, write_file};
 use dynocar::unpacking::UnpackError;
 
-/// Learn from recorded runs what the model in force lacks, and put it into the store as a candidate: at the
-/// start, when the daemon's residual monitor suspects something new, and at an hour
+/// Turn recorded runs into candidate models, while trains run.
+///
+/// It learns at the start, when the daemon's residual monitor suspects something new, and at an hour of the day,
+/// and puts what the model in force lacks into the store as a candidate.
 #[derive(Debug, Args)]
 pub struct LearnArguments {
     /// The daemon's configuration: the trains, what is declared of them, the log

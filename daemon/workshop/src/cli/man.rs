@@ -8,7 +8,7 @@ use clap_mangen::Man;
 use dynocar::cli::Failure;
 use dynocar::output::{require_folder, tell, write_in_folder};
 
-/// Write the pages of the manual, one for every command.
+/// Write the manual pages, one for every command.
 #[derive(Debug, Args)]
 pub struct ManArguments {
     /// Write the pages into this folder, which is made where there is none

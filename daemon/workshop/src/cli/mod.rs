@@ -85,6 +85,11 @@ fn all_commands() -> clap::Command {
     })
 }
 
+/// All commands of the workshop, with their options.
+pub fn commands() -> clap::Command {
+    Arguments::command()
+}
+
 /// Parses the command line, runs the command, reports a failure on standard error.
 pub fn main() -> ExitCode {
     let arguments = match parse::<Arguments>("dynocar") {

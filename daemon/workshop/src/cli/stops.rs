@@ -12,8 +12,9 @@ use dynocar::cli::Failure;
 use dynocar::dataset;
 use dynocar::output::{give, require_file};
 
-/// Deceleration over speed, friction and stopping distance from recorded stops: from speed alone,
-/// and the command of the brake where it is recorded.
+/// Estimate deceleration and stopping distance from recorded stops, without any force.
+///
+/// It needs the speed alone, and uses the command of the brake where it is recorded.
 #[derive(Debug, Args)]
 pub struct StopsArguments {
     /// The dataset's folder

@@ -67,6 +67,10 @@ impl Hypothesis for Linear {
         parameters[0].abs() > ambient::LEAST_PER_K
     }
 
+    fn affine_in(&self) -> Option<fn(f64) -> f64> {
+        Some(|value| value)
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         for (force, sample) in forces.iter_mut().zip(run.samples()) {
             let degc = sample.ambient_temperature_degc;

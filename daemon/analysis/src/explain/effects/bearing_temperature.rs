@@ -50,6 +50,19 @@ impl Hypothesis for Warming {
         &bearings::PARAMETERS
     }
 
+    fn only_resists(&self) -> bool {
+        true
+    }
+
+    fn unit_n_per_kn(&self, others: &[f64], run: &RunData, n_per_kn: &mut Vec<f64>) {
+        n_per_kn.clear();
+        n_per_kn.extend(run.samples().iter().map(|sample| {
+            let mut resistance = Resistance::BASIC;
+            bearings::act(1.0, others[0], sample.since_cold_s, &mut resistance);
+            resistance.bearing_n_per_kn
+        }));
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         for (force, sample) in forces.iter_mut().zip(run.samples()) {
             let since_cold_s = sample.since_cold_s;

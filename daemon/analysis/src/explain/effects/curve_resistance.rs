@@ -61,6 +61,10 @@ impl Hypothesis for Curves {
         (parameters[0] - self.declared_k).abs() > curve::LEAST_N_PER_KN_M
     }
 
+    fn affine_in(&self) -> Option<fn(f64) -> f64> {
+        Some(|value| value)
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         for (force, sample) in forces.iter_mut().zip(run.samples()) {
             curve::act(parameters[0], sample.curvature_per_m, &mut force.resistance);

@@ -262,6 +262,10 @@ impl Hypothesis for Dragging {
         self.choice_cost
     }
 
+    fn affine_in(&self) -> Option<fn(f64) -> f64> {
+        Some(|value| value)
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         for window in self.windows.iter().filter(|window| window.run == run.file) {
             let onset_s = window.t_start_s - run.offset_s;

@@ -92,6 +92,10 @@ impl Hypothesis for Shift {
         parameters[0].abs() > gradient::SHIFT_LEAST_M
     }
 
+    fn changes_others(&self) -> bool {
+        true
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         for (i, force) in forces.iter_mut().enumerate() {
             if let Some(gradient) = self.gradient_permille(run, i, parameters[0]) {

@@ -108,18 +108,28 @@ impl Hypothesis for Local {
         self.map_error
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+    fn only_resists(&self) -> bool {
+        true
+    }
+
+    fn unit_n_per_kn(&self, _others: &[f64], run: &RunData, n_per_kn: &mut Vec<f64>) {
+        n_per_kn.clear();
+        n_per_kn.resize(run.samples().len(), 0.0);
         if self.runs.as_ref().is_some_and(|runs| !runs.contains(&run.file)) {
             return;
         }
-        let Ok(profile) = place::profile(&self.stretches.intervals_m, parameters[0]) else {
-            return;
-        };
-        for (force, sample) in forces.iter_mut().zip(run.samples()) {
-            if let Some(position_m) = sample.position_m {
-                let extra_n_per_kn = profile.mean_around(position_m, self.length_m);
-                place::act(extra_n_per_kn, &mut force.resistance);
-            }
+        let Ok(profile) = place::profile(&self.stretches.intervals_m, 1.0) else { return };
+        for (n_per_kn, sample) in n_per_kn.iter_mut().zip(run.samples()) {
+            let at = sample.position_m.map(|at_m| profile.mean_around(at_m, self.length_m));
+            *n_per_kn = at.unwrap_or(0.0);
+        }
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+        let mut unit = Vec::new();
+        self.unit_n_per_kn(&[], run, &mut unit);
+        for (force, unit) in forces.iter_mut().zip(unit) {
+            place::act(parameters[0] * unit, &mut force.resistance);
         }
     }
 

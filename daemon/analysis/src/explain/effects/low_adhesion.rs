@@ -152,6 +152,10 @@ impl Hypothesis for Slippery {
         self.form == Form::Cap || parameters[0] < adhesion::RATIO_LEAST
     }
 
+    fn affine_in(&self) -> Option<fn(f64) -> f64> {
+        (self.form == Form::Ratio).then_some(|ratio| ratio)
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         if self.runs.as_ref().is_some_and(|runs| !runs.contains(&run.file)) {
             return;

@@ -48,6 +48,14 @@ impl Hypothesis for Gamma {
         (parameters[0] - self.declared).abs() > rotating::LEAST
     }
 
+    fn changes_others(&self) -> bool {
+        true
+    }
+
+    fn affine_in(&self) -> Option<fn(f64) -> f64> {
+        Some(|gamma| 1.0 / (1.0 + gamma))
+    }
+
     fn apply(&self, parameters: &[f64], _run: &RunData, forces: &mut [SampleForces]) {
         for force in forces {
             force.rotating_mass_factor = parameters[0];

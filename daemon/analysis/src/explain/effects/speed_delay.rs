@@ -74,6 +74,10 @@ impl Hypothesis for DelayAndLag {
         parameters[0] + parameters[1] > speed_delay::LEAST_S
     }
 
+    fn changes_others(&self) -> bool {
+        true
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         let mut late = LateSpeed::new(parameters[0], parameters[1]);
         for (force, sample) in forces.iter_mut().zip(run.samples()) {

@@ -49,6 +49,10 @@ impl Hypothesis for Gain {
         (parameters[0] - 1.0).abs() > traction::LEAST
     }
 
+    fn affine_in(&self) -> Option<fn(f64) -> f64> {
+        Some(f64::recip)
+    }
+
     fn apply(&self, parameters: &[f64], _run: &RunData, forces: &mut [SampleForces]) {
         for force in forces {
             force.traction_n = traction::true_force_n(force.traction_n, parameters[0]);

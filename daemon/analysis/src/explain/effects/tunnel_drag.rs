@@ -104,6 +104,10 @@ impl Hypothesis for Tunnels {
         parameters[0] > tunnel::LEAST_SHARE_OF_C * c
     }
 
+    fn affine_in(&self) -> Option<fn(f64) -> f64> {
+        Some(|value| value)
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
         let found = self.found.as_ref().map(|found| place::profile(&found.intervals_m, 1.0));
         for (force, sample) in forces.iter_mut().zip(run.samples()) {

@@ -48,6 +48,10 @@ impl Hypothesis for Scale {
         (parameters[0] - 1.0).abs() > wheel::LEAST
     }
 
+    fn changes_others(&self) -> bool {
+        true
+    }
+
     fn apply(&self, _parameters: &[f64], _run: &RunData, _forces: &mut [SampleForces]) {}
 
     fn speed_scale(&self, parameters: &[f64]) -> f64 {

@@ -1,7 +1,7 @@
 //! What is left of something that fades, step by step.
 
 /// Steps in s that differ by no more are equal: what is left of rounded times.
-const SAME_STEP_S: f64 = 1e-9;
+pub(super) const SAME_STEP_S: f64 = 1e-9;
 
 /// The share exp(-step / time) that is left after each step; computed anew only where the step
 /// changes, for nearly all steps of a recording are equal.

@@ -16,6 +16,7 @@ mod late_speed;
 mod model;
 mod noise;
 mod noise_search;
+mod response;
 mod run_data;
 mod run_scatter;
 mod sample_forces;

@@ -4,6 +4,7 @@ use dynocar_core::simulate::{ForceModel, QuadraticForces};
 use dynocar_core::terms::wheel;
 use dynocar_core::train::Davis;
 
+use super::response::Response;
 use super::run_data::RunData;
 use super::sample_forces::SampleForces;
 use crate::explain::hypothesis::SharedHypothesis;
@@ -41,14 +42,26 @@ impl GrownModel {
             .collect()
     }
 
-    /// The effects on the declared forces of a run.
-    fn act(&self, run: &RunData, theta: &[f64], forces: &mut GrownForces) {
+    /// True where what each effect does is the same whatever the others do.
+    pub fn adds_up(&self) -> bool {
+        !self.effects.iter().any(|effect| effect.changes_others())
+    }
+
+    /// Some of the effects on the declared forces of a run.
+    fn act(
+        &self,
+        run: &RunData,
+        theta: &[f64],
+        acts: impl Fn(usize) -> bool,
+        forces: &mut GrownForces,
+    ) {
         forces.samples.clear();
         forces.samples.extend_from_slice(&run.declared);
         forces.speed_scale = 1.0;
         for is_last in [false, true] {
-            let effects = self.effects.iter().zip(self.ranges());
-            for (effect, range) in effects.filter(|it| it.0.is_of_the_whole_record() == is_last) {
+            let effects = self.effects.iter().zip(self.ranges()).enumerate();
+            let turn = |effect: &SharedHypothesis| effect.is_of_the_whole_record() == is_last;
+            for (_, (effect, range)) in effects.filter(|it| turn(it.1.0) && acts(it.0)) {
                 effect.apply(&theta[range.clone()], run, &mut forces.samples);
                 forces.speed_scale *= effect.speed_scale(&theta[range]);
             }
@@ -57,7 +70,7 @@ impl GrownModel {
 
     /// The forces on a run for given parameters; `theta` starts with a, b, c.
     pub fn forces(&self, run: &RunData, theta: &[f64], forces: &mut GrownForces) {
-        self.act(run, theta, forces);
+        self.act(run, theta, |_| true, forces);
         let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
         let scale = forces.speed_scale;
         let samples = forces.samples.iter().zip(&run.smooth_mps);
@@ -76,38 +89,88 @@ impl GrownModel {
         forces: &mut GrownForces,
         bins: &mut Vec<f64>,
     ) {
-        self.act(run, theta, forces);
+        self.predict_bins_of(run, theta, |_| true, forces, bins);
+    }
+
+    /// The same with some of the effects, by their number.
+    pub fn predict_bins_of(
+        &self,
+        run: &RunData,
+        theta: &[f64],
+        acts: impl Fn(usize) -> bool,
+        forces: &mut GrownForces,
+        bins: &mut Vec<f64>,
+    ) {
+        self.act(run, theta, acts, forces);
         let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
         let scale = forces.speed_scale;
         let acceleration = |i: usize| {
             let speed_mps = wheel::true_speed_mps(run.smooth_mps[i], scale);
             let [p0, p1, p2] = forces.samples[i].polynomial(davis, speed_mps);
-            scale * (p0 + speed_mps * (p1 + speed_mps * p2))
+            [scale * (p0 + speed_mps * (p1 + speed_mps * p2))]
         };
-        integrate_bins(run, acceleration, bins);
+        integrate_bins(run, acceleration, [bins]);
+    }
+
+    /// What some of the effects make of the bins for every a, b and c.
+    pub fn response(
+        &self,
+        run: &RunData,
+        theta: &[f64],
+        acts: impl Fn(usize) -> bool,
+        forces: &mut GrownForces,
+        response: &mut Response,
+    ) {
+        self.act(run, theta, acts, forces);
+        let scale = forces.speed_scale;
+        let none = Davis { a: 0.0, b: 0.0, c: 0.0 };
+        let accelerations = |i: usize| {
+            let speed_mps = wheel::true_speed_mps(run.smooth_mps[i], scale);
+            let state = &forces.samples[i];
+            let [p0, p1, p2] = state.polynomial(none, speed_mps);
+            let [a, b, c] = state.davis_slopes(speed_mps);
+            [p0 + speed_mps * (p1 + speed_mps * p2), a, b, c].map(|own| scale * own)
+        };
+        let Response { rest, davis: [by_a, by_b, by_c] } = response;
+        integrate_bins(run, accelerations, [rest, by_a, by_b, by_c]);
     }
 }
 
-/// Integral of an acceleration in m/s² over each segment of motion, averaged over the bins.
-pub fn integrate_bins(run: &RunData, acceleration: impl Fn(usize) -> f64, bins: &mut Vec<f64>) {
+/// Integrals of accelerations in m/s² over each segment of motion, averaged over the bins.
+pub fn integrate_bins<const N: usize>(
+    run: &RunData,
+    accelerations: impl Fn(usize) -> [f64; N],
+    mut bins: [&mut Vec<f64>; N],
+) {
     let time_s = run.recording.time_s();
-    bins.clear();
+    for bins in &mut bins {
+        bins.clear();
+        bins.reserve(run.bins.len());
+    }
     let mut segment = usize::MAX;
-    let (mut gained, mut last) = (0.0, (0.0, 0.0));
+    let (mut gained, mut last_s, mut last) = ([0.0; N], 0.0, [0.0; N]);
     for bin in &run.bins {
-        let mut sum = 0.0;
+        let mut sums = [0.0; N];
         for i in bin.first..bin.end {
-            let here = (time_s[i], acceleration(i));
+            let here = accelerations(i);
             if bin.segment == segment || i > bin.first {
-                gained += 0.5 * (here.0 - last.0) * (here.1 + last.1);
+                let half_s = 0.5 * (time_s[i] - last_s);
+                for k in 0..N {
+                    gained[k] += half_s * (here[k] + last[k]);
+                }
             } else {
-                gained = 0.0;
+                gained = [0.0; N];
             }
-            last = here;
-            sum += gained;
+            (last_s, last) = (time_s[i], here);
+            for k in 0..N {
+                sums[k] += gained[k];
+            }
         }
         segment = bin.segment;
-        bins.push(sum / (bin.end - bin.first) as f64);
+        let count = (bin.end - bin.first) as f64;
+        for (bins, sum) in bins.iter_mut().zip(sums) {
+            bins.push(sum / count);
+        }
     }
 }
 
@@ -120,20 +183,11 @@ pub struct GrownForces {
 }
 
 impl GrownForces {
-    /// What the bins of the prediction made last change by for each unit of a (0), b (1) or c (2).
-    pub fn davis_slopes(&self, run: &RunData, coefficient: usize, bins: &mut Vec<f64>) {
-        let scale = self.speed_scale;
-        let slope = |i: usize| {
-            let speed_mps = wheel::true_speed_mps(run.smooth_mps[i], scale);
-            scale * self.samples[i].davis_slopes(speed_mps)[coefficient]
-        };
-        integrate_bins(run, slope, bins);
-    }
-
-    /// What they change by for a gradient in ‰ along the travel at each sample.
+    /// What the bins of the prediction made last change by for a gradient in ‰ along the travel at each
+    /// sample.
     pub fn gradient_slopes(&self, run: &RunData, permille: &[f64], bins: &mut Vec<f64>) {
-        let slope = |i: usize| self.speed_scale * self.samples[i].gradient_slope() * permille[i];
-        integrate_bins(run, slope, bins);
+        let slope = |i: usize| [self.speed_scale * self.samples[i].gradient_slope() * permille[i]];
+        integrate_bins(run, slope, [bins]);
     }
 }
 

@@ -1,24 +1,25 @@
 //! The likeliest noise of what a model leaves.
 
+use rayon::prelude::*;
+
 use super::noise::Noise;
 use super::run_data::RunData;
 use super::whitener::Whitener;
 
 /// What is tried for the noise at changes of the control force, in s.
 const JUMPS_S: [f64; 6] = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0];
+/// Runs that one thread takes at a time: less work is not worth handing out.
+const RUNS_A_TASK: usize = 8;
 
 impl Noise {
     /// The noise under which the differences of the fit runs from a model are likeliest, robust
     /// to outliers. `residuals` holds one vector of bin differences per run.
     pub fn estimate(runs: &[RunData], residuals: &[Vec<f64>], start: Noise) -> Noise {
         let cost = |noise: Noise| -> f64 {
-            let mut whitened = Vec::new();
-            let of_run = |(run, residual): (&RunData, &Vec<f64>)| {
-                let whitener = Whitener::new(run, noise);
-                whitener.whiten(residual, &mut whitened);
-                whitener.minus_two_log_likelihood(&whitened)
-            };
-            runs.iter().zip(residuals).map(of_run).sum()
+            let each = runs.par_iter().zip(residuals).with_min_len(RUNS_A_TASK);
+            let costs: Vec<f64> =
+                each.map(|(run, residual)| Whitener::cost(run, noise, residual)).collect();
+            costs.iter().sum()
         };
         let smooth = likeliest(start, &cost);
         let with = |jump_s: &f64| Noise { jump_s: *jump_s, ..smooth };

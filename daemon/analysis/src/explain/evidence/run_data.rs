@@ -2,6 +2,7 @@
 
 use dynocar_core::force::{ForceResolver, ResolvedSample};
 use dynocar_core::simulate::{BridgeLimits, Recording, SimulateError};
+use dynocar_core::terms::extra::Covariate;
 use dynocar_core::train::TrainModel;
 use dynocar_core::validation::{ValidationLimits, Validator};
 use dynocar_shared::TrainSample;
@@ -31,6 +32,8 @@ pub struct RunData {
     pub declared: Vec<SampleForces>,
     /// Cleaned speed in m/s, lightly smoothed, at which resistances are evaluated.
     pub smooth_mps: Vec<f64>,
+    /// What a force may depend on, by the number of the covariate, at each sample; `NaN` where unknown.
+    covariates: Vec<Vec<f64>>,
     /// The bins of all segments of motion, in order of time.
     pub bins: Vec<Bin>,
     /// Way by position over way by integrated speed, with its standard deviation, where
@@ -95,6 +98,11 @@ impl RunData {
         self.recording.samples()
     }
 
+    /// A covariate at each sample; `NaN` where it is not known.
+    pub fn covariate(&self, of: Covariate) -> &[f64] {
+        &self.covariates[of as usize]
+    }
+
     /// Time in s of moving, used motion.
     pub fn moving_s(&self) -> f64 {
         let time_s = self.recording.time_s();
@@ -143,6 +151,10 @@ fn prepare_run(
         .map(|sample| SampleForces::declared(sample, train.rotating_mass_factor))
         .collect();
     let smooth_mps = smoothed(&recording);
+    let of_samples = |of: &Covariate| {
+        recording.samples().iter().map(|sample| sample.covariate(*of).unwrap_or(f64::NAN)).collect()
+    };
+    let covariates = Covariate::ALL.iter().map(of_samples).collect();
     let bins = bins::bins(&recording);
     let is_position_recorded = run.position_source != PositionSource::IntegratedSpeed;
     let way_ratio = if is_position_recorded { way_ratio(&recording) } else { None };
@@ -159,6 +171,7 @@ fn prepare_run(
         recording,
         declared,
         smooth_mps,
+        covariates,
         bins,
         way_ratio,
         speed_late_s,

@@ -60,12 +60,12 @@ pub fn scatter_columns(run: &RunData, davis: Davis) -> Columns {
     let mut columns = Columns::default();
     let force =
         |i: usize| samples[i].control_force_n().unwrap_or(0.0) / samples[i].inertial_mass_kg;
-    integrate_bins(run, force, &mut columns[0]);
+    let [by_force, by_resistance, by_delay] = &mut columns;
     let resistance = |i: usize| {
         let per_unit = samples[i].weight_kn / samples[i].inertial_mass_kg;
         -per_unit * davis.w0_n_per_kn(run.smooth_mps[i])
     };
-    integrate_bins(run, resistance, &mut columns[1]);
+    integrate_bins(run, |i| [force(i), resistance(i)], [by_force, by_resistance]);
     // The integral of the force's slope is the force.
     let mut segment = usize::MAX;
     let mut at_start = 0.0;
@@ -74,7 +74,7 @@ pub fn scatter_columns(run: &RunData, davis: Davis) -> Columns {
             (segment, at_start) = (bin.segment, force(bin.first));
         }
         let mean = (bin.first..bin.end).map(force).sum::<f64>() / (bin.end - bin.first) as f64;
-        columns[2].push(at_start - mean);
+        by_delay.push(at_start - mean);
     }
     columns
 }

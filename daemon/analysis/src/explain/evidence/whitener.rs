@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::fade::Fade;
+use super::bins::Bin;
+use super::fade::{Fade, SAME_STEP_S};
 use super::noise::Noise;
 use super::run_data::RunData;
 use dynocar_core::filter::Gaussian;
@@ -54,44 +55,153 @@ fn fading_noise(fade: f64, step_s: f64, fading_s: f64) -> Matrix2<f64> {
     Matrix2::new(speed.max(0.0), both, both, 1.0 - fade * fade)
 }
 
+/// Variances so near to each other, by their share, are one: the filter has settled.
+const SETTLED_SHARE: f64 = 1e-14;
+
+/// The filter on its way over the bins of a run.
+struct Walk {
+    noise: Noise,
+    belief: Gaussian<2>,
+    before: Option<(usize, f64)>,
+    by_step: Fade,
+    /// The step made last within a segment.
+    last: Option<Settling>,
+}
+
+/// A step from one belief to the next: from the same belief the same step leads to the same.
+#[derive(Clone, Copy)]
+struct Settling {
+    time_s: f64,
+    bin_var: f64,
+    from: Matrix2<f64>,
+    to: Matrix2<f64>,
+    step: Step,
+    variance: f64,
+}
+
+impl Settling {
+    fn is_from(&self, belief: &Matrix2<f64>, time_s: f64, bin_var: f64) -> bool {
+        let is_near = |one: f64, other: f64| (one - other).abs() <= SETTLED_SHARE * other.abs();
+        self.bin_var == bin_var
+            && (self.time_s - time_s).abs() <= SAME_STEP_S
+            && self.from.iter().zip(belief.iter()).all(|(from, now)| is_near(*from, *now))
+    }
+}
+
+impl Walk {
+    fn new(noise: Noise) -> Self {
+        let std = Vector2::new(0.0, noise.fading_var.sqrt());
+        let belief = Gaussian::<2>::independent(Vector2::zeros(), std);
+        Walk { noise, belief, before: None, by_step: Fade::new(noise.fading_s), last: None }
+    }
+
+    /// The step to the next bin and the variance of the innovation there, 1 where there is none.
+    #[inline]
+    fn step(&mut self, bin: &Bin) -> (Step, f64) {
+        let Noise { fading_var, fading_s, .. } = self.noise;
+        let bin_var = self.noise.bin_var(bin.jump_mps2);
+        let step_s = self.before.map_or(0.0, |(_, time_s)| bin.time_s - time_s);
+        let starts = self.before.is_none_or(|(segment, _)| segment != bin.segment);
+        self.before = Some((bin.segment, bin.time_s));
+        let belief = &mut self.belief;
+        if let Some(last) = self.last.filter(|_| !starts)
+            && last.is_from(&belief.covariance, step_s, bin_var)
+        {
+            belief.covariance = last.to;
+            return (last.step, last.variance);
+        }
+        let fade = self.by_step.over(step_s);
+        let carry_s = fading_s * (1.0 - fade);
+        let mut step =
+            Step { starts, fade, carry_s, gain: Vector2::new(1.0, 0.0), per_deviation: 0.0 };
+        if starts {
+            belief.fade(FADING, fade, fading_var * (1.0 - fade * fade));
+            belief.replace(LEVEL, 0.0, bin_var);
+            return (step, 1.0);
+        }
+        let from = belief.covariance;
+        let moved = Matrix2::new(1.0, carry_s, 0.0, fade);
+        let added = fading_var * fading_noise(fade, step_s, fading_s);
+        let white = Matrix2::new(self.noise.white_density * step_s, 0.0, 0.0, 0.0);
+        belief.predict(Vector2::zeros(), &moved, &(added + white));
+        // Without mean and observation only the variances are told.
+        let Ok(innovation) = belief.innovation(LEVEL, 0.0, bin_var) else { return (step, 1.0) };
+        step.gain = belief.take(LEVEL, &innovation, bin_var);
+        step.per_deviation = innovation.inverse_variance.sqrt();
+        let (to, variance) = (belief.covariance, innovation.variance);
+        self.last = Some(Settling { time_s: step_s, bin_var, from, to, step, variance });
+        (step, variance)
+    }
+}
+
+/// A sum of logarithms, taken of products.
+struct LogSum {
+    sum: f64,
+    product: f64,
+}
+
+impl LogSum {
+    const NOTHING: LogSum = LogSum { sum: 0.0, product: 1.0 };
+    /// A product beyond these is closed: far from what a number holds, for variances above 1e-30.
+    const CLOSED: [f64; 2] = [1e-200, 1e200];
+
+    #[inline]
+    fn add(&mut self, value: f64) {
+        self.product *= value;
+        if !(Self::CLOSED[0]..Self::CLOSED[1]).contains(&self.product) {
+            self.sum += self.product.ln();
+            self.product = 1.0;
+        }
+    }
+
+    fn total(&self) -> f64 {
+        self.sum + self.product.ln()
+    }
+}
+
+/// The level of the speed difference and the fading acceleration at a bin.
+#[derive(Default)]
+struct Tracked {
+    level: f64,
+    fading: f64,
+}
+
+impl Tracked {
+    /// The innovation of the next difference.
+    #[inline]
+    fn innovation(&mut self, step: &Step, value: f64) -> f64 {
+        let ahead = if step.starts { value } else { self.level + step.carry_s * self.fading };
+        let difference = value - ahead;
+        self.level = ahead + step.gain[LEVEL] * difference;
+        self.fading = self.fading * step.fade + step.gain[FADING] * difference;
+        difference * step.per_deviation
+    }
+}
+
 impl Whitener {
     /// The filter of one run: level of the speed difference and fading acceleration. Each segment
     /// of motion starts with an unknown level; the fading acceleration lives through stops.
     pub fn new(run: &RunData, noise: Noise) -> Self {
-        let Noise { white_density, fading_var, fading_s, .. } = noise;
-        let mut belief =
-            Gaussian::<2>::independent(Vector2::zeros(), Vector2::new(0.0, fading_var.sqrt()));
-        let mut log_determinant = 0.0;
-        let mut before: Option<(usize, f64)> = None;
-        let mut steps = Vec::with_capacity(run.bins.len());
-        let mut by_step = Fade::new(fading_s);
-        for bin in &run.bins {
-            let bin_var = noise.bin_var(bin.jump_mps2);
-            let step_s = before.map_or(0.0, |(_, time_s)| bin.time_s - time_s);
-            let starts = before.is_none_or(|(segment, _)| segment != bin.segment);
-            before = Some((bin.segment, bin.time_s));
-            let fade = by_step.over(step_s);
-            let carry_s = fading_s * (1.0 - fade);
-            let mut step =
-                Step { starts, fade, carry_s, gain: Vector2::new(1.0, 0.0), per_deviation: 0.0 };
-            if starts {
-                belief.fade(FADING, fade, fading_var * (1.0 - fade * fade));
-                belief.replace(LEVEL, 0.0, bin_var);
-            } else {
-                let moved = Matrix2::new(1.0, carry_s, 0.0, fade);
-                let added = fading_var * fading_noise(fade, step_s, fading_s);
-                let white = Matrix2::new(white_density * step_s, 0.0, 0.0, 0.0);
-                belief.predict(Vector2::zeros(), &moved, &(added + white));
-                // Without mean and observation only the variances are told.
-                if let Ok(innovation) = belief.innovation(LEVEL, 0.0, bin_var) {
-                    step.gain = belief.take(LEVEL, &innovation, bin_var);
-                    step.per_deviation = innovation.inverse_variance.sqrt();
-                    log_determinant += innovation.variance.ln();
-                }
-            }
-            steps.push(step);
+        let (mut walk, mut logarithms) = (Walk::new(noise), LogSum::NOTHING);
+        let step = |bin| {
+            let (step, variance) = walk.step(bin);
+            logarithms.add(variance);
+            step
+        };
+        let steps = run.bins.iter().map(step).collect();
+        Whitener { steps, log_determinant: logarithms.total() }
+    }
+
+    /// Robust -2 log likelihood of a series of bin differences under a noise, up to a constant.
+    pub fn cost(run: &RunData, noise: Noise, series: &[f64]) -> f64 {
+        let (mut walk, mut logarithms) = (Walk::new(noise), LogSum::NOTHING);
+        let (mut tracked, mut loss) = (Tracked::default(), 0.0);
+        for (bin, &value) in run.bins.iter().zip(series) {
+            let (step, variance) = walk.step(bin);
+            logarithms.add(variance);
+            loss += robust_loss(tracked.innovation(&step, value));
         }
-        Whitener { steps, log_determinant }
+        logarithms.total() + loss
     }
 
     /// Innovations of a series of bin differences; 0 where a segment starts.
@@ -102,15 +212,9 @@ impl Whitener {
     /// Innovations of a series that is zero before bin number `first` and starts there.
     pub fn whiten_from(&self, first: usize, series: &[f64], innovations: &mut Vec<f64>) {
         innovations.clear();
-        let (mut level, mut fading) = (0.0, 0.0);
-        for (step, &value) in self.steps[first..].iter().zip(series) {
-            let ahead = if step.starts { value } else { level + step.carry_s * fading };
-            fading *= step.fade;
-            let difference = value - ahead;
-            innovations.push(difference * step.per_deviation);
-            level = ahead + step.gain[LEVEL] * difference;
-            fading += step.gain[FADING] * difference;
-        }
+        let mut tracked = Tracked::default();
+        let steps = self.steps[first..].iter().zip(series);
+        innovations.extend(steps.map(|(step, &value)| tracked.innovation(step, value)));
     }
 
     /// Robust -2 log likelihood of the innovations, up to a constant.

@@ -13,6 +13,14 @@ pub enum Inside {
 }
 
 impl Inside {
+    /// How far in m from its centre a train is inside a place.
+    pub fn reach_m(self) -> f64 {
+        match self {
+            Inside::Share { length_m } => 0.5 * length_m.max(1.0),
+            Inside::Centre => 0.0,
+        }
+    }
+
     /// The share of the train inside any of some disjoint intervals, 0 to 1, by the chainage of
     /// its centre; 0 where that is not known.
     #[inline]

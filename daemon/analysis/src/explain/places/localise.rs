@@ -1,6 +1,7 @@
 //! Where along the line, and in which runs, a force of a given shape acts.
 
 use dynocar_core::track::Track;
+use rayon::prelude::*;
 
 use super::found::Found;
 use super::inside::Inside;
@@ -30,7 +31,7 @@ struct Cell {
 }
 
 /// A shape: acceleration in m/s² per unit at a sample of a run, where the force acts in full.
-pub type Shape<'s> = &'s dyn Fn(&RunData, usize) -> f64;
+pub type Shape<'s> = &'s (dyn Fn(&RunData, usize) -> f64 + Sync);
 
 /// A shape at the bins of all fit runs, with the places of the bins.
 struct Places<'s, 'a> {
@@ -39,7 +40,12 @@ struct Places<'s, 'a> {
     positive: bool,
     /// By run and bin: chainage in m and acceleration in m/s² per unit.
     bins: Vec<Vec<(Option<f64>, f64)>>,
+    /// By run, for each [`BLOCK`] of bins: least and greatest chainage in m.
+    blocks: Vec<Vec<[f64; 2]>>,
 }
+
+/// Bins that are looked at together.
+const BLOCK: usize = 16;
 
 impl<'s, 'a> Places<'s, 'a> {
     fn new(scan: &'s Scan<'a>, shape: Shape, inside: Inside, positive: bool) -> Self {
@@ -47,8 +53,15 @@ impl<'s, 'a> Places<'s, 'a> {
             let middles = run.bins.iter().map(Bin::middle);
             middles.map(|i| (run.samples()[i].position_m, shape(run, i))).collect()
         };
-        let bins = scan.problem.runs.iter().map(at_bins).collect();
-        Places { scan, inside, positive, bins }
+        let bins: Vec<Vec<(Option<f64>, f64)>> = scan.problem.runs.iter().map(at_bins).collect();
+        let extent = |block: &[(Option<f64>, f64)]| {
+            let known = block.iter().filter_map(|bin| bin.0);
+            known.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], at| {
+                [low.min(at), high.max(at)]
+            })
+        };
+        let blocks = bins.iter().map(|run| run.chunks(BLOCK).map(extent).collect()).collect();
+        Places { scan, inside, positive, bins, blocks }
     }
 
     fn run_tuple(&self, index: usize, intervals_m: &[[f64; 2]]) -> Tuple {
@@ -59,7 +72,16 @@ impl<'s, 'a> Places<'s, 'a> {
             0.0 => 0.0,
             share => share * value,
         };
-        let shape: Vec<f64> = self.bins[index].iter().map(value).collect();
+        let reach_m = self.inside.reach_m();
+        let may_be_in = |[low, high]: &[f64; 2]| {
+            intervals_m.iter().any(|[from, to]| low - reach_m <= *to && high + reach_m >= *from)
+        };
+        let bins = &self.bins[index];
+        let mut shape = vec![0.0; bins.len()];
+        let blocks = shape.chunks_mut(BLOCK).zip(bins.chunks(BLOCK)).zip(&self.blocks[index]);
+        for ((shape, bins), _) in blocks.filter(|(_, extent)| may_be_in(extent)) {
+            shape.iter_mut().zip(bins).for_each(|(shape, bin)| *shape = value(bin));
+        }
         self.scan.shape_tuple(index, &shape)
     }
 
@@ -84,18 +106,18 @@ pub fn span_m(scan: &Scan) -> Option<[f64; 2]> {
 
 fn cells(places: &Places, [low, high]: [f64; 2]) -> Vec<Cell> {
     let shortest_m = SHORTEST_M.max((high - low) / 250.0);
-    let mut cells = Vec::new();
+    let mut intervals_m = Vec::new();
     let mut length_m = shortest_m;
     while length_m < 0.6 * (high - low) {
         let count = ((high - low) / (0.5 * length_m)).ceil() as usize;
         for k in 0..count {
             let from_m = low + 0.5 * length_m * k as f64;
-            let interval_m = [from_m, from_m + length_m];
-            cells.push(Cell { interval_m, runs: places.tuples(interval_m) });
+            intervals_m.push([from_m, from_m + length_m]);
         }
         length_m *= 1.6;
     }
-    cells
+    let cell = |interval_m| Cell { interval_m, runs: places.tuples(interval_m) };
+    intervals_m.into_par_iter().map(cell).collect()
 }
 
 /// Finds the intervals and runs in which a common factor on a shape explains most.
@@ -108,9 +130,12 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside, positive: bool) -> Option
     let cells = cells(&places, span);
     let interval_cost = 2.0 * (cells.len().max(2) as f64).ln();
     let runs_min = PLACE_RUNS_MIN.min(scan.problem.runs.len());
-    let best = cells
-        .iter()
+    let by_runs: Vec<_> = cells
+        .par_iter()
         .map(|cell| (cell, best_runs(scan, &cell.runs, positive, runs_min)))
+        .collect();
+    let best = by_runs
+        .into_iter()
         .max_by(|one, other| (one.1.1 - one.1.3).total_cmp(&(other.1.1 - other.1.3)))?;
     let (cell, (runs, gain, _, subset)) = best;
     if gain <= 0.0 {

@@ -29,7 +29,7 @@ struct Belief {
 /// Moves the ends of all places of a fit to the medians of their posteriors, fits again, and says
 /// for each effect how surely its place is known; `None` for one whose place was not estimated.
 pub fn settle(problem: &FitProblem, fit: &mut Fit) -> Vec<Option<PlaceUncertainty>> {
-    let mut nearby = Nearby::new(problem, fit);
+    let nearby = Nearby::new(problem, fit);
     let mut model = fit.model.clone();
     let mut known = Vec::new();
     let mut moved = 0;
@@ -49,7 +49,7 @@ pub fn settle(problem: &FitProblem, fit: &mut Fit) -> Vec<Option<PlaceUncertaint
                 moved += 1;
             }
         }
-        let runs = run_probability(problem, &mut nearby, &model, index);
+        let runs = run_probability(problem, &nearby, &model, index);
         known.push(uncertainty.finished(runs));
     }
     if moved > 0 {
@@ -156,7 +156,7 @@ fn discrete(points: &[(f64, f64)]) -> Belief {
 /// or none is as likely beforehand.
 fn run_probability(
     problem: &FitProblem,
-    nearby: &mut Nearby,
+    nearby: &Nearby,
     model: &GrownModel,
     index: usize,
 ) -> Option<BTreeMap<String, f64>> {
@@ -164,7 +164,7 @@ fn run_probability(
     let chosen = effect.chosen_runs()?;
     let mut probability = BTreeMap::new();
     for run in &problem.runs {
-        let mut cost = |is_in: bool| {
+        let cost = |is_in: bool| {
             let mut files: Vec<String> =
                 chosen.iter().filter(|file| **file != run.file).cloned().collect();
             files.extend(is_in.then(|| run.file.clone()));

@@ -1,16 +1,16 @@
-//! What one unit of each suspect would retard the train at a sample, and its impulse by blocks.
+//! What one unit of each column would retard the train at a sample, and its impulse by blocks.
 
 use nalgebra::SVector;
 
 use super::place_memory::PlaceMemory;
-use super::suspects::{BANK, SUSPECTS};
+use super::suspects::{COVARIATES, covariate};
 use crate::force::ResolvedSample;
 use crate::pipeline::resistance::sample::UnitSample;
 use crate::terms::Seen;
 use crate::train::Davis;
 
-/// One value for each suspect of the bank.
-pub type Covariates = SVector<f64, SUSPECTS>;
+/// One value for each column that comes from samples.
+pub type Covariates = SVector<f64, COVARIATES>;
 
 /// A longer gap in s between two samples is the start of a new run.
 const RUN_GAP_S: f64 = 900.0;
@@ -31,7 +31,7 @@ impl RunClock {
     }
 }
 
-/// The retarding force in N/kN of one unit of each suspect.
+/// The retarding force in N/kN of one unit of each column.
 pub fn covariates(
     sample: &ResolvedSample,
     unit: &UnitSample,
@@ -54,7 +54,7 @@ pub fn covariates(
         earlier: earlier.resistance,
         earlier_uphill: earlier.uphill,
     };
-    Covariates::from_fn(|place, _| (BANK[place].unit)(&seen))
+    Covariates::from_fn(|place, _| (covariate(place).unit)(&seen))
 }
 
 /// Integrals of the covariates from the mean of one block to that of the next, weighed as the

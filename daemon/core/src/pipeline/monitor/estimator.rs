@@ -2,16 +2,19 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
-use nalgebra::{SVector, Vector1};
+use nalgebra::Vector1;
 
 use super::covariates::{CovariateImpulse, Covariates, RunClock, covariates};
-use super::information::{BaseVector, Information, JOINT};
+use super::information::{BaseVector, Information};
 use super::onsets::Onsets;
 use super::place_memory::PlaceMemory;
 use super::pressure::ReleasedPressure;
 use super::rows::{Parameters, Row, Rows};
 use super::settings::MonitorSettings;
-use super::suspects::{BANK, BASE, FIRST_ONSET, ONSETS, SUSPECTS, suspect_of};
+use super::suspects::{
+    BANK, BASE, COVARIATES, CURVE, DAY_WIND, FIRST_ONSET, LOAD, ONSETS, SUSPECTS, WARMING,
+    suspect_of,
+};
 use super::verdict::{Evidence, Verdict};
 use super::wheel_scale::WheelScale;
 use crate::force::ResolvedSample;
@@ -20,7 +23,8 @@ use crate::pipeline::motion::{STANDING_MPS, SpeedRange};
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::resistance::momentum::MomentumBlocks;
 use crate::pipeline::resistance::regression::{
-    BRAKE_SCALE, FORCE_DELAY, MomentumBlock, TRACTION_SCALE, regressors, scaled, unscaling,
+    BRAKE_SCALE, FORCE_DELAY, MomentumBlock, PARAMETERS as DAVIS, SPEED_SCALE_MPS, TRACTION_SCALE,
+    UNKNOWNS, regressors, scaled, unscaling,
 };
 use crate::pipeline::resistance::sample::UnitSample;
 use crate::pipeline::settings::SettingError;
@@ -35,6 +39,12 @@ const MONITOR_ROWS: u32 = 150;
 const CUT_ROWS: u32 = 60;
 /// Innovations count as no larger for an effect that no suspect explains: beyond lie outliers.
 const CUT: f64 = 3.0;
+/// Standard deviation of a curve constant of which nothing is declared, in 1000 N/kN m.
+const CURVE_STD_MIN: f64 = 0.02;
+/// A mass that differs by less than this share from the one before is the same.
+const SAME_MASS_SHARE: f64 = 1e-4;
+/// Standard deviations of the wheels' diameter up to which it is usual.
+const WHEEL_STDS: f64 = 3.0;
 /// Samples over which the time between samples is averaged.
 const PERIOD_SAMPLES: f64 = 100.0;
 /// The force that the model does not explain.
@@ -55,6 +65,8 @@ pub struct ResidualMonitor {
     kept_per_row: f64,
     clock: RunClock,
     has_stopped: bool,
+    /// Mass in kg of the newest sample.
+    given_kg: f64,
     places: PlaceMemory,
     pressure: ReleasedPressure,
     wheels: WheelScale,
@@ -101,6 +113,12 @@ impl ResidualMonitor {
         base_std[TRACTION_SCALE] = settings.data.force_scale_std;
         base_std[BRAKE_SCALE] = settings.data.force_scale_std;
         base_std[FORCE_DELAY] = settings.data.force_delay_std_s;
+        base_std[LOAD] = 0.01 * settings.mass_std_percent;
+        base_std[DAY_WIND] = settings.wind_std_mps;
+        let curve = settings.curve_constant_std * 1e-3 * train.curve_constant_n_per_kn_m;
+        base_std[CURVE] = curve.max(CURVE_STD_MIN);
+        let over_a = declared.w0_n_per_kn(SPEED_SCALE_MPS) / declared.a.max(0.1);
+        base_std[WARMING] = settings.warming_std * over_a;
         let kept_per_row = 1.0 - settings.data.block_s / (3600.0 * settings.memory_h);
         Ok(ResidualMonitor {
             settings,
@@ -110,6 +128,7 @@ impl ResidualMonitor {
             kept_per_row,
             clock: RunClock::default(),
             has_stopped: false,
+            given_kg: train.mass_kg,
             places: PlaceMemory::new(),
             pressure: ReleasedPressure::new(),
             wheels: WheelScale::default(),
@@ -145,9 +164,19 @@ impl ResidualMonitor {
         for scale in [TRACTION_SCALE, BRAKE_SCALE] {
             self.information.loosen(scale, self.settings.force_run_std);
         }
+        self.reopen(LOAD);
+        self.reopen(DAY_WIND);
         self.places.next_pass();
         self.pressure.restart();
         self.start_leg();
+    }
+
+    /// Another mass is given: it is as sure as any.
+    fn weigh(&mut self, sample: &ResolvedSample) {
+        let before_kg = std::mem::replace(&mut self.given_kg, sample.mass_kg);
+        if (sample.mass_kg / before_kg - 1.0).abs() > SAME_MASS_SHARE {
+            self.reopen(LOAD);
+        }
     }
 
     /// The train has stopped and moves again: what may change at stops is open anew.
@@ -161,8 +190,15 @@ impl ResidualMonitor {
         }
     }
 
+    /// What the base model holds may be another from now on.
+    fn reopen(&mut self, parameter: usize) {
+        self.retire(parameter, true);
+        self.verdict.clear(parameter);
+    }
+
     fn retire(&mut self, parameter: usize, is_real: bool) {
-        let prior_std = is_real.then(|| suspect_of(parameter).prior_std);
+        let own_std = if parameter < BASE { self.base_std[parameter] } else { 0.0 };
+        let prior_std = is_real.then(|| suspect_of(parameter).prior_std.hypot(own_std));
         self.information.retire(parameter, prior_std);
         self.rows.clear(parameter);
         if parameter >= FIRST_ONSET {
@@ -177,7 +213,8 @@ impl ResidualMonitor {
             self.retire(FIRST_ONSET + place, false);
         }
         self.onsets.advance();
-        self.remember_place(block, sample);
+        let units = self.units(block, &impulse);
+        self.remember_place(block, &units, sample);
         let (model, declared) = (&self.model, &self.declared_base);
         let predicted = |features: &Parameters| {
             features.dot(model) + features.fixed_rows::<BASE>(0).dot(declared)
@@ -197,9 +234,9 @@ impl ResidualMonitor {
         self.wheels.forget(self.kept_per_row);
         self.speeds.push(block.speed_mps);
         let resistance = self.declared.w0_n_per_kn(block.speed_mps) * block.impulse[1];
-        self.verdict.note_forces(&self.units(&impulse, block.impulse[1]), resistance);
+        self.verdict.note_forces(&units, resistance);
         let passes = sample.position_m.map(|m| self.places.earlier(m, sample.direction).passes);
-        self.judge(&(impulse / block.impulse[1]), block.speed_mps, passes == Some(0.0));
+        self.judge(&(units / block.impulse[1]), block.speed_mps, passes == Some(0.0));
         true
     }
 
@@ -214,19 +251,24 @@ impl ResidualMonitor {
         }
     }
 
-    /// One value for each parameter beyond the base model: the bank's, and `onset` for each
-    /// onset that is open.
-    fn units(&self, bank: &Covariates, onset: f64) -> Parameters {
+    /// What one unit of each parameter takes off the momentum over a block; of onsets that are open.
+    fn units(&self, block: &MomentumBlock, covariates: &Covariates) -> Parameters {
         let mut units = Parameters::zeros();
-        units.fixed_rows_mut::<SUSPECTS>(BASE).copy_from(bank);
+        units.fixed_rows_mut::<UNKNOWNS>(0).copy_from(&block.impulse.fixed_rows::<UNKNOWNS>(1));
+        units.fixed_rows_mut::<COVARIATES>(UNKNOWNS).copy_from(covariates);
         for place in (0..ONSETS).filter(|&place| self.onsets.age(place).is_some()) {
-            units[FIRST_ONSET + place] = onset;
+            units[FIRST_ONSET + place] = block.impulse[1];
         }
         units
     }
 
     /// Notes what the base model leaves at this place, unless another suspect explains it.
-    fn remember_place(&mut self, block: &MomentumBlock, sample: &ResolvedSample) {
+    fn remember_place(
+        &mut self,
+        block: &MomentumBlock,
+        units: &Parameters,
+        sample: &ResolvedSample,
+    ) {
         let before = self.last_block.replace((sample.position_m, block.momentum));
         let has_other_suspect = self.verdict.naming().named().is_some_and(|named| {
             use EffectKind::{DraggingBrake, GradientError, LocalResistance, Unknown};
@@ -241,13 +283,13 @@ impl ResidualMonitor {
         }
         // The row is centred where the block before ended.
         let Some((Some(position_m), momentum)) = before else { return };
-        let known: f64 =
-            (0..BASE).map(|i| block.impulse[1 + i] * (self.declared_base[i] + self.model[i])).sum();
+        let base = self.declared_base + self.model.fixed_rows::<BASE>(0);
+        let known = units.fixed_rows::<BASE>(0).dot(&base);
         let unexplained = block.impulse[0] - known - (block.momentum - momentum);
         self.places.push(position_m, sample.direction, unexplained / block.impulse[1]);
     }
 
-    fn judge(&mut self, covariates: &Covariates, speed_mps: f64, is_new_place: bool) {
+    fn judge(&mut self, units: &Parameters, speed_mps: f64, is_new_place: bool) {
         let Ok(base) = self.information.base() else { return self.reset() };
         self.verdict.judge(&Evidence {
             information: &self.information,
@@ -255,41 +297,32 @@ impl ResidualMonitor {
             onsets: &self.onsets,
             is_pressure_raised: self.pressure.is_raised(),
             is_new_place,
-            wheel: self.wheels.evidence(),
+            wheel: self.wheels.evidence(WHEEL_STDS * self.settings.wheel_std).1,
             period_s: self.period_s,
-            force_scale_std: self.settings.data.force_scale_std,
-            force_delay_std_s: self.settings.data.force_delay_std_s,
             cut_innovations: &self.cut_innovations,
         });
         self.note_since();
         let suspect = self.verdict.naming().parameter();
-        // Without a suspect the joint solution has a parameter that no row sees.
-        let parameter = suspect.unwrap_or(BASE);
-        let prior_std = if suspect.is_some() { suspect_of(parameter).prior_std } else { 1e-6 };
-        let Ok((values, covariance)) = self.information.joint(parameter, prior_std) else {
-            return self.reset();
-        };
-        self.model = Parameters::zeros();
-        self.model.fixed_rows_mut::<BASE>(0).copy_from(&values.fixed_rows::<BASE>(0));
-        self.model[parameter] = values[BASE];
+        let beside = suspect.filter(|&parameter| parameter >= BASE);
+        let believed = base.believed(beside.map(|it| (it, suspect_of(it).prior_std)));
+        self.model = believed.values;
         let davis = (self.declared_base + self.model.fixed_rows::<BASE>(0))
-            .fixed_rows::<3>(0)
+            .fixed_rows::<DAVIS>(0)
             .component_mul(&unscaling());
         self.known = Davis { a: davis[0], b: davis[1], c: davis[2] };
 
-        let unit = self.units(covariates, 1.0)[parameter];
         let (known, taken, variance) = self.rows.disturbance();
-        let value =
-            known - taken.dot(&self.model) - taken.fixed_rows::<BASE>(0).dot(&self.declared_base)
-                + unit * values[BASE];
-        let powers = regressors(speed_mps);
-        let gradient = SVector::<f64, JOINT>::from_fn(|i, _| match i {
-            BASE => unit - taken[parameter],
-            i if i < powers.len() => -taken[i] - powers[i],
-            i => -taken[i],
-        });
-        let of_model = gradient.dot(&(covariance * gradient));
-        let total = self.verdict.scale() * (variance + of_model);
+        let mut weights = -taken;
+        for (place, power) in regressors(speed_mps).into_iter().enumerate() {
+            weights[place] -= power;
+        }
+        let mut value =
+            known - taken.dot(&self.model) - taken.fixed_rows::<BASE>(0).dot(&self.declared_base);
+        if let Some(parameter) = suspect {
+            value += units[parameter] * self.model[parameter];
+            weights[parameter] += units[parameter];
+        }
+        let total = self.verdict.scale() * (variance + believed.variance_of(&weights));
         self.unexplained = Unexplained { n_per_kn: value, std_n_per_kn: total.max(0.0).sqrt() };
     }
 
@@ -327,6 +360,7 @@ impl Estimator for ResidualMonitor {
         if self.clock.push(sample.time_ns) {
             self.start_run();
         }
+        self.weigh(sample);
         self.pressure.push(sample);
         self.has_stopped |= sample.speed_mps <= STANDING_MPS;
         let unit = match UnitSample::of(sample) {

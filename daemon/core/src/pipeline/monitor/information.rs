@@ -7,7 +7,7 @@
 //! `s² / (S + 1/sigma²)`; `ln(1 + S sigma²)` is what the freedom of its size costs, so that the
 //! difference is twice the logarithm of the Bayes factor.
 
-use nalgebra::{Cholesky, Const, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 
 use super::rows::{Parameters, Row};
 use super::suspects::{BASE, PARAMETERS};
@@ -16,9 +16,9 @@ use crate::filter::NotPositiveDefinite;
 /// One value for each parameter of the base model.
 pub type BaseVector = SVector<f64, BASE>;
 type BaseMatrix = SMatrix<f64, BASE, BASE>;
-
-/// Base parameters and a suspect.
-pub const JOINT: usize = BASE + 1;
+/// Parameters beside the base model.
+const BESIDE: usize = PARAMETERS - BASE;
+type BesideVector = SVector<f64, BESIDE>;
 
 /// All rows, condensed.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,12 +30,30 @@ pub struct Information {
     base_precision: BaseVector,
 }
 
-/// The base model solved.
+/// The base model solved, and what it leaves of each suspect.
 #[derive(Clone, Debug)]
 pub struct BaseSolution {
-    factor: Cholesky<f64, Const<BASE>>,
+    /// L, the base's factor.
+    factor: BaseMatrix,
     /// L⁻¹ of the right side.
     reduced: BaseVector,
+    /// L⁻¹ of the suspects' columns, transposed.
+    columns: SMatrix<f64, BESIDE, BASE>,
+    /// Schur complements of the suspects.
+    own: BesideVector,
+    /// Their right sides.
+    rest: BesideVector,
+    prior_variance: BaseVector,
+}
+
+/// What is believed: the base model, and a suspect beside it.
+#[derive(Clone, Debug)]
+pub struct Believed<'a> {
+    /// All parameters.
+    pub values: Parameters,
+    base: &'a BaseSolution,
+    /// The suspect's place beside the base model, and its variance.
+    suspect: Option<(usize, f64)>,
 }
 
 /// A suspect with the base model refitted.
@@ -50,6 +68,13 @@ pub struct Alternative {
 }
 
 impl Alternative {
+    /// A parameter of so much information and right side, and a prior standard deviation.
+    fn of(own: f64, rest: f64, prior_std: f64) -> Self {
+        let prior = prior_std * prior_std;
+        let precision = own + 1.0 / prior;
+        Alternative { value: rest / precision, precision, cost: (own * prior).ln_1p() }
+    }
+
     /// Twice the log-likelihood ratio against parameters of no more than a size.
     pub fn beyond(&self, size: f64) -> f64 {
         let beyond = (self.value.abs() - size).max(0.0);
@@ -61,8 +86,84 @@ impl BaseSolution {
     /// A parameter of the base model: value and variance.
     pub fn parameter(&self, place: usize) -> (f64, f64) {
         let unit = BaseVector::from_fn(|i, _| if i == place { 1.0 } else { 0.0 });
-        let solved = self.factor.l_dirty().solve_lower_triangular(&unit).unwrap_or(unit);
+        let solved = self.forward(unit);
         (solved.dot(&self.reduced), solved.norm_squared())
+    }
+
+    /// Standard deviation of a parameter of the base model before the rows.
+    pub fn usual_std(&self, place: usize) -> f64 {
+        self.prior_variance[place].sqrt()
+    }
+
+    /// A parameter of the base model that may be unusual, by a standard deviation beyond the usual one: as
+    /// it then is; and twice the log-likelihood ratio of that against a usual one, and what it costs.
+    pub fn unusual(&self, place: usize, more_std: f64) -> (Alternative, (f64, f64)) {
+        let (value, variance) = self.parameter(place);
+        let usual = self.prior_variance[place];
+        let own = (1.0 / variance - 1.0 / usual).max(0.0);
+        let side = value / variance;
+        let prior = usual + more_std * more_std;
+        let precision = own + 1.0 / prior;
+        let cost = (own * prior).ln_1p();
+        let ratio = side * side * (1.0 / precision - variance).max(0.0);
+        let beside = (ratio, cost - (own * usual).ln_1p());
+        (Alternative { value: side / precision, precision, cost }, beside)
+    }
+
+    /// L⁻¹ of a column.
+    fn forward(&self, mut column: BaseVector) -> BaseVector {
+        for k in 0..BASE {
+            column[k] /= self.factor[(k, k)];
+            let solved = column[k];
+            for below in k + 1..BASE {
+                column[below] -= self.factor[(below, k)] * solved;
+            }
+        }
+        column
+    }
+
+    /// L⁻ᵀ of a column.
+    fn backward(&self, mut column: BaseVector) -> BaseVector {
+        for k in (0..BASE).rev() {
+            for below in k + 1..BASE {
+                column[k] -= self.factor[(below, k)] * column[below];
+            }
+            column[k] /= self.factor[(k, k)];
+        }
+        column
+    }
+
+    /// A suspect beside the base model.
+    pub fn alternative(&self, parameter: usize, prior_std: f64) -> Alternative {
+        let place = parameter - BASE;
+        Alternative::of(self.own[place], self.rest[place], prior_std)
+    }
+
+    /// What is believed with a suspect, of a prior standard deviation, or without one.
+    pub fn believed(&self, suspect: Option<(usize, f64)>) -> Believed<'_> {
+        let mut values = Parameters::zeros();
+        let mut reduced = self.reduced;
+        let suspect = suspect.map(|(parameter, prior_std)| {
+            let Alternative { value, precision, .. } = self.alternative(parameter, prior_std);
+            values[parameter] = value;
+            reduced.axpy(-value, &self.columns.row(parameter - BASE).transpose(), 1.0);
+            (parameter - BASE, 1.0 / precision)
+        });
+        values.fixed_rows_mut::<BASE>(0).copy_from(&self.backward(reduced));
+        Believed { values, base: self, suspect }
+    }
+}
+
+impl Believed<'_> {
+    /// Variance of a sum of parameters by what the rows leave open.
+    pub fn variance_of(&self, weights: &Parameters) -> f64 {
+        let reduced = self.base.forward(weights.fixed_rows::<BASE>(0).into_owned());
+        let by_suspect = self.suspect.map_or(0.0, |(place, variance)| {
+            let weight =
+                weights[BASE + place] - self.base.columns.row(place).transpose().dot(&reduced);
+            weight * weight * variance
+        });
+        reduced.norm_squared() + by_suspect
     }
 }
 
@@ -127,32 +228,28 @@ impl Information {
         for i in 0..BASE {
             matrix[(i, i)] += self.base_precision[i];
         }
-        let factor = matrix.cholesky().ok_or(NotPositiveDefinite)?;
-        let side: BaseVector = self.side.fixed_rows::<BASE>(0).into_owned();
-        let reduced = factor.l_dirty().solve_lower_triangular(&side).ok_or(NotPositiveDefinite)?;
-        Ok(BaseSolution { reduced, factor })
-    }
-
-    /// A suspect beside the base model.
-    pub fn alternative(
-        &self,
-        base: &BaseSolution,
-        parameter: usize,
-        prior_std: f64,
-    ) -> Alternative {
-        let none = Alternative { value: 0.0, precision: 0.0, cost: 0.0 };
-        let column: BaseVector = self.matrix.fixed_view::<BASE, 1>(0, parameter).into_owned();
-        let Some(reduced) = base.factor.l_dirty().solve_lower_triangular(&column) else {
-            return none;
-        };
-        let own = (self.matrix[(parameter, parameter)] - reduced.norm_squared()).max(0.0);
-        let rest = self.side[parameter] - reduced.dot(&base.reduced);
-        let precision = own + 1.0 / (prior_std * prior_std);
-        Alternative {
-            value: rest / precision,
-            precision,
-            cost: (own * prior_std * prior_std).ln_1p(),
+        let factor = matrix.cholesky().ok_or(NotPositiveDefinite)?.unpack();
+        let mut columns: SMatrix<f64, BESIDE, BASE> =
+            self.matrix.fixed_view::<BESIDE, BASE>(BASE, 0).into_owned();
+        let mut reduced: BaseVector = self.side.fixed_rows::<BASE>(0).into_owned();
+        let mut own = BesideVector::from_fn(|i, _| self.matrix[(BASE + i, BASE + i)]);
+        let mut rest: BesideVector = self.side.fixed_rows::<BESIDE>(BASE).into_owned();
+        for k in 0..BASE {
+            for before in 0..k {
+                let share = -factor[(k, before)];
+                reduced[k] += share * reduced[before];
+                let (done, mut left) = columns.columns_range_pair_mut(before, k);
+                left.axpy(share, &done, 1.0);
+            }
+            reduced[k] /= factor[(k, k)];
+            let mut column = columns.column_mut(k);
+            column /= factor[(k, k)];
+            own.zip_apply(&column, |own, column| *own -= column * column);
+            rest.axpy(-reduced[k], &column, 1.0);
         }
+        own.apply(|own| *own = own.max(0.0));
+        let prior_variance = self.base_precision.map(|precision| 1.0 / precision);
+        Ok(BaseSolution { factor, reduced, columns, own, rest, prior_variance })
     }
 
     /// A suspect beside the base model and another suspect, both as free as their priors let them be.
@@ -162,69 +259,18 @@ impl Information {
         (other, other_std): (usize, f64),
         (parameter, prior_std): (usize, f64),
     ) -> Alternative {
-        let none = Alternative { value: 0.0, precision: 0.0, cost: 0.0 };
-        let reduced = |place: usize| {
-            let column: BaseVector = self.matrix.fixed_view::<BASE, 1>(0, place).into_owned();
-            base.factor.l_dirty().solve_lower_triangular(&column)
-        };
-        let (Some(taken), Some(own)) = (reduced(other), reduced(parameter)) else { return none };
-        let pivot = (self.matrix[(other, other)] - taken.norm_squared()).max(0.0)
-            + 1.0 / (other_std * other_std);
-        let share = (self.matrix[(parameter, other)] - own.dot(&taken)) / pivot;
-        let left =
-            (self.matrix[(parameter, parameter)] - own.norm_squared() - share * share * pivot)
-                .max(0.0);
-        let rest = self.side[parameter]
-            - own.dot(&base.reduced)
-            - share * (self.side[other] - taken.dot(&base.reduced));
-        let precision = left + 1.0 / (prior_std * prior_std);
-        let cost = (left * prior_std * prior_std).ln_1p();
-        Alternative { value: rest / precision, precision, cost }
-    }
-
-    /// A suspect that the base model holds in part, with that part: against the base model alone, a
-    /// small scale is free, so that a scale of any size would have little to speak for it.
-    pub fn together(&self, base: (usize, f64), suspect: (usize, f64)) -> Alternative {
-        let none = Alternative { value: 0.0, precision: 0.0, cost: 0.0 };
-        let ((place, base_std), (parameter, prior_std)) = (base, suspect);
-        let Ok((values, covariance)) = self.joint(parameter, prior_std) else { return none };
-        // The suspect's column is the base model's with the other sign.
-        let value = values[BASE] - values[place];
-        let variance =
-            covariance[(BASE, BASE)] + covariance[(place, place)] - 2.0 * covariance[(BASE, place)];
-        let prior = prior_std * prior_std + base_std * base_std;
-        if !(variance > 0.0 && variance <= prior) {
-            return none;
-        }
-        Alternative { value, precision: 1.0 / variance, cost: (prior / variance).ln() }
+        let (taken, own) = (other - BASE, parameter - BASE);
+        let pivot = base.own[taken] + 1.0 / (other_std * other_std);
+        let common = base.columns.row(own).dot(&base.columns.row(taken));
+        let share = (self.matrix[(parameter, other)] - common) / pivot;
+        let left = (base.own[own] - share * share * pivot).max(0.0);
+        Alternative::of(left, base.rest[own] - share * base.rest[taken], prior_std)
     }
 
     /// Mean square of what base model and a suspect of such a ratio leave of the rows.
     pub fn mean_square(&self, base: &BaseSolution, ratio: f64, prior_rows: f64) -> f64 {
         let rest = (self.square_sum - base.reduced.norm_squared() - ratio).max(0.0);
         (rest + prior_rows) / (self.count + prior_rows)
-    }
-
-    /// Base parameters and one suspect together: values and covariance.
-    ///
-    /// # Errors
-    ///
-    /// When their information matrix is not positive definite.
-    pub fn joint(
-        &self,
-        parameter: usize,
-        prior_std: f64,
-    ) -> Result<(SVector<f64, JOINT>, SMatrix<f64, JOINT, JOINT>), NotPositiveDefinite> {
-        let place = |i: usize| if i < BASE { i } else { parameter };
-        let mut matrix =
-            SMatrix::<f64, JOINT, JOINT>::from_fn(|i, j| self.matrix[(place(i), place(j))]);
-        for i in 0..BASE {
-            matrix[(i, i)] += self.base_precision[i];
-        }
-        matrix[(BASE, BASE)] += 1.0 / (prior_std * prior_std);
-        let side = SVector::<f64, JOINT>::from_fn(|i, _| self.side[place(i)]);
-        let factor = matrix.cholesky().ok_or(NotPositiveDefinite)?;
-        Ok((factor.solve(&side), factor.inverse()))
     }
 }
 
@@ -245,7 +291,7 @@ mod tests {
             information.push(&Row { features, observed, weight: 1.0 }, 1.0);
         }
         let base = information.base().unwrap();
-        let alone = information.alternative(&base, two, 1.0);
+        let alone = base.alternative(two, 1.0);
         let beside = information.beyond_another(&base, (one, 1.0), (two, 1.0));
         assert!(alone.beyond(0.0) > 100.0, "{alone:?}");
         assert!(beside.beyond(0.0) < 0.05 * alone.beyond(0.0), "{beside:?}");

@@ -3,8 +3,9 @@
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::onsets::Onsets;
-use super::suspects::{BASE, CANDIDATES, FIRST_ONSET, PARAMETERS, effect_of};
+use super::suspects::{CANDIDATES, FIRST_ONSET, PARAMETERS, effect_of};
 use crate::pipeline::InnovationMonitor;
+use crate::pipeline::resistance::regression::FORCE_DELAY;
 
 /// A named suspect stays until its evidence is below this share of what named it.
 const STAYS_SHARE: f64 = 0.5;
@@ -45,9 +46,9 @@ pub struct Named {
 }
 
 impl Named {
-    /// Its parameter of the regression, if it has one.
+    /// Its parameter of the regression, if it is a force.
     pub fn parameter(&self) -> Option<usize> {
-        self.candidate.filter(|&candidate| candidate < PARAMETERS)
+        self.candidate.filter(|&candidate| candidate < PARAMETERS && candidate != FORCE_DELAY)
     }
 }
 
@@ -138,7 +139,7 @@ impl Naming {
         let Standing { net, rank, .. } = *standing;
         self.let_go *= LET_GO_KEPT;
         let least = STAYS_SHARE * self.evidence_min;
-        let leading = (BASE..CANDIDATES)
+        let leading = (0..CANDIDATES)
             .filter(|&candidate| net[candidate] > self.evidence_min)
             .max_by(|&one, &other| rank[one].total_cmp(&rank[other]));
         let is_same =
@@ -223,7 +224,7 @@ impl Naming {
 
 /// The bits of the effects of those candidates that are so.
 fn bits_of(is_so: impl Fn(usize) -> bool) -> u32 {
-    let so = (BASE..CANDIDATES).filter(|&candidate| is_so(candidate));
+    let so = (0..CANDIDATES).filter(|&candidate| is_so(candidate));
     so.fold(0, |bits, candidate| bits | effect_of(candidate).bit())
 }
 
@@ -243,8 +244,9 @@ fn alternatives(chosen: usize, least: f64, standing: &Standing) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::suspects::{DELAY, WHEEL};
+    use super::super::suspects::WHEEL;
     use super::*;
+    use crate::pipeline::resistance::regression::FORCE_DELAY as DELAY;
 
     fn after(naming: &mut Naming, blocks: u32, evidence: &[(usize, f64)]) {
         after_with(naming, &Onsets::new(), blocks, evidence);

@@ -5,17 +5,19 @@ use nalgebra::{SMatrix, SVector};
 use super::covariates::Covariates;
 use super::onsets::Onsets;
 use super::settings::MonitorSettings;
-use super::suspects::{BASE, FIRST_ONSET, ONSETS, PARAMETERS, SUSPECTS};
+use super::suspects::{COVARIATES, FIRST_ONSET, ONSETS, PARAMETERS};
 use crate::filter::Whitener;
 use crate::pipeline::resistance::momentum_error::{
     DISTURBANCE, Disturbance, STATES, momentum_seen,
 };
-use crate::pipeline::resistance::regression::MomentumBlock;
+use crate::pipeline::resistance::regression::{MomentumBlock, UNKNOWNS};
 use crate::train::Davis;
 
 const COLUMNS: usize = 1 + PARAMETERS;
 /// Innovations beyond so many standard deviations count for less (Huber).
 const HUBER: f64 = 4.0;
+/// Gusts over the spread of the wind from day to day.
+const GUST_SHARE: f64 = 0.5;
 
 /// One value for each parameter.
 pub type Parameters = SVector<f64, PARAMETERS>;
@@ -34,8 +36,10 @@ pub struct Row {
 /// Makes rows of blocks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rows {
+    /// What does not depend on the speed: small forces and the map.
     floor_n_per_kn: f64,
     share: f64,
+    gust_mps: f64,
     time_s: f64,
     declared: Davis,
     whitener: Whitener<STATES, COLUMNS>,
@@ -46,8 +50,9 @@ impl Rows {
     /// Before the first block.
     pub fn new(settings: &MonitorSettings, declared: Davis) -> Self {
         Rows {
-            floor_n_per_kn: settings.disturbance_n_per_kn,
+            floor_n_per_kn: settings.disturbance_n_per_kn.hypot(settings.map_std_permille),
             share: settings.disturbance_share,
+            gust_mps: GUST_SHARE * settings.wind_std_mps,
             time_s: settings.disturbance_time_s,
             declared,
             whitener: Whitener::new(SMatrix::zeros(), SMatrix::zeros()),
@@ -64,7 +69,7 @@ impl Rows {
     pub fn push(
         &mut self,
         block: &MomentumBlock,
-        suspects: &Covariates,
+        covariates: &Covariates,
         onsets: &Onsets,
         predicted: impl Fn(&Parameters) -> f64,
     ) -> Option<Row> {
@@ -81,8 +86,8 @@ impl Rows {
         }
         let duration_s = block.impulse[1];
         let mut impulse = SVector::<f64, COLUMNS>::zeros();
-        impulse.fixed_rows_mut::<{ 1 + BASE }>(0).copy_from(&block.impulse);
-        impulse.fixed_rows_mut::<SUSPECTS>(1 + BASE).copy_from(suspects);
+        impulse.fixed_rows_mut::<{ 1 + UNKNOWNS }>(0).copy_from(&block.impulse);
+        impulse.fixed_rows_mut::<COVARIATES>(1 + UNKNOWNS).copy_from(covariates);
         for place in (0..ONSETS).filter(|&place| onsets.age(place).is_some()) {
             impulse[1 + FIRST_ONSET + place] = duration_s;
         }
@@ -105,7 +110,8 @@ impl Rows {
     /// The small forces that are no effect.
     fn small_forces(&self, block: &MomentumBlock) -> Disturbance {
         let w0_n_per_kn = self.declared.w0_n_per_kn(block.speed_mps);
-        let std_n_per_kn = self.floor_n_per_kn.hypot(self.share * w0_n_per_kn);
+        let gust_n_per_kn = 2.0 * self.declared.c * block.speed_mps * self.gust_mps;
+        let std_n_per_kn = self.floor_n_per_kn.hypot(self.share * w0_n_per_kn).hypot(gust_n_per_kn);
         Disturbance { std_n_per_kn, time_s: self.time_s }
     }
 

@@ -20,6 +20,20 @@ settings! {
         disturbance_share: f64 = 0.03 => (0 to 1);
         /// How long such a force lasts, in s.
         disturbance_time_s: f64 = 60.0 => (1 to 10000 "s");
+        /// Standard deviation in % of the mass that samples or the train's file give, from run to run and
+        /// at every stop where another is given.
+        mass_std_percent: f64 = 3.0 => (0.01 to 50 "%");
+        /// Standard deviation in m/s of the wind from run to run; gusts have half of it.
+        wind_std_mps: f64 = 1.5 => (0.01 to 20 "m/s");
+        /// Standard deviation in permille of the map's gradient, smooth over some hundred metres.
+        map_std_permille: f64 = 0.1 => (0 to 10 "permille");
+        /// Standard deviation of the declared curve constant, as a share of it.
+        curve_constant_std: f64 = 0.15 => (0.001 to 1);
+        /// Standard deviation of what bearings that warm up add at the start of a run, as a share of the
+        /// basic resistance.
+        warming_std: f64 = 0.05 => (0.0001 to 1);
+        /// Standard deviation of the wheels' diameter, as a share of it.
+        wheel_std: f64 = 0.0015 => (0.0001 to 0.1);
         /// Standard deviation by which the scales of traction and brake force differ from run to run.
         force_run_std: f64 = 0.003 => (0.000001 to 0.5);
         /// Time of motion in h over which evidence is forgotten.

@@ -1,17 +1,29 @@
 //! The effects that the monitor looks for.
 //!
-//! Most have a column of the regression each. The delay of the forces is one of the base model's
-//! own parameters, and the wheels' diameter is told by positions, without any force.
+//! What is never known exactly is among the base model's own parameters: the forces' scales and delay, the
+//! load, the wind of the day, the curve constant, how cold bearings are. Of these an unusual value is an
+//! effect. All other suspects have a column each beside it; the wheels' diameter shows by positions,
+//! without any force.
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use crate::pipeline::resistance::regression::UNKNOWNS;
+use crate::pipeline::resistance::regression::{FORCE_DELAY, TRACTION_SCALE, UNKNOWNS};
 use crate::terms::speed_band::BANDS;
-use crate::terms::{SUSPECTS as TERMS, Suspect, brake};
+use crate::terms::{SUSPECTS as TERMS, Suspect, USUAL, brake, traction};
 
-/// Columns of the base model: a, b, c, two force scales, the delay.
-pub const BASE: usize = UNKNOWNS;
-/// Suspects with a column of their own.
+/// Columns of the base model: a, b, c, two force scales, the delay, and what else is never exact.
+pub const BASE: usize = UNKNOWNS + USUAL.len();
+/// Place of the load of a run: the true over the given mass less 1.
+pub const LOAD: usize = UNKNOWNS;
+/// Place of the headwind of a run in m/s.
+pub const DAY_WIND: usize = UNKNOWNS + 1;
+/// Place of what the curve constant lacks, in 1000 N/kN m.
+pub const CURVE: usize = UNKNOWNS + 2;
+/// Place of what cold bearings add at the start of a run, as a share of a.
+pub const WARMING: usize = UNKNOWNS + 3;
+/// What counts only where it is unusual, the delay apart.
+pub const UNUSUAL: [usize; 5] = [TRACTION_SCALE, LOAD, DAY_WIND, CURVE, WARMING];
+/// Suspects with a column of their own beside the base model.
 pub const SUSPECTS: usize = TERMS.len() + BANDS.len();
 /// These: the terms, and laws of the speed that none of them follows.
 pub const BANK: [Suspect; SUSPECTS] = {
@@ -23,6 +35,8 @@ pub const BANK: [Suspect; SUSPECTS] = {
     }
     bank
 };
+/// Columns that come from samples: of the base model what the regression does not hold, and the suspects.
+pub const COVARIATES: usize = USUAL.len() + SUSPECTS;
 /// Place of the first band of speed among the parameters.
 pub const FIRST_BAND: usize = BASE + TERMS.len();
 /// Onsets of a dragging brake that are kept side by side.
@@ -31,22 +45,31 @@ pub const ONSETS: usize = 12;
 pub const FIRST_ONSET: usize = BASE + SUSPECTS;
 /// All parameters of the regression.
 pub const PARAMETERS: usize = FIRST_ONSET + ONSETS;
-/// Candidate without a column: forces that act late.
-pub const DELAY: usize = PARAMETERS;
 /// Candidate without a column: wheels of another diameter.
-pub const WHEEL: usize = PARAMETERS + 1;
-/// All candidates are those from `BASE` to here.
-pub const CANDIDATES: usize = PARAMETERS + 2;
+pub const WHEEL: usize = PARAMETERS;
+/// All parameters, and the wheels.
+pub const CANDIDATES: usize = PARAMETERS + 1;
+/// Candidates among them.
+pub const SEARCHED: usize = UNUSUAL.len() + 1 + CANDIDATES - BASE;
 
-/// The suspect behind a parameter beyond the base model.
+/// The suspect behind a column from samples.
+pub fn covariate(place: usize) -> &'static Suspect {
+    if place < USUAL.len() { &USUAL[place] } else { &BANK[place - USUAL.len()] }
+}
+
+/// The suspect behind a parameter; a, b, c and the brake's scale are none, and stand for the traction's.
 pub fn suspect_of(parameter: usize) -> &'static Suspect {
-    if parameter >= FIRST_ONSET { &brake::SUSPECT } else { &BANK[parameter - BASE] }
+    match parameter {
+        FIRST_ONSET.. => &brake::SUSPECT,
+        UNKNOWNS.. => covariate(parameter - UNKNOWNS),
+        _ => &traction::SUSPECT,
+    }
 }
 
 /// The effect behind a candidate.
 pub fn effect_of(candidate: usize) -> EffectKind {
     match candidate {
-        DELAY => EffectKind::ActuatorDelay,
+        FORCE_DELAY => EffectKind::ActuatorDelay,
         WHEEL => EffectKind::WheelDiameter,
         parameter => suspect_of(parameter).effect,
     }

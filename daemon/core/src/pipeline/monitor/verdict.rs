@@ -1,18 +1,17 @@
 //! What speaks for each candidate.
 
-use dynocar_shared::vocabulary::EffectKind;
-
-use super::information::{BaseSolution, Information};
+use super::information::{Alternative, BaseSolution, Information};
 use super::naming::{Naming, Standing};
 use super::onsets::Onsets;
 use super::rows::Parameters;
 use super::settings::MonitorSettings;
 use super::suspects::{
-    BASE, CANDIDATES, DELAY, FIRST_BAND, FIRST_ONSET, PARAMETERS, SUSPECTS, WHEEL, suspect_of,
+    BASE, CANDIDATES, FIRST_BAND, FIRST_ONSET, PARAMETERS, SEARCHED, SUSPECTS, UNUSUAL, WHEEL,
+    suspect_of,
 };
 use crate::pipeline::InnovationMonitor;
-use crate::pipeline::resistance::regression::{FORCE_DELAY, TRACTION_SCALE};
-use crate::terms::{Least, delay, wheel};
+use crate::pipeline::resistance::regression::{FORCE_DELAY, UNKNOWNS};
+use crate::terms::{Least, delay};
 
 /// Blocks that a suspect which began at some moment must have acted.
 const AGE_MIN: u32 = 5;
@@ -21,6 +20,10 @@ const PRESSURE_EVIDENCE: f64 = 10.0;
 /// Share of the least size worth naming up to which an effect counts as none: surveys, maps and
 /// calibrations are never exact, and what is small and lasts gathers evidence without end.
 const TOLERATED_SHARE: f64 = 0.25;
+/// Standard deviations up to which what is never known exactly is usual.
+const USUAL_STDS: f64 = 2.0;
+/// The same from which it is worth naming.
+const UNUSUAL_STDS: f64 = 2.5;
 /// Share of evidence that outlasts a stop, for effects that may change there.
 const KEPT_AT_STOP: f64 = 0.7;
 /// Share of it that outlasts a block: what is still there shows again within a minute.
@@ -41,14 +44,10 @@ pub struct Evidence<'a> {
     pub is_pressure_raised: bool,
     /// True where no earlier pass tells what the place does.
     pub is_new_place: bool,
-    /// The error of the speed's scale, and what speaks for it.
-    pub wheel: (f64, f64),
+    /// What speaks for an unusual error of the speed's scale.
+    pub wheel: f64,
     /// Time in s between samples, which limits what can be said of a delay.
     pub period_s: f64,
-    /// Standard deviation of the scales of the forces that the base model takes for usual.
-    pub force_scale_std: f64,
-    /// The same of their delay, in s.
-    pub force_delay_std_s: f64,
     /// Statistics of the innovations of the model as it is believed, cut off where outliers begin.
     pub cut_innovations: &'a InnovationMonitor,
 }
@@ -109,7 +108,7 @@ impl Verdict {
     pub fn note_forces(&mut self, units: &Parameters, resistance: f64) {
         self.unit_force *= self.kept_per_row;
         self.resistance *= self.kept_per_row;
-        for parameter in BASE..PARAMETERS {
+        for parameter in UNKNOWNS..PARAMETERS {
             let unit = units[parameter].abs();
             if unit > 1e-3 * resistance {
                 self.unit_force[parameter] += unit;
@@ -154,69 +153,75 @@ impl Verdict {
     ///
     /// # Real-time
     ///
-    /// One small triangular solution for each suspect, no allocation.
+    /// Bounded work, no allocation.
     pub fn judge(&mut self, evidence: &Evidence) {
-        let mut found = [(0.0, 0.0); CANDIDATES];
-        let mut beside = [None; CANDIDATES];
-        let mut best: f64 = 0.0;
         self.leg_blocks = self.leg_blocks.saturating_add(1);
+        let mut found = [None; CANDIDATES];
+        let mut best: f64 = 0.0;
         for parameter in BASE..PARAMETERS {
-            let suspect = suspect_of(parameter);
-            let onset = parameter.checked_sub(FIRST_ONSET);
             // What began with the train's start is no likelier than what began a little later.
-            let age = match onset {
-                Some(place) => evidence.onsets.age(place),
-                None if suspect.changes_at_stops => Some(self.leg_blocks),
-                None => Some(evidence.information.count() as u32),
-            };
-            if age.is_none_or(|age| age < AGE_MIN) {
-                continue;
-            }
-            let alternative =
-                evidence.information.alternative(evidence.base, parameter, suspect.prior_std);
-            let whole = match suspect.effect {
-                EffectKind::TractionGain => evidence.information.together(
-                    (TRACTION_SCALE, evidence.force_scale_std),
-                    (parameter, suspect.prior_std),
-                ),
-                _ => alternative,
-            };
-            let is_possible = whole.value > 0.0 || !suspect.is_positive;
+            let is_old = self.age(parameter, evidence).is_some_and(|age| age >= AGE_MIN);
+            let prior_std = suspect_of(parameter).prior_std;
+            let alternative = evidence.base.alternative(parameter, prior_std);
             let least = self.least(parameter);
-            if is_possible && whole.value.abs() >= least {
-                let tolerated = TOLERATED_SHARE * least;
+            if is_old && is_there(parameter, &alternative, least) {
                 best = best.max(alternative.beyond(0.0));
-                found[parameter] = (whole.beyond(tolerated), whole.cost);
-                beside[parameter] = Some((alternative.beyond(tolerated), alternative.cost));
+                let ratio = alternative.beyond(TOLERATED_SHARE * least);
+                found[parameter] = Some([(ratio, alternative.cost); 2]);
             }
         }
-        found[DELAY] = late(evidence);
-        self.scale = evidence.information.mean_square(evidence.base, best, PRIOR_ROWS).max(1.0);
-        for candidate in BASE..CANDIDATES {
-            let (ratio, cost) = found[candidate];
-            let is_onset = (FIRST_ONSET..PARAMETERS).contains(&candidate);
-            let hint = match is_onset && ratio > 0.0 && evidence.is_pressure_raised {
-                true => PRESSURE_EVIDENCE,
-                false => 0.0,
-            };
-            self.own[candidate] = ratio / self.scale + hint - cost - searched();
-            let (ratio, cost) = beside[candidate].unwrap_or((ratio, cost));
-            self.beside[candidate] = ratio / self.scale + hint - cost - searched();
+        for parameter in UNUSUAL {
+            found[parameter] = self.unusual(parameter, evidence);
         }
-        let (error, told) = evidence.wheel;
-        self.own[WHEEL] = if error.abs() >= wheel::LEAST { told } else { 0.0 } - searched();
+        found[FORCE_DELAY] = Some([late(evidence); 2]);
+        self.scale = evidence.information.mean_square(evidence.base, best, PRIOR_ROWS).max(1.0);
+        for (candidate, found) in found.iter().enumerate().take(PARAMETERS) {
+            let is_onset = candidate >= FIRST_ONSET;
+            let net = |(ratio, cost): (f64, f64)| {
+                let is_hinted = is_onset && ratio > 0.0 && evidence.is_pressure_raised;
+                let hint = if is_hinted { PRESSURE_EVIDENCE } else { 0.0 };
+                ratio / self.scale + hint - cost - searched()
+            };
+            let [own, beside] = found.unwrap_or_default().map(net);
+            (self.own[candidate], self.beside[candidate]) = (own, beside);
+        }
+        self.own[WHEEL] = evidence.wheel - searched();
         self.beside[WHEEL] = self.own[WHEEL];
         self.name(evidence);
+    }
+
+    /// What speaks for a parameter of the base model being unusual, and its cost: against any usual
+    /// value, and as the best account of the rows.
+    fn unusual(&self, parameter: usize, evidence: &Evidence) -> Option<[(f64, f64); 2]> {
+        let usual_std = evidence.base.usual_std(parameter);
+        let (it, beside) = evidence.base.unusual(parameter, suspect_of(parameter).prior_std);
+        let least = self.least(parameter).max(UNUSUAL_STDS * usual_std);
+        let usual = (TOLERATED_SHARE * least).max(USUAL_STDS * usual_std);
+        is_there(parameter, &it, least).then_some([(it.beyond(usual), it.cost), beside])
+    }
+
+    /// Blocks for which a suspect could act; `None` for a brake that was not yet looked for.
+    fn age(&self, parameter: usize, evidence: &Evidence) -> Option<u32> {
+        match parameter.checked_sub(FIRST_ONSET) {
+            Some(place) => evidence.onsets.age(place),
+            None if suspect_of(parameter).changes_at_stops => Some(self.leg_blocks),
+            None => Some(evidence.information.count() as u32),
+        }
     }
 
     /// What speaks for a law of the speed beside the suspect that is named: what the name leaves.
     fn left_by_name(&self, evidence: &Evidence) -> f64 {
         let Some(named) = self.naming.parameter() else { return 0.0 };
-        let named = (named, suspect_of(named).prior_std);
-        let bands = (FIRST_BAND..FIRST_ONSET).filter(|&band| band != named.0);
+        let bands = (FIRST_BAND..FIRST_ONSET).filter(|&band| band != named);
         let left = bands.map(|band| {
             let law = (band, suspect_of(band).prior_std);
-            let found = evidence.information.beyond_another(evidence.base, named, law);
+            let found = match named {
+                BASE.. => {
+                    let named = (named, suspect_of(named).prior_std);
+                    evidence.information.beyond_another(evidence.base, named, law)
+                }
+                _ => evidence.base.alternative(band, law.1),
+            };
             let least = self.least(band);
             let is_large = found.value.abs() >= least;
             let ratio = if is_large { found.beyond(TOLERATED_SHARE * least) } else { 0.0 };
@@ -260,7 +265,13 @@ impl Verdict {
 
 /// Evidence is the greatest of as many ratios as there are candidates.
 fn searched() -> f64 {
-    2.0 * ((CANDIDATES - BASE) as f64).ln()
+    2.0 * (SEARCHED as f64).ln()
+}
+
+/// True when a parameter has a size that is worth naming, and a sign that makes sense.
+fn is_there(parameter: usize, it: &Alternative, least: f64) -> bool {
+    let is_possible = it.value > 0.0 || !suspect_of(parameter).is_positive;
+    is_possible && it.value.abs() >= least
 }
 
 /// What speaks for forces that act late, and its cost: the base model's own delay, beyond what a
@@ -268,6 +279,6 @@ fn searched() -> f64 {
 fn late(evidence: &Evidence) -> (f64, f64) {
     let (late_s, variance) = evidence.base.parameter(FORCE_DELAY);
     let beyond_s = late_s - delay::TOLERATED_S.max(evidence.period_s);
-    let cost = (evidence.force_delay_std_s.powi(2) / variance).ln().max(0.0);
+    let cost = (evidence.base.usual_std(FORCE_DELAY).powi(2) / variance).ln().max(0.0);
     if beyond_s >= delay::LEAST_S { (beyond_s * beyond_s / variance, cost) } else { (0.0, 0.0) }
 }

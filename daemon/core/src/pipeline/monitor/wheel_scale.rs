@@ -6,7 +6,6 @@
 //! points has an offset of its own.
 
 use crate::force::ResolvedSample;
-use crate::terms::wheel::LEAST;
 
 /// Way in m between points: fixes lie so far apart.
 const APART_M: f64 = 500.0;
@@ -121,14 +120,14 @@ impl WheelScale {
         self.product *= kept;
     }
 
-    /// The speed's scale less 1, and twice the log-likelihood ratio of one beyond what wear makes
-    /// of it against that, less what the freedom of its size costs.
-    pub fn evidence(&self) -> (f64, f64) {
+    /// The speed's scale less 1, and twice the log-likelihood ratio of one beyond what is `usual`
+    /// against that, less what the freedom of its size costs.
+    pub fn evidence(&self, usual: f64) -> (f64, f64) {
         let (information, product) = self.going.map_or((0.0, 0.0), |going| going.row.told());
         let prior = 1.0 / (PRIOR_STD * PRIOR_STD);
         let precision = self.information + information + prior;
         let error = (self.product + product) / precision;
-        let beyond = (error.abs() - LEAST).max(0.0);
+        let beyond = (error.abs() - usual).max(0.0);
         (error, beyond * beyond * precision - (precision / prior).ln())
     }
 }
@@ -159,6 +158,7 @@ impl Row {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::terms::wheel::LEAST;
 
     /// Two runs of 10 km to and fro at 20 m/s whose wheels measure `scale` times the true speed,
     /// with a position that a balise corrects every 1000 m.
@@ -185,7 +185,7 @@ mod tests {
     #[test]
     fn fixes_tell_the_scale_of_the_speed_in_both_directions() {
         for scale in [0.98, 1.012, 1.02] {
-            let (error, evidence) = driven(scale, true, |_| 0.0).evidence();
+            let (error, evidence) = driven(scale, true, |_| 0.0).evidence(LEAST);
             assert!((error + 1.0 - scale).abs() < 1e-3, "{scale}: {error}");
             assert!(evidence > 30.0, "{scale}: {evidence}");
         }
@@ -201,7 +201,7 @@ mod tests {
             ("wild", driven(1.0, true, wild)),
             ("moved for good", driven(1.0, true, moved)),
         ] {
-            let (error, evidence) = wheels.evidence();
+            let (error, evidence) = wheels.evidence(LEAST);
             assert!(error.abs() < 2e-3 && evidence < 0.0, "{told}: {error}, {evidence}");
         }
     }

@@ -60,9 +60,11 @@ impl SpeedNoise {
     /// speed, and the weight that the measurement had against a full one.
     ///
     /// After an update, the residual r and the variance P of the filtered speed obey `E(r²) + P = R`
-    /// for the variance R of the measurement.
+    /// for the variance R of the measurement. A residual counts up to where its weight begins to
+    /// fall (Huber 1964): a spike that is not left out would else widen what passes for noise.
     pub fn take_residual(&mut self, residual_mps: f64, filtered_variance: f64, weight: f64) {
-        self.average(weight * residual_mps * residual_mps + filtered_variance, 1.0);
+        let bounded_mps = weight * residual_mps;
+        self.average(bounded_mps * bounded_mps + filtered_variance, 1.0);
     }
 
     /// The mean over all degrees of freedom, over the newest once they are as many as are looked back over.

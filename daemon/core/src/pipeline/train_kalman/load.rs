@@ -80,10 +80,15 @@ impl LoadWatch {
             return Some(anew);
         }
         let was_fresh = self.has_departed && std::mem::take(&mut self.is_fresh);
-        // A weighing that is exact leaves nothing open.
-        let is_exact = self.is_weighed && self.mass_std == 0.0;
-        (self.has_departed && !is_exact && !was_fresh)
-            .then(|| Change::Opened(self.load_change_std.powi(2), self.load_std.powi(2)))
+        (self.has_departed && !was_fresh).then(|| self.opened()).flatten()
+    }
+
+    /// What may have boarded; a weighing that did not change leaves as much open as it is off itself.
+    fn opened(&self) -> Option<Change> {
+        let change = self.load_change_std.powi(2);
+        let most = self.prior_variance();
+        let by = if self.is_weighed { change.min(2.0 * most) } else { change };
+        (most > 0.0).then_some(Change::Opened(by, most))
     }
 }
 
@@ -117,19 +122,23 @@ mod tests {
         let settings = TrainKalmanSettings::default();
         let (weighed, declared) = (Change::Anew(0.03 * 0.03), Change::Anew(0.15 * 0.15));
         let opened = Change::Opened(0.1 * 0.1, 0.15 * 0.15);
+        let weighed_again = Change::Opened(2.0 * 0.03 * 0.03, 0.03 * 0.03);
         let same = |one: &[Change], other: &[Change]| {
             assert_eq!(one.len(), other.len(), "{one:?}");
             for pair in one.iter().zip(other) {
                 let (a, b) = match pair {
                     (Change::Anew(a), Change::Anew(b)) => (a, b),
-                    (Change::Opened(a, _), Change::Opened(b, _)) => (a, b),
+                    (Change::Opened(a, most), Change::Opened(b, same)) => {
+                        assert!((most / same - 1.0).abs() < 1e-12, "{pair:?}");
+                        (a, b)
+                    }
                     _ => panic!("{pair:?}"),
                 };
                 assert!((a / b - 1.0).abs() < 1e-12, "{pair:?}");
             }
         };
         same(&changes(&settings, |_| None), &[declared, opened]);
-        same(&changes(&settings, |_| Some(100e3)), &[weighed, opened]);
+        same(&changes(&settings, |_| Some(100e3)), &[weighed, weighed_again]);
         let boarded = |second| Some(if second < 20 { 100e3 } else { 108e3 });
         same(&changes(&settings, boarded), &[weighed, weighed]);
     }

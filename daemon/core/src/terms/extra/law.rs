@@ -32,6 +32,16 @@ impl Factor {
         Some((value, if self.of == Covariate::Speed { slope } else { 0.0 }))
     }
 
+    /// Multiplies values, with their slopes over the speed, by those at each of a covariate; none where
+    /// that is `NaN`, not known.
+    pub fn multiply(&self, covariate: &[f64], values: &mut [f64], slopes: &mut [f64]) {
+        let known = |at: f64| (!at.is_nan()).then_some(at);
+        for ((value, slope), &at) in values.iter_mut().zip(slopes).zip(covariate) {
+            let (own, own_slope) = self.at(|_| known(at)).unwrap_or((0.0, 0.0));
+            (*value, *slope) = (*value * own, *slope * own + *value * own_slope);
+        }
+    }
+
     /// The formula.
     pub fn law(&self) -> String {
         self.form.law(self.numbers, self.of.name())

@@ -76,8 +76,13 @@ impl Hypothesis for Masses {
         }
     }
 
+    fn affine_in(&self) -> Option<fn(f64) -> f64> {
+        Some(f64::recip)
+    }
+
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
-        for (part, factor) in self.parts.iter().zip(parameters) {
+        let parts = self.parts.iter().zip(parameters).enumerate();
+        for (_, (part, factor)) in parts.filter(|(number, _)| self.touches(*number, run)) {
             for (i, force) in forces.iter_mut().enumerate() {
                 if part.holds(run, i) {
                     force.mass_factor *= factor;

@@ -134,6 +134,20 @@ fn best_band(scan: &Scan, axis: BandAxis) -> Option<(f64, Candidate)> {
     Some((gain, Candidate::new(band, vec![estimate])))
 }
 
+impl Band {
+    /// The number of a run among the fit runs.
+    fn number(&self, run: &RunData) -> Option<usize> {
+        self.files.iter().position(|file| *file == run.file)
+    }
+
+    /// Whether a sample of a run with this number lies in it.
+    #[inline]
+    fn holds(&self, run: &RunData, number: Option<usize>, index: usize) -> bool {
+        let value = self.axis.value(run, number, index);
+        value.is_some_and(|value| value >= self.low && value < self.high)
+    }
+}
+
 impl Hypothesis for Band {
     fn kind(&self) -> EffectKind {
         EffectKind::Unknown
@@ -164,10 +178,9 @@ impl Hypothesis for Band {
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
-        let number = self.files.iter().position(|file| *file == run.file);
+        let number = self.number(run);
         for (i, force) in forces.iter_mut().enumerate() {
-            let value = self.axis.value(run, number, i);
-            if !value.is_some_and(|value| value >= self.low && value < self.high) {
+            if !self.holds(run, number, i) {
                 continue;
             }
             match self.axis {
@@ -179,6 +192,25 @@ impl Hypothesis for Band {
                 _ => force.resistance.other_n_per_kn += parameters[0],
             }
         }
+    }
+
+    fn affine_in(&self) -> Option<fn(f64) -> f64> {
+        Some(|value| value)
+    }
+
+    fn only_resists(&self) -> bool {
+        !self.axis.is_force()
+    }
+
+    fn unit_n_per_kn(&self, _others: &[f64], run: &RunData, n_per_kn: &mut Vec<f64>) {
+        let number = self.number(run);
+        let unit = |i: usize| match self.axis {
+            _ if !self.holds(run, number, i) => 0.0,
+            BandAxis::Of(Covariate::Chainage) => run.samples()[i].direction,
+            _ => 1.0,
+        };
+        n_per_kn.clear();
+        n_per_kn.extend((0..run.samples().len()).map(unit));
     }
 
     fn formula(&self, parameters: &[f64]) -> Option<String> {

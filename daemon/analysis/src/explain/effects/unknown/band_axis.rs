@@ -48,6 +48,11 @@ impl BandAxis {
         }
     }
 
+    /// True where an extra force there is a share of the control force.
+    pub fn is_force(self) -> bool {
+        matches!(self, BandAxis::Of(Covariate::TractionForce | Covariate::BrakeForce))
+    }
+
     /// What an extra force there is measured by.
     pub fn parameters(self) -> &'static [Parameter] {
         match self {

@@ -85,11 +85,16 @@ impl FormForce {
 
     /// The force for given parameters.
     fn extra(&self, parameters: &[f64]) -> Extra {
+        Extra { n_per_kn: parameters[0], factors: self.factors_at(&parameters[1..]) }
+    }
+
+    /// Its factors for given numbers.
+    fn factors_at(&self, numbers: &[f64]) -> Vec<Factor> {
         let mut factors = self.factors.clone();
-        for (&(factor, number), &value) in self.fitted.iter().zip(&parameters[1..]) {
+        for (&(factor, number), &value) in self.fitted.iter().zip(numbers) {
             factors[factor].numbers[number] = value;
         }
-        Extra { n_per_kn: parameters[0], factors }
+        factors
     }
 }
 
@@ -138,6 +143,26 @@ impl Hypothesis for FormForce {
         for (sample, force) in run.samples().iter().zip(forces) {
             let known = |of: Covariate| sample.covariate(of);
             extra::act(&extra, sample.speed_mps, known, &mut force.resistance);
+        }
+    }
+
+    fn only_resists(&self) -> bool {
+        true
+    }
+
+    fn unit_n_per_kn(&self, others: &[f64], run: &RunData, n_per_kn: &mut Vec<f64>) {
+        let factors = self.factors_at(others);
+        let mut slopes = vec![0.0; run.samples().len()];
+        n_per_kn.clear();
+        n_per_kn.resize(slopes.len(), 1.0);
+        for factor in &factors {
+            factor.multiply(run.covariate(factor.of), n_per_kn, &mut slopes);
+        }
+        let away = run.smooth_mps.iter().zip(run.covariate(Covariate::Speed));
+        for ((n_per_kn, slope), (smooth_mps, speed_mps)) in
+            n_per_kn.iter_mut().zip(slopes).zip(away)
+        {
+            *n_per_kn += slope * (smooth_mps - speed_mps);
         }
     }
 

@@ -1,12 +1,13 @@
 //! The search of the fit, and one step of it.
 
 use nalgebra::{Cholesky, DVector};
+use rayon::prelude::*;
 
 use super::super::model::GrownModel;
 use super::super::noise::{Noise, RunScatter};
 use super::super::run_scatter::{ScatterFilter, remove};
 use super::super::whitener::Whitener;
-use super::linearised::Scratch;
+use super::memory::{Plan, RunMemory};
 use super::robust::RunFilters;
 use super::{Fit, FitProblem};
 
@@ -18,12 +19,21 @@ const DECREASE_MIN: f64 = 0.02;
 impl FitProblem {
     /// Fits a model from a start under a noise.
     pub fn fit(&self, model: &GrownModel, start: Vec<f64>, noise: Noise) -> Fit {
-        let filters = self.filters(noise);
-        let mut scratch = Scratch::default();
-        let mut fit = self.linearised(model, start, noise, &filters, &mut scratch);
+        self.fit_remembering(model, start, noise, &mut self.memories())
+    }
+
+    fn fit_remembering(
+        &self,
+        model: &GrownModel,
+        start: Vec<f64>,
+        noise: Noise,
+        memories: &mut [RunMemory],
+    ) -> Fit {
+        let (plan, filters) = (Plan::of(model), self.filters(noise));
+        let mut fit = self.first(&plan, model, (start, noise), (&filters, memories));
         for _ in 0..STEPS_MAX {
             let score = fit.score();
-            let Some(next) = self.descend(&fit, &score, &filters, &mut scratch) else { break };
+            let Some(next) = self.descend(&plan, &fit, &score, (&filters, memories)) else { break };
             let gained = fit.cost - next.cost;
             fit = next;
             if gained < DECREASE_MIN {
@@ -33,16 +43,29 @@ impl FitProblem {
         fit
     }
 
+    fn first(
+        &self,
+        plan: &Plan,
+        model: &GrownModel,
+        (theta, noise): (Vec<f64>, Noise),
+        (filters, memories): (&[RunFilters], &mut [RunMemory]),
+    ) -> Fit {
+        let left = self.left(plan, &theta, filters, memories);
+        self.linearised(plan, model, (theta, noise), left, (filters, memories))
+    }
+
     /// A model at given parameters, not fitted.
     pub fn at(&self, model: &GrownModel, theta: Vec<f64>, noise: Noise) -> Fit {
-        self.linearised(model, theta, noise, &self.filters(noise), &mut Scratch::default())
+        let (plan, filters) = (Plan::of(model), self.filters(noise));
+        self.first(&plan, model, (theta, noise), (&filters, &mut self.memories()))
     }
 
     /// Fits a model, the noise that its residuals show, and the model again.
     ///
     /// One turn only: under an undeclared force further turns would take ever more of it for noise.
     pub fn fit_with_noise(&self, model: &GrownModel, start: Vec<f64>, noise: Noise) -> Fit {
-        let fit = self.fit(model, start, noise);
+        let mut memories = self.memories();
+        let fit = self.fit_remembering(model, start, noise, &mut memories);
         let scatter = RunScatter::updated(&fit.factors);
         let residuals: Vec<Vec<f64>> = fit
             .residuals
@@ -52,12 +75,12 @@ impl FitProblem {
             .map(|((residual, columns), (factors, _))| remove(columns, residual, factors))
             .collect();
         let noise = Noise::estimate(&self.runs, &residuals, Noise { scatter, ..noise });
-        self.fit(model, fit.theta, noise)
+        self.fit_remembering(model, fit.theta, noise, &mut memories)
     }
 
     pub(super) fn filters(&self, noise: Noise) -> Vec<RunFilters> {
         self.runs
-            .iter()
+            .par_iter()
             .zip(&self.scatter_columns)
             .map(|(run, columns)| {
                 let whitener = Whitener::new(run, noise);
@@ -71,19 +94,20 @@ impl FitProblem {
     /// when no step promises or brings a decrease.
     fn descend(
         &self,
+        plan: &Plan,
         fit: &Fit,
         score: &DVector<f64>,
-        filters: &[RunFilters],
-        scratch: &mut Scratch,
+        (filters, memories): (&[RunFilters], &mut [RunMemory]),
     ) -> Option<Fit> {
         for damping in [0.0, 0.01, 0.3, 10.0, 300.0] {
             let (theta, promised) = self.bounded_step(fit, score, damping)?;
             if promised < DECREASE_MIN {
                 return None;
             }
-            let next = self.linearised(&fit.model, theta, fit.noise, filters, scratch);
-            if next.cost < fit.cost {
-                return Some(next);
+            let left = self.left(plan, &theta, filters, memories);
+            if self.cost(&fit.model, &theta, &left) < fit.cost {
+                let at = (theta, fit.noise);
+                return Some(self.linearised(plan, &fit.model, at, left, (filters, memories)));
             }
         }
         None

@@ -2,30 +2,19 @@
 
 use dynocar_core::filter::lanes::dot;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
-use super::super::model::{GrownForces, GrownModel};
+use super::super::model::GrownModel;
 use super::super::noise::Noise;
+use super::memory::{At, Plan, RunMemory};
 use super::robust::{RunFilters, Whitened};
 use super::{Fit, FitProblem, RunNormal};
-use crate::explain::evidence::RunData;
 
-/// Working memory of evaluations.
-#[derive(Default)]
-pub(super) struct Scratch {
-    forces: GrownForces,
-    bins: Vec<f64>,
-    moved: Vec<f64>,
-    whitened: Vec<f64>,
-}
-
-/// One run at given parameters.
-pub(super) struct LinearisedRun {
-    pub normal: RunNormal,
-    pub whitened: Whitened,
+/// What a model leaves of one run at given parameters.
+pub(super) struct Left {
+    whitened: Whitened,
     /// Differences of the bins, not whitened.
-    pub residual: Vec<f64>,
-    /// Whitened regressors, less what the run's own factors would explain.
-    pub free: Vec<Vec<f64>>,
+    residual: Vec<f64>,
 }
 
 impl FitProblem {
@@ -105,14 +94,40 @@ impl FitProblem {
         }
     }
 
-    /// Residuals, regressors and normal equations at given parameters.
+    /// Memories of the runs for a model.
+    pub(super) fn memories(&self) -> Vec<RunMemory> {
+        self.runs.iter().map(|_| RunMemory::default()).collect()
+    }
+
+    /// What a model leaves of each run at given parameters.
+    pub(super) fn left(
+        &self,
+        plan: &Plan,
+        theta: &[f64],
+        filters: &[RunFilters],
+        memories: &mut [RunMemory],
+    ) -> Vec<Left> {
+        let runs = self.runs.par_iter().zip(&self.declared_responses).zip(filters);
+        runs.zip(memories)
+            .map(|(((run, declared), filters), memory)| {
+                Left::of(At { plan, run, declared, theta }, filters, memory)
+            })
+            .collect()
+    }
+
+    /// The cost of what is left, with the prior.
+    pub(super) fn cost(&self, model: &GrownModel, theta: &[f64], left: &[Left]) -> f64 {
+        left.iter().fold(self.prior(model, theta).2, |cost, run| cost + run.whitened.cost)
+    }
+
+    /// Residuals, regressors and normal equations where a model leaves that.
     pub(super) fn linearised(
         &self,
+        plan: &Plan,
         model: &GrownModel,
-        theta: Vec<f64>,
-        noise: Noise,
-        filters: &[RunFilters],
-        scratch: &mut Scratch,
+        (theta, noise): (Vec<f64>, Noise),
+        left: Vec<Left>,
+        (filters, memories): (&[RunFilters], &mut [RunMemory]),
     ) -> Fit {
         let (prior_information, prior_score, mut cost) = self.prior(model, &theta);
         let mut fit = Fit {
@@ -131,14 +146,21 @@ impl FitProblem {
             factors: Vec::new(),
             theta,
         };
-        for (run, filters) in self.runs.iter().zip(filters) {
-            let own = Self::run_linearised(model, &fit.theta, run, filters, scratch);
-            let Whitened { innovations, filter, factors, cost: run_cost } = own.whitened;
+        let theta = &fit.theta[..];
+        let runs = self.runs.par_iter().zip(&self.declared_responses).zip(filters).zip(memories);
+        let linearised: Vec<(RunNormal, Vec<Vec<f64>>)> = runs
+            .zip(&left)
+            .map(|((((run, declared), filters), memory), left)| {
+                left.normal(model, At { plan, run, declared, theta }, filters, memory)
+            })
+            .collect();
+        for ((normal, free), left) in linearised.into_iter().zip(left) {
+            let Whitened { innovations, filter, factors, cost: run_cost } = left.whitened;
             cost += run_cost;
-            fit.runs.push(own.normal);
+            fit.runs.push(normal);
             fit.innovations.push(innovations);
-            fit.columns.push(own.free);
-            fit.residuals.push(own.residual);
+            fit.columns.push(free);
+            fit.residuals.push(left.residual);
             fit.factors.push((factors, filter.covariance));
             fit.filters.push(filter);
         }
@@ -147,85 +169,62 @@ impl FitProblem {
         fit
     }
 
-    /// The same for one run.
-    pub(super) fn run_linearised(
+    /// Normal equations of one run, by number.
+    pub(super) fn run_normal(
+        &self,
+        index: usize,
         model: &GrownModel,
         theta: &[f64],
-        run: &RunData,
         filters: &RunFilters,
-        scratch: &mut Scratch,
-    ) -> LinearisedRun {
-        model.predict_bins(run, theta, &mut scratch.forces, &mut scratch.bins);
-        let residual: Vec<f64> =
-            run.bins.iter().zip(&scratch.bins).map(|(bin, p)| bin.speed_mps - p).collect();
-        let whitened = filters.whitened(&residual, &mut scratch.whitened);
-        let steps = Self::difference_steps(model, theta);
-        let columns = whitened_columns(model, run, theta, &steps, filters, scratch);
-        let free: Vec<Vec<f64>> = columns
-            .iter()
-            .map(|column| whitened.filter.remove(column, &whitened.filter.factors(column)))
-            .collect();
-        let normal = normal_equations(&columns, &free, &whitened);
-        LinearisedRun { normal, whitened, residual, free }
-    }
-
-    /// Steps for finite differences of the effects' parameters, towards the inside of the bounds.
-    fn difference_steps(model: &GrownModel, theta: &[f64]) -> Vec<f64> {
-        let specs = model.effects.iter().flat_map(|effect| effect.parameters());
-        theta[3..]
-            .iter()
-            .zip(specs)
-            .map(
-                |(value, spec)| {
-                    if value + spec.step <= spec.upper { spec.step } else { -spec.step }
-                },
-            )
-            .collect()
+    ) -> RunNormal {
+        let (run, declared) = (&self.runs[index], &self.declared_responses[index]);
+        let plan = Plan::of(model);
+        let at = At { plan: &plan, run, declared, theta };
+        let mut memory = RunMemory::default();
+        Left::of(at, filters, &mut memory).normal(model, at, filters, &mut memory).0
     }
 }
 
-/// Regressors of one run at the parameters of the prediction made last: a, b, c and gradients by their
-/// slopes, the others by differences; empty for a parameter that does not touch the run.
-fn whitened_columns(
-    model: &GrownModel,
-    run: &RunData,
-    theta: &[f64],
-    steps: &[f64],
-    filters: &RunFilters,
-    scratch: &mut Scratch,
-) -> Vec<Vec<f64>> {
-    let Scratch { forces, bins, moved, .. } = scratch;
-    let mut columns = vec![Vec::new(); theta.len()];
-    for (coefficient, column) in columns.iter_mut().take(3).enumerate() {
-        forces.davis_slopes(run, coefficient, moved);
-        filters.whitener.whiten(moved, column);
+impl Left {
+    fn of(at: At, filters: &RunFilters, memory: &mut RunMemory) -> Self {
+        let (mut bins, mut scratch) = (Vec::new(), Vec::new());
+        memory.predict(at, &mut bins);
+        let residual: Vec<f64> =
+            at.run.bins.iter().zip(&bins).map(|(bin, p)| bin.speed_mps - p).collect();
+        let whitened = filters.whitened(&residual, &mut scratch);
+        Left { whitened, residual }
     }
-    let touched = || {
-        model.effects.iter().zip(model.ranges()).flat_map(move |(effect, range)| {
-            let from = range.start;
-            range.filter(move |i| effect.touches(i - from, run)).map(move |i| (effect, i - from, i))
-        })
-    };
-    let mut permille = Vec::new();
-    for (effect, parameter, i) in touched() {
-        if effect.is_gradient() {
-            effect.gradient_permille(parameter, run, &mut permille);
-            forces.gradient_slopes(run, &permille, moved);
-            filters.whitener.whiten(moved, &mut columns[i]);
+
+    /// Normal equations, and the whitened regressors less what the run's own factors would explain.
+    fn normal(
+        &self,
+        model: &GrownModel,
+        at: At,
+        filters: &RunFilters,
+        memory: &mut RunMemory,
+    ) -> (RunNormal, Vec<Vec<f64>>) {
+        let mut columns = memory.columns(at, &difference_steps(model, at.theta));
+        let mut whitened = Vec::new();
+        for column in &mut columns {
+            filters.whitener.whiten(column, &mut whitened);
+            std::mem::swap(column, &mut whitened);
         }
+        let own = &self.whitened.filter;
+        let free: Vec<Vec<f64>> =
+            columns.iter().map(|column| own.remove(column, &own.factors(column))).collect();
+        let normal = normal_equations(&columns, &free, &self.whitened);
+        (normal, free)
     }
-    let mut elsewhere = theta.to_vec();
-    for (_, _, i) in touched().filter(|(effect, ..)| !effect.is_gradient()) {
-        let step = steps[i - 3];
-        elsewhere[i] += step;
-        model.predict_bins(run, &elsewhere, forces, moved);
-        elsewhere[i] = theta[i];
-        for (moved, base) in moved.iter_mut().zip(bins.iter()) {
-            *moved = (*moved - base) / step;
-        }
-        filters.whitener.whiten(moved, &mut columns[i]);
-    }
-    columns
+}
+
+/// Steps for finite differences of the effects' parameters, towards the inside of the bounds.
+fn difference_steps(model: &GrownModel, theta: &[f64]) -> Vec<f64> {
+    let specs = model.effects.iter().flat_map(|effect| effect.parameters());
+    theta[3..]
+        .iter()
+        .zip(specs)
+        .map(|(value, spec)| if value + spec.step <= spec.upper { spec.step } else { -spec.step })
+        .collect()
 }
 
 /// `free` are the columns less what the run's own factors would explain.

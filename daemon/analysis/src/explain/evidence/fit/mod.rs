@@ -2,15 +2,18 @@
 
 mod descent;
 mod linearised;
+mod memory;
 mod nearby;
 mod robust;
 
 use dynocar_core::train::Davis;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
+use rayon::prelude::*;
 
 use super::late_speed;
-use super::model::GrownModel;
+use super::model::{GrownForces, GrownModel};
 use super::noise::Noise;
+use super::response::Response;
 use super::run_data::RunData;
 use super::run_scatter::{Columns, WeightedFilter, scatter_columns};
 use super::whitener::Whitener;
@@ -36,6 +39,8 @@ pub struct FitProblem {
     prior_deviation: [f64; 3],
     /// Columns of the runs' own factors.
     scatter_columns: Vec<Columns>,
+    /// What is declared makes of each run.
+    declared_responses: Vec<Response>,
     /// Measured way over way by integrated speed, with its standard deviation.
     pub way_ratio: Option<(f64, f64)>,
     /// Seconds by which the speed is late by the position, with their standard deviation, where it is.
@@ -142,7 +147,16 @@ impl FitProblem {
             runs.iter().flat_map(|run| run.speed_late_s.iter().copied()).collect();
         let speed_late_s = late_speed::pooled_s(&parts);
         let scatter_columns = runs.iter().map(|run| scatter_columns(run, declared)).collect();
-        FitProblem { runs, declared, prior_deviation, scatter_columns, way_ratio, speed_late_s }
+        let declared_responses = runs.par_iter().map(declared_response).collect();
+        FitProblem {
+            runs,
+            declared,
+            prior_deviation,
+            scatter_columns,
+            declared_responses,
+            way_ratio,
+            speed_late_s,
+        }
     }
 
     /// Standard deviation of the declared a (0), b (1) or c (2).
@@ -192,6 +206,14 @@ impl FitProblem {
         let Davis { a, b, c } = self.declared;
         [a, b, c].iter().chain(effects).copied().collect()
     }
+}
+
+fn declared_response(run: &RunData) -> Response {
+    let mut response = Response::default();
+    let nothing = |_: usize| false;
+    let mut forces = GrownForces::default();
+    GrownModel::default().response(run, &[0.0; 3], nothing, &mut forces, &mut response);
+    response
 }
 
 /// The ratios of all runs together. Wheel creep, rounding and the places where a run starts are

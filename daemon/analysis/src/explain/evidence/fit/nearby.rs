@@ -1,8 +1,9 @@
 //! What models of the same parameters cost near a fit.
 
 use nalgebra::Cholesky;
+use rayon::prelude::*;
 
-use super::linearised::Scratch;
+use super::super::run_data::RunData;
 use super::robust::RunFilters;
 use super::{Fit, FitProblem, GrownModel};
 
@@ -11,28 +12,28 @@ pub struct Nearby<'a> {
     problem: &'a FitProblem,
     fit: &'a Fit,
     filters: Vec<RunFilters>,
-    scratch: Scratch,
 }
 
 impl<'a> Nearby<'a> {
     /// Around a fit.
     pub fn new(problem: &'a FitProblem, fit: &'a Fit) -> Self {
         let filters = problem.filters(fit.noise);
-        Nearby { problem, fit, filters, scratch: Scratch::default() }
+        Nearby { problem, fit, filters }
     }
 
     /// Cost that a model reaches when all parameters are fitted again, to second order; `run` is
     /// the only run in which it differs from the fit's, by file, `None` when it may in all.
     /// `None` when the parameters are not determined.
-    pub fn cost(&mut self, model: &GrownModel, run: Option<&str>) -> Option<f64> {
+    pub fn cost(&self, model: &GrownModel, run: Option<&str>) -> Option<f64> {
         let theta = &self.fit.theta;
         let (mut information, mut score, mut cost) = self.problem.prior(model, theta);
-        for (index, own) in self.problem.runs.iter().enumerate() {
-            let filters = &self.filters[index];
-            let moved = run.is_none_or(|run| run == own.file).then(|| {
-                FitProblem::run_linearised(model, theta, own, filters, &mut self.scratch).normal
-            });
-            let normal = moved.as_ref().unwrap_or(&self.fit.runs[index]);
+        let moved = |(index, own): (usize, &RunData)| {
+            let may_differ = run.is_none_or(|run| run == own.file);
+            may_differ.then(|| self.problem.run_normal(index, model, theta, &self.filters[index]))
+        };
+        let moved: Vec<_> = self.problem.runs.par_iter().enumerate().map(moved).collect();
+        for (moved, fitted) in moved.iter().zip(&self.fit.runs) {
+            let normal = moved.as_ref().unwrap_or(fitted);
             information += &normal.information;
             score += &normal.score;
             cost += normal.cost;

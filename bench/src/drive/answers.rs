@@ -1,0 +1,178 @@
+//! From what the daemon says may be used to what the driver drives by, and whether that was right.
+
+use dynocar_core::train::Davis;
+use dynocar_shared::stopping::RailAdhesion;
+use dynocar_shared::{Parameter, ParameterSnapshot, Quantity, Uncertain};
+
+use super::knowledge::Knowledge;
+use super::train::Train;
+
+/// What the driver asks for.
+pub const ASKED: [Quantity; 4] =
+    [Quantity::Resistance, Quantity::Mass, Quantity::BrakeFriction, Quantity::Adhesion];
+/// Deviations beyond which an answer is wrong.
+const WRONG: f64 = 4.0;
+/// Share of the truth by which a worse answer than the declared one is worse.
+const WORSE_BY: f64 = 0.01;
+/// Speed in m/s from which an answer counts.
+const COUNTS_MPS: f64 = 2.0;
+
+fn value(snapshot: &ParameterSnapshot, parameter: Parameter) -> Option<Uncertain> {
+    Some(Uncertain::new(snapshot.value(parameter)?, snapshot.std(parameter)?))
+}
+
+/// What is declared with each usable answer in its place.
+pub fn learned<'a>(
+    declared: &Knowledge,
+    declared_friction: f64,
+    speed_mps: f64,
+    usable: impl Fn(Quantity) -> Option<&'a ParameterSnapshot>,
+) -> Knowledge {
+    let mut known = *declared;
+    if let Some(mass_t) = usable(Quantity::Mass).and_then(|it| value(it, Parameter::Mass)) {
+        known.mass_kg = Uncertain::new(1e3 * mass_t.value, 1e3 * mass_t.std);
+    }
+    if let Some(snapshot) = usable(Quantity::Resistance)
+        && let Some(at) = snapshot.resistance_at(speed_mps)
+    {
+        let davis = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
+        let [a, b, c] = davis.map(|parameter| snapshot.value(parameter).unwrap_or_default());
+        known.davis = Davis { a, b, c };
+        known.w0_std_n_per_kn = at.w0_std_n_per_kn;
+    }
+    // Where the rail carries less than the brake exerts, the brake shows nothing of itself.
+    let rail = usable(Quantity::Adhesion).and_then(RailAdhesion::learned);
+    let friction =
+        usable(Quantity::BrakeFriction).and_then(|it| value(it, Parameter::DiscFriction));
+    if rail.is_some() {
+        known.rail = rail;
+    } else if let Some(friction) = friction {
+        // Only brake force over mass slows the train, and the friction presumes the declared mass.
+        let share = known.mass_kg.value / (declared.mass_kg.value * declared_friction);
+        known.brake_scale = Uncertain::new(share * friction.value, share * friction.std);
+    }
+    known
+}
+
+/// What a driver keeps from its last braking for the next one: the daemon calls both stale once the train
+/// no longer brakes, which is when the next braking is planned. No stop is bounded by it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Memory {
+    brake_scale: Option<Uncertain>,
+    rail: Option<RailAdhesion>,
+    was_braking: bool,
+    saw_rail: bool,
+}
+
+impl Memory {
+    /// What the driver drives by, for what is usable now, by [`ASKED`].
+    pub fn recall(
+        &mut self,
+        learned: &Knowledge,
+        is_usable: [bool; 4],
+        is_braking: bool,
+    ) -> Knowledge {
+        let mut known = *learned;
+        if is_usable[2] && !is_usable[3] {
+            self.brake_scale = Some(learned.brake_scale);
+        } else if let Some(kept) = self.brake_scale {
+            known.brake_scale = kept;
+        }
+        if is_usable[3] {
+            (self.rail, self.saw_rail) = (learned.rail, true);
+        } else {
+            known.rail = self.rail;
+        }
+        if self.was_braking && !is_braking {
+            // A whole braking that the rail did not limit.
+            if !self.saw_rail {
+                self.rail = None;
+            }
+            self.saw_rail = false;
+        }
+        self.was_braking = is_braking;
+        known
+    }
+}
+
+/// How often one quantity was usable, and right.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Use {
+    /// Cycles of the moving train; of the braking one for brake and adhesion.
+    pub cycles: u64,
+    /// Those in which it was usable.
+    pub usable: u64,
+    /// Of those, with the truth more than four deviations off.
+    pub wrong: u64,
+    /// Of those, further from the truth than the declared value, by 1 % of the truth.
+    pub worse: u64,
+    /// Sums of the squares of the errors over the truth: usable, and of the declared value then.
+    pub squares: [f64; 2],
+    /// Changes of usable.
+    pub changes: u64,
+    /// Cycles until the first use.
+    pub first: Option<u64>,
+    was_usable: bool,
+}
+
+impl Use {
+    fn push(&mut self, answer: Option<[f64; 4]>) {
+        self.cycles += 1;
+        self.changes += u64::from(answer.is_some() != self.was_usable);
+        self.was_usable = answer.is_some();
+        let Some([value, std, declared, truth]) = answer else { return };
+        self.first.get_or_insert(self.cycles);
+        self.usable += 1;
+        self.wrong += u64::from((value - truth).abs() > WRONG * std);
+        for (sum, it) in self.squares.iter_mut().zip([value, declared]) {
+            *sum += (it / truth - 1.0).powi(2);
+        }
+        let by = (value - truth).abs() - (declared - truth).abs();
+        self.worse += u64::from(by > WORSE_BY * truth);
+    }
+
+    /// Joins another train's.
+    pub fn join(&mut self, other: &Use) {
+        self.cycles += other.cycles;
+        self.usable += other.usable;
+        self.wrong += other.wrong;
+        self.worse += other.worse;
+        self.changes += other.changes;
+        self.squares = [0, 1].map(|which| self.squares[which] + other.squares[which]);
+    }
+}
+
+/// Takes in a cycle: what is declared and what was learned, in the order of [`ASKED`].
+pub fn count(
+    uses: &mut [Use; 4],
+    train: &Train,
+    is_braking: bool,
+    declared: &Knowledge,
+    learned: &Knowledge,
+    is_usable: [bool; 4],
+) {
+    let speed_mps = train.speed_mps();
+    if speed_mps < COUNTS_MPS {
+        return;
+    }
+    let w0 = |davis: &Davis| davis.w0_n_per_kn(speed_mps);
+    let adhesion = match learned.rail {
+        Some(RailAdhesion::Law(law, scale)) => {
+            let at = law.adhesion(speed_mps);
+            Uncertain::new(at * scale.value, at * scale.std)
+        }
+        _ => Uncertain::exact(f64::NAN),
+    };
+    let scale = learned.brake_scale;
+    let answers = [
+        [w0(&learned.davis), learned.w0_std_n_per_kn, w0(&declared.davis), w0(&train.davis())],
+        [learned.mass_kg.value, learned.mass_kg.std, declared.mass_kg.value, train.mass_kg()],
+        [scale.value, scale.std, 1.0, train.brake_scale()],
+        [adhesion.value, adhesion.std, f64::INFINITY, train.adhesion(speed_mps)],
+    ];
+    for (place, answer) in answers.into_iter().enumerate() {
+        if place < 2 || is_braking {
+            uses[place].push(is_usable[place].then_some(answer));
+        }
+    }
+}

@@ -1,0 +1,248 @@
+//! What the world of ordinary mistakes does not have: brakes, rails, wind, tunnels, curves and loads.
+
+use dynocar_core::pipeline::braking::gear::DeclaredGear;
+use dynocar_core::train::{BrakeGear, EffortCurve, TrainModel};
+use dynocar_shared::stopping::RailAdhesion;
+use dynocar_shared::{RailCondition, Uncertain};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::knowledge::Ability;
+use crate::scenarios::world::{LoadTold, Scenario, Traffic, World, normal};
+
+/// What is particular about brakes, rail or daemon.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Condition {
+    /// Nothing.
+    Ordinary,
+    /// The brake exerts 10 % less than its pressure says.
+    WeakBrakes,
+    /// The brake exerts 10 % more.
+    StrongBrakes,
+    /// The rail is wet, and mostly more slippery than the law says.
+    WetRail,
+    /// The daemon is killed in the middle of a way, and another one comes.
+    DaemonDies,
+}
+
+impl Condition {
+    /// All of them.
+    pub const ALL: [Condition; 5] = [
+        Condition::Ordinary,
+        Condition::WeakBrakes,
+        Condition::StrongBrakes,
+        Condition::WetRail,
+        Condition::DaemonDies,
+    ];
+
+    /// In words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Condition::Ordinary => "ordinary",
+            Condition::WeakBrakes => "brakes 10 % weaker",
+            Condition::StrongBrakes => "brakes 10 % stronger",
+            Condition::WetRail => "wet rail",
+            Condition::DaemonDies => "daemon dies",
+        }
+    }
+
+    fn brake_scale(self) -> f64 {
+        match self {
+            Condition::WeakBrakes => 0.9,
+            Condition::StrongBrakes => 1.1,
+            _ => 1.0,
+        }
+    }
+}
+
+/// A row of the table: kind of traffic and what is particular.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Service {
+    /// Kind of traffic.
+    pub traffic: Traffic,
+    /// What is particular.
+    pub condition: Condition,
+    /// Cycle of the controller in ms.
+    pub cycle_ms: u32,
+}
+
+impl Service {
+    /// In words.
+    pub fn name(&self) -> String {
+        format!("{}, {}, {} ms", traffic_name(self.traffic), self.condition.name(), self.cycle_ms)
+    }
+
+    /// The world's scenario: places are those of balises, loads as the kind of traffic knows them.
+    pub fn scenario(&self) -> Scenario {
+        Scenario {
+            traffic: self.traffic,
+            load: match self.traffic {
+                Traffic::Metro => LoadTold::Changing,
+                Traffic::Freight => LoadTold::Unknown,
+                Traffic::Emu | Traffic::HighSpeed => LoadTold::Weighed(20),
+            },
+            jumps: false,
+            rate_hz: 1000 / self.cycle_ms,
+            speed_noise_mps: 0.03,
+            position_noise_m: 0.05,
+            map_std_permille: 0.1,
+        }
+    }
+
+    /// The train as declared, with drive and brake.
+    pub fn declared(&self) -> TrainModel {
+        let mut train = self.traffic.declared();
+        let ability = ability(self.traffic);
+        train.brake_gear = gear(ability.brake_max_n);
+        train.curve_constant_n_per_kn_m = 600.0;
+        train.traction = Some(ability.traction);
+        train.brake = EffortCurve::new(vec![(0.0, ability.brake_max_n)]);
+        train
+    }
+}
+
+/// The traffic in words.
+pub fn traffic_name(traffic: Traffic) -> &'static str {
+    match traffic {
+        Traffic::Metro => "metro",
+        Traffic::Emu => "regional",
+        Traffic::Freight => "freight",
+        Traffic::HighSpeed => "high speed",
+    }
+}
+
+/// What a train of this traffic can do with its declared load.
+pub fn ability(traffic: Traffic) -> Ability {
+    let (habits, train) = (traffic.habits(), traffic.declared());
+    let inertial_kg = train.mass_kg * (1.0 + train.rotating_mass_factor);
+    let (most, braking_mps2) = habits.acceleration_mps2;
+    let power_mps = 0.4 * habits.top_mps;
+    let points = (0..=20).map(|k| {
+        let speed_mps = power_mps + (1.1 * habits.top_mps - power_mps) * f64::from(k) / 20.0;
+        (speed_mps, inertial_kg * most * power_mps / speed_mps)
+    });
+    let points = [(0.0, inertial_kg * most)].into_iter().chain(points).collect();
+    let (jerk_mps3, lag_s) = match traffic {
+        Traffic::Metro => (0.8, 0.5),
+        Traffic::Emu | Traffic::HighSpeed => (0.5, 0.6),
+        Traffic::Freight => (0.1, 2.5),
+    };
+    Ability {
+        traction: EffortCurve::new(points).expect("rising speeds"),
+        brake_max_n: FULL_BRAKE * inertial_kg * braking_mps2,
+        braking_mps2,
+        jerk_mps3,
+        lag_s,
+    }
+}
+
+/// Full over ordinary braking: as much as brings a full train to a stop.
+const FULL_BRAKE: f64 = 1.7;
+/// Cylinder pressure in Pa of a full braking.
+const FULL_PRESSURE_PA: f64 = 400e3;
+
+fn gear(brake_max_n: f64) -> BrakeGear {
+    let one_pad = BrakeGear {
+        cylinder_diameter_mm: Some(203.0),
+        disc_radius_mm: Some(247.0),
+        wheel_radius_mm: Some(460.0),
+        efficiency: Some(0.9),
+        ratio: Some(2.5),
+        friction: Some(0.35),
+        pads: Some(1.0),
+        friction_brake: None,
+    };
+    let of_one_n = declared_gear(&one_pad).declared_force_n(FULL_PRESSURE_PA);
+    BrakeGear { pads: Some(brake_max_n / of_one_n), ..one_pad }
+}
+
+/// The gear as the daemon reckons with it.
+pub fn declared_gear(gear: &BrakeGear) -> DeclaredGear {
+    DeclaredGear::of(gear).expect("a gear with every quantity")
+}
+
+/// What acts on the train and is in no file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hidden {
+    /// Exerted over reported brake force, of the train and of all days.
+    pub brake_scale: f64,
+    /// The rail: its law, and the true adhesion over it.
+    pub rail: (RailCondition, f64),
+    /// Wind along the growing chainage in m/s: of the day.
+    pub wind_mps: f64,
+    /// Tunnels: from, to in m; nobody declares them.
+    pub tunnels_m: Vec<(f64, f64)>,
+    /// Curves: from, to and radius in m; they are declared.
+    pub curves_m: Vec<(f64, f64, f64)>,
+    /// k of the curve resistance k/R in N/kN.
+    pub curve_constant: f64,
+}
+
+impl Hidden {
+    /// Draws it for a world.
+    pub fn draw(service: &Service, world: &World, random: &mut ChaCha8Rng) -> Self {
+        let end_m = world.stops_m[world.stops_m.len() - 1];
+        let rail = match service.condition {
+            Condition::WetRail => {
+                (RailCondition::Wet, (0.75 + 0.1 * normal(random)).clamp(0.55, 1.0))
+            }
+            _ => (RailCondition::Dry, 1.0 + 0.05 * normal(random)),
+        };
+        let wind_std_mps = match service.traffic {
+            Traffic::Metro => 0.0,
+            Traffic::Emu | Traffic::Freight => 3.0,
+            Traffic::HighSpeed => 5.0,
+        };
+        let stretches = |count: usize, lengths_m: (f64, f64), random: &mut ChaCha8Rng| {
+            let piece_m = end_m / count.max(1) as f64;
+            let draw = |k: usize| {
+                let length_m = lengths_m.0 + (lengths_m.1 - lengths_m.0) * random.random::<f64>();
+                let from_m = piece_m * k as f64 + 0.5 * random.random::<f64>() * piece_m;
+                (from_m, from_m + length_m)
+            };
+            (0..count).map(draw).collect::<Vec<_>>()
+        };
+        let tunnels = if service.traffic == Traffic::HighSpeed { 8 } else { 0 };
+        let tunnels_m = stretches(tunnels, (1e3, 5e3), random);
+        let curves = if service.traffic == Traffic::HighSpeed { 0.0 } else { end_m / 1500.0 };
+        let curves_m = stretches(curves as usize, (200.0, 600.0), random)
+            .into_iter()
+            .map(|(from_m, to_m)| (from_m, to_m, 350.0 + 900.0 * random.random::<f64>()))
+            .collect();
+        Hidden {
+            brake_scale: service.condition.brake_scale() * (1.0 + 0.02 * normal(random)),
+            rail,
+            wind_mps: wind_std_mps * normal(random),
+            tunnels_m,
+            curves_m,
+            curve_constant: 600.0 * (1.0 + 0.15 * normal(random)),
+        }
+    }
+
+    /// Curvature in 1/m at a chainage in m.
+    pub fn curvature_per_m(&self, chainage_m: f64) -> f64 {
+        let here = |curve: &&(f64, f64, f64)| (curve.0..curve.1).contains(&chainage_m);
+        self.curves_m.iter().find(here).map_or(0.0, |curve| 1.0 / curve.2)
+    }
+
+    /// What tunnels add to the resistance to air, as a share of it.
+    pub fn tunnel_share(&self, chainage_m: f64) -> f64 {
+        let is_inside = |tunnel: &(f64, f64)| (tunnel.0..tunnel.1).contains(&chainage_m);
+        if self.tunnels_m.iter().any(is_inside) { 0.4 } else { 0.0 }
+    }
+
+    /// The adhesion's law with the exact scale.
+    pub fn adhesion(&self) -> RailAdhesion {
+        let (law, scale) = self.rail;
+        RailAdhesion::Law(law, Uncertain::exact(scale))
+    }
+}
+
+/// Gross mass in kg of the next load.
+pub fn next_load_kg(traffic: Traffic, before_kg: f64, random: &mut ChaCha8Rng) -> f64 {
+    match traffic {
+        // From empty to full.
+        Traffic::Metro => traffic.declared().mass_kg * (0.8 + 0.5 * random.random::<f64>()),
+        _ => before_kg,
+    }
+}

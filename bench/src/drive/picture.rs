@@ -1,0 +1,94 @@
+//! One picture: stops, timetable and energy with declared, learned and true parameters.
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+use super::score::{Figure, Line, Scored};
+
+const SIZE: (u32, u32) = (1_080, 400);
+const COLORS: [RGBColor; 3] =
+    [RGBColor(176, 176, 176), RGBColor(31, 119, 180), RGBColor(44, 160, 44)];
+const NAMES: [&str; 3] = ["declared parameters", "with Dynocar", "true parameters"];
+
+type Drawn = Result<(), Box<dyn std::error::Error>>;
+
+/// The picture of some services as SVG; one group of bars each.
+///
+/// # Errors
+///
+/// When it cannot be drawn.
+pub fn svg(scored: &[Scored]) -> Result<String, Box<dyn std::error::Error>> {
+    let mut text = String::new();
+    {
+        let area = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
+        area.fill(&WHITE)?;
+        let panels = area.split_evenly((1, 3));
+        let cm = |line: &Line| scaled(line.error_m, 100.0, 0.0);
+        panel(&panels[0], "stopping error in cm (rms)", scored, cm, true)?;
+        panel(&panels[1], "off the timetable in s", scored, |line| line.late_s, false)?;
+        let more = |line: &Line| scaled(line.energy_percent, 1.0, -100.0);
+        panel(&panels[2], "energy above the least in %", scored, more, false)?;
+        area.present()?;
+    }
+    Ok(text)
+}
+
+/// One group of bars for each service.
+fn panel(
+    area: &DrawingArea<SVGBackend<'_>, Shift>,
+    title: &str,
+    scored: &[Scored],
+    figure: impl Fn(&Line) -> Figure,
+    has_legend: bool,
+) -> Drawn {
+    let figures = scored.iter().flat_map(|it| &it.lines).map(&figure);
+    let most = figures.map(|it| it.high).fold(0.0, f64::max).max(1e-3);
+    let right = 4.0 * scored.len() as f64;
+    let mut chart = ChartBuilder::on(area)
+        .caption(title, ("sans-serif", 17))
+        .margin(10)
+        .y_label_area_size(40)
+        .build_cartesian_2d(0.0..right, -0.12 * most..1.25 * most)?;
+    chart
+        .configure_mesh()
+        .disable_x_mesh()
+        .disable_x_axis()
+        .max_light_lines(1)
+        .y_labels(6)
+        .y_label_formatter(&|value| match *value < 0.0 {
+            true => String::new(),
+            false => format!("{}", (10.0 * value).round() / 10.0),
+        })
+        .draw()?;
+    for (group, it) in scored.iter().enumerate() {
+        let left = 4.0 * group as f64 + 0.5;
+        for (bar, line) in it.lines.iter().enumerate() {
+            let (from, to, bar_figure) = (left + bar as f64, left + bar as f64 + 0.9, figure(line));
+            let (middle, color) = (0.5 * (from + to), COLORS[bar]);
+            chart.draw_series([Rectangle::new(
+                [(from, 0.0), (to, bar_figure.value.max(0.0))],
+                color.filled(),
+            )])?;
+            let ends = [(middle, bar_figure.low.max(0.0)), (middle, bar_figure.high.max(0.0))];
+            chart.draw_series([PathElement::new(ends, BLACK.stroke_width(1))])?;
+        }
+        let scenario = &it.lines[0].scenario;
+        let name = scenario.split(',').next().unwrap_or(scenario).to_owned();
+        chart.draw_series([Text::new(name, (left, -0.03 * most), ("sans-serif", 14))])?;
+    }
+    if has_legend {
+        for (place, name) in NAMES.into_iter().enumerate() {
+            let at = (0.03 * right, (1.22 - 0.08 * place as f64) * most);
+            let to = (0.06 * right, (1.18 - 0.08 * place as f64) * most);
+            chart.draw_series([Rectangle::new([at, to], COLORS[place].filled())])?;
+            let beside = (0.075 * right, at.1);
+            chart.draw_series([Text::new(name, beside, ("sans-serif", 13))])?;
+        }
+    }
+    Ok(())
+}
+
+fn scaled(figure: Figure, factor: f64, shift: f64) -> Figure {
+    let of = |value: f64| factor * value + shift;
+    Figure { value: of(figure.value), low: of(figure.low), high: of(figure.high) }
+}

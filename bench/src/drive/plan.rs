@@ -1,0 +1,238 @@
+//! The speed profile that keeps the timetable with the least energy: accelerate in full, cruise, coast,
+//! brake. Found are the cruising speed and the place from which the train coasts.
+
+use super::braking::BrakingCurve;
+use super::knowledge::{Ability, Knowledge};
+use super::leg::Leg;
+
+/// Steps of the way in a reckoned run.
+const STEPS: usize = 200;
+/// Slowest coasting as a share of the cruising speed; below it the train is pulled again.
+pub const COASTING_MIN_SHARE: f64 = 0.5;
+/// Least cruising speed as a share of the highest speed.
+const CRUISE_MIN_SHARE: f64 = 0.4;
+/// Looks for the place at which coasting may begin.
+const LOOKS: usize = 12;
+/// Thirds taken off the range of cruising speeds.
+const THIRDS: usize = 8;
+/// Share of the time left by which a plan may be early.
+const EARLY_SHARE: f64 = 5e-4;
+
+/// What the driver drives by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plan {
+    /// Cruising speed in m/s.
+    pub cruise_mps: f64,
+    /// Distance in m from which the train coasts.
+    pub coast_from_m: f64,
+    /// Running time in s from here.
+    pub time_s: f64,
+    /// Work in J of the traction at the rims from here.
+    pub energy_j: f64,
+}
+
+/// Everything that a plan follows from.
+#[derive(Clone, Copy, Debug)]
+pub struct Planner<'a> {
+    /// The way.
+    pub leg: &'a Leg,
+    /// The train.
+    pub knowledge: &'a Knowledge,
+    /// What it can do.
+    pub ability: &'a Ability,
+}
+
+impl Planner<'_> {
+    /// The plan with the least energy, from a distance in m and a speed in m/s, that needs no more than
+    /// `left_s`; the fastest one where none does.
+    pub fn plan(&self, from: (f64, f64), left_s: f64) -> Plan {
+        let top = self.leg.top_mps;
+        let fastest = self.run(from, top, self.leg.length_m);
+        if fastest.time_s >= left_s {
+            return fastest;
+        }
+        let (mut low, mut high) = (CRUISE_MIN_SHARE * top, top);
+        let mut best = self.in_time(from, top, left_s).unwrap_or(fastest);
+        for _ in 0..THIRDS {
+            let third = (high - low) / 3.0;
+            let one = self.in_time(from, low + third, left_s);
+            let other = self.in_time(from, high - third, left_s);
+            for found in [one, other].into_iter().flatten() {
+                if found.energy_j < best.energy_j {
+                    best = found;
+                }
+            }
+            // Too slow a cruise is never in time.
+            match (one, other) {
+                (Some(one), Some(other)) if one.energy_j < other.energy_j => high -= third,
+                _ => low += third,
+            }
+        }
+        best
+    }
+
+    /// The latest possible coasting that is still in time at a cruising speed in m/s.
+    fn in_time(&self, from: (f64, f64), cruise_mps: f64, left_s: f64) -> Option<Plan> {
+        let mut best = self.run(from, cruise_mps, self.leg.length_m);
+        if best.time_s > left_s {
+            return None;
+        }
+        // Between too early and in time, where a straight line between the two says.
+        let at_once = self.run(from, cruise_mps, from.0);
+        if at_once.time_s <= left_s {
+            return Some(at_once);
+        }
+        let (mut early, mut early_s) = (at_once, at_once.time_s - left_s);
+        let mut late_s = left_s - best.time_s;
+        for _ in 0..LOOKS {
+            let share = match early_s > 0.2 * left_s {
+                true => 0.5,
+                false => (early_s / (early_s + late_s)).clamp(0.03, 0.97),
+            };
+            let place_m = early.coast_from_m + share * (best.coast_from_m - early.coast_from_m);
+            let found = self.run(from, cruise_mps, place_m);
+            if found.time_s <= left_s {
+                (best, late_s) = (found, left_s - found.time_s);
+                // The other end counts for less where it stays.
+                early_s *= 0.5;
+                if late_s <= EARLY_SHARE * left_s {
+                    break;
+                }
+            } else {
+                (early, early_s) = (found, found.time_s - left_s);
+                late_s *= 0.5;
+            }
+        }
+        Some(best)
+    }
+
+    /// The run at a cruising speed with coasting from a distance on.
+    pub fn run(
+        &self,
+        (mut at_m, mut speed_mps): (f64, f64),
+        cruise_mps: f64,
+        coast_from_m: f64,
+    ) -> Plan {
+        let curve = BrakingCurve::of(self.knowledge, self.ability, cruise_mps.max(speed_mps));
+        let step_m = (self.leg.length_m - at_m).max(1.0) / STEPS as f64;
+        let (mut time_s, mut energy_j) = (0.0, 0.0);
+        // Beyond all need: a step is a share of the way.
+        for _ in 0..2 * STEPS {
+            let mut way_m = step_m;
+            if (at_m + 1e-6..at_m + step_m).contains(&coast_from_m) {
+                way_m = coast_from_m - at_m;
+            }
+            let spare_m = self.leg.length_m - at_m - curve.distance_m(speed_mps);
+            let (force_n, next_mps) = self.step((at_m, speed_mps), way_m, cruise_mps, coast_from_m);
+            let next_spare_m = self.leg.length_m - at_m - way_m - curve.distance_m(next_mps);
+            let share = match next_spare_m < 0.0 {
+                true => (spare_m / (spare_m - next_spare_m)).clamp(0.0, 1.0),
+                false => 1.0,
+            };
+            let passed_mps = speed_mps + share * (next_mps - speed_mps);
+            time_s += 2.0 * share * way_m / (speed_mps + passed_mps).max(0.01);
+            energy_j += share * way_m * force_n.max(0.0);
+            (at_m, speed_mps) = (at_m + share * way_m, passed_mps);
+            if next_spare_m < 0.0 {
+                break;
+            }
+        }
+        time_s += curve.time_s(speed_mps);
+        Plan { cruise_mps, coast_from_m, time_s, energy_j }
+    }
+
+    /// Force in N over a piece of the way, and the speed in m/s at its end.
+    fn step(
+        &self,
+        (at_m, speed_mps): (f64, f64),
+        way_m: f64,
+        cruise_mps: f64,
+        coast_from_m: f64,
+    ) -> (f64, f64) {
+        let slope = self.leg.slope_permille(at_m + 0.5 * way_m);
+        let share = if at_m >= coast_from_m { COASTING_MIN_SHARE } else { 1.0 };
+        let target_mps = share * cruise_mps;
+        let most_n = self.ability.traction.force_n(speed_mps);
+        let is_pulled = speed_mps < target_mps;
+        let limit_mps = if is_pulled { target_mps } else { self.leg.top_mps };
+        let held_n = match speed_mps > target_mps {
+            true => 0.0,
+            false => self.knowledge.resisting_n(speed_mps, slope).clamp(0.0, most_n),
+        };
+        let force_n = if is_pulled { most_n } else { held_n };
+        let acceleration = self.knowledge.acceleration_mps2(force_n, speed_mps, slope);
+        let free_mps = (speed_mps * speed_mps + 2.0 * way_m * acceleration).max(1e-4).sqrt();
+        let next_mps = free_mps.min(limit_mps.max(speed_mps));
+        // The last piece of an acceleration takes as much as it needs.
+        let used = match free_mps > next_mps && free_mps > speed_mps {
+            true => (next_mps.powi(2) - speed_mps.powi(2)) / (free_mps.powi(2) - speed_mps.powi(2)),
+            false => 1.0,
+        };
+        (used * force_n + (1.0 - used) * held_n, next_mps)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::knowledge::tests::metro;
+    use super::*;
+
+    fn leg() -> Leg {
+        let slopes = (0..140).map(|piece| if piece < 70 { 4.0 } else { -4.0 }).collect();
+        Leg { length_m: 1400.0, top_mps: 20.0, due_s: 0.0, slopes_permille: slopes }
+    }
+
+    fn with<T>(knowledge: &Knowledge, ability: &Ability, look: impl FnOnce(Planner) -> T) -> T {
+        look(Planner { leg: &leg(), knowledge, ability })
+    }
+
+    #[test]
+    fn a_reckoned_run_is_that_of_small_steps_in_time() {
+        let (knowledge, ability) = metro();
+        let found = with(&knowledge, &ability, |it| it.run((0.0, 0.0), 17.0, 600.0));
+        let curve = BrakingCurve::of(&knowledge, &ability, 17.0);
+        let (leg, step_s) = (leg(), 1e-3);
+        let (mut at_m, mut speed, mut time_s, mut energy_j) = (0.0, 0.0_f64, 0.0, 0.0);
+        while curve.distance_m(speed) < leg.length_m - at_m {
+            let slope = leg.slope_permille(at_m);
+            let force_n = match () {
+                () if at_m >= 600.0 => 0.0,
+                () if speed < 17.0 => ability.traction.force_n(speed),
+                () => knowledge.resisting_n(speed, slope),
+            };
+            let next = speed + step_s * knowledge.acceleration_mps2(force_n, speed, slope);
+            at_m += 0.5 * step_s * (speed + next);
+            energy_j += force_n * step_s * speed;
+            (speed, time_s) = (next, time_s + step_s);
+        }
+        time_s += curve.time_s(speed);
+        assert!((found.time_s / time_s - 1.0).abs() < 0.005, "{} {time_s}", found.time_s);
+        assert!((found.energy_j / energy_j - 1.0).abs() < 0.01, "{} {energy_j}", found.energy_j);
+    }
+
+    #[test]
+    fn more_time_costs_less_energy_and_no_other_plan_in_time_costs_less() {
+        let (knowledge, ability) = metro();
+        with(&knowledge, &ability, |planner| {
+            let fastest = planner.plan((0.0, 0.0), 0.0);
+            let mut before = fastest;
+            for late in [1.04, 1.1, 1.2] {
+                let left_s = late * fastest.time_s;
+                let found = planner.plan((0.0, 0.0), left_s);
+                assert!(found.time_s <= left_s && found.time_s > 0.995 * left_s, "{found:?}");
+                assert!(found.energy_j < 0.97 * before.energy_j, "{found:?} {before:?}");
+                before = found;
+                for cruise_mps in (8..=40).map(|half| 0.5 * f64::from(half)) {
+                    for coast_from_m in (0..70).map(|piece| 20.0 * f64::from(piece)) {
+                        let other = planner.run((0.0, 0.0), cruise_mps, coast_from_m);
+                        let is_in_time = other.time_s <= left_s;
+                        assert!(
+                            !is_in_time || other.energy_j > 0.99 * found.energy_j,
+                            "{other:?} {found:?}"
+                        );
+                    }
+                }
+            }
+        });
+    }
+}

@@ -1,0 +1,296 @@
+//! What the ways of all trains come to, with intervals.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+
+use super::answers::{ASKED, Use};
+use super::journey::Way;
+use super::line::Service;
+use super::run::{Driven, Informant};
+
+/// Draws of the trains behind an interval.
+const DRAWS: usize = 400;
+/// A way counts for the energy where every driver stops so near in m: else it is not the same service.
+const SAME_STOP_M: f64 = 1.0;
+/// What is no difference that anybody would notice: stop in m, energy in %, lateness in s, jerk in m/s³.
+const UNNOTICED: [f64; 4] = [0.03, 0.3, 0.5, 0.05];
+/// Share of bounds that may be exceeded.
+const EXCEEDED_MAX: f64 = 0.01;
+
+/// A figure with its 95 % interval over trains.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Figure {
+    /// The figure.
+    pub value: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+impl Figure {
+    /// A statistic of trains, given by their places; the interval is that of trains drawn anew.
+    fn of(trains: usize, statistic: impl Fn(&[usize]) -> f64) -> Self {
+        let all: Vec<usize> = (0..trains).collect();
+        let mut random = ChaCha8Rng::seed_from_u64(95);
+        let mut draws: Vec<f64> = (0..DRAWS)
+            .map(|_| {
+                let drawn: Vec<usize> =
+                    all.iter().map(|_| random.random_range(0..trains)).collect();
+                statistic(&drawn)
+            })
+            .collect();
+        draws.sort_by(f64::total_cmp);
+        let at = |share: f64| draws[(share * (DRAWS - 1) as f64).round() as usize];
+        Figure { value: statistic(&all), low: at(0.025), high: at(0.975) }
+    }
+}
+
+/// A service with one kind of parameters.
+#[derive(Clone, Debug, Serialize)]
+pub struct Line {
+    /// The service.
+    pub scenario: String,
+    /// The parameters.
+    pub driver: &'static str,
+    /// Stops behind the figures.
+    pub stops: usize,
+    /// Mean of the place beyond the stopping point in m.
+    pub beyond_m: Figure,
+    /// Its standard deviation in m.
+    pub spread_m: Figure,
+    /// Root of its mean square in m.
+    pub error_m: Figure,
+    /// Stops within 0.3 m in %.
+    pub within_03_percent: Figure,
+    /// Stops within 0.5 m in %.
+    pub within_05_percent: Figure,
+    /// Energy at the rims at the same running time, over that with true parameters, in %.
+    pub energy_percent: Figure,
+    /// Mean size of the deviation from the timetable in s.
+    pub late_s: Figure,
+    /// Mean of the ways' greatest jerk in m/s³.
+    pub jerk_mps3: Figure,
+    /// Bounds looked at.
+    pub bounds: usize,
+    /// Those that the true braking distance exceeded, or that could not be given; absent for the true
+    /// parameters, which leave no room.
+    pub exceeded: Option<usize>,
+    /// Length of the bound over the true braking distance in %.
+    pub bound_percent: Option<f64>,
+    /// The same of the fixed worst case.
+    pub fixed_percent: f64,
+}
+
+/// What an answer was worth in a service.
+#[derive(Clone, Debug, Serialize)]
+pub struct Answered {
+    /// The service.
+    pub scenario: String,
+    /// The quantity.
+    pub quantity: &'static str,
+    /// Share of the time in which it was usable in %.
+    pub usable_percent: f64,
+    /// Share of that with the truth more than four deviations off in %.
+    pub wrong_percent: f64,
+    /// Share of that with the declared value nearer to the truth, by 1 % of the truth, in %.
+    pub worse_percent: f64,
+    /// Root of the mean square of its error in % of the truth; of the declared value then.
+    pub error_percent: [Option<f64>; 2],
+    /// Median time in s until the first use, over trains.
+    pub first_s: Option<f64>,
+    /// Changes of usable for each stop.
+    pub changes_per_stop: f64,
+}
+
+/// The driver with Dynocar beside the one with declared parameters.
+#[derive(Clone, Debug, Serialize)]
+pub struct Comparison {
+    /// The service.
+    pub scenario: String,
+    /// What is better, beyond the noise.
+    pub better: Vec<String>,
+    /// What is worse, beyond the noise.
+    pub worse: Vec<String>,
+    /// True where that is not paid back by a better stop, or where stops or bounds are worse.
+    pub is_broken: bool,
+}
+
+/// Everything about one service.
+#[derive(Clone, Debug, Serialize)]
+pub struct Scored {
+    /// Declared, Dynocar, true.
+    pub lines: Vec<Line>,
+    /// By quantity.
+    pub answers: Vec<Answered>,
+    /// With and without Dynocar.
+    pub comparison: Comparison,
+}
+
+/// The ways of one kind of parameters beside all kinds, for the energy of the same stops.
+struct Drives<'a> {
+    own: &'a [Driven],
+    all: &'a [Vec<Driven>; 3],
+}
+
+impl Drives<'_> {
+    fn mean(&self, trains: &[usize], of: impl Fn(&Way) -> f64) -> f64 {
+        let ways = || trains.iter().flat_map(|&train| &self.own[train].ways);
+        ways().map(of).sum::<f64>() / ways().count().max(1) as f64
+    }
+
+    fn energy_percent(&self, trains: &[usize]) -> f64 {
+        let (mut own_j, mut true_j) = (0.0, 0.0);
+        for &train in trains {
+            for (place, way) in self.own[train].ways.iter().enumerate() {
+                let is_same =
+                    self.all.iter().all(|it| it[train].ways[place].beyond_m.abs() <= SAME_STOP_M);
+                if is_same {
+                    own_j += way.energy_j;
+                    true_j += self.all[2][train].ways[place].energy_j;
+                }
+            }
+        }
+        if true_j > 0.0 { 100.0 * own_j / true_j } else { f64::NAN }
+    }
+
+    fn error_m(&self, trains: &[usize]) -> f64 {
+        self.mean(trains, |way| way.beyond_m.powi(2)).sqrt()
+    }
+
+    /// Stop, energy, lateness and jerk: less is better.
+    fn compared(&self, trains: &[usize]) -> [f64; 4] {
+        [
+            self.error_m(trains),
+            self.energy_percent(trains),
+            self.mean(trains, |way| way.late_s.abs()),
+            self.mean(trains, |way| way.jerk_mps3),
+        ]
+    }
+}
+
+/// Scores a service's drives with declared, learned and true parameters.
+pub fn score(service: Service, all: &[Vec<Driven>; 3]) -> Scored {
+    let lines: Vec<Line> = Informant::ALL
+        .into_iter()
+        .zip(all)
+        .map(|(informant, own)| line(service, informant, &Drives { own, all }))
+        .collect();
+    let stops: usize = all[1].iter().map(|driven| driven.ways.len()).sum();
+    let answers = (0..ASKED.len()).map(|place| answered(service, place, &all[1], stops)).collect();
+    let comparison = comparison(service, all, &lines);
+    Scored { lines, answers, comparison }
+}
+
+fn line(service: Service, informant: Informant, drives: &Drives<'_>) -> Line {
+    let trains = drives.own.len();
+    let share = |within_m: f64| {
+        Figure::of(trains, |it| {
+            100.0 * drives.mean(it, |way| f64::from(u8::from(way.beyond_m.abs() <= within_m)))
+        })
+    };
+    let beyond_m = |it: &[usize]| drives.mean(it, |way| way.beyond_m);
+    let looks: Vec<_> =
+        drives.own.iter().flat_map(|driven| &driven.ways).flat_map(|way| &way.looks).collect();
+    let count = looks.len().max(1) as f64;
+    let is_exceeded = |bound_m: Option<f64>, true_m| bound_m.is_none_or(|it| true_m > it);
+    let exceeded = looks.iter().filter(|look| is_exceeded(look.bound_m, look.true_m)).count();
+    let given = looks.iter().filter_map(|look| Some(look.bound_m? / look.true_m));
+    let given_count = given.clone().count().max(1) as f64;
+    let is_true = informant == Informant::Truth;
+    Line {
+        scenario: service.name(),
+        driver: informant.name(),
+        stops: drives.own.iter().map(|driven| driven.ways.len()).sum(),
+        beyond_m: Figure::of(trains, beyond_m),
+        spread_m: Figure::of(trains, |it| {
+            let mean = beyond_m(it);
+            drives.mean(it, |way| (way.beyond_m - mean).powi(2)).sqrt()
+        }),
+        error_m: Figure::of(trains, |it| drives.error_m(it)),
+        within_03_percent: share(0.3),
+        within_05_percent: share(0.5),
+        energy_percent: Figure::of(trains, |it| drives.energy_percent(it)),
+        late_s: Figure::of(trains, |it| drives.mean(it, |way| way.late_s.abs())),
+        jerk_mps3: Figure::of(trains, |it| drives.mean(it, |way| way.jerk_mps3)),
+        bounds: looks.len(),
+        exceeded: (!is_true).then_some(exceeded),
+        bound_percent: (!is_true).then_some(100.0 * given.sum::<f64>() / given_count),
+        fixed_percent: 100.0 * looks.iter().map(|it| it.fixed_m / it.true_m).sum::<f64>() / count,
+    }
+}
+
+fn answered(service: Service, place: usize, driven: &[Driven], stops: usize) -> Answered {
+    let mut total = Use::default();
+    driven.iter().for_each(|it| total.join(&it.uses[place]));
+    let mut firsts: Vec<u64> =
+        driven.iter().map(|it| it.uses[place].first.unwrap_or(u64::MAX)).collect();
+    firsts.sort_unstable();
+    let first = firsts[firsts.len() / 2];
+    let usable = total.usable.max(1) as f64;
+    let percent = |count: u64| 100.0 * count as f64 / usable;
+    let error = |square: f64| {
+        (total.usable > 0 && square.is_finite()).then_some(100.0 * (square / usable).sqrt())
+    };
+    Answered {
+        scenario: service.name(),
+        quantity: ASKED[place].name(),
+        usable_percent: 100.0 * total.usable as f64 / total.cycles.max(1) as f64,
+        wrong_percent: percent(total.wrong),
+        worse_percent: percent(total.worse),
+        error_percent: total.squares.map(error),
+        first_s: (first < u64::MAX).then(|| 1e-3 * first as f64 * f64::from(service.cycle_ms)),
+        changes_per_stop: total.changes as f64 / stops.max(1) as f64,
+    }
+}
+
+fn comparison(service: Service, all: &[Vec<Driven>; 3], lines: &[Line]) -> Comparison {
+    let [declared, learned] = [0, 1].map(|which| Drives { own: &all[which], all });
+    let (mut better, mut worse) = (Vec::new(), Vec::new());
+    let mut is_stop = [false; 2];
+    for (place, name) in
+        ["stop in m", "energy in %", "lateness in s", "jerk in m/s³"].into_iter().enumerate()
+    {
+        let difference = Figure::of(all[0].len(), |it| {
+            learned.compared(it)[place] - declared.compared(it)[place]
+        });
+        let Figure { value, low, high } = difference;
+        let text = format!("{name}: {value:+.3} ({low:+.3} to {high:+.3})");
+        if low > UNNOTICED[place] {
+            worse.push(text);
+            is_stop[1] |= place == 0;
+        } else if high < 0.0 {
+            better.push(text);
+            is_stop[0] |= place == 0;
+        }
+    }
+    let line = &lines[1];
+    let bounds = line.bounds as f64;
+    // One in a hundred is promised; two deviations of chance on top.
+    let most = EXCEEDED_MAX * bounds + 2.0 * (EXCEEDED_MAX * bounds).sqrt();
+    let exceeded = line.exceeded.unwrap_or_default();
+    let are_bounds_broken = exceeded as f64 > most;
+    if are_bounds_broken {
+        worse.push(format!("bounds: {exceeded} of {bounds} exceeded"));
+    }
+    let is_broken = are_bounds_broken || is_stop[1] || (!worse.is_empty() && !is_stop[0]);
+    Comparison { scenario: service.name(), better, worse, is_broken }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interval_holds_the_figure_and_shrinks_with_trains() {
+        let spread = |trains: usize| {
+            let found = Figure::of(trains, |it| {
+                it.iter().map(|&train| (train % 5) as f64).sum::<f64>() / it.len() as f64
+            });
+            assert!(found.low <= found.value && found.value <= found.high, "{found:?}");
+            found.high - found.low
+        };
+        assert!(spread(200) < 0.6 * spread(20));
+    }
+}

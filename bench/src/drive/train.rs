@@ -1,0 +1,308 @@
+//! The train, whose truth nobody knows: what it does with a force, and what of that is measured.
+
+use std::collections::VecDeque;
+
+use dynocar_core::pipeline::braking::gear::DeclaredGear;
+use dynocar_core::simulate::motion::{Motion, advance};
+use dynocar_core::train::{Davis, TrainModel};
+use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::{SampleField, TrainId, TrainSample, Uncertain};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::knowledge::{Ability, Knowledge};
+use super::leg::{Leg, PIECE_M};
+use super::line::{Condition, Hidden, Service, ability, declared_gear, next_load_kg};
+use crate::scenarios::world::{LoadTold, World, normal};
+
+/// Longest step of the simulation in s.
+const STEP_MAX_S: f64 = 0.02;
+/// Standard deviation in m of the balises' places before a stop.
+const BALISE_STD_M: f64 = 0.08;
+/// Standard deviation of the brakes' force from stop to stop.
+const STOP_TO_STOP: f64 = 0.015;
+/// Mean time in s by which acting forces are later than reported ones.
+const MEAN_DELAY_S: f64 = 0.1;
+
+/// A train on its line.
+pub struct Train {
+    service: Service,
+    world: World,
+    hidden: Hidden,
+    /// As declared.
+    pub declared: TrainModel,
+    gear: DeclaredGear,
+    ability: Ability,
+    seed: u64,
+    random: ChaCha8Rng,
+    next_stop: usize,
+    direction: f64,
+    start_m: f64,
+    motion: Motion,
+    mass_kg: f64,
+    weighed_kg: f64,
+    brake_scale: f64,
+    balise_m: f64,
+    /// Traction minus brake force in N as reported, and what is reported and acts later.
+    reported_n: f64,
+    on_its_way_n: VecDeque<f64>,
+    cycles: u64,
+    /// Work in J of the traction at the rims since the last stop.
+    pub energy_j: f64,
+    legs: u64,
+}
+
+impl Train {
+    /// A train at the first stop.
+    pub fn new(service: Service, seed: u64) -> Self {
+        let world = World::draw(service.scenario(), seed);
+        let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x6472_6976_6572);
+        let hidden = Hidden::draw(&service, &world, &mut random);
+        let declared = service.declared();
+        let start_m = world.stops_m[0];
+        let mut train = Train {
+            gear: declared_gear(&declared.brake_gear),
+            declared,
+            ability: ability(service.traffic),
+            seed,
+            random,
+            next_stop: 1,
+            direction: 1.0,
+            start_m,
+            motion: Motion { distance_m: 0.0, speed_mps: 0.0 },
+            mass_kg: world.truth.mass_kg,
+            weighed_kg: 0.0,
+            brake_scale: 1.0,
+            balise_m: 0.0,
+            reported_n: 0.0,
+            on_its_way_n: VecDeque::new(),
+            cycles: 0,
+            energy_j: 0.0,
+            legs: 0,
+            service,
+            world,
+            hidden,
+        };
+        train.load();
+        train
+    }
+
+    /// Passengers or goods come and go; every way has its own chance, whoever drives.
+    fn load(&mut self) {
+        self.legs += 1;
+        let of_leg = self.seed ^ self.legs.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        self.random = ChaCha8Rng::seed_from_u64(of_leg);
+        let random = &mut self.random;
+        self.mass_kg = next_load_kg(self.service.traffic, self.mass_kg, random);
+        let scale = match self.world.scenario.load {
+            LoadTold::Changing => 1.0 + 0.03 * normal(random),
+            LoadTold::Weighed(permille) => {
+                // One weighing, wrong the same way all day.
+                let sign = if self.seed.is_multiple_of(2) { 1.0 } else { -1.0 };
+                1.0 + sign * 1e-3 * f64::from(permille)
+            }
+            LoadTold::Exact | LoadTold::Unknown => 1.0,
+        };
+        self.weighed_kg = scale * self.mass_kg;
+        self.brake_scale = self.hidden.brake_scale * (1.0 + STOP_TO_STOP * normal(random));
+        self.balise_m = BALISE_STD_M * normal(random);
+        self.energy_j = 0.0;
+    }
+
+    /// The train stands at a stop: what lies ahead is the next way.
+    pub fn turn_to_next(&mut self) {
+        self.start_m = self.chainage_m();
+        self.motion = Motion { distance_m: 0.0, speed_mps: 0.0 };
+        let last = self.world.stops_m.len() - 1;
+        if self.direction > 0.0 && self.next_stop == last {
+            self.direction = -1.0;
+        } else if self.direction < 0.0 && self.next_stop == 0 {
+            self.direction = 1.0;
+        }
+        self.next_stop = (self.next_stop as f64 + self.direction) as usize;
+        self.load();
+    }
+
+    /// The way ahead by the map, without a time.
+    pub fn leg(&self) -> Leg {
+        let length_m = self.direction * (self.world.stops_m[self.next_stop] - self.start_m);
+        let pieces = (length_m / PIECE_M) as usize + 2;
+        let slope = |piece: usize| {
+            let chainage_m = self.start_m + self.direction * PIECE_M * piece as f64;
+            let curve =
+                self.declared.curve_constant_n_per_kn_m * self.hidden.curvature_per_m(chainage_m);
+            self.direction * self.world.gradient_permille(chainage_m)[0] + curve
+        };
+        let slopes_permille = (0..pieces).map(slope).collect();
+        let top_mps = self.service.traffic.habits().top_mps;
+        Leg { length_m, top_mps, due_s: f64::INFINITY, slopes_permille }
+    }
+
+    /// What it can do, as declared.
+    pub fn ability(&self) -> &Ability {
+        &self.ability
+    }
+
+    /// Disc friction as declared.
+    pub fn declared_friction(&self) -> f64 {
+        self.gear.friction
+    }
+
+    /// Its service.
+    pub fn service(&self) -> &Service {
+        &self.service
+    }
+
+    fn chainage_m(&self) -> f64 {
+        self.start_m + self.direction * self.motion.distance_m
+    }
+
+    /// True distance to the stopping point in m.
+    pub fn left_m(&self) -> f64 {
+        self.direction * (self.world.stops_m[self.next_stop] - self.chainage_m())
+    }
+
+    /// True speed in m/s.
+    pub fn speed_mps(&self) -> f64 {
+        self.motion.speed_mps
+    }
+
+    /// True gross mass in kg.
+    pub fn mass_kg(&self) -> f64 {
+        self.mass_kg
+    }
+
+    /// Exerted over reported brake force on this way.
+    pub fn brake_scale(&self) -> f64 {
+        self.brake_scale / self.world.force_scale[1]
+    }
+
+    /// The true rail's adhesion at a speed in m/s.
+    pub fn adhesion(&self, speed_mps: f64) -> f64 {
+        let (law, scale) = self.hidden.rail;
+        law.adhesion(speed_mps) * scale
+    }
+
+    /// True basic resistance in the direction of travel, in the open, with the wind of the day.
+    pub fn davis(&self) -> Davis {
+        let Davis { a, b, c } = self.world.truth.resistance;
+        let head_mps = -self.direction * self.hidden.wind_mps;
+        Davis { a: a + c * head_mps * head_mps, b: b + 2.0 * c * head_mps, c }
+    }
+
+    /// The true parameters, counted in reported forces.
+    pub fn truth(&self) -> Knowledge {
+        let [traction, brake] = self.world.force_scale;
+        // m dv/dt = reported / scale - W w is scale m dv/dt = reported - scale W w.
+        Knowledge {
+            mass_kg: Uncertain::exact(traction * self.mass_kg),
+            rotating_mass_factor: self.world.truth.rotating_mass_factor,
+            davis: self.davis(),
+            w0_std_n_per_kn: 0.0,
+            brake_scale: Uncertain::exact(self.brake_scale * traction / brake),
+            rail: Some(self.hidden.adhesion()),
+        }
+    }
+
+    /// Acceleration in m/s² under a reported force in N at a distance and speed.
+    fn acceleration_mps2(&self, reported_n: f64, at: Motion) -> f64 {
+        let weight_n = self.mass_kg * STANDARD_GRAVITY_MPS2;
+        let force_n = match reported_n < 0.0 {
+            true => {
+                let brake_n = -reported_n * self.brake_scale();
+                -brake_n.min(weight_n * self.adhesion(at.speed_mps))
+            }
+            false => reported_n / self.world.force_scale[0],
+        };
+        let chainage_m = self.start_m + self.direction * at.distance_m;
+        let davis = self.davis();
+        let air = davis.c * at.speed_mps * at.speed_mps * self.hidden.tunnel_share(chainage_m);
+        let curve = self.hidden.curve_constant * self.hidden.curvature_per_m(chainage_m);
+        let gradient = self.direction * self.world.gradient_permille(chainage_m)[1];
+        let resisting = davis.w0_n_per_kn(at.speed_mps) + air + curve + gradient;
+        (force_n - 1e-3 * weight_n * resisting)
+            / (self.mass_kg * (1.0 + self.world.truth.rotating_mass_factor))
+    }
+
+    /// One cycle under a commanded force in N, braking negative; gives the acceleration in m/s² at its end.
+    pub fn apply(&mut self, commanded_n: f64) -> f64 {
+        let cycle_s = f64::from(self.service.cycle_ms) * 1e-3;
+        let steps = (cycle_s / STEP_MAX_S).ceil();
+        let step_s = cycle_s / steps;
+        // The reported force follows the command; what is left of the lag is the mean delay.
+        let follow = 1.0 - (-step_s / (self.ability.lag_s - MEAN_DELAY_S)).exp();
+        let late = (self.world.delay_s / step_s).round() as usize;
+        let mut acceleration = 0.0;
+        for _ in 0..steps as usize {
+            self.reported_n += follow * (commanded_n - self.reported_n);
+            self.on_its_way_n.push_back(self.reported_n);
+            while self.on_its_way_n.len() > late + 1 {
+                self.on_its_way_n.pop_front();
+            }
+            let acting_n = self.on_its_way_n[0];
+            let before = self.motion;
+            self.motion = advance(before, step_s, |_, at| self.acceleration_mps2(acting_n, at));
+            acceleration = (self.motion.speed_mps - before.speed_mps) / step_s;
+            let way_m = self.motion.distance_m - before.distance_m;
+            self.energy_j += way_m * (acting_n / self.world.force_scale[0]).max(0.0);
+        }
+        self.cycles += 1;
+        acceleration
+    }
+
+    /// True distance in m of a full braking from here.
+    pub fn full_braking_m(&self) -> f64 {
+        let full_n = -self.ability.brake_max_n;
+        let mut at = self.motion;
+        while at.speed_mps > 0.0 && at.distance_m < self.motion.distance_m + 50e3 {
+            at = advance(at, 0.05, |_, at| self.acceleration_mps2(full_n, at));
+        }
+        at.distance_m - self.motion.distance_m
+    }
+
+    /// What the controller measures and writes.
+    pub fn sample(&mut self) -> TrainSample {
+        let World { scenario, speed_scale, .. } = &self.world;
+        let speed_mps = match self.motion.speed_mps > 0.0 {
+            true => {
+                let noise_mps = scenario.speed_noise_mps * normal(&mut self.random);
+                (speed_scale * self.motion.speed_mps + noise_mps).max(0.0)
+            }
+            false => 0.0,
+        };
+        let noise_m = scenario.position_noise_m * normal(&mut self.random);
+        let place_m = self.chainage_m() + self.balise_m + noise_m;
+        let mut sample = TrainSample::empty(TrainId(1));
+        sample.time_ns =
+            1_000_000_000 + 1_000_000 * i64::from(self.service.cycle_ms) * self.cycles as i64;
+        sample.direction = if self.direction > 0.0 { 1 } else { -1 };
+        let brake_n = (-self.reported_n).max(0.0);
+        sample.set(SampleField::Speed, speed_mps);
+        sample.set(SampleField::Position, place_m);
+        sample.set(SampleField::TractionForce, self.reported_n.max(0.0));
+        sample.set(SampleField::BrakeForce, brake_n);
+        sample.set(SampleField::BrakeCylinderPressure, brake_n / self.gear.declared_force_n(1.0));
+        sample.set(SampleField::Gradient, self.world.gradient_permille(place_m)[0]);
+        let curvature = self.hidden.curvature_per_m(place_m);
+        sample.set(SampleField::CurveRadius, if curvature > 0.0 { 1.0 / curvature } else { 0.0 });
+        if scenario.load != LoadTold::Unknown {
+            sample.set(SampleField::Mass, self.weighed_kg);
+        }
+        sample
+    }
+
+    /// Distance in m from the start of the way of a measured place.
+    pub fn along_m(&self, sample: &TrainSample) -> f64 {
+        self.direction * (sample.position_m - self.start_m)
+    }
+
+    /// True where the daemon is to be killed on some way.
+    pub fn loses_daemon(&self) -> bool {
+        self.service.condition == Condition::DaemonDies
+    }
+
+    /// Standing time at a stop in s: shortened, for nothing is learned meanwhile.
+    pub fn standing_s(&self) -> f64 {
+        self.service.traffic.habits().standing_s.min(30.0)
+    }
+}

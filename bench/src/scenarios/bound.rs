@@ -1,0 +1,207 @@
+//! How well resistance and mass can be known at best: the joint Cramér–Rao bound of a drive.
+//!
+//! All that [`World::draw`] draws is unknown at once, each with the variance that it is drawn with:
+//! a, b, c, the loads, the scales and the delay of forces, wheels, rotating mass, and the map's error at
+//! every knot. What measured speeds say of them follows from how the true motion would differ.
+
+use dynocar_core::force::balance::mps2_per_n_per_kn;
+use dynocar_tests::simulator::Deviations;
+use nalgebra::{DMatrix, DVector, Matrix4};
+
+use super::drive::Truth;
+use super::world::{
+    COEFFICIENT_SHARE, DELAY_STD_S, KNOT_M, LoadTold, ROTATING_MASS_STD, WEIGHING_STD, World,
+    knot_std_permille,
+};
+
+/// Places of the unknowns that every run shares; loads and knots follow.
+const TRACTION_SCALE: usize = 3;
+const BRAKE_SCALE: usize = 4;
+const DELAY: usize = 5;
+const ROTATING_MASS: usize = 6;
+const WHEEL: usize = 7;
+const SHARED: usize = 8;
+/// Time in s between the speeds that are taken in: those between say the same many times.
+const BLOCK_S: f64 = 0.5;
+/// Distance in m between the places under the train at which the map is averaged.
+const UNDER_TRAIN_M: f64 = 50.0;
+/// Variance that stands for what is known exactly.
+const EXACT: f64 = 1e-18;
+/// Standard deviation of a load that is drawn evenly from 24 % of the declared mass.
+const DRAWN_LOAD_STD: f64 = 0.24 / 3.464;
+
+/// What measured speeds say so far of all that is unknown.
+pub struct Bound {
+    prior: Vec<f64>,
+    information: DMatrix<f64>,
+    /// Change of the speed by each unknown, of the run under way.
+    sensitivity: Vec<f64>,
+    /// The unknowns that the run under way has met.
+    met: Vec<usize>,
+    is_met: Vec<bool>,
+    loads: usize,
+    load: usize,
+    opens_at_stops: bool,
+    was_standing: bool,
+    knots_from: usize,
+    map_variance: f64,
+    length_m: f64,
+    block_s: f64,
+    last: Option<Truth>,
+}
+
+impl Bound {
+    /// Before the first sample of a drive of so many hours.
+    pub fn new(world: &World, hours: f64) -> Self {
+        let scenario = &world.scenario;
+        let opens_at_stops = scenario.load == LoadTold::Changing;
+        let load_std = match scenario.load {
+            LoadTold::Exact => 0.0,
+            LoadTold::Weighed(permille) => 1e-3 * f64::from(permille),
+            LoadTold::Unknown => DRAWN_LOAD_STD,
+            LoadTold::Changing => WEIGHING_STD,
+        };
+        // No train here stops more than once a minute.
+        let loads = if opens_at_stops { (60.0 * hours) as usize + 2 } else { 1 };
+        let knots_from = SHARED + loads;
+        let end_m = world.stops_m[world.stops_m.len() - 1] + 1000.0;
+        let count = knots_from + (end_m / KNOT_M) as usize + 3;
+        let declared = world.declared.resistance;
+        let mut prior = vec![EXACT; count];
+        for (place, value) in [declared.a, declared.b, declared.c].into_iter().enumerate() {
+            prior[place] = (COEFFICIENT_SHARE * value).powi(2);
+        }
+        let usual = Deviations::ROUGH;
+        prior[TRACTION_SCALE] = usual.force_share.powi(2);
+        prior[BRAKE_SCALE] = usual.force_share.powi(2);
+        prior[DELAY] = DELAY_STD_S.powi(2);
+        prior[ROTATING_MASS] = ROTATING_MASS_STD.powi(2);
+        prior[WHEEL] = usual.wheel_share.powi(2);
+        prior[SHARED..knots_from].fill((load_std * load_std).max(EXACT));
+        let map_variance = knot_std_permille(scenario.map_std_permille).powi(2).max(EXACT);
+        prior[knots_from..].fill(map_variance);
+        Bound {
+            information: DMatrix::zeros(count, count),
+            sensitivity: vec![0.0; count],
+            met: Vec::new(),
+            is_met: vec![false; count],
+            prior,
+            loads,
+            load: SHARED,
+            opens_at_stops,
+            was_standing: true,
+            knots_from,
+            map_variance,
+            length_m: world.declared.length_m,
+            block_s: 0.0,
+            last: None,
+        }
+    }
+
+    /// Takes in a cycle of a drive.
+    pub fn see(&mut self, world: &World, truth: &Truth, cycle_s: f64) {
+        let last = self.last.replace(*truth);
+        if truth.is_standing {
+            for place in self.met.drain(..) {
+                self.sensitivity[place] = 0.0;
+                self.is_met[place] = false;
+            }
+            self.block_s = 0.0;
+            if self.opens_at_stops && !self.was_standing && self.load + 1 < SHARED + self.loads {
+                self.load += 1;
+            }
+        } else if let Some(last) = last {
+            self.move_on(world, &last, truth, cycle_s);
+            self.block_s += cycle_s;
+            if self.block_s >= BLOCK_S {
+                self.measure(world, truth.speed_mps, self.block_s / cycle_s);
+                self.block_s = 0.0;
+            }
+        }
+        self.was_standing = truth.is_standing;
+    }
+
+    fn meet(&mut self, place: usize, change_mps: f64) {
+        if !std::mem::replace(&mut self.is_met[place], true) {
+            self.met.push(place);
+        }
+        self.sensitivity[place] += change_mps;
+    }
+
+    /// What a step does to the speed by each unknown.
+    fn move_on(&mut self, world: &World, last: &Truth, truth: &Truth, step_s: f64) {
+        let resistance = &world.truth.resistance;
+        let gain = mps2_per_n_per_kn(world.truth.rotating_mass_factor);
+        let speed_mps = truth.speed_mps;
+        let slope = resistance.b + 2.0 * resistance.c * speed_mps;
+        let kept = 1.0 - step_s * gain * slope;
+        self.met.iter().for_each(|place| self.sensitivity[*place] *= kept);
+        let push_mps2 = 0.5 * (last.push_mps2 + truth.push_mps2);
+        let acceleration_mps2 = (truth.speed_mps - last.speed_mps) / step_s;
+        let powers = [1.0, speed_mps, speed_mps * speed_mps];
+        for (place, power) in powers.into_iter().enumerate() {
+            self.meet(place, -step_s * gain * power);
+        }
+        self.meet(TRACTION_SCALE, -step_s * push_mps2.max(0.0));
+        self.meet(BRAKE_SCALE, -step_s * push_mps2.min(0.0));
+        self.meet(DELAY, -(truth.push_mps2 - last.push_mps2));
+        self.meet(
+            ROTATING_MASS,
+            -step_s * acceleration_mps2 / (1.0 + world.truth.rotating_mass_factor),
+        );
+        self.meet(WHEEL, 0.0);
+        self.meet(self.load, step_s * push_mps2);
+        if self.map_variance > EXACT {
+            self.pass_knots(truth, step_s * gain);
+        }
+    }
+
+    fn pass_knots(&mut self, truth: &Truth, seconds_gain: f64) {
+        let places = (self.length_m / UNDER_TRAIN_M).ceil() as usize + 1;
+        let change_mps = -truth.direction * seconds_gain / places as f64;
+        for place in 0..places {
+            let under = place as f64 / (places - 1) as f64 - 0.5;
+            let at = ((truth.place_m + under * self.length_m) / KNOT_M).max(0.0);
+            let (knot, share) = (self.knots_from + at as usize, at.fract());
+            if knot + 1 < self.prior.len() {
+                self.meet(knot, change_mps * (1.0 - share));
+                self.meet(knot + 1, change_mps * share);
+            }
+        }
+    }
+
+    fn measure(&mut self, world: &World, speed_mps: f64, count: f64) {
+        let weight = count / world.scenario.speed_noise_mps.powi(2);
+        let by_run = std::mem::replace(&mut self.sensitivity[WHEEL], speed_mps);
+        for &i in &self.met {
+            let scaled = weight * self.sensitivity[i];
+            for &j in &self.met {
+                self.information[(i, j)] += scaled * self.sensitivity[j];
+            }
+        }
+        self.sensitivity[WHEEL] = by_run;
+    }
+
+    /// The least covariance of a, b, c in N/kN by powers of m/s and of the load, as a share of it.
+    ///
+    /// `None` without noise, where nothing limits it.
+    pub fn covariance(&self) -> Option<Matrix4<f64>> {
+        let sought = [0, 1, 2, self.load];
+        let known =
+            |place: &usize| self.information[(*place, *place)] > 0.0 && !sought.contains(place);
+        let places: Vec<usize> =
+            sought.into_iter().chain((0..self.prior.len()).filter(known)).collect();
+        let information = DMatrix::from_fn(places.len(), places.len(), |i, j| {
+            let prior = if i == j { 1.0 / self.prior[places[i]] } else { 0.0 };
+            prior + self.information[(places[i], places[j])]
+        });
+        let factor = information.cholesky()?;
+        let columns: [DVector<f64>; 4] = std::array::from_fn(|column| {
+            let mut unit = DVector::zeros(places.len());
+            unit[column] = 1.0;
+            factor.solve(&unit)
+        });
+        let covariance = Matrix4::from_fn(|i, j| columns[j][i]);
+        covariance.iter().all(|value| value.is_finite()).then_some(covariance)
+    }
+}

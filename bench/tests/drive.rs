@@ -1,0 +1,73 @@
+//! The driver over a real daemon, with few stops: nothing that decides is a time.
+
+use std::process::Command;
+
+use serde_json::Value;
+
+/// The answer of `dynocar-bench drive`; with so few stops chance may call something worse.
+fn drive(arguments: &[&str]) -> Vec<Value> {
+    let few = ["drive", "--trains", "2", "--stops", "4", "--cycle-ms", "200", "--json", "-"];
+    let program =
+        Command::new(env!("CARGO_BIN_EXE_dynocar-bench")).args(few).args(arguments).output();
+    let output = program.expect("the program");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}: {errors}"))
+}
+
+fn number(value: &Value, key: &str) -> f64 {
+    value[key].as_f64().unwrap_or_else(|| panic!("{key} in {value}"))
+}
+
+/// Declared, Dynocar, true.
+fn lines(scored: &Value) -> &[Value] {
+    let lines = scored["lines"].as_array().expect("lines");
+    assert_eq!(lines.len(), 3, "{scored}");
+    lines
+}
+
+#[test]
+fn a_driver_with_dynocar_is_no_worse_whatever_becomes_of_the_daemon() {
+    for scenario in ["metro, ordinary", "metro, daemon dies", "regional, ordinary"] {
+        let scored = drive(&["--scenario", scenario]);
+        assert_eq!(scored.len(), 1);
+        let lines = lines(&scored[0]);
+        let of = |line: usize, key: &str| number(&lines[line][key], "value");
+        for line in lines {
+            println!("{line}");
+            assert_eq!(number(line, "stops"), 8.0);
+            assert!(number(&line["error_m"], "value") < 0.5, "{line}");
+        }
+        assert!(of(1, "error_m") < of(0, "error_m") + 0.1, "{scenario}");
+        assert!(of(1, "energy_percent") < of(0, "energy_percent") + 1.0, "{scenario}");
+        assert!(of(1, "late_s") < of(0, "late_s") + 1.0, "{scenario}");
+        assert_eq!(number(&lines[1], "exceeded"), 0.0, "{scenario}");
+        assert!(number(&lines[1], "bound_percent") < number(&lines[1], "fixed_percent"));
+        let mass = &scored[0]["answers"][1];
+        assert_eq!(mass["quantity"], "mass");
+        // A daemon that comes back has to learn anew.
+        let least = if scenario.contains("dies") { 40.0 } else { 80.0 };
+        assert!(number(mass, "usable_percent") > least, "{mass}");
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_figures_and_the_picture_is_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = folder.path().join("gain.svg");
+    let arguments = ["--scenario", "metro, ordinary", "--first-seed", "31"];
+    let once = drive(&[&arguments[..], &["--picture", picture.to_str().unwrap()]].concat());
+    assert_eq!(once, drive(&arguments));
+    let drawn = std::fs::read_to_string(picture).unwrap();
+    assert!(drawn.contains("<svg") && drawn.contains("with Dynocar"), "{drawn}");
+}
+
+#[test]
+fn what_cannot_be_driven_is_refused_in_words() {
+    for (argument, value) in [("--scenario", "tram"), ("--cycle-ms", "5"), ("--trains", "0")] {
+        let program = env!("CARGO_BIN_EXE_dynocar-bench");
+        let output = Command::new(program).args(["drive", argument, value]).output().unwrap();
+        assert_eq!(output.status.code(), Some(2));
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(said.contains(argument) && said.contains("expected"), "{said}");
+    }
+}
