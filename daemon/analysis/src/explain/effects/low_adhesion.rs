@@ -90,7 +90,7 @@ impl Effect for LowAdhesion {
 /// Structures for one shape: everywhere in all or some runs, and at places.
 fn places(
     scan: &Scan,
-    shape: &dyn Fn(&RunData, usize) -> f64,
+    shape: &(dyn Fn(&RunData, usize) -> f64 + Sync),
     form: Form,
     cap: f64,
 ) -> Vec<(f64, Form, Candidate)> {
