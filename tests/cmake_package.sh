@@ -2,7 +2,7 @@
 # Builds the controllers in C and C++ with CMake from nothing but the Debian package: shared and
 # static.
 # CMake is that of PyPI, in an environment of its own, where there is none.
-# Build first: cargo build --release -p dynocar && cargo build --release -p dynocar-client -p dynocar-fmu
+# Build first: cargo build --release --workspace
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

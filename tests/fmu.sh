@@ -13,7 +13,8 @@ fi
 python3 -m venv "$place/venv"
 "$place/venv/bin/pip" install --quiet --disable-pip-version-check fmpy==0.3.32
 
-cargo build --release
+cargo build --release --workspace --bin dynocar --bin dynocar-workshop
+cargo build --release --workspace --lib
 dynocar=${CARGO_TARGET_DIR:-target}/release/dynocar
 "$dynocar" fmu -o "$place/dynocar.fmu" --dataset config/demo --inputs "$place/inputs"
 "$dynocar" identify config/demo --all --per-run --json "$place/identified.json" >"$place/words"

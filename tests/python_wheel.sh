@@ -21,7 +21,7 @@ environment builder maturin==1.16.0
 "$folder/builder/bin/maturin" build --release --quiet --manifest-path client/python/Cargo.toml --out "$wheels"
 wheel=$(ls -t "$wheels"/dynocar-*.whl | head -n 1)
 
-cargo build --release --workspace --bin dynocar --bin dynocar-played-daemon
+cargo build --release --workspace --bin dynocar --bin dynocar-workshop --bin dynocar-played-daemon
 environment empty "$wheel[fleet]" ipykernel mypy nbclient pandas polars pyarrow pytest
 # In another folder, so that nothing but the wheel is imported.
 project=$PWD

@@ -45,300 +45,437 @@
 extern "C" {
 #endif
 
+/* What stands between generated: and end of generated is written from the library's own types
+ * (client/tests/bindings.rs). */
+
 /* ---- What this header was written for; see dynocar_header_matches_library() ---- */
 
+/* generated: numbers */
 #define DYNOCAR_SCHEMA 1u
 #define DYNOCAR_SAMPLE_LAYOUT UINT64_C(0xdc0c8856b34a4c70)
 #define DYNOCAR_SNAPSHOT_LAYOUT UINT64_C(0x9393d79d82bbec6)
 
-#define DYNOCAR_PIPELINES_MAX 32      /* pipelines of one train */
-#define DYNOCAR_PARAMETERS_MAX 6      /* parameters that one pipeline estimates together */
+#define DYNOCAR_PIPELINES_MAX 32 /* pipelines of one train */
+#define DYNOCAR_PARAMETERS_MAX 6 /* parameters that one pipeline estimates together */
 #define DYNOCAR_COVARIANCE_ENTRIES 21 /* of the lower triangle, packed by rows */
 #define DYNOCAR_REJECTION_REASONS 16
-#define DYNOCAR_MESSAGE_BYTES 512     /* room for any message; shorter buffers cut it */
+/* end of generated */
+
+#define DYNOCAR_MESSAGE_BYTES 512 /* room for any message; shorter buffers cut it */
 
 /* ---- Vocabularies: numbers on the wire. A peer of a later release may send others. ---- */
 
+/* generated: vocabularies */
 /* What every function that can fail gives. */
 typedef int32_t dynocar_code;
 enum {
-    DYNOCAR_OK = 0,
-    DYNOCAR_ERROR_NULL_ARGUMENT = 1,
-    DYNOCAR_ERROR_BAD_NUMBER = 2,          /* means nothing, lies out of range or is not finite */
-    DYNOCAR_ERROR_WRONG_THREAD = 3,        /* the handle was opened by another thread */
-    DYNOCAR_ERROR_ROOT_NAME = 4,           /* not absolute, too long, or special characters */
-    DYNOCAR_ERROR_DIRECTORY = 5,           /* a run-time directory or file cannot be used */
-    DYNOCAR_ERROR_OCCUPIED = 6,            /* the train already has a controller */
-    DYNOCAR_ERROR_INCOMPATIBLE_DAEMON = 7, /* another schema, layout or transport version */
-    DYNOCAR_ERROR_TRANSPORT = 8,           /* the shared memory cannot be used */
-    DYNOCAR_ERROR_SEND_REFUSED = 9,        /* the sample counts as lost; just go on */
-    DYNOCAR_ERROR_NO_SNAPSHOT = 10,        /* none of this pipeline has come yet */
-    DYNOCAR_ERROR_NOT_IN_SNAPSHOT = 11,    /* the pipeline does not estimate this parameter */
-    DYNOCAR_ERROR_PANIC = 12,              /* a fault inside the library: close the handle */
-    DYNOCAR_ERROR_DOES_NOT_STOP = 13,      /* the train does not slow down */
-    DYNOCAR_ERROR_NOT_PROVIDED = 14,       /* no pipeline answers this quantity for the train */
-    DYNOCAR_ERROR_NO_PLACE_LEFT = 15       /* all places of the train's channel are taken */
+    DYNOCAR_OK = 0, /* Done */
+    DYNOCAR_ERROR_NULL_ARGUMENT = 1, /* A pointer that must not be NULL is NULL */
+    /* A number that means nothing or lies out of range, or that is not finite */
+    DYNOCAR_ERROR_BAD_NUMBER = 2,
+    DYNOCAR_ERROR_WRONG_THREAD = 3, /* The handle belongs to the thread that opened it */
+    /* The root directory's name cannot be used: not absolute, too long, or special characters */
+    DYNOCAR_ERROR_ROOT_NAME = 4,
+    DYNOCAR_ERROR_DIRECTORY = 5, /* A run-time directory or file cannot be used */
+    DYNOCAR_ERROR_OCCUPIED = 6, /* Another process drives the train */
+    /* The daemon there speaks another schema, layout or transport version */
+    DYNOCAR_ERROR_INCOMPATIBLE_DAEMON = 7,
+    DYNOCAR_ERROR_TRANSPORT = 8, /* The shared memory cannot be used */
+    DYNOCAR_ERROR_SEND_REFUSED = 9, /* The sample was not taken and counts as lost; just go on */
+    DYNOCAR_ERROR_NO_SNAPSHOT = 10, /* No snapshot of this pipeline has come yet */
+    /* The snapshot's pipeline does not estimate this parameter */
+    DYNOCAR_ERROR_NOT_IN_SNAPSHOT = 11,
+    /* A fault inside the library, in words on standard error: close the handle */
+    DYNOCAR_ERROR_PANIC = 12,
+    /* The train does not slow down, at the values given or at the edge of the bound */
+    DYNOCAR_ERROR_DOES_NOT_STOP = 13,
+    /* The daemon's configuration lets no pipeline answer this quantity for the train */
+    DYNOCAR_ERROR_NOT_PROVIDED = 14,
+    /* Every place of the train's channel is taken: close what is no longer needed */
+    DYNOCAR_ERROR_NO_PLACE_LEFT = 15
 };
 
 /* Who serves a train. */
 enum {
-    DYNOCAR_DAEMON_ABSENT = 0,
-    DYNOCAR_DAEMON_COMPATIBLE = 1,
+    DYNOCAR_DAEMON_ABSENT = 0, /* Nobody serves the train */
+    DYNOCAR_DAEMON_COMPATIBLE = 1, /* A living daemon serves it */
+    /* A living daemon serves it, and we cannot understand each other */
     DYNOCAR_DAEMON_INCOMPATIBLE = 2
 };
 
-/* What a controller asks for; the daemon's configuration says which pipeline answers. */
+/* What a controller may do with an estimate. Of an estimated one, too, the reason may remark
+ * something. */
 enum {
-    DYNOCAR_QUANTITY_RESISTANCE = 0,     /* dynocar_snapshot_resistance(), or Davis a, b, c */
-    DYNOCAR_QUANTITY_MASS = 1,           /* DYNOCAR_PARAMETER_MASS */
-    DYNOCAR_QUANTITY_ADHESION = 2,       /* DYNOCAR_PARAMETER_ADHESION or ..._LOWER_BOUND */
-    DYNOCAR_QUANTITY_BRAKE_FRICTION = 3, /* DYNOCAR_PARAMETER_DISC_FRICTION, the ratio held */
-    DYNOCAR_QUANTITY_BRAKING_RATIO = 4   /* DYNOCAR_PARAMETER_BRAKING_RATIO, the friction held */
+    /* Not enough data yet; the values are the declared or the initial ones */
+    DYNOCAR_STATUS_UNESTIMATED = 1,
+    DYNOCAR_STATUS_ESTIMATED = 2, /* The values may be used */
+    DYNOCAR_STATUS_DEGRADED = 3, /* There are values, with a reservation named by the reason */
+    DYNOCAR_STATUS_INVALID = 4 /* The values must not be used */
 };
 
-/* Where the mass in a snapshot comes from. */
+/* Why a status is what it is. Of weak excitation, excited and missing_manoeuvres say more. */
 enum {
-    DYNOCAR_MASS_SOURCE_NONE = 0,     /* the pipeline estimates no mass */
-    DYNOCAR_MASS_SOURCE_DECLARED = 1, /* the train's file */
-    DYNOCAR_MASS_SOURCE_WEIGHED = 2,  /* the controller's samples */
-    DYNOCAR_MASS_SOURCE_LEARNED = 3   /* what forces do to the train */
-};
-
-/* What a controller may do with an estimate. */
-enum {
-    DYNOCAR_STATUS_UNESTIMATED = 1, /* not enough data; values are declared or initial ones */
-    DYNOCAR_STATUS_ESTIMATED = 2,   /* the values may be used; the reason may remark on them */
-    DYNOCAR_STATUS_DEGRADED = 3,    /* there are values, with a reservation: see the reason */
-    DYNOCAR_STATUS_INVALID = 4      /* the values must not be used */
-};
-
-/* Why a status is what it is. */
-enum {
-    DYNOCAR_REASON_NONE = 0,
-    DYNOCAR_REASON_TOO_FEW_SAMPLES = 1,
-    DYNOCAR_REASON_WEAK_EXCITATION = 2,       /* see excited and missing_manoeuvres */
-    DYNOCAR_REASON_AT_BOUND = 3,              /* a parameter lies at a physical bound */
-    DYNOCAR_REASON_INNOVATIONS_TOO_LARGE = 4, /* larger than their covariance says */
-    DYNOCAR_REASON_INNOVATIONS_NOT_WHITE = 5, /* correlated: the model lacks something */
-    DYNOCAR_REASON_BAD_INPUT = 6,             /* many samples are rejected or lost */
-    DYNOCAR_REASON_MISSING_QUANTITY = 7,      /* the samples lack what the pipeline needs */
-    DYNOCAR_REASON_GRADIENT_UNKNOWN = 8,      /* neither track nor sample gives one */
-    DYNOCAR_REASON_NUMERICAL_FAILURE = 9,     /* the filter was reset */
-    DYNOCAR_REASON_ESTIMATE_STALE = 11,       /* the last exciting manoeuvre is too long ago */
-    DYNOCAR_REASON_ONLY_LOWER_BOUND = 12,     /* these data give no more */
-    DYNOCAR_REASON_NOT_IDENTIFIABLE = 13,     /* other values of some parameters fit as well */
-    DYNOCAR_REASON_DAEMON_SILENT = 14,        /* set by the client, never by the daemon */
-    DYNOCAR_REASON_IMPLAUSIBLE_FORCES = 15,   /* a wrong unit, exchanged, of the wrong sign */
-    DYNOCAR_REASON_IMPLAUSIBLE_MOTION = 16,   /* speed, position, time, direction: unit or sign */
-    DYNOCAR_REASON_IMPLAUSIBLE_MASS = 17,     /* a wrong unit */
-    DYNOCAR_REASON_IMPLAUSIBLE_GRADIENT = 18, /* a wrong unit or sign */
-    DYNOCAR_REASON_IMPLAUSIBLE_PRESSURE = 19  /* a wrong unit */
+    DYNOCAR_REASON_NONE = 0, /* Nothing to remark */
+    DYNOCAR_REASON_TOO_FEW_SAMPLES = 1, /* Too few samples were used */
+    /* Some parameter directions were not excited by the data */
+    DYNOCAR_REASON_WEAK_EXCITATION = 2,
+    DYNOCAR_REASON_AT_BOUND = 3, /* A parameter lies at a physical bound */
+    /* The innovations are larger than their covariance says */
+    DYNOCAR_REASON_INNOVATIONS_TOO_LARGE = 4,
+    /* The innovations are correlated: the model lacks something */
+    DYNOCAR_REASON_INNOVATIONS_NOT_WHITE = 5,
+    DYNOCAR_REASON_BAD_INPUT = 6, /* A large share of the samples is rejected or lost */
+    DYNOCAR_REASON_MISSING_QUANTITY = 7, /* The samples lack a quantity that the pipeline needs */
+    /* No gradient is known: neither track nor sample gives one */
+    DYNOCAR_REASON_GRADIENT_UNKNOWN = 8,
+    DYNOCAR_REASON_NUMERICAL_FAILURE = 9, /* A factorisation failed; the filter was reset */
+    /* The last manoeuvre that could excite the parameter lies too far back */
+    DYNOCAR_REASON_ESTIMATE_STALE = 11,
+    DYNOCAR_REASON_ONLY_LOWER_BOUND = 12, /* Only a lower bound can be had from these data */
+    /* The same data fit other values of the parameters as well */
+    DYNOCAR_REASON_NOT_IDENTIFIABLE = 13,
+    /* The daemon has not been heard of lately; set by the client, never by the daemon */
+    DYNOCAR_REASON_DAEMON_SILENT = 14,
+    /* Forces that cannot be true: a wrong unit, exchanged, of the wrong sign */
+    DYNOCAR_REASON_IMPLAUSIBLE_FORCES = 15,
+    /* Speed, position, time or direction that contradict each other: a wrong unit or sign */
+    DYNOCAR_REASON_IMPLAUSIBLE_MOTION = 16,
+    DYNOCAR_REASON_IMPLAUSIBLE_MASS = 17, /* A mass that cannot be true: a wrong unit */
+    /* A gradient that cannot be true: a wrong unit or sign */
+    DYNOCAR_REASON_IMPLAUSIBLE_GRADIENT = 18,
+    /* A brake-cylinder pressure that cannot be true: a wrong unit */
+    DYNOCAR_REASON_IMPLAUSIBLE_PRESSURE = 19
 };
 
 /* The kind of estimator behind a snapshot, named as in the configuration. */
 enum {
-    DYNOCAR_PIPELINE_LS = 1,                 /* least squares, regularised (Liu 2018) */
-    DYNOCAR_PIPELINE_RLS = 2,                /* recursive least squares (Liu 2018) */
-    DYNOCAR_PIPELINE_REGULARISED_RLS = 3,    /* the same, regularised (Liu 2018) */
-    DYNOCAR_PIPELINE_MILS = 4,               /* multi-innovation (Liu 2018) */
-    DYNOCAR_PIPELINE_V_MILS = 5,             /* interval-varying multi-innovation (Liu 2018) */
-    DYNOCAR_PIPELINE_TRAJECTORY_NEWTON = 10, /* sliding-window trajectory fit (Xia 2023) */
-    DYNOCAR_PIPELINE_TRAJECTORY_KALMAN = 11, /* [v, a, b, c] with jump hypotheses */
-    DYNOCAR_PIPELINE_RESISTANCE_KALMAN = 12, /* robust, with a disturbance state */
-    DYNOCAR_PIPELINE_ADHESION_EM = 20,       /* expectation maximisation (Xie 2019) */
-    DYNOCAR_PIPELINE_ADHESION_EKF = 21,      /* extended Kalman filter (baseline of Xie 2019) */
-    DYNOCAR_PIPELINE_ADHESION_SMOOTHER = 22, /* fixed-lag smoothing */
-    DYNOCAR_PIPELINE_ADHESION_LAW = 23,      /* scale of a known law */
-    DYNOCAR_PIPELINE_BRAKE_EM = 30,          /* disc friction times ratio (Jin 2020) */
-    DYNOCAR_PIPELINE_BRAKE_EKF = 31,         /* extended Kalman filter (baseline of Jin 2020) */
-    DYNOCAR_PIPELINE_BRAKE_SMOOTHER = 32,    /* fixed-lag smoothing */
-    DYNOCAR_PIPELINE_STAGED_DESCENT = 40,    /* resistance and mass (Wang 2022) */
-    DYNOCAR_PIPELINE_JOINT_LEAST_SQUARES = 41, /* resistance and mass */
-    DYNOCAR_PIPELINE_MASS_KALMAN = 42,       /* [v, 1/m, bias] */
-    DYNOCAR_PIPELINE_TRAIN_KALMAN = 43,      /* resistance and mass as one estimate */
-    DYNOCAR_PIPELINE_RESIDUAL_MONITOR = 50,  /* watches model against measurement */
-    DYNOCAR_PIPELINE_ECHO = 60               /* estimates nothing: the latency floor */
+    DYNOCAR_PIPELINE_LS = 1, /* Regularised least squares over all windows (Liu 2018, eq. 7) */
+    DYNOCAR_PIPELINE_RLS = 2, /* Recursive least squares (Liu 2018, eq. 9-11) */
+    /* Regularised recursive least squares (Liu 2018, eq. 12-16) */
+    DYNOCAR_PIPELINE_REGULARISED_RLS = 3,
+    DYNOCAR_PIPELINE_MILS = 4, /* Multi-innovation least squares, regularised (Liu 2018) */
+    /* Interval-varying multi-innovation least squares, regularised (Liu 2018) */
+    DYNOCAR_PIPELINE_V_MILS = 5,
+    /* Trajectory fit by Wolfe-Newton over a sliding window (Xia 2023) */
+    DYNOCAR_PIPELINE_TRAJECTORY_NEWTON = 10,
+    DYNOCAR_PIPELINE_TRAJECTORY_KALMAN = 11, /* Kalman filter v, a, b, c with jump hypotheses */
+    /* Robust resistance filter with a disturbance state */
+    DYNOCAR_PIPELINE_RESISTANCE_KALMAN = 12,
+    /* Adhesion by sliding-window expectation maximisation (Xie 2019) */
+    DYNOCAR_PIPELINE_ADHESION_EM = 20,
+    /* Adhesion by extended Kalman filter (the baseline of Xie 2019) */
+    DYNOCAR_PIPELINE_ADHESION_EKF = 21,
+    /* Adhesion by fixed-lag smoothing of the effective deceleration */
+    DYNOCAR_PIPELINE_ADHESION_SMOOTHER = 22,
+    DYNOCAR_PIPELINE_ADHESION_LAW = 23, /* Adhesion as the scale of a known law */
+    /* Brake-disc friction times braking ratio by expectation maximisation (Jin 2020) */
+    DYNOCAR_PIPELINE_BRAKE_EM = 30,
+    /* Brake-disc friction times braking ratio by extended Kalman filter (Jin 2020's baseline) */
+    DYNOCAR_PIPELINE_BRAKE_EKF = 31,
+    /* Brake-disc friction times braking ratio by fixed-lag smoothing */
+    DYNOCAR_PIPELINE_BRAKE_SMOOTHER = 32,
+    /* Staged gradient descent for resistance and mass (Wang 2022) */
+    DYNOCAR_PIPELINE_STAGED_DESCENT = 40,
+    /* Joint integral least squares for resistance and mass */
+    DYNOCAR_PIPELINE_JOINT_LEAST_SQUARES = 41,
+    DYNOCAR_PIPELINE_MASS_KALMAN = 42, /* Kalman filter v, 1/m, bias for mass */
+    DYNOCAR_PIPELINE_TRAIN_KALMAN = 43, /* Kalman filters of resistance and mass together */
+    /* Watches the residual between model and measurement */
+    DYNOCAR_PIPELINE_RESIDUAL_MONITOR = 50,
+    /* Copies sample to snapshot without estimating: the latency floor */
+    DYNOCAR_PIPELINE_ECHO = 60
 };
 #define DYNOCAR_PIPELINE_LEAST_SQUARES DYNOCAR_PIPELINE_LS /* its name in earlier releases */
 
-/* A quantity that a pipeline estimates, with the unit of its value. */
+/* What a controller asks for; the daemon's configuration says which pipeline answers. Where
+ * the answer is: dynocar_snapshot_resistance() or Davis a, b and c; else the parameter MASS,
+ * ADHESION or ADHESION_LOWER_BOUND, DISC_FRICTION, BRAKING_RATIO. */
 enum {
-    DYNOCAR_PARAMETER_DAVIS_A = 1,              /* N/kN */
-    DYNOCAR_PARAMETER_DAVIS_B = 2,              /* N/kN per m/s */
-    DYNOCAR_PARAMETER_DAVIS_C = 3,              /* N/kN per (m/s)^2 */
-    DYNOCAR_PARAMETER_MASS = 5,                 /* t; a sample's mass is in kg */
-    DYNOCAR_PARAMETER_ADHESION = 6,             /* 1, wheel on rail */
-    DYNOCAR_PARAMETER_ADHESION_LOWER_BOUND = 7, /* 1 */
-    DYNOCAR_PARAMETER_ADHESION_LAW_SCALE = 8,   /* 1 */
-    DYNOCAR_PARAMETER_DISC_FRICTION = 9,        /* 1 */
-    DYNOCAR_PARAMETER_BRAKING_RATIO = 10,       /* 1 */
-    DYNOCAR_PARAMETER_ACCELERATION_BIAS = 14,   /* m/s^2 */
-    DYNOCAR_PARAMETER_UNEXPLAINED_FORCE = 15    /* N */
+    DYNOCAR_QUANTITY_RESISTANCE = 0, /* Basic resistance over speed: Davis a, b and c */
+    DYNOCAR_QUANTITY_MASS = 1, /* Gross mass */
+    DYNOCAR_QUANTITY_ADHESION = 2, /* Adhesion of wheel on rail */
+    /* Friction of the brake discs, the declared braking ratio held */
+    DYNOCAR_QUANTITY_BRAKE_FRICTION = 3,
+    DYNOCAR_QUANTITY_BRAKING_RATIO = 4 /* Braking ratio, the declared friction held */
+};
+
+/* Where the mass in a snapshot comes from. */
+enum {
+    DYNOCAR_MASS_SOURCE_NONE = 0, /* The pipeline estimates no mass */
+    /* The train's file: nothing else is known of the load yet */
+    DYNOCAR_MASS_SOURCE_DECLARED = 1,
+    DYNOCAR_MASS_SOURCE_WEIGHED = 2, /* The controller's samples, which carry it */
+    DYNOCAR_MASS_SOURCE_LEARNED = 3 /* What forces do to the train */
+};
+
+/* A number that a pipeline estimates, with the unit of its value. A sample's mass is in kg. */
+enum {
+    DYNOCAR_PARAMETER_DAVIS_A = 1, /* Davis a in N/kN */
+    DYNOCAR_PARAMETER_DAVIS_B = 2, /* Davis b in N/kN per m/s */
+    DYNOCAR_PARAMETER_DAVIS_C = 3, /* Davis c in N/kN per (m/s)^2 */
+    DYNOCAR_PARAMETER_MASS = 5, /* Mass in t */
+    DYNOCAR_PARAMETER_ADHESION = 6, /* Wheel-rail adhesion coefficient */
+    DYNOCAR_PARAMETER_ADHESION_LOWER_BOUND = 7, /* A lower bound of the adhesion coefficient */
+    DYNOCAR_PARAMETER_ADHESION_LAW_SCALE = 8, /* Scale of the known adhesion law */
+    DYNOCAR_PARAMETER_DISC_FRICTION = 9, /* Brake-disc friction coefficient */
+    DYNOCAR_PARAMETER_BRAKING_RATIO = 10, /* Braking ratio */
+    DYNOCAR_PARAMETER_ACCELERATION_BIAS = 14, /* Acceleration bias in m/s^2 */
+    DYNOCAR_PARAMETER_UNEXPLAINED_FORCE = 15 /* Unexplained force in N */
 };
 
 /* Why a sample was not used: places in rejected_by_reason. */
 enum {
+    /* The time is not later than the last accepted one */
     DYNOCAR_REJECTED_TIME_NOT_INCREASING = 0,
+    /* The time jumped ahead by more than a stretch of motion allows */
     DYNOCAR_REJECTED_TIME_JUMP = 1,
+    /* The sequence number repeats or runs backwards */
     DYNOCAR_REJECTED_SEQUENCE_NOT_INCREASING = 2,
-    DYNOCAR_REJECTED_WRONG_TRAIN = 3,
-    DYNOCAR_REJECTED_MISSING = 4,    /* a quantity that is needed */
-    DYNOCAR_REJECTED_NOT_FINITE = 5, /* NaN or infinite */
-    DYNOCAR_REJECTED_SPEED_OUT_OF_RANGE = 6,
-    DYNOCAR_REJECTED_SPEED_JUMP = 7,    /* faster than a train can */
-    DYNOCAR_REJECTED_POSITION_JUMP = 8, /* disagrees with the speed, or lies off the line */
-    DYNOCAR_REJECTED_FORCE_OUT_OF_RANGE = 9,
-    DYNOCAR_REJECTED_MASS_OUT_OF_RANGE = 10,
-    DYNOCAR_REJECTED_BAD_DIRECTION = 11, /* neither +1 nor -1 */
-    DYNOCAR_REJECTED_OUTLIER = 12,       /* by the estimator's own test */
-    DYNOCAR_REJECTED_WHEEL_SLIDE = 13,   /* slide or spin: not the train's speed */
-    DYNOCAR_REJECTED_OUT_OF_RANGE = 14,  /* another quantity */
-    DYNOCAR_REJECTED_FROZEN = 15         /* in motion the same, place and all, for over 2.5 s */
+    DYNOCAR_REJECTED_WRONG_TRAIN = 3, /* The sample is of another train */
+    DYNOCAR_REJECTED_MISSING = 4, /* A quantity that is needed is missing */
+    DYNOCAR_REJECTED_NOT_FINITE = 5, /* A quantity is NaN or infinite */
+    DYNOCAR_REJECTED_SPEED_OUT_OF_RANGE = 6, /* The speed lies outside the train's range */
+    DYNOCAR_REJECTED_SPEED_JUMP = 7, /* The speed changed faster than a train can */
+    /* The position disagrees with the speed or lies off the line */
+    DYNOCAR_REJECTED_POSITION_JUMP = 8,
+    DYNOCAR_REJECTED_FORCE_OUT_OF_RANGE = 9, /* A force lies outside what the train can exert */
+    DYNOCAR_REJECTED_MASS_OUT_OF_RANGE = 10, /* The mass lies outside the train's range */
+    DYNOCAR_REJECTED_BAD_DIRECTION = 11, /* The direction is neither +1 nor -1 */
+    DYNOCAR_REJECTED_OUTLIER = 12, /* The estimator's outlier test refused the window */
+    /* Wheel slide or wheel spin: the speed is not the train's */
+    DYNOCAR_REJECTED_WHEEL_SLIDE = 13,
+    DYNOCAR_REJECTED_OUT_OF_RANGE = 14, /* Another quantity lies outside its physical range */
+    /* A moving train has sent the same speed, place and forces for more than 2.5 s */
+    DYNOCAR_REJECTED_FROZEN = 15
 };
 
 /* Manoeuvres that would tell more: bits of missing_manoeuvres. */
 enum {
-    DYNOCAR_MANOEUVRE_COAST_SLOW = 1 << 0, /* tells of Davis a */
-    DYNOCAR_MANOEUVRE_COAST_FAST = 1 << 1, /* tells of Davis c */
-    DYNOCAR_MANOEUVRE_VARY_SPEED = 1 << 2, /* tells a, b and c apart */
-    DYNOCAR_MANOEUVRE_ACCELERATE = 1 << 3, /* tells of mass */
-    DYNOCAR_MANOEUVRE_BRAKE = 1 << 4,      /* tells of adhesion and brake friction */
-    DYNOCAR_MANOEUVRE_MOVE = 1 << 5        /* any motion */
+    DYNOCAR_MANOEUVRE_COAST_SLOW = 1 << 0, /* Coasting at low speed, which tells of Davis a */
+    DYNOCAR_MANOEUVRE_COAST_FAST = 1 << 1, /* Coasting at high speed, which tells of Davis c */
+    /* A wider range of speeds, which tells a, b and c apart */
+    DYNOCAR_MANOEUVRE_VARY_SPEED = 1 << 2,
+    DYNOCAR_MANOEUVRE_ACCELERATE = 1 << 3, /* Strong traction, which tells of mass */
+    /* Strong braking, which tells of adhesion and brake friction */
+    DYNOCAR_MANOEUVRE_BRAKE = 1 << 4,
+    DYNOCAR_MANOEUVRE_MOVE = 1 << 5 /* Any motion */
 };
 
 /* An effect that the model may lack. */
 enum {
-    DYNOCAR_EFFECT_NONE = 0,
-    DYNOCAR_EFFECT_TUNNEL_DRAG = 1,
-    DYNOCAR_EFFECT_CURVE_RESISTANCE = 2,
-    DYNOCAR_EFFECT_WIND = 3,
-    DYNOCAR_EFFECT_DRAGGING_BRAKE = 4,
-    DYNOCAR_EFFECT_WHEEL_DIAMETER = 5,
-    DYNOCAR_EFFECT_GRADIENT_SHIFT = 6, /* a profile moved along the line */
-    DYNOCAR_EFFECT_MASS_CHANGE = 7,
-    DYNOCAR_EFFECT_TRACTION_GAIN = 8,  /* a reported force that is not the true one */
-    DYNOCAR_EFFECT_ACTUATOR_DELAY = 9, /* forces act later than reported */
-    DYNOCAR_EFFECT_ROTATING_MASS = 10,
-    DYNOCAR_EFFECT_BEARING_TEMPERATURE = 11,
-    DYNOCAR_EFFECT_AMBIENT_TEMPERATURE = 12,
-    DYNOCAR_EFFECT_LOCAL_RESISTANCE = 13,
-    DYNOCAR_EFFECT_LOW_ADHESION = 14,
-    DYNOCAR_EFFECT_UNKNOWN = 15, /* a real residual that no known effect explains */
-    DYNOCAR_EFFECT_GRADIENT_ERROR = 16, /* a declared gradient that is wrong along the line */
-    DYNOCAR_EFFECT_SPEED_DELAY = 17     /* a measured speed that is late */
+    DYNOCAR_EFFECT_NONE = 0, /* No suspicion */
+    DYNOCAR_EFFECT_TUNNEL_DRAG = 1, /* Air drag in tunnels */
+    DYNOCAR_EFFECT_CURVE_RESISTANCE = 2, /* Resistance in curves */
+    DYNOCAR_EFFECT_WIND = 3, /* Wind along the line */
+    DYNOCAR_EFFECT_DRAGGING_BRAKE = 4, /* A brake that does not release */
+    DYNOCAR_EFFECT_WHEEL_DIAMETER = 5, /* A wrong wheel diameter, hence a wrong speed scale */
+    DYNOCAR_EFFECT_GRADIENT_SHIFT = 6, /* A gradient profile moved along the line */
+    DYNOCAR_EFFECT_MASS_CHANGE = 7, /* Another mass than declared */
+    DYNOCAR_EFFECT_TRACTION_GAIN = 8, /* A reported force that is not the true one */
+    DYNOCAR_EFFECT_ACTUATOR_DELAY = 9, /* Forces that act later than reported */
+    DYNOCAR_EFFECT_ROTATING_MASS = 10, /* Another rotating mass than declared */
+    DYNOCAR_EFFECT_BEARING_TEMPERATURE = 11, /* Cold bearings that warm up */
+    DYNOCAR_EFFECT_AMBIENT_TEMPERATURE = 12, /* Resistance that follows the outside temperature */
+    DYNOCAR_EFFECT_LOCAL_RESISTANCE = 13, /* Extra resistance at a place */
+    DYNOCAR_EFFECT_LOW_ADHESION = 14, /* A brake force that the rail does not carry */
+    DYNOCAR_EFFECT_UNKNOWN = 15, /* A real residual that no known effect explains */
+    /* A declared gradient that is wrong by a smooth function of the chainage */
+    DYNOCAR_EFFECT_GRADIENT_ERROR = 16,
+    DYNOCAR_EFFECT_SPEED_DELAY = 17 /* A measured speed that is late */
 };
 
-/* Measured quantities: bits of valid. */
+/* Measured quantities of a sample: bits of valid. */
 enum {
-    DYNOCAR_HAS_POSITION = 1 << 0,
-    DYNOCAR_HAS_SPEED = 1 << 1,
-    DYNOCAR_HAS_TRACTION_FORCE = 1 << 2,
-    DYNOCAR_HAS_BRAKE_FORCE = 1 << 3,
-    DYNOCAR_HAS_BRAKE_CYLINDER_PRESSURE = 1 << 4,
-    DYNOCAR_HAS_ACCELERATION = 1 << 5,
-    DYNOCAR_HAS_SPECIFIC_FORCE = 1 << 6,
-    DYNOCAR_HAS_MASS = 1 << 7,
-    DYNOCAR_HAS_AMBIENT_TEMPERATURE = 1 << 8,
-    DYNOCAR_HAS_GRADIENT = 1 << 9,
-    DYNOCAR_HAS_CURVE_RADIUS = 1 << 10
+    DYNOCAR_HAS_POSITION = 1 << 0, /* position_m */
+    DYNOCAR_HAS_SPEED = 1 << 1, /* speed_mps */
+    DYNOCAR_HAS_TRACTION_FORCE = 1 << 2, /* traction_force_n */
+    DYNOCAR_HAS_BRAKE_FORCE = 1 << 3, /* brake_force_n */
+    DYNOCAR_HAS_BRAKE_CYLINDER_PRESSURE = 1 << 4, /* brake_cylinder_pressure_pa */
+    DYNOCAR_HAS_ACCELERATION = 1 << 5, /* acceleration_mps2 */
+    DYNOCAR_HAS_SPECIFIC_FORCE = 1 << 6, /* specific_force_mps2 */
+    DYNOCAR_HAS_MASS = 1 << 7, /* mass_kg */
+    DYNOCAR_HAS_AMBIENT_TEMPERATURE = 1 << 8, /* ambient_temperature_degc */
+    DYNOCAR_HAS_GRADIENT = 1 << 9, /* gradient_permille */
+    DYNOCAR_HAS_CURVE_RADIUS = 1 << 10 /* curve_radius_m */
 };
 
 #define DYNOCAR_FLAG_WHEEL_SLIDE 1 /* in flags: the wheel-slide protection is active */
+/* end of generated */
 
 /* ---- What a controller writes ---- */
 
+/* generated: sample */
 /* One cycle of a train. A field counts only while its bit in valid is set; start from
- * dynocar_sample_empty(). Missing values: leave the bit out; never write a made-up number. */
+ * dynocar_sample_empty(). Missing values: leave the bit out; never write a made-up number.
+ * published_ns, sequence, train_id and run are filled in by publish. */
 typedef struct dynocar_train_sample {
-    int64_t time_ns;      /* when measured, controller's monotonic clock */
-    int64_t published_ns; /* filled in by publish: host's monotonic clock */
-    uint64_t sequence;    /* filled in by publish: counts from 1; a gap tells of lost samples */
-    uint64_t train_id;    /* filled in by publish */
-    uint16_t valid;       /* DYNOCAR_HAS_... of every field that holds a value */
-    uint8_t flags;        /* DYNOCAR_FLAG_WHEEL_SLIDE */
-    int8_t direction;     /* +1 while the chainage grows in the direction of travel, else -1 */
-    uint32_t run;         /* filled in by publish: number of the run (trip) */
-    double position_m;    /* chainage of the train's centre */
-    double speed_mps;     /* never negative */
-    double traction_force_n; /* at the wheel rims, never negative */
-    double brake_force_n;    /* retarding, never negative */
+    /* When the values were measured, in ns of the controller's monotonic clock */
+    int64_t time_ns;
+    /* When the sample was handed to the channel, in ns of the host's monotonic clock; the
+     * publisher writes it, and latency is counted from it */
+    int64_t published_ns;
+    /* Counts the controller's samples, one by one; a gap tells of lost samples */
+    uint64_t sequence;
+    /* The train */
+    uint64_t train_id;
+    /* One bit for each DYNOCAR_HAS_... that holds a value */
+    uint16_t valid;
+    /* DYNOCAR_FLAG_WHEEL_SLIDE */
+    uint8_t flags;
+    /* +1 while the chainage grows in the direction of travel, -1 while it falls */
+    int8_t direction;
+    /* Number of the run (trip); filters start a new stretch of motion when it changes */
+    uint32_t run;
+    /* Chainage of the train's centre in m */
+    double position_m;
+    /* Speed in m/s, never negative */
+    double speed_mps;
+    /* Traction force in N, never negative */
+    double traction_force_n;
+    /* Brake force in N, retarding, never negative */
+    double brake_force_n;
+    /* Brake-cylinder pressure in Pa */
     double brake_cylinder_pressure_pa;
-    double acceleration_mps2;        /* dv/dt, as measured */
-    double specific_force_mps2;      /* accelerometer along the track: dv/dt + g * gradient */
-    double mass_kg;                  /* gross, without the rotating part */
-    double ambient_temperature_degc; /* outside */
-    double gradient_permille; /* climbing positive as the chainage grows; if no track file */
-    double curve_radius_m;    /* 0 on straight track; if no track file */
+    /* dv/dt in m/s^2, as measured */
+    double acceleration_mps2;
+    /* What an accelerometer reads along the track in m/s^2: dv/dt + g * gradient */
+    double specific_force_mps2;
+    /* The train's gross mass in kg, without the rotating part */
+    double mass_kg;
+    /* Outside temperature in degC */
+    double ambient_temperature_degc;
+    /* Gradient in permille, climbing positive as the chainage grows; for lines without a track
+     * file */
+    double gradient_permille;
+    /* Curve radius in m, for lines without a track file; 0 on straight track */
+    double curve_radius_m;
 } dynocar_train_sample;
+/* end of generated */
 
 /* ---- What the daemon answers ---- */
 
-/* A pipeline's knowledge of one train at one moment. */
+/* generated: answers */
+/* A pipeline's knowledge of one train at one moment. One bit for each X is 1 << X; model_hash
+ * is as `dynocar models` names it. */
 typedef struct dynocar_parameter_snapshot {
-    uint64_t epoch;      /* start of the daemon, host's monotonic ns: grows with every restart */
-    uint64_t sequence;   /* counts the pipeline's snapshots within the epoch, from 1 */
-    uint64_t generation; /* counts the estimate's resets within the epoch */
+    /* Start of the daemon, in ns of the host's monotonic clock; grows with every restart */
+    uint64_t epoch;
+    /* Counts this pipeline's snapshots of this train within the epoch, from 1 */
+    uint64_t sequence;
+    /* Counts the resets of the estimate within the epoch */
+    uint64_t generation;
+    /* The train */
     uint64_t train_id;
-    uint32_t pipeline_index; /* in the daemon's configuration */
-    uint32_t pipeline_kind;  /* DYNOCAR_PIPELINE_... */
-    uint32_t status;         /* DYNOCAR_STATUS_... as the daemon wrote it */
-    uint32_t reason;         /* DYNOCAR_REASON_... as the daemon wrote it */
-    uint32_t quantities;     /* 1 << DYNOCAR_QUANTITY_...: what this pipeline answers */
-    uint32_t train_quantities; /* the same: what any pipeline answers for the train */
-
-    int64_t sample_time_ns;      /* newest sample: when measured, controller's clock */
-    int64_t sample_published_ns; /* newest sample: when published, host's monotonic clock */
-    int64_t published_ns;        /* this snapshot: when first published, same clock */
-    int64_t vouched_ns;          /* this snapshot: when last vouched for by the daemon, same clock */
-    uint64_t sample_sequence;    /* newest sample: its number */
-
+    /* Number of the pipeline in the daemon's configuration */
+    uint32_t pipeline_index;
+    /* DYNOCAR_PIPELINE_... */
+    uint32_t pipeline_kind;
+    /* DYNOCAR_STATUS_... */
+    uint32_t status;
+    /* DYNOCAR_REASON_... */
+    uint32_t reason;
+    /* One bit for each DYNOCAR_QUANTITY_... that this pipeline answers for the train, by the
+     * daemon's configuration */
+    uint32_t quantities;
+    /* One bit for each DYNOCAR_QUANTITY_... that any pipeline of the daemon answers for the
+     * train */
+    uint32_t train_quantities;
+    /* Measurement time of the newest sample behind the snapshot, controller's clock, in ns */
+    int64_t sample_time_ns;
+    /* When that sample was handed to the channel, host's monotonic clock, in ns */
+    int64_t sample_published_ns;
+    /* When the snapshot was first handed to the channel, host's monotonic clock, in ns */
+    int64_t published_ns;
+    /* When the daemon last vouched for it, host's monotonic clock, in ns; a snapshot is sent
+     * again from time to time while no sample comes */
+    int64_t vouched_ns;
+    /* Sequence number of the newest sample behind the snapshot */
+    uint64_t sample_sequence;
+    /* Samples that entered the estimate or its window */
     uint64_t samples_used;
+    /* Samples refused, for any reason */
     uint64_t samples_rejected;
-    uint64_t samples_lost; /* by gaps of the sequence number */
-    uint64_t updates;      /* windows or segments that updated the estimate */
-    uint32_t rejected_by_reason[DYNOCAR_REJECTION_REASONS]; /* by DYNOCAR_REJECTED_... */
-
-    uint32_t parameter_count;    /* in use, at most DYNOCAR_PARAMETERS_MAX */
-    uint32_t excited;            /* one bit for each parameter that the data excited */
-    uint32_t missing_manoeuvres; /* DYNOCAR_MANOEUVRE_... that would excite the others */
-    uint32_t suspected_effect;   /* DYNOCAR_EFFECT_... */
-    uint32_t suspected_alternatives; /* 1 << DYNOCAR_EFFECT_...: hardly told from it */
-    uint32_t suspicion_age_s;        /* s for which the suspicion has stood */
-    uint32_t parameters[DYNOCAR_PARAMETERS_MAX];   /* DYNOCAR_PARAMETER_... */
-    double values[DYNOCAR_PARAMETERS_MAX];         /* in the parameters' units */
-    double covariance[DYNOCAR_COVARIANCE_ENTRIES]; /* (0,0), (1,0), (1,1), (2,0), ... */
-
-    double innovation_normalised;   /* 1: newest innovation over its predicted deviation */
-    double innovation_mean_square;  /* 1: of the normalised ones lately; 1 when the model holds */
-    double innovation_correlation;  /* 1: lag 1, lately; 0 when white */
-    double unexplained_force_n;     /* retarding positive */
-    double unexplained_force_std_n; /* its standard deviation */
-    double suspicion_evidence;      /* 1: twice the log-likelihood ratio of the suspicion */
-    double speed_min_mps;           /* lowest speed behind the estimate */
-    double speed_max_mps;           /* highest speed behind the estimate */
-    uint64_t model_hash; /* of train and line, as `dynocar models` names it; 0: from no files */
-    uint32_t usable_quantities; /* 1 << DYNOCAR_QUANTITY_...: what may be used, with hysteresis */
-    uint32_t mass_source;       /* DYNOCAR_MASS_SOURCE_... */
+    /* Samples that never arrived, by gaps of the sequence number */
+    uint64_t samples_lost;
+    /* Windows or segments that updated the estimate */
+    uint64_t updates;
+    /* Samples refused, by DYNOCAR_REJECTED_... number */
+    uint32_t rejected_by_reason[DYNOCAR_REJECTION_REASONS];
+    /* Number of parameters in use */
+    uint32_t parameter_count;
+    /* One bit for each parameter that the data excited */
+    uint32_t excited;
+    /* Manoeuvres that would excite the others, see DYNOCAR_MANOEUVRE_... */
+    uint32_t missing_manoeuvres;
+    /* Suspected missing effect, DYNOCAR_EFFECT_... */
+    uint32_t suspected_effect;
+    /* Other effects that these data hardly tell from it: one bit for each DYNOCAR_EFFECT_... */
+    uint32_t suspected_alternatives;
+    /* How long the suspicion has stood, in whole s of the controller's clock */
+    uint32_t suspicion_age_s;
+    /* DYNOCAR_PARAMETER_... */
+    uint32_t parameters[DYNOCAR_PARAMETERS_MAX];
+    /* Values in the parameters' units */
+    double values[DYNOCAR_PARAMETERS_MAX];
+    /* Covariance, lower triangle packed by rows: (0,0), (1,0), (1,1), (2,0), ... */
+    double covariance[DYNOCAR_COVARIANCE_ENTRIES];
+    /* Newest innovation over its predicted standard deviation */
+    double innovation_normalised;
+    /* Mean square of the normalised innovations lately; 1 when the model holds */
+    double innovation_mean_square;
+    /* Lag-1 correlation of the innovations lately; 0 when they are white */
+    double innovation_correlation;
+    /* Force in N, retarding positive, that the model does not explain */
+    double unexplained_force_n;
+    /* Its standard deviation in N */
+    double unexplained_force_std_n;
+    /* Evidence for the suspected effect: twice the log-likelihood ratio */
+    double suspicion_evidence;
+    /* Lowest speed in m/s among the data behind the estimate */
+    double speed_min_mps;
+    /* Highest speed in m/s among the data behind the estimate */
+    double speed_max_mps;
+    /* The model of train and line that the pipeline reckons with: the first 8 bytes of SHA-256
+     * over the train's file, a zero byte and the line's file; 0 when it came from no files */
+    uint64_t model_hash;
+    /* One bit for each DYNOCAR_QUANTITY_... whose values a controller may use now. It changes
+     * seldom: what was usable stays so for half a second of doubt, and what was doubted has to
+     * hold for a while */
+    uint32_t usable_quantities;
+    /* Where the mass comes from: DYNOCAR_MASS_SOURCE_... */
+    uint32_t mass_source;
 } dynocar_parameter_snapshot;
 
-/* A snapshot copied out, with its age. */
+/* A snapshot copied out, with its age. is_usable is for what was asked, by usable_quantities. */
 typedef struct dynocar_reading {
-    int64_t age_ns;     /* since the daemon last vouched for the snapshot */
-    uint32_t status;    /* DYNOCAR_STATUS_...; INVALID while the daemon is silent */
-    uint32_t reason;    /* DYNOCAR_REASON_...; DAEMON_SILENT while the daemon is silent */
-    uint32_t is_stale;  /* 1 when the daemon has been silent for too long */
-    uint32_t is_usable; /* 1 when the values may be used for what was asked; see usable_quantities */
+    /* Time in ns since the daemon last vouched for the snapshot */
+    int64_t age_ns;
+    /* DYNOCAR_STATUS_...; invalid while the daemon is silent */
+    uint32_t status;
+    /* DYNOCAR_REASON_...; a number of a newer peer passes as it came */
+    uint32_t reason;
+    /* 1 when the daemon has been silent for too long, else 0 */
+    uint32_t is_stale;
+    /* 1 when a controller may use the values, else 0 */
+    uint32_t is_usable;
+    /* The snapshot as the daemon wrote it */
     dynocar_parameter_snapshot snapshot;
 } dynocar_reading;
 
 /* Basic resistance (no gradient, no curve) at a speed: w0(v) = a + b v + c v^2. */
 typedef struct dynocar_resistance {
-    double w0_n_per_kn;       /* N per kN of train weight */
-    double w0_std_n_per_kn;   /* standard deviation, from the full covariance */
-    double force_n;           /* w0 times the train's weight */
-    double force_std_n;       /* standard deviation, the mass taken as exact */
-    uint64_t is_extrapolated; /* 1 when the speed lies outside the speeds behind the estimate */
+    /* Unit basic resistance w0 in N per kN of train weight */
+    double w0_n_per_kn;
+    /* Standard deviation of w0_n_per_kn */
+    double w0_std_n_per_kn;
+    /* The same in N, for the mass the caller gave */
+    double force_n;
+    /* Standard deviation of force_n, the mass taken as exact */
+    double force_std_n;
+    /* 1 when the speed lies outside the speeds behind the estimate, else 0 */
+    uint64_t is_extrapolated;
 } dynocar_resistance;
+/* end of generated */
 
 /* ---- Publishing ---- */
 
@@ -425,44 +562,69 @@ dynocar_code dynocar_snapshot_covariance(const dynocar_parameter_snapshot *snaps
 
 /* ---- Braking distance and time; no handle, any thread ---- */
 
-/* What the rail carries: rail of a dynocar_stop. */
+/* generated: stops */
+/* What the rail carries in a stop. */
 enum {
-    DYNOCAR_RAIL_UNLIMITED = 0,   /* any brake force; adhesion is not read */
-    DYNOCAR_RAIL_COEFFICIENT = 1, /* adhesion is one coefficient at all speeds, or a lower bound */
-    DYNOCAR_RAIL_DRY_LAW = 2,     /* adhesion is a scale of the dry rail's law (Xie 2019) */
-    DYNOCAR_RAIL_WET_LAW = 3      /* adhesion is a scale of the wet rail's law (Xie 2019) */
+    DYNOCAR_RAIL_UNLIMITED = 0, /* Any brake force: adhesion and its deviation are not read */
+    /* Adhesion is one coefficient at all speeds, or a lower bound of it */
+    DYNOCAR_RAIL_COEFFICIENT = 1,
+    DYNOCAR_RAIL_DRY_LAW = 2, /* Adhesion is a scale of the dry rail's law (Xie 2019) */
+    DYNOCAR_RAIL_WET_LAW = 3 /* Adhesion is a scale of the wet rail's law (Xie 2019) */
 };
 
 /* The stop that is asked about. Set all to 0 first; standard deviations may stay 0. */
-typedef struct {
-    double from_speed_mps;       /* the brakes act in full from this speed on */
-    double to_speed_mps;         /* 0 for standstill */
-    double mass_kg;              /* without the rotating part */
-    double rotating_mass_factor; /* gamma: inertial mass = mass (1 + gamma) */
-    double gradient_permille;    /* along the travel, climbing positive */
-    double davis_a;              /* N/kN */
-    double davis_b;              /* N/kN per m/s */
-    double davis_c;              /* N/kN per (m/s)^2 */
-    double w0_std_n_per_kn;      /* as dynocar_snapshot_resistance() gives it */
-    double brake_scale;          /* factor on the effort: estimated over declared friction, or 1 */
+typedef struct dynocar_stop {
+    /* Speed in m/s at which the brakes act in full */
+    double from_speed_mps;
+    /* Speed in m/s at which the stop is over; 0 for standstill */
+    double to_speed_mps;
+    /* Gross mass in kg, without the rotating part */
+    double mass_kg;
+    /* gamma: inertial mass = mass (1 + gamma) */
+    double rotating_mass_factor;
+    /* Gradient in permille along the direction of travel, climbing positive */
+    double gradient_permille;
+    /* Davis a in N/kN */
+    double davis_a;
+    /* Davis b in N/kN per m/s */
+    double davis_b;
+    /* Davis c in N/kN per (m/s)^2 */
+    double davis_c;
+    /* Standard deviation of w0 in N/kN */
+    double w0_std_n_per_kn;
+    /* Factor on the brake force, as estimated over declared friction; 1 for the declared */
+    double brake_scale;
+    /* Its standard deviation */
     double brake_scale_std;
-    double adhesion;             /* by rail: coefficient or scale of a law */
+    /* Adhesion coefficient, or the scale of a law */
+    double adhesion;
+    /* Its standard deviation */
     double adhesion_std;
-    uint64_t rail;               /* DYNOCAR_RAIL_... */
+    /* What the rail carries: a Rail */
+    uint64_t rail;
 } dynocar_stop;
 
-/* A point of the brake-effort curve: linear between points, constant beyond the ends. */
-typedef struct {
-    double speed_mps; /* increasing */
-    double force_n;   /* of the whole train at the wheel rims */
+/* A point of the brake-effort curve: linear between points, constant beyond the ends; speeds
+ * increase. */
+typedef struct dynocar_effort_point {
+    /* Speed in m/s */
+    double speed_mps;
+    /* Brake force of the whole train in N */
+    double force_n;
 } dynocar_effort_point;
 
-typedef struct {
-    double distance_m; /* with every quantity at its value */
+/* Distance and time of a stop. */
+typedef struct dynocar_stopping {
+    /* Distance in m with every quantity at its value */
+    double distance_m;
+    /* Time in s with every quantity at its value */
     double time_s;
-    double distance_bound_m; /* not exceeded, with at least the confidence asked for */
+    /* Distance in m that is not exceeded, with at least the chosen confidence */
+    double distance_bound_m;
+    /* Time in s that is not exceeded, with at least the chosen confidence */
     double time_bound_s;
 } dynocar_stopping;
+/* end of generated */
 
 /* Distance and time of a stop. confidence: 0.5 up to below 1, for the bound, which moves every
  * uncertain quantity to its unfavourable side. effort: 1 to 1024 points.
@@ -567,6 +729,7 @@ static inline dynocar_code dynocar_reader_braking_ratio(dynocar_reader *reader, 
 #define DYNOCAR_SIZE_(type, size) \
     DYNOCAR_ASSERT_(sizeof(type) == (size), #type " has another size")
 
+/* generated: places */
 DYNOCAR_SIZE_(dynocar_train_sample, 128);
 DYNOCAR_AT_(dynocar_train_sample, time_ns, 0);
 DYNOCAR_AT_(dynocar_train_sample, published_ns, 8);
@@ -670,6 +833,7 @@ DYNOCAR_AT_(dynocar_stopping, distance_m, 0);
 DYNOCAR_AT_(dynocar_stopping, time_s, 8);
 DYNOCAR_AT_(dynocar_stopping, distance_bound_m, 16);
 DYNOCAR_AT_(dynocar_stopping, time_bound_s, 24);
+/* end of generated */
 
 #undef DYNOCAR_AT_
 #undef DYNOCAR_SIZE_

@@ -1,11 +1,11 @@
 #!/bin/sh
-# Builds dynocar_<version>_<arch>.deb from the release binaries. dynocar-watch, dynocar-recording,
-# dynocar-live, dynocar-forward and dynocar-parquet go into it where they lie beside the program.
+# Builds dynocar_<version>_<arch>.deb from the release binaries. dynocar-workshop must lie beside the program;
+# dynocar-watch, dynocar-recording, dynocar-live, dynocar-forward and dynocar-parquet go into it where they do.
 # usage: build.sh [--program FILE] [--libraries FOLDER] [--out FOLDER]
 #   --program    the program, default target/release/dynocar
 #   --libraries  where libdynocar_client.a and libdynocar_fmu.so lie, default target/release
 #   --out        where the package goes, default target/debian
-# Build first: cargo build --release -p dynocar -p dynocar-watch -p dynocar-recording -p dynocar-live \
+# Build first: cargo build --release -p dynocar -p dynocar-workshop -p dynocar-watch -p dynocar-recording -p dynocar-live \
 #                  -p dynocar-forward -p dynocar-parquet &&
 #              cargo build --release -p dynocar-client -p dynocar-fmu
 set -eu
@@ -32,7 +32,9 @@ while [ $# -gt 0 ]; do
     shift 2
 done
 
-for file in "$program" "$libraries/libdynocar_client.a" "$libraries/libdynocar_fmu.so"; do
+name=$(basename "$program")
+workshop=$(dirname "$program")/dynocar-workshop${name#dynocar}
+for file in "$program" "$workshop" "$libraries/libdynocar_client.a" "$libraries/libdynocar_fmu.so"; do
     [ -f "$file" ] || fail "$file: no such file; build it with cargo build --release"
 done
 for tool in cc dpkg dpkg-deb gzip; do
@@ -50,8 +52,9 @@ put() { # SOURCE TARGET [MODE]
     install -D -m "${3:-644}" "$1" "$root/$2"
 }
 
-# The program, what shells offer for it, and its manual.
+# The programs, what shells offer for them, and their manual.
 put "$program" usr/bin/dynocar 755
+put "$workshop" usr/bin/dynocar-workshop 755
 for companion in dynocar-watch dynocar-recording dynocar-live dynocar-forward dynocar-parquet; do
     if [ -f "$(dirname "$program")/$companion" ]; then
         put "$(dirname "$program")/$companion" "usr/bin/$companion" 755
@@ -152,7 +155,7 @@ Description: learns online how a train really behaves
  memory, learns running resistance, mass, adhesion and brake friction, and answers with estimates
  that say how sure they are. On recorded runs it finds the effect that a model of a train lacks.
  .
- The package holds the program, the daemon's unit, and the library that a controller links, for C
+ The package holds the programs, the daemon's unit, and the library that a controller links, for C
  and C++.
 EOF
 (cd "$root" && find etc -type f | sort | sed 's|^|/|') >"$root/DEBIAN/conffiles"

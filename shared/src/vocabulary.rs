@@ -4,6 +4,7 @@
 //! does not know gets `None`, never a guess.
 
 /// Declares an enum with explicit wire numbers, a snake-case name and conversion from the number.
+#[macro_export]
 macro_rules! vocabulary {
     ($(#[$meta:meta])* $name:ident : $repr:ty { $( $(#[doc = $doc:literal])* $item:ident = $number:literal $text:literal ),* $(,)? }) => {
         $(#[$meta])*

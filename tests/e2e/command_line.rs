@@ -24,3 +24,4 @@ mod report_pointer;
 mod shipped;
 mod stops;
 mod survey_command;
+mod two_programs;

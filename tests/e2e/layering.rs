@@ -1,23 +1,27 @@
 //! The invariants of `ARCHITECTURE.md` that can be read off the dependency tree and the sources.
 
+use std::collections::BTreeSet;
 use std::process::Command;
 
 use dynocar_tests::sources::{rust_files, workspace};
 
 /// Names of all packages that a package is built from.
 fn dependencies(package: &str) -> Vec<String> {
+    let lines = tree(package, "normal");
+    lines.iter().filter_map(|line| line.split(' ').next()).map(str::to_owned).collect()
+}
+
+/// Name and version of all packages below a package, by edges of some kinds; some of them more than once.
+fn tree(package: &str, edges: &str) -> Vec<String> {
     let output = Command::new(env!("CARGO"))
-        .args(["tree", "--offline", "--edges", "normal", "--prefix", "none", "--format", "{p}"])
+        .args(["tree", "--offline", "--edges", edges, "--prefix", "none", "--format", "{p}"])
         .args(["--package", package])
         .current_dir(workspace())
         .output()
         .expect("cargo tree");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8_lossy(&output.stdout)
-        .lines()
-        .filter_map(|line| line.split(' ').next())
-        .map(str::to_owned)
-        .collect()
+    let lines = String::from_utf8_lossy(&output.stdout);
+    lines.lines().map(|line| line.trim_end_matches(" (*)").to_owned()).collect()
 }
 
 fn assert_free_of(package: &str, forbidden: &[&str]) {
@@ -29,11 +33,14 @@ fn assert_free_of(package: &str, forbidden: &[&str]) {
     }
 }
 
-/// The packages without channel, clock, file, thread and log: what runs live, and what explains recordings.
-const PURE: [&str; 2] = ["dynocar-core", "dynocar-analysis"];
+/// The packages without channel, clock, file, thread and log: what runs live, what reads recorded runs, and
+/// what explains them.
+const PURE: [&str; 3] = ["dynocar-core", "dynocar-dataset", "dynocar-analysis"];
+/// The most packages that the daemon and its demo are built from, their build scripts' too.
+const DAEMON_PACKAGES_MAX: usize = 134;
 
 #[test]
-fn the_core_and_the_analysis_know_no_channel_clock_or_logger() {
+fn what_is_pure_knows_no_channel_clock_or_logger() {
     for package in PURE {
         assert_free_of(
             package,
@@ -44,14 +51,42 @@ fn the_core_and_the_analysis_know_no_channel_clock_or_logger() {
 
 #[test]
 fn what_runs_live_is_built_without_what_explains_recordings() {
-    assert_free_of("dynocar-core", &["dynocar-analysis", "csv", "granit-parser", "strsim"]);
-    // The daemon's program reads its files by the analysis; its threads know nothing of it.
+    assert_free_of("dynocar-core", &["dynocar-dataset", "dynocar-analysis", "csv", "strsim"]);
+    assert_free_of("dynocar-dataset", &["dynocar-analysis", "statrs", "granit-parser"]);
+    // The daemon's program reads its files as datasets' are read; its threads know nothing of that.
     for folder in ["daemon/src/runtime", "daemon/src/shadow", "daemon/src/state"] {
         for file in rust_files(folder) {
             let text = std::fs::read_to_string(&file).expect("a source file");
-            assert!(!text.contains("dynocar_analysis"), "{}", file.display());
+            assert!(!text.contains("dynocar_dataset"), "{}", file.display());
         }
     }
+}
+
+#[test]
+fn what_is_installed_beside_a_controller_draws_zips_asks_and_imports_nothing() {
+    assert_free_of(
+        "dynocar",
+        &[
+            "dynocar-workshop",
+            "dynocar-analysis",
+            "dynocar-fmu",
+            "plotters",
+            "zip",
+            "dialoguer",
+            "indicatif",
+            "granit-parser",
+            "statrs",
+            "clap_complete",
+            "clap_mangen",
+        ],
+    );
+    let packages: BTreeSet<String> = tree("dynocar", "normal,build").into_iter().collect();
+    assert!(packages.len() <= DAEMON_PACKAGES_MAX, "{}: {packages:#?}", packages.len());
+}
+
+#[test]
+fn the_workshop_has_no_network_and_no_format_of_recordings() {
+    assert_free_of("dynocar-workshop", &["tokio", "mqtt", "mcap", "prost", "parquet", "arrow"]);
 }
 
 #[test]
@@ -102,8 +137,8 @@ fn the_contract_depends_on_nothing() {
 }
 
 #[test]
-fn the_core_and_the_analysis_touch_no_file_thread_clock_or_terminal() {
-    let folders = ["daemon/core/src", "daemon/analysis/src"].map(rust_files);
+fn what_is_pure_touches_no_file_thread_clock_or_terminal() {
+    let folders = ["daemon/core/src", "daemon/dataset/src", "daemon/analysis/src"].map(rust_files);
     assert!(folders.iter().all(|files| files.len() > 10), "the sources were found");
     let forbidden =
         ["std::fs", "std::thread", "std::net", "Instant::now", "SystemTime", "println!("];

@@ -10,9 +10,10 @@ use dynocar_tests::process::Site;
 use crate::commands::{DYNOCAR, done, dynocar, said};
 use crate::support::{compiler, library_directory, must_succeed, require};
 
-/// What the package must hold, for the program that is tested.
-const FILES: [&str; 19] = [
+/// What the package must hold, for the programs that are tested.
+const FILES: [&str; 20] = [
     "usr/bin/dynocar",
+    "usr/bin/dynocar-workshop",
     "usr/lib/systemd/system/dynocar.service",
     "usr/lib/sysusers.d/dynocar.conf",
     "usr/include/dynocar.h",

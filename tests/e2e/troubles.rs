@@ -5,9 +5,11 @@ use std::collections::BTreeMap;
 use dynocar_tests::sources::workspace;
 
 /// Where messages are raised.
-const FOLDERS: [&str; 13] = [
+const FOLDERS: [&str; 15] = [
     "daemon/src",
+    "daemon/workshop/src",
     "daemon/core/src",
+    "daemon/dataset/src",
     "daemon/analysis/src",
     "daemon/fmu/src",
     "shared/src",
@@ -21,10 +23,12 @@ const FOLDERS: [&str; 13] = [
     "client/forward/src",
 ];
 /// A call whose first literal is a message, and the folder in which it is one.
-const CALLS: [(&str, &str); 11] = [
+const CALLS: [(&str, &str); 13] = [
     ("#[error(", ""),
     ("Failure::Input(", "daemon/src/cli"),
     ("Failure::Work(", "daemon/src/cli"),
+    ("Failure::Input(", "daemon/workshop/src/cli"),
+    ("Failure::Work(", "daemon/workshop/src/cli"),
     ("Failure::Input(", "client/forward/src"),
     ("Failure::Work(", "client/recording/src/cli"),
     ("Error::new_err(", "client/python/src"),
@@ -37,7 +41,7 @@ const CALLS: [(&str, &str); 11] = [
 /// Whole files whose sentences are messages: of impossible data and declarations, of stops.
 const SENTENCES: [&str; 3] = [
     "daemon/core/src/plausibility/words.rs",
-    "daemon/analysis/src/dataset/declared.rs",
+    "daemon/dataset/src/declared.rs",
     "shared/src/stopping.rs",
 ];
 /// Stands for what changes from message to message.

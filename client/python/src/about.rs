@@ -66,8 +66,8 @@ pub(crate) fn vocabularies() -> Vec<(&'static str, Members)> {
     }
     vec![
         ("Code", members(Code::ALL, |it| it as i64)),
-        ("Rail", members(&Rail::ALL, |it| it as i64)),
-        ("DaemonState", members(&DaemonState::ALL, |it| it as i64)),
+        ("Rail", members(Rail::ALL, |it| it as i64)),
+        ("DaemonState", members(DaemonState::ALL, |it| it as i64)),
         ("Status", members(Status::ALL, |it| it as i64)),
         ("Reason", members(Reason::ALL, |it| it as i64)),
         ("PipelineKind", members(PipelineKind::ALL, |it| it as i64)),

@@ -4,7 +4,7 @@ use std::ffi::{CStr, OsStr, c_char};
 use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 
-use dynocar_shared::{ParameterSnapshot, SCHEMA_MAJOR, TrainId, TrainSample};
+use dynocar_shared::{ParameterSnapshot, SCHEMA_MAJOR, TrainId, TrainSample, vocabulary};
 
 use super::error::{Code, Failure, Message, guard_in_words};
 use crate::announcement::Role;
@@ -12,22 +12,16 @@ use crate::error::ChannelError;
 use crate::host::Host;
 use crate::peer::Peer;
 
-/// Who serves a train; `DYNOCAR_DAEMON_…` in C.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(i32)]
-pub enum DaemonState {
-    /// Nobody serves the train.
-    Absent = 0,
-    /// A living daemon serves it.
-    Compatible = 1,
-    /// A living daemon serves it, and we cannot understand each other.
-    Incompatible = 2,
-}
-
-impl DaemonState {
-    /// Every state, in the order of its number.
-    pub const ALL: [DaemonState; 3] =
-        [DaemonState::Absent, DaemonState::Compatible, DaemonState::Incompatible];
+vocabulary! {
+    /// Who serves a train; `DYNOCAR_DAEMON_…` in C.
+    DaemonState: i32 {
+        /// Nobody serves the train.
+        Absent = 0 "absent",
+        /// A living daemon serves it.
+        Compatible = 1 "compatible",
+        /// A living daemon serves it, and we cannot understand each other.
+        Incompatible = 2 "incompatible",
+    }
 }
 
 /// Who serves a train now, as a state and in words. Opens files: not for the control cycle.

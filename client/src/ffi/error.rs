@@ -8,11 +8,11 @@ use crate::error::{ChannelError, SendRefused};
 
 /// Declares the codes with their numbers and texts, so that none is without a text.
 macro_rules! codes {
-    ($( $(#[$meta:meta])* $code:ident = $number:literal $text:literal ),* $(,)?) => {
+    ($( $(#[doc = $doc:literal])* $code:ident = $number:literal $text:literal ),* $(,)?) => {
         /// What every function that can fail gives; `DYNOCAR_ERROR_…` in C.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(i32)]
-        pub enum Code { $( $(#[$meta])* $code = $number ),* }
+        pub enum Code { $( $(#[doc = $doc])* $code = $number ),* }
 
         impl Code {
             /// Every code, in the order of its number.
@@ -21,6 +21,11 @@ macro_rules! codes {
             /// The code in words.
             pub const fn text(self) -> &'static CStr {
                 match self { $( Code::$code => $text ),* }
+            }
+
+            /// What the code means, as its documentation has it.
+            pub const fn meaning(self) -> &'static str {
+                match self { $( Code::$code => concat!($($doc),*) ),* }
             }
 
             /// The code with this number.
@@ -40,7 +45,7 @@ codes! {
     BadNumber = 2 c"a number means nothing, lies out of range or is not finite",
     /// The handle belongs to the thread that opened it.
     WrongThread = 3 c"the handle was opened by another thread",
-    /// The root directory's name cannot be used.
+    /// The root directory's name cannot be used: not absolute, too long, or special characters.
     RootName = 4 c"the root directory's name cannot be used",
     /// A run-time directory or file cannot be used.
     Directory = 5 c"a run-time directory or file cannot be used",
@@ -50,13 +55,13 @@ codes! {
     IncompatibleDaemon = 7 c"the daemon is of an incompatible release",
     /// The shared memory cannot be used.
     Transport = 8 c"the shared memory cannot be used",
-    /// The sample was not taken and counts as lost.
+    /// The sample was not taken and counts as lost; just go on.
     SendRefused = 9 c"the transport took no message",
     /// No snapshot of this pipeline has come yet.
     NoSnapshot = 10 c"no snapshot of this pipeline has come yet",
     /// The snapshot's pipeline does not estimate this parameter.
     NotInSnapshot = 11 c"the pipeline does not estimate this parameter",
-    /// A fault inside the library; its words go to standard error.
+    /// A fault inside the library, in words on standard error: close the handle.
     Panic = 12 c"a fault inside the library",
     /// The train does not slow down, at the values given or at the edge of the bound.
     DoesNotStop = 13 c"the train does not slow down",

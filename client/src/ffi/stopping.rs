@@ -1,30 +1,25 @@
 //! Braking distance and time for C; the mathematics are [`dynocar_shared::stopping`].
 
 use dynocar_shared::stopping::{EffortPoint, RailAdhesion, Stop, StoppingError};
-use dynocar_shared::{RailCondition, Uncertain, wire_struct};
+use dynocar_shared::{RailCondition, Uncertain, vocabulary, wire_struct};
 
 use super::error::{Code, guard};
 
 /// Most points of a brake-effort curve.
 pub const EFFORT_POINTS_MAX: usize = 1024;
 
-/// What the rail carries; `DYNOCAR_RAIL_…` in C.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u64)]
-pub enum Rail {
-    /// Any brake force: adhesion and its deviation are not read.
-    Unlimited = 0,
-    /// One adhesion coefficient at all speeds.
-    Coefficient = 1,
-    /// A scale of the dry rail's law.
-    DryLaw = 2,
-    /// A scale of the wet rail's law.
-    WetLaw = 3,
-}
-
-impl Rail {
-    /// Every kind, in the order of its number.
-    pub const ALL: [Rail; 4] = [Rail::Unlimited, Rail::Coefficient, Rail::DryLaw, Rail::WetLaw];
+vocabulary! {
+    /// What the rail carries; `DYNOCAR_RAIL_…` in C.
+    Rail: u64 {
+        /// Any brake force: adhesion and its deviation are not read.
+        Unlimited = 0 "unlimited",
+        /// Adhesion is one coefficient at all speeds, or a lower bound of it.
+        Coefficient = 1 "coefficient",
+        /// Adhesion is a scale of the dry rail's law (Xie 2019).
+        DryLaw = 2 "dry_law",
+        /// Adhesion is a scale of the wet rail's law (Xie 2019).
+        WetLaw = 3 "wet_law",
+    }
 }
 
 wire_struct! {
@@ -97,7 +92,7 @@ wire_struct! {
 impl StopRequest {
     fn stop<'a>(&self, effort: &'a [EffortPoint]) -> Option<Stop<'a>> {
         let adhesion = Uncertain::new(self.adhesion, self.adhesion_std);
-        let rail = Rail::ALL.into_iter().find(|rail| *rail as u64 == self.rail)?;
+        let rail = Rail::from_number(self.rail)?;
         let davis = [self.davis_a, self.davis_b, self.davis_c];
         Some(Stop {
             to_speed_mps: self.to_speed_mps,
@@ -199,7 +194,7 @@ mod tests {
     fn c_is_told_what_rust_is_told() {
         let effort =
             EFFORT.map(|EffortPlace { speed_mps, force_n }| EffortPoint { speed_mps, force_n });
-        for rail in Rail::ALL {
+        for &rail in Rail::ALL {
             let request = StopRequest { rail: rail as u64, ..request() };
             let expected = request.stop(&effort).unwrap().estimate(0.99).unwrap();
             let (code, found) = ask(&request, 0.99);
