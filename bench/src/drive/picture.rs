@@ -53,7 +53,6 @@ fn panel(
         .configure_mesh()
         .disable_x_mesh()
         .disable_x_axis()
-        .max_light_lines(1)
         .y_labels(6)
         .y_label_formatter(&|value| match *value < 0.0 {
             true => String::new(),
