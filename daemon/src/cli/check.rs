@@ -20,7 +20,7 @@ use super::{ErrorAnswer, Failure};
 use crate::dataset::{self, FileKind, LoadError, file_error, kind_of, read_text};
 use crate::output::{give, require_file, require_folder, tell, write_json};
 
-/// Check a dataset, train, track or daemon configuration, and report what was understood.
+/// Check a dataset, train, track or configuration, and report what was understood.
 #[derive(Clone, Debug, Args)]
 pub struct CheckArguments {
     /// A dataset's folder or its dataset.toml, a recording, a train.toml, a track.toml or a daemon.toml.

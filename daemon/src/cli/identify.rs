@@ -20,7 +20,7 @@ use crate::dataset;
 use crate::identify::{default_estimators, identify, recommended_estimators, samples_of_runs};
 use crate::output::{give, require_file};
 
-/// Estimate resistance, mass, adhesion and friction from recorded runs, as the daemon does.
+/// Estimate resistance, mass, adhesion, friction from recorded runs, as the daemon.
 #[derive(Debug, Args)]
 pub struct IdentifyArguments {
     /// The dataset's folder, or a recording

@@ -9,7 +9,7 @@ use crate::survey::answer::Answer;
 use crate::survey::{SurveyFailure, page, survey_folder};
 use clap::Args;
 
-/// Survey a line from recordings with GNSS: trips, chainage, stops, gradient from the forces.
+/// Survey a line from recordings with GNSS: trips, chainage, stops, gradient.
 #[derive(Debug, Args)]
 pub struct SurveyArguments {
     /// The folder of the raw recordings, or its dataset.toml under any name
