@@ -17,7 +17,7 @@ use crate::dataset::{FileKind, file_error, is_recording, kind_of, read_text};
 use crate::output::{give, require_file, tell, write_json};
 use crate::programs::WORKSHOP;
 
-/// Check a dataset, train, track or daemon configuration, and report what was understood.
+/// Check a dataset, train, track or configuration, and report what was understood.
 #[derive(Clone, Debug, Args)]
 pub struct CheckArguments {
     /// A dataset's folder or its dataset.toml, a recording, a train.toml, a track.toml or a daemon.toml.

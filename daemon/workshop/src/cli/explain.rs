@@ -31,7 +31,7 @@ const PREDICTIONS_HEADER: &str = "time_s,speed_mps\n";
 /// Why nothing is grown from data that cannot be true.
 const IMPOSSIBLE: &str = "no grown model is written: the data cannot be true";
 
-/// Find the effect that the declared model lacks, add it, and report the error before and after.
+/// Find the effect that the model lacks, add it, report the error before and after.
 #[derive(Debug, Args)]
 pub struct ExplainArguments {
     /// The dataset's folder, or a recording

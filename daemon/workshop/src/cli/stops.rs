@@ -12,7 +12,7 @@ use dynocar::cli::Failure;
 use dynocar::dataset;
 use dynocar::output::{give, require_file};
 
-/// Estimate deceleration and stopping distance from recorded stops, without any force.
+/// Estimate deceleration and stopping distance from recorded stops, without forces.
 ///
 /// It needs the speed alone, and uses the command of the brake where it is recorded.
 #[derive(Debug, Args)]

@@ -9,7 +9,7 @@ use clap::Args;
 use dynocar::cli::Failure;
 use dynocar::output::{give, require_file, require_folder, tell, write_file};
 
-/// Survey a line from recordings with GNSS: trips, chainage, stops, gradient from the forces.
+/// Survey a line from recordings with GNSS: trips, chainage, stops, gradient.
 #[derive(Debug, Args)]
 pub struct SurveyArguments {
     /// The folder of the raw recordings, or its dataset.toml under any name

@@ -13,10 +13,10 @@ use crate::cli::train_text::TrainArguments;
 /// The folder for the files where somebody who is asked says no other.
 pub const FOLDER_DEFAULT: &str = "my_train";
 
-/// Describe your train and your CSV recordings: write train.toml, daemon.toml, dataset.toml.
+/// Describe your train and your CSV recordings as TOML files.
 ///
-/// dataset.toml says of every column what it was taken for and why. Nothing is overwritten. On a terminal,
-/// without a folder, it asks for all that is not given.
+/// It writes train.toml, daemon.toml and dataset.toml, which says of every column what it was taken for and
+/// why. Nothing is overwritten. On a terminal, without a folder, it asks for all that is not given.
 #[derive(Clone, Debug, Args)]
 pub struct InitArguments {
     /// The folder for the files; it is made where there is none
