@@ -17,6 +17,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Failure;
 use super::text::{for_shell, notes};
+use super::threads::Threads;
 use crate::annotation::{AnnotationError, annotate};
 use crate::dataset::{self, DatasetFolder};
 use crate::grown::{GROWN_FILES, GROWN_MARK, GrownError, GrownFiles, write_grown};
@@ -57,6 +58,8 @@ pub struct ExplainArguments {
     /// Write the report's plots as SVG files into this folder
     #[arg(long, value_name = "DIR")]
     plots: Option<PathBuf>,
+    #[command(flatten)]
+    threads: Threads,
 }
 
 /// Explains a dataset and prints the answer.
@@ -79,7 +82,7 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
         bar.set_position(bar.position().max((1000.0 * share) as u64));
         bar.set_message(what.replace('_', " "));
     };
-    let explained = explain(&dataset, &progress);
+    let explained = arguments.threads.work(|| explain(&dataset, &progress))?;
     bar.finish_and_clear();
     let mut explanation = explained.map_err(|error| unusable(path, &dataset, error))?;
     if let Some(folder) = &arguments.predictions {

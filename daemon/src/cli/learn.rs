@@ -9,6 +9,7 @@ use dynocar_client::{Host, SnapshotReader};
 
 use super::Failure;
 use super::run::start_log;
+use super::threads::Threads;
 use crate::config::DaemonConfig;
 use crate::ending;
 use crate::learn::watch::{Suspicions, TimeOfDay, watch};
@@ -40,6 +41,8 @@ pub struct LearnArguments {
     /// Write the history of all models after each round: one HTML page that needs nothing else
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    threads: Threads,
 }
 
 /// Learns until it is asked to end or its terminal is gone, or once.
@@ -49,6 +52,10 @@ pub struct LearnArguments {
 /// A wrong configuration or name of a result is an input failure; what goes wrong at work ends a round, and
 /// the command only where it was to learn once.
 pub fn execute(arguments: &LearnArguments) -> Result<(), Failure> {
+    arguments.threads.or_one().work(|| learn(arguments))?
+}
+
+fn learn(arguments: &LearnArguments) -> Result<(), Failure> {
     let config = DaemonConfig::load(&arguments.config)?;
     if let Some(file) = &arguments.report {
         require_file(file, "<!DOCTYPE html>")?;

@@ -23,6 +23,7 @@ mod run;
 mod stops;
 mod survey;
 mod text;
+mod threads;
 mod train_text;
 
 use std::path::Path;

@@ -138,9 +138,9 @@ impl Hypothesis for FormForce {
         &self.parameters
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         let extra = [self.extra(parameters)];
-        for (sample, force) in run.samples().iter().zip(forces) {
+        for (sample, force) in run.samples()[first..].iter().zip(forces) {
             let known = |of: Covariate| sample.covariate(of);
             extra::act(&extra, sample.speed_mps, known, &mut force.resistance);
         }
@@ -159,7 +159,9 @@ impl Hypothesis for FormForce {
             factor.multiply(run.covariate(factor.of), n_per_kn, &mut slopes);
         }
         let away = run.smooth_mps.iter().zip(run.covariate(Covariate::Speed));
-        for ((n_per_kn, slope), (smooth_mps, speed_mps)) in n_per_kn.iter_mut().zip(slopes).zip(away) {
+        for ((n_per_kn, slope), (smooth_mps, speed_mps)) in
+            n_per_kn.iter_mut().zip(slopes).zip(away)
+        {
             *n_per_kn += slope * (smooth_mps - speed_mps);
         }
     }

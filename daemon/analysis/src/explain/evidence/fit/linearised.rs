@@ -223,11 +223,7 @@ fn difference_steps(model: &GrownModel, theta: &[f64]) -> Vec<f64> {
     theta[3..]
         .iter()
         .zip(specs)
-        .map(
-            |(value, spec)| {
-                if value + spec.step <= spec.upper { spec.step } else { -spec.step }
-            },
-        )
+        .map(|(value, spec)| if value + spec.step <= spec.upper { spec.step } else { -spec.step })
         .collect()
 }
 
