@@ -1,7 +1,6 @@
 //! Forward search with a swap pass and pruning.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
@@ -9,16 +8,13 @@ use dynocar_shared::vocabulary::EffectKind;
 use rayon::prelude::*;
 
 use super::price::{at_bound, discounted, model_penalty, penalty};
+use super::steps::{Progress, Steps, round_share};
 use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal, UNKNOWN};
 use crate::explain::evidence::{
     EQUAL, Fit, FitProblem, GrownModel, Noise, RunData, STRENGTH_MIN, strength,
 };
 use crate::explain::scan::Scan;
 use crate::explain::score::{FitErrors, reduction};
-
-/// Told how far the work is, by any thread: share done, and what is being done. It may unwind to end the
-/// work, which holds nothing that would have to be put right.
-pub type Progress<'p> = &'p (dyn Fn(f64, &str) + Sync);
 
 /// Effects at most.
 const EFFECTS_MAX: usize = 4;
@@ -120,42 +116,6 @@ impl<'e> Tried<'e> {
     }
 }
 
-/// How many steps of a round are done, by all threads together.
-struct Steps<'s> {
-    progress: Progress<'s>,
-    round: usize,
-    count: usize,
-    done: AtomicUsize,
-}
-
-/// Share done before a round ends: nobody knows how many there will be, and most have few.
-fn round_share(round: usize, done: f64) -> f64 {
-    let left = 0.5f64.powi(round as i32) * (1.0 - 0.5 * done);
-    0.05 + 0.9 * (1.0 - left)
-}
-
-impl<'s> Steps<'s> {
-    fn of(search: &Search<'s>, base: &Fit) -> Self {
-        let round = base.model.effects.len();
-        let count = LIBRARY.len() - round + FINALISTS;
-        Steps { progress: search.progress, round, count, done: AtomicUsize::new(0) }
-    }
-
-    /// Does one step for a kind.
-    fn done_with<'e, T>(
-        &self,
-        effect: &'e dyn Effect,
-        step: impl FnOnce(&'e dyn Effect) -> T,
-    ) -> T {
-        let share = || self.done.load(Ordering::Relaxed) as f64 / self.count as f64;
-        (self.progress)(round_share(self.round, share()), effect.kind().name());
-        let result = step(effect);
-        self.done.fetch_add(1, Ordering::Relaxed);
-        (self.progress)(round_share(self.round, share()), effect.kind().name());
-        result
-    }
-}
-
 impl Search<'_> {
     /// The declared model with a, b, c refitted, and no search for effects.
     pub fn base(&self) -> Outcome {
@@ -213,7 +173,7 @@ impl Search<'_> {
     /// Tries every kind that the model does not have yet; the strongest first.
     fn round(&self, base: &Fit, not_testable: &mut Vec<(EffectKind, String)>) -> Vec<Trial> {
         let Some(scan) = self.scan(base) else { return Vec::new() };
-        let steps = Steps::of(self, base);
+        let steps = Steps::of(self.progress, base.model.effects.len(), LIBRARY.len() + FINALISTS);
         let mut trials = self.try_all(base, &scan, &steps, not_testable);
         let by_advantage = |one: &Trial, other: &Trial| other.advantage.total_cmp(&one.advantage);
         let before = FitErrors::of(self.problem, base);

@@ -24,6 +24,9 @@ enum Way {
     Gradient,
 }
 
+/// An effect with the places of its parameters, and the function of each in which the forces are affine.
+type Affine<'m> = (&'m SharedHypothesis, Range<usize>, fn(f64) -> f64);
+
 /// A model with the way in which each of its effects is reckoned.
 pub(super) struct Plan<'m> {
     model: &'m GrownModel,
@@ -81,7 +84,7 @@ impl<'m> Plan<'m> {
     }
 
     /// The one effect that acts together, with the function in which it is affine.
-    fn affine(&self) -> Option<(&SharedHypothesis, Range<usize>, fn(f64) -> f64)> {
+    fn affine(&self) -> Option<Affine<'_>> {
         let mut together = self.of_way(Way::Together);
         let (_, effect, range) = together.next()?;
         let affine_in = effect.affine_in()?;
