@@ -9,9 +9,6 @@ pub const HEIGHT_STEP_M: f64 = 10.0;
 /// Heights reach beyond a way by half a vehicle and so many m.
 const MARGIN_M: f64 = 60.0;
 
-/// Heights that a vehicle lies over, at most, where a gradient is summed height by height.
-const UNDER_MAX: usize = 128;
-
 /// Steps between heights over which the uncertainty of a gradient is stated: 100 m.
 const STATED_STEPS: usize = 10;
 
@@ -68,21 +65,17 @@ impl Layout {
         (reach.ceil() as usize + 3).max(STATED_STEPS)
     }
 
-    /// The height before a place of a block, from the block's first, and the share of the next.
-    #[inline]
-    fn between(&self, block: usize, at_m: f64) -> (usize, f64) {
-        let last = (self.blocks[block].1 - 1) as f64 - 1e-9;
-        let place = ((at_m - self.start_m) / HEIGHT_STEP_M).clamp(0.0, last);
-        let node = place as usize;
-        (node, place - node as f64)
-    }
-
     /// Adds a height with a weight to a sparse row.
     pub fn push(&self, block: usize, at_m: f64, weight: f64, row: &mut Vec<(usize, f64)>) {
-        let first = self.blocks[block].0;
-        let (node, share) = self.between(block, at_m);
-        add(row, first + node, weight * (1.0 - share));
-        add(row, first + node + 1, weight * share);
+        let (first, count) = self.blocks[block];
+        let place = ((at_m - self.start_m) / HEIGHT_STEP_M).clamp(0.0, (count - 1) as f64 - 1e-9);
+        let (node, share) = (place as usize, place.fract());
+        for (node, part) in [(node, 1.0 - share), (node + 1, share)] {
+            match row.iter_mut().find(|entry| entry.0 == first + node) {
+                Some(entry) => entry.1 += weight * part,
+                None => row.push((first + node, weight * part)),
+            }
+        }
     }
 
     /// The gradient under a vehicle as a combination of heights.
@@ -99,37 +92,13 @@ impl Layout {
             true => &[(-1.0, 0.25), (0.0, 0.5), (1.0, 0.25)],
             false => &[(0.0, 1.0)],
         };
-        let ends = |(offset, weight): &(f64, f64)| {
+        for (offset, weight) in parts {
             let centre_m = along_m + offset * reach_m;
-            [(0.5, *weight), (-0.5, -weight)].map(|(side, weight)| {
-                let at_m = course.in_block(centre_m + side * length_m);
-                (self.between(course.block, at_m), weight / length_m)
-            })
-        };
-        let mut under = [((0, 0.0), 0.0); 6];
-        let found =
-            parts.iter().flat_map(ends).zip(&mut under).map(|(end, own)| *own = end).count();
-        let under = &under[..found];
-        let nodes = under.iter().map(|((node, _), _)| *node);
-        let (low, high) =
-            nodes.fold((usize::MAX, 0), |(low, high), at| (low.min(at), high.max(at)));
-        let mut sums = [0.0; UNDER_MAX];
-        let Some(sums) = sums.get_mut(..high - low + 2) else {
-            // A long train: few of so many heights have a part in it.
-            let first = self.blocks[course.block].0;
-            for &((node, share), weight) in under {
-                add(row, first + node, weight * (1.0 - share));
-                add(row, first + node + 1, weight * share);
-            }
-            return;
-        };
-        for &((node, share), weight) in under {
-            sums[node - low] += weight * (1.0 - share);
-            sums[node - low + 1] += weight * share;
+            let front = course.in_block(centre_m + 0.5 * length_m);
+            let rear = course.in_block(centre_m - 0.5 * length_m);
+            self.push(course.block, front, weight / length_m, row);
+            self.push(course.block, rear, -weight / length_m, row);
         }
-        let first = self.blocks[course.block].0 + low;
-        let parts = sums.iter().enumerate().filter(|(_, part)| **part != 0.0);
-        row.extend(parts.map(|(at, part)| (first + at, *part)));
     }
 
     /// Variance of the mean gradient over 100 m around each piece between neighbouring
@@ -157,13 +126,5 @@ impl Layout {
             (first..first + count - 1).map(around).collect()
         };
         self.blocks.iter().map(block).collect()
-    }
-}
-
-/// Adds a part of a height to a sparse row.
-fn add(row: &mut Vec<(usize, f64)>, node: usize, part: f64) {
-    match row.iter_mut().find(|entry| entry.0 == node) {
-        Some(entry) => entry.1 += part,
-        None => row.push((node, part)),
     }
 }
