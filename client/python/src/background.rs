@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 pub(crate) const SIGNALS_EVERY: Duration = Duration::from_millis(50);
 
 /// Told the share done, 0 to 1, and what is being done.
-pub(crate) type Progress<'p> = &'p dyn Fn(f64, &str);
+pub(crate) type Progress<'p> = &'p (dyn Fn(f64, &str) + Sync);
 
 /// Does the work in a thread of its own and calls `progress` with its steps. When a signal or
 /// `progress` raises, that is what the caller gets at once, and the work ends at its next step.

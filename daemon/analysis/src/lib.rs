@@ -1,7 +1,7 @@
 //! What recorded runs tell.
 //!
 //! It knows no channel, clock, file, thread or logger: texts, times and seeds come in as
-//! arguments. Laws, forces, simulation and estimators are [`dynocar_core`]'s, which knows nothing
+//! arguments, and what does not depend on each other is said to whoever gives it threads (decision 0018). Laws, forces, simulation and estimators are [`dynocar_core`]'s, which knows nothing
 //! of this library: what is found in recordings is what the daemon then applies.
 //!
 //! # Layout, in the order of the work

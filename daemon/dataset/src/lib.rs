@@ -83,13 +83,14 @@ use dynocar_shared::SampleField;
 
 use dynocar_core::track::Track;
 use dynocar_core::train::{Drive, TrainModel};
+use rayon::prelude::*;
 
 /// Name of the file that makes a folder a dataset.
 pub const MANIFEST_FILE: &str = "dataset.toml";
 
 /// Where the texts of a dataset come from. Paths are as the dataset writes them, from its
 /// folder.
-pub trait DatasetFiles {
+pub trait DatasetFiles: Sync {
     /// The text of a file.
     ///
     /// # Errors
@@ -207,8 +208,10 @@ impl DatasetHead {
     ///
     /// The first mistake in one of their files, with line and column.
     pub fn read(self, files: &(impl DatasetFiles + ?Sized)) -> Result<Dataset, DatasetError> {
-        let runs = (0..self.manifest.runs.len()).map(|index| self.read_run(files, index));
-        let runs = runs.collect::<Result<_, _>>()?;
+        let count = self.manifest.runs.len();
+        let runs = (0..count).into_par_iter().map(|index| self.read_run(files, index));
+        // The first mistake is that of the first run, whichever was read first.
+        let runs = runs.collect::<Vec<_>>().into_iter().collect::<Result<_, _>>()?;
         let Manifest { name, description, .. } = self.manifest;
         Ok(Dataset { name, description, train: self.train, track: self.track, runs })
     }

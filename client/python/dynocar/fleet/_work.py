@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import resource
 import tempfile
 import time
@@ -50,6 +51,8 @@ ASKABLE = ("local_resistance", *FACTORS)
 
 def explained(order: Order) -> dict[str, Any] | None:
     """The answer with its key; nothing where the known one still holds. What is wrong is told, too."""
+    # There is a worker for each core. Read when a process explains for the first time.
+    os.environ.setdefault("RAYON_NUM_THREADS", "1")
     unit = order.unit
     told: dict[str, Any] = {"train": unit.train, "month": unit.month, "key": None}
     if order.declared is not None:

@@ -139,10 +139,10 @@ impl Hypothesis for OpenDrive {
         run.power.is_some()
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         let Some(power) = &run.power else { return };
         let drive = self.at(parameters);
-        let rows = power.power_w.iter().zip(run.samples());
+        let rows = power.power_w.iter().zip(run.samples()).skip(first);
         for (force, (&power_w, sample)) in forces.iter_mut().zip(rows) {
             let more = drive.beyond_n(self.declared, power_w, sample.speed_mps);
             let Some([traction_n, brake_n]) = more else { continue };

@@ -39,7 +39,11 @@ impl Hypothesis for LateStamps {
         &PARAMETERS
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+    fn is_local(&self) -> bool {
+        false
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, _first: usize, forces: &mut [SampleForces]) {
         let (late_s, time_s) = (parameters[0], run.recording.time_s());
         let recorded: Vec<[f64; 2]> = forces.iter().map(|it| [it.traction_n, it.brake_n]).collect();
         for (i, force) in forces.iter_mut().enumerate() {

@@ -66,8 +66,14 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
     /// Its parameters, in order.
     fn parameters(&self) -> &[Parameter];
 
-    /// Changes the forces at all samples of a run.
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]);
+    /// Changes the forces at some samples of a run, which follow each other from number `first` on; at
+    /// all of them where it is not [local](Hypothesis::is_local).
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]);
+
+    /// True when what it does at a sample takes nothing of other samples.
+    fn is_local(&self) -> bool {
+        true
+    }
 
     /// False when a parameter changes nothing on a fit run.
     fn touches(&self, _parameter: usize, _run: &RunData) -> bool {

@@ -33,13 +33,13 @@ impl Banded {
     }
 
     /// Adds the outer product of a sparse row with itself, times a weight. Entries are
-    /// (column, value); no two of them may be further apart than the width.
+    /// (column, value), no column twice; no two of them may be further apart than the width.
     pub fn add_row(&mut self, row: &[(usize, f64)], weight: f64) {
-        for &(i, one) in row {
-            for &(j, other) in row {
-                if j <= i {
-                    self.below[i * (self.width + 1) + i - j] += weight * one * other;
-                }
+        let stride = self.width + 1;
+        for (k, &(i, one)) in row.iter().enumerate() {
+            let weighted = weight * one;
+            for &(j, other) in &row[..=k] {
+                self.below[i.max(j) * stride + i.abs_diff(j)] += weighted * other;
             }
         }
     }

@@ -1,5 +1,7 @@
 //! From passes with a chainage to a profile: how smooth it is, what the friction brake does.
 
+use rayon::prelude::*;
+
 use super::balance::Observation;
 use super::banded::NotPositive;
 use super::friction::{FoundBrake, found_brake, released_pa};
@@ -103,24 +105,24 @@ fn group(evidence: &Evidence, observation: &Observation, by_pass: bool) -> u32 {
 fn smoothest(evidence: &Evidence) -> Result<f64, NotPositive> {
     let by_pass = can_leave_out(evidence);
     let scale_n = evidence.fit(1e-6, &|_| true, false)?.residual_n;
-    let mut best = (f64::INFINITY, WALKS_PER_M[0]);
-    for walk_per_m in WALKS_PER_M {
-        let mut cost = 0.0;
-        for fold in 0..FOLDS {
-            let is_out = |it: &Observation| group(evidence, it, by_pass) == fold;
-            if !evidence.observations.iter().any(is_out) {
-                continue;
-            }
-            let profile = evidence.fit(walk_per_m, &|it| !is_out(it), false)?;
-            for (_, residual_n) in evidence.residuals(&profile).filter(|it| is_out(it.0)) {
-                cost += (residual_n / scale_n).powi(2).min(25.0);
-            }
+    let cost = |walk_per_m: f64, fold: u32| {
+        let is_out = |it: &Observation| group(evidence, it, by_pass) == fold;
+        if !evidence.observations.iter().any(is_out) {
+            return Ok(0.0);
         }
-        if cost < best.0 {
-            best = (cost, walk_per_m);
-        }
-    }
-    Ok(best.1)
+        let profile = evidence.fit(walk_per_m, &|it| !is_out(it), false)?;
+        let residuals = evidence.residuals(&profile).filter(|it| is_out(it.0));
+        Ok(residuals.map(|(_, residual_n)| (residual_n / scale_n).powi(2).min(25.0)).sum())
+    };
+    let folds = WALKS_PER_M.len() * FOLDS as usize;
+    let costs = (0..folds).into_par_iter().map(|k| {
+        let fold = k % FOLDS as usize;
+        cost(WALKS_PER_M[k / FOLDS as usize], fold as u32)
+    });
+    let costs = costs.collect::<Result<Vec<f64>, NotPositive>>()?;
+    let by_walk = costs.chunks(FOLDS as usize).map(|folds| folds.iter().sum::<f64>());
+    let best = by_walk.zip(WALKS_PER_M).min_by(|one, other| one.0.total_cmp(&other.0));
+    Ok(best.map_or(WALKS_PER_M[0], |(_, walk_per_m)| walk_per_m))
 }
 
 /// How far each pass is predicted by the others.
@@ -128,14 +130,16 @@ fn left_out(evidence: &Evidence, walk_per_m: f64) -> Result<Vec<f64>, NotPositiv
     let passes = evidence.courses.len();
     let mut sums = vec![(0.0, 0usize); passes];
     if can_leave_out(evidence) {
-        for fold in 0..FOLDS {
+        let profiles = (0..FOLDS).into_par_iter().map(|fold| {
             let is_out = |it: &Observation| group(evidence, it, true) == fold;
-            if !evidence.observations.iter().any(is_out) {
-                continue;
-            }
-            let profile = evidence.fit(walk_per_m, &|it| !is_out(it), false)?;
-            for (observation, residual_n) in evidence.residuals(&profile).filter(|it| is_out(it.0))
-            {
+            let has_some = evidence.observations.iter().any(is_out);
+            has_some.then(|| evidence.fit(walk_per_m, &|it| !is_out(it), false)).transpose()
+        });
+        let profiles = profiles.collect::<Result<Vec<Option<Profile>>, NotPositive>>()?;
+        for (fold, profile) in profiles.iter().enumerate() {
+            let Some(profile) = profile else { continue };
+            let is_out = |it: &Observation| group(evidence, it, true) == fold as u32;
+            for (observation, residual_n) in evidence.residuals(profile).filter(|it| is_out(it.0)) {
                 let sum = &mut sums[observation.pass as usize];
                 *sum = (sum.0 + residual_n * residual_n, sum.1 + 1);
             }

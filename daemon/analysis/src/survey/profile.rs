@@ -71,7 +71,7 @@ pub struct Profile {
 }
 
 /// Which observations count.
-pub type Fold<'f> = &'f dyn Fn(&Observation) -> bool;
+pub type Fold<'f> = &'f (dyn Fn(&Observation) -> bool + Sync);
 
 impl Evidence {
     /// Fits the profile for a variance per m of the gradient's random walk.
@@ -147,11 +147,12 @@ impl Evidence {
             }
             for (one, slope) in slopes.iter().enumerate() {
                 corner_right[one] += weight * slope * residual_n;
-                for (other, second) in slopes.iter().enumerate() {
+                for (other, second) in slopes[..=one].iter().enumerate() {
                     corner[(one, other)] += weight * slope * second;
                 }
             }
         }
+        corner.fill_upper_triangle_with_lower_triangle();
         let factor = matrix.factor()?;
         let step = Bordered { factor: &factor, border: &border, corner, corner_right }.solve(right);
         for (height, change) in state.heights_m.iter_mut().zip(&step.heights_m) {

@@ -1,5 +1,7 @@
 //! The survey as a whole.
 
+use rayon::prelude::*;
+
 use super::balance::{Observation, observations};
 use super::banded::NotPositive;
 use super::chainage::WheelsAndLag;
@@ -117,11 +119,12 @@ pub fn survey(
         Some(known) => known.plane,
         None => plane_of(raws).ok_or(SurveyError::NoPositions)?,
     };
-    let recordings: Vec<Recording> = raws.iter().map(|raw| Recording::of(raw, &plane)).collect();
+    let recordings: Vec<Recording> =
+        raws.par_iter().map(|raw| Recording::of(raw, &plane)).collect();
     let cut: Vec<Stretch> = recordings
-        .iter()
+        .par_iter()
         .enumerate()
-        .flat_map(|(number, recording)| stretches(number, recording))
+        .flat_map_iter(|(number, recording)| stretches(number, recording))
         .collect();
     let mut ways = match known {
         Some(known) => known.ways.clone(),
@@ -129,7 +132,7 @@ pub fn survey(
             .ok_or(SurveyError::NoLine { what: "no two passes follow the same way" })?,
     };
     let passes: Vec<_> =
-        cut.iter().filter_map(|stretch| pass_of(&ways, stretch, &recordings)).collect();
+        cut.par_iter().filter_map(|stretch| pass_of(&ways, stretch, &recordings)).collect();
     let (trips, wheels) = trips(&passes, &ways, &recordings);
     if trips.is_empty() {
         return Err(SurveyError::NoLine { what: "no recording runs along it" });
@@ -215,12 +218,12 @@ fn profile(
     let released_pa = acting_from_pa(raws.iter().filter(|raw| raw.is_fit));
     for block_s in BLOCKS_S {
         evidence.observations.clear();
-        for (pass, &number) in fit.iter().enumerate() {
+        let of_pass = |(pass, &number): (usize, &usize)| {
             let trip = &trips[number];
             let raw = &raws[trip.recording];
             let seen = observations(raw, &trip.along, pass as u32, block_s, speed_factor);
             let limit_m = ways.of(trip.direction).map_or(0.0, |way| way.length_m());
-            evidence.observations.extend(seen.into_iter().filter_map(|mut it| {
+            let on_line = |mut it: Observation| {
                 let at_m = match courses[pass].against_from_m {
                     Some(length_m) => length_m - it.along_m,
                     None => it.along_m,
@@ -228,8 +231,10 @@ fn profile(
                 let k = vehicle.curve_constant_n_per_kn_m;
                 it.curve_n_per_kn = k * curvature(curves.iter(), at_m, vehicle.length_m);
                 (-ENDS_M..=limit_m + ENDS_M).contains(&it.along_m).then_some(it)
-            }));
-        }
+            };
+            seen.into_iter().filter_map(on_line).collect::<Vec<Observation>>()
+        };
+        evidence.observations.par_extend(fit.par_iter().enumerate().flat_map_iter(of_pass));
         if evidence.observations.is_empty() {
             return Err(SurveyError::NoForces);
         }

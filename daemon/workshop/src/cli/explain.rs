@@ -16,6 +16,7 @@ use dynocar_analysis::explain::{Explanation, explain};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::text::{for_shell, notes};
+use super::threads::Threads;
 use crate::annotation::{AnnotationError, annotate};
 use crate::grown::{GROWN_FILES, GROWN_MARK, GrownError, GrownFiles, write_grown};
 use crate::report;
@@ -57,6 +58,8 @@ pub struct ExplainArguments {
     /// Write the report's plots as SVG files into this folder
     #[arg(long, value_name = "DIR")]
     plots: Option<PathBuf>,
+    #[command(flatten)]
+    threads: Threads,
 }
 
 /// Explains a dataset and prints the answer.
@@ -79,7 +82,7 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
         bar.set_position(bar.position().max((1000.0 * share) as u64));
         bar.set_message(what.replace('_', " "));
     };
-    let explained = explain(&dataset, &progress);
+    let explained = arguments.threads.work(|| explain(&dataset, &progress))?;
     bar.finish_and_clear();
     let mut explanation = explained.map_err(|error| unusable(path, &dataset, error))?;
     if let Some(folder) = &arguments.predictions {

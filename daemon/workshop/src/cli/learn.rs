@@ -7,6 +7,7 @@ use std::time::SystemTime;
 use clap::Args;
 use dynocar_client::{Host, SnapshotReader};
 
+use super::threads::Threads;
 use crate::learn::watch::{Suspicions, TimeOfDay, watch};
 use crate::learn::{Bounds, page};
 use crate::learn::{LearnError, Learner, LearnerSettings, Outcome, Round, TrainRound};
@@ -42,6 +43,8 @@ pub struct LearnArguments {
     /// Write the history of all models after each round: one HTML page that needs nothing else
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    threads: Threads,
 }
 
 /// Learns until it is asked to end or its terminal is gone, or once.
@@ -51,6 +54,10 @@ pub struct LearnArguments {
 /// A wrong configuration or name of a result is an input failure; what goes wrong at work ends a round, and
 /// the command only where it was to learn once.
 pub fn execute(arguments: &LearnArguments) -> Result<(), Failure> {
+    arguments.threads.or_one().work(|| learn(arguments))?
+}
+
+fn learn(arguments: &LearnArguments) -> Result<(), Failure> {
     let config = DaemonConfig::load(&arguments.config)?;
     if let Some(file) = &arguments.report {
         require_file(file, "<!DOCTYPE html>")?;

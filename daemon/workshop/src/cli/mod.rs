@@ -13,6 +13,7 @@ mod man;
 mod stops;
 mod survey;
 mod text;
+mod threads;
 mod train_text;
 
 use std::path::Path;

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::threads::Threads;
 use crate::report::provenance::{Provenance, own_command_line};
 use crate::survey::answer::Answer;
 use crate::survey::{SurveyFailure, page, survey_folder};
@@ -26,6 +27,8 @@ pub struct SurveyArguments {
     /// Write a report for people: one HTML page that needs nothing else
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    threads: Threads,
 }
 
 /// Surveys and writes the dataset.
@@ -39,7 +42,8 @@ pub fn execute(arguments: &SurveyArguments) -> Result<(), Failure> {
     }
     require_folder(&arguments.out)?;
     let (source, line) = (&arguments.dataset, arguments.line.as_deref());
-    let made = survey_folder(source, line, &arguments.out).map_err(failure)?;
+    let work = || survey_folder(source, line, &arguments.out);
+    let made = arguments.threads.work(work)?.map_err(failure)?;
     tell(&format!("dataset: {} files in {}", made.files.len(), arguments.out.display()));
     if let Some(file) = &arguments.report {
         let provenance = Provenance::of(source, own_command_line())

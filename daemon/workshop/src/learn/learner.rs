@@ -126,7 +126,11 @@ impl Learner {
     /// # Errors
     ///
     /// See [`LearnError`]; what was put into the store before is there for good.
-    pub fn round(&mut self, now: SystemTime, stop: &dyn Fn() -> bool) -> Result<Round, LearnError> {
+    pub fn round(
+        &mut self,
+        now: SystemTime,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Round, LearnError> {
         let mut round = Round { trains: Vec::new(), is_stopped: false };
         for (train, declared) in self.settings.trains.clone() {
             match self.train_round(train, &declared, Moment::of(now), stop)? {
@@ -143,7 +147,7 @@ impl Learner {
         train: TrainId,
         declared: &ModelText,
         now: Moment,
-        stop: &dyn Fn() -> bool,
+        stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Option<TrainRound>, LearnError> {
         let models = self.settings.store.train(train);
         let in_force = self.in_force(&models, declared, now)?;
@@ -191,7 +195,7 @@ impl Learner {
         in_force: ModelHash,
         choices: &[Vec<FoundRun>],
         now: Moment,
-        stop: &dyn Fn() -> bool,
+        stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Option<Outcome>, LearnError> {
         let text = models.text(in_force)?;
         let (model, track) = models.load(in_force)?;
@@ -241,7 +245,7 @@ impl Learner {
 fn explain_pool(
     mut pool: Pool,
     memory: &mut Memory,
-    stop: &dyn Fn() -> bool,
+    stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Option<(Pool, Explanation)>, Stopped> {
     let progress = |_: f64, _: &str| {
         if stop() {

@@ -44,7 +44,7 @@ fn decrease(scan: &Scan, [delay_s, lag_s]: [f64; 2]) -> f64 {
     let mut sum = Tuple::zero(scan.fit.theta.len());
     for (index, run) in scan.problem.runs.iter().enumerate() {
         let mut late = run.declared.clone();
-        DelayAndLag::default().apply(&[delay_s, lag_s], run, &mut late);
+        DelayAndLag::default().apply(&[delay_s, lag_s], run, 0, &mut late);
         let control_n = |force: &SampleForces| force.traction_n - force.brake_n;
         sum.add(&scan.run_tuple(index, |run, i| {
             let change_n = control_n(&late[i]) - control_n(&run.declared[i]);
@@ -67,9 +67,13 @@ impl Hypothesis for DelayAndLag {
         parameters[0] + parameters[1] > delay::LEAST_S
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+    fn is_local(&self) -> bool {
+        false
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         let mut line = DelayLine::new(parameters[0], parameters[1]);
-        for (force, sample) in forces.iter_mut().zip(run.samples()) {
+        for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
             let at = (sample.time_ns, sample.stretch);
             if let Some(late) = line.acting(at, Some([force.traction_n, force.brake_n])) {
                 [force.traction_n, force.brake_n] = late;

@@ -71,8 +71,8 @@ impl Hypothesis for Linear {
         Some(|value| value)
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
-        for (force, sample) in forces.iter_mut().zip(run.samples()) {
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+        for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
             let degc = sample.ambient_temperature_degc;
             ambient::act(parameters[0], ambient::REFERENCE_K, degc, &mut force.resistance);
         }

@@ -63,8 +63,8 @@ impl Hypothesis for Warming {
         }));
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
-        for (force, sample) in forces.iter_mut().zip(run.samples()) {
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+        for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
             let since_cold_s = sample.since_cold_s;
             bearings::act(parameters[0], parameters[1], since_cold_s, &mut force.resistance);
         }

@@ -65,8 +65,8 @@ impl Hypothesis for Curves {
         Some(|value| value)
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
-        for (force, sample) in forces.iter_mut().zip(run.samples()) {
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+        for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
             curve::act(parameters[0], sample.curvature_per_m, &mut force.resistance);
         }
     }

@@ -266,10 +266,10 @@ impl Hypothesis for Dragging {
         Some(|value| value)
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         for window in self.windows.iter().filter(|window| window.run == run.file) {
             let onset_s = window.t_start_s - run.offset_s;
-            for (force, time_s) in forces.iter_mut().zip(run.recording.time_s()) {
+            for (force, time_s) in forces.iter_mut().zip(&run.recording.time_s()[first..]) {
                 force.extra_n += parameters[0] * build_up(time_s - onset_s);
             }
         }

@@ -198,9 +198,9 @@ impl Hypothesis for Profile {
         run.samples().iter().any(|sample| sample.position_m.is_some_and(passes))
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         let Some(error) = self.error(parameters) else { return };
-        for (force, sample) in forces.iter_mut().zip(run.samples()) {
+        for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
             if let Some(position_m) = sample.position_m {
                 let at = (position_m, sample.direction);
                 gradient::err(&error, at, &mut force.gradient_permille);

@@ -96,8 +96,8 @@ impl Hypothesis for Shift {
         true
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
-        for (i, force) in forces.iter_mut().enumerate() {
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+        for (i, force) in (first..).zip(forces) {
             if let Some(gradient) = self.gradient_permille(run, i, parameters[0]) {
                 force.gradient_permille = gradient;
             }

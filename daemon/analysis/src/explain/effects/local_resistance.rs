@@ -91,6 +91,28 @@ impl Effect for LocalResistance {
     }
 }
 
+impl Local {
+    /// Does something with the resistance at each of some samples of a run, from number `first` on.
+    fn each<T>(
+        &self,
+        n_per_kn: f64,
+        run: &RunData,
+        first: usize,
+        of_samples: &mut [T],
+        act: impl Fn(&mut T, f64),
+    ) {
+        if self.runs.as_ref().is_some_and(|runs| !runs.contains(&run.file)) {
+            return;
+        }
+        let Ok(profile) = place::profile(&self.stretches.intervals_m, n_per_kn) else { return };
+        for (own, sample) in of_samples.iter_mut().zip(&run.samples()[first..]) {
+            if let Some(position_m) = sample.position_m {
+                act(own, profile.mean_around(position_m, self.length_m));
+            }
+        }
+    }
+}
+
 impl Hypothesis for Local {
     fn kind(&self) -> EffectKind {
         EffectKind::LocalResistance
@@ -115,22 +137,13 @@ impl Hypothesis for Local {
     fn unit_n_per_kn(&self, _others: &[f64], run: &RunData, n_per_kn: &mut Vec<f64>) {
         n_per_kn.clear();
         n_per_kn.resize(run.samples().len(), 0.0);
-        if self.runs.as_ref().is_some_and(|runs| !runs.contains(&run.file)) {
-            return;
-        }
-        let Ok(profile) = place::profile(&self.stretches.intervals_m, 1.0) else { return };
-        for (n_per_kn, sample) in n_per_kn.iter_mut().zip(run.samples()) {
-            let at = sample.position_m.map(|at_m| profile.mean_around(at_m, self.length_m));
-            *n_per_kn = at.unwrap_or(0.0);
-        }
+        self.each(1.0, run, 0, n_per_kn, |own, extra_n_per_kn| *own = extra_n_per_kn);
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
-        let mut unit = Vec::new();
-        self.unit_n_per_kn(&[], run, &mut unit);
-        for (force, unit) in forces.iter_mut().zip(unit) {
-            place::act(parameters[0] * unit, &mut force.resistance);
-        }
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+        self.each(parameters[0], run, first, forces, |force, extra_n_per_kn| {
+            place::act(extra_n_per_kn, &mut force.resistance);
+        });
     }
 
     fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {

@@ -156,11 +156,11 @@ impl Hypothesis for Slippery {
         (self.form == Form::Ratio).then_some(|ratio| ratio)
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         if self.runs.as_ref().is_some_and(|runs| !runs.contains(&run.file)) {
             return;
         }
-        for (force, sample) in forces.iter_mut().zip(run.samples()) {
+        for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
             let is_there = self.stretches.as_ref().is_none_or(|stretches| {
                 Inside::Centre.share(sample.position_m, &stretches.intervals_m) > 0.0
             });

@@ -56,7 +56,13 @@ impl Hypothesis for Gamma {
         Some(|gamma| 1.0 / (1.0 + gamma))
     }
 
-    fn apply(&self, parameters: &[f64], _run: &RunData, forces: &mut [SampleForces]) {
+    fn apply(
+        &self,
+        parameters: &[f64],
+        _run: &RunData,
+        _first: usize,
+        forces: &mut [SampleForces],
+    ) {
         for force in forces {
             force.rotating_mass_factor = parameters[0];
         }

@@ -48,7 +48,7 @@ fn decrease(scan: &Scan, parameters: [f64; 2]) -> f64 {
     let mut sum = Tuple::zero(theta.len());
     for (index, run) in scan.problem.runs.iter().enumerate() {
         let mut late = run.declared.clone();
-        DelayAndLag.apply(&parameters, run, &mut late);
+        DelayAndLag.apply(&parameters, run, 0, &mut late);
         sum.add(&scan.run_tuple(index, |run, i| {
             let speed_mps = run.smooth_mps[i];
             let mps2 = |force: &SampleForces| {
@@ -78,9 +78,13 @@ impl Hypothesis for DelayAndLag {
         true
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+    fn is_local(&self) -> bool {
+        false
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         let mut late = LateSpeed::new(parameters[0], parameters[1]);
-        for (force, sample) in forces.iter_mut().zip(run.samples()) {
+        for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
             let at = (sample.time_ns, sample.stretch);
             let now = Some([force.traction_n, force.brake_n]);
             if let Some(acting) = late.forces(at, sample.speed_mps, now) {

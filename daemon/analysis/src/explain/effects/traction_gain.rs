@@ -53,7 +53,13 @@ impl Hypothesis for Gain {
         Some(f64::recip)
     }
 
-    fn apply(&self, parameters: &[f64], _run: &RunData, forces: &mut [SampleForces]) {
+    fn apply(
+        &self,
+        parameters: &[f64],
+        _run: &RunData,
+        _first: usize,
+        forces: &mut [SampleForces],
+    ) {
         for force in forces {
             force.traction_n = traction::true_force_n(force.traction_n, parameters[0]);
         }

@@ -108,9 +108,9 @@ impl Hypothesis for Tunnels {
         Some(|value| value)
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         let found = self.found.as_ref().map(|found| place::profile(&found.intervals_m, 1.0));
-        for (force, sample) in forces.iter_mut().zip(run.samples()) {
+        for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
             let share = match &found {
                 None => sample.tunnel_share,
                 Some(profile) => profile

@@ -52,7 +52,14 @@ impl Hypothesis for Scale {
         true
     }
 
-    fn apply(&self, _parameters: &[f64], _run: &RunData, _forces: &mut [SampleForces]) {}
+    fn apply(
+        &self,
+        _parameters: &[f64],
+        _run: &RunData,
+        _first: usize,
+        _forces: &mut [SampleForces],
+    ) {
+    }
 
     fn speed_scale(&self, parameters: &[f64]) -> f64 {
         parameters[0]

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use dynocar_core::force::ResolvedSample;
 use dynocar_core::terms::{Entry, Parameter, wind};
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -57,8 +58,8 @@ impl Effect for Wind {
     }
 }
 
-fn blow(wind_plus_mps: f64, run: &RunData, forces: &mut [SampleForces]) {
-    for (force, sample) in forces.iter_mut().zip(run.samples()) {
+fn blow(wind_plus_mps: f64, samples: &[ResolvedSample], forces: &mut [SampleForces]) {
+    for (force, sample) in forces.iter_mut().zip(samples) {
         wind::act(wind_plus_mps, sample.direction, &mut force.resistance);
     }
 }
@@ -76,8 +77,8 @@ impl Hypothesis for Steady {
         parameters[0].abs() > wind::LEAST_MPS
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
-        blow(parameters[0], run, forces);
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+        blow(parameters[0], &run.samples()[first..], forces);
     }
 
     fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
@@ -119,10 +120,10 @@ impl Hypothesis for ByRun {
         self.runs[parameter].0 == run.file
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         let own = self.runs.iter().position(|(file, _)| *file == run.file);
         let mean = parameters.iter().sum::<f64>() / parameters.len() as f64;
-        blow(own.map_or(mean, |index| parameters[index]), run, forces);
+        blow(own.map_or(mean, |index| parameters[index]), &run.samples()[first..], forces);
     }
 
     fn report(&self, context: &ReportContext) -> Reported {

@@ -1,13 +1,19 @@
 //! The declared model with effects added, as acceleration at each sample.
 
-use dynocar_core::simulate::{ForceModel, QuadraticForces};
+use std::ops::Range;
+
+use dynocar_core::simulate::{ForceModel, Polynomial, QuadraticForces};
 use dynocar_core::terms::wheel;
 use dynocar_core::train::Davis;
 
+use super::bins::Bin;
 use super::response::Response;
 use super::run_data::RunData;
 use super::sample_forces::SampleForces;
 use crate::explain::hypothesis::SharedHypothesis;
+
+/// Samples that are looked at together.
+const BLOCK: usize = 256;
 
 /// The declared model with Davis coefficients and effects as parameters.
 #[derive(Clone, Default)]
@@ -47,35 +53,57 @@ impl GrownModel {
         !self.effects.iter().any(|effect| effect.changes_others())
     }
 
-    /// Some of the effects on the declared forces of a run.
+    /// Measured over true speed, by some of the effects.
+    fn speed_scale(&self, theta: &[f64], acts: &impl Fn(usize) -> bool) -> f64 {
+        let effects = self.effects.iter().zip(self.ranges()).enumerate();
+        let own = effects.filter(|(number, _)| acts(*number));
+        own.map(|(_, (effect, range))| effect.speed_scale(&theta[range])).product()
+    }
+
+    /// Some of the effects on the declared forces at some samples of a run.
     fn act(
         &self,
-        run: &RunData,
-        theta: &[f64],
-        acts: impl Fn(usize) -> bool,
-        forces: &mut GrownForces,
+        (run, theta): (&RunData, &[f64]),
+        acts: &impl Fn(usize) -> bool,
+        samples: Range<usize>,
+        forces: &mut Vec<SampleForces>,
     ) {
-        forces.samples.clear();
-        forces.samples.extend_from_slice(&run.declared);
-        forces.speed_scale = 1.0;
+        let first = samples.start;
+        forces.clear();
+        forces.extend_from_slice(&run.declared[samples]);
         for is_last in [false, true] {
             let effects = self.effects.iter().zip(self.ranges()).enumerate();
             let turn = |effect: &SharedHypothesis| effect.is_of_the_whole_record() == is_last;
             for (_, (effect, range)) in effects.filter(|it| turn(it.1.0) && acts(it.0)) {
-                effect.apply(&theta[range.clone()], run, &mut forces.samples);
-                forces.speed_scale *= effect.speed_scale(&theta[range]);
+                effect.apply(&theta[range], run, first, forces);
             }
         }
     }
 
+    /// The samples from one on that are looked at together: few enough to stay near the processor, but all
+    /// of the run where an effect looks at others than its own.
+    fn block(&self, run: &RunData, acts: &impl Fn(usize) -> bool, from: usize) -> Range<usize> {
+        let mut acting = self.effects.iter().enumerate().filter(|(number, _)| acts(*number));
+        let (is_local, count) = (acting.all(|(_, effect)| effect.is_local()), run.samples().len());
+        if is_local { from..(from + BLOCK).min(count) } else { 0..count }
+    }
+
     /// The forces on a run for given parameters; `theta` starts with a, b, c.
     pub fn forces(&self, run: &RunData, theta: &[f64], forces: &mut GrownForces) {
-        self.act(run, theta, |_| true, forces);
+        let all = |_: usize| true;
         let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
-        let scale = forces.speed_scale;
-        let samples = forces.samples.iter().zip(&run.smooth_mps);
-        let polynomials = samples.map(|(state, &speed_mps)| {
-            state.polynomial(davis, wheel::true_speed_mps(speed_mps, scale))
+        let scale = self.speed_scale(theta, &all);
+        let (count, samples) = (run.samples().len(), &mut forces.samples);
+        let next =
+            |block: &Range<usize>| (block.end < count).then(|| self.block(run, &all, block.end));
+        let blocks = std::iter::successors(Some(self.block(run, &all, 0)), next);
+        let polynomials = blocks.flat_map(|block| {
+            self.act((run, theta), &all, block.clone(), samples);
+            let own = samples.iter().zip(&run.smooth_mps[block]);
+            let polynomial = |(state, &speed_mps): (&SampleForces, &f64)| {
+                state.polynomial(davis, wheel::true_speed_mps(speed_mps, scale))
+            };
+            own.map(polynomial).collect::<Vec<Polynomial>>()
         });
         forces.quadratic.set(polynomials, scale);
     }
@@ -89,50 +117,128 @@ impl GrownModel {
         forces: &mut GrownForces,
         bins: &mut Vec<f64>,
     ) {
-        self.predict_bins_of(run, theta, |_| true, forces, bins);
+        self.predict_bins_of((run, theta), |_| true, forces, bins);
     }
 
     /// The same with some of the effects, by their number.
     pub fn predict_bins_of(
         &self,
-        run: &RunData,
-        theta: &[f64],
+        at: (&RunData, &[f64]),
         acts: impl Fn(usize) -> bool,
         forces: &mut GrownForces,
         bins: &mut Vec<f64>,
     ) {
-        self.act(run, theta, acts, forces);
-        let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
-        let scale = forces.speed_scale;
-        let acceleration = |i: usize| {
-            let speed_mps = wheel::true_speed_mps(run.smooth_mps[i], scale);
-            let [p0, p1, p2] = forces.samples[i].polynomial(davis, speed_mps);
-            [scale * (p0 + speed_mps * (p1 + speed_mps * p2))]
+        let davis = Davis { a: at.1[0], b: at.1[1], c: at.1[2] };
+        let accelerations = |state: &SampleForces, speed_mps: f64| {
+            let [p0, p1, p2] = state.polynomial(davis, speed_mps);
+            [p0 + speed_mps * (p1 + speed_mps * p2)]
         };
-        integrate_bins(run, acceleration, [bins]);
+        self.integrate(at, acts, accelerations, forces, [bins]);
     }
 
     /// What some of the effects make of the bins for every a, b and c.
     pub fn response(
         &self,
-        run: &RunData,
-        theta: &[f64],
+        at: (&RunData, &[f64]),
         acts: impl Fn(usize) -> bool,
         forces: &mut GrownForces,
         response: &mut Response,
     ) {
-        self.act(run, theta, acts, forces);
-        let scale = forces.speed_scale;
         let none = Davis { a: 0.0, b: 0.0, c: 0.0 };
-        let accelerations = |i: usize| {
-            let speed_mps = wheel::true_speed_mps(run.smooth_mps[i], scale);
-            let state = &forces.samples[i];
+        let accelerations = |state: &SampleForces, speed_mps: f64| {
             let [p0, p1, p2] = state.polynomial(none, speed_mps);
             let [a, b, c] = state.davis_slopes(speed_mps);
-            [p0 + speed_mps * (p1 + speed_mps * p2), a, b, c].map(|own| scale * own)
+            [p0 + speed_mps * (p1 + speed_mps * p2), a, b, c]
         };
         let Response { rest, davis: [by_a, by_b, by_c] } = response;
-        integrate_bins(run, accelerations, [rest, by_a, by_b, by_c]);
+        self.integrate(at, acts, accelerations, forces, [rest, by_a, by_b, by_c]);
+    }
+
+    /// What the bins change by for a gradient in ‰ along the travel at each sample.
+    pub fn gradient_slopes(
+        &self,
+        at: (&RunData, &[f64]),
+        acts: impl Fn(usize) -> bool,
+        permille: &[f64],
+        bins: &mut Vec<f64>,
+    ) {
+        let (run, theta) = at;
+        let (scale, mut samples) = (self.speed_scale(theta, &acts), Vec::new());
+        self.act(at, &acts, 0..run.samples().len(), &mut samples);
+        let slope = |i: usize| [scale * samples[i].gradient_slope() * permille[i]];
+        integrate_bins(run, slope, [bins]);
+    }
+
+    /// Integrates accelerations under the forces and at the true speed at each sample, as measured.
+    fn integrate<const N: usize>(
+        &self,
+        (run, theta): (&RunData, &[f64]),
+        acts: impl Fn(usize) -> bool,
+        accelerations: impl Fn(&SampleForces, f64) -> [f64; N],
+        forces: &mut GrownForces,
+        mut bins: [&mut Vec<f64>; N],
+    ) {
+        let scale = self.speed_scale(theta, &acts);
+        let (mut integral, mut rest) = (Integral::START, &run.bins[..]);
+        bins.iter_mut().for_each(|bins| bins.clear());
+        while let Some(bin) = rest.first() {
+            let mut block = self.block(run, &acts, bin.first);
+            // A bin may be longer than a block.
+            block.end = block.end.max(bin.end);
+            let together = rest.iter().take_while(|bin| bin.end <= block.end).count();
+            let (own, after) = rest.split_at(together);
+            let first = block.start;
+            self.act((run, theta), &acts, block, &mut forces.samples);
+            for bin in own {
+                let means = integral.mean(run, bin, |i| {
+                    let speed_mps = wheel::true_speed_mps(run.smooth_mps[i], scale);
+                    let own = accelerations(&forces.samples[i - first], speed_mps);
+                    own.map(|own| scale * own)
+                });
+                bins.iter_mut().zip(means).for_each(|(bins, mean)| bins.push(mean));
+            }
+            rest = after;
+        }
+    }
+}
+
+/// Integrals on their way over the bins of a run, each segment of motion starting from zero.
+struct Integral<const N: usize> {
+    segment: usize,
+    gained: [f64; N],
+    last_s: f64,
+    last: [f64; N],
+}
+
+impl<const N: usize> Integral<N> {
+    const START: Self =
+        Integral { segment: usize::MAX, gained: [0.0; N], last_s: 0.0, last: [0.0; N] };
+
+    /// Their means over the next bin.
+    #[inline]
+    fn mean(
+        &mut self,
+        run: &RunData,
+        bin: &Bin,
+        accelerations: impl Fn(usize) -> [f64; N],
+    ) -> [f64; N] {
+        let time_s = &run.recording.time_s()[bin.first..bin.end];
+        let mut sums = [0.0; N];
+        if bin.segment != self.segment {
+            self.segment = bin.segment;
+            (self.gained, self.last_s) = ([0.0; N], time_s[0]);
+            self.last = accelerations(bin.first);
+        }
+        for (i, &time_s) in (bin.first..).zip(time_s) {
+            let here = accelerations(i);
+            let half_s = 0.5 * (time_s - self.last_s);
+            for k in 0..N {
+                self.gained[k] += half_s * (here[k] + self.last[k]);
+                sums[k] += self.gained[k];
+            }
+            (self.last_s, self.last) = (time_s, here);
+        }
+        sums.map(|sum| sum / time_s.len() as f64)
     }
 }
 
@@ -142,53 +248,20 @@ pub fn integrate_bins<const N: usize>(
     accelerations: impl Fn(usize) -> [f64; N],
     mut bins: [&mut Vec<f64>; N],
 ) {
-    let time_s = run.recording.time_s();
-    for bins in &mut bins {
-        bins.clear();
-        bins.reserve(run.bins.len());
-    }
-    let mut segment = usize::MAX;
-    let (mut gained, mut last_s, mut last) = ([0.0; N], 0.0, [0.0; N]);
+    let mut integral = Integral::START;
+    bins.iter_mut().for_each(|bins| bins.clear());
     for bin in &run.bins {
-        let mut sums = [0.0; N];
-        for i in bin.first..bin.end {
-            let here = accelerations(i);
-            if bin.segment == segment || i > bin.first {
-                let half_s = 0.5 * (time_s[i] - last_s);
-                for k in 0..N {
-                    gained[k] += half_s * (here[k] + last[k]);
-                }
-            } else {
-                gained = [0.0; N];
-            }
-            (last_s, last) = (time_s[i], here);
-            for k in 0..N {
-                sums[k] += gained[k];
-            }
-        }
-        segment = bin.segment;
-        let count = (bin.end - bin.first) as f64;
-        for (bins, sum) in bins.iter_mut().zip(sums) {
-            bins.push(sum / count);
-        }
+        let means = integral.mean(run, bin, &accelerations);
+        bins.iter_mut().zip(means).for_each(|(bins, mean)| bins.push(mean));
     }
 }
 
 /// Forces of a grown model over one run; keeps its memory from one evaluation to the next.
 #[derive(Clone, Debug, Default)]
 pub struct GrownForces {
+    /// At the samples looked at last.
     samples: Vec<SampleForces>,
-    speed_scale: f64,
     quadratic: QuadraticForces,
-}
-
-impl GrownForces {
-    /// What the bins of the prediction made last change by for a gradient in ‰ along the travel at each
-    /// sample.
-    pub fn gradient_slopes(&self, run: &RunData, permille: &[f64], bins: &mut Vec<f64>) {
-        let slope = |i: usize| [self.speed_scale * self.samples[i].gradient_slope() * permille[i]];
-        integrate_bins(run, slope, [bins]);
-    }
 }
 
 impl ForceModel for GrownForces {
@@ -198,6 +271,6 @@ impl ForceModel for GrownForces {
     }
 
     fn speed_scale(&self) -> f64 {
-        self.speed_scale
+        self.quadratic.speed_scale()
     }
 }

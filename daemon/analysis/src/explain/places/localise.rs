@@ -77,6 +77,9 @@ impl<'s, 'a> Places<'s, 'a> {
             intervals_m.iter().any(|[from, to]| low - reach_m <= *to && high + reach_m >= *from)
         };
         let bins = &self.bins[index];
+        if !self.blocks[index].iter().any(may_be_in) {
+            return Tuple::zero(self.scan.fit.theta.len());
+        }
         let mut shape = vec![0.0; bins.len()];
         let blocks = shape.chunks_mut(BLOCK).zip(bins.chunks(BLOCK)).zip(&self.blocks[index]);
         for ((shape, bins), _) in blocks.filter(|(_, extent)| may_be_in(extent)) {

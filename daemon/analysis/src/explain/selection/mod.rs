@@ -5,8 +5,10 @@ mod by_run;
 mod outside;
 mod price;
 mod search;
+mod steps;
 
 pub use acceptance::Refusal;
 pub use by_run::{Deviations, deviations, few_runs_factor, without_each_run};
 pub use price::{discounted, model_penalty, penalty};
-pub use search::{OBSERVATIONS_MIN, Outcome, Progress, Search, Trial};
+pub use search::{OBSERVATIONS_MIN, Outcome, Search, Trial};
+pub use steps::Progress;

@@ -5,18 +5,16 @@ use std::sync::Arc;
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
 use dynocar_shared::vocabulary::EffectKind;
+use rayon::prelude::*;
 
 use super::price::{at_bound, discounted, model_penalty, penalty};
+use super::steps::{Progress, Steps, round_share};
 use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal, UNKNOWN};
 use crate::explain::evidence::{
     EQUAL, Fit, FitProblem, GrownModel, Noise, RunData, STRENGTH_MIN, strength,
 };
 use crate::explain::scan::Scan;
 use crate::explain::score::{FitErrors, reduction};
-
-/// Told how far the work is: share done, and what is being done. It may unwind to end the work, which
-/// holds nothing that would have to be put right.
-pub type Progress<'p> = &'p dyn Fn(f64, &str);
 
 /// Effects at most.
 const EFFECTS_MAX: usize = 4;
@@ -92,6 +90,32 @@ pub struct Search<'a> {
     pub progress: Progress<'a>,
 }
 
+/// What trying a kind brought.
+enum Tried<'e> {
+    /// The data do not allow to test it, and why.
+    NotTestable(EffectKind, String),
+    /// Its best candidate, if any, by this kind or its forms.
+    Best(Option<Box<Trial>>, &'e dyn Effect),
+}
+
+impl<'e> Tried<'e> {
+    /// Among the trials, or what cannot be tested.
+    fn take(
+        self,
+        trials: &mut Vec<(Trial, &'e dyn Effect)>,
+        not_testable: &mut Vec<(EffectKind, String)>,
+    ) {
+        match self {
+            Tried::Best(best, effect) => trials.extend(best.map(|trial| (*trial, effect))),
+            Tried::NotTestable(kind, reason) => {
+                if !not_testable.iter().any(|(other, _)| *other == kind) {
+                    not_testable.push((kind, reason));
+                }
+            }
+        }
+    }
+}
+
 impl Search<'_> {
     /// The declared model with a, b, c refitted, and no search for effects.
     pub fn base(&self) -> Outcome {
@@ -116,15 +140,13 @@ impl Search<'_> {
             return outcome;
         }
         while outcome.fit.model.effects.len() < EFFECTS_MAX {
-            let round = outcome.rounds.len() as f64;
-            (self.progress)((0.1 + 0.25 * round).min(0.8), "trying effects");
             let trials = self.round(&outcome.fit, &mut outcome.not_testable);
             let next = self.best(&trials).map(|trial| trial.fit.clone());
             outcome.rounds.push(trials);
             let Some(next) = next else { break };
             outcome.fit = next;
             if outcome.fit.model.effects.len() > 1 {
-                (self.progress)((0.2 + 0.25 * round).min(0.85), "swapping effects");
+                (self.progress)(round_share(outcome.rounds.len(), 0.0), "swapping effects");
                 outcome.instead = self.swap(&mut outcome.fit);
                 self.prune(&mut outcome.fit);
             }
@@ -151,41 +173,15 @@ impl Search<'_> {
     /// Tries every kind that the model does not have yet; the strongest first.
     fn round(&self, base: &Fit, not_testable: &mut Vec<(EffectKind, String)>) -> Vec<Trial> {
         let Some(scan) = self.scan(base) else { return Vec::new() };
-        let mut trials: Vec<(Trial, &dyn Effect)> = Vec::new();
-        let mut has_forms = false;
-        for effect in LIBRARY {
-            let kind = effect.kind();
-            if base.model.effects.iter().any(|own| own.kind() == kind) {
-                continue;
-            }
-            (self.progress)((0.1 + 0.25 * base.model.effects.len() as f64).min(0.8), kind.name());
-            let asks = kind == EffectKind::Unknown && self.asks_for_a_form(&scan, &trials);
-            has_forms |= asks;
-            let effect = if asks { UNKNOWN } else { effect };
-            match effect.propose(&scan) {
-                Proposal::NotTestable(reason) => {
-                    if !not_testable.iter().any(|(other, _)| *other == kind) {
-                        not_testable.push((kind, reason));
-                    }
-                }
-                Proposal::Candidates(candidates) => {
-                    let best = candidates
-                        .into_iter()
-                        .map(|candidate| self.attempt(base, base, candidate, false))
-                        .max_by(|one, other| one.advantage.total_cmp(&other.advantage));
-                    trials.extend(best.map(|trial| (trial, effect)));
-                }
-            }
-        }
-        if !has_forms {
-            self.take_form_that_noise_holds(base, &mut trials);
-        }
+        let steps = Steps::of(self.progress, base.model.effects.len(), LIBRARY.len() + FINALISTS);
+        let mut trials = self.try_all(base, &scan, &steps, not_testable);
         let by_advantage = |one: &Trial, other: &Trial| other.advantage.total_cmp(&one.advantage);
         let before = FitErrors::of(self.problem, base);
         let reduction = |fit: &Fit| FitErrors::of(self.problem, fit).reduction_from(&before);
-        for (trial, _) in trials.iter_mut().filter(|(trial, _)| trial.advantage > FINALIST_MIN) {
-            trial.reduction = reduction(&trial.fit);
-        }
+        trials
+            .par_iter_mut()
+            .filter(|(trial, _)| trial.advantage > FINALIST_MIN)
+            .for_each(|(trial, _)| trial.reduction = reduction(&trial.fit));
         // What takes nothing from the error comes last, and is no measure for the others.
         let helps = |trial: &Trial| trial.reduction > FINALIST_REDUCTION;
         let key = |trial: &Trial| (helps(trial), trial.advantage);
@@ -197,23 +193,74 @@ impl Search<'_> {
         let least = FINALIST_MIN.max(FINALIST_SHARE * greatest);
         let is_long = base.observations() > MANY_OBSERVATIONS;
         let mut finished: Vec<Trial> = trials
-            .into_iter()
+            .into_par_iter()
             .enumerate()
             .map(|(rank, (trial, effect))| {
                 let is_finalist =
                     rank < FINALISTS && trial.advantage > least && (helps(&trial) || !is_long);
-                let share = base.model.effects.len() as f64
-                    + (rank.min(FINALISTS) + 2) as f64 / (FINALISTS + 2) as f64;
-                (self.progress)((0.1 + 0.25 * share).min(0.85), trial.kind.name());
                 if !is_finalist {
                     return trial;
                 }
-                let trial = self.finalist(base, trial, effect);
+                let trial = steps.done_with(effect, |effect| self.finalist(base, trial, effect));
                 Trial { reduction: reduction(&trial.fit), ..trial }
             })
             .collect();
         finished.sort_by(by_advantage);
         finished
+    }
+
+    /// Tries every kind that the model does not have yet, what is outside the library last.
+    fn try_all<'e>(
+        &self,
+        base: &Fit,
+        scan: &Scan,
+        steps: &Steps,
+        not_testable: &mut Vec<(EffectKind, String)>,
+    ) -> Vec<(Trial, &'e dyn Effect)> {
+        let is_new = |effect: &&dyn Effect| {
+            !base.model.effects.iter().any(|own| own.kind() == effect.kind())
+        };
+        let (outside, library): (Vec<&dyn Effect>, Vec<&dyn Effect>) =
+            LIBRARY.into_iter().filter(is_new).partition(|it| it.kind() == EffectKind::Unknown);
+        let try_kind = |effect| steps.done_with(effect, |effect| self.try_kind(base, scan, effect));
+        let tried: Vec<Tried> = library.into_par_iter().map(try_kind).collect();
+        let mut trials = Vec::new();
+        tried.into_iter().for_each(|tried| tried.take(&mut trials, not_testable));
+        let mut has_forms = false;
+        for effect in outside {
+            has_forms = self.asks_for_a_form(scan, &trials);
+            try_kind(if has_forms { UNKNOWN } else { effect }).take(&mut trials, not_testable);
+        }
+        if !has_forms {
+            self.take_form_that_noise_holds(base, &mut trials);
+        }
+        trials
+    }
+
+    /// The best candidate of a kind, beside everything accepted so far.
+    fn try_kind<'e>(&self, base: &Fit, scan: &Scan, effect: &'e dyn Effect) -> Tried<'e> {
+        match effect.propose(scan) {
+            Proposal::NotTestable(reason) => Tried::NotTestable(effect.kind(), reason),
+            Proposal::Candidates(candidates) => {
+                let best = self.best_attempt(base, base, candidates, false);
+                Tried::Best(best.map(Box::new), effect)
+            }
+        }
+    }
+
+    /// The candidate that explains most for its price, fitted on top of a fit.
+    fn best_attempt(
+        &self,
+        base: &Fit,
+        onto: &Fit,
+        candidates: Vec<Candidate>,
+        own_noise: bool,
+    ) -> Option<Trial> {
+        let attempts: Vec<Trial> = candidates
+            .into_par_iter()
+            .map(|candidate| self.attempt(base, onto, candidate, own_noise))
+            .collect();
+        attempts.into_iter().max_by(|one, other| one.advantage.total_cmp(&other.advantage))
     }
 
     /// A scan around a fit; `None` when the fit's information is singular.
@@ -259,8 +306,9 @@ impl Search<'_> {
             let noises = [own, own.stiff(STIFF[0]), own.stiff(STIFF[1])];
             let looks = if attempt == 0 { &noises[..] } else { &noises[..1] };
             let mut is_better = false;
-            for &noise in looks {
-                let Some(again) = self.look_again(base, noise, effect) else { continue };
+            let found: Vec<Option<Trial>> =
+                looks.par_iter().map(|&noise| self.look_again(base, noise, effect)).collect();
+            for again in found.into_iter().flatten() {
                 if again.advantage > best.advantage + 1.0 {
                     best = again;
                     is_better = true;
@@ -283,10 +331,7 @@ impl Search<'_> {
         let onto = self.problem.fit(&base.model, base.theta.clone(), noise);
         let scan = self.scan(&onto)?;
         let Proposal::Candidates(candidates) = effect.propose(&scan) else { return None };
-        candidates
-            .into_iter()
-            .map(|candidate| self.attempt(base, &onto, candidate, true))
-            .max_by(|one, other| one.advantage.total_cmp(&other.advantage))
+        self.best_attempt(base, &onto, candidates, true)
     }
 
     /// Total cost of a model: fit and price.

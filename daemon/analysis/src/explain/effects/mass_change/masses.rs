@@ -70,20 +70,17 @@ impl Hypothesis for Masses {
     }
 
     fn touches(&self, parameter: usize, run: &RunData) -> bool {
-        match &self.parts[parameter] {
-            Part::Section { .. } => true,
-            Part::Window { run: file, .. } => *file == run.file,
-        }
+        self.parts[parameter].is_in(run)
     }
 
     fn affine_in(&self) -> Option<fn(f64) -> f64> {
         Some(f64::recip)
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
-        let parts = self.parts.iter().zip(parameters).enumerate();
-        for (_, (part, factor)) in parts.filter(|(number, _)| self.touches(*number, run)) {
-            for (i, force) in forces.iter_mut().enumerate() {
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+        let parts = self.parts.iter().zip(parameters);
+        for (part, factor) in parts.filter(|(part, _)| part.is_in(run)) {
+            for (i, force) in (first..).zip(&mut *forces) {
                 if part.holds(run, i) {
                     force.mass_factor *= factor;
                 }

@@ -29,7 +29,16 @@ pub enum Part {
 }
 
 impl Part {
-    /// True when sample number `index` of a run lies in it.
+    /// True when it may hold in a run.
+    pub fn is_in(&self, run: &RunData) -> bool {
+        match self {
+            Part::Section { .. } => true,
+            Part::Window { run: file, .. } => *file == run.file,
+        }
+    }
+
+    /// True when sample number `index` of a run in which it may hold lies in it.
+    #[inline]
     pub fn holds(&self, run: &RunData, index: usize) -> bool {
         match self {
             Part::Section { from_m, to_m, direction } => {
@@ -39,8 +48,8 @@ impl Part {
                 let section = MassSection { from_m, to_m, direction, mass_factor: 1.0 };
                 sample.position_m.is_some_and(|at_m| section.holds(at_m, sample.direction))
             }
-            Part::Window { run: file, from_s, to_s, .. } => {
-                *file == run.file && (*from_s..=*to_s).contains(&run.recording.time_s()[index])
+            Part::Window { from_s, to_s, .. } => {
+                (*from_s..=*to_s).contains(&run.recording.time_s()[index])
             }
         }
     }

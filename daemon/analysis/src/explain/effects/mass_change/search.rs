@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use dynocar_core::terms::masses::LEAST_SHARE;
 
+use rayon::prelude::*;
+
 use super::masses::Masses;
 use super::parts::{Part, STATION_M, STOP_MIN_S, stations, stops};
 use crate::explain::effects::Candidate;
@@ -36,14 +38,24 @@ pub fn all_sections(scan: &Scan) -> Vec<(Part, Tuple)> {
             direction,
         };
         let elementary: Vec<Tuple> = (0..stations.len().saturating_sub(1))
-            .map(|k| {
-                let part = part(k, k + 1);
-                scan.tuple(|run, i| if part.holds(run, i) { shape(run, i) } else { 0.0 })
-            })
+            .map(|k| part_tuple(scan, &part(k, k + 1)))
             .collect();
         sections.extend(joined(&elementary, part));
     }
     sections
+}
+
+/// The tuple of another mass in a part.
+fn part_tuple(scan: &Scan, part: &Part) -> Tuple {
+    let mut sum = Tuple::zero(scan.fit.theta.len());
+    for (index, run) in scan.problem.runs.iter().enumerate() {
+        if part.is_in(run) {
+            let masked =
+                |run: &RunData, i: usize| if part.holds(run, i) { shape(run, i) } else { 0.0 };
+            sum.add(&scan.run_tuple(index, masked));
+        }
+    }
+    sum
 }
 
 /// Every row of neighbouring parts whose ends carry a force, with the sum of their tuples.
@@ -80,7 +92,7 @@ pub fn everywhere(scan: &Scan) -> Option<Candidate> {
 /// Every stretch between two stops of a run, with its tuple.
 pub fn all_windows(scan: &Scan) -> Vec<(Part, Tuple)> {
     let mut windows = Vec::new();
-    for (index, run) in scan.problem.runs.iter().enumerate() {
+    for run in &scan.problem.runs {
         let mut edges = vec![0.0];
         edges.extend(stops(run).iter().map(|stop| 0.5 * (stop.0 + stop.1)));
         edges.push(run.duration_s());
@@ -91,15 +103,8 @@ pub fn all_windows(scan: &Scan) -> Vec<(Part, Tuple)> {
             to_s: edges[to],
             offset_s: run.offset_s,
         };
-        let elementary: Vec<Tuple> = (0..edges.len() - 1)
-            .map(|k| {
-                let part = part(k, k + 1);
-                let masked = |run: &RunData, i: usize| {
-                    if part.holds(run, i) { shape(run, i) } else { 0.0 }
-                };
-                scan.run_tuple(index, masked)
-            })
-            .collect();
+        let elementary: Vec<Tuple> =
+            (0..edges.len() - 1).map(|k| part_tuple(scan, &part(k, k + 1))).collect();
         windows.extend(joined(&elementary, part));
     }
     windows
@@ -130,15 +135,12 @@ pub fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Option<Candidate> {
         let Some(next) = Scan::new(scan.problem, scan.holdout, scan.train, scan.track, &fit) else {
             break;
         };
-        let free =
-            parts.iter().filter(|(part, _)| masses.parts().iter().all(|own| own.is_apart(part)));
-        let mut fresh = free.map(|(part, _)| {
-            let masked = |run: &RunData, i: usize| {
-                if part.holds(run, i) { shape(run, i) } else { 0.0 }
-            };
-            (part.clone(), next.tuple(masked))
-        });
-        match best(&next, &mut fresh) {
+        let free = parts
+            .par_iter()
+            .filter(|(part, _)| masses.parts().iter().all(|own| own.is_apart(part)));
+        let fresh: Vec<(Part, Tuple)> =
+            free.map(|(part, _)| (part.clone(), part_tuple(&next, part))).collect();
+        match best(&next, &mut fresh.into_iter()) {
             Some((gain, estimate, part))
                 if gain > part_cost + EQUAL && estimate.abs() > LEAST_SHARE =>
             {

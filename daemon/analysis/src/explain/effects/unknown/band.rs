@@ -177,9 +177,9 @@ impl Hypothesis for Band {
         (least..most).contains(&parameters[0].abs())
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         let number = self.number(run);
-        for (i, force) in forces.iter_mut().enumerate() {
+        for (i, force) in (first..).zip(forces) {
             if !self.holds(run, number, i) {
                 continue;
             }

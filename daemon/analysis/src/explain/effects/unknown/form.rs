@@ -138,9 +138,9 @@ impl Hypothesis for FormForce {
         &self.parameters
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         let extra = [self.extra(parameters)];
-        for (sample, force) in run.samples().iter().zip(forces) {
+        for (sample, force) in run.samples()[first..].iter().zip(forces) {
             let known = |of: Covariate| sample.covariate(of);
             extra::act(&extra, sample.speed_mps, known, &mut force.resistance);
         }

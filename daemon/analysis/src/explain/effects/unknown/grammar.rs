@@ -6,6 +6,8 @@
 
 use dynocar_core::terms::extra::{Covariate, Extra, Factor, Form};
 
+use rayon::prelude::*;
+
 use super::form::{FormForce, choice_cost};
 use super::known::Known;
 use super::shape::{Ground, Tried};
@@ -37,10 +39,11 @@ pub fn forms(scan: &Scan) -> Vec<Candidate> {
     if all.first().is_none_or(|best| best.worth < choice_cost(count)) {
         return Vec::new();
     }
-    let mut best: Vec<Tried> = alike(one_of_each_structure(all), REFINED_ALIKE)
-        .into_iter()
-        .take(REFINED)
-        .flat_map(|one| {
+    let mut structures = alike(one_of_each_structure(all), REFINED_ALIKE);
+    structures.truncate(REFINED);
+    let mut best: Vec<Tried> = structures
+        .into_par_iter()
+        .flat_map_iter(|one| {
             let refined = ground.refined(one);
             let whole = with_whole_exponent(&ground, &refined);
             std::iter::once(refined).chain(whole)
@@ -59,10 +62,15 @@ pub fn forms(scan: &Scan) -> Vec<Candidate> {
     alike(best, 1).into_iter().map(candidate).collect()
 }
 
+fn tried(ground: &Ground, forms: Vec<Vec<Factor>>) -> Vec<Tried> {
+    forms.into_par_iter().map(|factors| ground.tried(factors, false)).collect()
+}
+
 /// Every form of one covariate, and the products; the best first.
 fn all_tried(ground: &Ground) -> Vec<Tried> {
     let alone = ground.known.iter().flat_map(Known::alone);
-    let mut all: Vec<Tried> = alone.map(|factor| ground.tried(vec![factor], false)).collect();
+    let alone: Vec<Vec<Factor>> = alone.map(|factor| vec![factor]).collect();
+    let mut all = tried(ground, alone);
     sort(&mut all);
     let Some(speed) = ground.covariate(Covariate::Speed) else { return all };
     let of_speed = all.iter().filter(|it| it.factors[0].of == Covariate::Speed);
@@ -70,9 +78,8 @@ fn all_tried(ground: &Ground) -> Vec<Tried> {
     first.extend(speed.powers(&WHOLE_EXPONENTS));
     let others = ground.known.iter().filter(|one| one.of != Covariate::Speed);
     let second: Vec<Factor> = others.flat_map(Known::beside_speed).collect();
-    for one in &first {
-        all.extend(second.iter().map(|&other| ground.tried(vec![*one, other], false)));
-    }
+    let products = first.iter().flat_map(|one| second.iter().map(|other| vec![*one, *other]));
+    all.extend(tried(ground, products.collect()));
     sort(&mut all);
     all
 }

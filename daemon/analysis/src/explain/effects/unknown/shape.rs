@@ -29,6 +29,8 @@ pub struct Ground<'s> {
     scan: &'s Scan<'s>,
     /// The covariates that vary.
     pub known: Vec<Known>,
+    /// By run and bin: acceleration in m/s² that 1 N/kN gives.
+    per_unit_mps2: Vec<Vec<f64>>,
     /// Price of a number (Schwarz).
     number_cost: f64,
 }
@@ -38,7 +40,11 @@ impl<'s> Ground<'s> {
     pub fn of(scan: &'s Scan) -> Self {
         let known = Covariate::ALL.iter().filter_map(|&of| Known::of(scan, of)).collect();
         let number_cost = (scan.fit.observations().max(2) as f64).ln();
-        Ground { scan, known, number_cost }
+        let per_unit_mps2 = scan.problem.runs.iter().map(|run| {
+            let middles = run.bins.iter().map(|bin| &run.samples()[bin.middle()]);
+            middles.map(|sample| scan.per_unit_resistance_mps2(sample)).collect()
+        });
+        Ground { scan, known, per_unit_mps2: per_unit_mps2.collect(), number_cost }
     }
 
     /// A covariate, where it varies.
@@ -50,13 +56,12 @@ impl<'s> Ground<'s> {
     pub fn tried(&self, factors: Vec<Factor>, holds_exponents: bool) -> Tried {
         let shape_of = Extra { n_per_kn: 1.0, factors };
         let mut sum = Tuple::zero(self.scan.fit.theta.len());
-        for (index, run) in self.scan.problem.runs.iter().enumerate() {
-            let at_bin = |bin: usize| {
+        for (index, per_unit_mps2) in self.per_unit_mps2.iter().enumerate() {
+            let at_bin = |(bin, per_unit_mps2): (usize, &f64)| {
                 let of = |of: Covariate| self.covariate(of)?.values[index][bin];
-                let sample = &run.samples()[run.bins[bin].middle()];
-                -self.scan.per_unit_resistance_mps2(sample) * shape_of.at(of).0
+                -per_unit_mps2 * shape_of.at(of).0
             };
-            let shape: Vec<f64> = (0..run.bins.len()).map(at_bin).collect();
+            let shape: Vec<f64> = per_unit_mps2.iter().enumerate().map(at_bin).collect();
             sum.add(&self.scan.shape_tuple(index, &shape));
         }
         let (gain, n_per_kn) = self.scan.gain(&sum);

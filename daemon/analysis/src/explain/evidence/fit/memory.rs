@@ -24,6 +24,9 @@ enum Way {
     Gradient,
 }
 
+/// An effect with the places of its parameters, and the function of each in which the forces are affine.
+type Affine<'m> = (&'m SharedHypothesis, Range<usize>, fn(f64) -> f64);
+
 /// A model with the way in which each of its effects is reckoned.
 pub(super) struct Plan<'m> {
     model: &'m GrownModel,
@@ -81,7 +84,7 @@ impl<'m> Plan<'m> {
     }
 
     /// The one effect that acts together, with the function in which it is affine.
-    fn affine(&self) -> Option<(&SharedHypothesis, Range<usize>, fn(f64) -> f64)> {
+    fn affine(&self) -> Option<Affine<'_>> {
         let mut together = self.of_way(Way::Together);
         let (_, effect, range) = together.next()?;
         let affine_in = effect.affine_in()?;
@@ -194,12 +197,13 @@ impl RunMemory {
             Together::At(known, _) if known[3..] == theta[3..] => {}
             Together::At(known, response) => {
                 known.copy_from_slice(theta);
-                plan.model.response(run, theta, plan.acts_together(), &mut self.forces, response);
+                let acts = plan.acts_together();
+                plan.model.response((run, theta), acts, &mut self.forces, response);
             }
             Together::Unknown => {
                 let mut response = Response::default();
                 let acts = plan.acts_together();
-                plan.model.response(run, theta, acts, &mut self.forces, &mut response);
+                plan.model.response((run, theta), acts, &mut self.forces, &mut response);
                 self.together = Together::At(theta.to_vec(), response);
             }
         }
@@ -227,18 +231,11 @@ impl RunMemory {
         };
         let gradients = plan.of_way(Way::Together).filter(|(_, effect, _)| effect.is_gradient());
         for (_, effect, range) in gradients {
-            // Beside what changes gradients itself, and the forces may be those of other parameters.
             let start = range.start;
-            plan.model.predict_bins_of(
-                run,
-                theta,
-                plan.acts_together(),
-                &mut self.forces,
-                &mut bins,
-            );
             for i in touched(effect, range) {
                 effect.gradient_permille(i - start, run, &mut self.samples);
-                self.forces.gradient_slopes(run, &self.samples, &mut columns[i]);
+                let acts = plan.acts_together();
+                plan.model.gradient_slopes((run, theta), acts, &self.samples, &mut columns[i]);
             }
         }
         let mut elsewhere = theta.to_vec();
@@ -247,7 +244,8 @@ impl RunMemory {
             let step = steps[i - 3];
             elsewhere[i] += step;
             let acts = plan.acts_together();
-            plan.model.predict_bins_of(run, &elsewhere, acts, &mut self.forces, &mut columns[i]);
+            let at = (run, &elsewhere[..]);
+            plan.model.predict_bins_of(at, acts, &mut self.forces, &mut columns[i]);
             elsewhere[i] = theta[i];
             for (moved, base) in columns[i].iter_mut().zip(&bins) {
                 *moved = (*moved - base) / step;
@@ -303,7 +301,7 @@ fn affine(
     let mut elsewhere = theta.to_vec();
     elsewhere[range.clone()].fill(effect.none());
     let mut none = Response::default();
-    plan.model.response(run, &elsewhere, plan.acts_together(), forces, &mut none);
+    plan.model.response((run, &elsewhere), plan.acts_together(), forces, &mut none);
     let slope = |(parameter, i): (usize, usize)| {
         let spec = &effect.parameters()[parameter];
         // As far away as possible, where rounding matters least.
@@ -312,7 +310,7 @@ fn affine(
         effect.touches(parameter, run).then(|| {
             elsewhere[i] = far;
             let mut slope = Response::default();
-            plan.model.response(run, &elsewhere, plan.acts_together(), forces, &mut slope);
+            plan.model.response((run, &elsewhere), plan.acts_together(), forces, &mut slope);
             elsewhere[i] = effect.none();
             let affine_in = effect.affine_in().unwrap_or(|it| it);
             slope.become_slope_from(&none, affine_in(far) - affine_in(effect.none()));

@@ -212,7 +212,7 @@ fn declared_response(run: &RunData) -> Response {
     let mut response = Response::default();
     let nothing = |_: usize| false;
     let mut forces = GrownForces::default();
-    GrownModel::default().response(run, &[0.0; 3], nothing, &mut forces, &mut response);
+    GrownModel::default().response((run, &[0.0; 3]), nothing, &mut forces, &mut response);
     response
 }
 
