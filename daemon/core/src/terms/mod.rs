@@ -64,7 +64,8 @@ pub const SUSPECTS: [Suspect; 8] = [
 
 /// What is never known exactly, so that the monitor learns it in any case: only a value that is
 /// unusual is an effect.
-pub const USUAL: [Suspect; 4] = [masses::SUSPECT, wind::OF_THE_DAY, curve::SUSPECT, bearings::SUSPECT];
+pub const USUAL: [Suspect; 4] =
+    [masses::SUSPECT, wind::OF_THE_DAY, curve::SUSPECT, bearings::SUSPECT];
 
 #[cfg(test)]
 mod tests {

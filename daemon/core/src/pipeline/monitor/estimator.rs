@@ -12,7 +12,8 @@ use super::pressure::ReleasedPressure;
 use super::rows::{Parameters, Row, Rows};
 use super::settings::MonitorSettings;
 use super::suspects::{
-    BANK, BASE, COVARIATES, CURVE, DAY_WIND, FIRST_ONSET, LOAD, ONSETS, SUSPECTS, WARMING, suspect_of,
+    BANK, BASE, COVARIATES, CURVE, DAY_WIND, FIRST_ONSET, LOAD, ONSETS, SUSPECTS, WARMING,
+    suspect_of,
 };
 use super::verdict::{Evidence, Verdict};
 use super::wheel_scale::WheelScale;
@@ -22,11 +23,12 @@ use crate::pipeline::motion::{STANDING_MPS, SpeedRange};
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::resistance::momentum::MomentumBlocks;
 use crate::pipeline::resistance::regression::{
-    BRAKE_SCALE, FORCE_DELAY, MomentumBlock, PARAMETERS as DAVIS, TRACTION_SCALE, UNKNOWNS,
-    SPEED_SCALE_MPS, regressors, scaled, unscaling,
+    BRAKE_SCALE, FORCE_DELAY, MomentumBlock, PARAMETERS as DAVIS, SPEED_SCALE_MPS, TRACTION_SCALE,
+    UNKNOWNS, regressors, scaled, unscaling,
 };
 use crate::pipeline::resistance::sample::UnitSample;
-use crate::pipeline::settings::SettingError;
+use crate::pipeline::resistance::settings::DataSettings;
+use crate::pipeline::settings::{SettingError, require};
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 use crate::train::{Davis, TrainModel};
 
@@ -43,7 +45,7 @@ const CURVE_STD_MIN: f64 = 0.02;
 /// A mass that differs by less than this share from the one before is the same.
 const SAME_MASS_SHARE: f64 = 1e-4;
 /// Standard deviations of the wheels' diameter up to which it is usual.
-const WHEEL_STDS: f64 = 3.0;
+const WHEEL_STDS: f64 = 3.5;
 /// Samples over which the time between samples is averaged.
 const PERIOD_SAMPLES: f64 = 100.0;
 /// The force that the model does not explain.
@@ -100,6 +102,13 @@ impl ResidualMonitor {
     /// When a setting lies outside its range.
     pub fn new(settings: MonitorSettings, train: &TrainModel) -> Result<Self, SettingError> {
         settings.check_ranges()?;
+        let force_scale_std = settings.data.force_scale_std;
+        require(
+            force_scale_std == DataSettings::default().force_scale_std,
+            "data.force_scale_std",
+            force_scale_std,
+            "no value here: force_std_percent says it",
+        )?;
         let declared = train.resistance;
         let coefficients = scaled(&declared);
         let mut declared_base = BaseVector::zeros();
@@ -109,8 +118,8 @@ impl ResidualMonitor {
             let least = 0.01 * declared.w0_n_per_kn(10.0).max(0.1);
             base_std[i] = (settings.davis_std_share * coefficients[i].abs()).max(least);
         }
-        base_std[TRACTION_SCALE] = settings.data.force_scale_std;
-        base_std[BRAKE_SCALE] = settings.data.force_scale_std;
+        base_std[TRACTION_SCALE] = 0.01 * settings.force_std_percent;
+        base_std[BRAKE_SCALE] = 0.01 * settings.force_std_percent;
         base_std[FORCE_DELAY] = settings.data.force_delay_std_s;
         base_std[LOAD] = 0.01 * settings.mass_std_percent;
         base_std[DAY_WIND] = settings.wind_std_mps;
@@ -262,7 +271,12 @@ impl ResidualMonitor {
     }
 
     /// Notes what the base model leaves at this place, unless another suspect explains it.
-    fn remember_place(&mut self, block: &MomentumBlock, units: &Parameters, sample: &ResolvedSample) {
+    fn remember_place(
+        &mut self,
+        block: &MomentumBlock,
+        units: &Parameters,
+        sample: &ResolvedSample,
+    ) {
         let before = self.last_block.replace((sample.position_m, block.momentum));
         let has_other_suspect = self.verdict.naming().named().is_some_and(|named| {
             use EffectKind::{DraggingBrake, GradientError, LocalResistance, Unknown};

@@ -159,7 +159,8 @@ impl Believed<'_> {
     pub fn variance_of(&self, weights: &Parameters) -> f64 {
         let reduced = self.base.forward(weights.fixed_rows::<BASE>(0).into_owned());
         let by_suspect = self.suspect.map_or(0.0, |(place, variance)| {
-            let weight = weights[BASE + place] - self.base.columns.row(place).transpose().dot(&reduced);
+            let weight =
+                weights[BASE + place] - self.base.columns.row(place).transpose().dot(&reduced);
             weight * weight * variance
         });
         reduced.norm_squared() + by_suspect

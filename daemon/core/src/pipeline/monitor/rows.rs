@@ -111,8 +111,7 @@ impl Rows {
     fn small_forces(&self, block: &MomentumBlock) -> Disturbance {
         let w0_n_per_kn = self.declared.w0_n_per_kn(block.speed_mps);
         let gust_n_per_kn = 2.0 * self.declared.c * block.speed_mps * self.gust_mps;
-        let std_n_per_kn =
-            self.floor_n_per_kn.hypot(self.share * w0_n_per_kn).hypot(gust_n_per_kn);
+        let std_n_per_kn = self.floor_n_per_kn.hypot(self.share * w0_n_per_kn).hypot(gust_n_per_kn);
         Disturbance { std_n_per_kn, time_s: self.time_s }
     }
 
