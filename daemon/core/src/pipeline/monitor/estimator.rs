@@ -204,9 +204,18 @@ impl ResidualMonitor {
         self.verdict.clear(parameter);
     }
 
+    /// How far a parameter may be from nothing; of the base model's a named one further than usual.
+    fn prior_std(&self, parameter: usize) -> f64 {
+        let prior_std = suspect_of(parameter).prior_std;
+        match self.base_std.get(parameter) {
+            None => prior_std,
+            Some(&usual) if self.verdict.naming().parameter() != Some(parameter) => usual,
+            Some(&usual) => usual.hypot(prior_std),
+        }
+    }
+
     fn retire(&mut self, parameter: usize, is_real: bool) {
-        let own_std = if parameter < BASE { self.base_std[parameter] } else { 0.0 };
-        let prior_std = is_real.then(|| suspect_of(parameter).prior_std.hypot(own_std));
+        let prior_std = is_real.then(|| self.prior_std(parameter));
         self.information.retire(parameter, prior_std);
         self.rows.clear(parameter);
         if parameter >= FIRST_ONSET {
