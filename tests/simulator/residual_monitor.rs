@@ -3,13 +3,14 @@
 
 use std::sync::Arc;
 
-use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_core::pipeline::Pipeline;
+use dynocar_core::pipeline::monitor::{MonitorSettings, ResidualMonitor};
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
+use dynocar_shared::{ParameterSnapshot, TrainSample};
 use dynocar_tests::simulator::sensors::SIMULATED_TRAIN;
 use dynocar_tests::simulator::{
-    Defects, Effect, EffectRequest, Law, SimulatedDataset, SimulatorSettings, TrainType, Unlisted,
-    simulate,
+    Defects, Deviations, Effect, EffectRequest, Law, SimulatedDataset, SimulatorSettings,
+    TrainType, Unlisted, simulate,
 };
 
 fn dataset(seed: u64, train_type: Option<TrainType>, effects: EffectRequest) -> SimulatedDataset {
@@ -20,10 +21,19 @@ fn dataset(seed: u64, train_type: Option<TrainType>, effects: EffectRequest) -> 
 }
 
 /// Feeds all runs; calls `see` with the run, the time in s within it, and the snapshot.
-fn watch(data: &SimulatedDataset, mut see: impl FnMut(usize, f64, &ParameterSnapshot)) {
+fn watch(data: &SimulatedDataset, see: impl FnMut(usize, f64, &ParameterSnapshot)) {
+    watch_with(MonitorSettings::default(), data, see);
+}
+
+/// The same with other settings.
+fn watch_with(
+    settings: MonitorSettings,
+    data: &SimulatedDataset,
+    mut see: impl FnMut(usize, f64, &ParameterSnapshot),
+) {
     let train = Arc::new(data.declared_train().clone());
-    let settings = EstimatorSettings::default_of(PipelineKind::ResidualMonitor);
-    let monitor = settings.expect("the kind can be built").build(&train).expect("default settings");
+    let monitor = ResidualMonitor::new(settings, &train).expect("settings within their ranges");
+    let monitor = Box::new(monitor);
     let track = Some(Arc::new(data.track().clone()));
     let mut pipeline = Pipeline::new(SIMULATED_TRAIN, 0, train, track, monitor);
     let mut sequence = 0;
@@ -53,6 +63,42 @@ fn nothing_undeclared_raises_no_alarm_on_any_type_of_train() {
             blocks = snapshot.updates;
         });
         assert!(blocks > 200, "{}: {blocks} blocks", train_type.name());
+    }
+}
+
+/// Weights, map, curve constant, winds, forces, their lateness and wheels, all a little wrong.
+fn rough(seed: u64, effects: EffectRequest) -> SimulatorSettings {
+    SimulatorSettings { deviations: Deviations::ROUGH, ..SimulatorSettings::new(seed, effects) }
+}
+
+#[test]
+fn an_ordinary_day_with_everything_a_little_wrong_raises_no_alarm_on_any_type_of_train() {
+    for (seed, train_type) in (7001..).zip(TrainType::ALL) {
+        let train_type = Some(train_type);
+        let settings = SimulatorSettings { train_type, ..rough(seed, EffectRequest::none()) };
+        watch(&simulate(&settings), |run, time_s, snapshot| {
+            let found = suspect(snapshot);
+            assert_eq!(
+                found,
+                EffectKind::None,
+                "{train_type:?}, seed {seed}, run {run}, {time_s} s"
+            );
+        });
+    }
+}
+
+#[test]
+fn a_strong_effect_is_named_on_an_ordinary_day() {
+    for (seed, kind) in [
+        (7001, EffectKind::TunnelDrag),
+        (7002, EffectKind::ActuatorDelay),
+        (7003, EffectKind::LowAdhesion),
+    ] {
+        let mut named = 0;
+        watch(&simulate(&rough(seed, EffectRequest::Kinds(vec![kind]))), |_, _, snapshot| {
+            named += usize::from(suspect(snapshot) == kind);
+        });
+        assert!(named > 100, "{kind}, seed {seed}: for {named} samples");
     }
 }
 
@@ -119,7 +165,8 @@ fn what_cannot_be_told_apart_is_told_as_alternatives() {
     let mut settings = SimulatorSettings::new(320, kinds);
     settings.is_level_and_straight = true;
     let mut said: Vec<Vec<EffectKind>> = Vec::new();
-    watch(&simulate(&settings), |_, _, snapshot| {
+    let weighed = MonitorSettings { mass_std_percent: 0.2, ..MonitorSettings::default() };
+    watch_with(weighed, &simulate(&settings), |_, _, snapshot| {
         if suspect(snapshot) != EffectKind::None {
             let mut all: Vec<_> = snapshot.alternatives().chain([suspect(snapshot)]).collect();
             all.sort_unstable();

@@ -27,7 +27,8 @@ use crate::pipeline::resistance::regression::{
     UNKNOWNS, regressors, scaled, unscaling,
 };
 use crate::pipeline::resistance::sample::UnitSample;
-use crate::pipeline::settings::SettingError;
+use crate::pipeline::resistance::settings::DataSettings;
+use crate::pipeline::settings::{SettingError, require};
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 use crate::train::{Davis, TrainModel};
 
@@ -44,7 +45,7 @@ const CURVE_STD_MIN: f64 = 0.02;
 /// A mass that differs by less than this share from the one before is the same.
 const SAME_MASS_SHARE: f64 = 1e-4;
 /// Standard deviations of the wheels' diameter up to which it is usual.
-const WHEEL_STDS: f64 = 3.0;
+const WHEEL_STDS: f64 = 3.5;
 /// Samples over which the time between samples is averaged.
 const PERIOD_SAMPLES: f64 = 100.0;
 /// The force that the model does not explain.
@@ -101,6 +102,13 @@ impl ResidualMonitor {
     /// When a setting lies outside its range.
     pub fn new(settings: MonitorSettings, train: &TrainModel) -> Result<Self, SettingError> {
         settings.check_ranges()?;
+        let force_scale_std = settings.data.force_scale_std;
+        require(
+            force_scale_std == DataSettings::default().force_scale_std,
+            "data.force_scale_std",
+            force_scale_std,
+            "no value here: force_std_percent says it",
+        )?;
         let declared = train.resistance;
         let coefficients = scaled(&declared);
         let mut declared_base = BaseVector::zeros();
@@ -110,8 +118,8 @@ impl ResidualMonitor {
             let least = 0.01 * declared.w0_n_per_kn(10.0).max(0.1);
             base_std[i] = (settings.davis_std_share * coefficients[i].abs()).max(least);
         }
-        base_std[TRACTION_SCALE] = settings.data.force_scale_std;
-        base_std[BRAKE_SCALE] = settings.data.force_scale_std;
+        base_std[TRACTION_SCALE] = 0.01 * settings.force_std_percent;
+        base_std[BRAKE_SCALE] = 0.01 * settings.force_std_percent;
         base_std[FORCE_DELAY] = settings.data.force_delay_std_s;
         base_std[LOAD] = 0.01 * settings.mass_std_percent;
         base_std[DAY_WIND] = settings.wind_std_mps;
@@ -196,9 +204,18 @@ impl ResidualMonitor {
         self.verdict.clear(parameter);
     }
 
+    /// How far a parameter may be from nothing; of the base model's a named one further than usual.
+    fn prior_std(&self, parameter: usize) -> f64 {
+        let prior_std = suspect_of(parameter).prior_std;
+        match self.base_std.get(parameter) {
+            None => prior_std,
+            Some(&usual) if self.verdict.naming().parameter() != Some(parameter) => usual,
+            Some(&usual) => usual.hypot(prior_std),
+        }
+    }
+
     fn retire(&mut self, parameter: usize, is_real: bool) {
-        let own_std = if parameter < BASE { self.base_std[parameter] } else { 0.0 };
-        let prior_std = is_real.then(|| suspect_of(parameter).prior_std.hypot(own_std));
+        let prior_std = is_real.then(|| self.prior_std(parameter));
         self.information.retire(parameter, prior_std);
         self.rows.clear(parameter);
         if parameter >= FIRST_ONSET {

@@ -13,13 +13,15 @@ settings! {
         share_min: f64 = 0.08 => (0 to 1);
         /// Standard deviation of each declared Davis coefficient, as a share of it.
         davis_std_share: f64 = 0.1 => (0.001 to 1);
-        /// Small slow forces that are no effect (wind, survey of the gradient): standard deviation
-        /// in N/kN.
+        /// Small slow forces that are no effect: standard deviation in N/kN.
         disturbance_n_per_kn: f64 = 0.05 => (0.001 to 10 "N/kN");
         /// The same as a share of the resistance; both count.
         disturbance_share: f64 = 0.03 => (0 to 1);
         /// How long such a force lasts, in s.
         disturbance_time_s: f64 = 60.0 => (1 to 10000 "s");
+        /// Standard deviation in % of the scales of traction and brake force; it stands in the place of
+        /// `data.force_scale_std`.
+        force_std_percent: f64 = 0.6 => (0.0001 to 50 "%");
         /// Standard deviation in % of the mass that samples or the train's file give, from run to run and
         /// at every stop where another is given.
         mass_std_percent: f64 = 3.0 => (0.01 to 50 "%");

@@ -22,8 +22,6 @@ const PRESSURE_EVIDENCE: f64 = 10.0;
 const TOLERATED_SHARE: f64 = 0.25;
 /// Standard deviations up to which what is never known exactly is usual.
 const USUAL_STDS: f64 = 2.0;
-/// The same from which it is worth naming.
-const UNUSUAL_STDS: f64 = 2.5;
 /// Share of evidence that outlasts a stop, for effects that may change there.
 const KEPT_AT_STOP: f64 = 0.7;
 /// Share of it that outlasts a block: what is still there shows again within a minute.
@@ -195,9 +193,12 @@ impl Verdict {
     fn unusual(&self, parameter: usize, evidence: &Evidence) -> Option<[(f64, f64); 2]> {
         let usual_std = evidence.base.usual_std(parameter);
         let (it, beside) = evidence.base.unusual(parameter, suspect_of(parameter).prior_std);
-        let least = self.least(parameter).max(UNUSUAL_STDS * usual_std);
+        let least = self.least(parameter);
         let usual = (TOLERATED_SHARE * least).max(USUAL_STDS * usual_std);
-        is_there(parameter, &it, least).then_some([(it.beyond(usual), it.cost), beside])
+        let beyond = (it.beyond(usual), it.cost);
+        let is_surer = beyond.0 - beyond.1 > beside.0 - beside.1;
+        let own = if is_surer { beyond } else { beside };
+        is_there(parameter, &it, least).then_some([own, beside])
     }
 
     /// Blocks for which a suspect could act; `None` for a brake that was not yet looked for.
