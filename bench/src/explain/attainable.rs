@@ -69,10 +69,10 @@ impl Hypothesis for TrueLaw {
         &self.parameters
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         let law = with_numbers(self.law, &parameters[1..]);
         let unlisted = Unlisted { law, n_per_kn: parameters[0] };
-        let samples = run.samples().iter().zip(run.recording.time_s());
+        let samples = run.samples()[first..].iter().zip(&run.recording.time_s()[first..]);
         for ((sample, &time_s), force) in samples.zip(forces) {
             let degc = sample.ambient_temperature_degc.unwrap_or(0.0);
             let at = |speed_mps: f64| {

@@ -83,6 +83,7 @@ use dynocar_shared::SampleField;
 
 use dynocar_core::track::Track;
 use dynocar_core::train::{Drive, TrainModel};
+#[cfg(feature = "parallel")]
 use rayon::prelude::*;
 
 /// Name of the file that makes a folder a dataset.
@@ -209,7 +210,11 @@ impl DatasetHead {
     /// The first mistake in one of their files, with line and column.
     pub fn read(self, files: &(impl DatasetFiles + ?Sized)) -> Result<Dataset, DatasetError> {
         let count = self.manifest.runs.len();
-        let runs = (0..count).into_par_iter().map(|index| self.read_run(files, index));
+        #[cfg(feature = "parallel")]
+        let places = (0..count).into_par_iter();
+        #[cfg(not(feature = "parallel"))]
+        let places = 0..count;
+        let runs = places.map(|index| self.read_run(files, index));
         // The first mistake is that of the first run, whichever was read first.
         let runs = runs.collect::<Vec<_>>().into_iter().collect::<Result<_, _>>()?;
         let Manifest { name, description, .. } = self.manifest;
