@@ -42,7 +42,7 @@ fn text<'f>(files: &'f [(String, String)], name: &str) -> &'f str {
 fn fitted_forces(fit: &Fit, run: &RunData) -> (Vec<SampleForces>, f64) {
     let (mut forces, mut speed_scale) = (run.declared.clone(), 1.0);
     for (effect, range) in fit.model.effects.iter().zip(fit.model.ranges()) {
-        effect.apply(&fit.theta[range.clone()], run, &mut forces);
+        effect.apply(&fit.theta[range.clone()], run, 0, &mut forces);
         speed_scale *= effect.speed_scale(&fit.theta[range]);
     }
     (forces, speed_scale)
