@@ -2,19 +2,17 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
-use nalgebra::Vector1;
+use nalgebra::{Vector1, Vector3};
 
-use super::covariates::{CovariateImpulse, Covariates, RunClock, covariates};
+use super::covariates::{CovariateImpulse, RunClock, covariates};
 use super::information::{BaseVector, Information};
 use super::onsets::Onsets;
 use super::place_memory::PlaceMemory;
 use super::pressure::ReleasedPressure;
-use super::rows::{Parameters, Row, Rows};
+use super::rows::{Parameters, Row, Rows, units};
 use super::settings::MonitorSettings;
-use super::suspects::{
-    BANK, BASE, COVARIATES, CURVE, DAY_WIND, FIRST_ONSET, LOAD, ONSETS, SUSPECTS, WARMING,
-    suspect_of,
-};
+use super::suspects::{BANK, BASE, DAY_WIND, FIRST_ONSET, LOAD, ONSETS, SUSPECTS, suspect_of};
+use super::usual::Usual;
 use super::verdict::{Evidence, Verdict};
 use super::wheel_scale::WheelScale;
 use crate::force::ResolvedSample;
@@ -23,12 +21,10 @@ use crate::pipeline::motion::{STANDING_MPS, SpeedRange};
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::resistance::momentum::MomentumBlocks;
 use crate::pipeline::resistance::regression::{
-    BRAKE_SCALE, FORCE_DELAY, MomentumBlock, PARAMETERS as DAVIS, SPEED_SCALE_MPS, TRACTION_SCALE,
-    UNKNOWNS, regressors, scaled, unscaling,
+    BRAKE_SCALE, MomentumBlock, PARAMETERS as DAVIS, TRACTION_SCALE, regressors, unscaling,
 };
 use crate::pipeline::resistance::sample::UnitSample;
-use crate::pipeline::resistance::settings::DataSettings;
-use crate::pipeline::settings::{SettingError, require};
+use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 use crate::train::{Davis, TrainModel};
 
@@ -40,8 +36,6 @@ const MONITOR_ROWS: u32 = 150;
 const CUT_ROWS: u32 = 60;
 /// Innovations count as no larger for an effect that no suspect explains: beyond lie outliers.
 const CUT: f64 = 3.0;
-/// Standard deviation of a curve constant of which nothing is declared, in 1000 N/kN m.
-const CURVE_STD_MIN: f64 = 0.02;
 /// A mass that differs by less than this share from the one before is the same.
 const SAME_MASS_SHARE: f64 = 1e-4;
 /// Standard deviations of the wheels' diameter up to which it is usual.
@@ -102,31 +96,8 @@ impl ResidualMonitor {
     /// When a setting lies outside its range.
     pub fn new(settings: MonitorSettings, train: &TrainModel) -> Result<Self, SettingError> {
         settings.check_ranges()?;
-        let force_scale_std = settings.data.force_scale_std;
-        require(
-            force_scale_std == DataSettings::default().force_scale_std,
-            "data.force_scale_std",
-            force_scale_std,
-            "no value here: force_std_percent says it",
-        )?;
-        let declared = train.resistance;
-        let coefficients = scaled(&declared);
-        let mut declared_base = BaseVector::zeros();
-        let mut base_std = BaseVector::zeros();
-        for i in 0..coefficients.len() {
-            declared_base[i] = coefficients[i];
-            let least = 0.01 * declared.w0_n_per_kn(10.0).max(0.1);
-            base_std[i] = (settings.davis_std_share * coefficients[i].abs()).max(least);
-        }
-        base_std[TRACTION_SCALE] = 0.01 * settings.force_std_percent;
-        base_std[BRAKE_SCALE] = 0.01 * settings.force_std_percent;
-        base_std[FORCE_DELAY] = settings.data.force_delay_std_s;
-        base_std[LOAD] = 0.01 * settings.mass_std_percent;
-        base_std[DAY_WIND] = settings.wind_std_mps;
-        let curve = settings.curve_constant_std * 1e-3 * train.curve_constant_n_per_kn_m;
-        base_std[CURVE] = curve.max(CURVE_STD_MIN);
-        let over_a = declared.w0_n_per_kn(SPEED_SCALE_MPS) / declared.a.max(0.1);
-        base_std[WARMING] = settings.warming_std * over_a;
+        let (declared, usual) = (train.resistance, Usual::of(&settings, train)?);
+        let Usual { declared_base, base_std } = usual;
         let kept_per_row = 1.0 - settings.data.block_s / (3600.0 * settings.memory_h);
         Ok(ResidualMonitor {
             settings,
@@ -230,13 +201,13 @@ impl ResidualMonitor {
             self.retire(FIRST_ONSET + place, false);
         }
         self.onsets.advance();
-        let units = self.units(block, &impulse);
+        let units = units(block, &impulse, &self.onsets);
         self.remember_place(block, &units, sample);
         let (model, declared) = (&self.model, &self.declared_base);
         let predicted = |features: &Parameters| {
             features.dot(model) + features.fixed_rows::<BASE>(0).dot(declared)
         };
-        let Some(mut row) = self.rows.push(block, &impulse, &self.onsets, predicted) else {
+        let Some(mut row) = self.rows.push(block, &units, predicted) else {
             self.innovations.break_here();
             return false;
         };
@@ -268,17 +239,6 @@ impl ResidualMonitor {
         }
     }
 
-    /// What one unit of each parameter takes off the momentum over a block; of onsets that are open.
-    fn units(&self, block: &MomentumBlock, covariates: &Covariates) -> Parameters {
-        let mut units = Parameters::zeros();
-        units.fixed_rows_mut::<UNKNOWNS>(0).copy_from(&block.impulse.fixed_rows::<UNKNOWNS>(1));
-        units.fixed_rows_mut::<COVARIATES>(UNKNOWNS).copy_from(covariates);
-        for place in (0..ONSETS).filter(|&place| self.onsets.age(place).is_some()) {
-            units[FIRST_ONSET + place] = block.impulse[1];
-        }
-        units
-    }
-
     /// Notes what the base model leaves at this place, unless another suspect explains it.
     fn remember_place(
         &mut self,
@@ -287,14 +247,7 @@ impl ResidualMonitor {
         sample: &ResolvedSample,
     ) {
         let before = self.last_block.replace((sample.position_m, block.momentum));
-        let has_other_suspect = self.verdict.naming().named().is_some_and(|named| {
-            use EffectKind::{DraggingBrake, GradientError, LocalResistance, Unknown};
-            match named.effect {
-                LocalResistance | GradientError | Unknown => false,
-                DraggingBrake => named.alternatives & LocalResistance.bit() == 0,
-                _ => true,
-            }
-        });
+        let has_other_suspect = self.verdict.naming().is_no_place();
         if block.is_first || has_other_suspect {
             return;
         }
@@ -330,9 +283,8 @@ impl ResidualMonitor {
 
         let (known, taken, variance) = self.rows.disturbance();
         let mut weights = -taken;
-        for (place, power) in regressors(speed_mps).into_iter().enumerate() {
-            weights[place] -= power;
-        }
+        let mut of_davis = weights.fixed_rows_mut::<DAVIS>(0);
+        of_davis -= Vector3::from(regressors(speed_mps));
         let mut value =
             known - taken.dot(&self.model) - taken.fixed_rows::<BASE>(0).dot(&self.declared_base);
         if let Some(parameter) = suspect {
@@ -414,13 +366,8 @@ impl Estimator for ResidualMonitor {
     fn write(&self, snapshot: &mut ParameterSnapshot) {
         let force_n = self.unexplained.n_per_kn * self.weight_kn;
         let std_n = self.unexplained.std_n_per_kn * self.weight_kn;
-        let covariance = Vector1::new(std_n * std_n);
-        write_parameters(
-            snapshot,
-            [Parameter::UnexplainedForce],
-            &Vector1::new(force_n),
-            &covariance,
-        );
+        let (values, covariance) = (Vector1::new(force_n), Vector1::new(std_n * std_n));
+        write_parameters(snapshot, [Parameter::UnexplainedForce], &values, &covariance);
         let named = self.verdict.naming().named();
         let has_rows = self.information.count() >= ROWS_MIN;
         let case = Case {

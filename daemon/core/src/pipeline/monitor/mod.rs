@@ -10,7 +10,7 @@
 //! # Layout, in the order a sample takes
 //!
 //! - `settings`: thresholds and noise
-//! - `suspects`: the effects that are looked for
+//! - `suspects`: the effects that are looked for; `usual`: how far off everything may be
 //! - `covariates`, `place_memory`, `pressure`, `wheel_scale`: what a sample says of each of them
 //! - `rows`: blocks to independent rows of unit variance
 //! - `onsets`: since when a brake may drag
@@ -29,6 +29,7 @@ mod pressure;
 mod rows;
 mod settings;
 mod suspects;
+mod usual;
 mod verdict;
 mod wheel_scale;
 

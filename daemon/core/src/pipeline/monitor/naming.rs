@@ -112,6 +112,16 @@ impl Naming {
         self.named.is_some_and(|it| it.parameter() == Some(parameter) && is_clear(it))
     }
 
+    /// True when something is named that is no place and cannot be one.
+    pub fn is_no_place(&self) -> bool {
+        use EffectKind::{DraggingBrake, GradientError, LocalResistance, Unknown};
+        self.named.is_some_and(|named| match named.effect {
+            LocalResistance | GradientError | Unknown => false,
+            DraggingBrake => named.alternatives & LocalResistance.bit() == 0,
+            _ => true,
+        })
+    }
+
     /// A parameter stands for something else now.
     pub fn clear(&mut self, parameter: usize) {
         if self.parameter() == Some(parameter) {

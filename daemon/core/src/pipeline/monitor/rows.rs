@@ -33,6 +33,17 @@ pub struct Row {
     pub weight: f64,
 }
 
+/// What one unit of each parameter takes off the momentum over a block; of onsets that are open.
+pub fn units(block: &MomentumBlock, covariates: &Covariates, onsets: &Onsets) -> Parameters {
+    let mut units = Parameters::zeros();
+    units.fixed_rows_mut::<UNKNOWNS>(0).copy_from(&block.impulse.fixed_rows::<UNKNOWNS>(1));
+    units.fixed_rows_mut::<COVARIATES>(UNKNOWNS).copy_from(covariates);
+    for place in (0..ONSETS).filter(|&place| onsets.age(place).is_some()) {
+        units[FIRST_ONSET + place] = block.impulse[1];
+    }
+    units
+}
+
 /// Makes rows of blocks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rows {
@@ -60,7 +71,7 @@ impl Rows {
         }
     }
 
-    /// Takes in a block; gives its row, but for the first of a chain. `predicted` judges how far
+    /// Takes in a block and its `units`; gives its row, but for the first of a chain. `predicted` judges how far
     /// it is out.
     ///
     /// # Real-time
@@ -69,8 +80,7 @@ impl Rows {
     pub fn push(
         &mut self,
         block: &MomentumBlock,
-        covariates: &Covariates,
-        onsets: &Onsets,
+        units: &Parameters,
         predicted: impl Fn(&Parameters) -> f64,
     ) -> Option<Row> {
         let gap_s = self
@@ -86,11 +96,8 @@ impl Rows {
         }
         let duration_s = block.impulse[1];
         let mut impulse = SVector::<f64, COLUMNS>::zeros();
-        impulse.fixed_rows_mut::<{ 1 + UNKNOWNS }>(0).copy_from(&block.impulse);
-        impulse.fixed_rows_mut::<COVARIATES>(1 + UNKNOWNS).copy_from(covariates);
-        for place in (0..ONSETS).filter(|&place| onsets.age(place).is_some()) {
-            impulse[1 + FIRST_ONSET + place] = duration_s;
-        }
+        impulse[0] = block.impulse[0];
+        impulse.fixed_rows_mut::<PARAMETERS>(1).copy_from(units);
         self.whitener.propagate(&small.over_impulse(duration_s, &impulse, block.impulse_variance));
         self.see(block, predicted)
     }
