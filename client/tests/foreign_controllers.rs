@@ -219,11 +219,11 @@ fn the_stopping_examples_in_c_and_rust_say_the_same() {
 #[test]
 fn the_driver_examples_in_c_and_rust_drive_the_same() {
     let directory = tempfile::tempdir().unwrap();
-    let daemon = PlayedDaemon::start();
+    let root = directory.path().join("root");
     let in_c = c_program(&example("driver.c"), Link::Static, &directory);
     let in_rust = Command::new(library_directory().join("../examples/driver"));
     let said = [in_c, in_rust].map(|mut program| {
-        program.env(ROOT_VARIABLE, daemon.root()).args([TRAIN.to_string(), "2".into()]);
+        program.env(ROOT_VARIABLE, &root).args([TRAIN.to_string(), "2".into()]);
         support::must_succeed(&mut program)
     });
     assert_eq!(said[0], said[1]);
