@@ -52,7 +52,10 @@ fn what_is_pure_knows_no_channel_clock_or_logger() {
 
 #[test]
 fn what_runs_live_is_built_without_what_explains_recordings() {
-    assert_free_of("dynocar-core", &["dynocar-dataset", "dynocar-analysis", "csv", "strsim", "rayon"]);
+    assert_free_of(
+        "dynocar-core",
+        &["dynocar-dataset", "dynocar-analysis", "csv", "strsim", "rayon"],
+    );
     assert_free_of("dynocar-dataset", &["dynocar-analysis", "statrs", "granit-parser"]);
     // The daemon's program reads its files as datasets' are read; its threads know nothing of that.
     for folder in ["daemon/src/runtime", "daemon/src/shadow", "daemon/src/state"] {
