@@ -40,21 +40,21 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::DemoArguments),
-    /// Describe your train and your CSV recordings: write train.toml, daemon.toml, dataset.toml.
+    /// Describe your train and your CSV recordings as TOML files.
     Init(Passed),
     /// Import trains and lines of railtoolkit, TTOBench or OSRD.
     Import(Passed),
-    /// Find the effect that the declared model lacks, add it, and report the error before and after.
+    /// Find the effect that the model lacks, add it, report the error before and after.
     Explain(Passed),
     Run(run::RunArguments),
     Health(health::HealthArguments),
     Check(check::CheckArguments),
     Replay(replay::ReplayArguments),
-    /// Estimate resistance, mass, adhesion and friction from recorded runs, as the daemon does.
+    /// Estimate resistance, mass, adhesion, friction from recorded runs, as the daemon.
     Identify(Passed),
-    /// Estimate deceleration and stopping distance from recorded stops, without any force.
+    /// Estimate deceleration and stopping distance from recorded stops, without forces.
     Stops(Passed),
-    /// Survey a line from recordings with GNSS: trips, chainage, stops, gradient from the forces.
+    /// Survey a line from recordings with GNSS: trips, chainage, stops, gradient.
     Survey(Passed),
     /// Write the estimators, or the train itself, as an FMU for a simulator.
     Fmu(Passed),

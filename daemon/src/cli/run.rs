@@ -36,6 +36,7 @@ pub fn execute(arguments: &RunArguments) -> Result<(), Failure> {
 pub fn start_log(config: &DaemonConfig) -> Result<(), Failure> {
     let log = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
+        .with_ansi(false)
         // A log that cannot be written is told nowhere, and ends no daemon.
         .log_internal_errors(false);
     let log = match config.log_format {

@@ -194,13 +194,8 @@ fn profile(
         lengths_m.push(falling.way.length_m());
     }
     let layout = Layout::new(&lengths_m, vehicle.length_m);
-    let against_m = ways.growing.length_m();
-    let course = |direction: i8| match (direction, ways.is_one_track()) {
-        (1, _) => Course { block: 0, against_from_m: None },
-        (_, true) => Course { block: 0, against_from_m: Some(against_m) },
-        (_, false) => Course { block: 1, against_from_m: None },
-    };
-    let courses: Vec<Course> = fit.iter().map(|&number| course(trips[number].direction)).collect();
+    let course = |&number: &usize| course(trips[number].direction, ways);
+    let courses: Vec<Course> = fit.iter().map(course).collect();
     // Where each direction has a way of its own, its profile holds the curves' resistance too.
     let curves = if ways.is_one_track() { curves(&ways.growing) } else { Vec::new() };
     // True over recorded speed, when the chainage is GNSS's; else the wheels are believed.
@@ -248,6 +243,15 @@ fn profile(
         }
     }
     unreachable!("the longest block is always taken")
+}
+
+/// Where a direction lies in the profile.
+fn course(direction: i8, ways: &Ways) -> Course {
+    match (direction, ways.is_one_track()) {
+        (1, _) => Course { block: 0, against_from_m: None },
+        (_, true) => Course { block: 0, against_from_m: Some(ways.growing.length_m()) },
+        (_, false) => Course { block: 1, against_from_m: None },
+    }
 }
 
 fn typical_speed(observations: &[Observation]) -> f64 {

@@ -3,7 +3,7 @@
 use clap::Args;
 use rayon::ThreadPoolBuilder;
 
-use super::Failure;
+use dynocar::cli::Failure;
 
 /// More threads than any machine has cores for this work.
 const THREADS_MAX: usize = 1024;
