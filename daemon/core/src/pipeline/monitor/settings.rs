@@ -28,9 +28,9 @@ settings! {
         /// Standard deviation in m/s of the wind from run to run; gusts have half of it.
         wind_std_mps: f64 = 1.5 => (0.01 to 20 "m/s");
         /// Standard deviation in permille of the map's gradient, smooth over some hundred metres.
-        map_std_permille: f64 = 0.1 => (0 to 10 "permille");
+        map_std_permille: f64 = 0.03 => (0 to 10 "permille");
         /// Standard deviation of the declared curve constant, as a share of it.
-        curve_constant_std: f64 = 0.15 => (0.001 to 1);
+        curve_constant_std: f64 = 0.2 => (0.001 to 1);
         /// Standard deviation of what bearings that warm up add at the start of a run, as a share of the
         /// basic resistance.
         warming_std: f64 = 0.05 => (0.0001 to 1);
