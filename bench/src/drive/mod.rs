@@ -7,7 +7,7 @@
 //! - [`braking`]: the braking curve to the stopping point
 //! - [`plan`]: the speed profile for the timetable with the least energy
 //! - [`driver`]: tracking the plan and the braking curve
-//! - [`line`]: brakes, rails, wind, tunnels, curves and loads beside the world of ordinary mistakes
+//! - [`mod@line`]: brakes, rails, wind, tunnels, curves and loads beside the world of ordinary mistakes
 //! - [`train`]: the train, whose truth nobody knows
 //! - [`journey`]: a train and its driver from stop to stop
 //! - [`link`]: channels to a daemon of its own, in lock-step

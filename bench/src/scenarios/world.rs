@@ -100,9 +100,9 @@ impl Traffic {
 pub const COEFFICIENT_SHARE: f64 = 0.3;
 /// Standard deviation of the rotating mass as a share of the mass.
 pub const ROTATING_MASS_STD: f64 = 0.002;
-/// Mean and standard deviation in s of the delay of forces.
+/// Mean delay of forces in s.
 const DELAY_S: f64 = 0.1;
-/// See [`DELAY_S`].
+/// Standard deviation in s of the delay of forces.
 pub const DELAY_STD_S: f64 = 0.05;
 /// Standard deviation of a weighing as a share of the mass, where the load changes.
 pub const WEIGHING_STD: f64 = 0.03;
