@@ -8,7 +8,7 @@
 //!
 //! - [`layout`]: how a type describes its own bytes, and the hash both peers compare
 //! - [`sample`]: what the controller writes each cycle, [`TrainSample`]
-//! - [`vocabulary`]: pipelines, parameters, statuses, reasons, effects: the numbers on the wire
+//! - [`mod@vocabulary`]: pipelines, parameters, statuses, reasons, effects: the numbers on the wire
 //! - [`snapshot`]: what the daemon answers, [`ParameterSnapshot`]
 //! - [`resistance`]: resistance at a speed, with its standard deviation, from a snapshot
 //! - [`sleeper`]: which pipeline threads want to be woken
