@@ -5,7 +5,7 @@ use dynocar_core::terms::{
 };
 use dynocar_core::track::{GradientError, LinearProfile, StepProfile};
 
-use super::deviations::CommonDeviations;
+use super::common_deviations::CommonDeviations;
 use super::effects::{Effect, MassSection, RunWindow};
 use super::line_maker::Line;
 use super::random::{Random, Stream};

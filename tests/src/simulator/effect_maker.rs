@@ -2,7 +2,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::deviations::wavy;
+use super::common_deviations::wavy;
 use super::effects::{Effect, MassSection, RunWindow};
 use super::line_maker::Line;
 use super::random::Random;

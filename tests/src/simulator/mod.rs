@@ -10,7 +10,7 @@
 //!
 //! - [`settings`]: what is asked of a dataset; [`random`]: a stream of numbers per subject
 //! - [`train_maker`], [`line_maker`], [`run_maker`]: what there is
-//! - [`deviations`]: what is a little wrong in everything declared
+//! - [`deviations`], [`common_deviations`]: what is a little wrong in everything declared
 //! - [`effects`], [`unlisted`], [`effect_maker`], [`disturbances`]: what is undeclared, and what it
 //!   changes
 //! - [`driving`], [`permitted_speed`], [`driver`], [`actuators`], [`dynamics`], [`true_run`],
@@ -21,6 +21,7 @@
 
 pub mod actuators;
 pub mod columns;
+pub mod common_deviations;
 pub mod couplings;
 pub mod dataset_writer;
 pub mod defects;

@@ -1,0 +1,104 @@
+//! What is a little wrong in all runs of a dataset alike.
+
+use super::deviations::Deviations;
+use super::random::{Random, Stream};
+use super::train_maker::rounded;
+
+/// A draw of what is off in all runs of a dataset alike.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CommonDeviations {
+    /// True over declared curve constant.
+    pub curve_constant: f64,
+    /// Reported over true traction and brake force.
+    pub force_gains: [f64; 2],
+    /// Time in s that forces act after their stamps.
+    pub force_late_s: f64,
+    /// Measured over true speed.
+    pub speed_scale: f64,
+    /// What cold bearings add at the start over the basic resistance, and their time constant in s.
+    pub warming: (f64, f64),
+    /// Waves of the map's error: ‰, length in m, phase.
+    waves: Vec<[f64; 3]>,
+}
+
+/// Waves that make a map's error.
+const WAVES: usize = 12;
+/// Their lengths in m.
+const WAVES_M: (f64, f64) = (1500.0, 8000.0);
+/// Time constants in s of cold bearings.
+const WARMING_S: (f64, f64) = (150.0, 400.0);
+
+impl CommonDeviations {
+    /// The draw of a seed.
+    pub fn draw(deviations: &Deviations, seed: u64) -> Self {
+        let mut random = Random::new(seed, Stream::Deviations);
+        let mut near_one = |share: f64| 1.0 + share * random.gaussian();
+        let curve_constant = near_one(deviations.curve_constant_share);
+        let force_gains = [near_one(deviations.force_share), near_one(deviations.force_share)];
+        let speed_scale = near_one(deviations.wheel_share);
+        let late_s = deviations.force_late_s * random.uniform(0.5, 1.5);
+        let warming = deviations.warming_share * random.uniform(0.5, 1.5);
+        let warming = (warming, random.uniform(WARMING_S.0, WARMING_S.1));
+        // Amplitudes whose squares add up to twice the variance.
+        let each_permille = deviations.map_permille * (2.0 / WAVES as f64).sqrt();
+        let (shortest, longest) = (WAVES_M.0.ln(), WAVES_M.1.ln());
+        let waves = (0..WAVES)
+            .map(|_| {
+                let wave_m = random.uniform(shortest, longest).exp();
+                [each_permille, wave_m, random.uniform(0.0, std::f64::consts::TAU)]
+            })
+            .collect();
+        CommonDeviations {
+            curve_constant,
+            force_gains,
+            force_late_s: rounded(late_s, 0.05),
+            speed_scale,
+            warming,
+            waves: if each_permille > 0.0 { waves } else { Vec::new() },
+        }
+    }
+
+    /// What the map lacks on a line of a length in m: chainage in m and ‰; empty for nothing.
+    pub fn map_error(&self, length_m: f64) -> Vec<(f64, f64)> {
+        if self.waves.is_empty() { Vec::new() } else { wavy(&self.waves, length_m) }
+    }
+}
+
+/// Distance in m between the nodes of a wavy gradient.
+const APART_M: f64 = 100.0;
+
+/// The sum of waves (‰, length in m, phase) along a line of a length in m, by chainage in m.
+pub(super) fn wavy(waves: &[[f64; 3]], length_m: f64) -> Vec<(f64, f64)> {
+    let at = |chainage_m: f64| {
+        let wave = |[permille, wave_m, phase]: &[f64; 3]| {
+            permille * (std::f64::consts::TAU * chainage_m / wave_m + phase).sin()
+        };
+        waves.iter().map(wave).sum::<f64>()
+    };
+    let count = (length_m / APART_M).ceil() as usize;
+    let chainages = (0..=count).map(|k| APART_M * k as f64);
+    chainages.map(|m| (m, rounded(at(m), 0.001))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_is_off_by_as_much_as_was_asked() {
+        let squares = |seed: u64| {
+            let error = CommonDeviations::draw(&Deviations::ROUGH, seed).map_error(30e3);
+            error.iter().map(|(_, permille)| permille * permille).sum::<f64>() / error.len() as f64
+        };
+        let rms = ((0..20).map(squares).sum::<f64>() / 20.0).sqrt();
+        assert!((0.11..0.13).contains(&rms), "{rms}");
+    }
+
+    #[test]
+    fn nothing_is_off_where_nothing_is_asked() {
+        let none = CommonDeviations::draw(&Deviations::NONE, 7);
+        assert_eq!((none.curve_constant, none.force_gains, none.speed_scale), (1.0, [1.0; 2], 1.0));
+        assert_eq!((none.force_late_s, none.warming.0), (0.0, 0.0));
+        assert!(none.map_error(20e3).is_empty());
+    }
+}
