@@ -17,7 +17,7 @@ use super::verdict::{Evidence, Verdict};
 use super::wheel_scale::WheelScale;
 use crate::force::ResolvedSample;
 use crate::pipeline::judge::Case;
-use crate::pipeline::motion::{STANDING_MPS, SpeedRange};
+use crate::pipeline::motion::{STANDING_MPS, SpeedRange, is_same_mass};
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::resistance::momentum::MomentumBlocks;
 use crate::pipeline::resistance::regression::{
@@ -36,8 +36,6 @@ const MONITOR_ROWS: u32 = 150;
 const CUT_ROWS: u32 = 60;
 /// Innovations count as no larger for an effect that no suspect explains: beyond lie outliers.
 const CUT: f64 = 3.0;
-/// A mass that differs by less than this share from the one before is the same.
-const SAME_MASS_SHARE: f64 = 1e-4;
 /// Standard deviations of the wheels' diameter up to which it is usual.
 const WHEEL_STDS: f64 = 3.5;
 /// Samples over which the time between samples is averaged.
@@ -153,7 +151,7 @@ impl ResidualMonitor {
     /// Another mass is given: it is as sure as any.
     fn weigh(&mut self, sample: &ResolvedSample) {
         let before_kg = std::mem::replace(&mut self.given_kg, sample.mass_kg);
-        if (sample.mass_kg / before_kg - 1.0).abs() > SAME_MASS_SHARE {
+        if !is_same_mass(before_kg, sample.mass_kg) {
             self.reopen(LOAD);
         }
     }

@@ -6,7 +6,7 @@
 //! - [`Rounding`], [`SpeedNoise`]: the steps that a speed is told in, and its noise
 //! - [`PositionNoise`]: the noise of a measured position
 //! - [`SpeedRange`]: the speeds driven
-//! - [`StopWatch`]: when the mass may have changed
+//! - [`StopWatch`], [`is_same_mass`]: when the mass may have changed
 
 mod missed;
 mod outlier;
@@ -22,7 +22,7 @@ pub use position_noise::PositionNoise;
 pub use rounding::Rounding;
 pub use speed_noise::SpeedNoise;
 pub use speed_range::SpeedRange;
-pub use stop_watch::StopWatch;
+pub use stop_watch::{StopWatch, is_same_mass};
 
 /// Speed in m/s up to which a train counts as standing; below it a wheel sensor sees nothing.
 pub const STANDING_MPS: f64 = 0.3;

@@ -2,6 +2,14 @@
 
 use super::STANDING_MPS;
 
+/// Masses that differ by less than this share are the same.
+const SAME_MASS_SHARE: f64 = 1e-4;
+
+/// True for a mass in kg that says no more than the one before.
+pub fn is_same_mass(before_kg: f64, now_kg: f64) -> bool {
+    (now_kg / before_kg - 1.0).abs() <= SAME_MASS_SHARE
+}
+
 /// Notices when passengers or freight may have changed the mass.
 ///
 /// That is after a standstill of some length, after a gap as long, and in a new run. A run that

@@ -1,12 +1,9 @@
 //! What is known of the load, and when it may have become another one.
 
 use crate::force::ResolvedSample;
-use crate::pipeline::motion::StopWatch;
+use crate::pipeline::motion::{StopWatch, is_same_mass};
 
 use super::settings::TrainKalmanSettings;
-
-/// A mass in a sample that differs by less than this share from the one before is the same.
-const SAME_SHARE: f64 = 1e-4;
 
 /// What a sample changes in what is known of the load: the declared mass over the true one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,8 +71,7 @@ impl LoadWatch {
         let before_kg = self.declared_kg.replace(sample.mass_kg);
         let anew = Change::Anew(self.prior_variance());
         let Some(before_kg) = before_kg else { return Some(anew) };
-        let is_same = (sample.mass_kg / before_kg - 1.0).abs() <= SAME_SHARE;
-        if !is_same && self.is_weighed {
+        if self.is_weighed && !is_same_mass(before_kg, sample.mass_kg) {
             self.is_fresh = !self.has_departed;
             return Some(anew);
         }
