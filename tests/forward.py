@@ -57,7 +57,7 @@ def wait(condition, what):
     print(f"{time.monotonic() - begun:6.1f} s: {what}", flush=True)
 
 
-def told_drops():
+def reported_drops():
     return max(map(int, re.findall(r"(\d+) publications dropped so far", said("forward"))), default=0)
 
 
@@ -269,7 +269,7 @@ try:
     forward = start("forward", programs / "dynocar", "forward", "--broker", f"127.0.0.1:{port}", "--group", "depot",
                     "--node", "edge", "--every-ms", "500", "--queue", str(QUEUE))
     wait(lambda: "cannot be reached" in said("forward"), "the word that there is no broker")
-    wait(lambda: told_drops() > 0, "drops to be told")
+    wait(lambda: reported_drops() > 0, "drops to be told")
     full_kib = memory_kib(forward)
 
     # 2. The broker comes: births of all, then what waited, marked as of the past, then what is new.
@@ -294,7 +294,7 @@ try:
     # 4. A broker that takes nothing for so long that the queue is full again, and goes on.
     dropped = host.counts["forward/dropped"]
     broker.send_signal(signal.SIGSTOP)
-    wait(lambda: told_drops() > dropped, "drops by a slow broker")
+    wait(lambda: reported_drops() > dropped, "drops by a slow broker")
     broker.send_signal(signal.SIGCONT)
     wait(lambda: host.counts["forward/dropped"] > dropped, "the count of them")
     wait(lambda: len(host.devices) == TRAINS, "all trains")

@@ -5,12 +5,12 @@ use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use dynocar::cli::parse;
-use dynocar::output::{tell, write_file};
+use dynocar::output::{report_line, write_file};
 use serde::Serialize;
 
 use crate::drive::command::{DriveArguments, drive};
 use crate::estimators::measure::Effort;
-use crate::estimators::{self, beside, report};
+use crate::estimators::{self, against, report};
 use crate::explain::command::{ExplainArguments, explain};
 use crate::latency::server::{PeerArguments, serve};
 use crate::latency::{self, LatencyArguments, plot};
@@ -129,7 +129,7 @@ pub fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err((message, status)) => {
-            tell(&format!("dynocar-bench: {message}"));
+            report_line(&format!("dynocar-bench: {message}"));
             ExitCode::from(status)
         }
     }
@@ -137,8 +137,8 @@ pub fn main() -> ExitCode {
 
 fn estimators(arguments: &EstimatorsArguments) -> Result<(), (String, u8)> {
     if let (Some(other), Some(case)) = (&arguments.beside, &arguments.case) {
-        let cases = beside::measure(other, case).map_err(|error| (error.to_string(), 1))?;
-        return give(&arguments.json, &cases, || beside::table(&cases));
+        let cases = against::measure(other, case).map_err(|error| (error.to_string(), 1))?;
+        return give(&arguments.json, &cases, || against::table(&cases));
     }
     let effort = if arguments.quick { Effort::QUICK } else { Effort::FULL };
     let mut cases = estimators::cases().map_err(|error| (error.to_string(), 1))?;
@@ -169,7 +169,7 @@ fn papers(arguments: &PapersArguments) -> Result<(), (String, u8)> {
     }
     let mut rows = Vec::new();
     for source in chosen {
-        tell(&format!("{}: {} seeds from {}", source.name, seeds.count, seeds.first));
+        report_line(&format!("{}: {} seeds from {}", source.name, seeds.count, seeds.first));
         rows.extend((source.rows)(seeds));
     }
     let judged =

@@ -21,7 +21,7 @@ fn a_closed_pipe_ends_every_command_quietly() {
 }
 
 #[test]
-fn a_full_disk_is_told_in_words() {
+fn a_full_disk_is_reported_in_words() {
     for arguments in CASES {
         let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
         let output = bench(arguments).stdout(full).output().unwrap();

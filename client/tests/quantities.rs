@@ -44,7 +44,7 @@ fn answering(reader: &SnapshotReader, quantity: Quantity) -> Result<u32, NoAnswe
 }
 
 #[test]
-fn not_provided_is_told_from_not_heard_yet() {
+fn not_provided_is_distinguished_from_not_heard_yet() {
     use Quantity::{Adhesion, Mass, Resistance};
     let bench = bench();
     let mut reader = SnapshotReader::open(&bench.host, TRAIN).unwrap();

@@ -106,7 +106,7 @@ fn a_root_that_cannot_be_used_is_named_in_words() {
 }
 
 #[test]
-fn a_second_controller_is_told_who_drives() {
+fn a_second_controller_learns_who_drives() {
     let directory = TestRoot::new();
     let (mut first, mut second) = (null_mut(), null_mut());
     assert_eq!(open_publisher(directory.path(), &mut first), (Code::Ok, String::new()));

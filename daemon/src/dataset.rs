@@ -7,8 +7,8 @@ use dynocar_core::train::TrainModel;
 use dynocar_core::units::Unit;
 use dynocar_dataset::encoding::decoded;
 use dynocar_dataset::{
-    Dataset, DatasetError, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Manifest, Place,
-    Problem, is_parquet, parse_track, parse_train, top_keys,
+    Dataset, DatasetError, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Manifest,
+    Problem, SourcePosition, is_parquet, parse_track, parse_train, top_keys,
 };
 
 pub use crate::text_file::read_text;
@@ -254,7 +254,7 @@ pub fn file_error(label: &str, problem: FileProblem) -> DatasetError {
         FileProblem::NotUtf8 { line } | FileProblem::OtherEncoding { line, .. } => Some(line),
         _ => None,
     };
-    Place { file: label.into(), line }.problem(Problem::File(problem))
+    SourcePosition { file: label.into(), line }.problem(Problem::File(problem))
 }
 
 #[cfg(test)]
@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn paths_without_a_dataset_are_told_apart() {
+    fn paths_without_a_dataset_are_distinguished() {
         let folder =
             folder(&[("dataset.toml", MANIFEST.as_bytes()), ("latin.toml", b"# a\n# \xb0C\n")]);
         let path = folder.path();

@@ -55,7 +55,7 @@ pub fn print(text: &str) -> Result<(), OutputError> {
 }
 
 /// Writes a line to standard error. What cannot be written there can be told nowhere.
-pub fn tell(line: &str) {
+pub fn report_line(line: &str) {
     let _ = io::stderr().lock().write_all(format!("{line}\n").as_bytes());
 }
 

@@ -43,17 +43,17 @@ pub fn called_as(package: &'static str) -> &'static str {
 
 /// Why a program that was called did not do its work.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Complaint {
+pub enum CallFailure {
     /// It found something wrong with what it was given: its words, without its name.
     Input(String),
     /// It did not start, or the work failed.
     Work(String),
 }
 
-impl Complaint {
+impl CallFailure {
     /// The words.
     pub fn words(self) -> String {
-        let (Complaint::Input(words) | Complaint::Work(words)) = self;
+        let (CallFailure::Input(words) | CallFailure::Work(words)) = self;
         words
     }
 }
@@ -63,14 +63,15 @@ impl Complaint {
 /// # Errors
 ///
 /// In words when it does not start or does not end with 0.
-pub fn output_of(package: &str, command: &mut Command) -> Result<(Vec<u8>, String), Complaint> {
-    let output = command.output().map_err(|error| Complaint::Work(not_started(package, &error)))?;
+pub fn output_of(package: &str, command: &mut Command) -> Result<(Vec<u8>, String), CallFailure> {
+    let output =
+        command.output().map_err(|error| CallFailure::Work(not_started(package, &error)))?;
     let words = String::from_utf8_lossy(&output.stderr).trim().to_owned();
     let problem = || words.strip_prefix("dynocar: ").unwrap_or(&words).to_owned();
     match output.status.code() {
         Some(0) => Ok((output.stdout, words)),
-        Some(2) => Err(Complaint::Input(problem())),
-        _ => Err(Complaint::Work(problem())),
+        Some(2) => Err(CallFailure::Input(problem())),
+        _ => Err(CallFailure::Work(problem())),
     }
 }
 

@@ -28,7 +28,7 @@ use crate::runtime::memory::{STACK_BYTES, lock_all_memory, prefault_stack};
 use crate::runtime::scheduling::set_fifo_priority;
 use crate::runtime::tally::Tally;
 use crate::runtime::watch::{Watch, WatchedPipeline};
-use crate::runtime::worker::{LanePlan, Worker, WorkerPlan};
+use crate::runtime::worker::{ChannelPlan, Worker, WorkerPlan};
 use crate::shadow::train::Placed;
 use crate::shadow::{self, Board, ShadowTrain};
 use crate::state::{self, keeper::Keeper};
@@ -100,7 +100,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
         .transpose()
         .map_err(|source| RunError::System { what: "thread of models on trial", source })?;
     let keeper = state.map(|state| start_keeper(config, &host, state, &stop)).transpose()?;
-    tell_who_answers(config);
+    report_who_answers(config);
     info!(epoch, trains = trains.len(), pipelines = config.pipelines.len(), "serving");
 
     let listener =
@@ -110,14 +110,14 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     let supervisor = Supervisor::from_environment();
     let alive = watched.iter().map(|it| (it.name.clone(), Arc::clone(&it.tally))).collect();
     let watchdog = Watchdog::new(&supervisor, alive);
-    supervisor.tell("READY=1");
+    supervisor.notify("READY=1");
     let trains = trains.into_iter().zip(counts).collect();
     let mut watch = Watch::new(host, trains, watched);
     watch.until_stopped(&stop, || {
         watchdog.round(Instant::now());
         workers.iter().any(JoinHandle::is_finished)
     });
-    supervisor.tell("STOPPING=1");
+    supervisor.notify("STOPPING=1");
 
     let ended = workers.iter().find(|worker| worker.is_finished()).map(thread_name);
     let was_asked = stop.swap(true, std::sync::atomic::Ordering::Relaxed);
@@ -136,7 +136,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
 }
 
 /// One line for each train: which pipeline answers which question.
-fn tell_who_answers(config: &DaemonConfig) {
+fn report_who_answers(config: &DaemonConfig) {
     for train in &config.trains {
         let name = |it| train.answers.place(it).map_or("-", |place| &config.pipelines[place].name);
         info!(
@@ -195,7 +195,7 @@ fn plan_workers(
                 None => {
                     let (count, pipelines) = (Arc::clone(&counts[place]), vec![(pipeline, tally)]);
                     let (train, place, exchange) = (train.id, 0, None);
-                    lanes.push(LanePlan { train, count, place, pipelines, exchange });
+                    lanes.push(ChannelPlan { train, count, place, pipelines, exchange });
                 }
             }
         }
@@ -216,7 +216,7 @@ fn plan_shadow(
     let mut trains = Vec::new();
     for train in &config.trains {
         let lanes = plans.iter_mut().flat_map(|plan| &mut plan.lanes);
-        let mut lanes: Vec<&mut LanePlan> = lanes.filter(|it| it.train == train.id).collect();
+        let mut lanes: Vec<&mut ChannelPlan> = lanes.filter(|it| it.train == train.id).collect();
         lanes.sort_by_key(|lane| lane.place);
         let exchange = Arc::new(Exchange::new(lanes.len()));
         let mut placed = Vec::new();

@@ -192,7 +192,7 @@ pub fn replace(
     beside: &Path,
     (content, rights): (&[u8], &Rights),
 ) -> Result<(), StorageError> {
-    write_beside(storage, beside, content, rights)?;
+    write_next_to(storage, beside, content, rights)?;
     if let Err(source) = storage.rename(beside, path) {
         let _ = storage.remove(beside);
         return Err(failed(path, "replacing")(source));
@@ -215,7 +215,7 @@ pub fn write_once(
 ) -> Result<(), StorageError> {
     let folder = folder_of(path);
     storage.make_folder(folder).map_err(failed(folder, "making the folder"))?;
-    write_beside(storage, beside, content, &Rights::Usual)?;
+    write_next_to(storage, beside, content, &Rights::Usual)?;
     if let Err(source) = storage.rename_new(beside, path) {
         let _ = storage.remove(beside);
         return Err(failed(path, "naming")(source));
@@ -236,7 +236,7 @@ pub fn make_once(
 ) -> Result<(), StorageError> {
     storage.make_folder(beside).map_err(failed(beside, "making the folder"))?;
     for (name, content) in files {
-        write_beside(storage, &beside.join(name), content, &Rights::Usual)?;
+        write_next_to(storage, &beside.join(name), content, &Rights::Usual)?;
     }
     storage.sync_directory(beside).map_err(failed(beside, TO_THE_DISK))?;
     storage.rename_new(beside, folder).map_err(failed(folder, "naming"))?;
@@ -267,7 +267,7 @@ pub fn part_of(path: &Path) -> PathBuf {
 }
 
 /// Writes a file under a name that only one writer uses.
-fn write_beside(
+fn write_next_to(
     storage: &(impl Storage + ?Sized),
     beside: &Path,
     content: &[u8],

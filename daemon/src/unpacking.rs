@@ -9,8 +9,8 @@ use dynocar_dataset::ColumnMapping;
 use dynocar_shared::TrainId;
 use tempfile::TempDir;
 
-use crate::output::tell;
-use crate::programs::{Complaint, PARQUET, RECORDING, call, output_of};
+use crate::output::report_line;
+use crate::programs::{CallFailure, PARQUET, RECORDING, call, output_of};
 
 /// The program that knows a recording's format, by the recording's name; `None` for what is none: a file of
 /// MCAP, and a folder or a file of Parquet.
@@ -89,11 +89,11 @@ pub fn unpack(recording: &Path, folder: &Path, train: Option<TrainId>) -> Result
     }
     command.arg(recording);
     let (_, words) = output_of(program, &mut command).map_err(|complaint| match complaint {
-        Complaint::Input(problem) => UnpackError::Content { path: path.clone(), problem },
-        Complaint::Work(problem) => UnpackError::Failed { path: path.clone(), problem },
+        CallFailure::Input(problem) => UnpackError::Content { path: path.clone(), problem },
+        CallFailure::Work(problem) => UnpackError::Failed { path: path.clone(), problem },
     })?;
     if !words.is_empty() {
-        tell(&words);
+        report_line(&words);
     }
     Ok(())
 }

@@ -219,7 +219,7 @@ fn common_spellings_of_one_recording_give_one_answer() {
 }
 
 #[test]
-fn a_lone_run_is_told_that_nothing_was_scored_everywhere() {
+fn a_lone_run_is_reported_as_one_of_which_nothing_was_scored_everywhere() {
     let site = Site::new();
     let folder = dataset(&site, MANIFEST, run().as_bytes());
     let (json, page) = (site.path().join("a.json"), site.path().join("a.html"));
@@ -241,7 +241,7 @@ fn a_lone_run_is_told_that_nothing_was_scored_everywhere() {
 }
 
 #[test]
-fn a_dataset_of_holdout_runs_only_is_told_so() {
+fn a_dataset_of_holdout_runs_only_is_called_so() {
     let site = Site::new();
     let folder = dataset(&site, &format!("{MANIFEST}role = \"holdout\"\n"), run().as_bytes());
     let output = finished(&["explain", &folder].map(OsStr::new));
@@ -268,7 +268,7 @@ fn paths_that_are_no_text_work_for_input_and_results() {
 }
 
 #[test]
-fn rights_that_are_lacking_are_told_in_words() {
+fn rights_that_are_lacking_are_reported_in_words() {
     let site = Site::new();
     let folder = dataset(&site, MANIFEST, run().as_bytes());
     let without_privileges = |arguments: &[&str]| {

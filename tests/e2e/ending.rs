@@ -42,14 +42,14 @@ const ENDS: [End; 6] = [
 ];
 
 /// A program at work on a site of its own, beside a controller and, where it needs one, a broker.
-struct Place {
+struct TestSite {
     site: Site,
     controller: Process,
     broker: TcpListener,
     port: u16,
 }
 
-impl Place {
+impl TestSite {
     fn new() -> Self {
         let site = Site::new();
         site.write_config(1, "", "[[pipelines]]\nkind = \"mass_kalman\"\n");
@@ -59,7 +59,7 @@ impl Place {
         let broker = TcpListener::bind("127.0.0.1:0").unwrap();
         let free = TcpListener::bind("127.0.0.1:0").unwrap();
         let port = free.local_addr().unwrap().port();
-        Place { site, controller, broker, port }
+        TestSite { site, controller, broker, port }
     }
 
     fn at(&self, name: &str) -> PathBuf {
@@ -82,8 +82,8 @@ impl Place {
 struct Program {
     name: &'static str,
     words: &'static str,
-    is_at_work: fn(&Place) -> bool,
-    left: fn(&Place),
+    is_at_work: fn(&TestSite) -> bool,
+    left: fn(&TestSite),
 }
 
 const RUN: Program = Program {
@@ -137,7 +137,7 @@ const FORWARDER: Program = Program {
     left: |_| {},
 };
 
-fn ring(place: &Place) -> Vec<PathBuf> {
+fn ring(place: &TestSite) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(place.at("ring")).into_iter().flatten().flatten();
     let paths = entries.map(|entry| entry.path());
     paths.filter(|it| it.extension().is_some_and(|it| it == "mcap")).collect()
@@ -160,7 +160,7 @@ fn closed_pipe() -> Stdio {
 }
 
 /// Ends a program that is at work, and gives how it ended.
-fn ended(place: &Place, program: &Program, end: End) -> ExitStatus {
+fn ended(place: &TestSite, program: &Program, end: End) -> ExitStatus {
     let words = place.arguments(program.words);
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let at_work = || await_true(|| (program.is_at_work)(place), || format!("{words:?} at work"));
@@ -189,7 +189,7 @@ fn ended(place: &Place, program: &Program, end: End) -> ExitStatus {
 /// Whatever ends it, it ends with 0 and leaves what it must.
 fn ends_cleanly(program: &Program) {
     for end in ENDS {
-        let mut place = Place::new();
+        let mut place = TestSite::new();
         let status = ended(&place, program, end);
         assert_eq!(status.code(), Some(0), "{} by {end:?}: {status}", program.words);
         (program.left)(&place);
@@ -279,7 +279,7 @@ fn a_watcher_ends_though_its_terminal_takes_nothing_more() {
 
 #[test]
 fn a_program_that_is_to_outlive_its_terminal_does() {
-    let mut place = Place::new();
+    let mut place = TestSite::new();
     let words = place.arguments(RECORD.words);
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let terminal = Terminal::open();

@@ -15,7 +15,7 @@ use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{
     Effect, EffectRequest, Law, SimulatedDataset, SimulatorSettings, TrainType, Unlisted, simulate,
 };
-use dynocar_workshop::grown::write_grown;
+use dynocar_workshop::updated::write_updated;
 
 const SEED: u64 = 23;
 
@@ -38,7 +38,7 @@ fn nothing_undeclared_is_called_nothing() {
 }
 
 #[test]
-fn what_one_run_alone_tells_is_found_where_the_others_gain_nothing_from_it() {
+fn what_one_run_alone_shows_is_found_where_the_others_gain_nothing_from_it() {
     // Only one fit run goes on over one of the two sections: left out, the others say nothing of it.
     let request = EffectRequest::Kinds(vec![EffectKind::MassChange]);
     let simulated = simulate(&SimulatorSettings::new(9005, request));
@@ -65,7 +65,7 @@ fn a_number_is_no_surer_than_the_map_that_all_runs_share() {
 }
 
 #[test]
-fn a_curve_resistance_is_found_and_the_grown_files_leave_nothing() {
+fn a_curve_resistance_is_found_and_the_updated_files_leave_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let simulated = with_kinds(&[EffectKind::CurveResistance]);
     let explanation = explained(&simulated, folder.path());
@@ -81,7 +81,7 @@ fn a_curve_resistance_is_found_and_the_grown_files_leave_nothing() {
     assert!((found - truth).abs() < 0.1 * (truth - 600.0), "{found} against {truth}");
     assert!(answer.rmse_after.unwrap() < 0.7 * answer.rmse_before.unwrap());
 
-    let grown = write_grown(folder.path(), &explanation, folder.path()).unwrap();
+    let grown = write_updated(folder.path(), &explanation, folder.path()).unwrap();
     assert_eq!(grown.not_expressed, [] as [String; 0]);
     let again = dataset::load(folder.path()).expect("the grown files are read");
     assert!((again.train.curve_constant_n_per_kn_m - found).abs() < 1e-9);
@@ -90,7 +90,7 @@ fn a_curve_resistance_is_found_and_the_grown_files_leave_nothing() {
 }
 
 #[test]
-fn the_grown_files_of_other_kinds_leave_nothing_either() {
+fn the_updated_files_of_other_kinds_leave_nothing_either() {
     let kinds = [
         EffectKind::TunnelDrag,
         EffectKind::WheelDiameter,
@@ -103,7 +103,7 @@ fn the_grown_files_of_other_kinds_leave_nothing_either() {
         let folder = tempfile::tempdir().unwrap();
         let explanation = explained(&with_kinds(&[kind]), folder.path());
         assert_eq!(explanation.answer.verdict, Verdict::Effect, "{kind:?}");
-        let grown = write_grown(folder.path(), &explanation, folder.path()).unwrap();
+        let grown = write_updated(folder.path(), &explanation, folder.path()).unwrap();
         assert_eq!(grown.not_expressed, [] as [String; 0], "{kind:?}");
         let again = dataset::load(folder.path()).expect("the grown files are read");
         let again = explain(&again, &|_, _| {}).unwrap();
@@ -192,7 +192,7 @@ fn a_slow_trains_force_is_unknown_and_swallowed_by_no_impossible_resistance() {
 }
 
 #[test]
-fn a_force_outside_the_library_gets_its_form_and_goes_into_the_grown_model() {
+fn a_force_outside_the_library_gets_its_form_and_goes_into_the_updated_model() {
     let folder = tempfile::tempdir().unwrap();
     let law = Law::Slow { below_mps: 15.0, least_mps: 3.0 };
     let slow = Effect::Unlisted(Unlisted { law, n_per_kn: 1.2 });
@@ -222,7 +222,7 @@ fn a_force_outside_the_library_gets_its_form_and_goes_into_the_grown_model() {
     let after_mps = answer.rmse_after.expect("runs are held out");
     assert!(after_mps < 1.2 * oracle_mps, "{after_mps} m/s of {oracle_mps}");
     let grown = tempfile::tempdir().unwrap();
-    let written = write_grown(folder.path(), &explanation, grown.path()).unwrap();
+    let written = write_updated(folder.path(), &explanation, grown.path()).unwrap();
     assert_eq!(written.not_expressed, Vec::<String>::new());
     let text = std::fs::read_to_string(grown.path().join("train.toml")).unwrap();
     let train = parse_train("train.toml", &text).unwrap();
@@ -252,7 +252,7 @@ fn nothing_at_a_bound_of_what_is_looked_for_is_found() {
 }
 
 #[test]
-fn a_tunnel_that_the_map_lacks_is_named_alone_or_beside_a_resistance_there() {
+fn a_tunnel_that_the_map_lacks_is_named_alone_or_next_to_a_resistance_there() {
     let folder = tempfile::tempdir().unwrap();
     let kinds = EffectRequest::Kinds(vec![EffectKind::TunnelDrag]);
     let ordinary = SimulatorSettings::new(SEED, kinds);
@@ -290,7 +290,7 @@ fn a_place_in_one_run_is_found_with_its_time_and_may_be_a_brake() {
 }
 
 #[test]
-fn an_effect_that_predicts_the_runs_held_out_worse_is_told_as_that() {
+fn an_effect_that_predicts_the_runs_held_out_worse_is_reported_as_that() {
     let folder = tempfile::tempdir().unwrap();
     let declared = simulate(&SimulatorSettings::new(SEED, EffectRequest::none()));
     let fitted = declared.runs.iter().filter(|run| !run.plan.is_holdout);
@@ -309,7 +309,7 @@ fn an_effect_that_predicts_the_runs_held_out_worse_is_told_as_that() {
 }
 
 #[test]
-fn on_a_level_straight_line_two_kinds_of_mass_cannot_be_told_apart() {
+fn on_a_level_straight_line_two_kinds_of_mass_cannot_be_distinguished() {
     let folder = tempfile::tempdir().unwrap();
     let effects = EffectRequest::Kinds(vec![EffectKind::RotatingMass]);
     let ordinary = SimulatorSettings::new(SEED, effects);
@@ -339,7 +339,7 @@ fn a_force_that_acts_somewhat_later_than_stamped_bends_no_resistance() {
 }
 
 #[test]
-fn a_scan_foretells_what_a_fit_then_gains() {
+fn a_scan_predicts_what_a_fit_then_gains() {
     let folder = tempfile::tempdir().unwrap();
     let simulated = with_kinds(&[EffectKind::TunnelDrag]);
     let explanation = explained(&simulated, folder.path());
@@ -352,10 +352,13 @@ fn a_scan_foretells_what_a_fit_then_gains() {
         let share = sample.tunnel_share.unwrap_or(0.0);
         -scan.per_unit_resistance_mps2(sample) * share * speed * speed
     });
-    let (_, foretold) = scan.gain(&tuple);
+    let (_, expected_by_advice) = scan.gain(&tuple);
     let grown = explanation.grown.effect_parameters(0)[0];
     // The scan is linear and keeps the noise of the smaller model.
-    assert!((foretold - grown).abs() < 0.25 * grown, "{foretold} against {grown}");
+    assert!(
+        (expected_by_advice - grown).abs() < 0.25 * grown,
+        "{expected_by_advice} against {grown}"
+    );
 }
 
 #[test]

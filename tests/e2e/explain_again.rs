@@ -89,7 +89,7 @@ fn a_place_that_resists_is_explained_once_where_no_line_was_declared() {
 }
 
 #[test]
-fn a_grown_dataset_names_runs_and_ways_where_they_lie_and_forgets_an_older_line() {
+fn an_updated_dataset_names_runs_and_ways_where_they_lie_and_forgets_an_older_line() {
     let site = Site::new();
     let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo");
     let old = "# Grown from track.toml of dataset.toml by `dynocar explain`.\n[track]\n";

@@ -5,6 +5,6 @@ mod every_kind;
 mod explain;
 mod forms;
 mod gradient_error;
-mod grown_model;
 mod late_speed;
 mod told_by_data;
+mod updated_model;

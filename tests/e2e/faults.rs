@@ -142,7 +142,7 @@ fn with_small_memory(size: &str, command: &str) -> Result<Command, String> {
 }
 
 #[test]
-fn a_full_shared_memory_is_told_in_words_and_ends_nobody_by_a_signal() {
+fn a_full_shared_memory_is_reported_in_words_and_ends_nobody_by_a_signal() {
     let site = Site::new();
     let config = site.write_config(1, "", ECHO);
     let daemon = format!("exec {DYNOCAR} run --config {}", config.display());

@@ -17,7 +17,7 @@ use dynocar_fmu::ffi::life::{
 use dynocar_fmu::ffi::types::CO_SIMULATION;
 use dynocar_fmu::ffi::unsupported::fmi2CancelStep;
 use dynocar_fmu::ffi::values::{fmi2GetReal, fmi2SetReal};
-use dynocar_fmu::variables::{Kind, Meaning, Told};
+use dynocar_fmu::variables::{Kind, Meaning, SnapshotField};
 use dynocar_fmu::{ESTIMATORS, INTERFACES};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId};
 use dynocar_tests::process::Site;
@@ -54,20 +54,20 @@ fn demo_with_brake_gear(site: &Site) -> PathBuf {
 }
 
 /// A variable's bits as `identify` would tell them.
-fn expected(snapshot: &ParameterSnapshot, told: Told, speed_mps: f64) -> u64 {
+fn expected(snapshot: &ParameterSnapshot, told: SnapshotField, speed_mps: f64) -> u64 {
     let resistance = snapshot.resistance_at(speed_mps);
     let real = |value: Option<f64>| value.unwrap_or(f64::NAN).to_bits();
     match told {
-        Told::Value(parameter) => real(snapshot.value(parameter)),
-        Told::Std(parameter) => real(snapshot.std(parameter)),
-        Told::Resistance => real(resistance.map(|it| it.w0_n_per_kn)),
-        Told::ResistanceStd => real(resistance.map(|it| it.w0_std_n_per_kn)),
-        Told::UnexplainedForce => snapshot.unexplained_force_n.to_bits(),
-        Told::UnexplainedForceStd => snapshot.unexplained_force_std_n.to_bits(),
-        Told::SuspectedEffect => snapshot.suspected_effect.into(),
-        Told::Status => snapshot.status.into(),
-        Told::Reason => snapshot.reason.into(),
-        Told::Rejected => snapshot.samples_rejected,
+        SnapshotField::Value(parameter) => real(snapshot.value(parameter)),
+        SnapshotField::Std(parameter) => real(snapshot.std(parameter)),
+        SnapshotField::Resistance => real(resistance.map(|it| it.w0_n_per_kn)),
+        SnapshotField::ResistanceStd => real(resistance.map(|it| it.w0_std_n_per_kn)),
+        SnapshotField::UnexplainedForce => snapshot.unexplained_force_n.to_bits(),
+        SnapshotField::UnexplainedForceStd => snapshot.unexplained_force_std_n.to_bits(),
+        SnapshotField::SuspectedEffect => snapshot.suspected_effect.into(),
+        SnapshotField::Status => snapshot.status.into(),
+        SnapshotField::Reason => snapshot.reason.into(),
+        SnapshotField::Rejected => snapshot.samples_rejected,
     }
 }
 

@@ -1,6 +1,6 @@
 //! Forces by laws that no library holds, their forms and what these predict.
 
-use dynocar_analysis::explain::answer::{Answer, Verdict};
+use dynocar_analysis::explain::answer::{ExplainAnswer, Verdict};
 use dynocar_analysis::explain::explain;
 use dynocar_core::terms::Entry;
 use dynocar_core::terms::extra::{Covariate, Extra, Form};
@@ -20,7 +20,7 @@ fn simulated(seed: u64) -> (SimulatedDataset, Law) {
 }
 
 /// What is said of a force that must be called unknown, and the error over the true model's.
-fn told(simulated: &SimulatedDataset) -> (Answer, Vec<Extra>, f64) {
+fn told(simulated: &SimulatedDataset) -> (ExplainAnswer, Vec<Extra>, f64) {
     let dataset = read_files(&dataset_files(simulated));
     let explanation = explain(&dataset, &|_, _| {}).expect("usable runs");
     let answer = explanation.answer;
@@ -38,7 +38,7 @@ fn told(simulated: &SimulatedDataset) -> (Answer, Vec<Extra>, f64) {
 }
 
 #[test]
-fn the_edge_of_a_force_is_told_with_an_interval_and_a_whole_exponent_as_one() {
+fn the_edge_of_a_force_is_reported_with_an_interval_and_a_whole_exponent_as_one() {
     let (simulated, law) = simulated(51_007);
     let Law::FastLater { from_s, .. } = law else { panic!("{law:?}") };
     let (answer, extra, left) = told(&simulated);
@@ -60,7 +60,7 @@ fn the_edge_of_a_force_is_told_with_an_interval_and_a_whole_exponent_as_one() {
 }
 
 #[test]
-fn a_force_in_the_cold_is_told_where_a_library_kind_runs_to_its_bound() {
+fn a_force_in_the_cold_is_reported_where_a_library_kind_runs_to_its_bound() {
     let (simulated, law) = simulated(41_014);
     assert!(matches!(law, Law::FastInCold { .. }), "{law:?}");
     let (answer, extra, left) = told(&simulated);
@@ -71,7 +71,7 @@ fn a_force_in_the_cold_is_told_where_a_library_kind_runs_to_its_bound() {
 }
 
 #[test]
-fn a_force_that_rises_to_a_level_is_told_though_no_basic_resistance_may_hold_the_level() {
+fn a_force_that_rises_to_a_level_is_reported_though_no_basic_resistance_may_hold_the_level() {
     let (simulated, law) = simulated(51_006);
     assert!(matches!(law, Law::Levelling { .. }), "{law:?}");
     let (answer, extra, left) = told(&simulated);
@@ -81,7 +81,7 @@ fn a_force_that_rises_to_a_level_is_told_though_no_basic_resistance_may_hold_the
 }
 
 #[test]
-fn a_force_that_the_noise_would_hold_is_told() {
+fn a_force_that_the_noise_would_hold_is_reported() {
     let (simulated, law) = simulated(71_005);
     assert!(matches!(law, Law::FastLater { .. }), "{law:?}");
     let (answer, _, left) = told(&simulated);

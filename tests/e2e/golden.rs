@@ -49,7 +49,7 @@ fn recorded_runs_give_the_bits_of_the_golden_file_and_give_them_twice() {
 fn the_golden_files_form_leads_back_to_the_same_bits() {
     let golden = Golden {
         fingerprint: 7,
-        lines: vec![golden::Line {
+        lines: vec![golden::GoldenLine {
             kind: "rls".into(),
             counts: [1, 2, 3, 4],
             hash: u64::MAX,

@@ -96,7 +96,7 @@ fn an_imported_line_is_read_back_with_the_numbers_of_its_source() {
 }
 
 #[test]
-fn what_a_file_does_not_tell_is_a_marked_default_unless_somebody_says_it() {
+fn what_a_file_does_not_show_is_a_marked_default_unless_somebody_says_it() {
     let site = Site::new();
     let told = import(&site, "ttobench_train.json", &[]);
     let text = read_to_string(site.path().join("made/train.toml")).unwrap();

@@ -1,6 +1,6 @@
 //! A speed sensor that is late is told as that, and no places are made up for what it does on gradients.
 
-use dynocar_analysis::explain::answer::{Answer, Verdict};
+use dynocar_analysis::explain::answer::{ExplainAnswer, Verdict};
 use dynocar_analysis::explain::explain;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{FileText, dataset_files, read_files};
@@ -9,12 +9,12 @@ use dynocar_tests::simulator::{
     Effect, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate,
 };
 
-fn answer(files: &[FileText]) -> Answer {
+fn answer(files: &[FileText]) -> ExplainAnswer {
     explain(&read_files(files), &|_, _| {}).expect("usable runs").answer
 }
 
 /// Every kind that an answer names, the found ones first.
-fn named(answer: &Answer) -> Vec<&str> {
+fn named(answer: &ExplainAnswer) -> Vec<&str> {
     let found = answer.effects.iter().map(|effect| effect.kind);
     found.chain(answer.ambiguous_with.iter().copied()).collect()
 }
@@ -52,7 +52,7 @@ fn a_late_speed_is_named_whether_dead_time_or_lag_and_no_place_is_made_up() {
 }
 
 #[test]
-fn on_a_level_line_a_position_of_its_own_tells_and_forces_that_act_late_stay_ambiguous() {
+fn on_a_level_line_a_position_of_its_own_shows_and_forces_that_act_late_stay_ambiguous() {
     let late_speed = Effect::SpeedDelay { delay_s: 0.8, lag_s: 0.0 };
     let told = answer(&dataset_files(&simulated(9202, late_speed, true)));
     assert_eq!(told.verdict, Verdict::Effect, "{}", told.statement);
@@ -68,7 +68,7 @@ fn on_a_level_line_a_position_of_its_own_tells_and_forces_that_act_late_stay_amb
 }
 
 #[test]
-fn without_a_position_nothing_tells_a_late_speed_from_late_forces() {
+fn without_a_position_nothing_shows_a_late_speed_from_late_forces() {
     let late_speed = Effect::SpeedDelay { delay_s: 0.8, lag_s: 0.0 };
     let mut files = dataset_files(&simulated(9202, late_speed, true));
     let (_, manifest) = files.iter_mut().find(|(path, _)| path == "dataset.toml").unwrap();

@@ -67,7 +67,7 @@ fn what_runs_live_is_built_without_what_explains_recordings() {
 }
 
 #[test]
-fn what_is_installed_beside_a_controller_draws_zips_asks_and_imports_nothing() {
+fn what_is_installed_next_to_a_controller_draws_zips_asks_and_imports_nothing() {
     assert_free_of(
         "dynocar",
         &[

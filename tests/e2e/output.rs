@@ -66,7 +66,7 @@ fn a_closed_pipe_ends_every_command_quietly() {
 }
 
 #[test]
-fn a_full_disk_under_standard_output_is_told_by_every_command() {
+fn a_full_disk_under_standard_output_is_reported_by_every_command() {
     let site = Site::new();
     for it in COMMANDS {
         let output = command(&site, it).stdout(full_disk()).output().unwrap();
@@ -79,7 +79,7 @@ fn a_full_disk_under_standard_output_is_told_by_every_command() {
 }
 
 #[test]
-fn what_tells_people_on_standard_error_survives_its_loss() {
+fn what_people_read_on_standard_error_survives_its_loss() {
     let site = Site::new();
     let replay = (DYNOCAR, &["replay", DEMO, "--run", "1", "--rate", "1000"][..]);
     let wrong = (DYNOCAR, &["check", "/nowhere"][..]);
@@ -139,7 +139,7 @@ fn a_daemon_whose_log_cannot_be_written_serves_and_health_keeps_its_verdict() {
 }
 
 #[test]
-fn a_full_disk_under_a_file_is_told_with_its_name() {
+fn a_full_disk_under_a_file_is_reported_with_its_name() {
     let site = Site::new();
     let full = |name: &str| {
         let path = site.path().join(name);
@@ -237,7 +237,7 @@ fn names_of_results_that_would_cost_data_are_refused_before_the_work() {
 }
 
 #[test]
-fn people_are_told_unless_standard_output_is_for_machines() {
+fn people_get_results_unless_standard_output_is_for_machines() {
     let site = Site::new();
     let file = site.path().join("a.json").display().to_string();
     let cases: [(&[&str], &str); 3] = [

@@ -168,7 +168,7 @@ fn a_package_without_its_parts_is_refused_in_words() {
 }
 
 #[test]
-fn completions_and_manual_tell_of_every_command() {
+fn completions_and_manual_list_every_command() {
     let site = Site::new();
     let help = done(&site, &["--help"]);
     let commands: Vec<&str> = help

@@ -223,7 +223,7 @@ fn go_on(left: &Left) -> Result<(), String> {
 }
 
 #[test]
-fn a_power_cut_leaves_what_was_brought_to_the_disk_and_kept_stretches_whole_or_not_at_all() {
+fn a_power_cut_leaves_what_was_brought_to_the_disk_and_kept_events_whole_or_not_at_all() {
     let run = Run::on(Neglect::Nothing);
     let last = run.marks.last().unwrap();
     assert!(last.oldest > 1, "the ring has gone round");
@@ -271,7 +271,7 @@ fn cut_recovery(neglect: Neglect) -> Option<String> {
 }
 
 #[test]
-fn what_was_made_whole_is_on_the_disk_when_that_is_told_and_a_part_of_it_never_looks_whole() {
+fn what_was_made_whole_is_on_the_disk_when_that_is_reported_and_a_part_of_it_never_looks_whole() {
     assert_eq!(cut_recovery(Neglect::Nothing), None);
     for neglect in [Neglect::Bytes, Neglect::Names] {
         assert!(cut_recovery(neglect).is_some(), "{neglect:?} is noticed");
@@ -340,7 +340,7 @@ fn whoever_records_does_not_wait_for_a_disk_that_stalls() {
     let rotation = Rotation { bytes: Some(50_000), ..Rotation::default() };
     let begun = Files::begin_on(disk.clone(), &output, rotation, Some(Duration::ZERO));
     let mut files = begun.unwrap();
-    files.keep_house_beside().unwrap();
+    files.keep_house_in_parallel().unwrap();
     for sequence in 1..=5000 {
         files.sample(&sample(sequence)).unwrap();
         if sequence % 100 == 0 {

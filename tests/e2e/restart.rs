@@ -11,7 +11,7 @@ const ECHO: &str = "[[pipelines]]\nkind = \"echo\"\n";
 
 /// A line of the test client.
 #[derive(Debug)]
-struct Seen {
+struct ClientLine {
     epoch: u64,
     sequence: u64,
     used: u64,
@@ -21,10 +21,10 @@ struct Seen {
     status: String,
 }
 
-fn parse(line: &str) -> Option<Seen> {
+fn parse(line: &str) -> Option<ClientLine> {
     let words: Vec<&str> = line.split(' ').collect();
     let number = |place: usize| words.get(place)?.parse().ok();
-    Some(Seen {
+    Some(ClientLine {
         epoch: number(0)?,
         sequence: number(1)?,
         used: number(3)?,
@@ -35,7 +35,7 @@ fn parse(line: &str) -> Option<Seen> {
     })
 }
 
-fn await_seen(client: &Process, what: &str, condition: impl Fn(&Seen) -> bool) -> Seen {
+fn await_seen(client: &Process, what: &str, condition: impl Fn(&ClientLine) -> bool) -> ClientLine {
     let line = client.await_line(what, |line| parse(line).is_some_and(|seen| condition(&seen)));
     parse(&line).expect("a parsed line")
 }

@@ -56,7 +56,7 @@ fn stops(site: &Site, options: &[&str]) -> Output {
 }
 
 #[test]
-fn one_stop_predicts_the_next_and_tells_how_friction_goes_with_speed() {
+fn one_stop_predicts_the_next_and_shows_how_friction_goes_with_speed() {
     let (first, first_m) = recording(1.0, 30.0);
     let (second, second_m) = recording(0.97, 28.0);
     let site = site(&[("fit", first), ("holdout", second)], COLUMNS);
@@ -87,7 +87,7 @@ fn one_stop_predicts_the_next_and_tells_how_friction_goes_with_speed() {
 }
 
 #[test]
-fn speed_alone_is_enough_and_what_is_missing_is_told() {
+fn speed_alone_is_enough_and_what_is_missing_is_reported() {
     let speed = "speed = { column = \"v\", unit = \"km/h\" }\n";
     let site = site(&[("fit", recording(1.0, 30.0).0)], speed);
     let text = String::from_utf8(stops(&site, &["--from", "20"]).stdout).unwrap();
@@ -117,7 +117,7 @@ fn recordings_without_a_stop_and_speeds_never_seen_are_refused_in_words() {
 }
 
 #[test]
-fn a_modulated_stop_is_told_with_what_it_holds_and_gives_no_law() {
+fn a_modulated_stop_is_reported_with_what_it_holds_and_gives_no_law() {
     let recorded = recording(1.0, 25.0).0;
     let halved = recorded.lines().enumerate().map(|(index, row)| match row.strip_suffix(",1") {
         Some(rest) if index > 0 => format!("{rest},0.5\n"),

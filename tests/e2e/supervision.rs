@@ -78,7 +78,7 @@ fn health(site: &Site) -> (Option<i32>, String) {
 }
 
 #[test]
-fn health_tells_no_daemon_from_ok_from_stale_by_exit_status_and_words() {
+fn health_shows_no_daemon_from_ok_from_stale_by_exit_status_and_words() {
     let site = Site::new();
     let (code, words) = health(&site);
     assert_eq!(code, Some(6), "{words}");
@@ -135,7 +135,7 @@ fn health_without_options_lists_every_train_and_ends_with_the_worst_verdict() {
 }
 
 #[test]
-fn health_tells_a_degraded_pipeline_and_an_incompatible_daemon() {
+fn health_shows_a_degraded_pipeline_and_an_incompatible_daemon() {
     let site = Site::new();
     let host = site.host();
     let role = RoleLock::claim(&host, TRAIN, Role::Daemon).unwrap();

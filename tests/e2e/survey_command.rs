@@ -83,7 +83,7 @@ fn changed(change: &dyn Fn(&str, String) -> String) -> tempfile::TempDir {
 }
 
 #[test]
-fn a_closed_pipe_ends_it_quietly_and_a_full_disk_is_told() {
+fn a_closed_pipe_ends_it_quietly_and_a_full_disk_is_reported() {
     let (raw, out) = (surveyed().path("raw"), tempfile::tempdir().unwrap());
     let told = |standard_output: Stdio| {
         let mut command = Command::new(DYNOCAR);
@@ -197,7 +197,7 @@ fn a_line_that_is_none_is_refused_in_words() {
 }
 
 #[test]
-fn one_pass_makes_a_line_and_says_what_it_cannot_tell() {
+fn one_pass_makes_a_line_and_says_what_it_cannot_determine() {
     let one = changed(&|name, text| match name {
         "dataset.toml" => text[..text.match_indices("[[runs]]").nth(1).unwrap().0].into(),
         _ => text,

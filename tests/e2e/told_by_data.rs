@@ -48,7 +48,7 @@ fn explained(folder: &Path, speeds_mps: &[f64]) -> Explanation {
 }
 
 #[test]
-fn one_speed_does_not_tell_a_b_and_c_apart_and_several_do() {
+fn one_speed_does_not_show_a_b_and_c_apart_and_several_do() {
     let folder = tempfile::tempdir().unwrap();
     let steady = explained(folder.path(), &[19.0]).answer;
     assert!(steady.effects.is_empty(), "{}", steady.statement);
@@ -66,7 +66,7 @@ fn one_speed_does_not_tell_a_b_and_c_apart_and_several_do() {
 fn steady_runs_hide_a_rotating_mass_and_level_ones_hold_it_for_a_mass() {
     let folder = tempfile::tempdir().unwrap();
     let steady = explained(folder.path(), &[19.0]).answer;
-    let of = |answer: &dynocar_analysis::explain::answer::Answer, kind: &str| {
+    let of = |answer: &dynocar_analysis::explain::answer::ExplainAnswer, kind: &str| {
         answer.identifiability.iter().find(|own| own.kind == kind).cloned()
     };
     let hidden = of(&steady, "rotating_mass").expect("it can be tested");

@@ -50,7 +50,7 @@ fn one_help_lists_every_command_as_its_own_program_says_it() {
 }
 
 #[test]
-fn the_workshop_is_found_beside_the_program_else_on_the_search_path() {
+fn the_workshop_is_found_next_to_the_program_else_on_the_search_path() {
     let site = Site::new();
     let nowhere = site.path().join("nowhere");
     let beside = installed(&site, DYNOCAR, "both/dynocar");

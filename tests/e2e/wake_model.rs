@@ -35,7 +35,7 @@ fn is_left_asleep(with_fences: bool) -> bool {
 }
 
 #[test]
-fn a_thread_that_falls_asleep_beside_a_publication_finds_it_or_is_woken() {
+fn a_thread_that_falls_asleep_next_to_a_publication_finds_it_or_is_woken() {
     loom::model(|| assert!(!is_left_asleep(true)));
 }
 

@@ -72,7 +72,7 @@ impl Drop for Controller {
 }
 
 #[test]
-fn lines_tell_of_a_daemon_that_comes_goes_and_is_back_and_a_signal_ends_them() {
+fn lines_list_a_daemon_that_comes_goes_and_is_back_and_a_signal_ends_them() {
     let site = Site::new();
     let config = config(&site);
     let mut watch = site.start(WATCH, &["--config", config.to_str().unwrap()]);

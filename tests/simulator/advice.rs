@@ -160,7 +160,7 @@ const STD: fn(&ParameterSnapshot, usize) -> f64 = |snapshot, coefficient| {
 };
 
 #[test]
-fn the_interval_of_the_resistance_after_a_manoeuvre_is_the_one_foretold() {
+fn the_interval_of_the_resistance_after_a_manoeuvre_is_the_one_predicted() {
     let train = declared();
     let (mut ratios, mut shares, mut counts) = (Vec::new(), Vec::new(), [0; 3]);
     for seed in 0..SEEDS {
@@ -173,12 +173,13 @@ fn the_interval_of_the_resistance_after_a_manoeuvre_is_the_one_foretold() {
             trial.begin_at(drive.from_mps);
             let (_, covariance) = davis_of(trial.snapshot()).unwrap();
             let noise = trial.noise.noise(trial.snapshot(), &train, MASS_KG).unwrap();
-            let foretold = forecast(&trial.scene(&train), &covariance, &noise, drive).unwrap();
+            let expected_by_advice =
+                forecast(&trial.scene(&train), &covariance, &noise, drive).unwrap();
             let now = [0, 1, 2].map(|i| STD(trial.snapshot(), i));
             trial.drive(drive);
-            for i in (0..3).filter(|&i| foretold.std[i] <= SHARE_MAX * now[i]) {
+            for i in (0..3).filter(|&i| expected_by_advice.std[i] <= SHARE_MAX * now[i]) {
                 counts[i] += 1;
-                ratios.push(foretold.std[i] / STD(trial.snapshot(), i));
+                ratios.push(expected_by_advice.std[i] / STD(trial.snapshot(), i));
                 shares.push(STD(trial.snapshot(), i) / now[i]);
             }
         }
@@ -192,7 +193,7 @@ fn the_interval_of_the_resistance_after_a_manoeuvre_is_the_one_foretold() {
 }
 
 #[test]
-fn the_advised_manoeuvre_tells_more_than_most_and_about_as_much_as_the_best() {
+fn the_advised_manoeuvre_shows_more_than_most_and_about_as_much_as_the_best() {
     let train = declared();
     let worst = 2;
     let (mut against_best, mut against_middle) = (Vec::new(), Vec::new());
@@ -225,7 +226,7 @@ fn the_advised_manoeuvre_tells_more_than_most_and_about_as_much_as_the_best() {
 }
 
 #[test]
-fn the_deviation_of_the_mass_after_traction_is_the_one_foretold() {
+fn the_deviation_of_the_mass_after_traction_is_the_one_predicted() {
     let train = declared();
     let mut ratios = Vec::new();
     for seed in 0..SEEDS {
@@ -241,9 +242,9 @@ fn the_deviation_of_the_mass_after_traction_is_the_one_foretold() {
         let kind = DriveKind::Accelerate;
         let drive = Drive { kind, from_mps: 3.0, to_mps: 38.0, within_s: 20.0 };
         let scene = Scene::new(&train, train.resistance, MASS_KG, 20.0);
-        let foretold = mass::forecast(&scene, std_t, &noise, drive).unwrap();
+        let expected_by_advice = mass::forecast(&scene, std_t, &noise, drive).unwrap();
         trial.drive(drive);
-        ratios.push(foretold.std_t / trial.snapshot().std(Parameter::Mass).unwrap());
+        ratios.push(expected_by_advice.std_t / trial.snapshot().std(Parameter::Mass).unwrap());
     }
     let [low, median, high] = quantiles(ratios);
     println!("mass: foretold / found: median {median:.2}, 10 % {low:.2}, 90 % {high:.2}");

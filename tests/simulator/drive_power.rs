@@ -65,14 +65,14 @@ fn held_and_errors(has_auxiliaries: bool) -> (usize, Vec<f64>) {
 }
 
 #[test]
-fn the_efficiency_is_told_within_its_interval_from_the_drives_power() {
+fn the_efficiency_is_reported_within_its_interval_from_the_drives_power() {
     let (held, errors) = held_and_errors(false);
     assert!(held >= HELD_MIN, "{held} of {}", errors.len());
     assert!(errors.iter().all(|error| error.abs() < ERROR_MAX), "{errors:?}");
 }
 
 #[test]
-fn the_efficiency_is_told_within_its_interval_from_the_lines_power() {
+fn the_efficiency_is_reported_within_its_interval_from_the_lines_power() {
     let (held, errors) = held_and_errors(true);
     assert!(held >= HELD_MIN, "{held} of {}", errors.len());
     assert!(errors.iter().all(|error| error.abs() < ERROR_MAX), "{errors:?}");

@@ -66,7 +66,7 @@ fn late_s(force_sampling: ForceSampling) -> Vec<f64> {
 }
 
 #[test]
-fn a_survey_tells_forces_of_an_instant_held_ones_and_averages_apart() {
+fn a_survey_shows_forces_of_an_instant_held_ones_and_averages_apart() {
     for (sampling, expected_s) in
         [(ForceSampling::Instant, 0.0), (ForceSampling::Held, -0.5), (ForceSampling::Averaged, 0.5)]
     {

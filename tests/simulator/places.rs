@@ -12,7 +12,7 @@ const SEED: u64 = 97_004;
 const END_ERROR_MAX_M: f64 = 30.0;
 
 #[test]
-fn two_places_felt_together_are_told_with_their_ends_and_are_no_tunnels() {
+fn two_places_felt_together_are_reported_with_their_ends_and_are_no_tunnels() {
     let effects = EffectRequest::Kinds(vec![EffectKind::LocalResistance]);
     let simulated = simulate(&SimulatorSettings::new(SEED, effects));
     let [Effect::LocalResistance { intervals_m: truth, .. }] = &simulated.effects[..] else {

@@ -19,7 +19,7 @@ const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 
 /// A change of the description that no file contradicts.
 #[derive(Clone, Copy, Debug)]
-enum Slip {
+enum InputFault {
     /// Quantities are read so many times too large.
     Scale(&'static [&'static str], f64),
     /// Two columns are exchanged, or the sign of their difference.
@@ -35,51 +35,70 @@ enum Slip {
 const FORCES: &[&str] = &["traction_force", "brake_force", "control_force"];
 
 /// What goes wrong, the code of the note, and the reason of the pipelines.
-const SLIPS: [(&str, Slip, &str, Reason); 17] = [
-    ("kN as N", Slip::Scale(FORCES, 1e-3), "forces_scale", Reason::ImplausibleForces),
-    ("N as kN", Slip::Scale(FORCES, 1e3), "forces_scale", Reason::ImplausibleForces),
-    ("lbf as N", Slip::Scale(FORCES, 0.224_809), "forces_scale", Reason::ImplausibleForces),
-    ("exchanged", Slip::Exchange, "forces_swapped", Reason::ImplausibleForces),
-    ("km/h as m/s", Slip::Scale(&["speed"], 3.6), "speed_scale", Reason::ImplausibleMotion),
-    ("m/s as km/h", Slip::Scale(&["speed"], 1.0 / 3.6), "speed_scale", Reason::ImplausibleMotion),
-    ("mph as m/s", Slip::Scale(&["speed"], 2.236_936), "speed_scale", Reason::ImplausibleMotion),
-    ("km as m", Slip::Scale(&["position"], 1e-3), "position_scale", Reason::ImplausibleMotion),
-    ("m as km", Slip::Scale(&["position"], 1e3), "position_scale", Reason::ImplausibleMotion),
-    ("ms as s", Slip::Scale(&["time"], 1e3), "time_scale", Reason::ImplausibleMotion),
-    ("s as ms", Slip::Scale(&["time"], 1e-3), "time_scale", Reason::ImplausibleMotion),
-    ("t as kg", Slip::Mass(1e-3), "mass_scale", Reason::ImplausibleMass),
-    ("direction", Slip::Direction, "direction_reversed", Reason::ImplausibleMotion),
-    ("% as permille", Slip::Gradient(0.1), "gradient_scale", Reason::ImplausibleGradient),
-    ("falls for climbs", Slip::Gradient(-1.0), "gradient_sign", Reason::ImplausibleGradient),
+const SLIPS: [(&str, InputFault, &str, Reason); 17] = [
+    ("kN as N", InputFault::Scale(FORCES, 1e-3), "forces_scale", Reason::ImplausibleForces),
+    ("N as kN", InputFault::Scale(FORCES, 1e3), "forces_scale", Reason::ImplausibleForces),
+    ("lbf as N", InputFault::Scale(FORCES, 0.224_809), "forces_scale", Reason::ImplausibleForces),
+    ("exchanged", InputFault::Exchange, "forces_swapped", Reason::ImplausibleForces),
+    ("km/h as m/s", InputFault::Scale(&["speed"], 3.6), "speed_scale", Reason::ImplausibleMotion),
+    (
+        "m/s as km/h",
+        InputFault::Scale(&["speed"], 1.0 / 3.6),
+        "speed_scale",
+        Reason::ImplausibleMotion,
+    ),
+    (
+        "mph as m/s",
+        InputFault::Scale(&["speed"], 2.236_936),
+        "speed_scale",
+        Reason::ImplausibleMotion,
+    ),
+    (
+        "km as m",
+        InputFault::Scale(&["position"], 1e-3),
+        "position_scale",
+        Reason::ImplausibleMotion,
+    ),
+    ("m as km", InputFault::Scale(&["position"], 1e3), "position_scale", Reason::ImplausibleMotion),
+    ("ms as s", InputFault::Scale(&["time"], 1e3), "time_scale", Reason::ImplausibleMotion),
+    ("s as ms", InputFault::Scale(&["time"], 1e-3), "time_scale", Reason::ImplausibleMotion),
+    ("t as kg", InputFault::Mass(1e-3), "mass_scale", Reason::ImplausibleMass),
+    ("direction", InputFault::Direction, "direction_reversed", Reason::ImplausibleMotion),
+    ("% as permille", InputFault::Gradient(0.1), "gradient_scale", Reason::ImplausibleGradient),
+    ("falls for climbs", InputFault::Gradient(-1.0), "gradient_sign", Reason::ImplausibleGradient),
     ("kPa as Pa", PRESSURE_KPA, "pressure_scale", Reason::ImplausiblePressure),
     ("bar as Pa", PRESSURE_BAR, "pressure_scale", Reason::ImplausiblePressure),
 ];
-const PRESSURE_KPA: Slip = Slip::Scale(&["brake_cylinder_pressure"], 1e-3);
-const PRESSURE_BAR: Slip = Slip::Scale(&["brake_cylinder_pressure"], 1e-5);
+const PRESSURE_KPA: InputFault = InputFault::Scale(&["brake_cylinder_pressure"], 1e-3);
+const PRESSURE_BAR: InputFault = InputFault::Scale(&["brake_cylinder_pressure"], 1e-5);
 
-impl Slip {
+impl InputFault {
     /// Applies it to a line of a file.
     fn line(self, file: &str, line: &str) -> String {
         let key = line.split(" =").next().unwrap_or_default();
         match self {
-            Slip::Scale(quantities, factor) if quantities.contains(&key) => scaled(line, factor),
-            Slip::Exchange if key == "control_force" => scaled(line, -1.0),
-            Slip::Exchange if key == "traction_force" => {
+            InputFault::Scale(quantities, factor) if quantities.contains(&key) => {
+                scaled(line, factor)
+            }
+            InputFault::Exchange if key == "control_force" => scaled(line, -1.0),
+            InputFault::Exchange if key == "traction_force" => {
                 line.replacen("traction_force =", "brake_force =", 1)
             }
-            Slip::Exchange if key == "brake_force" => {
+            InputFault::Exchange if key == "brake_force" => {
                 line.replacen("brake_force =", "traction_force =", 1)
             }
-            Slip::Mass(factor) if file == "dataset.toml" && key == "mass_t" => {
+            InputFault::Mass(factor) if file == "dataset.toml" && key == "mass_t" => {
                 let mass_t: f64 = line.split("= ").nth(1).unwrap().parse().unwrap();
                 format!("mass_t = {:.4}", mass_t * factor)
             }
-            Slip::Direction if key == "direction" => {
+            InputFault::Direction if key == "direction" => {
                 let direction: i32 = line.split("= ").nth(1).unwrap().parse().unwrap();
                 format!("direction = {}", -direction)
             }
             // Curves have three numbers.
-            Slip::Gradient(factor) if file == "track.toml" && line.matches(',').count() == 2 => {
+            InputFault::Gradient(factor)
+                if file == "track.toml" && line.matches(',').count() == 2 =>
+            {
                 let Some((from, permille)) =
                     line.trim().trim_matches(['[', ']', ',']).split_once(", ")
                 else {
@@ -121,10 +140,10 @@ fn files(settings: &SimulatorSettings) -> Vec<(String, String)> {
 }
 
 /// Writes a dataset with a slip.
-fn write(files: &[(String, String)], slip: Option<Slip>, folder: &Path) {
+fn write(files: &[(String, String)], slip: Option<InputFault>, folder: &Path) {
     std::fs::create_dir_all(folder.join("runs")).unwrap();
     for (path, text) in files {
-        let changed = |slip: Slip| {
+        let changed = |slip: InputFault| {
             let lines = text.lines().map(|line| slip.line(path, line) + "\n");
             lines.collect::<String>()
         };
@@ -162,7 +181,7 @@ fn has_note(answer: &Value, code: &str) -> bool {
 const TRAINS: [(u64, TrainType); 2] = [(401, TrainType::Freight), (402, TrainType::Metro)];
 
 #[test]
-fn every_slip_is_named_by_check_identify_and_explain_on_the_terminal_and_in_json() {
+fn every_input_fault_is_named_by_check_identify_and_explain_on_the_terminal_and_in_json() {
     for (seed, train_type) in TRAINS {
         let files = files(&settings(seed, train_type, EffectRequest::none()));
         for (name, slip, code, _) in SLIPS {
@@ -239,7 +258,7 @@ fn notes_on(settings: &SimulatorSettings) -> Vec<String> {
 }
 
 #[test]
-fn no_effect_however_large_and_no_poor_recording_is_taken_for_a_slip() {
+fn no_effect_however_large_and_no_poor_recording_is_taken_for_a_input_fault() {
     let none: [String; 0] = [];
     let mut cases: Vec<EffectRequest> = EffectKind::ALL
         .iter()

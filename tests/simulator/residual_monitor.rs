@@ -131,7 +131,7 @@ fn forces_that_are_calibrated_anew_for_a_run_are_no_brake_that_drags() {
 }
 
 #[test]
-fn what_no_force_or_a_scale_of_forces_tells_is_named_too() {
+fn what_no_force_or_a_scale_of_forces_shows_is_named_too() {
     for (seed, kind) in [
         (310, EffectKind::WheelDiameter),
         (311, EffectKind::ActuatorDelay),
@@ -147,7 +147,7 @@ fn what_no_force_or_a_scale_of_forces_tells_is_named_too() {
 }
 
 #[test]
-fn a_force_by_a_law_of_the_speed_that_no_term_follows_is_told_to_be_unknown() {
+fn a_force_by_a_law_of_the_speed_that_no_term_follows_is_said_to_be_unknown() {
     for (seed, law) in [
         (330, Law::Slow { below_mps: 15.0, least_mps: 3.0 }),
         (331, Law::Band { centre_mps: 14.0, width_mps: 3.0 }),
@@ -166,7 +166,7 @@ fn a_force_by_a_law_of_the_speed_that_no_term_follows_is_told_to_be_unknown() {
 }
 
 #[test]
-fn what_cannot_be_told_apart_is_told_as_alternatives() {
+fn what_cannot_be_distinguished_is_reported_as_alternatives() {
     // On a level, straight line another rotating mass does what another mass does.
     let kinds = EffectRequest::Kinds(vec![EffectKind::RotatingMass]);
     let mut settings = SimulatorSettings::new(320, kinds);

@@ -8,7 +8,7 @@ use dynocar_tests::simulator::dataset_writer::write_dataset;
 use dynocar_tests::simulator::{
     Effect, EffectRequest, GnssReceiver, SimulatedDataset, SimulatorSettings, TrainType, simulate,
 };
-use dynocar_workshop::survey::answer::Answer;
+use dynocar_workshop::survey::answer::SurveyAnswer;
 use dynocar_workshop::survey::survey_folder;
 
 /// A regional railway of about 30 km: six runs to fit and two held out, each over the whole line.
@@ -24,7 +24,7 @@ fn railway(seed: u64, effects: EffectRequest) -> SimulatorSettings {
 /// What became of a simulated railway.
 struct Case {
     truth: SimulatedDataset,
-    answer: Answer,
+    answer: SurveyAnswer,
     explanation: Explanation,
 }
 

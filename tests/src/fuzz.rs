@@ -367,7 +367,7 @@ pub fn run(target: Target, rounds: u64, seed: u64) -> u64 {
                 let path = target.folder().join(format!("panic-{seed}-{round}.bin"));
                 // The panic tells more than a failure to keep the input.
                 let _ = std::fs::write(&path, &input);
-                dynocar::output::tell(&format!(
+                dynocar::output::report_line(&format!(
                     "{target:?}, seed {seed}, round {round}: {}",
                     path.display()
                 ));

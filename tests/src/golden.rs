@@ -24,7 +24,7 @@ pub fn path() -> PathBuf {
 
 /// What one estimator made of the runs.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Line {
+pub struct GoldenLine {
     /// The kind of estimator.
     pub kind: String,
     /// Samples used, rejected, lost, and updates.
@@ -41,7 +41,7 @@ pub struct Golden {
     /// Fingerprint of the C library's functions.
     pub fingerprint: u64,
     /// By kind.
-    pub lines: Vec<Line>,
+    pub lines: Vec<GoldenLine>,
 }
 
 fn mix(hash: &mut u64, word: u64) {
@@ -133,7 +133,7 @@ pub fn compute() -> Golden {
             mix_snapshot(&mut hash, pipeline.process(sample));
         }
         let last = pipeline.snapshot();
-        Line {
+        GoldenLine {
             kind: settings.kind().to_string(),
             counts: [last.samples_used, last.samples_rejected, last.samples_lost, last.updates],
             hash,
@@ -177,7 +177,7 @@ impl Golden {
                 return None;
             };
             let count = |word: &str| word.parse().ok();
-            Some(Line {
+            Some(GoldenLine {
                 kind: (*kind).to_owned(),
                 counts: [count(used)?, count(rejected)?, count(lost)?, count(updates)?],
                 hash: hash(bits)?,

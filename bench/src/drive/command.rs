@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use dynocar::output::{tell, write_file};
+use dynocar::output::{report_line, write_file};
 
 use super::line::{Condition, Service};
 use super::run::{Extent, Informant, drive as drive_all};
@@ -109,6 +109,6 @@ fn measure(service: Service, extent: Extent) -> Result<Scored, RigError> {
     for (driven, informant) in all.iter_mut().zip(Informant::ALL) {
         *driven = drive_all(service, informant, extent)?;
     }
-    tell(&format!("{}: done", service.name()));
+    report_line(&format!("{}: done", service.name()));
     Ok(score(service, &all))
 }

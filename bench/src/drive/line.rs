@@ -8,7 +8,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::knowledge::Ability;
-use crate::scenarios::world::{LoadTold, Scenario, Traffic, World, normal};
+use crate::scenarios::world::{LoadSource, Scenario, Traffic, World, normal};
 
 /// What is particular about brakes, rail or daemon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,9 +77,9 @@ impl Service {
         Scenario {
             traffic: self.traffic,
             load: match self.traffic {
-                Traffic::Metro => LoadTold::Changing,
-                Traffic::Freight => LoadTold::Unknown,
-                Traffic::Emu | Traffic::HighSpeed => LoadTold::Weighed(20),
+                Traffic::Metro => LoadSource::Changing,
+                Traffic::Freight => LoadSource::Unknown,
+                Traffic::Emu | Traffic::HighSpeed => LoadSource::Weighed(20),
             },
             jumps: false,
             rate_hz: 1000 / self.cycle_ms,

@@ -3,7 +3,7 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::score::{Figure, Line, Scored};
+use super::score::{Figure, ReportRow, Scored};
 
 const SIZE: (u32, u32) = (1_080, 400);
 const COLORS: [RGBColor; 3] =
@@ -23,10 +23,10 @@ pub fn svg(scored: &[Scored]) -> Result<String, Box<dyn std::error::Error>> {
         let area = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
         area.fill(&WHITE)?;
         let panels = area.split_evenly((1, 3));
-        let cm = |line: &Line| scaled(line.error_m, 100.0, 0.0);
+        let cm = |line: &ReportRow| scaled(line.error_m, 100.0, 0.0);
         panel(&panels[0], "stopping error in cm (rms)", scored, cm, true)?;
         panel(&panels[1], "off the timetable in s", scored, |line| line.late_s, false)?;
-        let more = |line: &Line| scaled(line.energy_percent, 1.0, -100.0);
+        let more = |line: &ReportRow| scaled(line.energy_percent, 1.0, -100.0);
         panel(&panels[2], "energy above the least in %", scored, more, false)?;
         area.present()?;
     }
@@ -38,7 +38,7 @@ fn panel(
     area: &DrawingArea<SVGBackend<'_>, Shift>,
     title: &str,
     scored: &[Scored],
-    figure: impl Fn(&Line) -> Figure,
+    figure: impl Fn(&ReportRow) -> Figure,
     has_legend: bool,
 ) -> Drawn {
     let figures = scored.iter().flat_map(|it| &it.lines).map(&figure);

@@ -49,7 +49,7 @@ impl Figure {
 
 /// A service with one kind of parameters.
 #[derive(Clone, Debug, Serialize)]
-pub struct Line {
+pub struct ReportRow {
     /// The service.
     pub scenario: String,
     /// The parameters.
@@ -121,7 +121,7 @@ pub struct Comparison {
 #[derive(Clone, Debug, Serialize)]
 pub struct Scored {
     /// Declared, Dynocar, true.
-    pub lines: Vec<Line>,
+    pub lines: Vec<ReportRow>,
     /// By quantity.
     pub answers: Vec<Answered>,
     /// With and without Dynocar.
@@ -172,7 +172,7 @@ impl Drives<'_> {
 
 /// Scores a service's drives with declared, learned and true parameters.
 pub fn score(service: Service, all: &[Vec<Driven>; 3]) -> Scored {
-    let lines: Vec<Line> = Informant::ALL
+    let lines: Vec<ReportRow> = Informant::ALL
         .into_iter()
         .zip(all)
         .map(|(informant, own)| line(service, informant, &Drives { own, all }))
@@ -183,7 +183,7 @@ pub fn score(service: Service, all: &[Vec<Driven>; 3]) -> Scored {
     Scored { lines, answers, comparison }
 }
 
-fn line(service: Service, informant: Informant, drives: &Drives<'_>) -> Line {
+fn line(service: Service, informant: Informant, drives: &Drives<'_>) -> ReportRow {
     let trains = drives.own.len();
     let share = |within_m: f64| {
         Figure::of(trains, |it| {
@@ -199,7 +199,7 @@ fn line(service: Service, informant: Informant, drives: &Drives<'_>) -> Line {
     let given = looks.iter().filter_map(|look| Some(look.bound_m? / look.true_m));
     let given_count = given.clone().count().max(1) as f64;
     let is_true = informant == Informant::Truth;
-    Line {
+    ReportRow {
         scenario: service.name(),
         driver: informant.name(),
         stops: drives.own.iter().map(|driven| driven.ways.len()).sum(),
@@ -245,7 +245,7 @@ fn answered(service: Service, place: usize, driven: &[Driven], stops: usize) -> 
     }
 }
 
-fn comparison(service: Service, all: &[Vec<Driven>; 3], lines: &[Line]) -> Comparison {
+fn comparison(service: Service, all: &[Vec<Driven>; 3], lines: &[ReportRow]) -> Comparison {
     let [declared, learned] = [0, 1].map(|which| Drives { own: &all[which], all });
     let (mut better, mut worse) = (Vec::new(), Vec::new());
     let mut is_stop = [false; 2];

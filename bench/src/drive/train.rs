@@ -13,7 +13,7 @@ use rand_chacha::ChaCha8Rng;
 use super::knowledge::{Ability, Knowledge};
 use super::leg::{Leg, PIECE_M};
 use super::line::{Condition, Hidden, Service, ability, declared_gear, next_load_kg};
-use crate::scenarios::world::{LoadTold, World, normal};
+use crate::scenarios::world::{LoadSource, World, normal};
 
 /// Longest step of the simulation in s.
 const STEP_MAX_S: f64 = 0.02;
@@ -95,13 +95,13 @@ impl Train {
         let random = &mut self.random;
         self.mass_kg = next_load_kg(self.service.traffic, self.mass_kg, random);
         let scale = match self.world.scenario.load {
-            LoadTold::Changing => 1.0 + 0.03 * normal(random),
-            LoadTold::Weighed(permille) => {
+            LoadSource::Changing => 1.0 + 0.03 * normal(random),
+            LoadSource::Weighed(permille) => {
                 // One weighing, wrong the same way all day.
                 let sign = if self.seed.is_multiple_of(2) { 1.0 } else { -1.0 };
                 1.0 + sign * 1e-3 * f64::from(permille)
             }
-            LoadTold::Exact | LoadTold::Unknown => 1.0,
+            LoadSource::Exact | LoadSource::Unknown => 1.0,
         };
         self.weighed_kg = scale * self.mass_kg;
         self.brake_scale = self.hidden.brake_scale * (1.0 + STOP_TO_STOP * normal(random));
@@ -285,7 +285,7 @@ impl Train {
         sample.set(SampleField::Gradient, self.world.gradient_permille(place_m)[0]);
         let curvature = self.hidden.curvature_per_m(place_m);
         sample.set(SampleField::CurveRadius, if curvature > 0.0 { 1.0 / curvature } else { 0.0 });
-        if scenario.load != LoadTold::Unknown {
+        if scenario.load != LoadSource::Unknown {
             sample.set(SampleField::Mass, self.weighed_kg);
         }
         sample

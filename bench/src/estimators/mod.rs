@@ -11,7 +11,7 @@
 //! - [`report`]: the table and the JSON
 //! - [`beside`]: another build of the program beside this one
 
-pub mod beside;
+pub mod against;
 pub mod braking;
 pub mod em_peers;
 pub mod least_squares;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use dynocar_core::filter::random::Random;
 use dynocar_core::force::balance::mps2_per_n_per_kn;
 use dynocar_core::pipeline::papers::xia::trajectory::fit::{
-    DavisPrior, FitSettings, Stretch, TrajectoryFit, TrajectoryFitter,
+    DavisPrior, FitSettings, MotionSegment, TrajectoryFit, TrajectoryFitter,
 };
 use dynocar_core::pipeline::papers::xia::trajectory::step::{Step, StepRule};
 use dynocar_core::train::Davis;
@@ -80,10 +80,13 @@ impl Windows {
         self
     }
 
-    fn stretch(&self, window: usize) -> Stretch<'_> {
+    fn stretch(&self, window: usize) -> MotionSegment<'_> {
         let first = window * SLIDE;
         let last = first + self.samples - 1;
-        Stretch { steps: &self.steps[first..last], speeds_mps: &self.speeds_mps[first..=last] }
+        MotionSegment {
+            steps: &self.steps[first..last],
+            speeds_mps: &self.speeds_mps[first..=last],
+        }
     }
 
     fn fit(&self, fitter: &mut TrajectoryFitter, window: usize) -> TrajectoryFit {
@@ -131,7 +134,7 @@ fn case(samples: usize, target_ns: f64) -> Case {
     }
 }
 
-fn peer_fit(stretch: Stretch<'_>, start: &Davis) -> Davis {
+fn peer_fit(stretch: MotionSegment<'_>, start: &Davis) -> Davis {
     let point = peer::Vector4::new(start.a, start.b, start.c, stretch.speeds_mps[0]);
     let samples = stretch.speeds_mps.len();
     let share = DECREASE / (0.5 * samples as f64);
@@ -144,7 +147,7 @@ fn peer_fit(stretch: Stretch<'_>, start: &Davis) -> Davis {
 /// Residuals of the computed trajectory and of the prior, in standard deviations, over
 /// (a, b, c, v_0).
 struct PeerProblem<'a> {
-    stretch: Stretch<'a>,
+    stretch: MotionSegment<'a>,
     point: peer::Vector4<f64>,
 }
 

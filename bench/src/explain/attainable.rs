@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::effects::Hypothesis;
-use dynocar_analysis::explain::evidence::{GrownModel, Noise, RunData, SampleForces};
+use dynocar_analysis::explain::evidence::{Noise, RunData, SampleForces, UpdatedModel};
 use dynocar_analysis::explain::score::run_error;
 use dynocar_core::simulate::{Restart, SpeedError};
 use dynocar_core::terms::Parameter;
@@ -98,7 +98,7 @@ pub fn attainable_mps(simulated: &SimulatedDataset, explanation: &Explanation) -
     let davis = simulated.train.resistance;
     let mut start = vec![davis.a, davis.b, davis.c, unlisted.n_per_kn];
     start.extend(numbers(unlisted.law));
-    let model = GrownModel::default().with(Arc::new(TrueLaw::new(unlisted.law)));
+    let model = UpdatedModel::default().with(Arc::new(TrueLaw::new(unlisted.law)));
     let problem = &explanation.problem;
     let first = problem.fit_with_noise(&model, start, Noise::START);
     let fit = problem.fit_with_noise(&model, first.theta, first.noise);

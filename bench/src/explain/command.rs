@@ -63,7 +63,7 @@ pub fn explain(arguments: &ExplainArguments) -> Result<(), (String, u8)> {
     let (seeds, first) = (arguments.seeds, arguments.first_seed);
     if arguments.growth {
         let sizes = growth::measure(&scenarios, first, &|size| {
-            dynocar::output::tell(&format!(
+            dynocar::output::report_line(&format!(
                 "{} x{}: {:.1} s",
                 size.axis.name(),
                 size.factor,
@@ -78,24 +78,24 @@ pub fn explain(arguments: &ExplainArguments) -> Result<(), (String, u8)> {
             case.write(folder).map_err(|error| (format!("{}: {error}", folder.display()), 1))?;
         }
     }
-    let tell = |case: &Case, grade: &Grade| {
+    let report = |case: &Case, grade: &Grade| {
         if arguments.verbose {
-            tell(case, grade);
+            print_case(case, grade);
         }
     };
-    let matrix = matrix::run(&scenarios, &cases, arguments.threads.max(1), &tell);
+    let matrix = matrix::run(&scenarios, &cases, arguments.threads.max(1), &report);
     give(&arguments.json, &matrix, || matrix::table(&matrix))
 }
 
 /// One dataset's outcome on standard error.
-fn tell(case: &Case, grade: &Grade) {
+fn print_case(case: &Case, grade: &Grade) {
     let kinds: Vec<_> = case.scenario.kinds(case.seed).iter().map(|kind| kind.name()).collect();
     let parameters: Vec<String> = grade
         .parameters
         .iter()
         .map(|p| format!("{} {:+.3} ({:+.1} sd)", p.name, p.error, p.z))
         .collect();
-    dynocar::output::tell(&format!(
+    dynocar::output::report_line(&format!(
         "{} seed {}: {} {} {} iou {:?} ends {}/{} share {:?} {}",
         if grade.is_right { "right" } else { "WRONG" },
         case.seed,
@@ -108,8 +108,8 @@ fn tell(case: &Case, grade: &Grade) {
         grade.share,
         parameters.join(", ")
     ));
-    dynocar::output::tell(&format!("    strength {:.2}", grade.strength));
+    dynocar::output::report_line(&format!("    strength {:.2}", grade.acceptance_score));
     for detail in &grade.details {
-        dynocar::output::tell(&format!("    {detail}"));
+        dynocar::output::report_line(&format!("    {detail}"));
     }
 }

@@ -1,7 +1,7 @@
 //! An answer against the truth.
 
 use dynocar_analysis::explain::Explanation;
-use dynocar_analysis::explain::answer::{Answer, HALF_95};
+use dynocar_analysis::explain::answer::{ExplainAnswer, HALF_95};
 use dynocar_core::track::LinearProfile;
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};
@@ -39,7 +39,7 @@ pub struct Grade {
     /// The same of the true law with estimated numbers, for a law that no library holds.
     pub attainable_ratio: Option<f64>,
     /// Greatest strength of a candidate in the first round of the search.
-    pub strength: f64,
+    pub acceptance_score: f64,
 }
 
 /// One parameter.
@@ -107,7 +107,7 @@ pub fn grade(simulated: &SimulatedDataset, case: &Case, explanation: &Explanatio
         share: attained.and_then(|attained| attained.share),
         left_ratio: attained.map(|attained| attained.left_ratio),
         attainable_ratio: attained.and_then(|attained| attained.attainable_ratio),
-        strength: explanation.strength,
+        acceptance_score: explanation.acceptance_score,
     }
 }
 
@@ -134,7 +134,7 @@ fn is_exactly(
 /// What the answer says, for people, and what it was if that is in no library.
 fn details(
     simulated: &SimulatedDataset,
-    answer: &Answer,
+    answer: &ExplainAnswer,
     attained: Option<Attained>,
 ) -> Vec<String> {
     let mut details: Vec<String> = answer

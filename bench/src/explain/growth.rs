@@ -70,7 +70,7 @@ impl Size {
 }
 
 /// Explains one dataset of each scenario at every size, one after the other on one thread.
-pub fn measure(scenarios: &[Scenario], seed: u64, tell: &dyn Fn(&Size)) -> Vec<Size> {
+pub fn measure(scenarios: &[Scenario], seed: u64, report: &dyn Fn(&Size)) -> Vec<Size> {
     let mut sizes = Vec::new();
     for axis in [Axis::Runs, Axis::Duration] {
         for factor in FACTORS {
@@ -85,7 +85,7 @@ pub fn measure(scenarios: &[Scenario], seed: u64, tell: &dyn Fn(&Size)) -> Vec<S
                 explained(&dataset);
                 size.seconds += since.elapsed().as_secs_f64();
             }
-            tell(&size);
+            report(&size);
             sizes.push(size);
         }
     }

@@ -99,20 +99,20 @@ pub fn run(
     scenarios: &[Scenario],
     cases: &[Case],
     threads: usize,
-    tell: &(dyn Fn(&Case, &Grade) + Sync),
+    report: &(dyn Fn(&Case, &Grade) + Sync),
 ) -> Matrix {
     let seeds = cases.len() / scenarios.len().max(1);
     let grades = over(cases, threads, |case| {
         let simulated = case.simulate();
         let explanation = explained(&read(&simulated));
         let graded = grade(&simulated, case, &explanation);
-        tell(case, &graded);
+        report(case, &graded);
         graded
     });
     let rows = scenarios.iter().zip(grades.chunks(seeds.max(1)));
     let nulls = rows.clone().filter(|(scenario, _)| scenario.is_null());
     let raised = nulls.clone().map(|(_, grades)| grades.iter().filter(|g| !g.is_right).count());
-    let strengths = nulls.clone().flat_map(|(_, grades)| grades.iter().map(|g| g.strength));
+    let strengths = nulls.clone().flat_map(|(_, grades)| grades.iter().map(|g| g.acceptance_score));
     let strengths: Vec<f64> = strengths.collect();
     Matrix {
         intervals: intervals(&grades),
@@ -227,8 +227,8 @@ pub fn table(matrix: &Matrix) -> String {
     }
     let FalseAlarms { runs, raised, strength_quantiles } = &matrix.false_alarms;
     text += &format!("false alarms: {raised} of {runs}\n");
-    for (share, strength) in strength_quantiles {
-        text += &format!("strength on nulls: {:.0} % below {strength:.2}\n", 100.0 * share);
+    for (share, acceptance_score) in strength_quantiles {
+        text += &format!("strength on nulls: {:.0} % below {acceptance_score:.2}\n", 100.0 * share);
     }
     text
 }

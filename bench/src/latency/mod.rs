@@ -161,7 +161,7 @@ pub fn run(arguments: &LatencyArguments) -> Result<Measured, LatencyError> {
     })?;
     let mut random = ChaCha8Rng::seed_from_u64(arguments.seed);
     for round in 1..=rounds {
-        dynocar::output::tell(&format!("round {round} of {rounds}"));
+        dynocar::output::report_line(&format!("round {round} of {rounds}"));
         let mut order: Vec<usize> = (0..cases.len()).collect();
         order.shuffle(&mut random);
         for place in order {

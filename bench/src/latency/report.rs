@@ -16,7 +16,7 @@ use crate::rig::usage::ThreadUsage;
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// One line for each case.
-    pub cases: Vec<Line>,
+    pub cases: Vec<ReportRow>,
     /// What a call costs.
     #[serde(flatten)]
     pub costs: Costs,
@@ -34,7 +34,7 @@ pub struct Report {
 
 /// One case.
 #[derive(Clone, Debug, Serialize)]
-pub struct Line {
+pub struct ReportRow {
     /// `floor`, `dynocar/<pipeline>` or `alternative/<transport>`.
     pub name: String,
     /// `busy`, `adaptive` or `event`.
@@ -82,7 +82,7 @@ impl Report {
     }
 }
 
-fn line((case, outcomes): &(Case, Vec<Outcome>), all: &[(Case, Vec<Outcome>)]) -> Line {
+fn line((case, outcomes): &(Case, Vec<Outcome>), all: &[(Case, Vec<Outcome>)]) -> ReportRow {
     let floor = all.iter().find(|(it, _)| it.name == "floor" && it.idle == case.floor_idle());
     let ratio = |quantile: f64| {
         let of =
@@ -103,7 +103,7 @@ fn line((case, outcomes): &(Case, Vec<Outcome>), all: &[(Case, Vec<Outcome>)]) -
             *suffered.get_or_insert(ThreadUsage::default()) += usage;
         }
     }
-    Line {
+    ReportRow {
         name: case.name.clone(),
         idle: case.idle.to_string(),
         latency: Quantiles::of(&pooled(outcomes)),

@@ -31,14 +31,14 @@ enum PeerKind {
         config: PathBuf,
     },
     /// Copies sample to snapshot on the daemon's channels, looking without pause
-    Echo(Place),
+    Echo(ServerSite),
     /// The same, woken by a listener of the plain transport
-    ListeningEcho(Place),
+    ListeningEcho(ServerSite),
     /// The estimator behind a Unix datagram socket
-    UnixDatagram(Place),
+    UnixDatagram(ServerSite),
     /// The estimator behind a ZeroMQ socket
     #[cfg(feature = "zeromq")]
-    ZeroMq(Place),
+    ZeroMq(ServerSite),
 }
 
 impl PeerKind {
@@ -55,7 +55,7 @@ impl PeerKind {
 }
 
 #[derive(Debug, Args)]
-struct Place {
+struct ServerSite {
     /// The site's folder
     folder: PathBuf,
     /// The core to bind to
@@ -69,7 +69,7 @@ struct Place {
     blocks: bool,
 }
 
-impl Place {
+impl ServerSite {
     fn pin(&self) {
         if let Some(core) = self.core {
             bind(core);

@@ -20,7 +20,7 @@ pub struct Report {
     /// How long, in s.
     pub seconds: f64,
     /// By pipeline, over all trains.
-    pub pipelines: Vec<Line>,
+    pub pipelines: Vec<ReportRow>,
     /// Processor time of the daemon over wall time, in %.
     pub cpu_percent: f64,
     /// Resident memory of the daemon after the first tenth, in bytes.
@@ -41,7 +41,7 @@ pub struct Report {
 
 /// One pipeline.
 #[derive(Clone, Debug, Serialize)]
-pub struct Line {
+pub struct ReportRow {
     /// Its kind.
     pub name: String,
     /// Samples published for its trains.
@@ -62,7 +62,7 @@ pub struct Line {
 impl Report {
     /// Of a trial.
     pub fn of(plan: &TrialPlan, trial: &Trial, host: HostFigures) -> Self {
-        let line = |it: &super::trial::PipelineOutcome| Line {
+        let line = |it: &super::trial::PipelineOutcome| ReportRow {
             name: it.kind.to_string(),
             offered: it.offered,
             used: it.used,

@@ -61,7 +61,7 @@ pub fn highest_rate(plan: &TrialPlan) -> Result<Found, RigError> {
         let mut plan = plan.clone();
         plan.traffic.rate_hz = rate_hz;
         let verdict = judge(&in_thread(|| trial::run(&plan))?);
-        dynocar::output::tell(&format!(
+        dynocar::output::report_line(&format!(
             "{rate_hz:.0} Hz: {}",
             match verdict {
                 Verdict::Clean => "nothing lost",
@@ -128,7 +128,7 @@ pub fn growth(plan: &TrialPlan) -> Result<Vec<Size>, RigError> {
             let mut plan = plan.clone();
             plan.trains = trains;
             plan.pipelines.truncate(width);
-            dynocar::output::tell(&format!("{trains} trains, {width} pipelines"));
+            dynocar::output::report_line(&format!("{trains} trains, {width} pipelines"));
             sizes.push(size(&plan, &in_thread(|| trial::run(&plan))?));
         }
     }

@@ -55,7 +55,7 @@ pub fn monitor(arguments: &MonitorArguments) -> Result<(), (String, u8)> {
             if arguments.verbose {
                 let raised = watched.raised.iter().map(|(kind, s)| format!("{kind} at {s:.0} s"));
                 let raised: Vec<String> = raised.collect();
-                dynocar::output::tell(&format!(
+                dynocar::output::report_line(&format!(
                     "{} seed {}: {} (wrong {:.0} s of {:.0})",
                     case.scenario.name(),
                     case.seed,

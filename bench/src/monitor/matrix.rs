@@ -74,11 +74,11 @@ pub struct Matrix {
 }
 
 /// Runs the matrix. Every finished case is told to `tell`.
-pub fn run(plan: &Plan<'_>, tell: &(dyn Fn(&Case, &Watched) + Sync)) -> Matrix {
+pub fn run(plan: &Plan<'_>, report: &(dyn Fn(&Case, &Watched) + Sync)) -> Matrix {
     let cases = cases(plan.scenarios, plan.seeds, plan.first_seed, plan.world);
     let watched = over(&cases, plan.threads, |case| {
         let watched = watch(&simulate(&SimulatorSettings { runs: plan.runs, ..case.settings() }));
-        tell(case, &watched);
+        report(case, &watched);
         watched
     });
     let rows = plan.scenarios.iter().zip(watched.chunks(plan.seeds.max(1)));

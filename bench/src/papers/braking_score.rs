@@ -1,7 +1,7 @@
 //! Errors of the braking estimators over seeded runs.
 
 use dynocar_core::pipeline::EstimatorSettings;
-use dynocar_core::pipeline::braking::intake::Quantity;
+use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
 use dynocar_core::pipeline::braking::settings::{
     BrakeFactor, BrakingSettings, EStep, EkfSettings, EmSettings, LawSettings, SmootherSettings,
     WalkSettings,
@@ -221,9 +221,9 @@ pub fn smoother_knowledge(sought: Sought) -> Knowledge {
 
 fn smoother_walk(sought: Sought) -> WalkSettings {
     SmootherSettings::default().walk(match sought {
-        Sought::Adhesion => Quantity::Adhesion,
-        Sought::Friction => Quantity::Friction,
-        Sought::Ratio => Quantity::Ratio,
+        Sought::Adhesion => BrakingCoefficient::Adhesion,
+        Sought::Friction => BrakingCoefficient::Friction,
+        Sought::Ratio => BrakingCoefficient::Ratio,
     })
 }
 

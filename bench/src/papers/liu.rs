@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use dynocar_core::force::balance::mps2_per_n_per_kn;
 use dynocar_core::pipeline::papers::xia::trajectory::fit::{
-    FitSettings, Stretch, TrajectoryFitter,
+    FitSettings, MotionSegment, TrajectoryFitter,
 };
 use dynocar_core::pipeline::papers::xia::trajectory::step::{Step, StepRule};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
@@ -113,10 +113,10 @@ fn whole_runs(runs: &[Vec<Measured>]) -> Option<Estimate> {
     let speed_mps = |sample: &Measured| sample.speed_kmh / 3.6;
     let speeds: Vec<Vec<f64>> =
         runs.iter().map(|run| run.iter().map(speed_mps).collect()).collect();
-    let stretches: Vec<Stretch<'_>> = steps
+    let stretches: Vec<MotionSegment<'_>> = steps
         .iter()
         .zip(&speeds)
-        .map(|(steps, speeds_mps)| Stretch { steps, speeds_mps })
+        .map(|(steps, speeds_mps)| MotionSegment { steps, speeds_mps })
         .collect();
     let settings =
         FitSettings { outlier_threshold: OUTLIER_THRESHOLD, ..FitSettings::new(StepRule::Time) };

@@ -52,7 +52,7 @@ mod tests {
     #[test]
     fn the_bound_is_that_of_the_estimators_own_derivatives() {
         use dynocar_core::pipeline::papers::xia::trajectory::fit::{
-            FitSettings, Stretch, TrajectoryFitter,
+            FitSettings, MotionSegment, TrajectoryFitter,
         };
         use dynocar_core::pipeline::papers::xia::trajectory::step::StepRule;
         let run = drive(Profile::Full, 25e3, 1, |_| CASES[0]);
@@ -61,7 +61,7 @@ mod tests {
             speed_noise_mps: Some(scenario::SPEED_NOISE_MPS),
             ..FitSettings::new(StepRule::Distance)
         };
-        let stretches = [Stretch { steps: &run.steps, speeds_mps: &run.speeds_mps }];
+        let stretches = [MotionSegment { steps: &run.steps, speeds_mps: &run.speeds_mps }];
         let fit = TrajectoryFitter::default().fit(&stretches, None, &settings).unwrap();
         for i in 0..3 {
             let ratio = fit.covariance[(i, i)] / numerical[(i, i)];

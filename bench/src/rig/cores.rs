@@ -1,6 +1,6 @@
 //! Cores and priorities of a measurement.
 
-use dynocar::output::tell;
+use dynocar::output::report_line;
 use dynocar::runtime::affinity::pin_to_core;
 use dynocar::runtime::scheduling::set_fifo_priority;
 
@@ -45,7 +45,9 @@ pub fn in_thread<T: Send>(
 /// Binds the calling thread to a core; without that the figures vary more, which is said.
 pub fn bind(core: usize) {
     if let Err(error) = pin_to_core(core) {
-        tell(&format!("dynocar-bench: not bound to core {core}, figures will vary more: {error}"));
+        report_line(&format!(
+            "dynocar-bench: not bound to core {core}, figures will vary more: {error}"
+        ));
     }
 }
 
@@ -55,6 +57,8 @@ pub fn prioritise(priority: Option<u8>) {
     if let Some(priority) = priority
         && let Err(error) = set_fifo_priority(priority)
     {
-        tell(&format!("dynocar-bench: no priority {priority}, figures will vary more: {error}"));
+        report_line(&format!(
+            "dynocar-bench: no priority {priority}, figures will vary more: {error}"
+        ));
     }
 }

@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn times_are_told_in_a_fitting_unit() {
+    fn times_are_reported_in_a_fitting_unit() {
         let told = [812.0, 4_310.0, 2.2e6].map(for_people);
         assert_eq!(told, ["812 ns", "4.31 µs", "2.20 ms"]);
     }

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector, Matrix4};
 
 use super::drive::Truth;
 use super::world::{
-    COEFFICIENT_SHARE, DELAY_STD_S, KNOT_M, LoadTold, ROTATING_MASS_STD, WEIGHING_STD, World,
+    COEFFICIENT_SHARE, DELAY_STD_S, KNOT_M, LoadSource, ROTATING_MASS_STD, WEIGHING_STD, World,
     knot_std_permille,
 };
 
@@ -54,12 +54,12 @@ impl Bound {
     /// Before the first sample of a drive of so many hours.
     pub fn new(world: &World, hours: f64) -> Self {
         let scenario = &world.scenario;
-        let opens_at_stops = scenario.load == LoadTold::Changing;
+        let opens_at_stops = scenario.load == LoadSource::Changing;
         let load_std = match scenario.load {
-            LoadTold::Exact => 0.0,
-            LoadTold::Weighed(permille) => 1e-3 * f64::from(permille),
-            LoadTold::Unknown => DRAWN_LOAD_STD,
-            LoadTold::Changing => WEIGHING_STD,
+            LoadSource::Exact => 0.0,
+            LoadSource::Weighed(permille) => 1e-3 * f64::from(permille),
+            LoadSource::Unknown => DRAWN_LOAD_STD,
+            LoadSource::Changing => WEIGHING_STD,
         };
         // No train here stops more than once a minute.
         let loads = if opens_at_stops { (60.0 * hours) as usize + 2 } else { 1 };

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use rand::RngExt;
 
-use super::world::{Habits, LoadTold, WEIGHING_STD, World, normal};
+use super::world::{Habits, LoadSource, WEIGHING_STD, World, normal};
 
 /// Steps of the simulation per cycle of the controller.
 const STEPS: u32 = 10;
@@ -119,8 +119,8 @@ impl Drive {
     fn weigh(&mut self) {
         let World { scenario, random, .. } = &mut self.world;
         self.told_kg = match scenario.load {
-            LoadTold::Exact | LoadTold::Unknown => self.mass_kg,
-            LoadTold::Weighed(permille) => {
+            LoadSource::Exact | LoadSource::Unknown => self.mass_kg,
+            LoadSource::Weighed(permille) => {
                 let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
                 // One weighing, wrong the same way for the whole drive.
                 if self.cycle == 0 {
@@ -129,7 +129,7 @@ impl Drive {
                     self.told_kg
                 }
             }
-            LoadTold::Changing => self.mass_kg * (1.0 + WEIGHING_STD * normal(random)),
+            LoadSource::Changing => self.mass_kg * (1.0 + WEIGHING_STD * normal(random)),
         };
     }
 
@@ -244,7 +244,7 @@ impl Drive {
             self.direction = 1.0;
         }
         self.next_stop = (self.next_stop as f64 + self.direction) as usize;
-        if self.world.scenario.load == LoadTold::Changing {
+        if self.world.scenario.load == LoadSource::Changing {
             let share = 0.24 * (self.world.random.random::<f64>() - 0.5);
             self.mass_kg = self.world.declared.mass_kg * (1.0 + share);
             self.weigh();
@@ -274,7 +274,7 @@ impl Drive {
         sample.set(SampleField::TractionForce, force_scale[0] * force_n.max(0.0));
         sample.set(SampleField::BrakeForce, force_scale[1] * (-force_n).max(0.0));
         sample.set(SampleField::Gradient, self.world.gradient_permille(place_m)[0]);
-        if scenario.load != LoadTold::Unknown {
+        if scenario.load != LoadSource::Unknown {
             sample.set(SampleField::Mass, self.told_kg);
         }
         Moment { sample, mass_kg: self.mass_kg, w0_n_per_kn, speed_mps: self.speed_mps }

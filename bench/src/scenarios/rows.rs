@@ -1,6 +1,6 @@
 //! The scenarios of the table.
 
-use super::world::{LoadTold, Scenario, Traffic};
+use super::world::{LoadSource, Scenario, Traffic};
 
 /// A scenario with its name.
 #[derive(Clone, Debug)]
@@ -18,12 +18,12 @@ const TRAFFIC: [(&str, Traffic); 4] = [
     ("high speed", Traffic::HighSpeed),
 ];
 
-const LOADS: [(&str, LoadTold); 5] = [
-    ("load exact", LoadTold::Exact),
-    ("weighed 2 % wrong", LoadTold::Weighed(20)),
-    ("weighed 5 % wrong", LoadTold::Weighed(50)),
-    ("load unknown", LoadTold::Unknown),
-    ("load changes at stops", LoadTold::Changing),
+const LOADS: [(&str, LoadSource); 5] = [
+    ("load exact", LoadSource::Exact),
+    ("weighed 2 % wrong", LoadSource::Weighed(20)),
+    ("weighed 5 % wrong", LoadSource::Weighed(50)),
+    ("load unknown", LoadSource::Unknown),
+    ("load changes at stops", LoadSource::Changing),
 ];
 
 /// All rows: each load, and the ordinary one with everything else varied.
@@ -34,7 +34,7 @@ pub fn all() -> Vec<NamedScenario> {
 fn of(traffic_name: &str, traffic: Traffic) -> Vec<NamedScenario> {
     let usual = Scenario {
         traffic,
-        load: LoadTold::Weighed(20),
+        load: LoadSource::Weighed(20),
         jumps: false,
         rate_hz: 10,
         speed_noise_mps: 0.03,

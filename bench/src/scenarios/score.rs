@@ -36,12 +36,12 @@ pub struct Score {
 
 impl Score {
     /// Takes in a cycle of so many s.
-    pub fn push(&mut self, time_s: f64, cycle_s: f64, answer: Option<Answer>) {
+    pub fn push(&mut self, time_s: f64, cycle_s: f64, answer: Option<ScoredAnswer>) {
         self.cycles += 1;
         let is_usable = answer.is_some();
         self.changes += u64::from(is_usable != self.was_usable);
         self.was_usable = is_usable;
-        let Some(Answer { error, deviation }) = answer else {
+        let Some(ScoredAnswer { error, deviation }) = answer else {
             self.wrong_now_s = 0.0;
             return;
         };
@@ -94,7 +94,7 @@ pub fn least_deviation(bound: &Matrix4<f64>, quantity: Quantity, moment: &Moment
 
 /// A usable answer: error and standard deviation, both relative to the truth.
 #[derive(Clone, Copy, Debug)]
-pub struct Answer {
+pub struct ScoredAnswer {
     /// Error over the truth.
     pub error: f64,
     /// Standard deviation over the truth.
@@ -102,7 +102,11 @@ pub struct Answer {
 }
 
 /// The resistance at the speed driven or the mass, if a snapshot may be used for it.
-pub fn answer(snapshot: &ParameterSnapshot, quantity: Quantity, moment: &Moment) -> Option<Answer> {
+pub fn answer(
+    snapshot: &ParameterSnapshot,
+    quantity: Quantity,
+    moment: &Moment,
+) -> Option<ScoredAnswer> {
     if !snapshot.is_usable_for(quantity) {
         return None;
     }
@@ -116,5 +120,5 @@ pub fn answer(snapshot: &ParameterSnapshot, quantity: Quantity, moment: &Moment)
             (mass_t, snapshot.std(Parameter::Mass)?, 1e-3 * moment.mass_kg)
         }
     };
-    Some(Answer { error: (value - truth) / truth, deviation: deviation / truth })
+    Some(ScoredAnswer { error: (value - truth) / truth, deviation: deviation / truth })
 }

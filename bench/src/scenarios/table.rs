@@ -11,7 +11,7 @@ use super::bound::Bound;
 use super::drive::Drive;
 use super::rows::NamedScenario;
 use super::score::{Score, answer, least_deviation};
-use super::world::{LoadTold, Scenario, World};
+use super::world::{LoadSource, Scenario, World};
 use crate::parallel;
 
 /// Speed in m/s from which an answer counts.
@@ -40,7 +40,7 @@ pub struct Plan<'a> {
 
 /// One quantity of one pipeline in one scenario, over all drives.
 #[derive(Clone, Debug, Serialize)]
-pub struct Line {
+pub struct ReportRow {
     /// The scenario.
     pub scenario: String,
     /// The pipeline.
@@ -70,7 +70,7 @@ pub struct Line {
 /// # Errors
 ///
 /// When a kind cannot be built.
-pub fn run(plan: &Plan<'_>) -> Result<Vec<Line>, SettingError> {
+pub fn run(plan: &Plan<'_>) -> Result<Vec<ReportRow>, SettingError> {
     let cases: Vec<(&NamedScenario, PipelineKind)> = plan
         .scenarios
         .iter()
@@ -84,7 +84,7 @@ pub fn run(plan: &Plan<'_>) -> Result<Vec<Line>, SettingError> {
 fn settings(kind: PipelineKind, scenario: &Scenario) -> Option<EstimatorSettings> {
     let mut settings = EstimatorSettings::default_of(kind)?;
     if let EstimatorSettings::TrainKalman(own) = &mut settings {
-        if scenario.load == LoadTold::Exact {
+        if scenario.load == LoadSource::Exact {
             own.mass_std_percent = 0.0;
         }
         own.gradient_std_permille = scenario.map_std_permille;
@@ -96,7 +96,7 @@ fn measure(
     plan: &Plan<'_>,
     row: &NamedScenario,
     kind: PipelineKind,
-) -> Result<Vec<Line>, SettingError> {
+) -> Result<Vec<ReportRow>, SettingError> {
     let Some(settings) = settings(kind, &row.scenario) else { return Ok(Vec::new()) };
     let mut totals = QUANTITIES.map(|_| (Score::default(), Vec::new()));
     for seed in plan.first_seed..plan.first_seed + plan.seeds {
@@ -153,11 +153,11 @@ fn line(
     kind: PipelineKind,
     quantity: Quantity,
     (total, mut firsts): (Score, Vec<f64>),
-) -> Line {
+) -> ReportRow {
     firsts.sort_by(f64::total_cmp);
     let first_s = firsts[firsts.len() / 2];
     let usable = total.usable.max(1) as f64;
-    Line {
+    ReportRow {
         scenario: row.name.clone(),
         pipeline: kind.name(),
         quantity: quantity.name(),
@@ -174,7 +174,7 @@ fn line(
 }
 
 /// The lines as a table of Markdown, which reads in a terminal too.
-pub fn table(lines: &[Line]) -> String {
+pub fn table(lines: &[ReportRow]) -> String {
     let mut text = String::from(
         "| scenario | pipeline | quantity | usable % | truth within 95 % | first use s | changes per h \
          | longest wrong s | error % | error / deviation | error / bound |\n\

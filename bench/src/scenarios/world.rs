@@ -20,7 +20,7 @@ pub enum Traffic {
 
 /// What is told of the load.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LoadTold {
+pub enum LoadSource {
     /// The declared mass is the true one, and the configuration says so.
     Exact,
     /// Every sample carries a mass wrong by so many per mille, too low or too high.
@@ -37,7 +37,7 @@ pub struct Scenario {
     /// The traffic.
     pub traffic: Traffic,
     /// What is told of the load.
-    pub load: LoadTold,
+    pub load: LoadSource,
     /// True where forces jump from cycle to cycle; else their change is limited.
     pub jumps: bool,
     /// Samples per second.
@@ -159,8 +159,12 @@ impl World {
         let delay_s = near(DELAY_S, DELAY_STD_S / DELAY_S).clamp(0.0, 0.25);
         truth.rotating_mass_factor += near(1.0, ROTATING_MASS_STD) - 1.0;
         truth.mass_kg *= match scenario.load {
-            LoadTold::Exact | LoadTold::Weighed(_) => 1.0 + 0.3 * (random.random::<f64>() - 0.5),
-            LoadTold::Unknown | LoadTold::Changing => 1.0 + 0.24 * (random.random::<f64>() - 0.5),
+            LoadSource::Exact | LoadSource::Weighed(_) => {
+                1.0 + 0.3 * (random.random::<f64>() - 0.5)
+            }
+            LoadSource::Unknown | LoadSource::Changing => {
+                1.0 + 0.24 * (random.random::<f64>() - 0.5)
+            }
         };
         let mut stops_m = vec![500.0];
         while stops_m[stops_m.len() - 1] < habits.line_m {

@@ -62,7 +62,7 @@ impl From<MqttError> for BrokerError {
 
 /// What the broker says.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Told {
+pub enum BrokerEvent {
     /// It has taken all that was sent before the ping.
     Pong,
     /// A command for the node.
@@ -74,7 +74,7 @@ pub struct Broker {
     stream: TcpStream,
     mqtt: Connection<role::Client>,
     out: Vec<u8>,
-    told: Vec<Told>,
+    told: Vec<BrokerEvent>,
     is_accepted: bool,
 }
 
@@ -165,7 +165,7 @@ impl Broker {
     /// # Errors
     ///
     /// When the connection is lost.
-    pub fn receive(&mut self, patience: Duration) -> Result<Vec<Told>, BrokerError> {
+    pub fn receive(&mut self, patience: Duration) -> Result<Vec<BrokerEvent>, BrokerError> {
         self.stream.set_read_timeout(Some(patience))?;
         let mut bytes = [0; 4096];
         let count = match self.stream.read(&mut bytes) {
@@ -216,9 +216,9 @@ impl Broker {
                 return Err(BrokerError::Refused(it.reason_code().to_string()));
             }
             Packet::V5_0Publish(it) => {
-                self.told.push(Told::Command(it.payload().as_slice().to_vec()));
+                self.told.push(BrokerEvent::Command(it.payload().as_slice().to_vec()));
             }
-            Packet::V5_0Pingresp(_) => self.told.push(Told::Pong),
+            Packet::V5_0Pingresp(_) => self.told.push(BrokerEvent::Pong),
             Packet::V5_0Disconnect(it) => {
                 let why = it.reason_code().map_or(String::new(), |it| format!(": {it}"));
                 return Err(BrokerError::Closed(why));

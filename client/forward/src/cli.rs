@@ -8,7 +8,7 @@ use clap::{CommandFactory, Parser};
 use dynocar::cli::{Failure, parse};
 use dynocar::dataset::read_text;
 use dynocar::ending;
-use dynocar::output::tell;
+use dynocar::output::report_line;
 use dynocar_client::{ChannelError, Host};
 use dynocar_shared::TrainId;
 
@@ -92,7 +92,7 @@ fn execute(arguments: &Arguments) -> Result<(), Failure> {
     };
     let must_end = ending::flag().map_err(|error| Failure::Work(error.to_string()))?;
     let counts = forward(&settings, &must_end);
-    tell(&format!(
+    report_line(&format!(
         "dynocar forward: {} publications made: {} taken by the broker, {} dropped, {} not sent",
         counts.made, counts.taken, counts.dropped, counts.waiting
     ));

@@ -17,7 +17,7 @@ use crate::payload::Value;
 
 /// The place of a metric among a pipeline's metrics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Place {
+pub struct MetricIndex {
     /// The folder within the pipeline's; empty for none.
     pub folder: &'static str,
     /// The name, with its unit.
@@ -26,14 +26,14 @@ pub struct Place {
 
 /// What does not change about a metric.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Told {
+pub struct MetricMeta {
     /// Where it is.
-    pub place: Place,
+    pub place: MetricIndex,
     /// Its meaning.
     pub meaning: &'static str,
 }
 
-impl Told {
+impl MetricMeta {
     /// The unit; empty for a count, words or a ratio.
     pub fn unit(&self) -> &'static str {
         unit_of(self.place.name)
@@ -68,18 +68,18 @@ pub static NUMBERS: LazyLock<Vec<Field>> = LazyLock::new(|| {
 });
 
 /// Gives every metric of a pipeline: what it is, and its value at this moment of the host's monotonic clock.
-pub fn each_metric(reading: &Reading<'_>, now_ns: i64, mut give: impl FnMut(Told, Value)) {
+pub fn each_metric(reading: &Reading<'_>, now_ns: i64, mut give: impl FnMut(MetricMeta, Value)) {
     let it = reading.snapshot;
-    let mut tell = |folder, name, meaning, value| {
-        give(Told { place: Place { folder, name }, meaning }, value);
+    let mut put = |folder, name, meaning, value| {
+        give(MetricMeta { place: MetricIndex { folder, name }, meaning }, value);
     };
     let status = Value::words(reading.status().name());
-    tell("", "status", "What may be done with the estimate", status);
+    put("", "status", "What may be done with the estimate", status);
     let reason = reading.reason().map_or("unknown", Reason::name);
-    tell("", "reason", "Why the status is what it is", Value::words(reason));
+    put("", "reason", "Why the status is what it is", Value::words(reason));
     let age_s = 1e-9 * now_ns.saturating_sub(it.sample_published_ns).max(0) as f64;
     let age_s = (it.sample_sequence > 0).then_some(age_s);
-    tell("", "age_s", "Age of the newest sample behind the estimate", Value::Number(age_s));
+    put("", "age_s", "Age of the newest sample behind the estimate", Value::Number(age_s));
     for (place, &number) in it.parameters.iter().take(it.parameter_count as usize).enumerate() {
         let Some(parameter) = Parameter::from_number(number) else { continue };
         // A field of this name says it, and another its deviation.
@@ -88,8 +88,8 @@ pub fn each_metric(reading: &Reading<'_>, now_ns: i64, mut give: impl FnMut(Told
         }
         let (name, meaning) = (parameter.full_name(), parameter.meaning().trim());
         let std = it.covariance_at(place, place).max(0.0).sqrt();
-        tell("", name, meaning, Value::Number(Some(it.values[place])));
-        tell("std", name, "Standard deviation of the value of this name", Value::Number(Some(std)));
+        put("", name, meaning, Value::Number(Some(it.values[place])));
+        put("std", name, "Standard deviation of the value of this name", Value::Number(Some(std)));
     }
     let words = it.fields();
     for field in NUMBERS.iter() {
@@ -98,33 +98,33 @@ pub fn each_metric(reading: &Reading<'_>, now_ns: i64, mut give: impl FnMut(Told
             "f64" => Value::Number(Some(f64::from_bits(word))),
             _ => Value::Count(Some(word)),
         };
-        tell("", field.layout.name, field.meaning, value);
+        put("", field.layout.name, field.meaning, value);
     }
     for &reason in RejectionReason::ALL {
         let count = Value::Count(Some(u64::from(it.rejected(reason))));
-        tell("rejected", reason.name(), reason.meaning().trim(), count);
+        put("rejected", reason.name(), reason.meaning().trim(), count);
     }
     let suspect = EffectKind::from_number(it.suspected_effect).map_or("unknown", EffectKind::name);
-    tell("", "suspect", "Suspected effect that the model lacks", Value::words(suspect));
+    put("", "suspect", "Suspected effect that the model lacks", Value::words(suspect));
     let others = it.alternatives().map(EffectKind::name).collect::<Vec<_>>().join(",");
     let meaning = "Other effects that these data hardly tell from it, with commas between";
-    tell("", "suspect_alternatives", meaning, Value::words(others));
+    put("", "suspect_alternatives", meaning, Value::words(others));
     let source = it.mass_source().map_or("unknown", MassSource::name);
-    tell("", "mass_source", "Where the mass comes from", Value::words(source));
+    put("", "mass_source", "Where the mass comes from", Value::words(source));
     let usable = Quantity::ALL.iter().filter(|quantity| it.is_usable_for(**quantity));
     let usable = usable.map(|quantity| quantity.name()).collect::<Vec<_>>().join(",");
     let meaning = "Quantities whose values a controller may use, with commas between";
-    tell("", "usable", meaning, Value::words(usable));
+    put("", "usable", meaning, Value::words(usable));
     let is_excited = |place: &usize| it.excited & (1 << place) != 0;
     let excited = (0..it.parameter_count as usize).filter(is_excited);
     let excited = excited.filter_map(|place| Parameter::from_number(it.parameters[place]));
     let excited = excited.map(Parameter::full_name).collect::<Vec<_>>().join(",");
     let meaning = "Parameters that the data excited, with commas between";
-    tell("", "excited", meaning, Value::words(excited));
+    put("", "excited", meaning, Value::words(excited));
     let missing = Manoeuvre::ALL.iter().filter(|a| it.missing_manoeuvres & a.bit() != 0);
     let missing = missing.map(|a| a.name()).collect::<Vec<_>>().join(",");
     let meaning = "Manoeuvres that would tell what the data do not, with commas between";
-    tell("", "missing_manoeuvres", meaning, Value::words(missing));
+    put("", "missing_manoeuvres", meaning, Value::words(missing));
 }
 
 /// The folder of a pipeline's metrics: its number and kind.

@@ -4,11 +4,11 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use dynocar::output::tell;
+use dynocar::output::report_line;
 use dynocar_client::Host;
 use dynocar_shared::TrainId;
 
-use crate::broker::{Broker, BrokerError, Login, PATIENCE, Told};
+use crate::broker::{Broker, BrokerError, BrokerEvent, Login, PATIENCE};
 use crate::node::{Known, Message, NodeName, Session, is_rebirth, locked};
 use crate::payload::utc_ms;
 use crate::queue::Counts;
@@ -25,7 +25,7 @@ const RETRY: [Duration; 2] = [Duration::from_millis(500), Duration::from_secs(15
 /// How long the end waits for the broker to take what is left.
 const FAREWELL: Duration = Duration::from_secs(3);
 /// How often drops are told at most.
-const TELL_DROPS: Duration = Duration::from_secs(10);
+const REPORT_DROPS: Duration = Duration::from_secs(10);
 
 /// What is forwarded, and where to.
 #[derive(Clone, Debug)]
@@ -50,7 +50,7 @@ pub fn forward(settings: &Settings, must_end: &AtomicBool) -> Counts {
     let is_all_made = AtomicBool::new(false);
     std::thread::scope(|scope| {
         scope.spawn(|| {
-            let told = ToldAtEnd(&is_all_made);
+            let told = ReportAtEnd(&is_all_made);
             let (host, trains) = (settings.host.clone(), settings.trains.clone());
             let mut watcher = Watcher::new(host, trains, settings.every, &known);
             watcher.run(must_end);
@@ -63,9 +63,9 @@ pub fn forward(settings: &Settings, must_end: &AtomicBool) -> Counts {
 }
 
 /// Sets its flag when its thread ends, however that ends: sending ends after the last publication is made.
-struct ToldAtEnd<'a>(&'a AtomicBool);
+struct ReportAtEnd<'a>(&'a AtomicBool);
 
-impl Drop for ToldAtEnd<'_> {
+impl Drop for ReportAtEnd<'_> {
     fn drop(&mut self) {
         self.0.store(true, Ordering::Relaxed);
     }
@@ -87,7 +87,7 @@ pub fn send(settings: &Settings, known: &Mutex<Known>, must_end: &AtomicBool) {
                 Ok(broker) => {
                     connections += 1;
                     (retry, told) = (RETRY[0], String::new());
-                    tell(&format!(
+                    report_line(&format!(
                         "dynocar forward: connected to {} as {}/{}",
                         settings.login.address, settings.name.group, settings.name.node
                     ));
@@ -104,12 +104,15 @@ pub fn send(settings: &Settings, known: &Mutex<Known>, must_end: &AtomicBool) {
         locked(known).queue.give_back();
         let words = error.to_string();
         if told != words {
-            tell(&format!("dynocar forward: {}: {words}; trying again", settings.login.address));
+            report_line(&format!(
+                "dynocar forward: {}: {words}; trying again",
+                settings.login.address
+            ));
             told = words;
         }
         let begun = Instant::now();
         while begun.elapsed() < retry && !must_end.load(Ordering::Relaxed) {
-            drops.tell(locked(known).queue.counts());
+            drops.report(locked(known).queue.counts());
             std::thread::sleep(PAUSE);
         }
         retry = (2 * retry).min(RETRY[1]);
@@ -125,9 +128,13 @@ struct Drops {
 
 impl Drops {
     /// Tells people of drops that they do not know of, now and then.
-    fn tell(&mut self, counts: Counts) {
-        if counts.dropped > self.dropped && self.told.is_none_or(|it| it.elapsed() >= TELL_DROPS) {
-            tell(&format!("dynocar forward: {} publications dropped so far", counts.dropped));
+    fn report(&mut self, counts: Counts) {
+        if counts.dropped > self.dropped && self.told.is_none_or(|it| it.elapsed() >= REPORT_DROPS)
+        {
+            report_line(&format!(
+                "dynocar forward: {} publications dropped so far",
+                counts.dropped
+            ));
             (self.dropped, self.told) = (counts.dropped, Some(Instant::now()));
         }
     }
@@ -161,12 +168,12 @@ impl<'a> Sending<'a> {
         loop {
             for told in self.broker.receive(PAUSE)? {
                 match told {
-                    Told::Pong => {
+                    BrokerEvent::Pong => {
                         self.pinged = None;
                         locked(self.known).queue.take_note();
                     }
-                    Told::Command(command) if is_rebirth(&command) => self.births()?,
-                    Told::Command(_) => {}
+                    BrokerEvent::Command(command) if is_rebirth(&command) => self.births()?,
+                    BrokerEvent::Command(_) => {}
                 }
             }
             if self.pinged.is_some_and(|it| it.elapsed() >= PATIENCE) {
@@ -177,7 +184,7 @@ impl<'a> Sending<'a> {
             }
             if Instant::now() >= own_due {
                 own_due = Instant::now() + every;
-                drops.tell(locked(self.known).queue.counts());
+                drops.report(locked(self.known).queue.counts());
                 if self.pinged.is_none() {
                     self.own_data()?;
                 }

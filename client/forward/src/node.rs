@@ -68,7 +68,7 @@ impl Known {
     pub fn publish(&mut self, publication: Option<Publication>) {
         let dropped = publication.and_then(|it| self.queue.push(it));
         if let Some(train) = dropped.and_then(|it| self.trains.get_mut(&it)) {
-            train.tell_all();
+            train.report_all();
         }
     }
 }

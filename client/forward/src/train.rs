@@ -6,7 +6,7 @@ use dynocar_client::Reading;
 use dynocar_shared::{PipelineKind, Quantity, TrainId};
 use prost::Message;
 
-use crate::fields::{Place, Told, each_metric, folder};
+use crate::fields::{MetricIndex, MetricMeta, each_metric, folder};
 use crate::payload::{Metric, Payload, Value};
 use crate::queue::Publication;
 
@@ -19,7 +19,7 @@ const OF_TRAIN: (u32, u32) = (u32::MAX, 0);
 #[derive(Clone, Debug)]
 struct Slot {
     name: String,
-    told: Told,
+    told: MetricMeta,
     value: Value,
     taken_ms: u64,
     is_changed: bool,
@@ -37,7 +37,7 @@ pub struct Train {
     pub is_alive: bool,
     first_alias: u64,
     slots: Vec<Slot>,
-    places: HashMap<((u32, u32), Place), usize>,
+    places: HashMap<((u32, u32), MetricIndex), usize>,
     round: u64,
     publications: u64,
     must_tell_all: bool,
@@ -114,11 +114,11 @@ impl Train {
         value: Value,
         now_ms: u64,
     ) {
-        let told = Told { place: Place { folder, name }, meaning };
+        let told = MetricMeta { place: MetricIndex { folder, name }, meaning };
         self.set(OF_TRAIN, told, value, now_ms);
     }
 
-    fn set(&mut self, pipeline: (u32, u32), told: Told, value: Value, now_ms: u64) {
+    fn set(&mut self, pipeline: (u32, u32), told: MetricMeta, value: Value, now_ms: u64) {
         let round = if pipeline == OF_TRAIN { 0 } else { self.round };
         if let Some(&place) = self.places.get(&(pipeline, told.place)) {
             let slot = &mut self.slots[place];
@@ -173,7 +173,7 @@ impl Train {
     /// A publication of an event, with what has changed.
     pub fn event(&mut self, kind: &'static str, text: String, now_ms: u64) -> Option<Publication> {
         for (name, value) in [("kind", Value::words(kind)), ("text", Value::words(text))] {
-            let place = Place { folder: "event", name };
+            let place = MetricIndex { folder: "event", name };
             let slot = self.places.get(&(OF_TRAIN, place)).copied();
             if let Some(slot) = slot.and_then(|it| self.slots.get_mut(it)) {
                 // An event like the last is one all the same.
@@ -184,7 +184,7 @@ impl Train {
     }
 
     /// Makes the next publication tell everything: one before it was dropped.
-    pub fn tell_all(&mut self) {
+    pub fn report_all(&mut self) {
         self.must_tell_all = true;
     }
 

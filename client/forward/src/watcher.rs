@@ -7,7 +7,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use dynocar::output::tell;
+use dynocar::output::report_line;
 use dynocar_client::{ChannelError, Host, Peer, Reading, Role, SnapshotReader, monotonic_now_ns};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Reason, Status, TrainId};
@@ -31,19 +31,19 @@ type Event = (&'static str, String);
 
 /// What was last seen of a pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Seen {
+struct LastSnapshot {
     status: Status,
     reason: Option<Reason>,
     suspect: u32,
 }
 
 /// One train with the one reader of its snapshots.
-struct Lane {
+struct TrainChannel {
     train: TrainId,
     reader: Option<SnapshotReader>,
     daemon: Option<u32>,
     controller: Option<u32>,
-    pipelines: BTreeMap<u32, Seen>,
+    pipelines: BTreeMap<u32, LastSnapshot>,
     is_silent: bool,
     due: Instant,
     /// Why it cannot be read, as it was last told.
@@ -57,7 +57,7 @@ pub struct Watcher<'a> {
     wanted: Vec<TrainId>,
     every: Duration,
     known: &'a Mutex<Known>,
-    lanes: Vec<Lane>,
+    lanes: Vec<TrainChannel>,
 }
 
 impl<'a> Watcher<'a> {
@@ -102,7 +102,7 @@ impl<'a> Watcher<'a> {
     }
 
     fn add(&mut self, train: TrainId) {
-        self.lanes.push(Lane {
+        self.lanes.push(TrainChannel {
             train,
             reader: None,
             daemon: None,
@@ -115,7 +115,7 @@ impl<'a> Watcher<'a> {
     }
 }
 
-impl Lane {
+impl TrainChannel {
     /// Looks who is there, and opens the reader when it can be opened.
     fn look_up(&mut self, host: &Host, events: &mut Vec<Event>) {
         match self.peers(host, events) {
@@ -123,7 +123,7 @@ impl Lane {
             Err(error) => {
                 let trouble = error.to_string();
                 if self.trouble != trouble {
-                    tell(&format!("dynocar forward: {trouble}"));
+                    report_line(&format!("dynocar forward: {trouble}"));
                     self.trouble = trouble;
                 }
             }
@@ -208,13 +208,20 @@ impl Lane {
 }
 
 /// Notes what has changed about a pipeline. Silence is an event of the train, not of each pipeline.
-fn note(pipelines: &mut BTreeMap<u32, Seen>, reading: &Reading<'_>, events: &mut Vec<Event>) {
+fn note(
+    pipelines: &mut BTreeMap<u32, LastSnapshot>,
+    reading: &Reading<'_>,
+    events: &mut Vec<Event>,
+) {
     if reading.is_stale {
         return;
     }
     let it = reading.snapshot;
-    let now =
-        Seen { status: reading.status(), reason: reading.reason(), suspect: it.suspected_effect };
+    let now = LastSnapshot {
+        status: reading.status(),
+        reason: reading.reason(),
+        suspect: it.suspected_effect,
+    };
     let last = pipelines.insert(it.pipeline_index, now);
     let name = folder(it.pipeline_index, it.pipeline_kind());
     if last.is_none_or(|last| (last.status, last.reason) != (now.status, now.reason)) {

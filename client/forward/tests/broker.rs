@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use dynocar_client::Host;
-use dynocar_forward::broker::{Broker, BrokerError, Login, Told};
+use dynocar_forward::broker::{Broker, BrokerError, BrokerEvent, Login};
 use dynocar_forward::forwarder::{Settings, forward, send};
 use dynocar_forward::node::{Known, Message, NodeName, locked};
 use dynocar_forward::queue::Publication;
@@ -73,8 +73,8 @@ fn answered(bytes: &'static [u8]) -> BrokerError {
 }
 
 #[test]
-fn a_broker_that_refuses_closes_in_mid_packet_or_talks_nonsense_is_told_from_one_that_is_not_there()
-{
+fn a_broker_that_refuses_closes_in_mid_packet_or_talks_nonsense_is_distinguished_from_one_that_is_not_there()
+ {
     let refused = answered(NOT_AUTHORIZED);
     assert!(matches!(refused, BrokerError::Refused(_)), "{refused}");
     assert!(refused.to_string().contains("refuses the connection: "), "{refused}");
@@ -127,7 +127,7 @@ fn a_command_that_comes_byte_by_byte_is_one_command() {
         }
         told
     });
-    assert_eq!(told, [Told::Command(b"again".to_vec()), Told::Pong]);
+    assert_eq!(told, [BrokerEvent::Command(b"again".to_vec()), BrokerEvent::Pong]);
 }
 
 /// Ends what works until its flag is set, however its test ends.

@@ -271,7 +271,7 @@ fn a_train_that_has_more_metrics_than_it_was_born_with_is_born_again_before_its_
 }
 
 #[test]
-fn a_full_queue_drops_the_oldest_and_the_train_then_tells_everything() {
+fn a_full_queue_drops_the_oldest_and_the_train_then_reports_everything() {
     let mut known = known(4);
     for now_ms in 1..=4 {
         publish(&mut known, now_ms);

@@ -15,6 +15,6 @@
 
 pub mod cli;
 pub mod live;
+pub mod slow_viewers;
 pub mod thinning;
-pub mod told;
 pub mod viewers;

@@ -4,13 +4,13 @@ use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use dynocar::output::tell;
-use dynocar_recording::lanes::{Lanes, PAUSE, Wanted};
+use dynocar::output::report_line;
+use dynocar_recording::train_channels::{PAUSE, TrainChannels, Wanted};
 use foxglove::{FoxgloveError, WebSocketServerHandle};
 use tokio::runtime::Builder;
 use tokio::time::{sleep, timeout};
 
-use crate::told::tell_of_viewers;
+use crate::slow_viewers::report_viewers;
 use crate::viewers::{LiveError, Viewers};
 
 /// Messages that wait for one viewer; then the oldest are dropped.
@@ -37,7 +37,7 @@ pub struct Settings {
 ///
 /// When the address cannot be served or a channel cannot be opened.
 pub fn live(settings: &Settings, stop: &AtomicBool) -> Result<(), LiveError> {
-    tell_of_viewers();
+    report_viewers();
     // One thread reads and serves by turns: the protocol's library refuses a viewer that subscribes to
     // a channel while it is still being advertised on another thread.
     let runtime = Builder::new_current_thread().enable_all().build().map_err(LiveError::System)?;
@@ -49,16 +49,16 @@ pub fn live(settings: &Settings, stop: &AtomicBool) -> Result<(), LiveError> {
 
 async fn serve(settings: &Settings, stop: &AtomicBool) -> Result<(), LiveError> {
     let mut viewers = Viewers::new(settings.samples_hz)?;
-    let mut lanes = Lanes::open(settings.wanted.clone(), "dynocar-live", &mut viewers)?;
+    let mut lanes = TrainChannels::open(settings.wanted.clone(), "dynocar-live", &mut viewers)?;
     let server = start(settings.address, &viewers).await?;
     let address = SocketAddr::new(settings.address.ip(), server.port());
     if !address.ip().is_loopback() {
-        tell(&format!(
+        report_line(&format!(
             "{address}: whoever reaches this address sees everything: nothing is encrypted, nobody \
              is asked who they are"
         ));
     }
-    tell(&format!(
+    report_line(&format!(
         "serving ws://{address}; Ctrl-C ends it\n\
          in Foxglove or Lichtblick: Open connection, Foxglove WebSocket, ws://{address}"
     ));

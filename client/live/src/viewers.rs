@@ -3,13 +3,13 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use dynocar::output::tell;
+use dynocar::output::report_line;
 use dynocar_client::ChannelError;
 use dynocar_recording::codec::{encode_event, encode_sample, encode_snapshot};
 use dynocar_recording::event::{Event, EventKind};
-use dynocar_recording::lanes::Sink;
 use dynocar_recording::schema::DESCRIPTORS;
 use dynocar_recording::topic::{ENCODING, LAYOUT, Topic};
+use dynocar_recording::train_channels::Sink;
 use dynocar_recording::writing::WallClock;
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 use foxglove::websocket::{ChannelView, Client, ServerListener};
@@ -217,12 +217,12 @@ impl ServerListener for Listener {
     fn on_client_connect(&self) {
         let mut count = locked(&self.count);
         *count += 1;
-        tell(&format!("a viewer has come: {count} now"));
+        report_line(&format!("a viewer has come: {count} now"));
     }
 
     fn on_client_disconnect(&self) {
         let mut count = locked(&self.count);
         *count = count.saturating_sub(1);
-        tell(&format!("a viewer has gone: {count} now"));
+        report_line(&format!("a viewer has gone: {count} now"));
     }
 }

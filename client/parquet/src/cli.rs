@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 use dynocar::cli::{Failure, parse};
-use dynocar::output::{OutputError, require_new, tell};
+use dynocar::output::{OutputError, report_line, require_new};
 use dynocar::programs::{PARQUET, called_as};
 use dynocar_recording::cli::{
     ConvertArguments, VerifyArguments, dataset_failure, from_dataset_failure,
@@ -79,13 +79,13 @@ fn convert(arguments: &ConvertArguments) -> Result<(), Failure> {
     if output.extension().is_some_and(|it| it == "mcap") {
         write_mcap(&content, output).map_err(|error| Failure::Work(error.to_string()))?;
         if !arguments.quiet {
-            tell(&format!("{}: {} messages", output.display(), content.messages.len()));
+            report_line(&format!("{}: {} messages", output.display(), content.messages.len()));
         }
         return Ok(());
     }
     let recording = content.into_recording();
     let unpacked = unpack(&from[0], recording, output, *train, &arguments.model_files());
-    arguments.tell(&unpacked.map_err(dataset_failure)?);
+    arguments.report(&unpacked.map_err(dataset_failure)?);
     Ok(())
 }
 
@@ -123,7 +123,7 @@ fn to_parquet(arguments: &ConvertArguments) -> Result<(), Failure> {
     })?;
     let Written { samples, snapshots, events, left_out, broken } = written;
     for it in broken {
-        tell(&format!("{}: {it}; `dynocar recover` makes it whole", called_as(PARQUET)));
+        report_line(&format!("{}: {it}; `dynocar recover` makes it whole", called_as(PARQUET)));
     }
     if !arguments.quiet {
         let others = match left_out {
@@ -131,7 +131,7 @@ fn to_parquet(arguments: &ConvertArguments) -> Result<(), Failure> {
             count => format!("; {count} messages of others have no place in it"),
         };
         let shown = output.display();
-        tell(&format!(
+        report_line(&format!(
             "{shown}: {samples} samples, {snapshots} snapshots, {events} events{others}"
         ));
     }

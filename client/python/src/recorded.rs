@@ -15,7 +15,7 @@ use crate::errors::of_failure;
 use crate::table::Table;
 
 /// An answer as JSON and in words.
-pub(crate) type Answer = (String, String);
+pub(crate) type JsonAndText = (String, String);
 
 /// An answer for machines, as the command line gives it.
 pub(crate) fn json(answer: &impl Serialize) -> Result<String, Failure> {
@@ -24,7 +24,7 @@ pub(crate) fn json(answer: &impl Serialize) -> Result<String, Failure> {
 
 /// What was understood of a path; what is wrong with it is the answer, too.
 #[pyfunction]
-pub(crate) fn check(py: Python<'_>, path: PathBuf) -> PyResult<Answer> {
+pub(crate) fn check(py: Python<'_>, path: PathBuf) -> PyResult<JsonAndText> {
     let answer = in_background(py, None, move |_| match checking::understand(&path) {
         Ok(understood) => Ok((json(&understood.answer(&path))?, understood.text())),
         Err(failure) => match failure.answer() {
@@ -40,7 +40,7 @@ pub(crate) fn check(py: Python<'_>, path: PathBuf) -> PyResult<Answer> {
 
 /// A dataset: what `check` says of it, and the tables of its runs and of all of them.
 #[pyfunction]
-pub(crate) fn read(py: Python<'_>, path: PathBuf) -> PyResult<(Answer, Vec<Table>, Table)> {
+pub(crate) fn read(py: Python<'_>, path: PathBuf) -> PyResult<(JsonAndText, Vec<Table>, Table)> {
     let read = in_background(py, None, move |_| {
         let understood = checking::understand(&path)?;
         let wrong: Option<Failure> = understood.errors().next().map(|it| it.clone().into());
@@ -70,7 +70,7 @@ pub(crate) fn identify(
     all: bool,
     per_run: bool,
     traction_only: bool,
-) -> PyResult<Answer> {
+) -> PyResult<JsonAndText> {
     let answer = in_background(py, None, move |_| {
         let asked = identifying::Asked::of(all, &names)?;
         let question = identifying::Question { dataset: &path, asked, per_run, traction_only };

@@ -251,7 +251,7 @@ def test_a_flush_ends_with_ctrl_c(played: PlayedDaemon) -> None:
     publisher.close()
 
 
-def test_a_wrong_directory_is_told_in_words() -> None:
+def test_a_wrong_directory_is_reported_in_words() -> None:
     with pytest.raises(dynocar.ChannelError, match="expected an absolute path") as refusal:
         dynocar.SnapshotReader(1, "here")
     assert refusal.value.code == Code.ROOT_NAME

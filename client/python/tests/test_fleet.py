@@ -76,7 +76,7 @@ def test_two_workers_give_the_answer_of_one_process_to_the_last_digit(
         assert answer_of(told, str(number))["answer"] == json.loads(json.dumps(alone))
 
 
-def test_the_train_with_another_mass_is_told_from_the_others(done: Fleet) -> None:
+def test_the_train_with_another_mass_is_distinguished_from_the_others(done: Fleet) -> None:
     differing = [it for it in done.report["differing"] if it["is_found"]]
     assert {it["train"] for it in differing if it["parameter"] == "mass"} == {"13"}
     own = next(it["own"] for it in differing if it["parameter"] == "mass")
@@ -115,7 +115,7 @@ def test_a_place_that_one_train_finds_is_the_trains_and_the_others_do_not_count_
     assert all(it["value"] is None for it in without)
 
 
-def test_what_came_since_the_month_before_is_told(done: Fleet) -> None:
+def test_what_came_since_the_month_before_is_reported(done: Fleet) -> None:
     assert (done.report["month"], done.report["month_before"]) == ("2026-05", "2026-04")
     came = [it for it in done.report["effects_changed"] if it["what"] == "came"]
     places = [it for it in came if it["train"] == "12" and it["kind"] == "local_resistance"]
@@ -154,7 +154,7 @@ def test_the_report_is_written_anew_from_kept_answers(done: Fleet, tmp_path: Pat
         write_report(out, month="2025-01")
 
 
-def test_a_failed_train_is_told_and_the_rest_is_done(
+def test_a_failed_train_is_reported_and_the_rest_is_done(
     fleet: Path, client: Client, tmp_path: Path
 ) -> None:
     folder = tmp_path / "fleet"
@@ -177,7 +177,7 @@ def test_a_failed_train_is_told_and_the_rest_is_done(
     }
 
 
-def test_a_worker_that_dies_is_replaced_and_a_train_that_kills_is_told(
+def test_a_worker_that_dies_is_replaced_and_a_train_that_kills_is_reported(
     fleet: Path, client: Client, tmp_path: Path
 ) -> None:
     folder, marks = tmp_path / "fleet", tmp_path / "marks"

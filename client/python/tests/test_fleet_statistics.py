@@ -135,7 +135,7 @@ def test_too_few_others_say_nothing() -> None:
 
 
 @pytest.mark.parametrize("trains", [5, 8])
-def test_trains_that_truly_scatter_are_not_told_to_differ(trains: int) -> None:
+def test_trains_that_truly_scatter_are_not_said_to_differ(trains: int) -> None:
     random, false = np.random.default_rng(trains), 0
     for _ in range(150):
         numbers, _ = simulated(random, trains, 3.0, 0)

@@ -227,7 +227,7 @@ def test_results_take_the_place_of_no_data(
     assert (recordings / "train.toml").read_text() == before
 
 
-def test_progress_is_told_while_other_threads_run(recordings: Path) -> None:
+def test_progress_is_reported_while_other_threads_run(recordings: Path) -> None:
     steps: list[tuple[float, str, int]] = []
     counts = [0]
     is_done = threading.Event()

@@ -11,7 +11,7 @@ use std::process::ExitCode;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use dynocar::cli::{Failure, parse};
 use dynocar::config::DaemonConfig;
-use dynocar::output::{print, require_new, tell};
+use dynocar::output::{print, report_line, require_new};
 use dynocar::programs::{RECORDING, called_as};
 
 use crate::convert::{ModelFiles, ToDatasetError, Unpacked, from_dataset, to_dataset};
@@ -99,13 +99,13 @@ impl ConvertArguments {
     }
 
     /// Says what became of a recording.
-    pub fn tell(&self, unpacked: &Unpacked) {
+    pub fn report(&self, unpacked: &Unpacked) {
         if let Some(broken) = &unpacked.broken {
-            tell(&format!("{}: {broken}; `dynocar recover` makes it whole", program()));
+            report_line(&format!("{}: {broken}; `dynocar recover` makes it whole", program()));
         }
         if !self.quiet {
             let Unpacked { runs, samples, left_out, .. } = unpacked;
-            tell(&format!(
+            report_line(&format!(
                 "{}: {runs} runs, {samples} samples; {left_out} snapshots and events have no place in \
                  a dataset",
                 self.output.display()
@@ -167,7 +167,7 @@ fn execute_recover(arguments: &RecoverArguments) -> Result<(), Failure> {
         arguments.broken.iter().zip(&recovered.endings).filter_map(lost).collect();
     let lost =
         if lost.is_empty() { "nothing is lost: it was whole".to_owned() } else { lost.join("; ") };
-    tell(&format!(
+    report_line(&format!(
         "{}: {} messages and {} attached files recovered; {lost}",
         arguments.output.display(),
         recovered.messages,
@@ -201,7 +201,7 @@ fn execute_convert(arguments: &ConvertArguments) -> Result<(), Failure> {
         return execute_from_dataset(dataset, output, *quiet);
     }
     let unpacked = to_dataset(from, output, *train, &arguments.model_files());
-    arguments.tell(&unpacked.map_err(dataset_failure)?);
+    arguments.report(&unpacked.map_err(dataset_failure)?);
     Ok(())
 }
 
@@ -216,7 +216,7 @@ pub fn dataset_failure(error: ToDatasetError) -> Failure {
 fn execute_from_dataset(from: &Path, output: &Path, is_quiet: bool) -> Result<(), Failure> {
     let samples = from_dataset(from, output).map_err(from_dataset_failure)?;
     if !is_quiet {
-        tell(&format!("{}: {samples} samples", output.display()));
+        report_line(&format!("{}: {samples} samples", output.display()));
     }
     Ok(())
 }
@@ -235,7 +235,7 @@ impl VerifyArguments {
         let path = &self.recording[0];
         let wrong = |error: &dyn std::fmt::Display| Failure::Input(error.to_string());
         if let Some(broken) = &recording.broken {
-            tell(&format!("{}: {broken}", program()));
+            report_line(&format!("{}: {broken}", program()));
         }
         if recording.snapshots.is_empty() {
             return Err(wrong(&format!("{}: no snapshots: nothing to verify", path.display())));

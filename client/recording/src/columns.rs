@@ -10,7 +10,7 @@ use dynocar_shared::{Parameter, ParameterSnapshot, RejectionReason, TrainSample}
 
 use crate::event::{EVENT_FIELDS, Event, EventField};
 use crate::schema::{
-    BESIDE_VALUE, INTERVAL_95, SAMPLE_FIELDS, SNAPSHOT_FIELDS, members_of, name_beside,
+    INTERVAL_95, SAMPLE_FIELDS, SNAPSHOT_FIELDS, SUFFIXES, members_of, suffixed_name,
     vocabulary_of, vocabulary_of_type,
 };
 
@@ -25,7 +25,7 @@ pub enum Source {
     Field(&'static Field),
     /// A parameter's value: repeats what arrays hold.
     Value(Parameter),
-    /// What [`BESIDE_VALUE`] tells of it, by the place there: repeats what arrays hold.
+    /// What [`SUFFIXES`] tells of it, by the place there: repeats what arrays hold.
     Beside(Parameter, usize),
     /// How many samples were refused for a reason: repeats what an array holds.
     Rejected(RejectionReason),
@@ -75,11 +75,10 @@ pub static SNAPSHOTS: LazyLock<Vec<Column>> = LazyLock::new(|| {
     let parameters = Parameter::ALL.iter().flat_map(|&it| {
         let name = format!("estimate_{}", it.full_name());
         let value = plain(name, "f64", it.meaning(), Source::Value(it));
-        let beside =
-            BESIDE_VALUE.into_iter().enumerate().map(move |(place, (_, word, meaning))| {
-                let name = format!("estimate_{}", name_beside(it, word));
-                plain(name, "f64", meaning, Source::Beside(it, place))
-            });
+        let beside = SUFFIXES.into_iter().enumerate().map(move |(place, (_, word, meaning))| {
+            let name = format!("estimate_{}", suffixed_name(it, word));
+            plain(name, "f64", meaning, Source::Beside(it, place))
+        });
         std::iter::once(value).chain(beside).map(nullable)
     });
     let rejected = RejectionReason::ALL.iter().map(|&it| {

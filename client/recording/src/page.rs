@@ -10,8 +10,8 @@ use crate::annotate::schema::MESSAGES;
 use crate::columns::{Column, EVENTS, SAMPLES, SNAPSHOTS, STAMPS, Source};
 use crate::event::{EVENT_FIELDS, EventField, EventKind};
 use crate::schema::{
-    BESIDE_VALUE, ESTIMATE, REJECTED, SAMPLE_FIELDS, SNAPSHOT_FIELDS, name_beside, number,
-    parameter_number, rejection_number, vocabulary_of_type,
+    ESTIMATE, REJECTED, SAMPLE_FIELDS, SNAPSHOT_FIELDS, SUFFIXES, number, parameter_number,
+    rejection_number, suffixed_name, vocabulary_of_type,
 };
 
 const HEAD: &str = "# Fields of a recording
@@ -61,8 +61,8 @@ pub fn page() -> String {
         let (name, number) = match column.source {
             Source::Value(it) => (it.full_name().to_owned(), parameter_number(it)),
             Source::Beside(it, place) => {
-                let (offset, word, _) = BESIDE_VALUE[place];
-                (name_beside(it, word), parameter_number(it) + offset)
+                let (offset, word, _) = SUFFIXES[place];
+                (suffixed_name(it, word), parameter_number(it) + offset)
             }
             _ => continue,
         };

@@ -60,14 +60,14 @@ pub fn parameter_number(parameter: Parameter) -> u32 {
 
 /// What `estimate` tells of a parameter beside its value: how much greater its number is, the word in
 /// its name, and what it is.
-pub const BESIDE_VALUE: [(u32, &str, &str); 3] = [
+pub const SUFFIXES: [(u32, &str, &str); 3] = [
     (STD_OFFSET, "std", "Its standard deviation."),
     (LOW_OFFSET, "low", "The lower end of its 95 % interval."),
     (HIGH_OFFSET, "high", "The upper end of its 95 % interval."),
 ];
 
 /// The name of what is told of a parameter beside its value: the unit stays last.
-pub fn name_beside(parameter: Parameter, word: &str) -> String {
+pub fn suffixed_name(parameter: Parameter, word: &str) -> String {
     let name = parameter.full_name();
     let unit = unit_end(name).0;
     format!("{}_{word}{unit}", &name[..name.len() - unit.len()])
@@ -183,8 +183,8 @@ fn estimate_message() -> Vec<FieldDescriptorProto> {
     let of = |&it: &Parameter| {
         let number = parameter_number(it);
         let value = field(it.full_name(), number, Type::Double, true);
-        let beside = BESIDE_VALUE.map(|(offset, word, _)| {
-            field(&name_beside(it, word), number + offset, Type::Double, true)
+        let beside = SUFFIXES.map(|(offset, word, _)| {
+            field(&suffixed_name(it, word), number + offset, Type::Double, true)
         });
         std::iter::once(value).chain(beside)
     };

@@ -1,6 +1,6 @@
 //! The recorder as a process beside a controller and a daemon: killed, asked to end, out of disk.
 
-mod beside;
+mod support_site;
 
 use std::io::Read;
 use std::os::unix::process::CommandExt;
@@ -8,7 +8,6 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
-use beside::{Controller, Place, TRAIN, await_true};
 use dynocar_client::channel::Transport;
 use dynocar_client::monotonic_now_ns;
 use dynocar_recording::event::EventKind;
@@ -17,16 +16,17 @@ use dynocar_recording::recording::Recording;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind};
 use rustix::process::{Pid, Signal, kill_process};
+use support_site::{Controller, TRAIN, TestSite, await_true};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_dynocar-recording");
 
 /// Starts the recorder and waits until its channels are open.
-fn recorder(place: &Place) -> Child {
+fn recorder(place: &TestSite) -> Child {
     started(place, &["record", "-o"], "run.mcap")
 }
 
 /// Starts a recorder that writes to a place, and waits until its channels are open.
-fn started(place: &Place, command: &[&str], to: &str) -> Child {
+fn started(place: &TestSite, command: &[&str], to: &str) -> Child {
     let mut recorder = Command::new(PROGRAM)
         .args(command)
         .arg(place.at(to))
@@ -44,18 +44,18 @@ fn started(place: &Place, command: &[&str], to: &str) -> Child {
 }
 
 /// What can be read by now.
-fn recording(place: &Place) -> Recording {
+fn recording(place: &TestSite) -> Recording {
     let mut recording = Recording::default();
     read(&place.at("run.mcap"), &mut recording).unwrap();
     recording
 }
 
-fn await_recorded(place: &Place, sequence: u64) {
+fn await_recorded(place: &TestSite, sequence: u64) {
     let newest = || recording(place).samples.last().map_or(0, |it| it.sequence);
     await_true("a sample in the file", || newest() >= sequence);
 }
 
-fn count(place: &Place, kind: EventKind) -> usize {
+fn count(place: &TestSite, kind: EventKind) -> usize {
     recording(place).events.iter().filter(|it| it.kind == kind as i32).count()
 }
 
@@ -81,7 +81,7 @@ fn signal(process: u32, signal: Signal) {
 
 #[test]
 fn a_recorder_outlives_daemons_and_controllers_and_what_is_killed_is_verified() {
-    let place = Place::new(&["mass_kalman", "v_mils"]);
+    let place = TestSite::new(&["mass_kalman", "v_mils"]);
     let mut recorder = recorder(&place);
     for round in 1..=2 {
         let daemon = place.daemon();
@@ -124,7 +124,7 @@ fn a_recorder_outlives_daemons_and_controllers_and_what_is_killed_is_verified() 
 
 #[test]
 fn a_recorder_that_is_asked_to_ends_whole() {
-    let place = Place::new(&["mass_kalman", "v_mils"]);
+    let place = TestSite::new(&["mass_kalman", "v_mils"]);
     let controller = Controller::start(&place, 1);
     let mut recorder = recorder(&place);
     await_more(&controller, 1);
@@ -144,7 +144,7 @@ fn a_recorder_that_is_asked_to_ends_whole() {
 
 #[test]
 fn a_full_disk_ends_only_the_recorder_and_what_was_written_can_be_read() {
-    let place = Place::new(&["mass_kalman", "v_mils"]);
+    let place = TestSite::new(&["mass_kalman", "v_mils"]);
     let controller = Controller::start(&place, 1);
     // A file may grow to 64 KiB, and writing on fails instead of killing: as on a full disk.
     let line = "trap '' XFSZ; ulimit -f 128; exec \"$0\" record --train 1 --root \"$1\" -o \"$2\"";
@@ -162,7 +162,7 @@ fn a_full_disk_ends_only_the_recorder_and_what_was_written_can_be_read() {
 
 #[test]
 fn a_flight_recorder_keeps_what_it_is_asked_to_whatever_ends_it() {
-    let place = Place::new(&["mass_kalman", "v_mils"]);
+    let place = TestSite::new(&["mass_kalman", "v_mils"]);
     let controller = Controller::start(&place, 1);
     let ring = place.at("ring");
     let asked = || run(&["keep", "--reason", "a jerk"], &[&ring]);
@@ -205,7 +205,7 @@ fn a_flight_recorder_keeps_what_it_is_asked_to_whatever_ends_it() {
 }
 
 #[test]
-fn a_closed_pipe_is_no_failure_and_a_full_disk_is_told_by_the_name_that_was_called() {
+fn a_closed_pipe_is_no_failure_and_a_full_disk_is_reported_by_the_name_that_was_called() {
     let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     for name in ["dynocar-recording", "dynocar"] {
         for arguments in [&["fields"][..], &["--help"], &["record", "--help"]] {
@@ -225,7 +225,7 @@ fn a_closed_pipe_is_no_failure_and_a_full_disk_is_told_by_the_name_that_was_call
 
 #[test]
 fn a_flight_recorder_keeps_what_lies_around_a_suspicion() {
-    let place = Place::new(&["mass_kalman", "v_mils"]);
+    let place = TestSite::new(&["mass_kalman", "v_mils"]);
     let controller = Controller::start(&place, 1);
     // A daemon's end of the channel, with nothing but what is suspected behind it.
     let transport = Transport::open(&place.host(), "monitor").unwrap();

@@ -34,14 +34,14 @@ const _: () = assert!(size_of::<Page>() <= BYTES);
 /// A number with a cache line of its own, for it has a writer of its own.
 #[derive(Debug)]
 #[repr(C, align(64))]
-struct Line<T>(T);
+struct CacheLine<T>(T);
 
 #[derive(Debug)]
 #[repr(C)]
 struct Page {
-    published: Line<Published>,
-    served: Line<Served>,
-    taken: [Line<AtomicU64>; THREADS_MAX],
+    published: CacheLine<Published>,
+    served: CacheLine<Served>,
+    taken: [CacheLine<AtomicU64>; THREADS_MAX],
 }
 
 /// Written by the controller.

@@ -85,13 +85,13 @@ impl Sleeper {
     /// Waits until a controller sends or `timeout` has passed, unless `has_work` after the
     /// controllers were told.
     pub fn sleep(&mut self, timeout: Duration, has_work: impl FnOnce() -> bool) {
-        self.tell(1);
+        self.announce(1);
         fence(Ordering::SeqCst);
         if !has_work() {
             // A failed wait is a short one: the caller looks for samples and comes back.
             let _ = self.listener.timed_wait(|_| {}, timeout);
         }
-        self.tell(0);
+        self.announce(0);
     }
 
     /// Speaks up to controllers that have come since; for a thread that seldom sleeps.
@@ -99,7 +99,7 @@ impl Sleeper {
         self.senders.iter().for_each(Sender::serve_newcomers);
     }
 
-    fn tell(&mut self, sleeping: u64) {
+    fn announce(&mut self, sleeping: u64) {
         self.state.sleeping = sleeping;
         for sender in &self.senders {
             // An untold controller does not notify: the wait ends by its timeout.

@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn c_is_told_what_rust_is_told() {
+    fn c_reads_what_rust_reads() {
         let effort =
             EFFORT.map(|EffortPlace { speed_mps, force_n }| EffortPoint { speed_mps, force_n });
         for &rail in Rail::ALL {

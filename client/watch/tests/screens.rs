@@ -132,20 +132,20 @@ fn a_larger_terminal_gets_more_speeds_and_plots() {
 }
 
 #[test]
-fn a_suspect_is_told_with_what_is_hardly_told_from_it() {
+fn a_suspect_is_reported_with_what_is_hardly_distinguished_from_it() {
     let drawn = screen(&[&suspected()], Choice::default(), (80, 24));
     assert!(drawn.contains("dragging_brake for 2 min, evidence 46, rivals: wind"), "{drawn}");
 }
 
 #[test]
-fn the_pipelines_tell_their_samples() {
+fn the_pipelines_show_their_samples() {
     let choice = Choice { view: View::Pipelines, ..Choice::default() };
     let drawn = screen(&[&train(), &suspected()], choice, (80, 24));
     assert_screen(&drawn, include_str!("screens/pipelines_80x24.txt"));
 }
 
 #[test]
-fn a_daemon_that_is_absent_gone_or_incompatible_is_told_in_words() {
+fn a_daemon_that_is_absent_gone_or_incompatible_is_reported_in_words() {
     let nobody = screen(&[], Choice::default(), (80, 24));
     assert!(nobody.contains("No daemon serves any train under /run/dynocar"), "{nobody}");
     let mut it = TrainState::new(TrainId(7), None);

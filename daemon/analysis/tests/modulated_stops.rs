@@ -157,7 +157,7 @@ fn compare(study: &Study, truth: &[True], found_by: FoundBy) -> [usize; 2] {
 }
 
 #[test]
-fn stops_of_a_coarse_recorder_are_found_and_those_of_the_driver_tell_no_law() {
+fn stops_of_a_coarse_recorder_are_found_and_those_of_the_driver_show_no_law() {
     let (mut inside, mut looks) = (0, 0);
     for seed in 0..6 {
         let (recording, truth) = trip(18, &mut StdRng::seed_from_u64(seed));

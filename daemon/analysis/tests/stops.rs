@@ -67,7 +67,7 @@ fn the_law_of_one_stop_holds_the_true_one_and_the_next_stop_keeps_its_bound() {
 }
 
 #[test]
-fn many_stops_tell_their_own_repeatability_and_slower_ones_say_nothing_of_faster_speeds() {
+fn many_stops_show_their_own_repeatability_and_slower_ones_say_nothing_of_faster_speeds() {
     let mut random = StdRng::seed_from_u64(7);
     let curves: Vec<Curve> = (0..30)
         .map(|k| {

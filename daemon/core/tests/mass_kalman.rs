@@ -125,7 +125,7 @@ fn a_declared_mass_that_changes_at_a_stop_is_followed() {
 }
 
 #[test]
-fn unknown_constant_forces_are_told_from_mass() {
+fn unknown_constant_forces_are_distinguished_from_mass() {
     for extra_n_per_kn in [-1.5, 1.0, 2.0] {
         let mut estimator = estimator();
         let mut simulation = Simulation::new(108_000.0, 6);

@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn a_declared_train_in_wrong_units_is_told_and_another_is_not() {
+    fn a_declared_train_in_wrong_units_is_reported_and_another_is_not() {
         let none: [&str; 0] = [];
         assert_eq!(codes(|_| {}), none);
         assert_eq!(codes(|train| train.length_m = 1.0), none, "a point");

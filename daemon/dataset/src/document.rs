@@ -4,7 +4,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 use toml::value::Datetime;
 
-use super::error::{DatasetError, Place, Problem};
+use super::error::{DatasetError, Problem, SourcePosition};
 use super::names::Choices;
 
 /// The names of the tables and keys at the top of a TOML file, in the order of the file.
@@ -33,7 +33,7 @@ impl<'t> Document<'t> {
             std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
         let root = DeTable::parse(text).map_err(|error| {
             let line = error.span().map(|span| line_of(&line_starts, span.start));
-            let place = Place { file: label.into(), line };
+            let place = SourcePosition { file: label.into(), line };
             let message = error.message().trim_end().replace('\n', ", ");
             place.problem(Problem::Syntax { language: "TOML", message })
         })?;
@@ -45,8 +45,8 @@ impl<'t> Document<'t> {
         Section { document: self, path: String::new(), at: None, table: self.root.get_ref() }
     }
 
-    fn place(&self, offset: usize) -> Place {
-        Place::line(self.label, line_of(&self.line_starts, offset))
+    fn place(&self, offset: usize) -> SourcePosition {
+        SourcePosition::line(self.label, line_of(&self.line_starts, offset))
     }
 }
 
@@ -64,7 +64,7 @@ pub(super) struct Section<'d> {
 }
 
 /// A list of N-tuples of numbers, with the place of each.
-pub(super) type Entries<const N: usize> = Vec<([f64; N], Place)>;
+pub(super) type Entries<const N: usize> = Vec<([f64; N], SourcePosition)>;
 
 impl<'d> Section<'d> {
     /// Refuses keys other than these.
@@ -96,15 +96,15 @@ impl<'d> Section<'d> {
     }
 
     /// Where the table stands.
-    pub fn place(&self) -> Place {
+    pub fn place(&self) -> SourcePosition {
         match self.at {
             Some(offset) => self.document.place(offset),
-            None => Place::whole(self.document.label),
+            None => SourcePosition::whole(self.document.label),
         }
     }
 
     /// Where a key's value stands; the table when there is none.
-    pub fn place_of(&self, key: &str) -> Place {
+    pub fn place_of(&self, key: &str) -> SourcePosition {
         match self.table.get(key) {
             Some(value) => self.document.place(value.span().start),
             None => self.place(),
@@ -117,7 +117,7 @@ impl<'d> Section<'d> {
     }
 
     /// The names of the keys, with their place, in the order of the file.
-    pub fn keys(&self) -> Vec<(&'d str, Place)> {
+    pub fn keys(&self) -> Vec<(&'d str, SourcePosition)> {
         let mut keys: Vec<_> = self.table.keys().collect();
         keys.sort_by_key(|key| key.span().start);
         keys.into_iter()

@@ -7,22 +7,22 @@ use super::quantity::Quantity;
 
 /// A place in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct SourcePosition {
     /// The file, as the user would find it.
     pub file: String,
     /// Line in the file, from 1; `None` when the whole file is meant.
     pub line: Option<usize>,
 }
 
-impl Place {
+impl SourcePosition {
     /// A line, from 1, of a file.
     pub fn line(file: &str, line: usize) -> Self {
-        Place { file: file.into(), line: Some(line) }
+        SourcePosition { file: file.into(), line: Some(line) }
     }
 
     /// A file as a whole.
     pub fn whole(file: &str) -> Self {
-        Place { file: file.into(), line: None }
+        SourcePosition { file: file.into(), line: None }
     }
 
     /// A problem at this place.
@@ -31,7 +31,7 @@ impl Place {
     }
 }
 
-impl std::fmt::Display for Place {
+impl std::fmt::Display for SourcePosition {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.line {
             Some(line) => write!(f, "{}:{line}", self.file),
@@ -45,7 +45,7 @@ impl std::fmt::Display for Place {
 #[error("{place}: {problem}")]
 pub struct DatasetError {
     /// File and line.
-    pub place: Place,
+    pub place: SourcePosition,
     /// What is wrong there.
     pub problem: Box<Problem>,
 }

@@ -1,25 +1,25 @@
 //! The unit that a finding is told in.
 
-use dynocar_core::plausibility::{Finding, Slip};
+use dynocar_core::plausibility::{Finding, InputFault};
 use dynocar_core::units::Unit;
 
 use super::manifest::Manifest;
 use super::quantity::Quantity;
 
 /// The quantities that a slip is about, and the unit to tell it in where none of them is mapped.
-pub(super) fn concerned(slip: Slip) -> (&'static [Quantity], &'static str) {
+pub(super) fn concerned(slip: InputFault) -> (&'static [Quantity], &'static str) {
     use Quantity::*;
     match slip {
-        Slip::TimeScale => (&[Time], "s"),
-        Slip::SpeedScale => (&[Speed], "m/s"),
-        Slip::PositionScale | Slip::DirectionReversed => (&[Position], "m"),
-        Slip::MassScale => (&[TrainMass], "t"),
-        Slip::BrakeScale => (&[BrakeForce, ControlForce], "kN"),
-        Slip::ForcesSwapped | Slip::ForcesScale | Slip::TractionScale => {
+        InputFault::TimeScale => (&[Time], "s"),
+        InputFault::SpeedScale => (&[Speed], "m/s"),
+        InputFault::PositionScale | InputFault::DirectionReversed => (&[Position], "m"),
+        InputFault::MassScale => (&[TrainMass], "t"),
+        InputFault::BrakeScale => (&[BrakeForce, ControlForce], "kN"),
+        InputFault::ForcesSwapped | InputFault::ForcesScale | InputFault::TractionScale => {
             (&[TractionForce, BrakeForce, ControlForce], "kN")
         }
-        Slip::GradientSign | Slip::GradientScale => (&[Gradient], "permille"),
-        Slip::PressureScale => (&[BrakeCylinderPressure], "Pa"),
+        InputFault::GradientSign | InputFault::GradientScale => (&[Gradient], "permille"),
+        InputFault::PressureScale => (&[BrakeCylinderPressure], "Pa"),
     }
 }
 

@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn the_friction_brake_acts_by_its_pressure_beside_the_signed_force() {
+    fn the_friction_brake_acts_by_its_pressure_next_to_the_signed_force() {
         let columns = "control_force={column='C',unit='N'}\n\
                        brake_cylinder_pressure={column='p',unit='kPa'}";
         let brake = "force_per_pressure_n_per_pa=0.5\nrelease_pressure_pa=20000\n";

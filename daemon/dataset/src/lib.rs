@@ -17,7 +17,7 @@
 //! - `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
 //! - `order`, `spikes`, `motion`, `power`, `forces`, [`stamps`], `altitude`: from columns to time, speed,
 //!   position, forces and gradient
-//! - `resolved`, [`run`], [`quality`], `findings`, [`remark`], `remarking`, `declared`, [`note`]: samples,
+//! - `resolved`, [`run`], [`quality`], `findings`, [`diagnostic`], `remarking`, `declared`, [`note`]: samples,
 //!   counts and warnings
 //! - [`guess`]: a description of files that nobody has described yet
 
@@ -26,6 +26,8 @@ mod cell;
 pub mod clock;
 mod corrections;
 mod declared;
+mod diagnosing;
+pub mod diagnostic;
 mod document;
 pub mod encoding;
 pub mod error;
@@ -44,8 +46,6 @@ mod order;
 mod power;
 pub mod quality;
 pub mod quantity;
-pub mod remark;
-mod remarking;
 mod resolved;
 pub mod run;
 mod spikes;
@@ -59,8 +59,9 @@ pub mod train_file;
 mod tests;
 
 pub use clock::TimeFormat;
+pub use diagnostic::Diagnostic;
 pub use document::top_keys;
-pub use error::{DatasetError, FileProblem, Place, Problem};
+pub use error::{DatasetError, FileProblem, Problem, SourcePosition};
 pub use forces::ForceSource;
 pub use manifest::{ColumnMapping, FileEntry, Manifest, PositionReference, Role, RunEntry};
 pub use motion::PositionSource;
@@ -69,7 +70,6 @@ pub use note::Note;
 pub use order::OrderCounts;
 pub use quality::{Phases, RunQuality};
 pub use quantity::Quantity;
-pub use remark::Remark;
 pub use resolved::{DATASET_TRAIN, GradientSource};
 pub use run::{Extras, Run, is_parquet, recorded_unix_s};
 pub use table::LineCounts;
@@ -268,18 +268,18 @@ impl Dataset {
 fn text(
     files: &(impl DatasetFiles + ?Sized),
     path: &str,
-    listed_at: Option<&Place>,
+    listed_at: Option<&SourcePosition>,
 ) -> Result<String, DatasetError> {
     files.read(path).map_err(|problem| unread(files.label(path), problem, listed_at))
 }
 
-fn unread(file: String, problem: FileProblem, listed_at: Option<&Place>) -> DatasetError {
+fn unread(file: String, problem: FileProblem, listed_at: Option<&SourcePosition>) -> DatasetError {
     match (&problem, listed_at) {
         (&(FileProblem::NotUtf8 { line } | FileProblem::OtherEncoding { line, .. }), _) => {
-            Place::line(&file, line).problem(Problem::File(problem))
+            SourcePosition::line(&file, line).problem(Problem::File(problem))
         }
         (FileProblem::NotText(_) | FileProblem::Table(_), _) | (_, None) => {
-            Place::whole(&file).problem(Problem::File(problem))
+            SourcePosition::whole(&file).problem(Problem::File(problem))
         }
         (_, Some(place)) => place.clone().problem(Problem::ListedFile { file, problem }),
     }

@@ -2,7 +2,7 @@
 
 use csv::{ByteRecord, ReaderBuilder};
 
-use super::error::{DatasetError, Place, Problem};
+use super::error::{DatasetError, Problem, SourcePosition};
 
 /// A reader of a text's rows.
 pub fn reader(text: &str, delimiter: u8) -> csv::Reader<&[u8]> {
@@ -20,7 +20,7 @@ pub fn below<'t>(label: &str, text: &'t str, skip_rows: usize) -> Result<&'t str
         let Some(end) = rest.find(['\n', '\r']) else {
             let lines = lines + usize::from(!rest.is_empty());
             let problem = Problem::NothingBelow { skip_rows, lines };
-            return Err(Place::whole(label).problem(problem));
+            return Err(SourcePosition::whole(label).problem(problem));
         };
         let is_pair = rest[end..].starts_with("\r\n");
         rest = &rest[end + 1 + usize::from(is_pair)..];

@@ -7,7 +7,7 @@ use dynocar_core::units::Unit;
 
 use super::clock::{self, TimeFormat};
 use super::document::{Document, Section};
-use super::error::{DatasetError, Place, Problem};
+use super::error::{DatasetError, Problem, SourcePosition};
 use super::names::Choices;
 use super::quantity::Quantity;
 use super::text_layout::TextLayout;
@@ -49,7 +49,7 @@ pub struct ColumnMapping {
     /// Added after the factor, in `unit`.
     pub offset: f64,
     /// Where the mapping is declared.
-    pub place: Place,
+    pub place: SourcePosition,
 }
 
 impl ColumnMapping {
@@ -65,7 +65,7 @@ pub struct FileEntry {
     /// Its path, from the dataset's folder.
     pub path: String,
     /// Where it is named.
-    pub place: Place,
+    pub place: SourcePosition,
 }
 
 /// A run as declared.
@@ -84,7 +84,7 @@ pub struct RunEntry {
     /// When it was recorded, in s since 1970 UTC, where that is declared.
     pub date_unix_s: Option<i64>,
     /// Where the run is declared.
-    pub place: Place,
+    pub place: SourcePosition,
 }
 
 /// The content of a `dataset.toml`.

@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use super::Dataset;
 use super::declared::misdeclared;
+use super::diagnostic::Diagnostic;
 use super::finding_unit::unit_of;
-use super::remark::Remark;
 use super::run::Run;
 
 /// A note on a dataset.
@@ -59,7 +59,7 @@ pub fn notes<'r>(
         for remark in run.remarks.iter().filter(|it| it.severity() > Severity::Info) {
             let same = |note: &Note| note.code == remark.code() && !note.runs.is_empty();
             let known = match remark {
-                Remark::Slip { finding, read_as } => {
+                Diagnostic::InputFault { finding, read_as } => {
                     let known = slips.iter_mut().find(|(_, other, unit, (low, _))| {
                         other.slip == finding.slip
                             && unit == read_as
@@ -75,7 +75,7 @@ pub fn notes<'r>(
             match known {
                 Some(place) => notes[place].runs.push(run.file.clone()),
                 None => {
-                    if let Remark::Slip { finding, read_as } = remark {
+                    if let Diagnostic::InputFault { finding, read_as } = remark {
                         let range = (finding.factor, finding.factor);
                         slips.push((notes.len(), *finding, read_as, range));
                     }

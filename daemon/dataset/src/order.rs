@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn repeated_rows_are_told_from_disorder() {
+    fn repeated_rows_are_distinguished_from_disorder() {
         let order = order_of(&[0.0, 1.0, 1.0, 2.0, 3.0, 0.0, 4.0]);
         assert_eq!((order.counts.out_of_order, order.counts.repeated), (0, 2));
         assert_eq!(order.in_order, [true, true, false, true, true, false, true]);

@@ -3,7 +3,9 @@
 use dynocar_core::train::Drive;
 use dynocar_shared::{SampleField, TrainSample};
 
-use super::error::{DatasetError, Place, Problem};
+use super::diagnosing::remarks;
+use super::diagnostic::Diagnostic;
+use super::error::{DatasetError, Problem, SourcePosition};
 use super::findings;
 use super::forces::ForceSource;
 use super::manifest::{Manifest, Role, RunEntry};
@@ -11,8 +13,6 @@ use super::motion::PositionSource;
 use super::power;
 use super::quality::{self, RunQuality};
 use super::quantity::Quantity;
-use super::remark::Remark;
-use super::remarking::remarks;
 use super::resolved::{Context, GradientSource, Resolved};
 use super::stamps;
 use super::table::Table;
@@ -81,7 +81,7 @@ pub struct Run {
     /// What the data are like.
     pub quality: RunQuality,
     /// What looks like a mistake, or should be known.
-    pub remarks: Vec<Remark>,
+    pub remarks: Vec<Diagnostic>,
 }
 
 impl Run {
@@ -153,7 +153,7 @@ pub(super) fn read(
     let rows = table.lines.rows;
     let has_speed = table.filled(Quantity::Speed).is_some();
     let resolved = Resolved::of(context, entry, table);
-    let refuse = |problem| Err(Place::whole(label).problem(problem));
+    let refuse = |problem| Err(SourcePosition::whole(label).problem(problem));
     let column =
         |quantity| context.manifest.mapping(quantity).map_or(String::new(), |it| it.column.clone());
     for (quantity, is_there) in

@@ -4,7 +4,7 @@ use csv::ByteRecord;
 
 use super::cell::{held, lossy, not_a_value, parse_cell};
 use super::clock::DayClock;
-use super::error::{DatasetError, Place, Problem};
+use super::error::{DatasetError, Problem, SourcePosition};
 use super::header::{find_column, misplaced};
 use super::lines::{below, line_of, reader};
 use super::manifest::ColumnMapping;
@@ -99,18 +99,19 @@ impl Table {
             Ok(has_more) => Ok(has_more),
             Err(error) => {
                 let message = error.to_string();
-                Err(Place::whole(label).problem(Problem::Syntax { language: "CSV", message }))
+                Err(SourcePosition::whole(label)
+                    .problem(Problem::Syntax { language: "CSV", message }))
             }
         };
         if !read(&mut record)? {
-            return Err(Place::whole(label).problem(Problem::NoHeader));
+            return Err(SourcePosition::whole(label).problem(Problem::NoHeader));
         }
         let header: Vec<String> = record.iter().map(|name| lossy(name).trim().into()).collect();
         let mut rows = Rows::new((label, text), layout, mappings, &header)
             .map_err(|problem| misplaced(problem, whole, (layout, mappings)))
             .map_err(|problem| {
                 let line = layout.skip_rows + line_of(text, &record);
-                Place::line(label, line).problem(problem)
+                SourcePosition::line(label, line).problem(problem)
             })?;
         let mut has_row = read(&mut record)?;
         if layout.units_row && has_row {
@@ -193,7 +194,7 @@ impl<'m> Rows<'m> {
             let is_number = parse_cell(cell, self.layout.decimal).is_some_and(|it| !it.is_nan());
             // The unit "1" is one.
             if is_number && cell != b"1" {
-                let place = Place::line(self.label, self.line_of(record));
+                let place = SourcePosition::line(self.label, self.line_of(record));
                 let (column, found) = (column.mapping.column.clone(), lossy(cell).into());
                 return Err(place.problem(Problem::NoUnits { column, found }));
             }
@@ -204,7 +205,7 @@ impl<'m> Rows<'m> {
     /// Takes in a row; what is wrong with it stays pending.
     fn push(&mut self, record: &ByteRecord) -> Result<(), DatasetError> {
         let line = self.line_of(record);
-        let place = || Place::line(self.label, line);
+        let place = || SourcePosition::line(self.label, line);
         if record.len() < self.width && record.as_slice().contains(&b'\n') {
             return Err(place().problem(Problem::UnclosedQuote));
         }
@@ -270,7 +271,7 @@ impl<'m> Rows<'m> {
             }
         }
         if self.lines.rows == 0 {
-            return Err(Place::whole(self.label).problem(Problem::NoRows));
+            return Err(SourcePosition::whole(self.label).problem(Problem::NoRows));
         }
         let first_day = self.columns.iter().find_map(|it| it.clock.as_ref()?.first_day());
         let columns = self.columns.into_iter();

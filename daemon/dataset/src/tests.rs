@@ -115,7 +115,7 @@ fn the_mass_is_the_rows_then_the_runs_then_the_trains() {
 }
 
 #[test]
-fn what_a_sample_does_not_carry_is_kept_beside_it() {
+fn what_a_sample_does_not_carry_is_kept_next_to_it() {
     let columns = [
         ("relative_humidity", "rh", "%"),
         ("wind_speed", "w", "km/h"),
@@ -147,10 +147,10 @@ fn without_positions_they_are_integrated_and_the_run_says_so() {
     assert_eq!(run.position_source, PositionSource::IntegratedSpeed);
     assert_eq!(field(&run, SampleField::Position), [Some(0.0), Some(1.0), Some(4.0)]);
     example.track = true;
-    assert!(example.run().remarks.contains(&Remark::StartUnknown));
+    assert!(example.run().remarks.contains(&Diagnostic::StartUnknown));
     example.run = "start_m = 700".into();
     assert_eq!(field(&example.run(), SampleField::Position)[2], Some(704.0));
-    assert!(!example.run().remarks.contains(&Remark::StartUnknown));
+    assert!(!example.run().remarks.contains(&Diagnostic::StartUnknown));
 }
 
 #[test]
@@ -181,7 +181,7 @@ fn the_gradients_source_goes_from_track_to_unknown() {
     assert!((slope - 30.0).abs() < 1e-9, "{slope}");
     let unknown = source(&[], false);
     assert_eq!(unknown.gradient_source, GradientSource::Unknown);
-    assert!(unknown.remarks.contains(&Remark::GradientUnknown));
+    assert!(unknown.remarks.contains(&Diagnostic::GradientUnknown));
 }
 
 #[test]
@@ -254,7 +254,7 @@ fn the_phases_add_up_to_the_duration() {
 }
 
 #[test]
-fn likely_mistakes_are_remarked_on() {
+fn likely_mistakes_are_diagnosed() {
     let csv: String =
         (0..100).map(|i| format!("{i},36,{},-80\n", 5000.0 - 10.0 * f64::from(i))).collect();
     let columns = [("position", "s", "m"), ("brake_force", "B", "kN")];
@@ -273,7 +273,7 @@ fn likely_mistakes_are_remarked_on() {
 }
 
 #[test]
-fn a_recorder_that_hangs_while_the_train_moves_is_remarked_on() {
+fn a_recorder_that_hangs_while_the_train_moves_is_diagnosed() {
     let remarks = |hangs_at: &dyn Fn(u32) -> bool, stands: bool| -> Vec<String> {
         let mut csv = String::from("t,v,F,B\n");
         let (mut speed_mps, mut force_kn) = (16.0, 30.0);
@@ -331,7 +331,7 @@ fn a_run_without_any_time_is_refused() {
 }
 
 #[test]
-fn runs_are_numbered_and_told_apart_by_role() {
+fn runs_are_numbered_and_distinguished_by_role() {
     let files = [
         (
             "dataset.toml",

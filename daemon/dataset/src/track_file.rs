@@ -7,7 +7,7 @@ use dynocar_core::track::{
 };
 
 use super::document::{Document, Section};
-use super::error::{DatasetError, Place, Problem};
+use super::error::{DatasetError, Problem, SourcePosition};
 
 /// A steeper gradient in ‰ than any adhesion railway has is a mistake of unit.
 const GRADIENT_MAX_PERMILLE: f64 = 150.0;
@@ -25,7 +25,8 @@ pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
     root.allow(&["track"])?;
     let Some(section) = root.table("track")? else {
         let unknown = Track::new(UNNAMED.into(), None, None, None, None);
-        return unknown.map_err(|error| Place::whole(label).problem(Problem::Track(error)));
+        return unknown
+            .map_err(|error| SourcePosition::whole(label).problem(Problem::Track(error)));
     };
     section.allow(&[
         "name",
@@ -189,9 +190,9 @@ fn gradient_error(
 
 /// Where the entries of the lists stand.
 struct Places {
-    gradient: Vec<Place>,
-    curves: Vec<Place>,
-    tunnels: Vec<Place>,
+    gradient: Vec<SourcePosition>,
+    curves: Vec<SourcePosition>,
+    tunnels: Vec<SourcePosition>,
 }
 
 /// Where the intervals start, in the order of the file.
@@ -202,7 +203,7 @@ struct Starts {
 
 impl Places {
     /// The place of the entry that an error means.
-    fn of(&self, error: &TrackError, starts: &Starts, section: &Section) -> Place {
+    fn of(&self, error: &TrackError, starts: &Starts, section: &Section) -> SourcePosition {
         let (list, index) = match error {
             TrackError::Gradient(ProfileError::Empty) => return section.place_of("gradient"),
             TrackError::Gradient(
@@ -222,16 +223,18 @@ impl Places {
         list.get(index - 1).cloned().unwrap_or_else(|| section.place())
     }
 
-    fn list(&self, list: &str) -> &Vec<Place> {
+    fn list(&self, list: &str) -> &Vec<SourcePosition> {
         if list == "tunnels" { &self.tunnels } else { &self.curves }
     }
 }
 
-fn split<const N: usize>(entries: Vec<([f64; N], Place)>) -> (Vec<[f64; N]>, Vec<Place>) {
+fn split<const N: usize>(
+    entries: Vec<([f64; N], SourcePosition)>,
+) -> (Vec<[f64; N]>, Vec<SourcePosition>) {
     entries.into_iter().unzip()
 }
 
-type Gradient = (Vec<(f64, f64)>, Vec<Place>);
+type Gradient = (Vec<(f64, f64)>, Vec<SourcePosition>);
 
 /// A list of [chainage_m, permille] with values from `low` to the steepest gradient.
 fn profile(section: &Section, key: &str, low: f64) -> Result<Option<Gradient>, DatasetError> {

@@ -8,7 +8,7 @@ use dynocar_shared::{
 
 use crate::units::{self, Unit};
 use crate::variables::{
-    Interface, Meaning, ModelFile, Told, Variable, digits, guid, measured, row,
+    Interface, Meaning, ModelFile, SnapshotField, Variable, digits, guid, measured, row,
 };
 
 /// The recommended estimators, which a configuration of the daemon has by default; one for each
@@ -40,7 +40,7 @@ pub(crate) const GUID_DIGITS: [u8; 16] =
 const fn told(
     name: &'static str,
     of: PipelineKind,
-    told: Told,
+    told: SnapshotField,
     unit: Unit,
     description: &'static str,
 ) -> Variable {
@@ -73,46 +73,46 @@ const VARIABLES: &[Variable] = &[
     row("wheel_slide", Meaning::WheelSlide, units::NONE, "True while wheel-slide protection is active"),
     row("run", Meaning::Run, units::NONE, "Number of the run (trip); no integral crosses its change"),
 
-    told("resistance.a", RESISTANCE, Told::Value(Parameter::DavisA), units::NEWTON_PER_KILONEWTON, "Davis a"),
-    told("resistance.a_std", RESISTANCE, Told::Std(Parameter::DavisA), units::NEWTON_PER_KILONEWTON, STD),
-    told("resistance.b", RESISTANCE, Told::Value(Parameter::DavisB), units::DAVIS_B, "Davis b"),
-    told("resistance.b_std", RESISTANCE, Told::Std(Parameter::DavisB), units::DAVIS_B, STD),
-    told("resistance.c", RESISTANCE, Told::Value(Parameter::DavisC), units::DAVIS_C, "Davis c"),
-    told("resistance.c_std", RESISTANCE, Told::Std(Parameter::DavisC), units::DAVIS_C, STD),
-    told("resistance.w0", RESISTANCE, Told::Resistance, units::NEWTON_PER_KILONEWTON, "Basic resistance at the speed of the sample"),
-    told("resistance.w0_std", RESISTANCE, Told::ResistanceStd, units::NEWTON_PER_KILONEWTON, "Its standard deviation, from the full covariance"),
-    told("resistance.status", RESISTANCE, Told::Status, units::NONE, STATUS),
-    told("resistance.reason", RESISTANCE, Told::Reason, units::NONE, REASON),
-    told("resistance.rejected", RESISTANCE, Told::Rejected, units::NONE, REJECTED),
+    told("resistance.a", RESISTANCE, SnapshotField::Value(Parameter::DavisA), units::NEWTON_PER_KILONEWTON, "Davis a"),
+    told("resistance.a_std", RESISTANCE, SnapshotField::Std(Parameter::DavisA), units::NEWTON_PER_KILONEWTON, STD),
+    told("resistance.b", RESISTANCE, SnapshotField::Value(Parameter::DavisB), units::DAVIS_B, "Davis b"),
+    told("resistance.b_std", RESISTANCE, SnapshotField::Std(Parameter::DavisB), units::DAVIS_B, STD),
+    told("resistance.c", RESISTANCE, SnapshotField::Value(Parameter::DavisC), units::DAVIS_C, "Davis c"),
+    told("resistance.c_std", RESISTANCE, SnapshotField::Std(Parameter::DavisC), units::DAVIS_C, STD),
+    told("resistance.w0", RESISTANCE, SnapshotField::Resistance, units::NEWTON_PER_KILONEWTON, "Basic resistance at the speed of the sample"),
+    told("resistance.w0_std", RESISTANCE, SnapshotField::ResistanceStd, units::NEWTON_PER_KILONEWTON, "Its standard deviation, from the full covariance"),
+    told("resistance.status", RESISTANCE, SnapshotField::Status, units::NONE, STATUS),
+    told("resistance.reason", RESISTANCE, SnapshotField::Reason, units::NONE, REASON),
+    told("resistance.rejected", RESISTANCE, SnapshotField::Rejected, units::NONE, REJECTED),
 
-    told("mass.mass_t", MASS, Told::Value(Parameter::Mass), units::TONNE, "Gross mass"),
-    told("mass.mass_t_std", MASS, Told::Std(Parameter::Mass), units::TONNE, STD),
-    told("mass.status", MASS, Told::Status, units::NONE, STATUS),
-    told("mass.reason", MASS, Told::Reason, units::NONE, REASON),
-    told("mass.rejected", MASS, Told::Rejected, units::NONE, REJECTED),
+    told("mass.mass_t", MASS, SnapshotField::Value(Parameter::Mass), units::TONNE, "Gross mass"),
+    told("mass.mass_t_std", MASS, SnapshotField::Std(Parameter::Mass), units::TONNE, STD),
+    told("mass.status", MASS, SnapshotField::Status, units::NONE, STATUS),
+    told("mass.reason", MASS, SnapshotField::Reason, units::NONE, REASON),
+    told("mass.rejected", MASS, SnapshotField::Rejected, units::NONE, REJECTED),
 
-    told("adhesion.adhesion", ADHESION, Told::Value(Parameter::Adhesion), units::NONE, "Adhesion of wheel on rail, where the rail was the limit"),
-    told("adhesion.adhesion_std", ADHESION, Told::Std(Parameter::Adhesion), units::NONE, STD),
-    told("adhesion.adhesion_lower_bound", ADHESION, Told::Value(Parameter::AdhesionLowerBound), units::NONE, "What the rail carried at least, where the brake was the limit"),
-    told("adhesion.adhesion_lower_bound_std", ADHESION, Told::Std(Parameter::AdhesionLowerBound), units::NONE, STD),
-    told("adhesion.adhesion_law_scale", ADHESION, Told::Value(Parameter::AdhesionLawScale), units::NONE, "Scale of the known law of adhesion over speed"),
-    told("adhesion.adhesion_law_scale_std", ADHESION, Told::Std(Parameter::AdhesionLawScale), units::NONE, STD),
-    told("adhesion.status", ADHESION, Told::Status, units::NONE, STATUS),
-    told("adhesion.reason", ADHESION, Told::Reason, units::NONE, REASON),
-    told("adhesion.rejected", ADHESION, Told::Rejected, units::NONE, REJECTED),
+    told("adhesion.adhesion", ADHESION, SnapshotField::Value(Parameter::Adhesion), units::NONE, "Adhesion of wheel on rail, where the rail was the limit"),
+    told("adhesion.adhesion_std", ADHESION, SnapshotField::Std(Parameter::Adhesion), units::NONE, STD),
+    told("adhesion.adhesion_lower_bound", ADHESION, SnapshotField::Value(Parameter::AdhesionLowerBound), units::NONE, "What the rail carried at least, where the brake was the limit"),
+    told("adhesion.adhesion_lower_bound_std", ADHESION, SnapshotField::Std(Parameter::AdhesionLowerBound), units::NONE, STD),
+    told("adhesion.adhesion_law_scale", ADHESION, SnapshotField::Value(Parameter::AdhesionLawScale), units::NONE, "Scale of the known law of adhesion over speed"),
+    told("adhesion.adhesion_law_scale_std", ADHESION, SnapshotField::Std(Parameter::AdhesionLawScale), units::NONE, STD),
+    told("adhesion.status", ADHESION, SnapshotField::Status, units::NONE, STATUS),
+    told("adhesion.reason", ADHESION, SnapshotField::Reason, units::NONE, REASON),
+    told("adhesion.rejected", ADHESION, SnapshotField::Rejected, units::NONE, REJECTED),
 
-    told("brake_friction.disc_friction", BRAKE, Told::Value(Parameter::DiscFriction), units::NONE, "Friction of the brake discs; needs the pressure and the gear in the train's file"),
-    told("brake_friction.disc_friction_std", BRAKE, Told::Std(Parameter::DiscFriction), units::NONE, STD),
-    told("brake_friction.status", BRAKE, Told::Status, units::NONE, STATUS),
-    told("brake_friction.reason", BRAKE, Told::Reason, units::NONE, REASON),
-    told("brake_friction.rejected", BRAKE, Told::Rejected, units::NONE, REJECTED),
+    told("brake_friction.disc_friction", BRAKE, SnapshotField::Value(Parameter::DiscFriction), units::NONE, "Friction of the brake discs; needs the pressure and the gear in the train's file"),
+    told("brake_friction.disc_friction_std", BRAKE, SnapshotField::Std(Parameter::DiscFriction), units::NONE, STD),
+    told("brake_friction.status", BRAKE, SnapshotField::Status, units::NONE, STATUS),
+    told("brake_friction.reason", BRAKE, SnapshotField::Reason, units::NONE, REASON),
+    told("brake_friction.rejected", BRAKE, SnapshotField::Rejected, units::NONE, REJECTED),
 
-    told("monitor.unexplained_force_n", MONITOR, Told::UnexplainedForce, units::NEWTON, "Force that the declared model does not explain, retarding positive"),
-    told("monitor.unexplained_force_n_std", MONITOR, Told::UnexplainedForceStd, units::NEWTON, STD),
-    told("monitor.suspected_effect", MONITOR, Told::SuspectedEffect, units::NONE, "The effect that the model may lack"),
-    told("monitor.status", MONITOR, Told::Status, units::NONE, STATUS),
-    told("monitor.reason", MONITOR, Told::Reason, units::NONE, REASON),
-    told("monitor.rejected", MONITOR, Told::Rejected, units::NONE, REJECTED),
+    told("monitor.unexplained_force_n", MONITOR, SnapshotField::UnexplainedForce, units::NEWTON, "Force that the declared model does not explain, retarding positive"),
+    told("monitor.unexplained_force_n_std", MONITOR, SnapshotField::UnexplainedForceStd, units::NEWTON, STD),
+    told("monitor.suspected_effect", MONITOR, SnapshotField::SuspectedEffect, units::NONE, "The effect that the model may lack"),
+    told("monitor.status", MONITOR, SnapshotField::Status, units::NONE, STATUS),
+    told("monitor.reason", MONITOR, SnapshotField::Reason, units::NONE, REASON),
+    told("monitor.rejected", MONITOR, SnapshotField::Rejected, units::NONE, REJECTED),
 ];
 
 /// What is told before the files are read.
@@ -146,26 +146,31 @@ impl Estimators {
     }
 
     /// A number, where it is known.
-    pub fn real(&self, of: PipelineKind, told: Told) -> Option<f64> {
+    pub fn real(&self, of: PipelineKind, told: SnapshotField) -> Option<f64> {
         let snapshot = self.snapshot(of);
         match told {
-            Told::Value(parameter) => snapshot.value(parameter),
-            Told::Std(parameter) => snapshot.std(parameter),
-            Told::Resistance => Some(snapshot.resistance_at(self.speed_mps)?.w0_n_per_kn),
-            Told::ResistanceStd => Some(snapshot.resistance_at(self.speed_mps)?.w0_std_n_per_kn),
-            Told::UnexplainedForce => Some(snapshot.unexplained_force_n),
-            Told::UnexplainedForceStd => Some(snapshot.unexplained_force_std_n),
-            Told::SuspectedEffect | Told::Status | Told::Reason | Told::Rejected => None,
+            SnapshotField::Value(parameter) => snapshot.value(parameter),
+            SnapshotField::Std(parameter) => snapshot.std(parameter),
+            SnapshotField::Resistance => Some(snapshot.resistance_at(self.speed_mps)?.w0_n_per_kn),
+            SnapshotField::ResistanceStd => {
+                Some(snapshot.resistance_at(self.speed_mps)?.w0_std_n_per_kn)
+            }
+            SnapshotField::UnexplainedForce => Some(snapshot.unexplained_force_n),
+            SnapshotField::UnexplainedForceStd => Some(snapshot.unexplained_force_std_n),
+            SnapshotField::SuspectedEffect
+            | SnapshotField::Status
+            | SnapshotField::Reason
+            | SnapshotField::Rejected => None,
         }
     }
 
     /// A whole number, or the number of a member of a vocabulary.
-    pub fn integer(&self, of: PipelineKind, told: Told) -> u64 {
+    pub fn integer(&self, of: PipelineKind, told: SnapshotField) -> u64 {
         let snapshot = self.snapshot(of);
         match told {
-            Told::Status => snapshot.status.into(),
-            Told::Reason => snapshot.reason.into(),
-            Told::SuspectedEffect => snapshot.suspected_effect.into(),
+            SnapshotField::Status => snapshot.status.into(),
+            SnapshotField::Reason => snapshot.reason.into(),
+            SnapshotField::SuspectedEffect => snapshot.suspected_effect.into(),
             _ => snapshot.samples_rejected,
         }
     }
@@ -180,8 +185,12 @@ mod tests {
         for variable in VARIABLES {
             let name = variable.name;
             let expected = match variable.meaning {
-                Meaning::Estimate(_, Told::Value(parameter)) => parameter.name().to_owned(),
-                Meaning::Estimate(_, Told::Std(parameter)) => format!("{}_std", parameter.name()),
+                Meaning::Estimate(_, SnapshotField::Value(parameter)) => {
+                    parameter.name().to_owned()
+                }
+                Meaning::Estimate(_, SnapshotField::Std(parameter)) => {
+                    format!("{}_std", parameter.name())
+                }
                 _ => continue,
             };
             assert_eq!(name.split_once('.').map(|(_, name)| name), Some(expected.as_str()));
@@ -194,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn every_recommended_estimator_tells_status_reason_and_refusals_under_one_name() {
+    fn every_recommended_estimator_shows_status_reason_and_refusals_under_one_name() {
         for kind in PIPELINES {
             let of_kind =
                 |it: &&Variable| matches!(it.meaning, Meaning::Estimate(of, _) if of == kind);

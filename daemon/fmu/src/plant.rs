@@ -63,7 +63,7 @@ const VARIABLES: &[Variable] = &[
     force("force.wind_n", ForcePart::Wind, "What wind adds to the air resistance"),
     force("force.ambient_n", ForcePart::Ambient, "What the temperature adds to the basic resistance"),
     force("force.bearing_n", ForcePart::Bearing, "Resistance of cold bearings"),
-    force("force.place_n", ForcePart::Place, "Resistance at places of the line"),
+    force("force.place_n", ForcePart::Location, "Resistance at places of the line"),
     force("force.other_n", ForcePart::Other, "Resistances of forms of their own"),
 ];
 
@@ -129,7 +129,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_force_is_told_under_one_name() {
+    fn every_force_is_reported_under_one_name() {
         for part in ForcePart::ALL {
             let is_it = |it: &&Variable| it.meaning == Meaning::Driven(Driven::Force(part));
             assert_eq!(VARIABLES.iter().filter(is_it).count(), 1, "{part:?}");

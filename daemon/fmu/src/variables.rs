@@ -67,7 +67,7 @@ pub enum ModelFile {
 
 /// What is told of an estimator's snapshot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Told {
+pub enum SnapshotField {
     /// A parameter's value.
     Value(Parameter),
     /// A parameter's standard deviation.
@@ -134,7 +134,7 @@ pub enum Meaning {
     /// Input: whether wheel-slide protection is active.
     WheelSlide,
     /// Output: what an estimator says.
-    Estimate(PipelineKind, Told),
+    Estimate(PipelineKind, SnapshotField),
     /// Parameter: how the driven train begins.
     Begins(Begins),
     /// Output: what the driven train does.
@@ -201,10 +201,10 @@ impl Meaning {
             Meaning::WheelSlide | Meaning::Begins(Begins::HeldAtRest) => Kind::Boolean,
             Meaning::Begins(_) | Meaning::Driven(_) => Kind::Real,
             Meaning::Estimate(_, told) => match told {
-                Told::Status => Kind::Enumeration(Vocabulary::Status),
-                Told::Reason => Kind::Enumeration(Vocabulary::Reason),
-                Told::SuspectedEffect => Kind::Enumeration(Vocabulary::Effect),
-                Told::Rejected => Kind::Integer,
+                SnapshotField::Status => Kind::Enumeration(Vocabulary::Status),
+                SnapshotField::Reason => Kind::Enumeration(Vocabulary::Reason),
+                SnapshotField::SuspectedEffect => Kind::Enumeration(Vocabulary::Effect),
+                SnapshotField::Rejected => Kind::Integer,
                 _ => Kind::Real,
             },
         }

@@ -14,7 +14,7 @@ use super::companion::{become_it, words_of_command};
 use super::{ErrorAnswer, Failure};
 use crate::config::DaemonConfig;
 use crate::dataset::{FileKind, file_error, is_recording, kind_of, read_text};
-use crate::output::{give, require_file, tell, write_json};
+use crate::output::{give, report_line, require_file, write_json};
 use crate::programs::WORKSHOP;
 
 /// Check a dataset, train, track or configuration, and report what was understood.
@@ -104,7 +104,7 @@ pub fn or_refused<T>(
         // The exit status is that of what is wrong with the input.
         && let Err(error) = write_json(file, &refusal(path, error))
     {
-        tell(&format!("dynocar: {error}"));
+        report_line(&format!("dynocar: {error}"));
     }
     result
 }

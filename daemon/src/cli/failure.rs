@@ -3,12 +3,12 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use dynocar_dataset::{DatasetError, Place};
+use dynocar_dataset::{DatasetError, SourcePosition};
 use serde::Serialize;
 
 use crate::config::ConfigError;
 use crate::dataset::LoadError;
-use crate::output::{OutputError, require_file, tell, write_json};
+use crate::output::{OutputError, report_line, require_file, write_json};
 use crate::unpacking::UnpackError;
 
 /// Why a command ended without a result; says which exit status follows.
@@ -17,7 +17,7 @@ pub enum Failure {
     /// The command line or an input file is wrong: exit status 2.
     Input(String),
     /// An input file is wrong at a known place: exit status 2.
-    At(Place, String),
+    At(SourcePosition, String),
     /// The work failed: exit status 1.
     Work(String),
     /// A result cannot be given: exit status 1, or 2 when its name would cost data.
@@ -41,7 +41,7 @@ pub struct ErrorAnswer {
 
 /// What stands in the place of a result.
 #[derive(Serialize)]
-pub struct Answer {
+pub struct ErrorDocument {
     /// Why there is none.
     pub error: ErrorAnswer,
 }
@@ -69,19 +69,19 @@ impl Failure {
             let Failure::Verdict(status) = self else { return ExitCode::FAILURE };
             return ExitCode::from(*status);
         };
-        tell(&format!("{program}: {}", error.message));
+        report_line(&format!("{program}: {}", error.message));
         let status = ExitCode::from(error.exit_status);
         if let Some(file) = json
-            && self.can_be_told_in(file)
-            && let Err(error) = write_json(file, &Answer { error })
+            && self.can_be_estimated_in(file)
+            && let Err(error) = write_json(file, &ErrorDocument { error })
         {
-            tell(&format!("{program}: {error}"));
+            report_line(&format!("{program}: {error}"));
         }
         status
     }
 
     /// False where the file holds the result already, cannot be written or must not be.
-    fn can_be_told_in(&self, file: &Path) -> bool {
+    fn can_be_estimated_in(&self, file: &Path) -> bool {
         match self {
             Failure::Output(OutputError::StandardOutput(_)) => false,
             Failure::Output(OutputError::File { path, .. } | OutputError::Name { path, .. })
@@ -116,7 +116,7 @@ impl From<LoadError> for Failure {
             | LoadError::NoSuchPath { path }
             | LoadError::NotADataset { path, .. }
             | LoadError::NoManifest { path, .. } => {
-                Failure::At(Place::whole(&path.display().to_string()), message)
+                Failure::At(SourcePosition::whole(&path.display().to_string()), message)
             }
         }
     }
@@ -130,7 +130,7 @@ impl From<ConfigError> for Failure {
             ConfigError::Unreadable { path, .. }
             | ConfigError::Malformed { path, .. }
             | ConfigError::OutOfRange { path, .. } => {
-                Failure::At(Place::whole(&path.display().to_string()), message)
+                Failure::At(SourcePosition::whole(&path.display().to_string()), message)
             }
         }
     }

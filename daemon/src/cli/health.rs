@@ -9,7 +9,7 @@ use dynocar_shared::TrainId;
 use super::Failure;
 use crate::config::DaemonConfig;
 use crate::operator::refused_words;
-use crate::output::{print, tell};
+use crate::output::{print, report_line};
 use crate::supervision::health::{TrainHealth, Verdict, look_at};
 
 /// Report whether the daemon is well, by an exit status for each verdict.
@@ -57,7 +57,7 @@ pub fn execute(arguments: &HealthArguments) -> Result<(), Failure> {
     }
     if let Err(error) = print(&text) {
         // The exit status is the verdict, whether or not it can be told in words.
-        tell(&format!("dynocar: {error}"));
+        report_line(&format!("dynocar: {error}"));
     }
     if worst == Verdict::Ok { Ok(()) } else { Err(Failure::Verdict(worst.exit_status())) }
 }

@@ -169,7 +169,7 @@ fn parse_by<A: Parser>(mut command: clap::Command, program: &str) -> Result<A, E
         let message = message.trim().trim_start_matches("error: ").to_string();
         if let (true, Some(error)) = (wants_json, Failure::Input(message).answer()) {
             // People know already; that machines cannot be told changes no status.
-            let _ = write_json(Path::new("-"), &failure::Answer { error });
+            let _ = write_json(Path::new("-"), &failure::ErrorDocument { error });
         }
         return Err(ExitCode::from(2));
     }

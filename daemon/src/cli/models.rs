@@ -16,7 +16,7 @@ use crate::models::history::{History, State};
 use crate::models::{
     Figure, ModelHash, ModelText, ModelsError, Moment, NewDecision, Store, Stored, TrainModels,
 };
-use crate::output::{print, tell};
+use crate::output::{print, report_line};
 use crate::shadow::record::{Trials, Tried, ratio_in_words};
 
 /// The store where none is named.
@@ -96,7 +96,7 @@ pub fn execute(arguments: &ModelsArguments) -> Result<(), Failure> {
     let text = match &arguments.command {
         ModelsCommand::List => {
             for (path, problem) in &history.left_out {
-                tell(&format!("left out: {}: {problem}", path.display()));
+                report_line(&format!("left out: {}: {problem}", path.display()));
             }
             list(&models, &history)
         }
@@ -284,8 +284,8 @@ fn trial(trials: &Trials, hash: ModelHash) -> String {
 
 /// A model's error over that of the one in force, with what speaks for it.
 fn compared(tried: &Tried) -> String {
-    let (trips, capital) = (tried.evidence.trips(), tried.evidence.capital());
-    let evidence = if capital < 1e4 { short(capital, 1) } else { format!("{capital:.0e}") };
+    let (trips, e_value) = (tried.evidence.trips(), tried.evidence.e_value());
+    let evidence = if e_value < 1e4 { short(e_value, 1) } else { format!("{e_value:.0e}") };
     match tried.error_ratio {
         Some(ratio) => {
             let ratio = ratio_in_words(ratio);

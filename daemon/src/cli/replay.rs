@@ -13,7 +13,7 @@ use dynocar_shared::{PipelineKind, TrainId};
 use super::Failure;
 use super::companion::{self, Passed};
 use crate::dataset;
-use crate::output::tell;
+use crate::output::report_line;
 use crate::redrawn::{Redrawn, bar};
 use crate::replay::{Rate, ReplayReport, Replayer};
 use crate::unpacking::program_for;
@@ -84,7 +84,7 @@ pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
         Failure::Input(format!("--wait {}: expected a time in s from 0", arguments.wait))
     })?;
     if !replayer.await_daemon(wait) {
-        tell(&format!(
+        report_line(&format!(
             "dynocar: no daemon serves train {} after {} s; publishing all the same",
             arguments.train, arguments.wait
         ));
@@ -94,7 +94,7 @@ pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
         replayer.play(&run.samples, |count| progress.show(count));
     }
     let report = replayer.finish();
-    tell_report(&report);
+    report_page(&report);
     if report.snapshots.is_empty() {
         return Err(Failure::Work(format!(
             "nobody took the samples: no daemon serves train {}",
@@ -134,8 +134,8 @@ impl<'r> Progress<'r> {
     }
 }
 
-fn tell_report(report: &ReplayReport) {
-    tell(&format!(
+fn report_page(report: &ReplayReport) {
+    report_line(&format!(
         "{} samples published in {:.1} s, {} not taken by the transport",
         report.published, report.elapsed_s, report.refused
     ));
@@ -146,7 +146,7 @@ fn tell_report(report: &ReplayReport) {
             taken.reasons.iter().map(|(reason, count)| format!("{reason} {count}")).collect();
         let reasons =
             if reasons.is_empty() { String::new() } else { format!(" ({})", reasons.join(", ")) };
-        tell(&format!(
+        report_line(&format!(
             "  pipeline {} ({}): {}, {} used, {} rejected{reasons}, {} lost",
             snapshot.pipeline_index,
             kind.map_or("unknown kind", PipelineKind::name),

@@ -8,7 +8,7 @@ use dynocar_shared::{ParameterSnapshot, PipelineKind};
 
 use dynocar_dataset::Dataset;
 
-use crate::output::tell;
+use crate::output::report_line;
 use crate::redrawn::{Redrawn, bar};
 
 /// How often a plain line is written for each pipeline.
@@ -28,12 +28,12 @@ pub struct View {
 impl View {
     /// A view of the replay of a dataset with so many samples.
     pub fn new(dataset: &Dataset, total: u64, rate: f64) -> Self {
-        tell(&format!(
+        report_line(&format!(
             "{}: {} recorded runs at {rate} times their speed",
             dataset.train.name,
             dataset.runs.len()
         ));
-        tell("controller, daemon and client are three processes; ± is a 95 % interval");
+        report_line("controller, daemon and client are three processes; ± is a 95 % interval");
         let redrawn = std::io::stderr().is_terminal().then(Redrawn::default);
         View { total, redrawn, last_plain: None }
     }
@@ -54,7 +54,7 @@ impl View {
     fn write_lines(&self, reader: &SnapshotReader, now_ns: i64) {
         for reading in reader.readings(now_ns) {
             let percent = 100 * reading.snapshot.sample_sequence / self.total.max(1);
-            tell(&format!("{percent:3} %  {}", describe(&reading)));
+            report_line(&format!("{percent:3} %  {}", describe(&reading)));
         }
     }
 }

@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_suspicion_is_named_with_its_force_and_its_rivals() {
+    fn a_suspicion_is_named_with_its_force_and_its_competing_hypotheses() {
         let mut snapshot = ParameterSnapshot::empty();
         assert_eq!(Suspicion::of(&snapshot), None);
         snapshot.suspected_effect = EffectKind::DraggingBrake as u32;

@@ -56,7 +56,7 @@ impl StatusLog {
         self.told.retain(|it| now.duration_since(it.1) < STAY_MAX);
         let Some(place) = self.told.iter().position(|it| it.0 == state) else {
             self.stay = STAY_MIN;
-            return self.tell(now);
+            return self.report(now);
         };
         self.told[place].1 = now;
         if place + 1 == self.told.len() || now.duration_since(self.since) < self.stay {
@@ -64,7 +64,7 @@ impl StatusLog {
         }
         self.told.remove(place);
         self.stay = (2 * self.stay).min(STAY_MAX);
-        self.tell(now)
+        self.report(now)
     }
 
     /// Changes seen so far, told or not.
@@ -72,7 +72,7 @@ impl StatusLog {
         self.changes
     }
 
-    fn tell(&mut self, now: Instant) -> Option<Vec<(State, u64)>> {
+    fn report(&mut self, now: Instant) -> Option<Vec<(State, u64)>> {
         if self.told.len() == REMEMBERED {
             self.told.remove(0);
         }
@@ -107,13 +107,13 @@ mod tests {
     }
 
     #[test]
-    fn a_status_that_is_new_is_told_at_once_and_once() {
+    fn a_status_that_is_new_is_reported_at_once_and_once() {
         let state = |tenth| if tenth < 45 { GOOD } else { INVALID };
         assert_eq!(told(state, 60), [(0.0, GOOD, 0), (4.5, INVALID, 0)]);
     }
 
     #[test]
-    fn a_status_that_flips_is_told_once_and_its_flips_are_counted_when_it_stays() {
+    fn a_status_that_flips_is_reported_once_and_its_flips_are_counted_when_it_stays() {
         // Flips each 0.3 s for a minute, then stays.
         let state = |tenth| {
             if tenth < 600 && (tenth / 3) % 2 == 0 { GOOD } else { AT_BOUND }
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_told_is_named_with_how_often_it_came() {
+    fn what_was_not_reported_is_named_with_how_often_it_came() {
         let start = Instant::now();
         let mut log = StatusLog::new(start);
         let mut at =
@@ -137,20 +137,20 @@ mod tests {
     }
 
     #[test]
-    fn a_return_that_stays_is_told_soon() {
+    fn a_return_that_stays_is_called_soon() {
         let state = |tenth| if (100..105).contains(&tenth) { INVALID } else { GOOD };
         assert_eq!(told(state, 60), [(0.0, GOOD, 0), (10.0, INVALID, 0), (12.5, GOOD, 0)]);
     }
 
     #[test]
-    fn slow_flips_are_told_ever_more_seldom() {
+    fn slow_flips_are_reported_ever_more_seldom() {
         let state = |tenth| if (tenth / 50) % 2 == 0 { GOOD } else { AT_BOUND };
         let told = told(state, 3_600);
         assert!((3..=8).contains(&told.len()), "720 flips in an hour: {told:?}");
     }
 
     #[test]
-    fn a_status_comes_as_news_when_it_was_not_told_for_long() {
+    fn a_status_comes_as_news_when_it_was_not_reported_for_long() {
         let state = |tenth| if (100..3_000).contains(&tenth) { INVALID } else { GOOD };
         assert_eq!(told(state, 400), [(0.0, GOOD, 0), (10.0, INVALID, 0), (300.0, GOOD, 0)]);
     }

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 
 use crossbeam_utils::CachePadded;
-use dynocar_core::plausibility::{Finding, Slip};
+use dynocar_core::plausibility::{Finding, InputFault};
 use dynocar_shared::ParameterSnapshot;
 use dynocar_shared::snapshot::REJECTION_REASONS;
 
@@ -156,7 +156,7 @@ fn packed(finding: Option<Finding>) -> u64 {
 
 fn unpacked(word: u64) -> Option<Finding> {
     let (slip, factor) = halves(word);
-    let slip = Slip::from_number(slip as u8)?;
+    let slip = InputFault::from_number(slip as u8)?;
     Some(Finding { slip, factor: f64::from(f32::from_bits(factor)) })
 }
 

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use dynocar_client::channel::SampleCount;
 use dynocar_client::{Announcement, ChannelError, Host, Peer, Role};
-use dynocar_core::plausibility::Slip;
+use dynocar_core::plausibility::InputFault;
 use dynocar_shared::snapshot::REJECTION_REASONS;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Reason, RejectionReason, Status, TrainId};
@@ -123,7 +123,7 @@ impl Watch {
         let known = |(pipeline, last): (&WatchedPipeline, &TallyReading)| {
             Some((pipeline.train.0, last.implausible?.slip))
         };
-        let mut told: Vec<(u64, Slip)> =
+        let mut told: Vec<(u64, InputFault)> =
             self.pipelines.iter().zip(&self.readings).filter_map(known).collect();
         let now = Instant::now();
         let mut refused: HashMap<TrainId, [u32; REJECTION_REASONS]> = HashMap::new();

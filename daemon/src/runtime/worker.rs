@@ -34,13 +34,13 @@ pub struct WorkerPlan {
     /// See [`crate::config::DaemonConfig::heartbeat_ms`].
     pub heartbeat_ms: u64,
     /// The thread's pipelines by train.
-    pub lanes: Vec<LanePlan>,
+    pub lanes: Vec<ChannelPlan>,
     /// Set when the daemon is to stop.
     pub stop: Arc<AtomicBool>,
 }
 
 /// One train of a worker, with its pipelines.
-pub struct LanePlan {
+pub struct ChannelPlan {
     /// The train.
     pub train: TrainId,
     /// How far the train's samples have been counted.
@@ -60,7 +60,7 @@ struct Slot {
     last_vouched_ns: i64,
 }
 
-struct Lane {
+struct TrainChannel {
     receiver: Receiver<TrainSample>,
     count: Arc<SampleCount>,
     place: usize,
@@ -76,7 +76,7 @@ struct Lane {
 
 /// A pipeline thread at work; lives in its own thread, for the ports cannot move.
 pub struct Worker {
-    lanes: Vec<Lane>,
+    lanes: Vec<TrainChannel>,
     idler: Idler,
     epoch: u64,
     heartbeat_ns: i64,
@@ -101,7 +101,7 @@ impl Worker {
         let lanes = plan
             .lanes
             .into_iter()
-            .map(|lane| open_lane(&transport, lane, plan.epoch))
+            .map(|lane| open_channel_of(&transport, lane, plan.epoch))
             .collect::<Result<Vec<_>, _>>()?;
         transport.reserve()?;
         let idler = Idler::new(plan.thread.idle, plan.spin_us, plan.heartbeat_ms, sleeper);
@@ -182,7 +182,7 @@ impl Worker {
     }
 }
 
-impl Lane {
+impl TrainChannel {
     fn next(&mut self) -> Option<TrainSample> {
         self.found.take().or_else(|| self.receiver.receive())
     }
@@ -248,7 +248,11 @@ impl Slot {
     }
 }
 
-fn open_lane(transport: &Transport, plan: LanePlan, epoch: u64) -> Result<Lane, ChannelError> {
+fn open_channel_of(
+    transport: &Transport,
+    plan: ChannelPlan,
+    epoch: u64,
+) -> Result<TrainChannel, ChannelError> {
     // Before the first snapshot: who reads that may publish at once, and loses nothing.
     let receiver = transport.receiver::<TrainSample>(plan.train)?;
     // After the port is open: what is published from now on can be received, and is counted.
@@ -265,7 +269,7 @@ fn open_lane(transport: &Transport, plan: LanePlan, epoch: u64) -> Result<Lane, 
             Ok(slot)
         })
         .collect::<Result<_, ChannelError>>()?;
-    Ok(Lane {
+    Ok(TrainChannel {
         receiver,
         count: plan.count,
         place: plan.place,
@@ -278,7 +282,7 @@ fn open_lane(transport: &Transport, plan: LanePlan, epoch: u64) -> Result<Lane, 
 }
 
 /// True when a sample came while the controllers were told of the sleep; keeps it.
-fn look_once_more(lanes: &mut [Lane]) -> bool {
+fn look_once_more(lanes: &mut [TrainChannel]) -> bool {
     let mut any = false;
     for lane in lanes {
         lane.found = lane.next();

@@ -21,7 +21,7 @@ pub struct TrialFigures {
     /// Trips that were compared.
     pub trips: u64,
     /// The evidence for it, see [`dynocar_core::trial::evidence`].
-    pub capital: f64,
+    pub e_value: f64,
 }
 
 /// Maintenance events of a kind.

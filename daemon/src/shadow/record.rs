@@ -153,7 +153,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_end_that_tells_nothing_is_not_shown_as_a_number() {
+    fn an_end_that_shows_nothing_is_not_shown_as_a_number() {
         assert_eq!(ratio_in_words([0.42, 0.55]), "0.42 to 0.55 times");
         assert_eq!(ratio_in_words([0.0, 0.55]), "at most 0.55 times");
         assert_eq!(ratio_in_words([1.2, RATIO_MAX]), "at least 1.20 times");

@@ -37,7 +37,7 @@ pub struct Rule {
 impl Rule {
     /// True where one of so many rivals has shown that it is better.
     pub fn is_better(&self, rival: &Rival, rivals: usize) -> bool {
-        rival.evidence.capital() >= self.trips_between_mistakes * rivals as f64
+        rival.evidence.e_value() >= self.trips_between_mistakes * rivals as f64
     }
 
     /// What to decide when a rival is better: to take back what is in force, if the rival was

@@ -23,7 +23,7 @@ const LOOK: Duration = Duration::from_secs(1);
 /// A train of which no sample comes for so long is not driven.
 const SILENCE: Duration = Duration::from_secs(2);
 
-struct Lane {
+struct TrainChannel {
     train: ShadowTrain,
     receiver: Receiver<TrainSample>,
     heard: Instant,
@@ -56,16 +56,16 @@ pub fn start(
     std::thread::Builder::new().name("shadow".into()).spawn(work)
 }
 
-fn open(host: &Host, trains: Vec<ShadowTrain>) -> Result<Vec<Lane>, ChannelError> {
+fn open(host: &Host, trains: Vec<ShadowTrain>) -> Result<Vec<TrainChannel>, ChannelError> {
     let transport = Transport::open(host, "dynocar-shadow")?;
     let lane = |train: ShadowTrain| {
         let receiver = transport.receiver::<TrainSample>(TrainId(train.id()))?;
-        Ok(Lane { train, receiver, heard: Instant::now() })
+        Ok(TrainChannel { train, receiver, heard: Instant::now() })
     };
     trains.into_iter().map(lane).collect()
 }
 
-fn run(lanes: &mut [Lane], settings: &ModelsConfig, board: &Board, stop: &AtomicBool) {
+fn run(lanes: &mut [TrainChannel], settings: &ModelsConfig, board: &Board, stop: &AtomicBool) {
     let every = Duration::from_secs(settings.interval_s);
     let (mut looked, mut written) = (None::<Instant>, Instant::now());
     info!(store = %settings.directory.display(), "models are tried");
@@ -96,7 +96,7 @@ fn run(lanes: &mut [Lane], settings: &ModelsConfig, board: &Board, stop: &Atomic
     }
 }
 
-impl Lane {
+impl TrainChannel {
     fn hear(&mut self) {
         let since = SystemTime::now().duration_since(UNIX_EPOCH);
         let unix_s = since.map_or(0.0, |since| since.as_secs_f64());

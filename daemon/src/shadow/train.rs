@@ -175,7 +175,7 @@ impl ShadowTrain {
             error_mps: rival.ledger.all.rmse_mps(),
             error_ratio: rival.evidence.error_ratio(),
             trips: rival.evidence.trips(),
-            capital: rival.evidence.capital(),
+            e_value: rival.evidence.e_value(),
         };
         let rivals = self.trials.rivals.iter().map(|rival| figures(rival, false));
         std::iter::once(figures(&self.trials.in_force, true)).chain(rivals).collect()
@@ -265,7 +265,7 @@ impl ShadowTrain {
                 Ok(None) if rule.adopt == Adopt::WhenBetter => {
                     return self.decide(hash, reason, now);
                 }
-                Ok(None) => self.tell_once(format!(
+                Ok(None) => self.report_once(format!(
                     "model {hash} is better: {reason}. `dynocar models adopt {hash}` puts it in force"
                 )),
                 Ok(Some(outside)) => {
@@ -346,7 +346,7 @@ impl ShadowTrain {
         }
     }
 
-    fn tell_once(&mut self, message: String) {
+    fn report_once(&mut self, message: String) {
         // The figures in it change: once for each model.
         let about = message.split(':').next().unwrap_or_default().to_owned();
         if self.told.insert(about) {

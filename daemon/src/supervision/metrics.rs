@@ -110,7 +110,7 @@ impl Families {
             labels.push(("end", end.to_owned()));
             self.trial_ratio.get_or_create(&labels).set(value);
         }
-        self.trial_evidence.get_or_create(&labels).set(it.capital);
+        self.trial_evidence.get_or_create(&labels).set(it.e_value);
         self.trial_trips.get_or_create(&labels).set(it.trips as f64);
     }
 

@@ -57,7 +57,7 @@ impl Supervisor {
     }
 
     /// Tells the supervisor a state, as `READY=1`.
-    pub fn tell(&self, state: &str) {
+    pub fn notify(&self, state: &str) {
         if let Some((socket, address)) = &self.socket
             && let Err(error) = socket.send_to_addr(state.as_bytes(), address)
         {
@@ -110,7 +110,7 @@ impl<'a> Watchdog<'a> {
         }
         if all_alive && fed.is_none_or(|fed| now.duration_since(fed) >= feeding) {
             *fed = Some(now);
-            self.supervisor.tell("WATCHDOG=1");
+            self.supervisor.notify("WATCHDOG=1");
         }
     }
 }
@@ -170,10 +170,10 @@ mod tests {
 
     #[test]
     fn without_a_supervisor_or_with_a_dead_one_nothing_happens() {
-        Supervisor::at(None, Some(1)).tell("READY=1");
-        Supervisor::at(Some("/nowhere/notify"), None).tell("READY=1");
+        Supervisor::at(None, Some(1)).notify("READY=1");
+        Supervisor::at(Some("/nowhere/notify"), None).notify("READY=1");
         let supervisor = Supervisor::at(Some("@dynocar-no-such-socket"), None);
-        supervisor.tell("READY=1");
+        supervisor.notify("READY=1");
         Watchdog::new(&supervisor, Vec::new()).round(Instant::now());
     }
 }

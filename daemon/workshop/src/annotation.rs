@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use dynocar_analysis::explain::report::timeline::Timeline;
 use tempfile::NamedTempFile;
 
-use dynocar::output::tell;
-use dynocar::programs::{Complaint, RECORDING, call, output_of};
+use dynocar::output::report_line;
+use dynocar::programs::{CallFailure, RECORDING, call, output_of};
 
 /// Why a recording is not annotated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -36,9 +36,9 @@ pub fn annotate(from: &Path, timeline: &Timeline, to: &Path) -> Result<(), Annot
     let mut command = call(RECORDING);
     command.arg("annotate").arg(from).arg("--timeline").arg(file.path()).arg("--output").arg(to);
     let (_, words) = output_of(RECORDING, &mut command).map_err(|complaint| match complaint {
-        Complaint::Input(problem) => AnnotationError::Input(problem),
-        Complaint::Work(problem) => failed(problem),
+        CallFailure::Input(problem) => AnnotationError::Input(problem),
+        CallFailure::Work(problem) => failed(problem),
     })?;
-    tell(&words);
+    report_line(&words);
     Ok(())
 }

@@ -19,10 +19,10 @@
 pub mod annotation;
 pub mod cli;
 pub mod fmu;
-pub mod grown;
 pub mod learn;
 pub mod paths;
 pub mod report;
 pub mod run_facts;
 pub mod survey;
 pub mod track_text;
+pub mod updated;

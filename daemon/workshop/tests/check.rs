@@ -169,9 +169,9 @@ fn a_train_and_a_track_can_be_checked_alone() {
 }
 
 #[test]
-fn what_a_grown_model_adds_is_told_and_nothing_else() {
+fn what_an_updated_model_adds_is_reported_and_nothing_else() {
     let folder = dataset(RUN_2);
-    let grown_train = format!(
+    let updated_train = format!(
         "{TRAIN}[corrections]\nspeed_scale = 0.985\nactuator_lag_s = 0.4\ntunnel_c_factor = 1.9\n\
          tunnel_dc_n_per_kn_per_mps2 = 0.0003\n\
          wind_plus_mps = -2.5\nbearing_delta_a_n_per_kn = 0.6\nbearing_tau_s = 420\n\
@@ -181,7 +181,7 @@ fn what_a_grown_model_adds_is_told_and_nothing_else() {
         "{TRACK}gradient_shift_m = -40\ngradient_error = [[0, 0.5], [900, -1]]\n\
          resistance = [[100, 200, 1.25], [300, 400, -0.5]]\nmasses = [[0, 900, 1, 1.04]]\n"
     );
-    std::fs::write(folder.path().join("train.toml"), grown_train).unwrap();
+    std::fs::write(folder.path().join("train.toml"), updated_train).unwrap();
     std::fs::write(folder.path().join("track.toml"), grown_track).unwrap();
     let output = check(folder.path(), &["train.toml"]);
     let report = text(&output.stdout);
@@ -278,7 +278,7 @@ fn what_is_no_dataset_is_refused_with_what_was_expected() {
 }
 
 #[test]
-fn a_daemon_configuration_is_told_with_its_pipelines_or_refused_with_key_and_range() {
+fn a_daemon_configuration_is_reported_with_its_pipelines_or_refused_with_key_and_range() {
     let folder = dataset(RUN_2);
     let output = check(folder.path(), &["daemon.toml", "--json", "-"]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));

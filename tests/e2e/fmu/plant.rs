@@ -3,7 +3,7 @@
 use std::fs::{read_to_string, write};
 
 use dynocar::dataset;
-use dynocar_analysis::explain::evidence::{GrownForces, GrownModel, RunData, prepare};
+use dynocar_analysis::explain::evidence::{RunData, UpdatedForces, UpdatedModel, prepare};
 use dynocar_core::simulate::{Prediction, Restart};
 use dynocar_fmu::ffi::Status;
 use dynocar_fmu::{MISSING, PLANT};
@@ -36,7 +36,7 @@ fn set(fmu: &Fmu, name: &str, value: f64) {
 }
 
 /// The FMU of a grown model, unpacked; `grown` holds its files.
-fn of_grown(site: &Site, grown: &str) -> Fmu {
+fn of_updated(site: &Site, grown: &str) -> Fmu {
     done(site, &["fmu", "--plant", "-o", "train.fmu", "--grown", grown]);
     let resources = unpacked(site, "train.fmu").join("resources");
     Fmu::of(&PLANT, resources.to_str().unwrap())
@@ -57,8 +57,8 @@ fn corrected_demo(site: &Site, wind_plus_mps: f64) {
 
 /// Speeds that `explain` predicts for a run by the declared model.
 fn predicted(run: &RunData, davis: [f64; 3]) -> Vec<f64> {
-    let (mut forces, mut prediction) = (GrownForces::default(), Prediction::new());
-    GrownModel::default().forces(run, &davis, &mut forces);
+    let (mut forces, mut prediction) = (UpdatedForces::default(), Prediction::new());
+    UpdatedModel::default().forces(run, &davis, &mut forces);
     prediction.simulate(&run.recording, &forces, Restart::FullRun);
     prediction.speed_mps().to_vec()
 }
@@ -88,7 +88,7 @@ fn the_train_drives_recorded_runs_as_explain_predicts_them() {
         let (run, data) = (&dataset.runs[place], &prepare(&dataset).unwrap()[place]);
         assert_eq!((data.rejected, data.replaced), (0, 0), "so that the samples are the recorded");
         let expected = predicted(data, [davis.a, davis.b, davis.c]);
-        let fmu = of_grown(&site, "grown");
+        let fmu = of_updated(&site, "grown");
         set(&fmu, "initial_speed_mps", expected[0]);
         act(&fmu, &run.samples[0], &run.samples[1]);
         fmu.initialize();
@@ -110,7 +110,7 @@ fn the_train_drives_recorded_runs_as_explain_predicts_them() {
 fn what_was_found_is_seen_in_the_forces_and_they_are_the_whole() {
     let site = Site::new();
     corrected_demo(&site, 2.5);
-    let fmu = of_grown(&site, "grown");
+    let fmu = of_updated(&site, "grown");
     set(&fmu, "initial_speed_mps", 12.0);
     set(&fmu, "initial_position_m", 3000.0);
     set(&fmu, "traction_force_n", 104e3);
@@ -168,7 +168,7 @@ fn a_standing_train_starts_by_traction_and_what_is_not_connected_is_none() {
 fn what_no_train_does_is_refused_in_words() {
     let site = Site::new();
     corrected_demo(&site, 2.5);
-    let fmu = of_grown(&site, "grown");
+    let fmu = of_updated(&site, "grown");
     let named = |name: &str| reference_in(&PLANT, name);
     let refused = |went: Status, words: &str| {
         assert_eq!(went, Status::Error, "expected: {words}");

@@ -40,10 +40,10 @@ fn main() {
         }
     });
     let mut out = std::io::stdout().lock();
-    let mut tell = |value: Value| {
+    let mut report = |value: Value| {
         writeln!(out, "{value}").and_then(|()| out.flush()).expect("a reader of standard output");
     };
-    tell(json!({ "root": daemon.root() }));
+    report(json!({ "root": daemon.root() }));
     let mut is_answering = false;
     loop {
         match orders.try_recv() {
@@ -52,7 +52,7 @@ fn main() {
             Err(TryRecvError::Disconnected) => return,
         }
         while let Some(sample) = daemon.next_sample() {
-            tell(told(&sample));
+            report(told(&sample));
             if is_answering {
                 daemon.answer(&sample);
             }

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
 use dynocar::cli::parse;
-use dynocar::output::{OutputError, print, tell, write_file};
+use dynocar::output::{OutputError, print, report_line, write_file};
 use dynocar_analysis::identify::default_estimators;
 use dynocar_tests::fuzz::{self, Target};
 use dynocar_tests::golden;
@@ -148,7 +148,7 @@ fn main() -> ExitCode {
         Command::Day { hours, seed } => say(day::hours::table(&day::run(&programs, hours, seed))),
         Command::Months(months) => {
             if let Err(message) = live(&months) {
-                tell(&format!("dynocar-soak: {message}"));
+                report_line(&format!("dynocar-soak: {message}"));
                 return ExitCode::from(2);
             }
         }
@@ -226,7 +226,7 @@ fn say(line: String) {
 
 /// Ends the program when nobody can be given the result.
 fn give_up(error: &OutputError) {
-    tell(&format!("dynocar-soak: {error}"));
+    report_line(&format!("dynocar-soak: {error}"));
     std::process::exit(1);
 }
 

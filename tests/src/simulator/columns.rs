@@ -7,7 +7,7 @@ use super::run_maker::RunPlan;
 
 /// What a column holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
+pub enum ColumnKind {
     /// Time.
     Time,
     /// Position of the train's centre, or of its head.
@@ -28,65 +28,65 @@ pub enum Quantity {
     WheelSlide,
 }
 
-impl Quantity {
+impl ColumnKind {
     /// The canonical name in `dataset.toml`.
     pub const fn canonical(self) -> &'static str {
         match self {
-            Quantity::Time => "time",
-            Quantity::Position => "position",
-            Quantity::Speed => "speed",
-            Quantity::TractionForce => "traction_force",
-            Quantity::BrakeForce => "brake_force",
-            Quantity::ControlForce => "control_force",
-            Quantity::Pressure => "brake_cylinder_pressure",
-            Quantity::Temperature => "ambient_temperature",
-            Quantity::WheelSlide => "wheel_slide",
+            ColumnKind::Time => "time",
+            ColumnKind::Position => "position",
+            ColumnKind::Speed => "speed",
+            ColumnKind::TractionForce => "traction_force",
+            ColumnKind::BrakeForce => "brake_force",
+            ColumnKind::ControlForce => "control_force",
+            ColumnKind::Pressure => "brake_cylinder_pressure",
+            ColumnKind::Temperature => "ambient_temperature",
+            ColumnKind::WheelSlide => "wheel_slide",
         }
     }
 
     /// (unit, file value per SI value, addend after that, decimals) to choose from.
     const fn units(self) -> &'static [(&'static str, f64, f64, usize)] {
         match self {
-            Quantity::Time => &[("s", 1.0, 0.0, 3), ("ms", 1e3, 0.0, 0)],
-            Quantity::Position => &[("m", 1.0, 0.0, 1), ("km", 1e-3, 0.0, 4)],
-            Quantity::Speed => {
+            ColumnKind::Time => &[("s", 1.0, 0.0, 3), ("ms", 1e3, 0.0, 0)],
+            ColumnKind::Position => &[("m", 1.0, 0.0, 1), ("km", 1e-3, 0.0, 4)],
+            ColumnKind::Speed => {
                 &[("m/s", 1.0, 0.0, 2), ("km/h", 3.6, 0.0, 3), ("mph", 1.0 / 0.44704, 0.0, 3)]
             }
-            Quantity::TractionForce | Quantity::BrakeForce | Quantity::ControlForce => {
+            ColumnKind::TractionForce | ColumnKind::BrakeForce | ColumnKind::ControlForce => {
                 &[("N", 1.0, 0.0, 0), ("kN", 1e-3, 0.0, 2)]
             }
-            Quantity::Pressure => {
+            ColumnKind::Pressure => {
                 &[("Pa", 1.0, 0.0, 0), ("kPa", 1e-3, 0.0, 1), ("bar", 1e-5, 0.0, 3)]
             }
-            Quantity::Temperature => {
+            ColumnKind::Temperature => {
                 &[("degC", 1.0, 0.0, 1), ("K", 1.0, 273.15, 2), ("degF", 1.8, 32.0, 1)]
             }
-            Quantity::WheelSlide => &[("1", 1.0, 0.0, 0)],
+            ColumnKind::WheelSlide => &[("1", 1.0, 0.0, 0)],
         }
     }
 
     /// Column names in several houses' styles; `{u}` stands for the unit.
     const fn names(self) -> [&'static str; 5] {
         match self {
-            Quantity::Time => ["time_{u}", "Time [{u}]", "zeit", "t", "timestamp"],
-            Quantity::Position => ["position_{u}", "Chainage [{u}]", "weg", "s", "odo"],
-            Quantity::Speed => ["speed_{u}", "Speed [{u}]", "v_ist", "v", "velocity"],
-            Quantity::TractionForce => {
+            ColumnKind::Time => ["time_{u}", "Time [{u}]", "zeit", "t", "timestamp"],
+            ColumnKind::Position => ["position_{u}", "Chainage [{u}]", "weg", "s", "odo"],
+            ColumnKind::Speed => ["speed_{u}", "Speed [{u}]", "v_ist", "v", "velocity"],
+            ColumnKind::TractionForce => {
                 ["traction_{u}", "Tractive effort [{u}]", "f_zug", "te", "tractionForce"]
             }
-            Quantity::BrakeForce => {
+            ColumnKind::BrakeForce => {
                 ["braking_{u}", "Brake effort [{u}]", "f_brems", "be", "brakeForce"]
             }
-            Quantity::ControlForce => {
+            ColumnKind::ControlForce => {
                 ["control_{u}", "Wheel rim force [{u}]", "f_rad", "f", "controlForce"]
             }
-            Quantity::Pressure => {
+            ColumnKind::Pressure => {
                 ["cylinder_{u}", "BC pressure [{u}]", "p_c", "bcp", "brakePressure"]
             }
-            Quantity::Temperature => {
+            ColumnKind::Temperature => {
                 ["outside_{u}", "Outside temp [{u}]", "t_aussen", "oat", "ambient"]
             }
-            Quantity::WheelSlide => ["slide", "Wheel slide", "gleiten", "ws", "wheelSlide"],
+            ColumnKind::WheelSlide => ["slide", "Wheel slide", "gleiten", "ws", "wheelSlide"],
         }
     }
 }
@@ -95,7 +95,7 @@ impl Quantity {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
     /// What it holds.
-    pub quantity: Quantity,
+    pub quantity: ColumnKind,
     /// Its name in the files.
     pub name: String,
     /// Its unit.
@@ -110,7 +110,7 @@ pub struct Column {
 impl Column {
     /// A train without an odometer has no position of its own.
     pub fn is_written(&self, has_odometer: bool) -> bool {
-        has_odometer || self.quantity != Quantity::Position
+        has_odometer || self.quantity != ColumnKind::Position
     }
 
     /// The file's text for an SI value.
@@ -137,25 +137,25 @@ pub struct FileStyle {
 pub fn make_style(extra_decimals: usize, random: &mut Random) -> FileStyle {
     let house = random.integer(0, 4);
     let has_control_force = random.chance(0.2);
-    let mut quantities = vec![Quantity::Time, Quantity::Position, Quantity::Speed];
+    let mut quantities = vec![ColumnKind::Time, ColumnKind::Position, ColumnKind::Speed];
     if has_control_force {
-        quantities.push(Quantity::ControlForce);
+        quantities.push(ColumnKind::ControlForce);
     } else {
-        quantities.extend([Quantity::TractionForce, Quantity::BrakeForce]);
+        quantities.extend([ColumnKind::TractionForce, ColumnKind::BrakeForce]);
     }
-    quantities.extend([Quantity::Pressure, Quantity::Temperature]);
+    quantities.extend([ColumnKind::Pressure, ColumnKind::Temperature]);
     if random.chance(0.4) {
-        quantities.push(Quantity::WheelSlide);
+        quantities.push(ColumnKind::WheelSlide);
     }
     let columns = quantities
         .into_iter()
         .map(|quantity| {
             let (unit, per_si, addend, decimals) = random.pick(quantity.units());
             // Some loggers write raw counts of a thousandth.
-            let is_raw = quantity == Quantity::Pressure && random.chance(0.25);
+            let is_raw = quantity == ColumnKind::Pressure && random.chance(0.25);
             let (scale, decimals) =
                 if is_raw { (1e-3, 0) } else { (1.0, decimals + extra_decimals) };
-            let is_whole = matches!(quantity, Quantity::Time | Quantity::WheelSlide);
+            let is_whole = matches!(quantity, ColumnKind::Time | ColumnKind::WheelSlide);
             let plain = quantity.units().iter().find(|choice| choice.0 == unit);
             let decimals =
                 if is_whole { plain.map_or(decimals, |choice| choice.3) } else { decimals };
@@ -186,15 +186,15 @@ pub fn row_text(
     let written = style.columns.iter().filter(|it| it.is_written(has_odometer));
     let cells = written.map(|column| {
         let value = match column.quantity {
-            Quantity::Time => Some(sample.time_ns as f64 * 1e-9),
-            Quantity::Position => sample.get(SampleField::Position).map(|centre| centre + head_m),
-            Quantity::Speed => sample.get(SampleField::Speed),
-            Quantity::TractionForce => sample.get(SampleField::TractionForce),
-            Quantity::BrakeForce => sample.get(SampleField::BrakeForce),
-            Quantity::ControlForce => control_force_n(sample),
-            Quantity::Pressure => sample.get(SampleField::BrakeCylinderPressure),
-            Quantity::Temperature => sample.get(SampleField::AmbientTemperature),
-            Quantity::WheelSlide => Some(f64::from(sample.flags & 1)),
+            ColumnKind::Time => Some(sample.time_ns as f64 * 1e-9),
+            ColumnKind::Position => sample.get(SampleField::Position).map(|centre| centre + head_m),
+            ColumnKind::Speed => sample.get(SampleField::Speed),
+            ColumnKind::TractionForce => sample.get(SampleField::TractionForce),
+            ColumnKind::BrakeForce => sample.get(SampleField::BrakeForce),
+            ColumnKind::ControlForce => control_force_n(sample),
+            ColumnKind::Pressure => sample.get(SampleField::BrakeCylinderPressure),
+            ColumnKind::Temperature => sample.get(SampleField::AmbientTemperature),
+            ColumnKind::WheelSlide => Some(f64::from(sample.flags & 1)),
         };
         value.map_or_else(String::new, |si| column.text(si))
     });

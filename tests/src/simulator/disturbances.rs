@@ -7,7 +7,7 @@ use dynocar_core::track::{GradientError, LinearProfile, StepProfile};
 
 use super::common_deviations::CommonDeviations;
 use super::effects::{Effect, MassSection, RunWindow};
-use super::line_maker::Line;
+use super::line_maker::SimulatedLine;
 use super::random::{Random, Stream};
 use super::run_maker::RunPlan;
 use super::settings::SimulatorSettings;
@@ -88,7 +88,7 @@ pub struct Disturbances {
 
 /// What the disturbances act on at an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen {
+pub struct DisturbanceInput {
     /// Time in s from the run's first sample, when bearings are cold.
     pub time_s: f64,
     /// Mean of 1/R along the train in 1/m.
@@ -109,7 +109,7 @@ impl Disturbances {
     /// # Panics
     ///
     /// When the line has no gradient, which generated lines have.
-    pub fn none(train: &TrueTrain, line: &Line) -> Self {
+    pub fn none(train: &TrueTrain, line: &SimulatedLine) -> Self {
         Disturbances {
             direction: 1.0,
             gradient: line.track.gradient().expect("a generated line has a gradient").clone(),
@@ -147,7 +147,7 @@ impl Disturbances {
     pub fn of(
         effects: &[Effect],
         train: &TrueTrain,
-        line: &Line,
+        line: &SimulatedLine,
         plan: &RunPlan,
         settings: &SimulatorSettings,
     ) -> Self {
@@ -187,7 +187,7 @@ impl Disturbances {
     fn deviate(
         &mut self,
         train: &TrueTrain,
-        line: &Line,
+        line: &SimulatedLine,
         plan: &RunPlan,
         settings: &SimulatorSettings,
     ) {
@@ -281,7 +281,7 @@ impl Disturbances {
     }
 
     /// What resists at an instant by the laws of the terms; basic and curve resistance among it.
-    pub fn resistance(&self, seen: Seen) -> Resistance {
+    pub fn resistance(&self, seen: DisturbanceInput) -> Resistance {
         let mut resistance = Resistance::BASIC;
         let share = Some(seen.tunnel_share);
         curve::act(self.curve_constant_n_per_kn_m, Some(seen.curvature_per_m), &mut resistance);

@@ -3,7 +3,7 @@
 use dynocar_core::simulate::motion::Motion;
 
 use super::driving::{Controls, Driver, TrainOnLine};
-use super::line_maker::Line;
+use super::line_maker::SimulatedLine;
 use super::permitted_speed::{Leg, PermittedSpeed};
 use super::random::Random;
 use super::run_maker::RunPlan;
@@ -33,7 +33,7 @@ const SPEED_GAIN_PER_S: f64 = 0.12;
 #[derive(Debug)]
 pub struct TrainDriver<'a> {
     train: &'a TrueTrain,
-    line: &'a Line,
+    line: &'a SimulatedLine,
     plan: &'a RunPlan,
     declared: TrainOnLine<'a>,
     random: Random,
@@ -46,7 +46,12 @@ pub struct TrainDriver<'a> {
 
 impl<'a> TrainDriver<'a> {
     /// A driver who stands at the run's start for some seconds.
-    pub fn new(train: &'a TrueTrain, line: &'a Line, plan: &'a RunPlan, random: Random) -> Self {
+    pub fn new(
+        train: &'a TrueTrain,
+        line: &'a SimulatedLine,
+        plan: &'a RunPlan,
+        random: Random,
+    ) -> Self {
         let mut random = random;
         let stops_m: Vec<f64> =
             plan.stops_m.iter().map(|stop_m| (stop_m - plan.start_m).abs()).collect();
@@ -209,7 +214,7 @@ impl Driver for TrainDriver<'_> {
 
 fn permitted_to(
     train: &TrueTrain,
-    line: &Line,
+    line: &SimulatedLine,
     plan: &RunPlan,
     from_m: f64,
     to_m: f64,

@@ -2,8 +2,8 @@
 
 use dynocar_core::train::TrainModel;
 
-use super::disturbances::{Disturbances, Seen};
-use super::line_maker::Line;
+use super::disturbances::{DisturbanceInput, Disturbances};
+use super::line_maker::SimulatedLine;
 use super::run_maker::RunPlan;
 use super::train_maker::TrueTrain;
 
@@ -57,7 +57,7 @@ pub struct TruePhysics<'a> {
     /// The train.
     pub train: &'a TrueTrain,
     /// The line.
-    pub line: &'a Line,
+    pub line: &'a SimulatedLine,
     /// The run.
     pub plan: &'a RunPlan,
     /// What is undeclared in it.
@@ -92,7 +92,7 @@ impl TruePhysics<'_> {
         let w0_n_per_kn = disturbances.resistance_factor * davis.w0_n_per_kn(speed_mps);
         let declared_k = self.train.declared.curve_constant_n_per_kn_m;
         let ordinary_n_per_kn = w0_n_per_kn + declared_k * under.curvature_per_m;
-        let mut all = disturbances.resistance(Seen {
+        let mut all = disturbances.resistance(DisturbanceInput {
             time_s: now.time_s,
             curvature_per_m: under.curvature_per_m,
             tunnel_share: under.tunnel_share,

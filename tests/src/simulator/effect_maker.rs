@@ -4,7 +4,7 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::common_deviations::wavy;
 use super::effects::{Effect, MassSection, RunWindow};
-use super::line_maker::Line;
+use super::line_maker::SimulatedLine;
 use super::random::Random;
 use super::run_maker::RunPlan;
 use super::settings::TrainType;
@@ -33,7 +33,7 @@ pub struct EffectScene<'a> {
     /// The train.
     pub train: &'a TrueTrain,
     /// The line.
-    pub line: &'a Line,
+    pub line: &'a SimulatedLine,
     /// The runs.
     pub plans: &'a [RunPlan],
 }

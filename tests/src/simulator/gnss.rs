@@ -3,7 +3,7 @@
 use dynocar_analysis::survey::geodesy::LocalPlane;
 use dynocar_shared::TrainSample;
 
-use super::line_maker::Line;
+use super::line_maker::SimulatedLine;
 use super::random::Random;
 use super::settings::{GnssReceiver, SimulatorSettings};
 use super::true_run::{TRUE_STEP_S, TrueState};
@@ -30,7 +30,7 @@ pub struct Position {
 
 /// The way of a line on a plane: east, north and height in m every 5 m. Curves turn left and right
 /// in turns.
-pub fn way_m(line: &Line) -> Vec<[f64; 3]> {
+pub fn way_m(line: &SimulatedLine) -> Vec<[f64; 3]> {
     let track = &line.track;
     let (mut heading, mut at) = (0.3f64, [0.0, 0.0, ORIGIN_M]);
     let mut way = Vec::new();
@@ -58,7 +58,7 @@ pub fn way_m(line: &Line) -> Vec<[f64; 3]> {
 pub fn positions(
     samples: &[TrainSample],
     states: &[TrueState],
-    line: &Line,
+    line: &SimulatedLine,
     (receiver, settings): (GnssReceiver, &SimulatorSettings),
     random: &mut Random,
 ) -> Vec<Option<Position>> {

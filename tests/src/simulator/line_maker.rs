@@ -17,7 +17,7 @@ pub struct SpeedLimit {
 
 /// A line with what the track file does not hold.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Line {
+pub struct SimulatedLine {
     /// The declared track.
     pub track: Track,
     /// Length in m.
@@ -30,7 +30,7 @@ pub struct Line {
     pub balises_m: Vec<f64>,
 }
 
-impl Line {
+impl SimulatedLine {
     /// The lowest speed limit in m/s anywhere under a train.
     pub fn limit_under_mps(&self, centre_m: f64, train_length_m: f64) -> f64 {
         let (rear_m, front_m) = (centre_m - 0.5 * train_length_m, centre_m + 0.5 * train_length_m);
@@ -144,7 +144,7 @@ pub fn make_line(
     train: (f64, f64),
     has_tunnels: bool,
     random: &mut Random,
-) -> Line {
+) -> SimulatedLine {
     let ranges = match train_type {
         TrainType::Freight => FREIGHT,
         TrainType::Regional => REGIONAL,
@@ -173,7 +173,7 @@ pub fn make_line(
         Some(if has_tunnels { tunnels } else { Vec::new() }),
     )
     .expect("a generated line is well formed");
-    Line { track, length_m, stations_m, limits, balises_m }
+    SimulatedLine { track, length_m, stations_m, limits, balises_m }
 }
 
 fn make_gradient(ranges: &Ranges, length_m: f64, random: &mut Random) -> Vec<(f64, f64)> {

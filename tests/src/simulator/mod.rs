@@ -63,7 +63,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use disturbances::Disturbances;
 use dynamics::TruePhysics;
 use effect_maker::{EffectScene, make_effect, suitable_types};
-use line_maker::{Line, make_line};
+use line_maker::{SimulatedLine, make_line};
 use random::{Random, Stream};
 use run_maker::{RunPlan, make_plans};
 use sensors::{Sensors, make_sensors, measure_run};
@@ -93,7 +93,7 @@ pub struct SimulatedDataset {
     /// The train, declared and true.
     pub train: TrueTrain,
     /// The line, declared and true.
-    pub line: Line,
+    pub line: SimulatedLine,
     /// The undeclared effects.
     pub effects: Vec<Effect>,
     /// The sensors.
@@ -140,7 +140,7 @@ pub struct World {
     /// The train, declared and true.
     pub train: TrueTrain,
     /// The line, declared and true.
-    pub line: Line,
+    pub line: SimulatedLine,
     /// The sensors.
     pub sensors: Sensors,
     /// The runs.
@@ -178,7 +178,7 @@ fn draw_world(settings: &SimulatorSettings) -> World {
     let drawn_type = of_train.pick(&fitting_types(&settings.effects));
     let train_type = settings.train_type.unwrap_or(drawn_type);
     let train = make_train(train_type, settings.resistance_spread, &mut of_train);
-    let mut of_line = stream(Stream::Line);
+    let mut of_line = stream(Stream::SimulatedLine);
     let has_tunnels =
         of_line.chance(0.5) || settings.effects.kinds().contains(&EffectKind::TunnelDrag);
     let size = (train.declared.length_m, train.handling.speed_max_mps);
@@ -222,7 +222,7 @@ fn draw_effects(settings: &SimulatorSettings, scene: &EffectScene<'_>) -> Vec<Ef
 fn simulate_run(
     settings: &SimulatorSettings,
     train: &TrueTrain,
-    line: &Line,
+    line: &SimulatedLine,
     plan: RunPlan,
     effects: &[Effect],
     sensors: &Sensors,

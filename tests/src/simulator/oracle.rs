@@ -14,7 +14,7 @@ use dynocar_core::terms::delay::DelayLine;
 use dynocar_core::terms::{gradient, traction};
 use dynocar_core::validation::{ValidationLimits, Validator};
 
-use super::disturbances::{Disturbances, Seen};
+use super::disturbances::{DisturbanceInput, Disturbances};
 use super::sensors::SIMULATED_TRAIN;
 use super::{SimulatedDataset, SimulatedRun};
 
@@ -175,7 +175,7 @@ fn extra_n_per_kn(
     let davis = dataset.train.resistance;
     let disturbances = &run.disturbances;
     let length_m = dataset.train.declared.length_m;
-    let mut all = disturbances.resistance(Seen {
+    let mut all = disturbances.resistance(DisturbanceInput {
         time_s,
         curvature_per_m: sample.curvature_per_m.unwrap_or(0.0),
         tunnel_share: sample.tunnel_share.unwrap_or(0.0),

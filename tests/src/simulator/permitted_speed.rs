@@ -1,6 +1,6 @@
 //! The speed that limits and the next stop allow along the way.
 
-use super::line_maker::Line;
+use super::line_maker::SimulatedLine;
 
 /// Highest speed over the distance travelled, up to the next stop.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,7 +33,7 @@ pub struct Leg {
 
 impl PermittedSpeed {
     /// The profile of a leg.
-    pub fn new(line: &Line, leg: &Leg) -> Self {
+    pub fn new(line: &SimulatedLine, leg: &Leg) -> Self {
         let spacing_m = 4.0;
         let count = ((leg.to_m - leg.from_m) / spacing_m).ceil().max(1.0) as usize;
         let mut squares: Vec<f64> = (0..count)

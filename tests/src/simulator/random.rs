@@ -14,7 +14,7 @@ pub enum Stream {
     /// The train.
     Train,
     /// The line.
-    Line,
+    SimulatedLine,
     /// Which runs are made, and how they are driven.
     Plans,
     /// The size and place of effects.
@@ -50,7 +50,7 @@ impl Stream {
         let of_run = |subject: u64, run: usize| subject + 16 * (run as u64 + 1);
         match self {
             Stream::Train => 1,
-            Stream::Line => 2,
+            Stream::SimulatedLine => 2,
             Stream::Plans => 3,
             Stream::Effects => 4,
             Stream::Files => 5,

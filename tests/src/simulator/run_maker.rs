@@ -1,6 +1,6 @@
 //! Which runs are made: direction, load, stops, weather and manner of driving.
 
-use super::line_maker::Line;
+use super::line_maker::SimulatedLine;
 use super::random::Random;
 use super::run_file::run_file;
 use super::settings::{SimulatorSettings, TrainType};
@@ -66,7 +66,7 @@ impl RunPlan {
 pub fn make_plans(
     settings: &SimulatorSettings,
     train: &TrueTrain,
-    line: &Line,
+    line: &SimulatedLine,
     random: &mut Random,
 ) -> Vec<RunPlan> {
     let first_sign = random.sign();
@@ -127,7 +127,7 @@ fn make_style(train_type: TrainType, random: &mut Random) -> DrivingStyle {
 fn make_route(
     duration_s: f64,
     train: &TrueTrain,
-    line: &Line,
+    line: &SimulatedLine,
     direction: f64,
     style: &DrivingStyle,
     random: &mut Random,
@@ -171,7 +171,7 @@ fn make_route(
 }
 
 /// Places where a freight train may have to stop: every kilometre or two.
-fn signals_m(train: &TrueTrain, line: &Line, random: &mut Random) -> Vec<f64> {
+fn signals_m(train: &TrueTrain, line: &SimulatedLine, random: &mut Random) -> Vec<f64> {
     let margin_m = 0.5 * train.declared.length_m + 80.0;
     let mut places_m = vec![margin_m + random.uniform(0.0, 1500.0)];
     loop {

@@ -5,7 +5,7 @@ use dynocar_shared::{SampleField, TrainId, TrainSample};
 
 use super::actuators::lagged;
 use super::disturbances::Disturbances;
-use super::line_maker::Line;
+use super::line_maker::SimulatedLine;
 use super::random::Random;
 use super::run_maker::RunPlan;
 use super::settings::{ForceSampling, SimulatorSettings};
@@ -120,7 +120,7 @@ impl Instant<'_> {
 pub fn measure_run(
     states: &[TrueState],
     plan: &RunPlan,
-    line: &Line,
+    line: &SimulatedLine,
     (sensors, disturbances): (&Sensors, &Disturbances),
     settings: &SimulatorSettings,
     random: &mut Random,
@@ -209,7 +209,7 @@ fn shown_speeds_mps(states: &[TrueState], disturbances: &Disturbances) -> Vec<f6
 fn read_odometer(
     states: &[TrueState],
     plan: &RunPlan,
-    line: &Line,
+    line: &SimulatedLine,
     (sensors, disturbances): (&Sensors, &Disturbances),
     random: &mut Random,
 ) -> Vec<f64> {

@@ -45,7 +45,7 @@ const FAULTS: [Fault; 10] = [
 
 /// One poll of the client, see `dynocar-test-peer`.
 #[derive(Clone, Copy, Debug)]
-struct Seen {
+struct ClientPoll {
     epoch: u64,
     sequence: u64,
     used: u64,
@@ -54,10 +54,10 @@ struct Seen {
     time_ns: i64,
 }
 
-fn parse(line: &str) -> Option<Seen> {
+fn parse(line: &str) -> Option<ClientPoll> {
     let words: Vec<&str> = line.split(' ').collect();
     let number = |place: usize| words.get(place)?.parse().ok();
-    Some(Seen {
+    Some(ClientPoll {
         epoch: number(0)?,
         sequence: number(1)?,
         used: number(3)?,
@@ -78,7 +78,7 @@ struct Cast<'a> {
     epoch: u64,
     /// Lines of the client that were checked.
     checked: usize,
-    newest: Option<Seen>,
+    newest: Option<ClientPoll>,
     /// Times in ns between which no daemon was at work.
     silences_ns: Vec<(i64, i64)>,
 }
@@ -271,7 +271,7 @@ pub fn run(programs: &Programs, rounds: u64, seed: u64) -> Summary {
         summary.polls += cast.check_polls();
         summary.daemons += u64::from(cast.epoch != epoch);
         if round % 100 == 0 {
-            dynocar::output::tell(&format!("{told}: {summary:?}"));
+            dynocar::output::report_line(&format!("{told}: {summary:?}"));
         }
     }
     cast.client.end(Signal::KILL);

@@ -5,7 +5,7 @@ use dynocar_core::filter::levenberg_marquardt::{
 };
 use dynocar_core::filter::triangular::{TriangularAccumulator, TriangularSystem};
 use dynocar_core::pipeline::papers::xia::trajectory::fit::{
-    FitSettings, Stretch, TrajectoryFit, TrajectoryFitter,
+    FitSettings, MotionSegment, TrajectoryFit, TrajectoryFitter,
 };
 use dynocar_core::pipeline::papers::xia::trajectory::step::StepRule;
 use dynocar_core::pipeline::papers::xia::wolfe_newton::{
@@ -69,7 +69,7 @@ fn fit(
     bounds: ParameterBox<3>,
 ) -> Option<TrajectoryFit> {
     let settings = FitSettings { bounds, ..FitSettings::new(StepRule::Distance) };
-    let stretches = [Stretch { steps: &run.steps, speeds_mps }];
+    let stretches = [MotionSegment { steps: &run.steps, speeds_mps }];
     TrajectoryFitter::default().fit(&stretches, start, &settings).ok()
 }
 
@@ -267,7 +267,7 @@ fn disturbed_row(seeds: Seeds) -> Row {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let run = cruise.disturbed(&truth, &mut random);
         let speeds = run.measured_mps(0, &mut random);
-        let stretches = [Stretch { steps: &run.steps, speeds_mps: &speeds }];
+        let stretches = [MotionSegment { steps: &run.steps, speeds_mps: &speeds }];
         let settings = FitSettings { bounds: anywhere(), ..FitSettings::new(StepRule::Distance) };
         let exact = TrajectoryFitter::default().fit(&stretches, None, &settings);
         let estimated = likeliest_fit(&stretches, &settings);

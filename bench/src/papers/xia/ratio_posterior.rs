@@ -7,7 +7,7 @@
 //! their restricted likelihood, every decade being as likely beforehand.
 
 use dynocar_core::pipeline::papers::xia::trajectory::fit::{
-    FitError, FitSettings, Stretch, TrajectoryFit, TrajectoryFitter,
+    FitError, FitSettings, MotionSegment, TrajectoryFit, TrajectoryFitter,
 };
 use dynocar_core::train::Davis;
 use nalgebra::{Matrix3, Vector3};
@@ -26,7 +26,7 @@ const ROUGH_DECREASE: f64 = 2e-4;
 /// The fit at the disturbance ratio of greatest restricted likelihood, by decades and then by quarters
 /// of a decade; its covariance is averaged over all ratios.
 pub fn likeliest_fit(
-    stretches: &[Stretch<'_>],
+    stretches: &[MotionSegment<'_>],
     settings: &FitSettings,
 ) -> Result<TrajectoryFit, FitError> {
     let mut fitter = TrajectoryFitter::default();
@@ -242,7 +242,7 @@ mod tests {
                 let bounds =
                     ParameterBox { low: Vector3::repeat(-1e3), high: Vector3::repeat(1e3) };
                 let settings = FitSettings { bounds, ..FitSettings::new(StepRule::Time) };
-                let stretches = [Stretch { steps: &steps, speeds_mps: &speeds }];
+                let stretches = [MotionSegment { steps: &steps, speeds_mps: &speeds }];
                 let fit = likeliest_fit(&stretches, &settings).unwrap();
                 let error =
                     Vector3::new(fit.davis.a - FAST.a, fit.davis.b - FAST.b, fit.davis.c - FAST.c);

@@ -1,8 +1,8 @@
 //! The live view as a process beside a controller and a daemon, with viewers that come, stall and go.
 
-#[path = "../../../recording/tests/beside/mod.rs"]
-mod beside;
 mod support;
+#[path = "../../../recording/tests/support_site/mod.rs"]
+mod support_site;
 mod viewer;
 
 use std::process::Command;
@@ -11,8 +11,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use dynocar_recording::codec::{decode_sample, decode_snapshot, encode_sample};
 use dynocar_shared::PipelineKind;
 
-use beside::{Controller, Place};
 use support::{Live, PROGRAM, published_sample};
+use support_site::{Controller, TestSite};
 use viewer::Viewer;
 
 const SAMPLES: &str = "/train/1/samples";
@@ -20,7 +20,7 @@ const MASS: &str = "/train/1/0_mass_kalman";
 
 #[test]
 fn a_viewer_gets_what_was_published_bit_by_bit_in_order_and_at_wall_time() {
-    let place = Place::new(&["mass_kalman"]);
+    let place = TestSite::new(&["mass_kalman"]);
     let live = Live::beside(&place, &["--samples-hz", "0"]);
     let controller = Controller::start(&place, 1);
     let mut viewer = Viewer::connect(live.port);
@@ -41,7 +41,7 @@ fn a_viewer_gets_what_was_published_bit_by_bit_in_order_and_at_wall_time() {
 
 #[test]
 fn of_five_hundred_samples_a_second_viewers_get_what_was_asked_for() {
-    let place = Place::new(&["mass_kalman"]);
+    let place = TestSite::new(&["mass_kalman"]);
     let live = Live::beside(&place, &["--samples-hz", "20"]);
     let _controller = Controller::start(&place, 1);
     let mut viewer = Viewer::connect(live.port);
@@ -56,7 +56,7 @@ fn of_five_hundred_samples_a_second_viewers_get_what_was_asked_for() {
 
 #[test]
 fn channels_come_and_go_with_those_who_write_them() {
-    let place = Place::new(&["mass_kalman"]);
+    let place = TestSite::new(&["mass_kalman"]);
     let live = Live::beside(&place, &[]);
     let mut viewer = Viewer::connect(live.port);
     viewer.await_topics(&["/events"]);
@@ -70,7 +70,7 @@ fn channels_come_and_go_with_those_who_write_them() {
 
 #[test]
 fn a_viewer_that_comes_late_gets_the_newest_snapshot() {
-    let place = Place::new(&["mass_kalman"]);
+    let place = TestSite::new(&["mass_kalman"]);
     let live = Live::beside(&place, &["--train", "1"]);
     place.daemon();
     let mut first = Viewer::connect(live.port);
@@ -91,13 +91,13 @@ fn a_viewer_that_comes_late_gets_the_newest_snapshot() {
 }
 
 #[test]
-fn a_viewer_that_reads_nothing_is_told_of_and_holds_nobody_up() {
-    let place = Place::new(&["mass_kalman"]);
+fn a_viewer_that_reads_nothing_is_reported_of_and_holds_nobody_up() {
+    let place = TestSite::new(&["mass_kalman"]);
     let mut live = Live::beside(&place, &["--samples-hz", "0"]);
     let controller = Controller::start(&place, 40);
     let mut stalled = Viewer::connect(live.port);
     stalled.subscribe(SAMPLES);
-    live.await_told("does not keep up: its oldest messages are dropped");
+    live.await_reported("does not keep up: its oldest messages are dropped");
     let mut viewer = Viewer::connect(live.port);
     viewer.subscribe(SAMPLES);
     let sequence = |viewer: &mut Viewer| {
@@ -113,15 +113,15 @@ fn a_viewer_that_reads_nothing_is_told_of_and_holds_nobody_up() {
 
 #[test]
 fn a_viewer_of_the_older_protocol_is_refused_in_words() {
-    let place = Place::new(&["mass_kalman"]);
+    let place = TestSite::new(&["mass_kalman"]);
     let live = Live::beside(&place, &[]);
     assert!(Viewer::offer(live.port, "foxglove.websocket.v1").is_none());
-    live.await_told("is refused: it does not offer foxglove.sdk.v1");
+    live.await_reported("is refused: it does not offer foxglove.sdk.v1");
 }
 
 #[test]
-fn a_taken_port_and_a_wrong_address_are_told() {
-    let place = Place::new(&["mass_kalman"]);
+fn a_taken_port_and_a_wrong_address_are_reported() {
+    let place = TestSite::new(&["mass_kalman"]);
     let live = Live::beside(&place, &[]);
     let port = live.port.to_string();
     let run = |options: &[&str]| {

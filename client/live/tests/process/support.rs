@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use dynocar_shared::TrainSample;
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::beside::{Controller, Place, await_true};
+use crate::support_site::{Controller, TestSite, await_true};
 
 pub const PROGRAM: &str = env!("CARGO_BIN_EXE_dynocar-live");
 
@@ -20,7 +20,7 @@ pub struct Live {
 
 impl Live {
     /// Starts a live view on a free port, and waits until it serves.
-    pub fn beside(place: &Place, options: &[&str]) -> Self {
+    pub fn beside(place: &TestSite, options: &[&str]) -> Self {
         let mut process = Command::new(PROGRAM)
             .args(["--port", "0", "--root"])
             .arg(place.at("root"))
@@ -37,7 +37,7 @@ impl Live {
             }
         });
         let mut live = Live { process, told, port: 0 };
-        live.await_told("serving ws://127.0.0.1:");
+        live.await_reported("serving ws://127.0.0.1:");
         let told = live.told();
         let address = told.split("ws://127.0.0.1:").nth(1).unwrap();
         live.port = address.split(';').next().unwrap().parse().unwrap();
@@ -48,7 +48,7 @@ impl Live {
         self.told.lock().unwrap().clone()
     }
 
-    pub fn await_told(&self, words: &str) {
+    pub fn await_reported(&self, words: &str) {
         await_true(words, || self.told().contains(words));
     }
 

@@ -9,10 +9,10 @@ use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::{Error, Message, WebSocket};
 
-use crate::beside::WATCHDOG;
+use crate::support_site::WATCHDOG;
 
 /// A message on a channel that was subscribed to.
-pub struct Seen {
+pub struct ReceivedMessage {
     pub topic: String,
     pub log_time_ns: u64,
     pub message: Vec<u8>,
@@ -48,7 +48,7 @@ impl Viewer {
     }
 
     /// Takes one message, if there is one; what a channel brings is given.
-    fn take(&mut self) -> Option<Seen> {
+    fn take(&mut self) -> Option<ReceivedMessage> {
         match self.socket.read() {
             Ok(Message::Text(text)) => self.control(&serde_json::from_str(&text).unwrap()),
             Ok(Message::Binary(bytes)) => {
@@ -57,7 +57,7 @@ impl Viewer {
                 let (subscription, rest) = rest.split_first_chunk::<4>().unwrap();
                 let (log_time, message) = rest.split_first_chunk::<8>().unwrap();
                 let place = u32::from_le_bytes(*subscription) as usize;
-                return Some(Seen {
+                return Some(ReceivedMessage {
                     topic: self.subscribed[place].clone(),
                     log_time_ns: u64::from_le_bytes(*log_time),
                     message: message.to_vec(),
@@ -92,7 +92,11 @@ impl Viewer {
     }
 
     /// Takes messages until one is what is waited for.
-    pub fn await_seen(&mut self, what: &str, mut is_it: impl FnMut(&Seen) -> bool) -> Seen {
+    pub fn await_seen(
+        &mut self,
+        what: &str,
+        mut is_it: impl FnMut(&ReceivedMessage) -> bool,
+    ) -> ReceivedMessage {
         let start = Instant::now();
         loop {
             if let Some(seen) = self.take().filter(&mut is_it) {

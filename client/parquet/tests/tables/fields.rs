@@ -34,7 +34,7 @@ fn in_words(schema: &Schema, columns: &[Column]) -> Vec<[String; 3]> {
 }
 
 #[test]
-fn the_page_tells_the_arrow_type_of_every_column_and_the_schema_has_them_all() {
+fn the_page_shows_the_arrow_type_of_every_column_and_the_schema_has_them_all() {
     let page = page();
     let tables = [
         (&*SAMPLES, &["TrainSample"][..]),

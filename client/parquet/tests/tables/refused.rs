@@ -154,7 +154,7 @@ fn nothing_is_overwritten_and_parquet_is_not_converted_into_itself() {
 }
 
 #[test]
-fn a_closed_pipe_is_no_failure_and_a_full_disk_is_told() {
+fn a_closed_pipe_is_no_failure_and_a_full_disk_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let from = recording(folder.path());
     let program = env!("CARGO_BIN_EXE_dynocar-parquet");

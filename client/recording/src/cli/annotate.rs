@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use dynocar::cli::Failure;
-use dynocar::output::{require_new, tell};
+use dynocar::output::{report_line, require_new};
 use dynocar_analysis::explain::report::timeline::Timeline;
 
 use super::failure::from_dataset_failure;
@@ -52,7 +52,7 @@ pub fn execute(arguments: &AnnotateArguments) -> Result<(), Failure> {
         AnnotateError::Write { .. } => Failure::Work(error.to_string()),
         error => Failure::Input(error.to_string()),
     })?;
-    tell(&format!(
+    report_line(&format!(
         "annotated recording: {}: {} stretches in which an effect acts, {} messages in all",
         output.display(),
         added.effects,

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 use dynocar::cli::Failure;
-use dynocar::output::tell;
+use dynocar::output::report_line;
 
 use super::record::{MIB, SyncArguments, WantedArguments, run};
 use crate::record::{Keeping, Rotation, Settings, request_keeping};
@@ -101,7 +101,7 @@ pub fn execute_keep(arguments: &KeepArguments) -> Result<(), Failure> {
     let shown = arguments.folder.display();
     match request_keeping(&arguments.folder, &arguments.reason) {
         Ok(true) => {
-            tell(&format!("asked: what lies around this moment is kept in {shown}/kept"));
+            report_line(&format!("asked: what lies around this moment is kept in {shown}/kept"));
             Ok(())
         }
         Ok(false) => Err(Failure::Work(format!("{shown}: no flight recorder writes into it"))),

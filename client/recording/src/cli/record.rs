@@ -6,12 +6,12 @@ use std::time::Duration;
 use clap::{ArgGroup, Args};
 use dynocar::cli::Failure;
 use dynocar::ending;
-use dynocar::output::tell;
+use dynocar::output::report_line;
 use dynocar_client::Host;
 use dynocar_shared::TrainId;
 
-use crate::lanes::Wanted;
 use crate::record::{KeepError, RecordError, Rotation, SYNC, Settings, record};
+use crate::train_channels::Wanted;
 
 /// Record what a controller and the daemon write, as MCAP.
 #[derive(Debug, Args)]
@@ -126,7 +126,7 @@ pub fn run(settings: &Settings) -> Result<(), Failure> {
         }
         error => Failure::Work(error.to_string()),
     })?;
-    tell(&format!(
+    report_line(&format!(
         "{} samples, {} snapshots and {} events recorded, {} samples lost",
         recorded.samples, recorded.snapshots, recorded.events, recorded.lost
     ));

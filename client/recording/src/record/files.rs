@@ -18,7 +18,7 @@ use super::keeping::{self, Keeper};
 use super::rotation::{Rotation, next};
 use super::{RecordError, Recorded, SYNC};
 use crate::event::{Event, EventKind};
-use crate::lanes::event;
+use crate::train_channels::event;
 use crate::writing::{CONFIGURATION, RecordingWriter, WallClock, folder_of_configuration};
 
 /// A file, with the bytes that were handed to the system.
@@ -113,8 +113,8 @@ impl Files {
     /// # Errors
     ///
     /// When the system gives no thread.
-    pub fn keep_house_beside(&mut self) -> Result<(), RecordError> {
-        self.housekeeper.go_beside().map_err(RecordError::Thread)
+    pub fn keep_house_in_parallel(&mut self) -> Result<(), RecordError> {
+        self.housekeeper.go_in_parallel().map_err(RecordError::Thread)
     }
 
     /// Samples, snapshots and events that no power cut takes any more.

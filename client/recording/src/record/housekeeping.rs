@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
-use dynocar::output::tell;
+use dynocar::output::report_line;
 use dynocar::storage::{SharedStorage, settle};
 
 use super::keeping::{KeepError, Keeper};
@@ -82,7 +82,7 @@ impl Housekeeping {
                         self.is_failure_told = false;
                     }
                     Err(source) if !std::mem::replace(&mut self.is_failure_told, true) => {
-                        tell(&SettleError { file, source }.to_string());
+                        report_line(&SettleError { file, source }.to_string());
                     }
                     Err(_) => {}
                 }
@@ -110,13 +110,13 @@ impl Housekeeping {
         let Some(keeper) = &mut self.keeper else { return };
         let files: Vec<PathBuf> = numbered(&self.output).into_iter().map(|it| it.1).collect();
         if let Err(problem) = work(keeper, &files) {
-            tell(&problem.to_string());
+            report_line(&problem.to_string());
         }
     }
 }
 
 /// Where it is done.
-enum Place {
+enum HousekeepingThread {
     /// At once, by whoever asks.
     Here(Box<Housekeeping>),
     /// In a thread of its own, which ends when nobody can ask any more.
@@ -125,7 +125,7 @@ enum Place {
 
 /// Has things done with the files of a recording.
 pub struct Housekeeper {
-    place: Place,
+    place: HousekeepingThread,
     progress: Arc<Progress>,
 }
 
@@ -142,7 +142,7 @@ impl Housekeeper {
             named: PathBuf::new(),
             is_failure_told: false,
         };
-        Housekeeper { place: Place::Here(Box::new(housekeeping)), progress }
+        Housekeeper { place: HousekeepingThread::Here(Box::new(housekeeping)), progress }
     }
 
     /// Does everything in a thread of its own from now on; with a keeper, keeps.
@@ -150,14 +150,15 @@ impl Housekeeper {
     /// # Errors
     ///
     /// When the system gives no thread.
-    pub fn go_beside(&mut self) -> std::io::Result<()> {
-        if let Place::Here(_) = self.place {
+    pub fn go_in_parallel(&mut self) -> std::io::Result<()> {
+        if let HousekeepingThread::Here(_) = self.place {
             let (tasks, asked) = channel();
             let (hand_over, taken) = channel::<Box<Housekeeping>>();
             let thread = std::thread::Builder::new().name("housekeeping".into());
             let thread = thread.spawn(move || work(&taken, &asked))?;
-            let here = std::mem::replace(&mut self.place, Place::Beside(tasks, thread));
-            if let Place::Here(housekeeping) = here {
+            let here =
+                std::mem::replace(&mut self.place, HousekeepingThread::Beside(tasks, thread));
+            if let HousekeepingThread::Here(housekeeping) = here {
                 // The thread waits for it.
                 let _ = hand_over.send(housekeeping);
             }
@@ -167,7 +168,7 @@ impl Housekeeper {
 
     /// Keeps from now on; before it works beside.
     pub fn set_keeper(&mut self, keeper: Keeper) {
-        if let Place::Here(housekeeping) = &mut self.place {
+        if let HousekeepingThread::Here(housekeeping) = &mut self.place {
             housekeeping.keeper = Some(keeper);
         }
     }
@@ -178,9 +179,9 @@ impl Housekeeper {
             self.progress.is_settling.store(true, Ordering::Release);
         }
         match &mut self.place {
-            Place::Here(housekeeping) => housekeeping.take(task),
+            HousekeepingThread::Here(housekeeping) => housekeeping.take(task),
             // The thread ends after the sender only.
-            Place::Beside(tasks, _) => drop(tasks.send(task)),
+            HousekeepingThread::Beside(tasks, _) => drop(tasks.send(task)),
         }
     }
 
@@ -196,7 +197,7 @@ impl Housekeeper {
 
     /// Ends when everything is done.
     pub fn finish(self) {
-        if let Place::Beside(tasks, thread) = self.place {
+        if let HousekeepingThread::Beside(tasks, thread) = self.place {
             drop(tasks);
             // A thread that panicked has told so.
             let _ = thread.join();

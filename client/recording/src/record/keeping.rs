@@ -11,11 +11,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use dynocar::output::{tell, write_file};
+use dynocar::output::{report_line, write_file};
 use dynocar::storage::{Disk, SharedStorage, StorageError};
 use dynocar_shared::Status;
 
-use super::stretch::{self, Reason, Stretch, beside, forget_unfinished, kept_bytes, unix_s};
+use super::kept_event::{self, KeptEvent, Reason, beside, forget_unfinished, kept_bytes, unix_s};
 use crate::event::{Event, EventKind};
 
 /// Beside the ring: what is kept.
@@ -75,7 +75,7 @@ pub struct Keeper {
     ring: PathBuf,
     keeping: Keeping,
     /// The newest stretch, which goes on until its end.
-    open: Option<(PathBuf, Stretch)>,
+    open: Option<(PathBuf, KeptEvent)>,
     is_full_told: bool,
     /// No other recorder writes here.
     _lock: File,
@@ -162,7 +162,7 @@ impl Keeper {
             TryLockError::Error(error) => refused(ring)(error),
         })?;
         forget_unfinished(&ring.join(KEPT_FOLDER));
-        let open = stretch::newest(&ring.join(KEPT_FOLDER));
+        let open = kept_event::newest(&ring.join(KEPT_FOLDER));
         Ok(Keeper { storage, ring: ring.into(), keeping, open, is_full_told: false, _lock: lock })
     }
 
@@ -178,7 +178,7 @@ impl Keeper {
         let open = self.open.take().filter(|it| it.1.is_open(now));
         let is_new = open.is_none();
         let (folder, mut stretch) =
-            open.unwrap_or_else(|| (self.new_folder(&reason), Stretch::default()));
+            open.unwrap_or_else(|| (self.new_folder(&reason), KeptEvent::default()));
         let is_news = stretch.reasons.last().is_none_or(|last| !last.is_like(&reason));
         let told =
             format!("kept for good: {}: {} ({})", folder.display(), reason.kind, reason.text);
@@ -193,7 +193,7 @@ impl Keeper {
             false => Ok(()),
         };
         if is_news && kept.is_ok() {
-            tell(&told);
+            report_line(&told);
         }
         // One that was not made is not there to go on with.
         self.open = (folder.exists()).then_some((folder, stretch));
@@ -217,7 +217,7 @@ impl Keeper {
     fn make(
         &mut self,
         folder: &Path,
-        stretch: &Stretch,
+        stretch: &KeptEvent,
         files: &[PathBuf],
     ) -> Result<(), KeepError> {
         let beside = beside(folder);

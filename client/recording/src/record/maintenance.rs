@@ -8,7 +8,7 @@ use dynocar_shared::TrainId;
 
 use super::configuration::Configuration;
 use crate::event::{Event, EventKind};
-use crate::lanes::event;
+use crate::train_channels::event;
 
 /// How often it is looked for new ones.
 const EVERY: Duration = Duration::from_secs(5);

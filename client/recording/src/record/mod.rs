@@ -5,23 +5,23 @@ mod configuration;
 mod files;
 mod housekeeping;
 mod keeping;
+mod kept_event;
 mod maintenance;
 mod rotation;
-mod stretch;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use dynocar::output::tell;
+use dynocar::output::report_line;
 use dynocar::storage::{Disk, folder_of};
 use dynocar_client::ChannelError;
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 use mcap::McapError;
 
 use crate::event::{Event, EventKind};
-use crate::lanes::{Lanes, PAUSE, Sink, Wanted, event};
+use crate::train_channels::{PAUSE, Sink, TrainChannels, Wanted, event};
 use configuration::Configuration;
 use maintenance::Maintenance;
 
@@ -121,14 +121,15 @@ pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, Record
     if let Some(keeper) = keeper {
         files.set_keeper(keeper);
     }
-    files.keep_house_beside()?;
+    files.keep_house_in_parallel()?;
     let mut recorder = Recorder {
         files,
         configuration: settings.configuration.clone(),
         maintenance: Maintenance::default(),
     };
-    let mut lanes = Lanes::open(settings.wanted.clone(), "dynocar-recorder", &mut recorder)?;
-    tell(&format!("recording into {}; Ctrl-C ends it", recorder.files.path().display()));
+    let mut lanes =
+        TrainChannels::open(settings.wanted.clone(), "dynocar-recorder", &mut recorder)?;
+    report_line(&format!("recording into {}; Ctrl-C ends it", recorder.files.path().display()));
     let mut flushed = Instant::now();
     while !stop.load(Ordering::Relaxed) {
         lanes.take(&mut recorder)?;
@@ -182,7 +183,7 @@ impl Sink for Recorder {
                 self.files.attach(configuration)
             }
             Err(problem) => {
-                tell(&format!("train {train}: {problem}"));
+                report_line(&format!("train {train}: {problem}"));
                 Ok(())
             }
         }

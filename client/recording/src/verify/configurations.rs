@@ -48,7 +48,7 @@ pub enum ConfigurationError {
 }
 
 /// A configuration with when it was seen.
-struct Seen {
+struct SeenConfiguration {
     monotonic_ns: i64,
     config: DaemonConfig,
     keeps_state: bool,
@@ -56,7 +56,7 @@ struct Seen {
 
 /// The configurations of a recording, in the order in which they were seen.
 pub struct Configurations {
-    seen: Vec<Seen>,
+    seen: Vec<SeenConfiguration>,
 }
 
 impl Configurations {
@@ -66,7 +66,7 @@ impl Configurations {
     ///
     /// See [`ConfigurationError`].
     pub fn of(path: &Path, recording: &Recording) -> Result<Self, ConfigurationError> {
-        let mut seen: Vec<Seen> = Vec::new();
+        let mut seen: Vec<SeenConfiguration> = Vec::new();
         for metadata in recording.metadata.iter().filter(|it| it.name == CONFIGURATION) {
             let number = |key| metadata.metadata.get(key).and_then(|it| it.parse::<i64>().ok());
             let (Some(place), Some(monotonic_ns)) = (number("number"), number("seen_monotonic_ns"))
@@ -77,7 +77,7 @@ impl Configurations {
             if seen.iter().all(|it| it.monotonic_ns != monotonic_ns) {
                 let folder = folder_of_configuration(place as u32);
                 let (config, keeps_state) = load(path, recording, folder)?;
-                seen.push(Seen { monotonic_ns, config, keeps_state });
+                seen.push(SeenConfiguration { monotonic_ns, config, keeps_state });
             }
         }
         if seen.is_empty() {

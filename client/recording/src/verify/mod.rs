@@ -10,7 +10,7 @@ mod pipelines;
 mod report;
 
 pub use configurations::{ConfigurationError, Configurations};
-pub use overlay::{Told, overlay};
+pub use overlay::{QuantityAnswer, overlay};
 pub use pipelines::{Difference, Outcome, Verified, verify};
 pub use report::{overlay_text, text};
 

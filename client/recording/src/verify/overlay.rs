@@ -6,7 +6,7 @@ use dynocar_shared::{ParameterSnapshot, Quantity, TrainId, TrainSample};
 
 /// What a configuration's pipeline tells of a quantity.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Told {
+pub struct QuantityAnswer {
     /// The train.
     pub train: u64,
     /// The quantity.
@@ -18,7 +18,7 @@ pub struct Told {
 }
 
 /// What a configuration tells of every quantity after the last of some samples.
-pub fn overlay(config: &DaemonConfig, samples: &[TrainSample]) -> Vec<Told> {
+pub fn overlay(config: &DaemonConfig, samples: &[TrainSample]) -> Vec<QuantityAnswer> {
     let mut told = Vec::new();
     for train in &config.trains {
         let TrainId(id) = train.id;
@@ -33,7 +33,7 @@ pub fn overlay(config: &DaemonConfig, samples: &[TrainSample]) -> Vec<Told> {
                 pipeline.process(sample);
             }
             let (pipeline, snapshot) = (settings.name.clone(), *pipeline.snapshot());
-            told.push(Told { train: id, quantity, pipeline, snapshot });
+            told.push(QuantityAnswer { train: id, quantity, pipeline, snapshot });
         }
     }
     told

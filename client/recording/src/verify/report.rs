@@ -5,7 +5,7 @@ use std::fmt::Write;
 use dynocar_shared::schema::unit_of;
 use dynocar_shared::{Parameter, ParameterSnapshot, Quantity, Reason};
 
-use super::{Outcome, STAMPS, Told, Verified};
+use super::{Outcome, QuantityAnswer, STAMPS, Verified};
 
 /// The answer for people.
 pub fn text(verified: &[Verified]) -> String {
@@ -50,7 +50,7 @@ fn rest(it: &Verified) -> String {
 }
 
 /// What two configurations tell after the last sample, side by side.
-pub fn overlay_text(recorded: &[Told], other: &[Told], name: &str) -> String {
+pub fn overlay_text(recorded: &[QuantityAnswer], other: &[QuantityAnswer], name: &str) -> String {
     let mut text = format!(
         "after the last sample, each computed from the first recorded one\n{:<44} {:>32} {:>32}\n",
         "", "recorded configuration", name
@@ -60,21 +60,21 @@ pub fn overlay_text(recorded: &[Told], other: &[Told], name: &str) -> String {
     keys.sort_by_key(|it| (it.0, it.1 as u32));
     keys.dedup();
     for (train, quantity) in keys {
-        let find = |told: &[Told]| {
+        let find = |told: &[QuantityAnswer]| {
             told.iter().find(|it| (it.train, it.quantity) == (train, quantity)).cloned()
         };
         let (one, two) = (find(recorded), find(other));
-        let shown = |it: &Option<Told>, show: &dyn Fn(&Told) -> String| {
+        let shown = |it: &Option<QuantityAnswer>, show: &dyn Fn(&QuantityAnswer) -> String| {
             it.as_ref().map_or("-".to_owned(), show)
         };
-        let mut row = |title: &str, show: &dyn Fn(&Told) -> String| {
+        let mut row = |title: &str, show: &dyn Fn(&QuantityAnswer) -> String| {
             let (one, two) = (shown(&one, show), shown(&two, show));
             let _ = writeln!(text, "{title:<44} {one:>32} {two:>32}");
         };
         row(&format!("train {train}, {quantity}"), &|it| it.pipeline.clone());
         row("  status", &|it| status(&it.snapshot));
         for &parameter in Parameter::ALL {
-            let has = |it: &Option<Told>| {
+            let has = |it: &Option<QuantityAnswer>| {
                 it.as_ref().is_some_and(|it| it.snapshot.index_of(parameter).is_some())
             };
             if has(&one) || has(&two) {

@@ -70,7 +70,7 @@ fn timeline(runs: &[&[TrainSample]]) -> Timeline {
 }
 
 #[test]
-fn an_explanation_lies_beside_the_data_at_the_moments_that_it_speaks_of() {
+fn an_explanation_lies_next_to_the_data_at_the_moments_that_it_speaks_of() {
     let folder = tempfile::tempdir().unwrap();
     let (plain, annotated) = (folder.path().join("run.mcap"), folder.path().join("told.mcap"));
     let samples = samples();

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use dynocar_recording::columns::{EVENTS, SAMPLES, SNAPSHOTS};
 use dynocar_recording::event::{EVENT_FIELDS, Event, EventKind};
 use dynocar_recording::page::page;
-use dynocar_recording::schema::{BESIDE_VALUE, DESCRIPTORS, name_beside};
+use dynocar_recording::schema::{DESCRIPTORS, SUFFIXES, suffixed_name};
 use dynocar_shared::Parameter;
 use prost::Message;
 use prost::encoding::{DecodeContext, decode_key, skip_field};
@@ -55,9 +55,9 @@ fn names_and_numbers_are_unique_in_every_message_and_numbers_never_meet_the_nest
 }
 
 #[test]
-fn parameters_have_names_with_units_and_deviations_and_intervals_beside_them() {
+fn parameters_have_names_with_units_and_deviations_and_intervals_next_to_them() {
     let of = |&it: &Parameter| {
-        let beside = BESIDE_VALUE.map(|(_, word, _)| name_beside(it, word));
+        let beside = SUFFIXES.map(|(_, word, _)| suffixed_name(it, word));
         std::iter::once(it.full_name().to_owned()).chain(beside)
     };
     let names: Vec<String> = Parameter::ALL.iter().flat_map(of).collect();

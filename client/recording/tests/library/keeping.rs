@@ -78,7 +78,7 @@ fn what_lies_around_a_suspicion_outlives_the_ring() {
 }
 
 #[test]
-fn a_second_reason_lengthens_the_stretch_and_a_late_one_begins_another() {
+fn a_second_reason_lengthens_the_kept_event_and_a_late_one_begins_another() {
     let folder = tempfile::tempdir().unwrap();
     let mut files = ring(folder.path(), keeping());
     files.event(&event(EventKind::DaemonSilent)).unwrap();
@@ -99,7 +99,7 @@ fn a_second_reason_lengthens_the_stretch_and_a_late_one_begins_another() {
 }
 
 #[test]
-fn a_recorder_that_died_leaves_its_stretch_to_the_next() {
+fn a_recorder_that_died_leaves_its_kept_event_to_the_next() {
     let folder = tempfile::tempdir().unwrap();
     let mut files = ring(folder.path(), keeping());
     drive(&mut files, 1..200);

@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn the_disturbance_is_told_by_how_the_information_grows_at_any_speed() {
+    fn the_disturbance_is_reported_by_how_the_information_grows_at_any_speed() {
         for (seconds, stands_from_s) in [(60, 60), (8, 8), (600, 300)] {
             let noise = after(seconds, stands_from_s).unwrap();
             let ratio = noise.disturbance_n_per_kn_sqrt_s / DISTURBANCE;
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_told_before_anything_is_learned_or_of_other_pipelines() {
+    fn nothing_is_reported_before_anything_is_learned_or_of_other_pipelines() {
         assert_eq!(after(3, 3), None, "one look");
         assert_eq!(after(60, 0), None, "a train that stands");
         let mut other = snapshot(0.0, &Matrix3::identity());

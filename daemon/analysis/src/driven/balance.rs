@@ -26,7 +26,7 @@ pub enum ForcePart {
     /// Cold bearings.
     Bearing,
     /// Places.
-    Place,
+    Location,
     /// Forms of their own.
     Other,
 }
@@ -43,7 +43,7 @@ impl ForcePart {
         ForcePart::Wind,
         ForcePart::Ambient,
         ForcePart::Bearing,
-        ForcePart::Place,
+        ForcePart::Location,
         ForcePart::Other,
     ];
 }
@@ -105,7 +105,7 @@ impl Balance {
             ForcePart::Wind => resistance.by_wind_n_per_kn(davis, speed_mps),
             ForcePart::Ambient => resistance.by_factor_n_per_kn(davis, speed_mps),
             ForcePart::Bearing => resistance.bearing_n_per_kn,
-            ForcePart::Place => resistance.place_n_per_kn,
+            ForcePart::Location => resistance.place_n_per_kn,
             ForcePart::Other => resistance.other_at_n_per_kn(speed_mps),
         };
         self.weight_kn() * n_per_kn

@@ -10,7 +10,7 @@ use dynocar_shared::TrainId;
 const DAVIS: Davis = Davis { a: 1.5, b: 0.02, c: 0.004 };
 
 /// A train with a bit of every term that does not ask for its speed.
-fn grown_train() -> TrainModel {
+fn updated_train() -> TrainModel {
     let mut train = TrainModel::bare("grown", 100e3, DAVIS);
     train.rotating_mass_factor = 0.06;
     train.length_m = 120.0;
@@ -49,7 +49,7 @@ fn track() -> Track {
 
 #[test]
 fn a_train_driven_along_a_recording_goes_to_the_bit_as_is_predicted() {
-    let train = Arc::new(grown_train());
+    let train = Arc::new(updated_train());
     let track = Arc::new(track());
     let at = |k: usize| {
         let mut sample = acting(k as f64 * 0.2);
@@ -69,7 +69,7 @@ fn a_train_driven_along_a_recording_goes_to_the_bit_as_is_predicted() {
     };
     let mut prediction = Prediction::new();
     prediction.simulate(&recording, &law, Restart::FullRun);
-    let mut driven = train_at(grown_train(), None, prediction.speed_mps()[0]);
+    let mut driven = train_at(updated_train(), None, prediction.speed_mps()[0]);
     driven.forces = ForceResolver::new(train.clone(), Some(track));
     driven.look(&at(0));
     let mut fastest_mps = 0.0_f64;
@@ -84,7 +84,7 @@ fn a_train_driven_along_a_recording_goes_to_the_bit_as_is_predicted() {
 
 #[test]
 fn the_parts_are_the_whole() {
-    let mut driven = train_at(grown_train(), Some(track()), 20.0);
+    let mut driven = train_at(updated_train(), Some(track()), 20.0);
     for k in 0..600 {
         driven.drive(0.1, |at_s| acting(f64::from(k) * 0.1 + at_s));
         let balance = driven.balance().unwrap();
@@ -138,8 +138,8 @@ fn a_train_towards_falling_chainage_goes_there_and_long_steps_are_divided() {
     driven.drive(0.0, |_| coasting);
     assert_eq!((driven.speed_mps(), driven.measured_speed_mps()), (10.0, 10.0));
     let (mut short, mut long) = (
-        train_at(grown_train(), Some(track()), 30.0),
-        train_at(grown_train(), Some(track()), 30.0),
+        train_at(updated_train(), Some(track()), 30.0),
+        train_at(updated_train(), Some(track()), 30.0),
     );
     (0..30).for_each(|k| short.drive(1.0, |at_s| acting(f64::from(k) + at_s)));
     long.drive(30.0, acting);

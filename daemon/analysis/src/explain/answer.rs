@@ -79,7 +79,7 @@ pub struct PlaceUncertainty {
 
 /// Where an effect acts; all that is given holds together.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Place {
+pub struct Location {
     /// Chainages in m of the train's centre.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub intervals_m: Option<Vec<[f64; 2]>>,
@@ -100,17 +100,20 @@ pub struct Place {
     pub uncertainty_95: Option<PlaceUncertainty>,
 }
 
-impl Answer {
+impl ExplainAnswer {
     /// The notes by which the data cannot be true.
     pub fn impossibilities(&self) -> impl Iterator<Item = &Note> {
         self.notes.iter().filter(|note| note.severity == Severity::Fundamental)
     }
 }
 
-impl Place {
+impl Location {
     /// A place that is a set of intervals; nothing given for an empty set.
     pub fn of_intervals(intervals_m: Vec<[f64; 2]>) -> Self {
-        Place { intervals_m: (!intervals_m.is_empty()).then_some(intervals_m), ..Place::default() }
+        Location {
+            intervals_m: (!intervals_m.is_empty()).then_some(intervals_m),
+            ..Location::default()
+        }
     }
 
     /// Whether the place may be in a run, by its file.
@@ -173,7 +176,7 @@ pub struct EffectAnswer {
     pub kind: &'static str,
     /// Where it acts.
     #[serde(rename = "where")]
-    pub place: Place,
+    pub place: Location,
     /// Parameters in SI units.
     pub parameters: BTreeMap<String, ParameterValue>,
     /// Their standard deviations.
@@ -237,7 +240,7 @@ pub struct Considered {
 
 /// A value with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Told {
+pub struct WithStd {
     /// The value.
     pub value: f64,
     /// Its standard deviation.
@@ -248,10 +251,10 @@ pub struct Told {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DriveAnswer {
     /// Share of the power that reaches the rims, for the declared mass: both scale alike.
-    pub efficiency: Told,
+    pub efficiency: WithStd,
     /// Power in kW that is fed beside the drive; absent where the drive's own power is recorded.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub auxiliary_power_kw: Option<Told>,
+    pub auxiliary_power_kw: Option<WithStd>,
     /// The declared efficiency, with which forces were read; absent where the usual one was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub declared_efficiency: Option<f64>,
@@ -289,7 +292,7 @@ pub struct DavisDeviations {
 
 /// The answer.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Answer {
+pub struct ExplainAnswer {
     /// The verdict.
     pub verdict: Verdict,
     /// The verdict in a sentence or two.
@@ -336,7 +339,7 @@ pub struct Answer {
     /// Seconds by which forces act before their stamps; absent where samples are dense or it is not
     /// told.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub force_late_s: Option<Told>,
+    pub force_late_s: Option<WithStd>,
     /// What stays unexplained and is taken for noise: a force of this standard deviation in N/kN
     /// on average over a minute; absent without motion.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -11,10 +11,10 @@ use dynocar_core::train::Drive;
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 
-use super::answer::{DriveAnswer, HALF_95, Told};
+use super::answer::{DriveAnswer, HALF_95, WithStd};
 use super::effects::{AtBound, Hypothesis};
 use super::evidence::{
-    FitProblem, GrownModel, Noise, RunData, RunDataError, SampleForces, prepare,
+    FitProblem, Noise, RunData, RunDataError, SampleForces, UpdatedModel, prepare,
 };
 use super::selection::{OBSERVATIONS_MIN, deviations};
 use crate::dataset::{Dataset, Role};
@@ -156,7 +156,7 @@ impl Hypothesis for OpenDrive {
 
 /// A drive as the runs tell it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ToldDrive {
+pub struct EstimatedDrive {
     /// With what was found.
     pub drive: Drive,
     /// The same for machines.
@@ -169,7 +169,7 @@ pub struct ToldDrive {
 /// # Errors
 ///
 /// When a run has no usable sample.
-pub fn told(dataset: &Dataset) -> Result<Option<ToldDrive>, RunDataError> {
+pub fn told(dataset: &Dataset) -> Result<Option<EstimatedDrive>, RunDataError> {
     if dataset.runs.iter().all(|run| run.power().is_none()) {
         return Ok(None);
     }
@@ -185,13 +185,17 @@ pub fn told(dataset: &Dataset) -> Result<Option<ToldDrive>, RunDataError> {
     let resting = powered.iter().any(holds_more).then(|| Auxiliaries::of(&powered, drive));
     let open = OpenDrive::new(drive, resting);
     let problem = FitProblem::new(runs, dataset.train.resistance);
-    Ok(told_by(&problem, open, declared))
+    Ok(reported_by(&problem, open, declared))
 }
 
-fn told_by(problem: &FitProblem, open: OpenDrive, declared: Option<Drive>) -> Option<ToldDrive> {
+fn reported_by(
+    problem: &FitProblem,
+    open: OpenDrive,
+    declared: Option<Drive>,
+) -> Option<EstimatedDrive> {
     let start = problem.start(&open.start());
     let open = Arc::new(open);
-    let model = GrownModel::default().with(open.clone());
+    let model = UpdatedModel::default().with(open.clone());
     let first = problem.fit_with_noise(&model, start, Noise::START);
     let fit = problem.fit_with_noise(&model, first.theta, first.noise);
     if fit.observations() < OBSERVATIONS_MIN {
@@ -203,22 +207,23 @@ fn told_by(problem: &FitProblem, open: OpenDrive, declared: Option<Drive>) -> Op
     let form_kw = AUXILIARIES_FORM_SHARE * moving_power_kw(problem);
     let at_bound = open.at_bound(found).map(|at| at.name);
     let answer = DriveAnswer {
-        efficiency: Told { value: at.efficiency, std: deviation[3].hypot(EFFICIENCY_FORM_STD) },
-        auxiliary_power_kw: open
-            .resting
-            .map(|_| Told { value: 1e-3 * at.auxiliary_power_w, std: deviation[4].hypot(form_kw) }),
+        efficiency: WithStd { value: at.efficiency, std: deviation[3].hypot(EFFICIENCY_FORM_STD) },
+        auxiliary_power_kw: open.resting.map(|_| WithStd {
+            value: 1e-3 * at.auxiliary_power_w,
+            std: deviation[4].hypot(form_kw),
+        }),
         declared_efficiency: declared.map(|drive| drive.efficiency),
         at_bound,
     };
     // What lies at a bound is not told.
     let drive = if at_bound.is_some() { open.declared } else { at };
-    Some(ToldDrive { drive, answer })
+    Some(EstimatedDrive { drive, answer })
 }
 
 impl DriveAnswer {
     /// What is told of the drive, as a sentence to follow another.
     pub fn sentence(&self) -> String {
-        let Told { value, std } = self.efficiency;
+        let WithStd { value, std } = self.efficiency;
         let read = match self.declared_efficiency {
             Some(declared) => format!("declared {declared}"),
             None => format!("{} is usual", Drive::USUAL.efficiency),

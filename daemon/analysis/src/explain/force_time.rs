@@ -10,10 +10,10 @@ use dynocar_core::terms::Parameter;
 use crate::dataset::stamps;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::answer::{HALF_95, Told};
+use super::answer::{HALF_95, WithStd};
 use super::effects::Hypothesis;
 use super::evidence::{
-    FitProblem, GrownModel, Noise, RunData, RunDataError, SampleForces, prepare,
+    FitProblem, Noise, RunData, RunDataError, SampleForces, UpdatedModel, prepare,
 };
 use super::selection::{OBSERVATIONS_MIN, deviations};
 use crate::dataset::{Dataset, Role};
@@ -63,7 +63,7 @@ impl Hypothesis for LateStamps {
 /// # Errors
 ///
 /// When a run has no usable sample.
-pub fn told(dataset: &Dataset) -> Result<Option<Told>, RunDataError> {
+pub fn told(dataset: &Dataset) -> Result<Option<WithStd>, RunDataError> {
     let step_s = dataset.runs.iter().map(|run| run.quality.order.step_s).fold(0.0, f64::max);
     if step_s < STEP_MIN_S {
         return Ok(None);
@@ -71,21 +71,21 @@ pub fn told(dataset: &Dataset) -> Result<Option<Told>, RunDataError> {
     let mut runs = prepare(dataset)?;
     runs.retain(|run| run.role == Role::Fit);
     let problem = FitProblem::new(runs, dataset.train.resistance);
-    let model = GrownModel::default().with(Arc::new(LateStamps));
+    let model = UpdatedModel::default().with(Arc::new(LateStamps));
     let first = problem.fit_with_noise(&model, problem.start(&[0.0]), Noise::START);
     let fit = problem.fit_with_noise(&model, first.theta, first.noise);
     if fit.observations() < OBSERVATIONS_MIN {
         return Ok(None);
     }
     let deviation = deviations(&fit).std;
-    let late = Told { value: fit.effect_parameters(0)[0], std: deviation[3] };
+    let late = WithStd { value: fit.effect_parameters(0)[0], std: deviation[3] };
     let is_inside = LateStamps.at_bound(&[late.value]).is_none();
     let counts = late.value > LATE_SHARE_MIN * step_s && is_inside;
     Ok((counts && stamps::is_stamped_late(late.value, late.std)).then_some(late))
 }
 
 /// What is told of it, as a sentence to follow another.
-pub fn sentence(late: Told) -> String {
+pub fn sentence(late: WithStd) -> String {
     format!(
         " Forces act {:.2} ± {:.2} s before their stamps and were taken where they act.",
         late.value,

@@ -7,7 +7,7 @@ use dynocar_core::terms::{Entry, Parameter};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 
-use super::answer::{ParameterValue, Place};
+use super::answer::{Location, ParameterValue};
 use super::evidence::{RunData, SampleForces};
 use super::places::End;
 
@@ -136,8 +136,8 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
     }
 
     /// Where it acts.
-    fn place(&self) -> Place {
-        Place::default()
+    fn place(&self) -> Location {
+        Location::default()
     }
 
     /// The ends of its places that were estimated from the speeds.

@@ -8,8 +8,8 @@ use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{Cholesky, DMatrix};
 
 use super::answer::{HALF_95, Identifiability};
+use super::competing::{informative_runs, is_in, separating_run};
 use super::effects::{Candidate, LIBRARY};
-use super::rivals::{is_in, separating_run, telling_runs};
 use super::selection::{Outcome, Search};
 
 /// The kinds that are one number of the whole train or line, and not found.
@@ -66,8 +66,9 @@ pub fn identifiability(search: &Search, outcome: &Outcome) -> Vec<Identifiabilit
 /// In words what the data would not show, which kinds they cannot tell apart, and what would; empty where
 /// they hold all.
 pub fn not_held(all: &[Identifiability]) -> String {
-    let would =
-        |own: &Identifiability| EffectKind::from_name(own.kind).map_or("more runs", telling_runs);
+    let would = |own: &Identifiability| {
+        EffectKind::from_name(own.kind).map_or("more runs", informative_runs)
+    };
     let hidden: Vec<String> = all
         .iter()
         .filter(|own| !own.told)

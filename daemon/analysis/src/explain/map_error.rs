@@ -13,7 +13,7 @@ use super::selection::{Deviations, Outcome, Search, deviations};
 /// Moves the models without and with the effects that were found to where they fit best beside the map's
 /// error; how surely the parameters of the latter are known then. Where nothing was found they stay: a, b
 /// and c alone are not told better.
-pub fn beside_map_error(search: &Search, outcome: &mut Outcome) -> Deviations {
+pub fn given_map_error(search: &Search, outcome: &mut Outcome) -> Deviations {
     let Some(joint) = joint(search, &outcome.fit) else { return deviations(&outcome.fit) };
     let count = outcome.fit.theta.len();
     if !outcome.fit.model.effects.is_empty() {

@@ -12,13 +12,14 @@
 //! - [`selection`]: the search for effects, its significance, evidence by run
 //! - [`gradient_prior`], [`map_error`]: how maps err; the finished model beside what the map's own error makes all runs err alike
 //! - [`score`], `stop_runs`, [`stop_to_stop`], [`judged`], `bootstrap`: open-loop prediction of fit and holdout runs
-//! - [`unexplained`], [`told`], [`identifiability`], [`rivals`], [`runners_up`], [`verdict`], [`answer`]: the statement
+//! - [`unexplained`], [`informed`], [`identifiability`], [`competing`], [`runners_up`], [`verdict`], [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
 //!
 //! [`explain`] runs it all.
 
 pub mod answer;
 mod bootstrap;
+pub mod competing;
 pub mod drive;
 pub mod effects;
 pub mod evidence;
@@ -26,26 +27,25 @@ pub mod force_time;
 pub mod gradient_prior;
 pub mod hypothesis;
 pub mod identifiability;
+pub mod informed;
 pub mod judged;
 pub mod map_error;
 pub mod places;
 pub mod report;
 pub mod residual_pressure;
-pub mod rivals;
 pub mod runners_up;
 pub mod scan;
 pub mod score;
 pub mod selection;
 mod stop_runs;
 pub mod stop_to_stop;
-pub mod told;
 pub mod unexplained;
 pub mod verdict;
 
 use dynocar_core::plausibility::Severity;
 
 use crate::dataset::{Dataset, Role};
-use answer::Answer;
+use answer::ExplainAnswer;
 use evidence::{Fit, FitProblem, RunData, RunDataError};
 use score::{PredictedRun, Score};
 use selection::{Deviations, Outcome, Progress, Search};
@@ -54,7 +54,7 @@ use unexplained::Unexplained;
 /// Fit and holdout runs with the models that were fitted.
 pub struct Explanation {
     /// The machine-readable answer.
-    pub answer: Answer,
+    pub answer: ExplainAnswer,
     /// The fit runs and their prior.
     pub problem: FitProblem,
     /// The runs set aside.
@@ -72,7 +72,7 @@ pub struct Explanation {
     /// What the search found.
     pub outcome: Outcome,
     /// Greatest strength of a candidate in the first round of the search.
-    pub strength: f64,
+    pub acceptance_score: f64,
 }
 
 /// Explains what the declared model of a dataset leaves.
@@ -108,7 +108,7 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
         search.look_under_noise(&mut outcome);
     }
     let known = places::settle(&problem, &mut outcome.fit);
-    let deviations = map_error::beside_map_error(&search, &mut outcome);
+    let deviations = map_error::given_map_error(&search, &mut outcome);
     progress(0.95, "scoring the holdout runs");
     let score = Score::of(&problem, &holdout, &outcome.base, &outcome.fit);
     let predictions = score::predictions(&problem, &holdout, &outcome.fit);
@@ -121,7 +121,7 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
         answer.statement += &force_time::sentence(late);
         answer.force_late_s = Some(late);
     }
-    let strength = Search::greatest_strength(&outcome);
+    let acceptance_score = Search::greatest_score(&outcome);
     progress(1.0, "done");
     let (base, grown) = (outcome.base.clone(), outcome.fit.clone());
     Ok(Explanation {
@@ -134,6 +134,6 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
         score,
         predictions,
         outcome,
-        strength,
+        acceptance_score,
     })
 }

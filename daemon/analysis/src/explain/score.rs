@@ -4,7 +4,7 @@ use dynocar_core::simulate::{Prediction, Restart, SpeedError};
 use rayon::prelude::*;
 
 use super::bootstrap::intervals_95;
-use super::evidence::{Fit, FitProblem, GrownForces, RunData};
+use super::evidence::{Fit, FitProblem, RunData, UpdatedForces};
 use super::judged::Judged;
 use super::selection::without_each_run;
 use super::stop_runs::stop_runs;
@@ -47,7 +47,7 @@ fn errors_at<const N: usize>(
     run: &RunData,
     restarts: [Restart; N],
 ) -> [SpeedError; N] {
-    let (mut forces, mut prediction) = (GrownForces::default(), Prediction::new());
+    let (mut forces, mut prediction) = (UpdatedForces::default(), Prediction::new());
     fit.model.forces(run, theta, &mut forces);
     restarts.map(|restart| {
         prediction.simulate(&run.recording, &forces, restart);
@@ -59,7 +59,7 @@ fn errors_at<const N: usize>(
 /// where none of them goes from stop to stop.
 pub fn stop_to_stop(runs: &[RunData], before: &Fit, after: &Fit) -> Option<StopToStop> {
     let errors_mps = |fit: &Fit, run: &RunData| {
-        let (mut forces, mut prediction) = (GrownForces::default(), Prediction::new());
+        let (mut forces, mut prediction) = (UpdatedForces::default(), Prediction::new());
         fit.model.forces(run, &fit.theta, &mut forces);
         prediction.simulate(&run.recording, &forces, Restart::AtDepartures);
         let within = |part| SpeedError::within(&run.recording, &prediction, part).rmse_mps();
@@ -135,7 +135,7 @@ pub fn predictions(problem: &FitProblem, holdout: &[RunData], fit: &Fit) -> Vec<
         .iter()
         .chain(holdout)
         .map(|run| {
-            let (mut forces, mut prediction) = (GrownForces::default(), Prediction::new());
+            let (mut forces, mut prediction) = (UpdatedForces::default(), Prediction::new());
             fit.model.forces(run, &fit.theta, &mut forces);
             prediction.simulate(&run.recording, &forces, Restart::FullRun);
             PredictedRun {

@@ -1,6 +1,6 @@
 //! What is left when the search is done: whether noise explains it, and where it lives.
 
-use super::answer::Place;
+use super::answer::Location;
 use super::selection::{Outcome, Refusal, Search, Trial};
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -20,7 +20,7 @@ pub struct Unexplained<'o> {
     /// Trials of the last round that all but a bound speaks for, with that; the strongest first.
     pub refused: Vec<(&'o Trial, Refusal)>,
     /// Where a force outside the library explains most.
-    pub place: Option<Place>,
+    pub place: Option<Location>,
 }
 
 impl<'o> Unexplained<'o> {
@@ -54,7 +54,7 @@ impl<'o> Unexplained<'o> {
     }
 
     /// What explains the residual but is not told, in words; empty for nothing.
-    pub fn not_told(&self) -> String {
+    pub fn not_informed(&self) -> String {
         let one = |(trial, refusal): &(&Trial, Refusal)| {
             format!(" Not told is {}: {refusal}.", trial.kind.name())
         };

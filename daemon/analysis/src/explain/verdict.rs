@@ -7,17 +7,17 @@ use dynocar_core::simulate::SpeedError;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::{
-    Answer, BaseAnswer, Considered, DavisDeviations, EffectAnswer, HALF_95, ParameterValue, Place,
-    PlaceUncertainty, Verdict,
+    BaseAnswer, Considered, DavisDeviations, EffectAnswer, ExplainAnswer, HALF_95, Location,
+    ParameterValue, PlaceUncertainty, Verdict,
 };
+use super::competing::{CompetingHypotheses, is_in, rivals, separating_run};
 use super::effects::ReportContext;
-use super::evidence::{p_value, strength};
+use super::evidence::{acceptance_score, p_value};
 use super::identifiability::{identifiability, not_held};
-use super::rivals::{Rivals, is_in, rivals, separating_run};
+use super::informed::{not_informed, told_by_data};
 use super::runners_up::runners_up;
 use super::score::{self, Score};
 use super::selection::{Deviations, Outcome, Search, discounted, few_runs_factor, penalty};
-use super::told::{not_told, told_by_data};
 use super::unexplained::Unexplained;
 use crate::dataset::Note;
 
@@ -34,7 +34,7 @@ pub fn answer(
     known: &[Option<PlaceUncertainty>],
     score: &Score,
     notes: Vec<Note>,
-) -> Answer {
+) -> ExplainAnswer {
     let (fit, std) = (&outcome.fit, &deviations.std);
     let effects = effect_answers(search, outcome, known, deviations);
     // What has no name has no rivals either.
@@ -56,16 +56,16 @@ pub fn answer(
     let (statement, experiment) = if impossible.is_empty() {
         let (text, experiment) =
             statement(search, outcome, verdict, &effects, &rivals, left.as_ref());
-        let not_told = match verdict {
+        let not_informed = match verdict {
             Verdict::InsufficientData => String::new(),
-            _ => not_told(search.problem, fit, std) + &not_held(&identifiability),
+            _ => not_informed(search.problem, fit, std) + &not_held(&identifiability),
         };
-        (text + &worse_held_out(&effects, score) + &not_told, experiment)
+        (text + &worse_held_out(&effects, score) + &not_informed, experiment)
     } else {
         let text = format!("The data cannot be true as described: {}", impossible.join("; "));
         (text, Some("Set right what is named and run this again.".into()))
     };
-    Answer {
+    ExplainAnswer {
         verdict,
         statement,
         notes,
@@ -170,10 +170,10 @@ fn effect_answers(
             });
             let answer = EffectAnswer {
                 kind: effect.kind().name(),
-                place: Place { uncertainty_95: known[index].clone(), ..effect.place() },
+                place: Location { uncertainty_95: known[index].clone(), ..effect.place() },
                 parameters: reported.values,
                 std: reported.deviations,
-                p_value: p_value(strength(decrease - penalty(fit, index), reduction)),
+                p_value: p_value(acceptance_score(decrease - penalty(fit, index), reduction)),
                 error_reduction: reduction,
                 runners_up: if effect.kind() == EffectKind::Unknown {
                     runners_up(search, outcome)
@@ -191,7 +191,7 @@ fn effect_answers(
 fn verdict(
     search: &Search,
     outcome: &Outcome,
-    rivals: &[Rivals],
+    rivals: &[CompetingHypotheses],
     left: Option<&Unexplained>,
 ) -> Verdict {
     if outcome.rounds.is_empty() || moving_s(search) < MOVING_MIN_S {
@@ -218,7 +218,7 @@ fn verdict(
     if rivals.is_empty() { Verdict::Effect } else { Verdict::Ambiguous }
 }
 
-fn considered(outcome: &Outcome, rivals: &[Rivals]) -> Vec<Considered> {
+fn considered(outcome: &Outcome, rivals: &[CompetingHypotheses]) -> Vec<Considered> {
     let mut list: Vec<Considered> = Vec::new();
     if let Some(last) = outcome.rounds.last() {
         for trial in last {
@@ -250,12 +250,12 @@ fn statement(
     outcome: &Outcome,
     verdict: Verdict,
     effects: &[EffectAnswer],
-    rivals: &[Rivals],
+    rivals: &[CompetingHypotheses],
     left: Option<&Unexplained>,
 ) -> (String, Option<String>) {
     let described: Vec<String> = effects.iter().map(describe).collect();
     let described = described.join("; ");
-    let not_told = left.map(Unexplained::not_told).unwrap_or_default();
+    let not_informed = left.map(Unexplained::not_informed).unwrap_or_default();
     match verdict {
         Verdict::InsufficientData if search.problem.runs.is_empty() => {
             let held_out = search.holdout.len();
@@ -273,23 +273,23 @@ fn statement(
         Verdict::None => {
             let text = "Nothing undeclared is found: the declared model with a, b, c refitted \
                         explains the runs.";
-            (format!("{text}{not_told}"), None)
+            (format!("{text}{not_informed}"), None)
         }
-        Verdict::Effect => (format!("Found: {described}.{not_told}"), None),
+        Verdict::Effect => (format!("Found: {described}.{not_informed}"), None),
         Verdict::Unknown => {
             let text = if is_in(&outcome.fit, EffectKind::Unknown) {
                 format!(
                     "The residual is real, but no effect of the library explains it; it lives \
-                     here: {described}.{not_told}"
+                     here: {described}.{not_informed}"
                 )
             } else {
-                unnamed(left, &described) + &not_told
+                unnamed(left, &described) + &not_informed
             };
             let experiment = "Drive this range again with other speeds, loads and directions.";
             (text, Some(experiment.into()))
         }
         Verdict::Ambiguous => {
-            let one = |Rivals { accepted, kinds }: &Rivals| {
+            let one = |CompetingHypotheses { accepted, kinds }: &CompetingHypotheses| {
                 let names: Vec<&str> = kinds.iter().map(|kind| kind.name()).collect();
                 format!("{} and {}", accepted.name(), names.join(", "))
             };
@@ -345,7 +345,7 @@ fn describe(effect: &EffectAnswer) -> String {
 }
 
 /// Where something acts.
-fn describe_place(place: &Place) -> Vec<String> {
+fn describe_place(place: &Location) -> Vec<String> {
     let mut parts = Vec::new();
     if let Some(intervals) = &place.intervals_m {
         let shown = intervals.iter().take(4).map(|[from, to]| format!("{from:.0}–{to:.0} m"));

@@ -1,20 +1,20 @@
 //! Why another project's file cannot be imported.
 
-use crate::dataset::{Place, Problem};
+use crate::dataset::{Problem, SourcePosition};
 
 /// Why nothing can be imported, and where.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{place}: {problem}")]
 pub struct ImportError {
     /// File and line.
-    pub place: Place,
+    pub place: SourcePosition,
     /// What is wrong there.
     pub problem: Box<ImportProblem>,
 }
 
 impl ImportError {
     /// A problem at a place.
-    pub(super) fn new(place: Place, problem: impl Into<ImportProblem>) -> Self {
+    pub(super) fn new(place: SourcePosition, problem: impl Into<ImportProblem>) -> Self {
         ImportError { place, problem: Box::new(problem.into()) }
     }
 }

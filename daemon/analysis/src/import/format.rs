@@ -4,7 +4,7 @@ use dynocar_core::named;
 
 use super::error::{ImportError, ImportProblem};
 use super::item::Item;
-use crate::dataset::Place;
+use crate::dataset::SourcePosition;
 
 named! {
     /// A project whose files are read.
@@ -42,7 +42,7 @@ pub(super) fn refuse_xml(label: &str, text: &str) -> Result<(), ImportError> {
         "railml" => ImportProblem::RailMl,
         _ => ImportProblem::Xml { root: root.chars().take(40).collect() },
     };
-    Err(ImportError::new(Place::whole(label), problem))
+    Err(ImportError::new(SourcePosition::whole(label), problem))
 }
 
 /// The name of the root element; `None` for a text that is no XML.

@@ -3,7 +3,7 @@
 use dynocar_core::track::Curve;
 use dynocar_core::train::Davis;
 
-use crate::dataset::Place;
+use crate::dataset::SourcePosition;
 
 /// How a file is to be read where its format leaves a choice.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -16,7 +16,7 @@ pub struct Reading {
 
 /// What became of a field.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Remark {
+pub enum FieldOutcome {
     /// It stands under a key.
     Taken {
         /// The field, with its unit where the format has one.
@@ -45,31 +45,31 @@ pub enum Remark {
 /// The account of the fields of one train or line, each once.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Account {
-    remarks: Vec<Remark>,
+    remarks: Vec<FieldOutcome>,
 }
 
 impl Account {
     /// Everything said, in the order of the work.
-    pub fn remarks(&self) -> &[Remark] {
+    pub fn remarks(&self) -> &[FieldOutcome] {
         &self.remarks
     }
 
-    fn say(&mut self, remark: Remark) {
+    fn say(&mut self, remark: FieldOutcome) {
         if !self.remarks.contains(&remark) {
             self.remarks.push(remark);
         }
     }
 
     pub(super) fn taken(&mut self, field: &str, key: &'static str, how: impl Into<String>) {
-        self.say(Remark::Taken { field: field.into(), key, how: how.into() });
+        self.say(FieldOutcome::Taken { field: field.into(), key, how: how.into() });
     }
 
     pub(super) fn left(&mut self, field: &str, why: impl Into<String>) {
-        self.say(Remark::Left { field: field.into(), why: why.into() });
+        self.say(FieldOutcome::Left { field: field.into(), why: why.into() });
     }
 
     pub(super) fn unknown(&mut self, key: &'static str, why: impl Into<String>) {
-        self.say(Remark::Unknown { key, why: why.into() });
+        self.say(FieldOutcome::Unknown { key, why: why.into() });
     }
 
     /// Accounts for the fields of a map that were not taken: those of `without_place` for a reason,
@@ -95,7 +95,7 @@ pub struct ImportedTrain {
     /// By which it is chosen among others.
     pub id: String,
     /// Where it stands.
-    pub place: Place,
+    pub place: SourcePosition,
     /// Name for people.
     pub name: String,
     /// Mass in kg.
@@ -120,7 +120,7 @@ pub struct ImportedLine {
     /// By which it is chosen among others.
     pub id: String,
     /// Where it stands.
-    pub place: Place,
+    pub place: SourcePosition,
     /// Name for people.
     pub name: String,
     /// Length in m.

@@ -2,7 +2,7 @@
 
 use super::error::{ImportError, ImportProblem};
 use super::tree::{Content, Node};
-use crate::dataset::{Place, Problem};
+use crate::dataset::{Problem, SourcePosition};
 
 /// A value with file and path, for messages.
 #[derive(Clone, Debug)]
@@ -30,7 +30,7 @@ impl<'t> Item<'t> {
 
     /// A problem with this value.
     pub fn wrong(&self, problem: impl Into<ImportProblem>) -> ImportError {
-        ImportError::new(Place::line(self.label, self.node.line), problem)
+        ImportError::new(SourcePosition::line(self.label, self.node.line), problem)
     }
 
     /// A path to a key of this map.

@@ -30,7 +30,7 @@ mod vehicle;
 
 pub use error::{ImportError, ImportProblem};
 pub use format::Format;
-pub use imported::{Account, ImportedLine, ImportedTrain, Reading, Remark};
+pub use imported::{Account, FieldOutcome, ImportedLine, ImportedTrain, Reading};
 
 use format::Kind;
 use item::Item;

@@ -8,7 +8,7 @@ use dynocar_core::train::{Davis, TrainModel};
 use super::error::{ImportError, ImportProblem};
 use super::imported::{Account, ImportedTrain, Reading};
 use super::item::Item;
-use crate::dataset::{Choices, Place, Problem};
+use crate::dataset::{Choices, Problem, SourcePosition};
 
 const TAKEN: [&str; 6] =
     ["name", "mass", "length", "inertia_coefficient", "rolling_resistance", "effort_curves"];
@@ -82,7 +82,7 @@ pub(super) fn train(root: &Item, reading: &Reading) -> Result<ImportedTrain, Imp
     };
     Ok(ImportedTrain {
         id: name.into(),
-        place: Place::line(root.label(), root.line()),
+        place: SourcePosition::line(root.label(), root.line()),
         name: name.into(),
         mass_kg,
         length_m,

@@ -7,7 +7,7 @@ use super::error::{ImportError, ImportProblem};
 use super::imported::{Account, ImportedTrain, Reading};
 use super::item::Item;
 use super::vehicle::{Kind, Vehicle, vehicle};
-use crate::dataset::Place;
+use crate::dataset::SourcePosition;
 
 const TAKEN: [&str; 12] = [
     "air_resistance",
@@ -138,7 +138,7 @@ fn train(
     }
     ImportedTrain {
         id: id.into(),
-        place: Place::line(item.label(), item.line()),
+        place: SourcePosition::line(item.label(), item.line()),
         name: name.into(),
         mass_kg,
         length_m: Some(sum(&|it| it.length_m)),

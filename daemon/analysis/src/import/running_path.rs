@@ -4,7 +4,7 @@
 use super::error::{ImportError, ImportProblem};
 use super::imported::{Account, ImportedLine};
 use super::item::Item;
-use crate::dataset::Place;
+use crate::dataset::SourcePosition;
 
 const SECTIONS: &str = "characteristic_sections";
 /// Reasons for fields that have no place.
@@ -88,7 +88,7 @@ fn line(item: &Item, id: &str) -> Result<ImportedLine, ImportError> {
     account.rest("paths.", item.keys(), &["id", "name", SECTIONS], &WITHOUT_PLACE);
     Ok(ImportedLine {
         id: id.into(),
-        place: Place::line(item.label(), item.line()),
+        place: SourcePosition::line(item.label(), item.line()),
         name: name.into(),
         length_m: last_m - first_m,
         gradient: Some(gradient).filter(|list| !list.is_empty()),

@@ -45,8 +45,8 @@ fn flat(list: &[(f64, f64)]) -> Vec<f64> {
 /// The reason for which a field has no place, or a key is not known.
 fn reason<'a>(account: &'a Account, name: &str) -> &'a str {
     let of = account.remarks().iter().find_map(|remark| match remark {
-        Remark::Left { field, why } if field == name => Some(why.as_str()),
-        Remark::Unknown { key, why } if *key == name => Some(why.as_str()),
+        FieldOutcome::Left { field, why } if field == name => Some(why.as_str()),
+        FieldOutcome::Unknown { key, why } if *key == name => Some(why.as_str()),
         _ => None,
     });
     of.unwrap_or_else(|| panic!("{name}: {account:?}"))
@@ -88,7 +88,7 @@ fn a_load_weighs_on_the_wagons_and_not_on_the_locomotive() {
 }
 
 #[test]
-fn what_a_vehicle_lacks_is_told_and_not_made_up() {
+fn what_a_vehicle_lacks_is_reported_and_not_made_up() {
     let without = |line: &str| {
         let text = STOCK.replace(line, "");
         assert_ne!(text, STOCK, "{line}");
@@ -188,7 +188,7 @@ fn a_ttobench_train_is_read_by_its_units() {
 }
 
 #[test]
-fn davis_coefficients_are_told_by_their_size() {
+fn davis_coefficients_are_reported_by_their_size() {
     let tram = &read(TRAM).trains[0];
     let weight_kn = 80.0 * STANDARD_GRAVITY_MPS2;
     assert_close(&davis(tram), &[1200.0 / weight_kn, 90.0 / weight_kn, 1.4 / weight_kn]);

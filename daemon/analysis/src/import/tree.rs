@@ -3,7 +3,7 @@
 use granit_parser::{Event, Parser, ScalarStyle};
 
 use super::error::ImportError;
-use crate::dataset::{Place, Problem};
+use crate::dataset::{Problem, SourcePosition};
 
 /// No format nests deeper; a file that does would cost stack.
 const DEPTH_MAX: usize = 64;
@@ -69,7 +69,7 @@ struct Builder<'l> {
 impl Builder<'_> {
     fn wrong(&self, line: usize, message: String) -> ImportError {
         let problem = Problem::Syntax { language: self.language, message };
-        ImportError::new(Place::line(self.label, line), problem)
+        ImportError::new(SourcePosition::line(self.label, line), problem)
     }
 
     fn feed(&mut self, event: Event, line: usize) -> Result<(), ImportError> {

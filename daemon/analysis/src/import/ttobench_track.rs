@@ -7,7 +7,7 @@ use super::error::ImportError;
 use super::imported::{Account, ImportedLine};
 use super::item::Item;
 use super::ttobench::{METADATA, id, unit};
-use crate::dataset::Place;
+use crate::dataset::SourcePosition;
 
 const TAKEN: [&str; 5] = ["metadata", "stops", "speed limits", "gradients", "curvatures"];
 const WITHOUT_PLACE: [(&str, &str); 1] =
@@ -77,7 +77,7 @@ pub(super) fn line(root: &Item) -> Result<ImportedLine, ImportError> {
     }
     Ok(ImportedLine {
         id: id.into(),
-        place: Place::line(root.label(), root.line()),
+        place: SourcePosition::line(root.label(), root.line()),
         name: id.into(),
         length_m,
         gradient,

@@ -7,7 +7,7 @@ use super::error::ImportError;
 use super::imported::{Account, ImportedTrain};
 use super::item::Item;
 use super::ttobench::{METADATA, coefficient, id, value};
-use crate::dataset::Place;
+use crate::dataset::SourcePosition;
 
 const TAKEN: [&str; 9] = [
     "metadata",
@@ -74,7 +74,7 @@ pub(super) fn train(root: &Item) -> Result<ImportedTrain, ImportError> {
     }
     Ok(ImportedTrain {
         id: id.into(),
-        place: Place::line(root.label(), root.line()),
+        place: SourcePosition::line(root.label(), root.line()),
         name: id.into(),
         mass_kg,
         length_m: None,

@@ -1,6 +1,6 @@
 //! Whether both directions take one track, and which.
 
-use super::stretches::SAME_WAY_M;
+use super::recording_parts::SAME_WAY_M;
 use super::way::Way;
 
 /// Both directions take the same way when so much of what both drive lies within `SAME_TRACK_M`.

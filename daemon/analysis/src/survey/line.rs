@@ -3,8 +3,8 @@
 use super::alignment::{PassRows, align};
 use super::both_directions::{Compared, compare};
 use super::recording::Recording;
+use super::recording_parts::{RecordingPart, SAME_WAY_M, distance_squared};
 use super::silence::{TracePoint, filled, trace};
-use super::stretches::{SAME_WAY_M, Stretch, distance_squared};
 use super::tracking::follow;
 use super::way::Way;
 
@@ -84,15 +84,15 @@ pub struct Pass {
 }
 
 /// Finds the line among the stretches of the fit runs; `None` when there is none.
-pub fn find(stretches: &[Stretch], recordings: &[Recording]) -> Option<Ways> {
-    let fit: Vec<Stretch> =
-        stretches.iter().filter(|it| recordings[it.recording].raw.is_fit).copied().collect();
+pub fn find(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Option<Ways> {
+    let fit: Vec<RecordingPart> =
+        recording_parts.iter().filter(|it| recordings[it.recording].raw.is_fit).copied().collect();
     let template = template(&fit, recordings)?;
     let back = template.reversed()?;
     let growing = along(&template, &fit, recordings);
     let falling = along(&back, &fit, recordings);
     // The line's chainage grows in the direction in which it was first driven.
-    let first = |along: &[(Stretch, PassRows)]| {
+    let first = |along: &[(RecordingPart, PassRows)]| {
         along.iter().map(|(_, pass)| (pass.recording, pass.rows.start)).min()
     };
     let is_backward = match (first(&growing), first(&falling)) {
@@ -132,8 +132,8 @@ pub fn find(stretches: &[Stretch], recordings: &[Recording]) -> Option<Ways> {
 
 /// The way of a direction from its own stretches: where they differ from the other direction's,
 /// they know better. A single stretch cannot say what of it is the line.
-fn way_of(template: &Way, along: &[(Stretch, PassRows)], recordings: &[Recording]) -> Way {
-    let own: Vec<Stretch> = along.iter().map(|(stretch, _)| *stretch).collect();
+fn way_of(template: &Way, along: &[(RecordingPart, PassRows)], recordings: &[Recording]) -> Way {
+    let own: Vec<RecordingPart> = along.iter().map(|(stretch, _)| *stretch).collect();
     let first = match own.len() {
         0 | 1 => template.clone(),
         _ => self::template(&own, recordings).unwrap_or_else(|| template.clone()),
@@ -149,7 +149,7 @@ fn thinned(passes: &[PassRows]) -> Vec<PassRows> {
     passes.iter().step_by(step).cloned().collect()
 }
 
-fn rows_of(stretch: &Stretch, recordings: &[Recording]) -> std::ops::Range<usize> {
+fn rows_of(stretch: &RecordingPart, recordings: &[Recording]) -> std::ops::Range<usize> {
     let recording = &recordings[stretch.recording];
     let first = recording.way_m.partition_point(|&way| way < stretch.from_m);
     let end = recording.way_m.partition_point(|&way| way <= stretch.to_m);
@@ -157,9 +157,9 @@ fn rows_of(stretch: &Stretch, recordings: &[Recording]) -> std::ops::Range<usize
 }
 
 /// The stretch that the others follow furthest, cut to what at least one other drives too.
-fn template(stretches: &[Stretch], recordings: &[Recording]) -> Option<Way> {
-    let thinned: Vec<&Stretch> = {
-        let mut long: Vec<&Stretch> = stretches.iter().collect();
+fn template(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Option<Way> {
+    let thinned: Vec<&RecordingPart> = {
+        let mut long: Vec<&RecordingPart> = recording_parts.iter().collect();
         long.retain(|stretch| stretch.to_m - stretch.from_m > 100.0);
         let step = long.len().div_ceil(TRIED_MAX).max(1);
         long.into_iter().step_by(step).collect()
@@ -185,10 +185,10 @@ fn template(stretches: &[Stretch], recordings: &[Recording]) -> Option<Way> {
 
 /// For each node of a way how many other stretches drive it, each counted in the direction in
 /// which it drives most of it.
-fn covered(way: &Way, own: usize, stretches: &[Vec<[f64; 2]>]) -> Vec<usize> {
+fn covered(way: &Way, own: usize, recording_parts: &[Vec<[f64; 2]>]) -> Vec<usize> {
     let count = way.nodes_m().len();
     let mut counts = vec![0; count];
-    for (_, points) in stretches.iter().enumerate().filter(|(other, _)| *other != own) {
+    for (_, points) in recording_parts.iter().enumerate().filter(|(other, _)| *other != own) {
         let mut marks = [vec![false; count], vec![false; count]];
         for pair in points.windows(2) {
             let step = [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]];
@@ -211,12 +211,16 @@ fn covered(way: &Way, own: usize, stretches: &[Vec<[f64; 2]>]) -> Vec<usize> {
 }
 
 /// The stretches that run along a way in its direction, with their rows on it.
-fn along(way: &Way, stretches: &[Stretch], recordings: &[Recording]) -> Vec<(Stretch, PassRows)> {
-    let pass = |stretch: &Stretch| Some((*stretch, pass_along(way, stretch, recordings)?));
-    stretches.iter().filter_map(pass).collect()
+fn along(
+    way: &Way,
+    recording_parts: &[RecordingPart],
+    recordings: &[Recording],
+) -> Vec<(RecordingPart, PassRows)> {
+    let pass = |stretch: &RecordingPart| Some((*stretch, pass_along(way, stretch, recordings)?));
+    recording_parts.iter().filter_map(pass).collect()
 }
 
-fn pass_along(way: &Way, stretch: &Stretch, recordings: &[Recording]) -> Option<PassRows> {
+fn pass_along(way: &Way, stretch: &RecordingPart, recordings: &[Recording]) -> Option<PassRows> {
     let rows = rows_of(stretch, recordings);
     let placed = follow(&recordings[stretch.recording], rows.clone(), way);
     let (first, last) = (placed.first()?, placed.last()?);
@@ -227,7 +231,7 @@ fn pass_along(way: &Way, stretch: &Stretch, recordings: &[Recording]) -> Option<
 }
 
 /// The pass that a stretch of any role is, if it is one.
-pub fn pass_of(ways: &Ways, stretch: &Stretch, recordings: &[Recording]) -> Option<Pass> {
+pub fn pass_of(ways: &Ways, stretch: &RecordingPart, recordings: &[Recording]) -> Option<Pass> {
     let along = |direction: i8| {
         let rows = pass_along(ways.of(direction)?, stretch, recordings)?;
         Some(Pass { rows, direction })

@@ -8,7 +8,7 @@
 //! # Layout, in the order of reading
 //!
 //! - [`recording`], [`geodesy`]: what was recorded, on a plane in metres
-//! - `stretches`, [`way`], `silence`, `tracking`, `alignment`, `both_directions`, [`mod@line`]: the line that
+//! - `recording_parts`, [`way`], `silence`, `tracking`, `alignment`, `both_directions`, [`mod@line`]: the line that
 //!   is driven repeatedly
 //! - [`chainage`]: a chainage for every row; [`stops`], [`curves`]: what it shows
 //! - [`balance`], [`common`], [`profile`], [`friction`], [`learn`]: gradient, resistance, mass,
@@ -31,9 +31,9 @@ pub mod learn;
 pub mod line;
 pub mod profile;
 pub mod recording;
+mod recording_parts;
 mod silence;
 pub mod stops;
-mod stretches;
 mod surveying;
 mod tracking;
 pub mod trips;

@@ -1,7 +1,7 @@
 //! Where a receiver was silent, the way of one pass is that of another.
 
 use super::recording::Recording;
-use super::stretches::{SAME_WAY_M, Stretch, distance_squared};
+use super::recording_parts::{RecordingPart, SAME_WAY_M, distance_squared};
 
 /// Fixes further apart along the way than this many m leave it open in between.
 pub const GAP_MAX_M: f64 = 150.0;
@@ -18,7 +18,7 @@ pub struct TracePoint {
 }
 
 /// Points every `step_m` along a stretch.
-pub fn trace(stretch: &Stretch, recordings: &[Recording], step_m: f64) -> Vec<TracePoint> {
+pub fn trace(stretch: &RecordingPart, recordings: &[Recording], step_m: f64) -> Vec<TracePoint> {
     let recording = &recordings[stretch.recording];
     let silences: Vec<(f64, f64)> = recording
         .fixes

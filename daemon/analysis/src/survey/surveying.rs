@@ -13,8 +13,8 @@ use super::learn::{Learned, acting_from_pa, learn};
 use super::line::{Ways, find, pass_of};
 use super::profile::{Altitude, Evidence};
 use super::recording::{RawRecording, Recording, plane_of};
+use super::recording_parts::{RecordingPart, recording_parts};
 use super::stops::{Stop, stands, stops};
-use super::stretches::{Stretch, stretches};
 use super::trips::{NotUsed, Trip, not_used, trips};
 
 /// Lateral uncertainty in m of a way: what the wheels roll differs from it by so much times the
@@ -121,10 +121,10 @@ pub fn survey(
     };
     let recordings: Vec<Recording> =
         raws.par_iter().map(|raw| Recording::of(raw, &plane)).collect();
-    let cut: Vec<Stretch> = recordings
+    let cut: Vec<RecordingPart> = recordings
         .par_iter()
         .enumerate()
-        .flat_map_iter(|(number, recording)| stretches(number, recording))
+        .flat_map_iter(|(number, recording)| recording_parts(number, recording))
         .collect();
     let mut ways = match known {
         Some(known) => known.ways.clone(),

@@ -1,7 +1,7 @@
 //! Following a recording along a way: a chainage for each fix.
 
 use super::recording::{Fix, Recording};
-use super::stretches::{SAME_WAY_M, distance_squared};
+use super::recording_parts::{SAME_WAY_M, distance_squared};
 use super::way::{Beside, Way};
 
 /// Window in m around the expected chainage in which a fix is placed.

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::stretches::distance_squared;
+use super::recording_parts::distance_squared;
 
 /// Distance in m between the nodes of a way.
 pub const NODE_STEP_M: f64 = 10.0;
@@ -148,7 +148,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_point_beside_a_way_is_found_with_its_side() {
+    fn a_point_next_to_a_way_is_found_with_its_side() {
         let way = Way::through(&[[0.0, 0.0], [100.0, 0.0], [100.0, 80.0]]).unwrap();
         assert!((way.length_m() - 180.0).abs() < 1e-9);
         let beside = way.beside([42.0, 3.0], 0.0, 180.0);

@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn a_weight_that_is_no_number_is_told() {
+    fn a_weight_that_is_no_number_is_reported() {
         let mut bank = Bank::<_, Nats, 2>::even([0, 1]);
         bank.weights[1] = f64::NAN;
         assert!(!bank.settle());

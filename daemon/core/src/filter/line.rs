@@ -4,7 +4,7 @@
 ///
 /// The sums are about t = 0 and x = 0: choose the origin near the points.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Line {
+pub struct FittedLine {
     count: f64,
     t: f64,
     tt: f64,
@@ -13,7 +13,7 @@ pub struct Line {
     xx: f64,
 }
 
-impl Line {
+impl FittedLine {
     /// Takes in a point.
     pub fn push(&mut self, t: f64, x: f64) {
         self.count += 1.0;
@@ -25,8 +25,8 @@ impl Line {
     }
 
     /// The line through the points of both, which must share their origin.
-    pub fn joined(&self, other: &Line) -> Line {
-        Line {
+    pub fn joined(&self, other: &FittedLine) -> FittedLine {
+        FittedLine {
             count: self.count + other.count,
             t: self.t + other.t,
             tt: self.tt + other.tt,
@@ -71,7 +71,7 @@ mod tests {
 
     #[test]
     fn points_on_a_line_have_its_slope_and_no_scatter() {
-        let mut line = Line::default();
+        let mut line = FittedLine::default();
         for i in 0..10 {
             line.push(0.2 * f64::from(i), 3.0 - 0.5 * 0.2 * f64::from(i));
         }
@@ -83,7 +83,8 @@ mod tests {
     #[test]
     fn joining_equals_pushing_all() {
         let points = [(0.0, 1.0), (1.0, 0.5), (2.0, 1.5), (3.0, 4.0)];
-        let (mut all, mut first, mut last) = (Line::default(), Line::default(), Line::default());
+        let (mut all, mut first, mut last) =
+            (FittedLine::default(), FittedLine::default(), FittedLine::default());
         for (i, &(t, x)) in points.iter().enumerate() {
             all.push(t, x);
             if i < 2 { first.push(t, x) } else { last.push(t, x) }
@@ -96,7 +97,7 @@ mod tests {
 
     #[test]
     fn one_point_has_no_slope() {
-        let mut line = Line::default();
+        let mut line = FittedLine::default();
         assert_eq!(line.slope(), None);
         line.push(1.0, 2.0);
         assert_eq!(line.slope(), None);

@@ -45,7 +45,7 @@ pub use bounded::{Bounded, bounded_minimum};
 pub use drifting_level::DriftingLevel;
 pub use gaussian::{Gaussian, Innovation};
 pub use information::SquareRootInformation;
-pub use line::Line;
+pub use line::FittedLine;
 pub use median::RunningMedian;
 pub use mils::{Mils, Penalty};
 pub use rls::{Forgetting, Rls};

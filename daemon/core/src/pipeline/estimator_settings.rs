@@ -8,7 +8,7 @@ use dynocar_shared::PipelineKind;
 use serde::Deserialize;
 
 use super::Estimator;
-use super::braking::intake::Quantity;
+use super::braking::intake::BrakingCoefficient;
 use super::braking::settings::{EkfSettings, EmSettings, LawSettings, SmootherSettings};
 use super::echo::Echo;
 use super::monitor::{MonitorSettings, ResidualMonitor};
@@ -124,13 +124,13 @@ estimator_kinds! {
         |s, t| boxed(ResidualMonitor::new(*s, t));
     /// Adhesion by sliding-window EM.
     AdhesionEm(EmSettings) = AdhesionEm,
-        |s, t| s.build(PipelineKind::AdhesionEm, Quantity::Adhesion, t);
+        |s, t| s.build(PipelineKind::AdhesionEm, BrakingCoefficient::Adhesion, t);
     /// Adhesion by extended Kalman filter.
     AdhesionEkf(EkfSettings) = AdhesionEkf,
-        |s, t| s.build(PipelineKind::AdhesionEkf, Quantity::Adhesion, t);
+        |s, t| s.build(PipelineKind::AdhesionEkf, BrakingCoefficient::Adhesion, t);
     /// Adhesion by fixed-lag smoothing.
     AdhesionSmoother(SmootherSettings) = AdhesionSmoother,
-        |s, t| s.build(PipelineKind::AdhesionSmoother, Quantity::Adhesion, t);
+        |s, t| s.build(PipelineKind::AdhesionSmoother, BrakingCoefficient::Adhesion, t);
     /// Adhesion as the scale of a known law.
     AdhesionLaw(LawSettings) = AdhesionLaw, |s, t| s.build_adhesion(t);
     /// Disc friction or braking ratio by sliding-window EM.

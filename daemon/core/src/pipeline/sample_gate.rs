@@ -161,7 +161,7 @@ impl SampleGate {
     }
 
     /// What is wrong with the forces, if anything.
-    pub fn complaint(&self) -> Option<Reason> {
+    pub fn input_doubt(&self) -> Option<Reason> {
         self.is_in_doubt().then_some(Reason::BadInput)
     }
 

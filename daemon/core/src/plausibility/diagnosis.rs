@@ -10,7 +10,7 @@
 //! | traction and brake exchanged | -1 | 1 | 1 |
 
 use super::balance::Slope;
-use super::slip::{Finding, Slip};
+use super::input_fault::{Finding, InputFault};
 use super::watch::Figures;
 
 /// Factors of forces within these bounds are effects that a train can have.
@@ -42,7 +42,7 @@ pub struct Findings {
 }
 
 impl Findings {
-    fn add(&mut self, slip: Slip, factor: f64) {
+    fn add(&mut self, slip: InputFault, factor: f64) {
         if let Some(place) = self.list.iter_mut().find(|place| place.is_none()) {
             *place = Some(Finding { slip, factor });
         }
@@ -63,8 +63,8 @@ pub fn diagnose(figures: &Figures) -> Findings {
     let mut found = Findings::default();
     let kinematic = kinematic(figures);
     let (forces_by, gradients_by) = match kinematic {
-        Some(Finding { slip: Slip::SpeedScale, factor }) => (factor, factor),
-        Some(Finding { slip: Slip::TimeScale, factor }) => (1.0 / factor, 1.0 / factor),
+        Some(Finding { slip: InputFault::SpeedScale, factor }) => (factor, factor),
+        Some(Finding { slip: InputFault::TimeScale, factor }) => (1.0 / factor, 1.0 / factor),
         _ => (1.0, 1.0),
     };
     if let Some(Finding { slip, factor }) = kinematic {
@@ -72,7 +72,7 @@ pub fn diagnose(figures: &Figures) -> Findings {
     }
     let mut forces_by = forces_by;
     if let Some(ratio) = figures.mass_ratio.filter(|&ratio| is_outside(ratio, MASS_RATIOS)) {
-        found.add(Slip::MassScale, ratio);
+        found.add(InputFault::MassScale, ratio);
         forces_by *= ratio;
     }
     of_forces(figures, forces_by, kinematic.is_some(), &mut found);
@@ -82,7 +82,7 @@ pub fn diagnose(figures: &Figures) -> Findings {
     if let Some(pressure_pa) = figures.braking_pressure_pa
         && pressure_pa < BRAKING_PRESSURE_MIN_PA
     {
-        found.add(Slip::PressureScale, pressure_factor(pressure_pa));
+        found.add(InputFault::PressureScale, pressure_factor(pressure_pa));
     }
     found
 }
@@ -95,24 +95,24 @@ fn is_outside(value: f64, (low, high): (f64, f64)) -> bool {
 fn kinematic(figures: &Figures) -> Option<Finding> {
     let ratio = figures.way_ratio?;
     if (-WAY_RATIOS.1..-WAY_RATIOS.0).contains(&ratio) {
-        return Some(Finding { slip: Slip::DirectionReversed, factor: ratio });
+        return Some(Finding { slip: InputFault::DirectionReversed, factor: ratio });
     }
     if !(ratio > 0.0) || !is_outside(ratio, WAY_RATIOS) {
         return None;
     }
     let candidates = [
-        (Slip::SpeedScale, 1.0 / ratio, 1.0 / ratio),
-        (Slip::TimeScale, 1.0 / ratio, ratio),
-        (Slip::PositionScale, ratio, 1.0),
+        (InputFault::SpeedScale, 1.0 / ratio, 1.0 / ratio),
+        (InputFault::TimeScale, 1.0 / ratio, ratio),
+        (InputFault::PositionScale, ratio, 1.0),
     ];
     let of_forces = common_factor(figures);
     let has_usual_step = !is_outside(figures.step_s, USUAL_STEP_S);
     let is_unlikely = |slip| match slip {
-        Slip::TimeScale => has_usual_step,
-        Slip::PositionScale => !has_usual_step,
+        InputFault::TimeScale => has_usual_step,
+        InputFault::PositionScale => !has_usual_step,
         _ => false,
     };
-    let misfit = |(slip, factor, expected): &(Slip, f64, f64)| {
+    let misfit = |(slip, factor, expected): &(InputFault, f64, f64)| {
         let of_unit = slip.misfit(*factor)?;
         Some(match of_forces {
             Some(of_forces) if of_forces > 0.0 => of_unit + (of_forces / expected).ln().abs(),
@@ -143,14 +143,15 @@ fn of_forces(figures: &Figures, by: f64, is_kinematic: bool, found: &mut Finding
     let slopes = figures.slopes;
     if let Some(common) = common_factor(figures).map(|factor| factor / by) {
         if common < -FORCE_FACTORS.0 {
-            found.add(Slip::ForcesSwapped, common);
+            found.add(InputFault::ForcesSwapped, common);
         } else if is_outside(common, FORCE_FACTORS) {
             let (slip, factor) = blamed(figures, common, is_kinematic);
             found.add(slip, factor);
         }
         return;
     }
-    let of_one = [(Slip::TractionScale, slopes.traction), (Slip::BrakeScale, slopes.brake)];
+    let of_one =
+        [(InputFault::TractionScale, slopes.traction), (InputFault::BrakeScale, slopes.brake)];
     for (slip, slope) in of_one {
         let Some(Slope { factor, .. }) = slope else { continue };
         let factor = factor / by;
@@ -163,17 +164,17 @@ fn of_forces(figures: &Figures, by: f64, is_kinematic: bool, found: &mut Finding
 /// Who is to blame when both forces miss the acceleration by a factor: the speed where its units
 /// explain it and no position contradicts, the mass where the forces are such as the effort curves
 /// allow and would not be otherwise, else the forces.
-fn blamed(figures: &Figures, common: f64, is_kinematic: bool) -> (Slip, f64) {
-    let of_forces = Slip::ForcesScale.misfit(common).unwrap_or(f64::INFINITY);
-    let of_speed = Slip::SpeedScale.misfit(common).filter(|_| !is_kinematic);
+fn blamed(figures: &Figures, common: f64, is_kinematic: bool) -> (InputFault, f64) {
+    let of_forces = InputFault::ForcesScale.misfit(common).unwrap_or(f64::INFINITY);
+    let of_speed = InputFault::SpeedScale.misfit(common).filter(|_| !is_kinematic);
     if of_speed.is_some_and(|misfit| misfit < of_forces) {
-        return (Slip::SpeedScale, common);
+        return (InputFault::SpeedScale, common);
     }
     let shares = figures.effort_shares.iter().flatten().copied();
     let is_mass = shares.reduce(f64::max).is_some_and(|share| {
         !is_outside(share, EFFORT_SHARES) && is_outside(share * common, EFFORT_SHARES)
     });
-    if is_mass { (Slip::MassScale, common) } else { (Slip::ForcesScale, 1.0 / common) }
+    if is_mass { (InputFault::MassScale, common) } else { (InputFault::ForcesScale, 1.0 / common) }
 }
 
 fn of_gradient(figures: &Figures, by: f64, found: &mut Findings) {
@@ -181,15 +182,15 @@ fn of_gradient(figures: &Figures, by: f64, found: &mut Findings) {
     let factor = slope.factor / by;
     if factor < 0.0 {
         if !is_outside(-factor, WAY_RATIOS) {
-            found.add(Slip::GradientSign, factor);
+            found.add(InputFault::GradientSign, factor);
         }
         return;
     }
     let rms = figures.gradient_rms_permille;
     let is_credible =
         if factor > 1.0 { rms < GRADIENT_RMS_PERMILLE.0 } else { rms > GRADIENT_RMS_PERMILLE.1 };
-    if is_credible && Slip::GradientScale.misfit(1.0 / factor).is_some() {
-        found.add(Slip::GradientScale, 1.0 / factor);
+    if is_credible && InputFault::GradientScale.misfit(1.0 / factor).is_some() {
+        found.add(InputFault::GradientScale, 1.0 / factor);
     }
 }
 

@@ -7,12 +7,12 @@
 //!
 //! - [`watch`]: sample by sample, with [`balance`] (forces against acceleration) and [`pressure`]
 //! - [`diagnosis`]: which slip makes all figures come out as they did
-//! - [`slip`]: the slips, their names and severity; [`words`]: a finding in a sentence
+//! - [`input_fault`]: the slips, their names and severity; [`words`]: a finding in a sentence
 
 pub mod balance;
 pub mod diagnosis;
+pub mod input_fault;
 pub mod pressure;
-pub mod slip;
 pub mod watch;
 pub mod words;
 
@@ -21,7 +21,7 @@ use std::sync::Arc;
 use dynocar_shared::{RejectionReason, TrainSample};
 
 pub use diagnosis::Findings;
-pub use slip::{Finding, Severity, Slip};
+pub use input_fault::{Finding, InputFault, Severity};
 
 use crate::train::TrainModel;
 use watch::Watch;

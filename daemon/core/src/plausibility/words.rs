@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::slip::{Finding, Slip};
+use super::input_fault::{Finding, InputFault};
 use crate::units::{Dimension, Unit};
 
 impl Finding {
@@ -15,25 +15,26 @@ impl Finding {
     pub fn words_for(&self, (low, high): (f64, f64), read_as: &Unit) -> String {
         let size = size(low, high);
         let what = match self.slip {
-            Slip::TimeScale => format!("times look {size} by speed, position and forces"),
-            Slip::SpeedScale => {
+            InputFault::TimeScale => format!("times look {size} by speed, position and forces"),
+            InputFault::SpeedScale => {
                 format!("speeds look {size} by position or acceleration")
             }
-            Slip::PositionScale => format!("positions look {size} by the speed"),
-            Slip::DirectionReversed => {
+            InputFault::PositionScale => format!("positions look {size} by the speed"),
+            InputFault::DirectionReversed => {
                 return "the position runs against the stated direction: is the sign of direction \
                         right, and does the chainage grow the way it is taken to?"
                     .into();
             }
-            Slip::MassScale => format!("the mass looks {size}"),
-            Slip::ForcesSwapped => {
+            InputFault::MassScale => format!("the mass looks {size}"),
+            InputFault::ForcesSwapped => {
                 return "the train slows down under traction and speeds up under the brake: are \
                         traction and brake exchanged, or is the sign of control_force reversed?"
                     .into();
             }
-            Slip::ForcesScale => format!("forces look {size} for how the train accelerates"),
-            Slip::TractionScale | Slip::BrakeScale => {
-                let force = if self.slip == Slip::TractionScale { "traction" } else { "brake" };
+            InputFault::ForcesScale => format!("forces look {size} for how the train accelerates"),
+            InputFault::TractionScale | InputFault::BrakeScale => {
+                let force =
+                    if self.slip == InputFault::TractionScale { "traction" } else { "brake" };
                 if self.factor < 0.0 {
                     return format!(
                         "the {force} force acts against what it is for: is its sign or column \
@@ -42,13 +43,15 @@ impl Finding {
                 }
                 format!("the {force} force looks {size} for how the train accelerates")
             }
-            Slip::GradientSign => {
+            InputFault::GradientSign => {
                 return "the train speeds up where the gradient climbs: is the sign of the \
                         gradient or of direction right?"
                     .into();
             }
-            Slip::GradientScale => format!("gradients look {size} for how the train accelerates"),
-            Slip::PressureScale => {
+            InputFault::GradientScale => {
+                format!("gradients look {size} for how the train accelerates")
+            }
+            InputFault::PressureScale => {
                 format!("the brake-cylinder pressure looks {size} for a brake that is applied")
             }
         };

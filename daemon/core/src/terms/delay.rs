@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_stretch_forgets_the_forces_before_it() {
+    fn a_new_segment_forgets_the_forces_before_it() {
         let mut line = DelayLine::new(1.0, 0.5);
         acting(&mut line, |_| [9000.0, 0.0], 50);
         assert_eq!(line.acting(at(60.0, 2), Some([100.0, 20.0])), Some([100.0, 20.0]));

@@ -31,7 +31,7 @@ pub mod wind;
 pub use key::{Entry, Joined, Key};
 pub use parameter::Parameter;
 pub use resistance::Resistance;
-pub use suspect::{Least, Seen, Suspect};
+pub use suspect::{Least, Suspect, SuspectInput};
 
 /// Every number of a term that stands in `[corrections]` of `train.toml`.
 pub const CORRECTIONS: [&Key; 13] = [

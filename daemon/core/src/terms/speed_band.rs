@@ -6,7 +6,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Least, Seen, Suspect};
+use super::{Least, Suspect, SuspectInput};
 
 /// Speed in m/s from the middle of a band to those of its neighbours, where it ends.
 const WIDTH_MPS: f64 = 7.5;
@@ -18,7 +18,7 @@ fn share(band: usize, speed_mps: f64) -> f64 {
 }
 
 /// 1 N/kN in a band.
-const fn of(unit: fn(&Seen) -> f64) -> Suspect {
+const fn of(unit: fn(&SuspectInput) -> f64) -> Suspect {
     Suspect {
         effect: EffectKind::Unknown,
         prior_std: 1.0,

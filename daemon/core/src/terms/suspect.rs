@@ -15,7 +15,7 @@ pub enum Least {
 
 /// What is seen at a sample, forces in N/kN.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen {
+pub struct SuspectInput {
     /// Speed in m/s.
     pub speed_mps: f64,
     /// +1 while the chainage grows, -1 while it falls.
@@ -56,5 +56,5 @@ pub struct Suspect {
     /// True when it may be another after each stop.
     pub changes_at_stops: bool,
     /// The retarding force in N/kN of one unit.
-    pub unit: fn(&Seen) -> f64,
+    pub unit: fn(&SuspectInput) -> f64,
 }

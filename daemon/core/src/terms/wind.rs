@@ -3,7 +3,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Joined, Key, Least, Parameter, Resistance, Seen, Suspect};
+use super::{Joined, Key, Least, Parameter, Resistance, Suspect, SuspectInput};
 
 /// Headwind in m/s for the direction of growing chainage.
 pub const WIND_PLUS: Key = Key {
@@ -39,7 +39,7 @@ pub const SUSPECT: Suspect = Suspect {
 pub const OF_THE_DAY: Suspect = Suspect { unit: |seen| unit(seen, 1.0), ..SUSPECT };
 
 /// What 1 m/s along the line adds, in N/kN.
-fn unit(seen: &Seen, direction: f64) -> f64 {
+fn unit(seen: &SuspectInput, direction: f64) -> f64 {
     let blows = |wind_plus_mps: f64| {
         let mut air = Resistance::BASIC;
         super::tunnel::enter(seen.tunnel_share, &mut air);

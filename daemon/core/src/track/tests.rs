@@ -35,7 +35,7 @@ fn trains_the_other_way_round_may_have_a_gradient_of_their_own() {
 }
 
 #[test]
-fn the_gradients_error_averages_out_over_long_stretches_only() {
+fn the_gradients_error_averages_out_over_long_segments_only() {
     let gradient_std_permille = Some(StepProfile::new(&[(0.0, 0.8)]).unwrap());
     let survey = TrackSurvey { gradient_std_permille, ..Default::default() };
     let track = Track { survey, ..line() };

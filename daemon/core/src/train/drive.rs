@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_that_hardly_turns_tells_no_force() {
+    fn a_drive_that_hardly_turns_shows_no_force() {
         assert_eq!(DRIVE.force_n(110e3, 1.99), None);
         assert_eq!(DRIVE.force_n(110e3, f64::NAN), None);
         assert_eq!(DRIVE.force_n(f64::NAN, 10.0), None);

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 /// Shares of the capital that are bet; the winnings are averaged over them.
 const BETS: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 /// Capital beyond which counting on tells nothing more.
-const CAPITAL_MAX: f64 = 1e100;
+const E_VALUE_MAX: f64 = 1e100;
 /// What the confidence sequence may miss the truth by at any time: 95 %.
 const MISS: f64 = 0.05;
 /// The largest weight of a trip in the confidence sequence.
@@ -49,7 +49,8 @@ pub struct Evidence {
     /// Share of the error that the rival must take away to count as better.
     least_gain: f64,
     /// Capital by bet.
-    capital: [f64; BETS.len()],
+    #[serde(rename = "capital")]
+    e_value: [f64; BETS.len()],
     /// Trips that were compared.
     trips: u64,
     /// Of the confidence sequence: sums of the weights, of the weighted scores and of their spread.
@@ -66,7 +67,7 @@ impl Evidence {
     pub fn new(least_gain: f64) -> Self {
         Evidence {
             least_gain,
-            capital: [0.0; BETS.len()],
+            e_value: [0.0; BETS.len()],
             trips: 0,
             weights: 0.0,
             weighted: 0.0,
@@ -90,8 +91,8 @@ impl Evidence {
     pub fn take(&mut self, score: f64) {
         let asked = score_of_ratio(1.0 - self.least_gain);
         let won = (score - asked) / (1.0 + asked);
-        for (capital, bet) in self.capital.iter_mut().zip(BETS) {
-            *capital = ((*capital + 1.0) * (1.0 + bet * won)).min(CAPITAL_MAX);
+        for (e_value, bet) in self.e_value.iter_mut().zip(BETS) {
+            *e_value = ((*e_value + 1.0) * (1.0 + bet * won)).min(E_VALUE_MAX);
         }
         self.widen(score);
         self.trips += 1;
@@ -116,8 +117,8 @@ impl Evidence {
 
     /// What the gamblers hold together. While the rival is no better than asked for, it reaches M
     /// after no fewer than M trips on average.
-    pub fn capital(&self) -> f64 {
-        self.capital.iter().sum::<f64>() / BETS.len() as f64
+    pub fn e_value(&self) -> f64 {
+        self.e_value.iter().sum::<f64>() / BETS.len() as f64
     }
 
     /// The rival's error over that of the model in force in a typical trip: lower and upper end of
@@ -142,7 +143,7 @@ mod tests {
     use super::*;
 
     /// Trips whose scores lie around a mean, each anywhere within `spread` of it.
-    fn capital_reaches(
+    fn e_value_reaches(
         mean: f64,
         spread: f64,
         level: f64,
@@ -153,7 +154,7 @@ mod tests {
         let mut evidence = Evidence::new(0.1);
         (1..=trips).find(|_| {
             evidence.take((mean + spread * random.random_range(-1.0..1.0)).clamp(-1.0, 1.0));
-            evidence.capital() >= level
+            evidence.e_value() >= level
         })
     }
 
@@ -161,7 +162,7 @@ mod tests {
     fn a_rival_that_gains_no_more_than_asked_for_is_found_no_oftener_than_promised() {
         let (level, most) = (100.0, 100_000);
         let asked = score_of_ratio(0.9);
-        let found = |seed| capital_reaches(asked, 0.8, level, most, seed).unwrap_or(most);
+        let found = |seed| e_value_reaches(asked, 0.8, level, most, seed).unwrap_or(most);
         let mean = (0..400).map(found).sum::<usize>() as f64 / 400.0;
         assert!(mean >= level, "after {mean} trips on average");
     }
@@ -170,7 +171,7 @@ mod tests {
     fn a_rival_that_halves_the_error_is_found_within_some_fifty_trips() {
         let halved = score_of_ratio(0.5);
         for seed in 0..50 {
-            let found = capital_reaches(halved, 0.3, 200_000.0, 200, seed);
+            let found = e_value_reaches(halved, 0.3, 200_000.0, 200, seed);
             assert!(found.is_some_and(|trips| trips < 90), "{seed}: {found:?}");
         }
     }
@@ -181,10 +182,10 @@ mod tests {
         for _ in 0..2000 {
             evidence.take(score_of_ratio(2.0));
         }
-        assert!(evidence.capital() < 10.0);
+        assert!(evidence.e_value() < 10.0);
         let found = (1..100).find(|_| {
             evidence.take(score_of_ratio(0.5));
-            evidence.capital() >= 200_000.0
+            evidence.e_value() >= 200_000.0
         });
         assert!(found.is_some_and(|trips| trips < 60), "{found:?}");
     }

@@ -71,7 +71,7 @@ fn a_rival_that_is_right_wins_and_the_day_and_the_place_of_the_errors_are_known(
     assert_eq!(compared, 39, "the last trip goes on");
     let [wrong, right] = [&trials.in_force, &trials.rivals[0]];
     assert_eq!(right.evidence.trips(), 39);
-    assert!(right.evidence.capital() > 1e4, "{}", right.evidence.capital());
+    assert!(right.evidence.e_value() > 1e4, "{}", right.evidence.e_value());
     assert!(right.evidence.error_ratio().unwrap()[1] < 0.6);
     let error = |it: &Rival| it.ledger.all.rmse_mps().unwrap();
     assert!(error(wrong) > 0.1 && error(right) < 0.05, "{} {}", error(wrong), error(right));
@@ -140,7 +140,7 @@ fn after_a_change_the_comparison_begins_anew_with_the_roles_exchanged() {
             trials.take(&sample, 0.0);
         }
     }
-    assert!(trials.rivals[0].evidence.capital() < 6.0, "the old model is no better");
+    assert!(trials.rivals[0].evidence.e_value() < 6.0, "the old model is no better");
     assert!(trials.rivals[0].evidence.error_ratio().unwrap()[0] > 1.0);
 }
 

@@ -21,7 +21,7 @@ fn cruising(index: u64) -> TrainSample {
 }
 
 #[test]
-fn steady_motion_passes_in_one_stretch() {
+fn steady_motion_passes_in_one_segment() {
     let mut validator = validator();
     for index in 0..50 {
         let sample = cruising(index);
@@ -122,7 +122,7 @@ fn one_wrong_sequence_number_is_taken_back_when_the_count_goes_on_without_it() {
 }
 
 #[test]
-fn a_restarted_controller_starts_a_new_stretch_and_its_own_count() {
+fn a_restarted_controller_starts_a_new_segment_and_its_own_count() {
     let mut validator = validator();
     for index in 0..10 {
         validator.check(&cruising(index)).unwrap();
@@ -135,7 +135,7 @@ fn a_restarted_controller_starts_a_new_stretch_and_its_own_count() {
 }
 
 #[test]
-fn a_long_gap_starts_a_new_stretch() {
+fn a_long_gap_starts_a_new_segment() {
     let mut validator = validator();
     validator.check(&cruising(0)).unwrap();
     let mut late = cruising(50);

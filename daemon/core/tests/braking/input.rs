@@ -66,7 +66,7 @@ fn a_train_without_declared_gear_has_no_friction() {
 }
 
 #[test]
-fn a_train_that_does_not_brake_tells_nothing() {
+fn a_train_that_does_not_brake_shows_nothing() {
     for kind in KINDS {
         let run = Run { pressure_pa: |_| 0.0, ..WET };
         let snapshot = after(&mut pipeline(&default_of(kind)), &run.simulate(2));
@@ -117,7 +117,7 @@ fn an_estimate_that_is_too_uncertain_is_shown_but_does_not_count() {
 }
 
 #[test]
-fn a_gap_ends_the_braking_and_the_next_stretch_starts_anew() {
+fn a_gap_ends_the_braking_and_the_next_segment_starts_anew() {
     for kind in KINDS {
         let mut moments = WET.simulate(4);
         for (index, moment) in moments.iter_mut().enumerate() {
@@ -207,7 +207,7 @@ fn a_corrected_position_restarts_the_estimate_and_is_counted() {
 }
 
 #[test]
-fn sliding_wheels_tell_nothing_unless_the_position_is_independent_of_them() {
+fn sliding_wheels_show_nothing_unless_the_position_is_independent_of_them() {
     let mut moments = WET.simulate(8);
     for moment in &mut moments[50..] {
         moment.sample.flags |= FLAG_WHEEL_SLIDE;

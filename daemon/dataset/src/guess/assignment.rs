@@ -4,12 +4,12 @@ use std::cmp::Reverse;
 
 use super::columns::{Column, Columns};
 use super::facts::Facts;
-use super::guessed::{GuessResult, GuessedColumn, Told, Unmapped};
+use super::guessed::{GivenColumn, GuessResult, GuessedColumn, Unmapped};
 use super::matching::{Candidate, can_hold, consider, named_unit};
 use super::plausible::{UnitChoice, choose_unit};
 use super::problem::{GuessError, GuessProblem};
 use super::spelling::Spelled;
-use crate::{Place, Quantity};
+use crate::{Quantity, SourcePosition};
 
 /// What the columns are taken for.
 pub struct Assignment<'c> {
@@ -27,7 +27,7 @@ impl<'c> Assignment<'c> {
     /// # Errors
     ///
     /// Where what is told cannot be.
-    pub fn new(columns: &'c Columns, told: &[Told], label: &str) -> GuessResult<Self> {
+    pub fn new(columns: &'c Columns, told: &[GivenColumn], label: &str) -> GuessResult<Self> {
         let mut assignment = Assignment {
             columns: &columns.columns,
             taken: Vec::new(),
@@ -36,15 +36,15 @@ impl<'c> Assignment<'c> {
             refused: Vec::new(),
         };
         for it in told {
-            let problem = assignment.take_told(it, columns);
-            let place = || Place::line(label, columns.skip_rows + 1);
+            let problem = assignment.take_reported(it, columns);
+            let place = || SourcePosition::line(label, columns.skip_rows + 1);
             problem.map_err(|problem| GuessError::new(place(), problem))?;
         }
         for (index, column) in columns.columns.iter().enumerate() {
             if column.unusable.is_some() || assignment.is_taken(index) {
                 continue;
             }
-            for quantity in Quantity::ALL.into_iter().filter(|it| !told_of(told, *it)) {
+            for quantity in Quantity::ALL.into_iter().filter(|it| !reported_of(told, *it)) {
                 match consider(index, &column.name, &column.all, quantity) {
                     None => {}
                     Some(Ok(candidate)) => assignment.candidates.push(candidate),
@@ -56,7 +56,7 @@ impl<'c> Assignment<'c> {
         Ok(assignment)
     }
 
-    fn take_told(&mut self, told: &Told, columns: &Columns) -> Result<(), GuessProblem> {
+    fn take_reported(&mut self, told: &GivenColumn, columns: &Columns) -> Result<(), GuessProblem> {
         let (name, quantity) = (told.column.clone(), told.quantity);
         let index = self.columns.iter().position(|column| column.name.text == told.column.trim());
         let Some(index) = index else {
@@ -217,6 +217,6 @@ impl<'c> Assignment<'c> {
     }
 }
 
-fn told_of(told: &[Told], quantity: Quantity) -> bool {
+fn reported_of(told: &[GivenColumn], quantity: Quantity) -> bool {
     told.iter().any(|it| it.quantity == quantity)
 }

@@ -8,7 +8,7 @@ use super::layout::{Layout, layout};
 use super::name::Name;
 use super::problem::{GuessError, GuessProblem};
 use crate::lines::{below, line_of, reader};
-use crate::{Place, Problem};
+use crate::{Problem, SourcePosition};
 
 /// A column of the first file's header.
 #[derive(Clone, Debug)]
@@ -50,7 +50,7 @@ impl Columns {
         let layouts: Vec<Layout> =
             files.iter().map(|file| layout(file.label, file.text)).collect::<Result<_, _>>()?;
         let Some(first) = layouts.first() else {
-            return Err(Place::whole("no file").problem(Problem::NoHeader).into());
+            return Err(SourcePosition::whole("no file").problem(Problem::NoHeader).into());
         };
         let decimal = layouts.iter().find_map(|it| it.decimal).unwrap_or(b'.');
         for (file, other) in files.iter().zip(&layouts) {
@@ -134,7 +134,7 @@ fn require_alike(
         Some((what, found, expected)) => {
             let first = label.to_string();
             let problem = GuessProblem::OtherLayout { what, found, expected, first };
-            Err(GuessError::new(Place::whole(file.label), problem))
+            Err(GuessError::new(SourcePosition::whole(file.label), problem))
         }
     }
 }
@@ -153,7 +153,7 @@ fn read_file(file: &Recording, layout: &Layout, decimal: u8) -> GuessResult<(Vec
     loop {
         let has_row = reader.read_byte_record(&mut record).map_err(|error| {
             let message = error.to_string();
-            Place::whole(file.label).problem(Problem::Syntax { language: "CSV", message })
+            SourcePosition::whole(file.label).problem(Problem::Syntax { language: "CSV", message })
         })?;
         if !has_row {
             // Names and units are no rows of values.

@@ -1,10 +1,10 @@
 //! Units that the values alone did not tell, set right by how the train moves.
 
-use dynocar_core::plausibility::Slip;
+use dynocar_core::plausibility::InputFault;
 
 use super::guessed::Guess;
 use crate::finding_unit::{concerned, unit_of};
-use crate::{GradientSource, Remark, Run};
+use crate::{Diagnostic, GradientSource, Run};
 
 impl Guess {
     /// Changes the unit of one quantity whose unit no name gives, where the runs, read as guessed,
@@ -20,7 +20,7 @@ impl Guess {
     ) -> Option<String> {
         let of_run = |run: &'r Run| run.remarks.iter().map(move |remark| (run, remark));
         for (run, remark) in runs.into_iter().flat_map(of_run) {
-            let Remark::Slip { finding, read_as } = remark else { continue };
+            let Diagnostic::InputFault { finding, read_as } = remark else { continue };
             let is_measured = is_mass_known && run.gradient_source != GradientSource::Unknown;
             if needs_balance(finding.slip) && !is_measured {
                 continue;
@@ -52,6 +52,12 @@ impl Guess {
 }
 
 /// True for what the balance of forces tells.
-fn needs_balance(slip: Slip) -> bool {
-    matches!(slip, Slip::MassScale | Slip::ForcesScale | Slip::TractionScale | Slip::BrakeScale)
+fn needs_balance(slip: InputFault) -> bool {
+    matches!(
+        slip,
+        InputFault::MassScale
+            | InputFault::ForcesScale
+            | InputFault::TractionScale
+            | InputFault::BrakeScale
+    )
 }

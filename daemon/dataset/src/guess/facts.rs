@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn middle_top_and_step_are_told_of_columns_of_any_length() {
+    fn middle_top_and_step_are_reported_of_columns_of_any_length() {
         for count in [3_usize, 100, 50_000] {
             let seen = facts((0..count).map(|row| row as f64 * 0.5));
             let end = (count - 1) as f64 * 0.5;
@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn directions_and_signs_are_told() {
+    fn directions_and_signs_are_reported() {
         assert_eq!(facts([5.0, 4.0, 3.0]).direction(), -1);
         assert_eq!(facts([5.0, 4.0, 6.0]).direction(), 1);
         assert!(!facts([3.0, 2.0, 1.0]).grows() && !facts([1.0, 1.0]).grows());
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn without_numbers_nothing_is_told() {
+    fn without_numbers_nothing_is_reported() {
         let mut seen = facts([f64::NAN, f64::INFINITY]);
         seen.push_text(3, "a\tb");
         seen.push_text(4, "c");

@@ -18,7 +18,7 @@ pub struct Recording<'t> {
 
 /// What somebody says of a column.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Told {
+pub struct GivenColumn {
     /// What it holds.
     pub quantity: Quantity,
     /// Its name in the header.

@@ -7,7 +7,7 @@ use super::problem::{GuessError, GuessProblem};
 use super::spelling;
 use crate::cell::parse_cell;
 use crate::lines::{line_of, reader};
-use crate::{Place, Problem, TimeFormat};
+use crate::{Problem, SourcePosition, TimeFormat};
 
 /// What may separate cells, in the order of preference.
 const DELIMITERS: [u8; 4] = *b";\t|,";
@@ -61,7 +61,7 @@ pub fn layout(label: &str, text: &str) -> Result<Layout, GuessError> {
     });
     let [(.., rows), ..] = &readings;
     if rows.iter().all(|row| row.filled().next().is_none()) {
-        return Err(Place::whole(label).problem(Problem::NoHeader).into());
+        return Err(SourcePosition::whole(label).problem(Problem::NoHeader).into());
     }
     let best =
         readings.iter().max_by(|one, other| fit(one.1, &one.2).total_cmp(&fit(other.1, &other.2)));
@@ -69,11 +69,17 @@ pub fn layout(label: &str, text: &str) -> Result<Layout, GuessError> {
         best.filter(|(.., rows)| rows.iter().any(|row| row.cells.len() > 1))
     else {
         let found = Name::parse(&rows[0].cells.join(",")).shown();
-        return Err(GuessError::new(Place::line(label, 1), GuessProblem::OneColumn { found }));
+        return Err(GuessError::new(
+            SourcePosition::line(label, 1),
+            GuessProblem::OneColumn { found },
+        ));
     };
     let Some(block) = *block else {
         let (line, found) = (rows[0].line, rows[0].cells[0].trim().to_string());
-        return Err(GuessError::new(Place::line(label, line), GuessProblem::NoNames { found }));
+        return Err(GuessError::new(
+            SourcePosition::line(label, line),
+            GuessProblem::NoNames { found },
+        ));
     };
     let decimal = decimal(&rows[block.first_values().min(rows.len())..]);
     judge_header(label, rows, block)?;
@@ -201,12 +207,12 @@ fn decimal(rows: &[Row]) -> Option<u8> {
 fn judge_header(label: &str, rows: &[Row], block: Block) -> Result<(), GuessError> {
     let values = &rows[block.first_values().min(rows.len())..];
     if values.is_empty() {
-        return Err(Place::whole(label).problem(Problem::NoRows).into());
+        return Err(SourcePosition::whole(label).problem(Problem::NoRows).into());
     }
     let (header, usual) = (&rows[block.header], usual_width(values).unwrap_or(0));
     let found = header.cells.len();
     if found < usual {
-        let place = Place::line(label, header.line);
+        let place = SourcePosition::line(label, header.line);
         return Err(GuessError::new(place, GuessProblem::FewNames { found, usual }));
     }
     Ok(())
@@ -227,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn delimiter_and_decimal_mark_are_told_apart() {
+    fn delimiter_and_decimal_mark_are_distinguished() {
         assert_eq!(told("t,v\n0,1.5\n1,2.5\n"), (',', Some('.'), 2));
         assert_eq!(told("t;v\n0;1,5\n1;2,5\n"), (';', Some(','), 2));
         assert_eq!(told("t;v\n0,5;1,5\n1;2,5\n"), (';', Some(','), 2));

@@ -4,7 +4,7 @@ use super::facts::Facts;
 use super::name::Name;
 use super::plausible::{UnitChoice, choose_unit};
 use super::spelling::{self, Spelled};
-use super::vocabulary::{ABOUT, NEUTRAL, NOT_MEASURED, OTHER_THINGS, Strength, terms};
+use super::vocabulary::{ABOUT, NEUTRAL, NOT_MEASURED, OTHER_THINGS, TermWeight, terms};
 use crate::{Choices, Quantity};
 
 /// What a name is worth that says the quantity and nothing else.
@@ -157,18 +157,18 @@ fn readings(name: &Name, quantity: Quantity) -> Vec<(&[String], Option<Spelled>)
 fn by_words(words: &[String], quantity: Quantity) -> Option<(i32, String)> {
     let own = quantity.name().replace('_', " ");
     let is_listed = terms(quantity).any(|(_, term)| term == own);
-    let score = |(strength, term): (Strength, &str)| {
+    let score = |(strength, term): (TermWeight, &str)| {
         let score = by_term(words, strength, term)?;
         Some((score, format!("'{term}' in the name")))
     };
-    let by_own = Some((Strength::Named, own.as_str())).filter(|_| !is_listed).and_then(score);
+    let by_own = Some((TermWeight::Named, own.as_str())).filter(|_| !is_listed).and_then(score);
     let matches = by_own.into_iter().chain(terms(quantity).filter_map(score));
     let best = matches.max_by_key(|(score, _)| *score);
     best.or_else(|| by_likeness(words, quantity))
 }
 
 /// What a name is worth that holds a term.
-fn by_term(words: &[String], strength: Strength, term: &str) -> Option<i32> {
+fn by_term(words: &[String], strength: TermWeight, term: &str) -> Option<i32> {
     let wanted: Vec<&str> = term.split(' ').collect();
     let is_wanted = |word: &String| wanted.contains(&word.as_str());
     let joined = wanted.concat();
@@ -190,18 +190,18 @@ fn by_term(words: &[String], strength: Strength, term: &str) -> Option<i32> {
     let neutral = extras.iter().filter(|word| is_neutral(word)).count() as i32;
     let unknown = extras.len() as i32 - neutral;
     let base = match strength {
-        Strength::Named => SAID - 20 * unknown,
-        Strength::Alone if unknown == 0 => 80,
-        Strength::Symbol if unknown == 0 => 60,
-        Strength::Weak if unknown == 0 => 50,
+        TermWeight::Named => SAID - 20 * unknown,
+        TermWeight::Alone if unknown == 0 => 80,
+        TermWeight::Symbol if unknown == 0 => 60,
+        TermWeight::Weak if unknown == 0 => 50,
         _ => return None,
     };
     Some(base + wanted.len() as i32 - 2 * neutral)
 }
 
 /// A term within a longer word, as words are joined in German.
-fn within(words: &[String], strength: Strength, joined: &str) -> Option<i32> {
-    let is_long = strength == Strength::Named && joined.len() >= WITHIN_MIN;
+fn within(words: &[String], strength: TermWeight, joined: &str) -> Option<i32> {
+    let is_long = strength == TermWeight::Named && joined.len() >= WITHIN_MIN;
     let holds = |word: &String| word.len() > joined.len() && word.contains(joined);
     (is_long && words.iter().any(holds)).then(|| 70 - 10 * (words.len() as i32 - 1))
 }
@@ -217,7 +217,7 @@ fn by_likeness(words: &[String], quantity: Quantity) -> Option<(i32, String)> {
         return None;
     }
     let named = |it: Quantity| {
-        let listed = terms(it).filter(|(strength, _)| *strength == Strength::Named);
+        let listed = terms(it).filter(|(strength, _)| *strength == TermWeight::Named);
         let listed = listed.map(|(_, term)| term);
         let own = std::iter::once(it.name());
         own.chain(listed)

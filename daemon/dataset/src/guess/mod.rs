@@ -31,11 +31,11 @@ mod vocabulary;
 #[cfg(test)]
 mod tests;
 
-pub use guessed::{Guess, GuessedColumn, GuessedRun, Recording, Told, Unmapped};
+pub use guessed::{GivenColumn, Guess, GuessedColumn, GuessedRun, Recording, Unmapped};
 pub use name::Name;
 pub use problem::{GuessError, GuessProblem};
 
-use super::{Place, Quantity};
+use super::{Quantity, SourcePosition};
 
 /// Guesses the description of recordings that are laid out alike, and takes what is told for
 /// granted.
@@ -44,7 +44,7 @@ use super::{Place, Quantity};
 ///
 /// Where a file is none that a dataset can have, or holds no time or no speed that can be
 /// recognised; with file, line and what was expected.
-pub fn guess(files: &[Recording], told: &[Told]) -> Result<Guess, GuessError> {
+pub fn guess(files: &[Recording], told: &[GivenColumn]) -> Result<Guess, GuessError> {
     let read = columns::Columns::read(files)?;
     let label = files.first().map_or("", |file| file.label);
     let mut assignment = assignment::Assignment::new(&read, told, label)?;
@@ -53,7 +53,7 @@ pub fn guess(files: &[Recording], told: &[Told]) -> Result<Guess, GuessError> {
         if !assignment.has(quantity) {
             let (reasons, columns) = (assignment.near(quantity), read.names());
             let problem = GuessProblem::Missing { quantity, reasons, columns };
-            return Err(GuessError::new(Place::line(label, read.skip_rows + 1), problem));
+            return Err(GuessError::new(SourcePosition::line(label, read.skip_rows + 1), problem));
         }
     }
     let (columns, unmapped) = assignment.finish();

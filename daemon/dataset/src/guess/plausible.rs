@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn time_is_told_by_its_step_and_temperature_by_its_middle() {
+    fn time_is_reported_by_its_step_and_temperature_by_its_middle() {
         let time = |step: f64| {
             let mut facts = Facts::new();
             (0..500).for_each(|row| facts.push(1.7e9 + f64::from(row) * step));

@@ -1,13 +1,13 @@
 //! Why nothing can be guessed of a recording.
 
-use crate::{DatasetError, Place, Problem, Quantity};
+use crate::{DatasetError, Problem, Quantity, SourcePosition};
 
 /// Why nothing can be guessed of a recording, and where.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{place}: {problem}")]
 pub struct GuessError {
     /// File and line.
-    pub place: Place,
+    pub place: SourcePosition,
     /// What is wrong there.
     pub problem: Box<GuessProblem>,
 }
@@ -95,7 +95,7 @@ fn because(reasons: &[String]) -> String {
 
 impl GuessError {
     /// A problem at a place.
-    pub fn new(place: Place, problem: GuessProblem) -> Self {
+    pub fn new(place: SourcePosition, problem: GuessProblem) -> Self {
         GuessError { place, problem: Box::new(problem) }
     }
 }

@@ -172,7 +172,7 @@ fn what_was_wanted_and_other_things_are_not_taken_for_what_was_measured() {
 }
 
 #[test]
-fn of_two_columns_that_say_the_same_one_is_taken_and_the_other_told() {
+fn of_two_columns_that_say_the_same_one_is_taken_and_the_other_reported() {
     let text = file("t,speed_kmh,speed_gps_kmh", |row| {
         let speed = format!("{}", row[2] * 3.6);
         vec![row[0].to_string(), speed.clone(), speed]
@@ -222,7 +222,7 @@ fn a_negative_brake_force_is_turned() {
 }
 
 #[test]
-fn a_signed_force_beside_single_ones_and_handles_beside_forces_are_left_out() {
+fn a_signed_force_next_to_single_ones_and_handles_next_to_forces_are_left_out() {
     let text = file("t,v,traction_kN,brake_kN,force_kN,throttle", |row| {
         let (traction, brake) = (row[3] / 1e3, row[4] / 1e3);
         let cells = [row[0], row[2], traction, brake, traction - brake, traction / 300.0];
@@ -289,15 +289,15 @@ fn what_lacks_time_or_speed_is_refused_with_what_comes_near() {
 }
 
 #[test]
-fn what_is_told_is_taken_for_granted() {
+fn what_is_reported_is_taken_for_granted() {
     let text = file("A,B,v", |row| [row[0], row[2] * 3.6, 7.0].map(|it| it.to_string()).to_vec());
     let kmh = dynocar_core::units::Unit::find(Speed.dimension(), "km/h");
-    let told = |quantity, column: &str, unit| Told { quantity, column: column.into(), unit };
+    let told = |quantity, column: &str, unit| GivenColumn { quantity, column: column.into(), unit };
     let files = [Recording { label: "a.csv", text: &text }];
     let all = [told(Time, "A", None), told(Speed, "B", kmh)];
     let guessed = guess(&files, &all).unwrap();
     assert_eq!(mapped(&guessed), [(Time, "A", "s", 1.0), (Speed, "B", "km/h", 1.0)]);
-    let refused = |told: Told| guess(&files, &[told]).unwrap_err().to_string();
+    let refused = |told: GivenColumn| guess(&files, &[told]).unwrap_err().to_string();
     let message = refused(told(Time, "C", None));
     assert_eq!(message, "a.csv:1: no column 'C' for time; the columns: 'A', 'B', 'v'");
     let message = refused(told(Time, "v", None));

@@ -4,7 +4,7 @@ use crate::Quantity;
 
 /// How far a term can be trusted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Strength {
+pub enum TermWeight {
     /// Says the quantity among other words too.
     Named,
     /// Says it where nothing else of weight is said: `brake` may go on as `brake disc wear`.
@@ -17,9 +17,9 @@ pub enum Strength {
 
 /// What quantities are called: what the terms are worth, and the terms, separated by commas. The
 /// name of a quantity comes on top.
-const TERMS: &[(Quantity, Strength, &str)] = {
+const TERMS: &[(Quantity, TermWeight, &str)] = {
     use Quantity::*;
-    use Strength::{Alone, Named, Symbol, Weak};
+    use TermWeight::{Alone, Named, Symbol, Weak};
     &[
         (
             Time,
@@ -192,7 +192,7 @@ const TERMS: &[(Quantity, Strength, &str)] = {
 };
 
 /// What a quantity is called besides its name, and what each term is worth.
-pub fn terms(quantity: Quantity) -> impl Iterator<Item = (Strength, &'static str)> {
+pub fn terms(quantity: Quantity) -> impl Iterator<Item = (TermWeight, &'static str)> {
     let own = TERMS.iter().filter(move |(of, ..)| *of == quantity);
     own.flat_map(|&(_, strength, list)| list.split(", ").map(move |term| (strength, term)))
 }

@@ -38,7 +38,8 @@ fn every_key_is_read() {
     assert_eq!(manifest.position_reference, PositionReference::Head);
     assert_eq!((manifest.layout.delimiter, manifest.layout.decimal), (b';', b','));
     assert_eq!(manifest.train_file.path, "train.toml");
-    let track = FileEntry { path: "track.toml".into(), place: Place::line("dataset.toml", 10) };
+    let track =
+        FileEntry { path: "track.toml".into(), place: SourcePosition::line("dataset.toml", 10) };
     assert_eq!(manifest.track_file, Some(track));
     let time = manifest.mapping(Quantity::Time).unwrap();
     assert_eq!((time.column.as_str(), time.convert(200.0)), ("t", 0.2));

@@ -87,7 +87,7 @@ fn a_cell_that_is_no_number_is_named_with_line_and_column() {
 }
 
 #[test]
-fn decimal_commas_without_quotes_are_told_apart_from_delimiters() {
+fn decimal_commas_without_quotes_are_distinguished_from_delimiters() {
     let message = table("", "t,v\n0,\"1,5\"\n").unwrap_err();
     assert!(message.ends_with("for decimal commas set decimal = \",\" in [dataset]"), "{message}");
     let message = table("decimal = \",\"", "t,v\n0,1,5\n").unwrap_err();

@@ -15,7 +15,7 @@ fn a_run_without_any_speed_or_with_one_time_only_is_refused() {
 }
 
 #[test]
-fn what_a_run_lacks_altogether_is_remarked_on() {
+fn what_a_run_lacks_altogether_is_diagnosed() {
     let remarks = |csv: &str| {
         let mapped = [("control_force", "F", "kN")];
         let run = Example::new(&mapped, csv).run();

@@ -35,7 +35,7 @@ impl Log {
     }
 
     /// Tells the simulator why a call was refused.
-    pub(super) fn tell(&self, words: &str) {
+    pub(super) fn report(&self, words: &str) {
         let Some(logger) = self.logger else { return };
         // The message is a format, where these signs have a meaning of their own.
         let words = words.replace('%', "%%").replace('#', "##").replace('\0', " ");
@@ -75,14 +75,14 @@ pub(super) unsafe fn call(
     match catch_unwind(AssertUnwindSafe(|| work(model))) {
         Ok(Ok(())) => Status::Ok,
         Ok(Err(refusal)) => {
-            log.tell(&refusal.to_string());
+            log.report(&refusal.to_string());
             Status::Error
         }
         Err(payload) => {
             // Dropping a foreign payload may panic once more; leaking it cannot.
             std::mem::forget(payload);
             model.break_off();
-            log.tell(FAULT);
+            log.report(FAULT);
             Status::Error
         }
     }

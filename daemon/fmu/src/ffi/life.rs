@@ -47,14 +47,14 @@ pub unsafe extern "C" fn fmi2Instantiate(
         let log = Log::new(name.unwrap_or(c"dynocar"), &callbacks);
         let guid = guid.unwrap_or_default().to_string_lossy();
         if kind != CO_SIMULATION {
-            log.tell("this FMU is for co-simulation only");
+            log.report("this FMU is for co-simulation only");
             None
         } else if let Some(interface) = INTERFACES.into_iter().find(|it| it.guid == guid) {
             let resources = resources.unwrap_or_default().to_string_lossy().into_owned();
             Some(Instance::hand_out(Model::new(interface, resources), log))
         } else {
             let [one, other] = INTERFACES.map(|it| it.guid);
-            log.tell(&format!(
+            log.report(&format!(
                 "modelDescription.xml is of {guid}, the library of {one} and {other}"
             ));
             None

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use dynocar_dataset::Place;
+use dynocar_dataset::SourcePosition;
 use dynocar_shared::Quantity;
 use serde::Serialize;
 
@@ -25,7 +25,7 @@ pub fn read(path: &Path) -> Result<DaemonConfig, Failure> {
             pipeline.estimator.build(&train.model).map_err(|error| {
                 let label = path.display().to_string();
                 let words = format!("{label}: pipelines.{}.settings.{error}", pipeline.name);
-                Failure::At(Place::whole(&label), words)
+                Failure::At(SourcePosition::whole(&label), words)
             })?;
         }
     }

@@ -12,7 +12,7 @@ pub use understood::Understood;
 use std::path::Path;
 
 use dynocar::cli::check::{self as daemon_check, CheckArguments, or_refused};
-use dynocar_analysis::dataset::{Place, parse_track, parse_train, top_keys};
+use dynocar_analysis::dataset::{SourcePosition, parse_track, parse_train, top_keys};
 use serde::Serialize;
 
 use dynocar::cli::Failure;
@@ -64,7 +64,7 @@ pub fn understand(path: &Path) -> Result<Understood, Failure> {
         return read_dataset(path);
     }
     let label = path.display().to_string();
-    let refuse = |message| Err(Failure::At(Place::whole(&label), message));
+    let refuse = |message| Err(Failure::At(SourcePosition::whole(&label), message));
     let text = read_text(path).map_err(|problem| file_error(&label, problem))?;
     if path.extension().is_none_or(|extension| extension != "toml") {
         return refuse(format!("{label}: not a TOML file; {EXPECTED}"));
@@ -95,7 +95,7 @@ fn found(keys: &[String]) -> String {
 fn read_dataset(path: &Path) -> Result<Understood, Failure> {
     let (folder, head) = dataset::open(path).map_err(|error| match error {
         LoadError::NotADataset { .. } => {
-            let place = Place::whole(&path.display().to_string());
+            let place = SourcePosition::whole(&path.display().to_string());
             Failure::At(place, format!("{error}; {EXPECTED}"))
         }
         other => other.into(),

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
-use dynocar_analysis::dataset::{Dataset, DatasetFiles, Place, Role};
-use dynocar_analysis::explain::answer::{Answer, RunnerUp};
+use dynocar_analysis::dataset::{Dataset, DatasetFiles, Role, SourcePosition};
+use dynocar_analysis::explain::answer::{ExplainAnswer, RunnerUp};
 use dynocar_analysis::explain::evidence::RunDataError;
 use dynocar_analysis::explain::judged::Metric;
 use dynocar_analysis::explain::report::timeline::Timeline;
@@ -18,13 +18,14 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::text::{for_shell, notes};
 use super::threads::Threads;
 use crate::annotation::{AnnotationError, annotate};
-use crate::grown::{GROWN_FILES, GROWN_MARK, GrownError, GrownFiles, write_grown};
 use crate::report;
 use crate::report::provenance::{Provenance, own_command_line};
+use crate::updated::{UPDATED_FILES, UPDATED_MARK, UpdatedFiles, UpdatedModelError, write_updated};
 use dynocar::cli::Failure;
 use dynocar::dataset::{self, DatasetFolder};
 use dynocar::output::{
-    OutputError, give, require_file, require_folder, require_new, tell, write_file, write_in_folder,
+    OutputError, give, report_line, require_file, require_folder, require_new, write_file,
+    write_in_folder,
 };
 
 /// First line of a file with predictions.
@@ -90,18 +91,18 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
     }
     if let Some(folder) = &arguments.grown {
         if explanation.answer.impossibilities().next().is_none() {
-            tell_grown(&grow(folder, path, &explanation)?);
+            report_updated(&grow(folder, path, &explanation)?);
             let again = if arguments.traction_only { " --traction-only" } else { "" };
             let folder = for_shell(&folder.display().to_string());
-            tell(&format!("what is left with it: dynocar explain {folder}{again}"));
+            report_line(&format!("what is left with it: dynocar explain {folder}{again}"));
         } else {
-            tell(IMPOSSIBLE);
+            report_line(IMPOSSIBLE);
         }
     }
     if let Some(file) = &arguments.report {
         let page = page(path, &dataset, &explanation, own_command_line())?;
         write_file(file, &page)?;
-        tell(&format!("report: {}", file.display()));
+        report_line(&format!("report: {}", file.display()));
     }
     if let Some(folder) = &arguments.plots {
         write_plots(folder, &dataset, &explanation)?;
@@ -170,7 +171,7 @@ fn unusable(path: &Path, dataset: &Dataset, error: RunDataError) -> Failure {
     let RunDataError::Simulate { file, source } = error;
     let label = DatasetFolder::at(path).map_or(file.clone(), |folder| folder.label(&file));
     let notes: String = dataset.notes().iter().map(|note| format!("; {note}")).collect();
-    Failure::At(Place::whole(&label), format!("{label}: {source}{notes}"))
+    Failure::At(SourcePosition::whole(&label), format!("{label}: {source}{notes}"))
 }
 
 /// Writes the grown model of the dataset at a path into a folder.
@@ -178,13 +179,17 @@ fn unusable(path: &Path, dataset: &Dataset, error: RunDataError) -> Failure {
 /// # Errors
 ///
 /// When the data cannot be true, or a file cannot be written or would take the place of another.
-pub fn grow(folder: &Path, path: &Path, explanation: &Explanation) -> Result<GrownFiles, Failure> {
+pub fn grow(
+    folder: &Path,
+    path: &Path,
+    explanation: &Explanation,
+) -> Result<UpdatedFiles, Failure> {
     require_growable(folder)?;
     if explanation.answer.impossibilities().next().is_some() {
         return Err(Failure::Work(IMPOSSIBLE.into()));
     }
-    write_grown(path, explanation, folder).map_err(|error| match error {
-        GrownError::Output(error) => error.into(),
+    write_updated(path, explanation, folder).map_err(|error| match error {
+        UpdatedModelError::Output(error) => error.into(),
         error => Failure::Work(error.to_string()),
     })
 }
@@ -192,16 +197,16 @@ pub fn grow(folder: &Path, path: &Path, explanation: &Explanation) -> Result<Gro
 /// Refuses a folder in which the files of a grown model would take the place of others.
 fn require_growable(folder: &Path) -> Result<(), OutputError> {
     require_folder(folder)?;
-    GROWN_FILES.iter().try_for_each(|name| require_replaceable(&folder.join(name), GROWN_MARK))
+    UPDATED_FILES.iter().try_for_each(|name| require_replaceable(&folder.join(name), UPDATED_MARK))
 }
 
-fn tell_grown(grown: &GrownFiles) {
+fn report_updated(grown: &UpdatedFiles) {
     for file in &grown.files {
-        tell(&format!("grown model: {}", file.display()));
+        report_line(&format!("grown model: {}", file.display()));
     }
     if !grown.not_expressed.is_empty() {
         let kinds = grown.not_expressed.join(", ");
-        tell(&format!("the files cannot express {kinds}: use the answer of --json for it"));
+        report_line(&format!("the files cannot express {kinds}: use the answer of --json for it"));
     }
 }
 
@@ -236,7 +241,7 @@ fn write_plots(folder: &Path, dataset: &Dataset, explanation: &Explanation) -> R
         .map_err(|error| Failure::Work(error.to_string()))?;
     for image in images {
         let path = write_in_folder(folder, &image.name, &image.svg)?;
-        tell(&format!("plot: {}", path.display()));
+        report_line(&format!("plot: {}", path.display()));
     }
     Ok(())
 }
@@ -275,7 +280,7 @@ fn write_predictions(
 }
 
 /// The answer for people.
-pub fn text(answer: &Answer) -> String {
+pub fn text(answer: &ExplainAnswer) -> String {
     let mut text = notes(&answer.notes) + &format!("{}\n", answer.statement);
     if let Some(experiment) = &answer.experiment {
         text += &format!("To settle it: {experiment}\n");

@@ -11,7 +11,7 @@ use crate::fmu::{FmuError, INPUTS_MARK, archive, find_library, inputs, read_libr
 use dynocar::cli::Failure;
 use dynocar::dataset;
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
-use dynocar::output::{require_file, require_folder, tell, write_file, write_in_folder};
+use dynocar::output::{report_line, require_file, require_folder, write_file, write_in_folder};
 
 /// Write the estimators, or the train itself, as an FMU for a simulator.
 ///
@@ -54,7 +54,7 @@ pub fn execute(arguments: &FmuArguments) -> Result<(), Failure> {
     require_file(&arguments.out, "PK")?;
     arguments.inputs.as_deref().map_or(Ok(()), require_folder)?;
     let files = match (&arguments.grown, &arguments.dataset) {
-        (Some(grown), _) => files_of_grown(grown)?,
+        (Some(grown), _) => files_of_updated(grown)?,
         (None, Some(dataset)) => files_of_dataset(dataset)?,
         (None, None) => named_files(arguments.train.as_deref(), arguments.track.as_deref())?,
     };
@@ -68,7 +68,7 @@ pub fn execute(arguments: &FmuArguments) -> Result<(), Failure> {
         write_inputs(dataset, folder)?;
     }
     write_file(&arguments.out, &fmu)?;
-    tell(&format!("FMU: {}", arguments.out.display()));
+    report_line(&format!("FMU: {}", arguments.out.display()));
     Ok(())
 }
 
@@ -103,7 +103,7 @@ fn named_files(
 }
 
 /// The texts of a grown train and, where it is known, its line.
-fn files_of_grown(folder: &Path) -> Result<Vec<(ModelFile, String)>, Failure> {
+fn files_of_updated(folder: &Path) -> Result<Vec<(ModelFile, String)>, Failure> {
     let [train, track] = [TRAIN_FILE, TRACK_FILE].map(|name| folder.join(name));
     named_files(Some(&train), track.exists().then_some(&*track))
 }
@@ -133,6 +133,6 @@ fn write_inputs(path: &Path, folder: &Path) -> Result<(), Failure> {
     for (run, name) in dataset.runs.iter().zip(&names) {
         write_in_folder(folder, name, &inputs(run))?;
     }
-    tell(&format!("inputs: {} runs in {}", dataset.runs.len(), folder.display()));
+    report_line(&format!("inputs: {} runs in {}", dataset.runs.len(), folder.display()));
     Ok(())
 }

@@ -89,7 +89,7 @@ pub struct Question<'a> {
 
 /// What was learned.
 #[derive(Debug, Serialize)]
-pub struct Answer {
+pub struct IdentifyAnswer {
     dataset: String,
     /// The unit in which the runs hold the speed.
     #[serde(skip)]
@@ -130,7 +130,7 @@ pub fn execute(arguments: &IdentifyArguments) -> Result<(), Failure> {
 /// # Errors
 ///
 /// A wrong dataset or estimator name is an input failure.
-pub fn answer(question: Question) -> Result<Answer, Failure> {
+pub fn answer(question: Question) -> Result<IdentifyAnswer, Failure> {
     let named = match question.asked {
         Asked::Named(names) => Some(named_estimators(names)?),
         Asked::All => Some(default_estimators()),
@@ -146,7 +146,7 @@ pub fn answer(question: Question) -> Result<Answer, Failure> {
     let learned = learned(&dataset, &all, (&estimators, speed_unit))?;
     let by_run = || by_run(&dataset, (&estimators, speed_unit));
     let runs = if question.per_run { Some(by_run()?) } else { None };
-    Ok(Answer {
+    Ok(IdentifyAnswer {
         dataset: dataset.name.clone(),
         speed_unit,
         notes: dataset.notes(),
@@ -210,7 +210,7 @@ fn others(estimators: &[EstimatorSettings]) -> Vec<&'static str> {
 }
 
 /// The answer for people.
-pub fn text(answer: &Answer) -> String {
+pub fn text(answer: &IdentifyAnswer) -> String {
     let mut text = format!("{}\n{}", answer.dataset, notes(&answer.notes));
     for it in &answer.estimators {
         let reason = if it.reason == "none" { String::new() } else { format!(", {}", it.reason) };

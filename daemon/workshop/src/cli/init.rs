@@ -14,7 +14,7 @@ use std::path::Path;
 
 use dynocar_analysis::dataset::guess::{Guess, GuessError, GuessProblem, Recording, guess};
 use dynocar_analysis::dataset::note::notes;
-use dynocar_analysis::dataset::{MANIFEST_FILE, Place, Quantity};
+use dynocar_analysis::dataset::{MANIFEST_FILE, Quantity, SourcePosition};
 use toml::Value;
 
 use super::train_text::{Found, TRAIN_FILE, TrainText};
@@ -126,5 +126,5 @@ fn failure(error: GuessError) -> Failure {
         ),
         _ => error.to_string(),
     };
-    Failure::At(Place { file: error.place.file, line: error.place.line }, message)
+    Failure::At(SourcePosition { file: error.place.file, line: error.place.line }, message)
 }

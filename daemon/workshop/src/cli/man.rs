@@ -6,7 +6,7 @@ use clap::{Args, Command};
 use clap_mangen::Man;
 
 use dynocar::cli::Failure;
-use dynocar::output::{require_folder, tell, write_in_folder};
+use dynocar::output::{report_line, require_folder, write_in_folder};
 
 /// Write the manual pages, one for every command.
 #[derive(Debug, Args)]
@@ -27,7 +27,7 @@ pub fn execute(arguments: &ManArguments, commands: Command) -> Result<(), Failur
     for (name, page) in &pages {
         write_in_folder(&arguments.out, name, page)?;
     }
-    tell(&format!("manual: {} pages in {}", pages.len(), arguments.out.display()));
+    report_line(&format!("manual: {} pages in {}", pages.len(), arguments.out.display()));
     Ok(())
 }
 

@@ -53,7 +53,7 @@ fn share(text: &str) -> Result<f64, String> {
 }
 
 #[derive(Debug, Serialize)]
-struct Answer {
+struct StopsAnswer {
     dataset: String,
     /// What may spoil the results, the worst first.
     notes: Vec<Note>,
@@ -93,11 +93,11 @@ pub fn execute(arguments: &StopsArguments) -> Result<(), Failure> {
         };
         return Err(Failure::Input(why));
     }
-    let answer = Answer { dataset: dataset.name.clone(), notes: dataset.notes(), study };
+    let answer = StopsAnswer { dataset: dataset.name.clone(), notes: dataset.notes(), study };
     Ok(give(arguments.json.as_deref(), &answer, || text(&answer))?)
 }
 
-fn text(answer: &Answer) -> String {
+fn text(answer: &StopsAnswer) -> String {
     let study = &answer.study;
     let mut text = format!("{}\n{}\n{}", answer.dataset, notes(&answer.notes), stops(&study.stops));
     text += &modulated(&study.stops);

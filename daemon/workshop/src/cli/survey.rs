@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use super::threads::Threads;
 use crate::report::provenance::{Provenance, own_command_line};
-use crate::survey::answer::Answer;
+use crate::survey::answer::SurveyAnswer;
 use crate::survey::{SurveyFailure, page, survey_folder};
 use clap::Args;
 use dynocar::cli::Failure;
-use dynocar::output::{give, require_file, require_folder, tell, write_file};
+use dynocar::output::{give, report_line, require_file, require_folder, write_file};
 
 /// Survey a line from recordings with GNSS: trips, chainage, stops, gradient.
 #[derive(Debug, Args)]
@@ -44,14 +44,14 @@ pub fn execute(arguments: &SurveyArguments) -> Result<(), Failure> {
     let (source, line) = (&arguments.dataset, arguments.line.as_deref());
     let work = || survey_folder(source, line, &arguments.out);
     let made = arguments.threads.work(work)?.map_err(failure)?;
-    tell(&format!("dataset: {} files in {}", made.files.len(), arguments.out.display()));
+    report_line(&format!("dataset: {} files in {}", made.files.len(), arguments.out.display()));
     if let Some(file) = &arguments.report {
         let provenance = Provenance::of(source, own_command_line())
             .map_err(|error| Failure::Input(error.to_string()))?;
         let page = page::html(&made.raw, &made.survey, &made.answer, &provenance)
             .map_err(|error| Failure::Work(format!("{}: {error}", file.display())))?;
         write_file(file, &page)?;
-        tell(&format!("report: {}", file.display()));
+        report_line(&format!("report: {}", file.display()));
     }
     Ok(give(arguments.json.as_deref(), &made.answer, || summary(&made.answer))?)
 }
@@ -64,7 +64,7 @@ fn failure(failure: SurveyFailure) -> Failure {
     }
 }
 
-fn summary(answer: &Answer) -> String {
+fn summary(answer: &SurveyAnswer) -> String {
     let mut text = format!(
         "line of {:.1} m, {} stops, {} trips, {} parts not used\n",
         answer.line.length_m,

@@ -8,13 +8,13 @@ use tracing::{info, warn};
 
 use super::error::LearnError;
 use super::finding::{
-    event, found_effect, improvement, is_event, is_to_be_told, question, sentence,
+    event, found_effect, improvement, is_event, is_to_be_reported, question, sentence,
 };
 use super::memory::{Memory, OpenQuestion};
 use super::pool::Pool;
-use crate::grown::{GrownTexts, grown_texts};
 use crate::report;
 use crate::report::provenance::{FileDigest, Provenance, hex};
+use crate::updated::{UpdatedTexts, updated_texts};
 use dynocar::models::event::EventWindow;
 use dynocar::models::origin::SourceFile;
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
@@ -84,11 +84,11 @@ impl Conclusion<'_> {
         }
         let labels = (TRAIN_FILE, TRACK_FILE);
         let declared = (&text.train[..], text.track.as_deref());
-        let grown = grown_texts(explanation, declared, labels, &format!("model {in_force}"))
+        let grown = updated_texts(explanation, declared, labels, &format!("model {in_force}"))
             .map_err(|error| LearnError::Report(error.to_string()))?;
         for effect in answer.effects.iter().filter(|it| is_event(it, &grown.not_expressed)) {
             let event = event(effect, pool, explanation, (in_force, now));
-            if is_to_be_told(&event, explanation) {
+            if is_to_be_reported(&event, explanation) {
                 explained.events.extend(put_event(models, event)?);
             }
         }
@@ -115,7 +115,7 @@ impl Conclusion<'_> {
 
     /// The model that an explanation makes; `None` where no effect of the train or the line was found, or
     /// the runs held out are not predicted better.
-    fn candidate(&self, grown: GrownTexts) -> Result<Option<NewModel>, LearnError> {
+    fn candidate(&self, grown: UpdatedTexts) -> Result<Option<NewModel>, LearnError> {
         let &Conclusion { models, in_force, pool, explanation, now, .. } = self;
         let answer = &explanation.answer;
         let is_held = |kind: &str| !grown.not_expressed.iter().any(|it| it == kind);

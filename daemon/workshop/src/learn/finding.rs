@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::Explanation;
-use dynocar_analysis::explain::answer::{Answer, EffectAnswer, ParameterValue, Verdict};
+use dynocar_analysis::explain::answer::{EffectAnswer, ExplainAnswer, ParameterValue, Verdict};
 use dynocar_shared::TrainId;
 
 use super::memory::OpenQuestion;
@@ -73,14 +73,14 @@ pub fn is_event(effect: &EffectAnswer, not_expressed: &[String]) -> bool {
 
 /// True for an event that is told at once or is over: other kinds that act in the newest of the fit runs
 /// may be about to last, and are looked at again when there are newer ones.
-pub fn is_to_be_told(event: &MaintenanceEvent, explanation: &Explanation) -> bool {
+pub fn is_to_be_reported(event: &MaintenanceEvent, explanation: &Explanation) -> bool {
     let newest = explanation.problem.runs.last().map(|run| run.file.as_str());
     let acts_in_newest = event.windows.iter().any(|window| Some(window.run.as_str()) == newest);
     PASSING.contains(&event.kind.as_str()) || !acts_in_newest
 }
 
 /// The errors on the runs held out, where the model is better on them.
-pub fn improvement(answer: &Answer) -> Option<HeldOutError> {
+pub fn improvement(answer: &ExplainAnswer) -> Option<HeldOutError> {
     let (before_mps, after_mps) = (answer.rmse_before?, answer.rmse_after?);
     (after_mps < before_mps).then_some(HeldOutError { before_mps, after_mps })
 }
@@ -184,7 +184,7 @@ pub fn sentence(event: &MaintenanceEvent) -> String {
 
 /// What the runs do not tell; `None` where they tell enough.
 pub fn question(
-    answer: &Answer,
+    answer: &ExplainAnswer,
     train: TrainId,
     (model, at): (ModelHash, Moment),
 ) -> Option<OpenQuestion> {

@@ -16,7 +16,7 @@ use super::conclusion::{Conclusion, Explained};
 use super::error::LearnError;
 use super::memory::Memory;
 use super::pool::{self, Bounds, Pool};
-use super::source::{FoundRun, Places, runs_of, tell_unusable};
+use super::source::{FoundRun, Places, report_unusable, runs_of};
 use crate::report::provenance::hex;
 use dynocar::models::{Action, ModelHash, ModelText, Moment, Store, TrainModels};
 use dynocar::storage::{Disk, Storage, StorageError};
@@ -264,7 +264,7 @@ fn explain_pool(
             Err(error) => error,
         };
         if let Some(run) = pool.runs.iter().find(|run| run.name == file) {
-            tell_unusable(memory, &run.key(), &format!("{file}: {source}"));
+            report_unusable(memory, &run.key(), &format!("{file}: {source}"));
         }
         match pool.without(&file) {
             Some(rest) => pool = rest,

@@ -16,7 +16,7 @@ const FILE: &str = "learn.state";
 /// Files that are remembered; more are hashed anew in each round.
 const FILES_MAX: usize = 2000;
 /// Problems and questions that are remembered; more are told again.
-const TOLD_MAX: usize = 400;
+const REPORTED_MAX: usize = 400;
 
 /// A file whose content is known.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -102,10 +102,10 @@ impl Memory {
         while self.files.len() > FILES_MAX {
             self.files.pop_first();
         }
-        while self.unusable.len() > TOLD_MAX {
+        while self.unusable.len() > REPORTED_MAX {
             self.unusable.pop_first();
         }
-        let surplus = self.open.len().saturating_sub(TOLD_MAX);
+        let surplus = self.open.len().saturating_sub(REPORTED_MAX);
         self.open.drain(..surplus);
         let path = folder.join(FILE);
         let text = toml::to_string(self).map_err(|error| StateError::Malformed {

@@ -11,7 +11,7 @@ use dynocar_core::train::TrainModel;
 
 use super::memory::Memory;
 use super::overlay::Overlay;
-use super::source::{FoundRun, tell_unusable};
+use super::source::{FoundRun, report_unusable};
 use dynocar::models::ModelText;
 
 /// Bounds of what is explained together.
@@ -98,7 +98,7 @@ pub fn read(
         let run = match read_run(found, text, &mut head) {
             Ok(run) => run,
             Err(problem) => {
-                tell_unusable(memory, &found.key(), &problem);
+                report_unusable(memory, &found.key(), &problem);
                 continue;
             }
         };

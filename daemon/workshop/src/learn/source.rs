@@ -162,7 +162,7 @@ fn runs_in(
     let manifest = match manifest {
         Ok(manifest) => manifest,
         Err(problem) => {
-            tell_unusable(memory, &described, &problem);
+            report_unusable(memory, &described, &problem);
             return Vec::new();
         }
     };
@@ -183,7 +183,7 @@ fn runs_in(
 }
 
 /// Tells why something is not used, once for each content.
-pub fn tell_unusable(memory: &mut Memory, sha256: &str, problem: &str) {
+pub fn report_unusable(memory: &mut Memory, sha256: &str, problem: &str) {
     if memory.unusable.insert(sha256.to_owned(), problem.to_owned()).is_none() {
         warn!("left out: {problem}");
     }

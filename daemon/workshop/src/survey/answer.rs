@@ -9,9 +9,9 @@ use super::write::{gradient_entries, trip_file};
 
 /// All that a survey found.
 #[derive(Debug, Serialize)]
-pub struct Answer {
+pub struct SurveyAnswer {
     /// The line.
-    pub line: Line,
+    pub line: SurveyedLine,
     /// The trips, in the order of the written dataset.
     pub trips: Vec<TripAnswer>,
     /// What is no trip.
@@ -25,7 +25,7 @@ pub struct Answer {
 
 /// A line.
 #[derive(Debug, Serialize)]
-pub struct Line {
+pub struct SurveyedLine {
     /// Length in m.
     pub length_m: f64,
     /// Its stops.
@@ -129,7 +129,7 @@ pub struct LearnedAnswer {
     pub residual_n: f64,
 }
 
-impl Answer {
+impl SurveyAnswer {
     /// The answer to a survey.
     pub fn of(dataset: &Dataset, vehicle: &Vehicle, survey: &Survey) -> Self {
         let raw = |recording: usize| &dataset.runs[recording];
@@ -158,8 +158,8 @@ impl Answer {
             to_s: it.to_s,
             reason: it.reason,
         });
-        Answer {
-            line: Line::of(survey),
+        SurveyAnswer {
+            line: SurveyedLine::of(survey),
             trips: trips.collect(),
             not_used: not_used.collect(),
             learned: LearnedAnswer::of(vehicle, survey),
@@ -168,7 +168,7 @@ impl Answer {
     }
 }
 
-impl Line {
+impl SurveyedLine {
     fn of(survey: &Survey) -> Self {
         let stops = survey.stops.iter().map(|stop| StopAnswer {
             chainage_m: stop.chainage_m.value,
@@ -183,7 +183,7 @@ impl Line {
             let middle = stds.len() / 2;
             *stds.select_nth_unstable_by(middle, f64::total_cmp).1
         });
-        Line {
+        SurveyedLine {
             length_m: survey.ways.chainage_per_m * survey.ways.growing.length_m(),
             stops: stops.collect(),
             gradient_std_permille: median,

@@ -18,7 +18,7 @@ pub enum SurveyFailure {
     Survey(#[from] SurveyError),
     /// A line's file lacks what a map needs, or its alignment cannot be read.
     #[error("{}: {problem}", path.display())]
-    Line {
+    SurveyedLine {
         /// The file.
         path: PathBuf,
         /// What was expected and what came.

@@ -6,7 +6,7 @@ use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::survey::stops::Stop;
 use dynocar_analysis::survey::{Survey, survey};
 
-use super::answer::Answer;
+use super::answer::SurveyAnswer;
 use super::failure::SurveyFailure;
 use super::material::Material;
 use super::read;
@@ -23,7 +23,7 @@ pub struct Surveyed {
     /// What was found.
     pub survey: Survey,
     /// The same for machines.
-    pub answer: Answer,
+    pub answer: SurveyAnswer,
     /// The files of the dataset of trips.
     pub files: Vec<PathBuf>,
 }
@@ -48,7 +48,7 @@ pub fn survey_folder(
     }
     let material = Material { source, dataset: &raw, vehicle: &vehicle, survey: &survey, line };
     let files = write(&material, out)?;
-    let answer = Answer::of(&raw, &vehicle, &survey);
+    let answer = SurveyAnswer::of(&raw, &vehicle, &survey);
     Ok(Surveyed { raw, survey, answer, files })
 }
 

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::survey::Survey;
 
-use super::answer::Answer;
+use super::answer::SurveyAnswer;
 use super::write::gradient_entries;
 use crate::report::document::document;
 use crate::report::html::{Column, Table, escape};
@@ -24,7 +24,7 @@ const SIZE: (f64, f64) = (980.0, 420.0);
 pub fn html(
     dataset: &Dataset,
     survey: &Survey,
-    answer: &Answer,
+    answer: &SurveyAnswer,
     made: &Provenance,
 ) -> Result<String, PlotError> {
     let name = escape(&dataset.name);
@@ -70,7 +70,7 @@ fn path(points: impl Iterator<Item = (f64, f64)>) -> String {
     path
 }
 
-fn map(survey: &Survey, answer: &Answer) -> String {
+fn map(survey: &Survey, answer: &SurveyAnswer) -> String {
     let ways = &survey.ways;
     let nodes = [1, -1].into_iter().filter_map(|it| ways.of(it)).flat_map(|way| way.nodes_m());
     let all: Vec<[f64; 2]> = nodes.copied().collect();
@@ -139,7 +139,7 @@ fn profile_plots(entries: &[(f64, f64, f64)], direction: &str) -> Result<String,
     Ok(figure("trace", &format!("For {direction}"), "", &[wide?, narrow?]))
 }
 
-fn learned(answer: &Answer) -> String {
+fn learned(answer: &SurveyAnswer) -> String {
     let Some(learned) = &answer.learned else {
         return "<p>The line was known: nothing was learned.</p>\n".into();
     };
@@ -168,7 +168,7 @@ fn learned(answer: &Answer) -> String {
     table.html()
 }
 
-fn stops(answer: &Answer) -> String {
+fn stops(answer: &SurveyAnswer) -> String {
     let head = [
         ("chainage, m", Column::Numbers),
         ("name", Column::Names),
@@ -190,7 +190,7 @@ fn stops(answer: &Answer) -> String {
     table.html()
 }
 
-fn trips(answer: &Answer) -> String {
+fn trips(answer: &SurveyAnswer) -> String {
     let head = [
         ("file", Column::Names),
         ("recording", Column::Names),
@@ -217,7 +217,7 @@ fn trips(answer: &Answer) -> String {
     table.html()
 }
 
-fn not_used(answer: &Answer) -> String {
+fn not_used(answer: &SurveyAnswer) -> String {
     let head = [
         ("recording", Column::Names),
         ("from, s", Column::Numbers),
@@ -236,7 +236,7 @@ fn not_used(answer: &Answer) -> String {
     table.html()
 }
 
-fn open(answer: &Answer) -> String {
+fn open(answer: &SurveyAnswer) -> String {
     let mut html = String::from("<ul>\n");
     for open in &answer.cannot_tell {
         let _ = writeln!(html, "<li>{}</li>", escape(open));

@@ -113,7 +113,8 @@ pub fn vehicle(dataset: &Dataset) -> Vehicle {
 /// When a file cannot be read or names no alignment.
 pub fn known_line(path: &Path) -> Result<(KnownLine, Track), SurveyFailure> {
     let track = load_track(path)?;
-    let wrong = |path: &Path, problem: String| SurveyFailure::Line { path: path.into(), problem };
+    let wrong =
+        |path: &Path, problem: String| SurveyFailure::SurveyedLine { path: path.into(), problem };
     let Some(alignment) = &track.survey.alignment else {
         let problem = "expected alignment = \"…csv\", the way on the map, got none".into();
         return Err(wrong(path, problem));

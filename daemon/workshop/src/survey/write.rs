@@ -70,7 +70,7 @@ pub fn write(material: &Material, folder: &Path) -> Result<Vec<PathBuf>, SurveyF
 /// A known line with its alignments, under their own names.
 fn copied_line(line: &Path) -> Result<Vec<(String, String)>, SurveyFailure> {
     let read = |path: &Path| {
-        dynocar::dataset::read_text(path).map_err(|problem| SurveyFailure::Line {
+        dynocar::dataset::read_text(path).map_err(|problem| SurveyFailure::SurveyedLine {
             path: path.into(),
             problem: problem.to_string(),
         })
@@ -87,7 +87,7 @@ fn copied_line(line: &Path) -> Result<Vec<(String, String)>, SurveyFailure> {
 fn train_toml(material: &Material) -> Result<String, SurveyFailure> {
     let (files, head) = open(material.source)?;
     let path = &head.manifest.train_file.path;
-    let wrong = |problem: String| SurveyFailure::Line { path: path.into(), problem };
+    let wrong = |problem: String| SurveyFailure::SurveyedLine { path: path.into(), problem };
     let text = files.read(path).map_err(|problem| wrong(problem.to_string()))?;
     let Some(profile) = &material.survey.profile else {
         return Ok(format!("{MARK}: {path} as declared.\n{text}"));

@@ -5,11 +5,11 @@ use std::path::Path;
 
 use dynocar::dataset;
 use dynocar_analysis::dataset::Dataset;
-use dynocar_analysis::explain::answer::Answer as ExplainAnswer;
+use dynocar_analysis::explain::answer::ExplainAnswer;
 use dynocar_analysis::explain::explain;
 use dynocar_analysis::explain::stop_to_stop::StopToStop;
 use dynocar_shared::PipelineKind;
-use dynocar_workshop::survey::answer::Answer;
+use dynocar_workshop::survey::answer::SurveyAnswer;
 use dynocar_workshop::survey::survey_folder;
 
 use super::bus_variants::{self, ByPower, OtherDay};
@@ -52,7 +52,7 @@ pub fn check(report: &mut Report, folder: &Path) {
         "bus: its force from power, trips left out two by two",
         powers.and_then(|it| bus_variants::powers(&it.power)),
     );
-    let climbs = outcome.as_ref().map_err(Clone::clone).and_then(|it| told_to_climb(&it.level));
+    let climbs = outcome.as_ref().map_err(Clone::clone).and_then(|it| found_to_climb(&it.level));
     report.note("bus: its line declared level", climbs);
     for (place, (told, ..)) in WAYS.iter().enumerate() {
         let masses = outcome.as_ref().map_err(Clone::clone).map(|it| &it.masses[place]);
@@ -109,12 +109,12 @@ impl LeftOut {
     }
 }
 
-fn surveyed(source: &Path) -> Result<Answer, String> {
+fn surveyed(source: &Path) -> Result<SurveyAnswer, String> {
     let out = tempfile::tempdir().map_err(|error| error.to_string())?;
     Ok(survey_folder(source, None, out.path()).map_err(|error| error.to_string())?.answer)
 }
 
-fn learned(answer: &Answer) -> Result<String, String> {
+fn learned(answer: &SurveyAnswer) -> Result<String, String> {
     let learned = answer.learned.as_ref().ok_or("nothing is learned")?;
     let missing = f64::NAN;
     let passenger_kg = learned.passenger_mass_kg.as_ref().map_or(missing, |it| it.value);
@@ -132,7 +132,7 @@ fn learned(answer: &Answer) -> Result<String, String> {
     if is_inside { Ok(words.join(", ")) } else { Err(words.join(", ")) }
 }
 
-fn left_out(folder: &Path, whole: &Answer) -> Result<LeftOut, String> {
+fn left_out(folder: &Path, whole: &SurveyAnswer) -> Result<LeftOut, String> {
     let trips = &whole.trips;
     // A trip's recording reaches to the middle of the stands beside it.
     let middles: Vec<f64> =
@@ -177,7 +177,7 @@ fn declared_level(folder: &Path) -> Result<Dataset, String> {
     dataset::load(folder).map_err(|error| error.to_string())
 }
 
-fn told_to_climb(answer: &Option<ExplainAnswer>) -> Result<String, String> {
+fn found_to_climb(answer: &Option<ExplainAnswer>) -> Result<String, String> {
     let answer = answer.as_ref().ok_or("nothing was explained")?;
     let error = |error: Option<f64>| error.unwrap_or(f64::NAN);
     let (before, after) = (error(answer.rmse_before), error(answer.rmse_after));

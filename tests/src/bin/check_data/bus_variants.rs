@@ -5,7 +5,7 @@ use std::path::Path;
 
 use dynocar::dataset;
 use dynocar_analysis::dataset::{Dataset, Role};
-use dynocar_analysis::explain::answer::Told;
+use dynocar_analysis::explain::answer::WithStd;
 use dynocar_analysis::explain::{drive, explain};
 use dynocar_core::train::Drive;
 use dynocar_shared::SampleField;
@@ -31,8 +31,8 @@ pub struct OtherDay {
 /// What the power of six trips tells, and how it fares on the two left out.
 #[derive(Clone, Copy, Debug)]
 pub struct ByPower {
-    efficiency: Told,
-    auxiliaries_kw: Told,
+    efficiency: WithStd,
+    auxiliaries_kw: WithStd,
     /// Root mean square difference from the recorded force, as a share of it.
     apart: f64,
     /// Error over 60 s in m/s.
@@ -59,7 +59,7 @@ pub fn other_days(pairs: &[OtherDay]) -> Result<String, String> {
 pub fn powers(pairs: &[ByPower]) -> Result<String, String> {
     let apart = root_mean_square(pairs.iter().map(|it| it.apart));
     let error_mps = root_mean_square(pairs.iter().map(|it| it.error_mps));
-    let told = |it: Told| format!("{:.3} ± {:.3}", it.value, 1.96 * it.std);
+    let told = |it: WithStd| format!("{:.3} ± {:.3}", it.value, 1.96 * it.std);
     let efficiencies: Vec<String> = pairs.iter().map(|it| told(it.efficiency)).collect();
     let kw: Vec<String> = pairs.iter().map(|it| told(it.auxiliaries_kw)).collect();
     let words = format!(

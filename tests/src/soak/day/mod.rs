@@ -89,7 +89,7 @@ pub fn run(programs: &Programs, hours: usize, seed: u64) -> Vec<Hour> {
         let row = &mut rows[quarter / 4];
         row.resident_kib = row.resident_kib.max(day.resident_kib.last().copied().unwrap_or(0));
         if quarter % 4 == 3 {
-            day.tell(row);
+            day.report(row);
         }
     }
     day.end();
@@ -246,7 +246,7 @@ impl<'a> Day<'a> {
     }
 
     /// The row of an hour that ends now; its counts are since the day began.
-    fn tell(&mut self, row: &mut Hour) {
+    fn report(&mut self, row: &mut Hour) {
         row.account = self.account();
         row.offered =
             self.pipelines as u64 * self.trains.iter().map(DayTrain::published).sum::<u64>();

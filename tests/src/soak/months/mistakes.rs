@@ -56,7 +56,7 @@ pub fn measure(trains: u64, years: usize, seed: u64, trips_between_mistakes: f64
             let trip = random.integer(0, all[0].len() - 1);
             for (evidence, scores) in evidence.iter_mut().zip(&worse) {
                 evidence.take(scores[trip]);
-                if evidence.capital() >= level {
+                if evidence.e_value() >= level {
                     found.adopted += 1;
                     *evidence = Evidence::new(LEAST_GAIN);
                 }

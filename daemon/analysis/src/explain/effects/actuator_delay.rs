@@ -9,7 +9,7 @@ use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::{Scan, Tuple};
 
 /// Where positions are integrated from the speed, they are late with it, and nothing is on time.
-const NEVER_TOLD: [EffectKind; 1] = [EffectKind::SpeedDelay];
+const NEVER_REPORTED: [EffectKind; 1] = [EffectKind::SpeedDelay];
 /// Delay and lag in s that a fit may start from.
 const STARTS: [[f64; 2]; 4] = [[0.3, 0.3], [1.0, 1.0], [0.2, 2.0], [2.0, 0.3]];
 
@@ -32,7 +32,7 @@ impl Effect for ActuatorDelay {
             .map(|start| (decrease(scan, start), start))
             .max_by(|one, other| one.0.total_cmp(&other.0));
         let is_any_recorded = scan.problem.runs.iter().any(|run| run.is_position_recorded);
-        let twins: &[EffectKind] = if is_any_recorded { &[] } else { &NEVER_TOLD };
+        let twins: &[EffectKind] = if is_any_recorded { &[] } else { &NEVER_REPORTED };
         let candidate =
             |(_, start): (f64, [f64; 2])| Candidate::new(DelayAndLag { twins }, start.to_vec());
         Proposal::Candidates(best.map(candidate).into_iter().collect())

@@ -4,7 +4,7 @@ use dynocar_core::terms::{Entry, Parameter, curve};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Proposal};
-use crate::explain::answer::Place;
+use crate::explain::answer::Location;
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 
@@ -75,7 +75,7 @@ impl Hypothesis for Curves {
         Some(vec![Entry::Number(&curve::CONSTANT, parameters[0])])
     }
 
-    fn place(&self) -> Place {
-        Place::of_intervals(self.intervals_m.clone())
+    fn place(&self) -> Location {
+        Location::of_intervals(self.intervals_m.clone())
     }
 }

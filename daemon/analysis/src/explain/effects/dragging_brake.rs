@@ -10,7 +10,7 @@ use dynocar_core::terms::brake::{self, BUILD_UP_S, build_up};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Proposal, SharedHypothesis};
-use crate::explain::answer::{Place, RunWindow};
+use crate::explain::answer::{Location, RunWindow};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{Axis, End, Reach};
 use crate::explain::residual_pressure;
@@ -299,7 +299,7 @@ impl Hypothesis for Dragging {
         Some(Arc::new(moved))
     }
 
-    fn place(&self) -> Place {
-        Place { windows: Some(self.windows.clone()), ..Place::default() }
+    fn place(&self) -> Location {
+        Location { windows: Some(self.windows.clone()), ..Location::default() }
     }
 }

@@ -6,9 +6,9 @@ use dynocar_core::terms::{Entry, Parameter, place};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Proposal, SharedHypothesis};
-use crate::explain::answer::{Place, RunWindow};
+use crate::explain::answer::{Location, RunWindow};
 use crate::explain::evidence::{RunData, SampleForces};
-use crate::explain::places::{End, Inside, Stretches, find};
+use crate::explain::places::{End, Inside, Intervals, find};
 use crate::explain::scan::Scan;
 
 /// The kind.
@@ -16,7 +16,7 @@ pub struct LocalResistance;
 
 #[derive(Clone, Debug)]
 struct Local {
-    stretches: Stretches,
+    stretches: Intervals,
     length_m: f64,
     /// Files of the runs; `None` for all.
     runs: Option<Vec<String>>,
@@ -176,9 +176,9 @@ impl Hypothesis for Local {
         self.runs.is_some()
     }
 
-    fn place(&self) -> Place {
+    fn place(&self) -> Location {
         let intervals_m = &self.stretches.intervals_m;
         let windows = self.only.as_ref().map(|only| only.windows(intervals_m));
-        Place { runs: self.runs.clone(), windows, ..Place::of_intervals(intervals_m.clone()) }
+        Location { runs: self.runs.clone(), windows, ..Location::of_intervals(intervals_m.clone()) }
     }
 }

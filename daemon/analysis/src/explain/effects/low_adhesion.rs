@@ -8,9 +8,9 @@ use dynocar_core::terms::{Parameter, adhesion};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Proposal, SharedHypothesis};
-use crate::explain::answer::Place;
+use crate::explain::answer::Location;
 use crate::explain::evidence::{RunData, SampleForces};
-use crate::explain::places::{End, Found, Inside, Stretches, best_of_runs, find};
+use crate::explain::places::{End, Found, Inside, Intervals, best_of_runs, find};
 use crate::explain::scan::{Scan, Tuple};
 
 /// Caps that a search starts from, as share of the strongest braking seen.
@@ -31,7 +31,7 @@ enum Form {
 struct Slippery {
     form: Form,
     /// `None` for everywhere.
-    stretches: Option<Stretches>,
+    stretches: Option<Intervals>,
     /// Files of the runs; `None` for all.
     runs: Option<Vec<String>>,
     choice_cost: f64,
@@ -94,7 +94,7 @@ fn places(
     form: Form,
     cap: f64,
 ) -> Vec<(f64, Form, Candidate)> {
-    let candidate = |found: &Found, stretches: Option<Stretches>| {
+    let candidate = |found: &Found, stretches: Option<Intervals>| {
         let runs = found.files(scan);
         let start = match form {
             Form::Cap => vec![cap.max(0.006)],
@@ -177,7 +177,7 @@ impl Hypothesis for Slippery {
     }
 
     fn ends(&self) -> Vec<End> {
-        self.stretches.as_ref().map_or_else(Vec::new, Stretches::ends)
+        self.stretches.as_ref().map_or_else(Vec::new, Intervals::ends)
     }
 
     fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
@@ -193,8 +193,8 @@ impl Hypothesis for Slippery {
         Some(Arc::new(Slippery { runs: Some(runs), ..self.clone() }))
     }
 
-    fn place(&self) -> Place {
+    fn place(&self) -> Location {
         let intervals_m = self.stretches.as_ref().map(|stretches| stretches.intervals_m.clone());
-        Place { runs: self.runs.clone(), intervals_m, ..Place::default() }
+        Location { runs: self.runs.clone(), intervals_m, ..Location::default() }
     }
 }

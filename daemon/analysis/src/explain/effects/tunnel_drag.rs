@@ -11,9 +11,9 @@ use dynocar_core::track::Track;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Proposal, ReportContext, Reported, SharedHypothesis};
-use crate::explain::answer::Place;
+use crate::explain::answer::Location;
 use crate::explain::evidence::{RunData, SampleForces};
-use crate::explain::places::{End, Inside, Stretches, find};
+use crate::explain::places::{End, Inside, Intervals, find};
 use crate::explain::scan::Scan;
 
 /// Motion in s inside mapped tunnels that tells of them.
@@ -27,7 +27,7 @@ pub struct TunnelDrag;
 #[derive(Clone, Debug)]
 struct Tunnels {
     /// Where they were found; `None`: the mapped ones.
-    found: Option<Stretches>,
+    found: Option<Intervals>,
     length_m: f64,
     mapped_m: Vec<[f64; 2]>,
     choice_cost: f64,
@@ -139,7 +139,7 @@ impl Hypothesis for Tunnels {
     }
 
     fn ends(&self) -> Vec<End> {
-        self.found.as_ref().map_or_else(Vec::new, Stretches::ends)
+        self.found.as_ref().map_or_else(Vec::new, Intervals::ends)
     }
 
     fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
@@ -147,9 +147,9 @@ impl Hypothesis for Tunnels {
         Some(Arc::new(Tunnels { found, ..self.clone() }))
     }
 
-    fn place(&self) -> Place {
+    fn place(&self) -> Location {
         let found = self.found.as_ref().map(|stretches| &stretches.intervals_m);
-        Place::of_intervals(found.unwrap_or(&self.mapped_m).clone())
+        Location::of_intervals(found.unwrap_or(&self.mapped_m).clone())
     }
 
     fn report(&self, context: &ReportContext) -> Reported {

@@ -1,19 +1,19 @@
 //! What decides whether something is more than chance, and whether two explanations are one.
 
 /// Strength that an effect must have. Simulated data without any effect stay far below it
-/// ([`NULL_STRENGTH`]); recorded data, whose noise is not quite what the model of it says, come nearer.
-pub const STRENGTH_MIN: f64 = 3.0;
+/// ([`NULL_SCORE`]); recorded data, whose noise is not quite what the model of it says, come nearer.
+pub const SCORE_MIN: f64 = 3.0;
 /// Evidence by which two explanations may differ and still explain the data equally well; what is added
 /// beside others explains this much more than its price.
 pub const EQUAL: f64 = 6.0;
 /// Strength of the strongest candidate of a search where nothing acts, fitted to the quantiles that
 /// `dynocar-bench explain --kind none --kind none_poor_recording --seeds 200 --first-seed 2001` prints: 0.08,
 /// 0.18, 0.21 and 1.0 for shares of 0.05, 0.02, 0.01 and 0.0025.
-pub const NULL_STRENGTH: NullStrength = NullStrength { share: 0.05, at: 0.08, power: 1.0 };
+pub const NULL_SCORE: NullScore = NullScore { share: 0.05, at: 0.08, power: 1.0 };
 
 /// The tail of a distribution of strengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NullStrength {
+pub struct NullScore {
     /// Share of the searches that reach `at`.
     pub share: f64,
     /// A strength.
@@ -26,14 +26,14 @@ pub struct NullStrength {
 /// from the open-loop error, of runs that were fitted and of runs left out. Either alone is easily had:
 /// thousands of samples make anything significant, and a flexible form takes away some of any error. The
 /// smaller the share, the more evidence it needs; what helps no run left out has none.
-pub fn strength(evidence: f64, reduction: f64) -> f64 {
+pub fn acceptance_score(evidence: f64, reduction: f64) -> f64 {
     evidence.max(0.0) * reduction.max(0.0).powi(2)
 }
 
 /// Probability that a search over the whole library finds this strength where nothing acts.
-pub fn p_value(strength: f64) -> f64 {
-    let NullStrength { share, at, power } = NULL_STRENGTH;
-    (share * (strength.max(0.0) / at).powf(-power)).min(1.0)
+pub fn p_value(acceptance_score: f64) -> f64 {
+    let NullScore { share, at, power } = NULL_SCORE;
+    (share * (acceptance_score.max(0.0) / at).powf(-power)).min(1.0)
 }
 
 #[cfg(test)]
@@ -42,7 +42,7 @@ mod tests {
 
     #[test]
     fn what_is_accepted_is_rare_on_nulls() {
-        assert!(p_value(STRENGTH_MIN) <= 0.01);
+        assert!(p_value(SCORE_MIN) <= 0.01);
         assert_eq!(p_value(-1e3), 1.0);
         assert!(p_value(1e6) > 0.0);
         assert!((0.0025..0.01).contains(&p_value(1.0)));
@@ -50,10 +50,10 @@ mod tests {
 
     #[test]
     fn what_helps_no_run_left_out_has_no_strength() {
-        assert_eq!(strength(1e6, -0.01), 0.0);
-        assert_eq!(strength(-5.0, 0.9), 0.0);
-        assert!(strength(400.0, 0.1) > strength(100.0, 0.1));
+        assert_eq!(acceptance_score(1e6, -0.01), 0.0);
+        assert_eq!(acceptance_score(-5.0, 0.9), 0.0);
+        assert!(acceptance_score(400.0, 0.1) > acceptance_score(100.0, 0.1));
         // Half the share asks for four times the evidence.
-        assert_eq!(strength(400.0, 0.1), strength(100.0, 0.2));
+        assert_eq!(acceptance_score(400.0, 0.1), acceptance_score(100.0, 0.2));
     }
 }

@@ -26,10 +26,10 @@ mod way;
 mod whitener;
 
 pub use bins::Bin;
-pub use criterion::{EQUAL, NULL_STRENGTH, NullStrength, STRENGTH_MIN, p_value, strength};
+pub use criterion::{EQUAL, NULL_SCORE, NullScore, SCORE_MIN, acceptance_score, p_value};
 pub use fade::Fade;
 pub use fit::{Fit, FitProblem, Nearby, RunNormal};
-pub use model::{GrownForces, GrownModel};
+pub use model::{UpdatedForces, UpdatedModel};
 pub use noise::{Noise, RunScatter};
 pub use run_data::{RunData, RunDataError, RunPower, prepare};
 pub use run_scatter::{PRIOR_RUNS, WeightedFilter};

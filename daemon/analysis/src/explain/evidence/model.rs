@@ -17,12 +17,12 @@ const BLOCK: usize = 256;
 
 /// The declared model with Davis coefficients and effects as parameters.
 #[derive(Clone, Default)]
-pub struct GrownModel {
+pub struct UpdatedModel {
     /// Effects, in the order in which they act on the sample forces.
     pub effects: Vec<SharedHypothesis>,
 }
 
-impl GrownModel {
+impl UpdatedModel {
     /// The same with one effect more.
     pub fn with(&self, effect: SharedHypothesis) -> Self {
         let mut grown = self.clone();
@@ -89,7 +89,7 @@ impl GrownModel {
     }
 
     /// The forces on a run for given parameters; `theta` starts with a, b, c.
-    pub fn forces(&self, run: &RunData, theta: &[f64], forces: &mut GrownForces) {
+    pub fn forces(&self, run: &RunData, theta: &[f64], forces: &mut UpdatedForces) {
         let all = |_: usize| true;
         let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
         let scale = self.speed_scale(theta, &all);
@@ -114,7 +114,7 @@ impl GrownModel {
         &self,
         run: &RunData,
         theta: &[f64],
-        forces: &mut GrownForces,
+        forces: &mut UpdatedForces,
         bins: &mut Vec<f64>,
     ) {
         self.predict_bins_of((run, theta), |_| true, forces, bins);
@@ -125,7 +125,7 @@ impl GrownModel {
         &self,
         at: (&RunData, &[f64]),
         acts: impl Fn(usize) -> bool,
-        forces: &mut GrownForces,
+        forces: &mut UpdatedForces,
         bins: &mut Vec<f64>,
     ) {
         let davis = Davis { a: at.1[0], b: at.1[1], c: at.1[2] };
@@ -141,7 +141,7 @@ impl GrownModel {
         &self,
         at: (&RunData, &[f64]),
         acts: impl Fn(usize) -> bool,
-        forces: &mut GrownForces,
+        forces: &mut UpdatedForces,
         response: &mut Response,
     ) {
         let none = Davis { a: 0.0, b: 0.0, c: 0.0 };
@@ -175,7 +175,7 @@ impl GrownModel {
         (run, theta): (&RunData, &[f64]),
         acts: impl Fn(usize) -> bool,
         accelerations: impl Fn(&SampleForces, f64) -> [f64; N],
-        forces: &mut GrownForces,
+        forces: &mut UpdatedForces,
         mut bins: [&mut Vec<f64>; N],
     ) {
         let scale = self.speed_scale(theta, &acts);
@@ -258,13 +258,13 @@ pub fn integrate_bins<const N: usize>(
 
 /// Forces of a grown model over one run; keeps its memory from one evaluation to the next.
 #[derive(Clone, Debug, Default)]
-pub struct GrownForces {
+pub struct UpdatedForces {
     /// At the samples looked at last.
     samples: Vec<SampleForces>,
     quadratic: QuadraticForces,
 }
 
-impl ForceModel for GrownForces {
+impl ForceModel for UpdatedForces {
     #[inline]
     fn acceleration_mps2(&self, index: usize, speed_mps: f64) -> f64 {
         self.quadratic.acceleration_mps2(index, speed_mps)

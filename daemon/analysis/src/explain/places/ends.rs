@@ -44,14 +44,14 @@ pub struct End {
 
 /// Disjoint intervals of chainage whose ends were estimated.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stretches {
+pub struct Intervals {
     /// The intervals in m, by chainage.
     pub intervals_m: Vec<[f64; 2]>,
     /// The chainage in m over which the runs move.
     pub span_m: [f64; 2],
 }
 
-impl Stretches {
+impl Intervals {
     /// All ends, lower before upper; each may move up to its neighbours.
     pub fn ends(&self) -> Vec<End> {
         let all = &self.intervals_m;
@@ -88,8 +88,8 @@ impl Stretches {
 mod tests {
     use super::*;
 
-    fn two() -> Stretches {
-        Stretches { intervals_m: vec![[1000.0, 2000.0], [3000.0, 3500.0]], span_m: [0.0, 5000.0] }
+    fn two() -> Intervals {
+        Intervals { intervals_m: vec![[1000.0, 2000.0], [3000.0, 3500.0]], span_m: [0.0, 5000.0] }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Where and in which runs a force was found.
 
-use super::ends::Stretches;
+use super::ends::Intervals;
 use crate::explain::scan::Scan;
 
 /// A set of intervals and runs with what a common factor on the shape there explains.
@@ -24,8 +24,8 @@ pub struct Found {
 
 impl Found {
     /// Its intervals, as ends that were estimated.
-    pub fn stretches(&self) -> Stretches {
-        Stretches { intervals_m: self.intervals_m.clone(), span_m: self.span_m }
+    pub fn stretches(&self) -> Intervals {
+        Intervals { intervals_m: self.intervals_m.clone(), span_m: self.span_m }
     }
 
     /// Files of its runs; `None` for all.

@@ -2,7 +2,7 @@
 //!
 //! - [`Inside`]: how much of a train is at a place
 //! - [`find`]: the intervals and runs in which a force of some shape explains most
-//! - [`End`], [`Stretches`]: ends that were estimated, and where else they could be
+//! - [`End`], [`Intervals`]: ends that were estimated, and where else they could be
 //! - [`settle`]: every end at the middle of what the data allow, with its interval, and for every
 //!   run how likely it takes part
 
@@ -13,7 +13,7 @@ mod localise;
 mod runs;
 mod settle;
 
-pub use ends::{Axis, End, Reach, Stretches};
+pub use ends::{Axis, End, Intervals, Reach};
 pub use found::Found;
 pub use inside::Inside;
 pub use localise::{MAP_ERROR_PERMILLE, find, span_m};

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use super::ends::{Axis, End, Reach};
 use crate::explain::answer::{PlaceUncertainty, WindowUncertainty};
-use crate::explain::evidence::{Fit, FitProblem, GrownModel, Nearby};
+use crate::explain::evidence::{Fit, FitProblem, Nearby, UpdatedModel};
 use crate::explain::hypothesis::SharedHypothesis;
 
 /// A cost above the least by this is out of the question.
@@ -67,7 +67,7 @@ impl End {
     }
 }
 
-fn replaced(model: &GrownModel, index: usize, effect: SharedHypothesis) -> GrownModel {
+fn replaced(model: &UpdatedModel, index: usize, effect: SharedHypothesis) -> UpdatedModel {
     let mut replaced = model.clone();
     replaced.effects[index] = effect;
     replaced
@@ -157,7 +157,7 @@ fn discrete(points: &[(f64, f64)]) -> Belief {
 fn run_probability(
     problem: &FitProblem,
     nearby: &Nearby,
-    model: &GrownModel,
+    model: &UpdatedModel,
     index: usize,
 ) -> Option<BTreeMap<String, f64>> {
     let effect = &model.effects[index];

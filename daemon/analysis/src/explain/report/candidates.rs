@@ -4,7 +4,7 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::words;
 use crate::explain::Explanation;
-use crate::explain::evidence::STRENGTH_MIN;
+use crate::explain::evidence::SCORE_MIN;
 use crate::explain::score::reduction;
 use crate::explain::selection::Trial;
 
@@ -92,7 +92,7 @@ fn reason(explanation: &Explanation, row: &CandidateRow, is_rival: bool) -> Stri
         return format!("explains the runs as well as {found}: not told apart");
     }
     match row.beside {
-        Some(beside) if alone > STRENGTH_MIN && beside <= STRENGTH_MIN => {
+        Some(beside) if alone > SCORE_MIN && beside <= SCORE_MIN => {
             format!("borrows from the same residual: adds nothing beside {found}")
         }
         _ => remark(),

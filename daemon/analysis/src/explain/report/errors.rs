@@ -6,7 +6,7 @@ use super::Estimate;
 use crate::dataset::Role;
 use crate::explain::Explanation;
 use crate::explain::bootstrap::intervals_95;
-use crate::explain::evidence::{Fit, GrownForces, RunData};
+use crate::explain::evidence::{Fit, RunData, UpdatedForces};
 use crate::explain::judged::Judged;
 use crate::explain::score;
 use crate::explain::score::run_error;
@@ -155,7 +155,7 @@ fn blocks(run: &RunData, before: &Fit, after: &Fit, restart: Restart) -> Vec<[Sp
     let (samples, time_s) = (run.samples(), run.recording.time_s());
     let count = (run.duration_s() / BLOCK_S) as usize + 1;
     let mut blocks = vec![[SpeedError::default(); 2]; count];
-    let (mut forces, mut prediction) = (GrownForces::default(), Prediction::new());
+    let (mut forces, mut prediction) = (UpdatedForces::default(), Prediction::new());
     for (side, fit) in [before, after].into_iter().enumerate() {
         fit.model.forces(run, &fit.theta, &mut forces);
         prediction.simulate(&run.recording, &forces, restart);

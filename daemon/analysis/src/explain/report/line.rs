@@ -13,7 +13,7 @@ use crate::explain::evidence::RunData;
 
 /// A stretch of the line where an effect was found.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stretch {
+pub struct MarkedInterval {
     /// Lower and upper chainage in m.
     pub at_m: [f64; 2],
     /// File of the only run in which it was, where that is known; its train was there then.
@@ -28,7 +28,7 @@ pub struct FoundPlace {
     /// The kind, in words.
     pub name: String,
     /// Stretches of the line.
-    pub stretches: Vec<Stretch>,
+    pub stretches: Vec<MarkedInterval>,
 }
 
 /// What was found along the line.
@@ -67,7 +67,7 @@ impl AlongLine {
     }
 }
 
-fn stretches(effect: &EffectAnswer, runs: &[&RunData]) -> Vec<Stretch> {
+fn stretches(effect: &EffectAnswer, runs: &[&RunData]) -> Vec<MarkedInterval> {
     let (place, known) = (&effect.place, effect.place.uncertainty_95.as_ref());
     if let Some(intervals_m) = &place.intervals_m {
         let ends_m = known.and_then(|it| it.intervals_m.as_ref());
@@ -76,14 +76,19 @@ fn stretches(effect: &EffectAnswer, runs: &[&RunData]) -> Vec<Stretch> {
             None => [None; 2],
         };
         let all = intervals_m.iter().enumerate();
-        return all.map(|(k, at_m)| Stretch { at_m: *at_m, run: None, ends_m: ends(k) }).collect();
+        return all
+            .map(|(k, at_m)| MarkedInterval { at_m: *at_m, run: None, ends_m: ends(k) })
+            .collect();
     }
     let sections = effect.parameters.values().flat_map(|value| match value {
         ParameterValue::Sections(sections) => &sections[..],
         _ => &[],
     });
-    let by_section =
-        sections.map(|it| Stretch { at_m: [it.from_m, it.to_m], run: None, ends_m: [None; 2] });
+    let by_section = sections.map(|it| MarkedInterval {
+        at_m: [it.from_m, it.to_m],
+        run: None,
+        ends_m: [None; 2],
+    });
     let by_window = place.windows.iter().flatten().filter_map(|window| {
         let run = runs.iter().find(|run| run.file == window.run)?;
         let mut ends = known.and_then(|it| it.windows.as_ref()).into_iter().flatten();
@@ -101,7 +106,7 @@ fn driven_over(
     run: &RunData,
     window: &RunWindow,
     known: Option<&WindowUncertainty>,
-) -> Option<Stretch> {
+) -> Option<MarkedInterval> {
     let at_m = |time_s: f64| {
         let times_s = run.recording.time_s();
         let next = times_s.partition_point(|it| run.offset_s + it < time_s);
@@ -115,7 +120,7 @@ fn driven_over(
     let last = end(window.t_end_s, known.and_then(|it| it.t_end_s))?;
     let (low, high) = if first.0 <= last.0 { (first, last) } else { (last, first) };
     let run = Some(window.run.clone());
-    Some(Stretch { at_m: [low.0, high.0], run, ends_m: [low.1, high.1] })
+    Some(MarkedInterval { at_m: [low.0, high.0], run, ends_m: [low.1, high.1] })
 }
 
 fn gradient_error(effect: &EffectAnswer) -> Vec<[f64; 3]> {

@@ -3,13 +3,15 @@
 use super::errors::Errors;
 use super::words::{self, joined, kind_name, number};
 use crate::dataset::Role;
-use crate::explain::answer::{Answer, EffectAnswer, HALF_95, ParameterValue, Place, Verdict};
+use crate::explain::answer::{
+    EffectAnswer, ExplainAnswer, HALF_95, Location, ParameterValue, Verdict,
+};
 
 /// Places named in a sentence at most.
 const PLACES_MAX: usize = 4;
 
 /// The verdict of an answer.
-pub fn sentence(answer: &Answer, errors: &Errors) -> String {
+pub fn sentence(answer: &ExplainAnswer, errors: &Errors) -> String {
     let found: Vec<String> = answer.effects.iter().map(described).collect();
     let found = found.join("; and ");
     match answer.verdict {
@@ -130,7 +132,7 @@ fn sizes(effect: &EffectAnswer) -> Vec<String> {
 }
 
 /// Where an effect acts, in words; empty when it acts everywhere.
-pub fn placed(place: &Place) -> String {
+pub fn placed(place: &Location) -> String {
     let mut parts = Vec::new();
     let listed = |all: Vec<String>| {
         let more = all.len().saturating_sub(PLACES_MAX);
@@ -191,34 +193,34 @@ mod tests {
     use crate::explain::stop_to_stop::StopToStop;
 
     #[test]
-    fn places_are_told_in_words() {
-        let tunnels = Place::of_intervals(vec![[5200.0, 6900.0], [8000.0, 8100.0]]);
+    fn places_are_reported_in_words() {
+        let tunnels = Location::of_intervals(vec![[5200.0, 6900.0], [8000.0, 8100.0]]);
         assert_eq!(placed(&tunnels), "from km 5.20 to 6.90 and from km 8.00 to 8.10");
         let curves: Vec<[f64; 2]> =
             (0..9).map(|k| [1e3 * f64::from(k), 1e3 * f64::from(k) + 300.0]).collect();
-        assert_eq!(placed(&Place::of_intervals(curves)), "at 9 places between km 0.00 and 8.30");
+        assert_eq!(placed(&Location::of_intervals(curves)), "at 9 places between km 0.00 and 8.30");
         let window = RunWindow { run: "runs/03.csv".into(), t_start_s: 204.0, t_end_s: 729.6 };
         let covariate = CovariateRange { name: "brake_force_n".into(), range: [1e3, 2.5e4] };
-        let place = Place {
+        let place = Location {
             windows: Some(vec![window]),
             speed_range_mps: Some([10.0, 12.5]),
             covariate: Some(covariate),
-            ..Place::default()
+            ..Location::default()
         };
         assert_eq!(
             placed(&place),
             "in runs/03.csv from 204 to 730 s, at 10.0 to 12.5 m/s, \
              while brake_force_n is 1000 to 25000"
         );
-        assert_eq!(placed(&Place::default()), "");
+        assert_eq!(placed(&Location::default()), "");
     }
 
     #[test]
-    fn an_effect_is_told_with_its_size_and_interval() {
+    fn an_effect_is_reported_with_its_size_and_interval() {
         let number = |value| [("force_n".to_string(), ParameterValue::Number(value))].into();
         let effect = EffectAnswer {
             kind: "dragging_brake",
-            place: Place { runs: Some(vec!["runs/02.csv".into()]), ..Place::default() },
+            place: Location { runs: Some(vec!["runs/02.csv".into()]), ..Location::default() },
             parameters: number(3058.6),
             std: number(107.5),
             p_value: 1e-9,
@@ -234,7 +236,7 @@ mod tests {
     fn effect(kind: &'static str, parameter: &str) -> EffectAnswer {
         EffectAnswer {
             kind,
-            place: Place::of_intervals(vec![[5200.0, 6900.0]]),
+            place: Location::of_intervals(vec![[5200.0, 6900.0]]),
             parameters: [(parameter.to_string(), ParameterValue::Number(2.5))].into(),
             std: [(parameter.to_string(), ParameterValue::Number(0.1))].into(),
             p_value: 1e-9,
@@ -244,9 +246,9 @@ mod tests {
     }
 
     /// An ambiguous answer.
-    fn ambiguous() -> Answer {
+    fn ambiguous() -> ExplainAnswer {
         let none = DavisDeviations { a: 0.0, b: 0.0, c: 0.0 };
-        Answer {
+        ExplainAnswer {
             verdict: Verdict::Ambiguous,
             statement: String::new(),
             notes: Vec::new(),
@@ -274,7 +276,7 @@ mod tests {
     }
 
     /// Errors over whole runs held out that grow.
-    fn grown_errors() -> Errors {
+    fn updated_errors() -> Errors {
         let value = |value| Estimate { value, interval: None };
         let pair = ErrorPair {
             before_mps: value(0.8),
@@ -294,8 +296,8 @@ mod tests {
     }
 
     #[test]
-    fn rivals_and_unknown_causes_are_told_apart_from_findings() {
-        let (mut answer, errors) = (ambiguous(), grown_errors());
+    fn rivals_and_unknown_causes_are_distinguished_from_findings() {
+        let (mut answer, errors) = (ambiguous(), updated_errors());
         let size = "from km 5.20 to 6.90 – extra resistance 2.50 N/kN (95 % interval 2.30 to 2.70)";
         let gained = "With it, the error of the predicted speed on the runs held out does not \
                       fall (from 0.800 to 0.900 m/s).";
@@ -319,7 +321,7 @@ mod tests {
 
     #[test]
     fn a_headline_states_the_error_from_stop_to_stop_where_there_are_stops() {
-        let mut errors = grown_errors();
+        let mut errors = updated_errors();
         // Stops that were cut off leave an error over whole runs that says nothing of the forces.
         errors.holdout_stop_to_stop = StopToStop::from_errors(vec![vec![[0.5, 0.06]; 3]; 4]);
         let said = sentence(&ambiguous(), &errors);

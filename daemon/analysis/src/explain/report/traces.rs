@@ -4,7 +4,7 @@ use dynocar_core::simulate::{Prediction, Restart};
 
 use crate::dataset::Role;
 use crate::explain::Explanation;
-use crate::explain::evidence::{Fit, GrownForces, RunData};
+use crate::explain::evidence::{Fit, RunData, UpdatedForces};
 use crate::explain::score::run_error;
 
 use super::panels::{Zones, zones};
@@ -61,7 +61,7 @@ pub fn traces(explanation: &Explanation) -> Vec<Trace> {
 
 /// Speeds of a run predicted open loop from its first sample to its last, anew from each standstill.
 pub(super) fn predicted(fit: &Fit, run: &RunData) -> Prediction {
-    let (mut forces, mut prediction) = (GrownForces::default(), Prediction::new());
+    let (mut forces, mut prediction) = (UpdatedForces::default(), Prediction::new());
     fit.model.forces(run, &fit.theta, &mut forces);
     prediction.simulate(&run.recording, &forces, Restart::AtDepartures);
     prediction

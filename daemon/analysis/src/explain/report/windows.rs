@@ -5,7 +5,7 @@
 //! resistance in N/kN that the model lacks there (positive retards).
 
 use crate::explain::Explanation;
-use crate::explain::evidence::{Bin, Fit, GrownForces, RunData};
+use crate::explain::evidence::{Bin, Fit, RunData, UpdatedForces};
 use crate::explain::selection::deviations;
 
 /// Bins of about 2 s in a window.
@@ -82,7 +82,7 @@ fn force_n_per_kn(run: &RunData, first: usize, end: usize, differences: &[f64]) 
 /// The resistance in N/kN that a model lacks, for each window of any run: first bin and the one past the
 /// last, and the resistance.
 pub(super) fn missing_resistance(fit: &Fit, run: &RunData) -> Vec<((usize, usize), f64)> {
-    let (mut forces, mut predicted) = (GrownForces::default(), Vec::new());
+    let (mut forces, mut predicted) = (UpdatedForces::default(), Vec::new());
     fit.model.predict_bins(run, &fit.theta, &mut forces, &mut predicted);
     let differences: Vec<f64> =
         run.bins.iter().zip(&predicted).map(|(bin, it)| bin.speed_mps - it).collect();
@@ -109,7 +109,7 @@ fn spans(bins: &[Bin]) -> Vec<(usize, usize)> {
 
 /// Change of the modelled speeds of a run's bins per unit of each parameter.
 fn columns(fit: &Fit, run: &RunData) -> Vec<Vec<f64>> {
-    let (mut forces, mut base, mut moved) = (GrownForces::default(), Vec::new(), Vec::new());
+    let (mut forces, mut base, mut moved) = (UpdatedForces::default(), Vec::new(), Vec::new());
     fit.model.predict_bins(run, &fit.theta, &mut forces, &mut base);
     let deviations = deviations(fit).std;
     (0..fit.theta.len())

@@ -3,7 +3,7 @@
 use super::price::at_bound;
 use super::search::{Outcome, Search, Trial};
 use crate::explain::effects::AtBound;
-use crate::explain::evidence::STRENGTH_MIN;
+use crate::explain::evidence::SCORE_MIN;
 
 /// Why an effect is not accepted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,7 +59,7 @@ impl Search<'_> {
             Some(Refusal::Chance)
         } else if !is_material(trial) {
             Some(Refusal::Immaterial)
-        } else if trial.strength() <= STRENGTH_MIN {
+        } else if trial.acceptance_score() <= SCORE_MIN {
             Some(Refusal::Weak(trial.reduction))
         } else {
             contradiction(trial)
@@ -70,11 +70,11 @@ impl Search<'_> {
 
     /// The greatest strength of the trials of the first round that only their strength may refuse:
     /// what is compared with its distribution where nothing acts.
-    pub fn greatest_strength(outcome: &Outcome) -> f64 {
+    pub fn greatest_score(outcome: &Outcome) -> f64 {
         let first = outcome.rounds.first().into_iter().flatten();
         first
             .filter(|trial| is_material(trial) && is_possible(trial))
-            .map(Trial::strength)
+            .map(Trial::acceptance_score)
             .fold(0.0, f64::max)
     }
 }

@@ -7,7 +7,7 @@ use super::acceptance::is_possible;
 use super::price::penalty;
 use super::search::{Outcome, STIFF, Search, Trial};
 use crate::explain::effects::{Effect, UNKNOWN, a_form_explains_more, leaves_a_force};
-use crate::explain::evidence::{EQUAL, Fit, STRENGTH_MIN};
+use crate::explain::evidence::{EQUAL, Fit, SCORE_MIN};
 use crate::explain::scan::Scan;
 use crate::explain::score::FitErrors;
 
@@ -24,10 +24,10 @@ impl Search<'_> {
     /// leaves a force that has some form.
     pub(super) fn asks_for_a_form(&self, scan: &Scan, trials: &[(Trial, &dyn Effect)]) -> bool {
         let best = best_possible(trials);
-        let explained = best.map_or(0.0, |best| best.advantage);
+        let explained = best.map_or(0.0, |best| best.bic_gain);
         let left = self.scan(best.map_or(scan.fit, |best| &best.fit));
         left.is_some_and(|left| leaves_a_force(&left))
-            || a_form_explains_more(scan, explained.max(STRENGTH_MIN))
+            || a_form_explains_more(scan, explained.max(SCORE_MIN))
     }
 
     /// Puts a form that the noise holds in the place of what was tried outside the library, where it
@@ -43,7 +43,7 @@ impl Search<'_> {
         }
         let Some(form) = self.form_that_noise_holds(base, trials) else { return };
         let own = trials.iter().find(|(trial, _)| is_unknown(trial.kind));
-        if own.is_none_or(|(own, _)| own.advantage < form.advantage) {
+        if own.is_none_or(|(own, _)| own.bic_gain < form.bic_gain) {
             trials.retain(|(trial, _)| !is_unknown(trial.kind));
             trials.push((form, UNKNOWN));
         }
@@ -64,7 +64,7 @@ impl Search<'_> {
             onto.cost - with.cost - penalty(&with, best.last())
         });
         let scan = self.scan(&onto)?;
-        a_form_explains_more(&scan, (COARSE_SHARE * explained).max(STRENGTH_MIN))
+        a_form_explains_more(&scan, (COARSE_SHARE * explained).max(SCORE_MIN))
             .then(|| self.look_again(base, noise, UNKNOWN))
             .flatten()
     }
@@ -96,6 +96,6 @@ impl Search<'_> {
 fn best_possible<'t>(trials: &'t [(Trial, &dyn Effect)]) -> Option<&'t Trial> {
     let trials = trials.iter().map(|(trial, _)| trial);
     let possible =
-        trials.filter(|it| it.advantage > 0.0 && it.kind != EffectKind::Unknown && is_possible(it));
-    possible.max_by(|one, other| one.advantage.total_cmp(&other.advantage))
+        trials.filter(|it| it.bic_gain > 0.0 && it.kind != EffectKind::Unknown && is_possible(it));
+    possible.max_by(|one, other| one.bic_gain.total_cmp(&other.bic_gain))
 }

@@ -11,7 +11,7 @@ use super::price::{at_bound, discounted, model_penalty, penalty};
 use super::steps::{Progress, Steps, round_share};
 use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal, UNKNOWN};
 use crate::explain::evidence::{
-    EQUAL, Fit, FitProblem, GrownModel, Noise, RunData, STRENGTH_MIN, strength,
+    EQUAL, Fit, FitProblem, Noise, RunData, SCORE_MIN, UpdatedModel, acceptance_score,
 };
 use crate::explain::scan::Scan;
 use crate::explain::score::{FitErrors, reduction};
@@ -25,7 +25,7 @@ const FINALIST_MIN: f64 = -20.0;
 const FINALIST_SHARE: f64 = 0.1;
 /// Kinds that take away this share of the open-loop error come before the others, and are all that is
 /// looked at again beyond this number of observations, where small things are significant.
-const FINALIST_REDUCTION: f64 = 0.02;
+const FINALIST_ERROR_REDUCTION: f64 = 0.02;
 const MANY_OBSERVATIONS: usize = 5_000;
 /// Shares of the slow part of a noise under which a kind looks again.
 pub(super) const STIFF: [f64; 2] = [0.01, 1e-4];
@@ -40,7 +40,7 @@ pub struct Trial {
     /// The fitted model; the candidate is its last effect.
     pub fit: Fit,
     /// Decrease of -2 log likelihood by it, less its price: what kinds are compared by.
-    pub advantage: f64,
+    pub bic_gain: f64,
     /// The same after the discount for errors that all runs share: what must be more than chance.
     pub evidence: f64,
     /// Share of the open-loop error that it takes away, of the fit runs and of each by what the others
@@ -55,8 +55,8 @@ impl Trial {
     }
 
     /// What decides.
-    pub fn strength(&self) -> f64 {
-        strength(self.evidence, self.reduction)
+    pub fn acceptance_score(&self) -> f64 {
+        acceptance_score(self.evidence, self.reduction)
     }
 }
 
@@ -120,7 +120,7 @@ impl Search<'_> {
     /// The declared model with a, b, c refitted, and no search for effects.
     pub fn base(&self) -> Outcome {
         (self.progress)(0.05, "fitting a, b, c");
-        let declared = GrownModel::default();
+        let declared = UpdatedModel::default();
         let start = self.problem.start(&[]);
         let first = self.problem.fit_with_noise(&declared, start, Noise::START);
         let base = self.problem.fit_with_noise(&declared, first.theta, first.noise);
@@ -163,7 +163,7 @@ impl Search<'_> {
         let strongest = accepted.first()?;
         accepted
             .iter()
-            .take_while(|trial| trial.advantage > strongest.advantage - EQUAL)
+            .take_while(|trial| trial.bic_gain > strongest.bic_gain - EQUAL)
             .filter(|trial| trial.kind != EffectKind::Unknown)
             .max_by(|one, other| one.reduction.total_cmp(&other.reduction))
             .or(Some(strongest))
@@ -175,21 +175,21 @@ impl Search<'_> {
         let Some(scan) = self.scan(base) else { return Vec::new() };
         let steps = Steps::of(self.progress, base.model.effects.len(), LIBRARY.len() + FINALISTS);
         let mut trials = self.try_all(base, &scan, &steps, not_testable);
-        let by_advantage = |one: &Trial, other: &Trial| other.advantage.total_cmp(&one.advantage);
+        let by_advantage = |one: &Trial, other: &Trial| other.bic_gain.total_cmp(&one.bic_gain);
         let before = FitErrors::of(self.problem, base);
         let reduction = |fit: &Fit| FitErrors::of(self.problem, fit).reduction_from(&before);
         trials
             .par_iter_mut()
-            .filter(|(trial, _)| trial.advantage > FINALIST_MIN)
+            .filter(|(trial, _)| trial.bic_gain > FINALIST_MIN)
             .for_each(|(trial, _)| trial.reduction = reduction(&trial.fit));
         // What takes nothing from the error comes last, and is no measure for the others.
-        let helps = |trial: &Trial| trial.reduction > FINALIST_REDUCTION;
-        let key = |trial: &Trial| (helps(trial), trial.advantage);
+        let helps = |trial: &Trial| trial.reduction > FINALIST_ERROR_REDUCTION;
+        let key = |trial: &Trial| (helps(trial), trial.bic_gain);
         trials.sort_by(|(one, _), (other, _)| {
             let (one, other) = (key(one), key(other));
             other.0.cmp(&one.0).then(other.1.total_cmp(&one.1))
         });
-        let greatest = trials.first().map_or(0.0, |(trial, _)| trial.advantage);
+        let greatest = trials.first().map_or(0.0, |(trial, _)| trial.bic_gain);
         let least = FINALIST_MIN.max(FINALIST_SHARE * greatest);
         let is_long = base.observations() > MANY_OBSERVATIONS;
         let mut finished: Vec<Trial> = trials
@@ -197,7 +197,7 @@ impl Search<'_> {
             .enumerate()
             .map(|(rank, (trial, effect))| {
                 let is_finalist =
-                    rank < FINALISTS && trial.advantage > least && (helps(&trial) || !is_long);
+                    rank < FINALISTS && trial.bic_gain > least && (helps(&trial) || !is_long);
                 if !is_finalist {
                     return trial;
                 }
@@ -260,7 +260,7 @@ impl Search<'_> {
             .into_par_iter()
             .map(|candidate| self.attempt(base, onto, candidate, own_noise))
             .collect();
-        attempts.into_iter().max_by(|one, other| one.advantage.total_cmp(&other.advantage))
+        attempts.into_iter().max_by(|one, other| one.bic_gain.total_cmp(&other.bic_gain))
     }
 
     /// A scan around a fit; `None` when the fit's information is singular.
@@ -286,7 +286,7 @@ impl Search<'_> {
         let last = fit.model.effects.len() - 1;
         let price = penalty(&fit, last);
         let evidence = discounted(&fit, last, decrease) - price;
-        Trial { kind, fit, advantage: decrease - price, evidence, reduction: 0.0 }
+        Trial { kind, fit, bic_gain: decrease - price, evidence, reduction: 0.0 }
     }
 
     /// Gives a trial the noise that remains under it and lets its kind look again for places and
@@ -309,7 +309,7 @@ impl Search<'_> {
             let found: Vec<Option<Trial>> =
                 looks.par_iter().map(|&noise| self.look_again(base, noise, effect)).collect();
             for again in found.into_iter().flatten() {
-                if again.advantage > best.advantage + 1.0 {
+                if again.bic_gain > best.bic_gain + 1.0 {
                     best = again;
                     is_better = true;
                 }
@@ -365,7 +365,7 @@ impl Search<'_> {
             let rest = self.without(fit, index);
             let evidence = Self::total(&rest) - Self::total(fit);
             let reduction = reduction(self.problem, &rest, fit);
-            if strength(evidence, reduction) < STRENGTH_MIN || at_bound(fit, index).is_some() {
+            if acceptance_score(evidence, reduction) < SCORE_MIN || at_bound(fit, index).is_some() {
                 *fit = rest;
             } else {
                 index += 1;

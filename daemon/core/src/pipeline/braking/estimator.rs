@@ -3,7 +3,7 @@
 use dynocar_shared::{Manoeuvre, ParameterSnapshot, PipelineKind, Reason, RejectionReason};
 
 use super::engine::{Engine, Estimate, Observation, Step};
-use super::intake::{BrakingIntake, Intake, Quantity};
+use super::intake::{BrakingCoefficient, BrakingIntake, Intake};
 use super::motion::StepInputs;
 use super::report::{self, Circumstances, ReportSettings};
 use crate::force::ResolvedSample;
@@ -18,7 +18,7 @@ const INNOVATION_MEMORY: u32 = 100;
 #[derive(Clone, Debug)]
 pub struct BrakingEstimator<E> {
     kind: PipelineKind,
-    quantity: Quantity,
+    quantity: BrakingCoefficient,
     intake: BrakingIntake,
     engine: E,
     report: ReportSettings,
@@ -43,7 +43,7 @@ impl<E: Engine> BrakingEstimator<E> {
     /// An estimator of one quantity.
     pub fn new(
         kind: PipelineKind,
-        quantity: Quantity,
+        quantity: BrakingCoefficient,
         intake: BrakingIntake,
         engine: E,
         report: ReportSettings,

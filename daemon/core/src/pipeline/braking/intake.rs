@@ -10,7 +10,7 @@ use crate::train::{Davis, TrainModel};
 
 /// The coefficient that is looked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
+pub enum BrakingCoefficient {
     /// Adhesion: brake force over weight.
     Adhesion,
     /// Disc friction, the declared braking ratio held.
@@ -115,7 +115,7 @@ impl Collected {
 /// Picks observations and collects the known motion between them.
 #[derive(Clone, Debug)]
 pub struct BrakingIntake {
-    quantity: Quantity,
+    quantity: BrakingCoefficient,
     settings: IntakeSettings,
     gear: Option<DeclaredGear>,
     resistance: Davis,
@@ -131,7 +131,7 @@ struct Braking {
 
 impl BrakingIntake {
     /// An intake for a train as declared.
-    pub fn new(quantity: Quantity, settings: IntakeSettings, train: &TrainModel) -> Self {
+    pub fn new(quantity: BrakingCoefficient, settings: IntakeSettings, train: &TrainModel) -> Self {
         let gear = DeclaredGear::of(&train.brake_gear);
         BrakingIntake { quantity, settings, gear, resistance: train.resistance, braking: None }
     }
@@ -197,9 +197,11 @@ impl BrakingIntake {
             return Ok(None);
         }
         let (gain_n, demand) = match (self.quantity, self.gear) {
-            (Quantity::Adhesion, _) => (weight_n, brake_force_n / weight_n),
-            (Quantity::Friction, Some(gear)) => (brake_force_n / gear.friction, gear.friction),
-            (Quantity::Ratio, Some(gear)) => (brake_force_n / gear.ratio, gear.ratio),
+            (BrakingCoefficient::Adhesion, _) => (weight_n, brake_force_n / weight_n),
+            (BrakingCoefficient::Friction, Some(gear)) => {
+                (brake_force_n / gear.friction, gear.friction)
+            }
+            (BrakingCoefficient::Ratio, Some(gear)) => (brake_force_n / gear.ratio, gear.ratio),
             (_, None) => return Err(Reason::MissingQuantity),
         };
         let per_n_per_kn = sample.weight_kn / inertial_mass_kg;
@@ -220,8 +222,8 @@ impl BrakingIntake {
             .zip(sample.brake_cylinder_pressure_pa)
             .map(|(gear, pressure_pa)| gear.declared_force_n(pressure_pa));
         match self.quantity {
-            Quantity::Adhesion => by_pressure.or(sample.brake_force_n),
-            Quantity::Friction | Quantity::Ratio => by_pressure,
+            BrakingCoefficient::Adhesion => by_pressure.or(sample.brake_force_n),
+            BrakingCoefficient::Friction | BrakingCoefficient::Ratio => by_pressure,
         }
     }
 }

@@ -4,7 +4,7 @@ use dynocar_shared::{Parameter, ParameterSnapshot, Reason, Status};
 use nalgebra::{Matrix1, Matrix2, SVector};
 
 use super::engine::Estimate;
-use super::intake::Quantity;
+use super::intake::BrakingCoefficient;
 use crate::pipeline::judge::Case;
 use crate::pipeline::output::{write_parameters, write_status};
 
@@ -59,7 +59,7 @@ pub fn is_rail_limited(estimate: &Estimate, demand_relative_std: f64) -> bool {
 /// Allocates nothing.
 pub fn write(
     snapshot: &mut ParameterSnapshot,
-    quantity: Quantity,
+    quantity: BrakingCoefficient,
     settings: &ReportSettings,
     estimate: Option<&Estimate>,
     circumstances: &Circumstances,
@@ -69,13 +69,13 @@ pub fn write(
         write_status(snapshot, (Status::Unestimated, circumstances.reason));
         return;
     };
-    let is_number =
-        quantity != Quantity::Adhesion || is_rail_limited(estimate, settings.demand_relative_std);
+    let is_number = quantity != BrakingCoefficient::Adhesion
+        || is_rail_limited(estimate, settings.demand_relative_std);
     let parameter = match quantity {
-        Quantity::Adhesion if is_number => Parameter::Adhesion,
-        Quantity::Adhesion => Parameter::AdhesionLowerBound,
-        Quantity::Friction => Parameter::DiscFriction,
-        Quantity::Ratio => Parameter::BrakingRatio,
+        BrakingCoefficient::Adhesion if is_number => Parameter::Adhesion,
+        BrakingCoefficient::Adhesion => Parameter::AdhesionLowerBound,
+        BrakingCoefficient::Friction => Parameter::DiscFriction,
+        BrakingCoefficient::Ratio => Parameter::BrakingRatio,
     };
     write_values(snapshot, parameter, settings.has_law_scale && is_number, estimate);
     let case = case(quantity, settings, is_number, estimate, circumstances);
@@ -109,7 +109,7 @@ fn write_values(
 }
 
 fn case(
-    quantity: Quantity,
+    quantity: BrakingCoefficient,
     settings: &ReportSettings,
     is_number: bool,
     estimate: &Estimate,
@@ -136,8 +136,8 @@ fn case(
         // Only friction times ratio acts on the train, and the other factor is held as declared:
         // who reckons with both has the force that acts.
         remark: match quantity {
-            Quantity::Adhesion => Reason::None,
-            Quantity::Friction | Quantity::Ratio => Reason::NotIdentifiable,
+            BrakingCoefficient::Adhesion => Reason::None,
+            BrakingCoefficient::Friction | BrakingCoefficient::Ratio => Reason::NotIdentifiable,
         },
     }
 }

@@ -60,7 +60,7 @@ impl InputHealth {
     }
 
     /// What is wrong with the input, if anything.
-    pub fn complaint(&self) -> Option<Reason> {
+    pub fn input_doubt(&self) -> Option<Reason> {
         let is_starved = self.used == 0 && self.want.is_some();
         (is_starved || self.refused_share > BAD_SHARE)
             .then(|| self.want.unwrap_or(Reason::BadInput))

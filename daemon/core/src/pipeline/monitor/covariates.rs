@@ -6,7 +6,7 @@ use super::place_memory::PlaceMemory;
 use super::suspects::{COVARIATES, covariate};
 use crate::force::ResolvedSample;
 use crate::pipeline::resistance::sample::UnitSample;
-use crate::terms::Seen;
+use crate::terms::SuspectInput;
 use crate::train::Davis;
 
 /// One value for each column that comes from samples.
@@ -40,7 +40,7 @@ pub fn covariates(
 ) -> Covariates {
     let earlier = sample.position_m.map(|m| places.earlier(m, sample.direction));
     let earlier = earlier.unwrap_or_default();
-    let seen = Seen {
+    let seen = SuspectInput {
         speed_mps: sample.speed_mps,
         direction: sample.direction,
         curvature_per_m: sample.curvature_per_m,

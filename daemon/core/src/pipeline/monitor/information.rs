@@ -280,7 +280,7 @@ mod tests {
     use crate::pipeline::resistance::regression::TRACTION_SCALE;
 
     #[test]
-    fn what_another_suspect_explains_is_not_found_beside_it_and_what_it_does_not_is() {
+    fn what_another_suspect_explains_is_not_found_next_to_it_and_what_it_does_not_is() {
         let [one, two] = [BASE, BASE + 1];
         let mut information = Information::new(&BaseVector::repeat(1.0));
         for row in 0..400 {

@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn evidence_must_last_and_a_close_rival_is_told() {
+    fn evidence_must_last_and_a_close_rival_is_reported() {
         let mut naming = Naming::new(25.0);
         after(&mut naming, 1, &[(DELAY, 30.0)]);
         assert_eq!(naming.named(), None, "a block is no evidence that lasts");
@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_force_is_told_beside_what_is_not_known_until_it_has_lasted() {
+    fn a_constant_force_is_reported_next_to_what_is_not_known_until_it_has_lasted() {
         let mut naming = Naming::new(25.0);
         let mut onsets = Onsets::new();
         onsets.open(None);

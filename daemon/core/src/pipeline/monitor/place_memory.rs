@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn both_directions_tell_a_resistance_from_a_wrong_gradient() {
+    fn both_directions_show_a_resistance_from_a_wrong_gradient() {
         for (back_n_per_kn, expected) in [(2.0, (2.0, 0.0)), (-2.0, (0.0, 2.0))] {
             let mut memory = PlaceMemory::new();
             memory.push(700.0, 1.0, 2.0);

@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn fixes_tell_the_scale_of_the_speed_in_both_directions() {
+    fn fixes_show_the_scale_of_the_speed_in_both_directions() {
         for scale in [0.98, 1.012, 1.02] {
             let (error, evidence) = driven(scale, true, |_| 0.0).evidence(LEAST);
             assert!((error + 1.0 - scale).abs() < 1e-3, "{scale}: {error}");

@@ -18,7 +18,7 @@ const CLIP_DEVIATIONS: f64 = 5.0;
 /// product of two that follow each other has the mean `-R`, whatever slow scale or drift there is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PositionNoise {
-    last: Option<Seen>,
+    last: Option<PositionPair>,
     rest_m: Option<f64>,
     variance_m2: f64,
     square_m2: f64,
@@ -26,7 +26,7 @@ pub struct PositionNoise {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Seen {
+struct PositionPair {
     stretch: u32,
     time_ns: i64,
     along_m: f64,
@@ -44,7 +44,7 @@ impl PositionNoise {
             (self.last, self.rest_m) = (None, None);
             return;
         };
-        let now = Seen {
+        let now = PositionPair {
             stretch: sample.stretch,
             time_ns: sample.time_ns,
             along_m: sample.direction * position_m,
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn white_noise_is_found_beside_a_wrong_scale_and_a_jump() {
+    fn white_noise_is_found_next_to_a_wrong_scale_and_a_jump() {
         assert!((learned(0.5, 0.0) - 0.5).abs() < 0.08);
         assert!((learned(3.0, 0.01) - 3.0).abs() < 0.5);
         assert_eq!(learned(0.05, 0.002), 0.1, "no better than declared");

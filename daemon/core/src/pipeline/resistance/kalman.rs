@@ -36,9 +36,9 @@ const FORCE_RATE_MEMORY_S: f64 = 0.5;
 /// Samples that the innovation statistics look back over.
 const MONITOR_SAMPLES: u32 = 600;
 /// Standard deviations beyond which a speed speaks against the filter.
-const ASTRAY_BEYOND: f64 = 3.0;
+const OUTLIER_BEYOND: f64 = 3.0;
 /// After so many of them in a row on one side, each no spike, it is the filter that is wrong.
-const ASTRAY_MAX: i32 = 10;
+const CONSECUTIVE_OUTLIERS_MAX: i32 = 10;
 
 /// Davis coefficients by a robust Kalman filter with a disturbance state.
 #[derive(Clone, Debug)]
@@ -57,7 +57,7 @@ pub struct ResistanceKalman {
     /// How far the speed moved in the newest step, in m/s.
     moved_mps: f64,
     /// Speeds in a row that speak against the filter, with the sign of their side.
-    astray: i32,
+    consecutive_outliers: i32,
     monitor: InnovationMonitor,
     report: Report,
     resets: u64,
@@ -81,7 +81,7 @@ impl ResistanceKalman {
             noise: beside.bank.likeliest_noise(),
             force_rate: 0.0,
             moved_mps: 0.0,
-            astray: 0,
+            consecutive_outliers: 0,
             monitor: InnovationMonitor::new(MONITOR_SAMPLES),
             report: *beside.report(),
             resets: 0,
@@ -101,7 +101,7 @@ impl ResistanceKalman {
         self.decay(gap_s.unwrap_or(f64::INFINITY));
         self.monitor.break_here();
         self.last = Some(*now);
-        self.astray = 0;
+        self.consecutive_outliers = 0;
     }
 
     /// The disturbance after a time without a sight of it.
@@ -186,8 +186,8 @@ impl ResistanceKalman {
             self.monitor.push((square * weight).sqrt().copysign(innovation.value));
         }
         let side = if innovation.value > 0.0 { 1 } else { -1 };
-        self.astray = match square > ASTRAY_BEYOND * ASTRAY_BEYOND {
-            true if self.astray * side > 0 => self.astray + side,
+        self.consecutive_outliers = match square > OUTLIER_BEYOND * OUTLIER_BEYOND {
+            true if self.consecutive_outliers * side > 0 => self.consecutive_outliers + side,
             true => side,
             false => 0,
         };
@@ -197,7 +197,7 @@ impl ResistanceKalman {
     /// Starts anew at a sample with what the least squares beside have learned: weighing by
     /// Student's t, a filter far from the speeds would never come back to them.
     fn recover(&mut self, now: &UnitSample) {
-        self.astray = 0;
+        self.consecutive_outliers = 0;
         let known = self.beside.bank.likeliest_solution().filter(|_| self.beside.is_warm());
         let disturbance = *self.filter.mean.fixed_rows::<1>(DISTURBANCE).as_scalar();
         let variance = self.filter.covariance[(DISTURBANCE, DISTURBANCE)];
@@ -362,7 +362,7 @@ impl Estimator for ResistanceKalman {
                 self.propagate(&before, &now);
                 if !self.correct(&before, &now) {
                     self.reset();
-                } else if self.astray.abs() >= ASTRAY_MAX {
+                } else if self.consecutive_outliers.abs() >= CONSECUTIVE_OUTLIERS_MAX {
                     self.recover(&now);
                 } else {
                     self.last = Some(now);

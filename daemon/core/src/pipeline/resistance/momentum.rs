@@ -13,7 +13,7 @@ use super::regression::{
 };
 use super::sample::{SpeedWatch, UnitSample, resistance_integral, trapezoids};
 use super::settings::DataSettings;
-use crate::filter::Line;
+use crate::filter::FittedLine;
 use crate::pipeline::motion::{SpeedNoise, jump_variance};
 use crate::train::Davis;
 
@@ -29,7 +29,7 @@ struct Block {
     speed_sum: f64,
     integral_sum: Columns,
     /// The speed less what the forces explain, over time: its scatter is noise.
-    rest: Line,
+    rest: FittedLine,
     edge_variance: f64,
     speed_min_mps: f64,
     speed_max_mps: f64,
@@ -183,7 +183,7 @@ impl Block {
             start_s,
             speed_sum: 0.0,
             integral_sum: Columns::zeros(),
-            rest: Line::default(),
+            rest: FittedLine::default(),
             edge_variance: 0.0,
             speed_min_mps: f64::INFINITY,
             speed_max_mps: 0.0,
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_stretch_of_motion_starts_a_new_chain() {
+    fn a_new_segment_of_motion_starts_a_new_chain() {
         let mut samples = driven(&DAVIS, 25.0, 0.0, 0.2);
         for sample in &mut samples[150..] {
             sample.stretch = 2;

@@ -136,7 +136,7 @@ fn the_unexplained_force_follows_a_dragging_brake() {
 }
 
 #[test]
-fn cruising_tells_the_resistance_there_and_says_what_is_missing() {
+fn cruising_shows_the_resistance_there_and_says_what_is_missing() {
     let scenario = Scenario { is_coasting_only: true, ..Scenario::default() };
     let davis = scenario.davis;
     let mut samples = scenario.samples();

@@ -94,13 +94,13 @@ fn where_many_forces_stand_alone_none_is_taken_until_they_are_steady() {
     let mut gate = SampleGate::default();
     let early = taken(&mut gate, &samples[..500]);
     assert!(gate.is_in_doubt() && early.len() < 40, "{}", early.len());
-    assert_eq!(gate.complaint(), Some(Reason::BadInput));
+    assert_eq!(gate.input_doubt(), Some(Reason::BadInput));
     let late = taken(&mut gate, &samples[500..]);
     assert!(!gate.is_in_doubt() && late.len() > 150, "{}", late.len());
 }
 
 #[test]
-fn what_a_moving_train_repeats_place_and_all_tells_nothing() {
+fn what_a_moving_train_repeats_place_and_all_shows_nothing() {
     let mut samples = samples(&[40.0; 60]);
     let held = samples[10];
     let frozen = |samples: &mut [ResolvedSample]| {

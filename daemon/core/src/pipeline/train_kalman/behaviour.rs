@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_force_beside_an_error_of_the_map_has_variance_and_correlation_of_their_sum() {
+    fn a_force_next_to_an_error_of_the_map_has_variance_and_correlation_of_their_sum() {
         let force =
             Behaviour { std_n_per_kn: 0.1, time_s: 60.0, is_of_line: false, log_prior: 0.0 };
         let (keep, variance) = force.over(0.5, 5.0, 0.2);

@@ -276,15 +276,15 @@ impl TrainKalman {
     }
 
     /// What is wrong with the samples lately.
-    fn complaint(&self) -> Option<Reason> {
-        self.health.complaint().or(self.gate.complaint())
+    fn input_doubt(&self) -> Option<Reason> {
+        self.health.input_doubt().or(self.gate.input_doubt())
     }
 
     fn case(&self) -> Case {
         let failure = (Status::Invalid, Reason::NumericalFailure);
         Case {
             fault: self.is_fresh_reset.then_some(failure),
-            input: self.complaint(),
+            input: self.input_doubt(),
             is_ready: self.moved_s >= self.moved_min_s.min(MASS_MOVED_MIN_S),
             is_known: self.known_now() == COMPLETE,
             lacking: Status::Unestimated,
@@ -343,7 +343,7 @@ impl Estimator for TrainKalman {
     /// Before all is known, the status does not show what speaks against the part that is.
     fn known(&self, status: Status) -> u32 {
         let is_sound = matches!(status, Status::Estimated | Status::Unestimated)
-            && self.complaint().is_none()
+            && self.input_doubt().is_none()
             && self.contradiction().is_none();
         if is_sound { self.known_now() } else { 0 }
     }

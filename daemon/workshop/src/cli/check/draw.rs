@@ -8,7 +8,7 @@ use super::Understood;
 use crate::report::plots::speeds::Width;
 use crate::report::plots::{as_file, effort, line};
 use dynocar::cli::Failure;
-use dynocar::output::{tell, write_in_folder};
+use dynocar::output::{report_line, write_in_folder};
 
 /// Draws the line's profile and the train's effort curves into a folder, as far as they are known.
 ///
@@ -34,14 +34,14 @@ pub(super) fn draw(understood: &Understood, folder: &Path) -> Result<(), Failure
     let effort = train.map(effort::draw).transpose().map_err(failed)?.flatten();
     let drawn = [("line.svg", line), ("effort.svg", effort)];
     if drawn.iter().all(|(_, plot)| plot.is_none()) {
-        tell(
+        report_line(
             "nothing drawn: no gradient, curves or permitted speed of a line, no effort of a train",
         );
     }
     for (name, plot) in drawn {
         if let Some(plot) = plot {
             let path = write_in_folder(folder, name, &as_file(&plot))?;
-            tell(&format!("drawn: {}", path.display()));
+            report_line(&format!("drawn: {}", path.display()));
         }
     }
     Ok(())

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use dynocar_analysis::dataset::{
-    ColumnMapping, DatasetError, DatasetHead, ForceSource, GradientSource, Manifest,
-    PositionSource, Quantity, Remark, Role, Run, RunEntry, RunQuality, TimeFormat,
+    ColumnMapping, DatasetError, DatasetHead, Diagnostic, ForceSource, GradientSource, Manifest,
+    PositionSource, Quantity, Role, Run, RunEntry, RunQuality, TimeFormat,
 };
 use dynocar_core::terms::extra::Extra;
 use dynocar_core::track::{LinearProfile, Track};
@@ -73,7 +73,7 @@ enum RunOutcome<'a> {
         traction_source: ForceSource,
         brake_source: ForceSource,
         quality: &'a RunQuality,
-        remarks: &'a [Remark],
+        remarks: &'a [Diagnostic],
     },
     Failed {
         error: String,

@@ -2,10 +2,10 @@
 
 use dynocar_analysis::dataset::quality::{QuantityCount, ReasonCount};
 use dynocar_analysis::dataset::{
-    DatasetError, ForceSource, GradientSource, Manifest, Note, PositionSource, Quantity, Remark,
-    Role, Run, is_parquet,
+    DatasetError, Diagnostic, ForceSource, GradientSource, Manifest, Note, PositionSource,
+    Quantity, Role, Run, is_parquet,
 };
-use dynocar_core::plausibility::Slip;
+use dynocar_core::plausibility::InputFault;
 
 use crate::cli::text::{TextTable, WIDTH, short, wrap};
 use crate::run_facts::{mass_t, recorded, recorded_in_words};
@@ -171,7 +171,7 @@ fn notes(manifest: &Manifest, runs: &[Read], of_dataset: &[Note]) -> String {
         let run = runs.iter().flatten().find(|run| run.file == *file);
         run.map_or_else(String::new, |run| run.number.to_string())
     };
-    let is_slip = |note: &&Note| Slip::ALL.iter().any(|slip| slip.name() == note.code);
+    let is_slip = |note: &&Note| InputFault::ALL.iter().any(|slip| slip.name() == note.code);
     let told_first = of_dataset.iter().filter(|note| note.runs.is_empty() || is_slip(note));
     let mut notes: Vec<(String, Vec<String>)> = told_first
         .map(|note| (note.text.clone(), note.runs.iter().map(number).collect()))
@@ -247,7 +247,8 @@ fn notes_on(manifest: &Manifest, run: &Run) -> Vec<String> {
     if !quality.order.is_regular {
         notes.push("the time step varies, so that missing rows cannot be counted".into());
     }
-    let by_run = run.remarks.iter().filter(|remark| !matches!(remark, Remark::Slip { .. }));
+    let by_run =
+        run.remarks.iter().filter(|remark| !matches!(remark, Diagnostic::InputFault { .. }));
     notes.extend(by_run.map(ToString::to_string));
     notes
 }

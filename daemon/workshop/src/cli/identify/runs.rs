@@ -58,14 +58,14 @@ impl RunAnswer {
 }
 
 /// A column of a run table: its title, and each run's value with its standard deviation.
-struct Quantity {
+struct RunColumn {
     title: String,
     /// The speed in m/s at which it is.
     at_mps: Option<f64>,
     by_run: Vec<Option<(f64, f64)>>,
 }
 
-impl Quantity {
+impl RunColumn {
     /// The title for people, with a speed in their unit.
     fn shown(&self, speed_unit: Unit) -> String {
         let at = |speed_mps| short(speed_unit.from_base(speed_mps), 1);
@@ -99,7 +99,7 @@ fn spread<'a>(estimates: impl Iterator<Item = &'a (f64, f64)> + Clone) -> Option
 }
 
 /// The parameters of an estimator by its place, and the resistance at a speed that all runs drove.
-fn quantities(runs: &[RunAnswer], place: usize) -> Vec<Quantity> {
+fn quantities(runs: &[RunAnswer], place: usize) -> Vec<RunColumn> {
     let answers: Vec<&EstimatorAnswer> = runs.iter().map(|run| &run.estimators[place]).collect();
     let known = |value: &dyn Fn(&EstimatorAnswer) -> Option<(f64, f64)>| -> Vec<_> {
         answers
@@ -112,9 +112,9 @@ fn quantities(runs: &[RunAnswer], place: usize) -> Vec<Quantity> {
     };
     let names = answers.iter().flat_map(|answer| answer.values.keys());
     let names: std::collections::BTreeSet<&str> = names.copied().collect();
-    let mut quantities: Vec<Quantity> = names
+    let mut quantities: Vec<RunColumn> = names
         .into_iter()
-        .map(|name| Quantity {
+        .map(|name| RunColumn {
             title: name.into(),
             at_mps: None,
             by_run: known(&|answer| Some((*answer.values.get(name)?, *answer.std.get(name)?))),
@@ -126,7 +126,7 @@ fn quantities(runs: &[RunAnswer], place: usize) -> Vec<Quantity> {
             Some((point.w0_n_per_kn, point.std))
         };
         let (title, at_mps) = (format!("w0 at {speed_mps} m/s"), Some(speed_mps));
-        quantities.push(Quantity { title, at_mps, by_run: known(&at) });
+        quantities.push(RunColumn { title, at_mps, by_run: known(&at) });
     }
     quantities
 }
@@ -216,7 +216,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_spread_tells_scatter_between_runs_from_their_own_intervals() {
+    fn a_spread_shows_scatter_between_runs_from_their_own_intervals() {
         let found = spread([(1.0, 0.3), (2.0, 0.4), (3.0, 0.5)].iter()).unwrap();
         assert_eq!((found.runs, found.mean, found.std_between), (3, 2.0, 1.0));
         assert!((found.std_stated - (0.5_f64 / 3.0).sqrt()).abs() < 1e-12);

@@ -1,6 +1,6 @@
 //! What was imported as the texts of `train.toml` and `track.toml`.
 
-use dynocar_analysis::import::{Account, ImportedLine, ImportedTrain, Remark};
+use dynocar_analysis::import::{Account, FieldOutcome, ImportedLine, ImportedTrain};
 use toml::Value;
 
 use crate::cli::text::comment;
@@ -35,7 +35,7 @@ pub fn train(train: &ImportedTrain, told: &TrainArguments) -> Result<TrainText, 
 /// From which field a key is.
 fn origin(account: &Account, wanted: &str) -> String {
     let fields = account.remarks().iter().filter_map(|remark| match remark {
-        Remark::Taken { field, key, .. } if key.split(", ").any(|key| key == wanted) => {
+        FieldOutcome::Taken { field, key, .. } if key.split(", ").any(|key| key == wanted) => {
             Some(field.as_str())
         }
         _ => None,
@@ -52,7 +52,7 @@ pub fn track(line: &ImportedLine) -> String {
     );
     let mut head = comment("", &words);
     for remark in line.account.remarks() {
-        if let Remark::Unknown { key, why } = remark {
+        if let FieldOutcome::Unknown { key, why } = remark {
             head += &comment("  ", &format!("{key} is not known: {why}."));
         }
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use dynocar_analysis::dataset::Note;
-use dynocar_analysis::import::{Account, ImportedLine, ImportedTrain, Remark};
+use dynocar_analysis::import::{Account, FieldOutcome, ImportedLine, ImportedTrain};
 
 use crate::cli::text::{TextTable, entry, for_shell, notes, on_one_line};
 use crate::cli::train_text::TrainText;
@@ -46,13 +46,13 @@ fn account(account: &Account) -> String {
     let mut rest = String::new();
     for remark in account.remarks() {
         match remark {
-            Remark::Taken { field, key, how } => {
+            FieldOutcome::Taken { field, key, how } => {
                 table.push(vec![on_one_line(field), (*key).into(), on_one_line(how)]);
             }
-            Remark::Left { field, why } => {
+            FieldOutcome::Left { field, why } => {
                 rest += &entry("  ", &on_one_line(&format!("not taken: '{field}': {why}")));
             }
-            Remark::Unknown { key, why } => {
+            FieldOutcome::Unknown { key, why } => {
                 rest += &entry("  ", &on_one_line(&format!("not in the file: {key}: {why}")));
             }
         }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use dynocar_analysis::dataset::Quantity;
-use dynocar_analysis::dataset::guess::Told;
+use dynocar_analysis::dataset::guess::GivenColumn;
 use dynocar_core::units::Unit;
 
 use crate::cli::train_text::TrainArguments;
@@ -27,7 +27,7 @@ pub struct InitArguments {
     pub csv: Vec<PathBuf>,
     /// Say what a column holds, as speed=v_ist:km/h; may be given several times
     #[arg(long, value_name = "QUANTITY=COLUMN[:UNIT]", value_parser = told)]
-    pub column: Vec<Told>,
+    pub column: Vec<GivenColumn>,
     #[command(flatten)]
     pub train: TrainArguments,
 }
@@ -45,7 +45,7 @@ fn nobody_is_there() -> bool {
 }
 
 /// What somebody says of a column: `QUANTITY=COLUMN` or `QUANTITY=COLUMN:UNIT`.
-fn told(text: &str) -> Result<Told, String> {
+fn told(text: &str) -> Result<GivenColumn, String> {
     let expected = "expected QUANTITY=COLUMN or QUANTITY=COLUMN:UNIT, as speed=v_ist:km/h";
     let (name, rest) = text.split_once('=').ok_or(expected)?;
     let names = || Quantity::ALL.map(Quantity::name).join(", ");
@@ -60,7 +60,7 @@ fn told(text: &str) -> Result<Told, String> {
     if column.trim().is_empty() {
         return Err(expected.into());
     }
-    Ok(Told { quantity, column: column.trim().into(), unit })
+    Ok(GivenColumn { quantity, column: column.trim().into(), unit })
 }
 
 #[cfg(test)]
@@ -68,10 +68,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_column_is_told_with_or_without_its_unit() {
+    fn a_column_is_reported_with_or_without_its_unit() {
         let kmh = Unit::find(Quantity::Speed.dimension(), "km/h");
-        let speed =
-            |column: &str, unit| Told { quantity: Quantity::Speed, column: column.into(), unit };
+        let speed = |column: &str, unit| GivenColumn {
+            quantity: Quantity::Speed,
+            column: column.into(),
+            unit,
+        };
         assert_eq!(told("speed=v_ist:km/h"), Ok(speed("v_ist", kmh)));
         assert_eq!(told("speed=v_ist"), Ok(speed("v_ist", None)));
         assert_eq!(told("speed=MVB:v=1:km/h"), Ok(speed("MVB:v=1", kmh)));

@@ -40,7 +40,7 @@ mod tests {
     use dynocar::config::DaemonConfig;
 
     #[test]
-    fn the_configuration_is_the_shipped_one_for_the_train_beside_it() {
+    fn the_configuration_is_the_shipped_one_for_the_train_next_to_it() {
         for (shipped, _) in REPLACED {
             assert_eq!(SHIPPED.matches(shipped).count(), 1, "{shipped}");
         }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use dynocar_analysis::dataset::Place;
+use dynocar_analysis::dataset::SourcePosition;
 use dynocar_analysis::dataset::encoding::{decoded, guessed};
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
@@ -48,7 +48,7 @@ pub fn texts(paths: &[PathBuf]) -> Result<Letters, Failure> {
                 own.name(),
                 encoding.name()
             );
-            return Err(Failure::At(Place::whole(&label), words));
+            return Err(Failure::At(SourcePosition::whole(&label), words));
         }
         let text = decoded(bytes, encoding).map_err(|problem| file_error(&label, problem))?;
         texts.push((label, text));

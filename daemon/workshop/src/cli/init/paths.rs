@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use dynocar_analysis::dataset::Place;
+use dynocar_analysis::dataset::SourcePosition;
 
 use crate::paths::{self, real};
 use dynocar::cli::Failure;
@@ -18,7 +18,7 @@ pub fn from_folder(folder: &Path, files: &[PathBuf]) -> Result<Vec<String>, Fail
     for file in files {
         let refuse = |words: &str| {
             let label = file.display().to_string();
-            Failure::At(Place::whole(&label), format!("{label}: {words}"))
+            Failure::At(SourcePosition::whole(&label), format!("{label}: {words}"))
         };
         let full = real(file);
         if seen.contains(&full) {

@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn labels_have_the_decimals_that_tell_them_apart() {
+    fn labels_have_the_decimals_that_show_them_apart() {
         let axis = |range| Axis { range, title: "", labels: 5, is_whole: false };
         assert_eq!(decimals(&axis([0.0, 1000.0])), 0);
         assert_eq!(decimals(&axis([0.0, 5.0])), 0);

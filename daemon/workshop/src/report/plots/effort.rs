@@ -20,7 +20,7 @@ const SPEED_MPS: f64 = 40.0;
 const POINTS: u32 = 100;
 
 /// A curve of (km/h, kN) with its name and colour.
-type Line = (&'static str, RGBColor, Vec<(f64, f64)>);
+type NamedCurve = (&'static str, RGBColor, Vec<(f64, f64)>);
 
 /// The curves as SVG; `None` for a train without any.
 ///
@@ -32,7 +32,7 @@ pub fn draw(train: &TrainModel) -> Result<Option<String>, PlotError> {
         return Ok(None);
     }
     let top_mps = train.speed_max_mps().filter(|top| *top > 0.0).unwrap_or(SPEED_MPS);
-    let mut lines: Vec<Line> = Vec::new();
+    let mut lines: Vec<NamedCurve> = Vec::new();
     for (name, colour, curve) in
         [("traction", AFTER, &train.traction), ("brake", BEFORE, &train.brake)]
     {
@@ -98,7 +98,7 @@ mod tests {
         rotating_mass_factor = 0.1\n[resistance]\na = 1\nb = 0.01\nc = 0.001\n";
 
     #[test]
-    fn effort_and_resistance_are_drawn_and_told() {
+    fn effort_and_resistance_are_drawn_and_reported() {
         let text = format!(
             "{TRAIN}[traction]\neffort = [[0, 80.0], [25.0, 30.0]]\n[brake]\nmax_force_kn = 90\n"
         );

@@ -1,6 +1,6 @@
 //! What else was considered, and why it lost.
 
-use dynocar_analysis::explain::evidence::STRENGTH_MIN;
+use dynocar_analysis::explain::evidence::SCORE_MIN;
 use dynocar_analysis::explain::identifiability::not_held;
 
 use super::Section;
@@ -40,7 +40,7 @@ pub fn section(subject: &Subject) -> Section {
         "<p>Every kind of the library was fitted together with a, b and c. Evidence is the \
          decrease of −2 log likelihood less the price of the parameters and of the structures \
          that were tried; times the square of the share of the error that it takes away, of runs \
-         that were fitted and of runs left out of the fit, it must exceed {STRENGTH_MIN:.0}, and the effect \
+         that were fitted and of runs left out of the fit, it must exceed {SCORE_MIN:.0}, and the effect \
          must be large enough to matter. ‘Alone’ is on top of a, b and c only.</p>\n"
     );
     if subject.data.candidates.is_empty() {

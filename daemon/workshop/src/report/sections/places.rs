@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn runs_are_told_apart_by_how_surely_the_effect_acts_in_them() {
+    fn runs_are_distinguished_by_how_surely_the_effect_acts_in_them() {
         let runs = [("1.csv", 1.0), ("2.csv", 0.0), ("3.csv", 0.6), ("<4>.csv", 0.999)];
         let runs = runs.map(|(run, known)| (run.to_string(), known)).to_vec();
         assert_eq!(

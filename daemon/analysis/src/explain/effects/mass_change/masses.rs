@@ -6,7 +6,7 @@ use dynocar_core::terms::{Entry, Parameter, masses};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::parts::Part;
-use crate::explain::answer::{MassSection, MassWindow, ParameterValue, Place, RunWindow};
+use crate::explain::answer::{Location, MassSection, MassWindow, ParameterValue, RunWindow};
 use crate::explain::effects::{Hypothesis, ReportContext, Reported, SharedHypothesis};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{Axis, End, Reach};
@@ -123,7 +123,7 @@ impl Hypothesis for Masses {
         is_free.then(|| Arc::new(moved) as SharedHypothesis)
     }
 
-    fn place(&self) -> Place {
+    fn place(&self) -> Location {
         let windows: Vec<RunWindow> = self
             .parts
             .iter()
@@ -144,10 +144,10 @@ impl Hypothesis for Masses {
                 Part::Window { .. } => None,
             })
             .collect();
-        Place {
+        Location {
             windows: (!windows.is_empty()).then_some(windows),
             intervals_m: (!intervals.is_empty()).then_some(intervals),
-            ..Place::default()
+            ..Location::default()
         }
     }
 

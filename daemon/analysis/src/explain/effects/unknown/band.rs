@@ -10,7 +10,7 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::band_axis::{AXES, BandAxis};
 use super::outside::OUTSIDE_COST;
-use crate::explain::answer::{CovariateRange, Place};
+use crate::explain::answer::{CovariateRange, Location};
 use crate::explain::effects::{Candidate, Hypothesis, SharedHypothesis};
 use crate::explain::evidence::{Bin, RunData, SampleForces};
 use crate::explain::places::{Axis, End, MAP_ERROR_PERMILLE, Reach};
@@ -244,8 +244,8 @@ impl Hypothesis for Band {
         (low < high).then(|| Arc::new(Band { low, high, ..self.clone() }) as SharedHypothesis)
     }
 
-    fn place(&self) -> Place {
-        let mut place = Place::default();
+    fn place(&self) -> Location {
+        let mut place = Location::default();
         match self.axis {
             BandAxis::Of(Covariate::Speed) => place.speed_range_mps = Some([self.low, self.high]),
             BandAxis::Of(Covariate::Chainage) => {

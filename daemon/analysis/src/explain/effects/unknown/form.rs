@@ -8,7 +8,7 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::numbers::{edges, fitted_numbers, is_exponent, named};
 use super::outside::OUTSIDE_COST;
-use crate::explain::answer::{CovariateRange, ParameterValue, Place};
+use crate::explain::answer::{CovariateRange, Location, ParameterValue};
 use crate::explain::effects::{Candidate, Hypothesis, ReportContext, Reported, SharedHypothesis};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{Axis, End, Reach};
@@ -32,7 +32,7 @@ pub struct FormForce {
     fitted: Vec<(usize, usize)>,
     /// Greatest product of the factors over the fit runs.
     greatest: f64,
-    place: Place,
+    place: Location,
     /// Least and greatest value of the last factor's covariate.
     span: [f64; 2],
     choice_cost: f64,
@@ -99,7 +99,7 @@ impl FormForce {
 }
 
 /// The greatest product of the factors over the fit runs, and where it lives.
-fn lives(extra: &Extra, scan: &Scan) -> (f64, Place) {
+fn lives(extra: &Extra, scan: &Scan) -> (f64, Location) {
     let unit = Extra { n_per_kn: 1.0, ..extra.clone() };
     let of_bins = || {
         scan.problem.runs.iter().flat_map(|run| {
@@ -116,7 +116,7 @@ fn lives(extra: &Extra, scan: &Scan) -> (f64, Place) {
                 [low.min(value), high.max(value)]
             })
     };
-    let mut place = Place::default();
+    let mut place = Location::default();
     for factor in &extra.factors {
         match factor.of {
             Covariate::Speed => place.speed_range_mps = Some(range(factor.of)),
@@ -174,7 +174,7 @@ impl Hypothesis for FormForce {
         (parameters[0] * self.greatest).abs() >= LEAST_N_PER_KN
     }
 
-    fn place(&self) -> Place {
+    fn place(&self) -> Location {
         self.place.clone()
     }
 
@@ -248,7 +248,7 @@ mod tests {
             parameters: vec![Parameter::new("extra_n_per_kn", (-9.0, 9.0), 0.01)],
             fitted: Vec::new(),
             greatest: 1.0,
-            place: Place { covariate, ..Place::default() },
+            place: Location { covariate, ..Location::default() },
             span: [0.0, 900.0],
             choice_cost: 0.0,
         };

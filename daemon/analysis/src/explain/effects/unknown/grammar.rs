@@ -24,7 +24,7 @@ const REFINED_ALIKE: usize = 2;
 const WHOLE_EXPONENTS: [f64; 2] = [1.0, 2.0];
 
 /// What the form that explains most does beyond its price, before its numbers are fitted.
-pub fn greatest_advantage(scan: &Scan) -> f64 {
+pub fn greatest_bic_gain(scan: &Scan) -> f64 {
     let all = all_tried(&Ground::of(scan));
     let first = all.first().map_or(f64::NEG_INFINITY, |best| best.worth);
     first - choice_cost(all.len() as f64)
@@ -77,7 +77,7 @@ fn all_tried(ground: &Ground) -> Vec<Tried> {
     let mut first: Vec<Factor> = of_speed.take(BEST_FOR_PRODUCTS).map(|it| it.factors[0]).collect();
     first.extend(speed.powers(&WHOLE_EXPONENTS));
     let others = ground.known.iter().filter(|one| one.of != Covariate::Speed);
-    let second: Vec<Factor> = others.flat_map(Known::beside_speed).collect();
+    let second: Vec<Factor> = others.flat_map(Known::given_speed).collect();
     let products = first.iter().flat_map(|one| second.iter().map(|other| vec![*one, *other]));
     all.extend(tried(ground, products.collect()));
     sort(&mut all);

@@ -123,7 +123,7 @@ impl Known {
     }
 
     /// What the force of a form of the speed may be multiplied by.
-    pub fn beside_speed(&self) -> Vec<Factor> {
+    pub fn given_speed(&self) -> Vec<Factor> {
         let mut factors = self.parts();
         if self.of != Covariate::Chainage {
             let knees = self.hinges().into_iter();

@@ -18,7 +18,7 @@ mod shape;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Proposal};
-use crate::explain::evidence::STRENGTH_MIN;
+use crate::explain::evidence::SCORE_MIN;
 use crate::explain::scan::Scan;
 
 /// Bands and forms that are worth a fit.
@@ -39,13 +39,13 @@ pub fn leaves_a_force(scan: &Scan) -> bool {
 
 /// Whether some form explains more, at its price, than this advantage.
 pub fn a_form_explains_more(scan: &Scan, than: f64) -> bool {
-    grammar::greatest_advantage(scan) > than
+    grammar::greatest_bic_gain(scan) > than
 }
 
 /// Whether a band explains its price, and as much more as an effect needs at least.
 fn counts(scan: &Scan, (gain, band): &(f64, Candidate)) -> bool {
     let size = (scan.fit.observations().max(2) as f64).ln();
-    *gain > band.hypothesis.choice_cost() + size + STRENGTH_MIN
+    *gain > band.hypothesis.choice_cost() + size + SCORE_MIN
 }
 
 impl Effect for Bands {

@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DVector};
 use rayon::prelude::*;
 
-use super::super::model::GrownModel;
+use super::super::model::UpdatedModel;
 use super::super::noise::{Noise, RunScatter};
 use super::super::run_scatter::{ScatterFilter, remove};
 use super::super::whitener::Whitener;
@@ -18,13 +18,13 @@ const DECREASE_MIN: f64 = 0.02;
 
 impl FitProblem {
     /// Fits a model from a start under a noise.
-    pub fn fit(&self, model: &GrownModel, start: Vec<f64>, noise: Noise) -> Fit {
+    pub fn fit(&self, model: &UpdatedModel, start: Vec<f64>, noise: Noise) -> Fit {
         self.fit_remembering(model, start, noise, &mut self.memories())
     }
 
     fn fit_remembering(
         &self,
-        model: &GrownModel,
+        model: &UpdatedModel,
         start: Vec<f64>,
         noise: Noise,
         memories: &mut [RunMemory],
@@ -46,7 +46,7 @@ impl FitProblem {
     fn first(
         &self,
         plan: &Plan,
-        model: &GrownModel,
+        model: &UpdatedModel,
         (theta, noise): (Vec<f64>, Noise),
         (filters, memories): (&[RunFilters], &mut [RunMemory]),
     ) -> Fit {
@@ -55,7 +55,7 @@ impl FitProblem {
     }
 
     /// A model at given parameters, not fitted.
-    pub fn at(&self, model: &GrownModel, theta: Vec<f64>, noise: Noise) -> Fit {
+    pub fn at(&self, model: &UpdatedModel, theta: Vec<f64>, noise: Noise) -> Fit {
         let (plan, filters) = (Plan::of(model), self.filters(noise));
         self.first(&plan, model, (theta, noise), (&filters, &mut self.memories()))
     }
@@ -63,7 +63,7 @@ impl FitProblem {
     /// Fits a model, the noise that its residuals show, and the model again.
     ///
     /// One turn only: under an undeclared force further turns would take ever more of it for noise.
-    pub fn fit_with_noise(&self, model: &GrownModel, start: Vec<f64>, noise: Noise) -> Fit {
+    pub fn fit_with_noise(&self, model: &UpdatedModel, start: Vec<f64>, noise: Noise) -> Fit {
         let mut memories = self.memories();
         let fit = self.fit_remembering(model, start, noise, &mut memories);
         let scatter = RunScatter::updated(&fit.factors);
@@ -159,7 +159,7 @@ impl FitProblem {
     }
 
     /// Bounds of all parameters.
-    fn bounds(&self, model: &GrownModel) -> Vec<(f64, f64)> {
+    fn bounds(&self, model: &UpdatedModel) -> Vec<(f64, f64)> {
         let declared = [0, 1, 2].map(|coefficient| self.declared_bounds(coefficient));
         let of_effects = model
             .effects

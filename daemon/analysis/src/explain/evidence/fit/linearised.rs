@@ -4,7 +4,7 @@ use dynocar_core::filter::lanes::dot;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::super::model::GrownModel;
+use super::super::model::UpdatedModel;
 use super::super::noise::Noise;
 use super::memory::{At, Plan, RunMemory};
 use super::robust::{RunFilters, Whitened};
@@ -21,7 +21,7 @@ impl FitProblem {
     /// Pull of the prior: information and score.
     pub(super) fn prior(
         &self,
-        model: &GrownModel,
+        model: &UpdatedModel,
         theta: &[f64],
     ) -> (DMatrix<f64>, DVector<f64>, f64) {
         let count = theta.len();
@@ -53,7 +53,7 @@ impl FitProblem {
     /// What positions say of the scale of the speeds and of how late they are.
     fn take_positions(
         &self,
-        model: &GrownModel,
+        model: &UpdatedModel,
         theta: &[f64],
         (information, score, cost): (&mut DMatrix<f64>, &mut DVector<f64>, &mut f64),
     ) {
@@ -116,7 +116,7 @@ impl FitProblem {
     }
 
     /// The cost of what is left, with the prior.
-    pub(super) fn cost(&self, model: &GrownModel, theta: &[f64], left: &[Left]) -> f64 {
+    pub(super) fn cost(&self, model: &UpdatedModel, theta: &[f64], left: &[Left]) -> f64 {
         left.iter().fold(self.prior(model, theta).2, |cost, run| cost + run.whitened.cost)
     }
 
@@ -124,7 +124,7 @@ impl FitProblem {
     pub(super) fn linearised(
         &self,
         plan: &Plan,
-        model: &GrownModel,
+        model: &UpdatedModel,
         (theta, noise): (Vec<f64>, Noise),
         left: Vec<Left>,
         (filters, memories): (&[RunFilters], &mut [RunMemory]),
@@ -173,7 +173,7 @@ impl FitProblem {
     pub(super) fn run_normal(
         &self,
         index: usize,
-        model: &GrownModel,
+        model: &UpdatedModel,
         theta: &[f64],
         filters: &RunFilters,
     ) -> RunNormal {
@@ -198,7 +198,7 @@ impl Left {
     /// Normal equations, and the whitened regressors less what the run's own factors would explain.
     fn normal(
         &self,
-        model: &GrownModel,
+        model: &UpdatedModel,
         at: At,
         filters: &RunFilters,
         memory: &mut RunMemory,
@@ -218,7 +218,7 @@ impl Left {
 }
 
 /// Steps for finite differences of the effects' parameters, towards the inside of the bounds.
-fn difference_steps(model: &GrownModel, theta: &[f64]) -> Vec<f64> {
+fn difference_steps(model: &UpdatedModel, theta: &[f64]) -> Vec<f64> {
     let specs = model.effects.iter().flat_map(|effect| effect.parameters());
     theta[3..]
         .iter()

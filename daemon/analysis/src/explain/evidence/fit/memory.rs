@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use dynocar_core::force::balance::mps2_per_n_per_kn;
 
-use super::super::model::{GrownForces, GrownModel, integrate_bins};
+use super::super::model::{UpdatedForces, UpdatedModel, integrate_bins};
 use super::super::response::Response;
 use super::super::run_data::RunData;
 use crate::explain::hypothesis::SharedHypothesis;
@@ -29,7 +29,7 @@ type Affine<'m> = (&'m SharedHypothesis, Range<usize>, fn(f64) -> f64);
 
 /// A model with the way in which each of its effects is reckoned.
 pub(super) struct Plan<'m> {
-    model: &'m GrownModel,
+    model: &'m UpdatedModel,
     ranges: Vec<Range<usize>>,
     ways: Vec<Way>,
 }
@@ -42,7 +42,7 @@ pub(super) struct RunMemory {
     added: Vec<Option<(Vec<f64>, Vec<f64>)>>,
     /// By parameter of gradients: the bins for one of 1; empty where it does not touch the run.
     gradients: Vec<Option<Vec<f64>>>,
-    forces: GrownForces,
+    forces: UpdatedForces,
     /// At each sample.
     samples: Vec<f64>,
 }
@@ -62,7 +62,7 @@ enum Together {
 
 impl<'m> Plan<'m> {
     /// Of a model.
-    pub fn of(model: &'m GrownModel) -> Self {
+    pub fn of(model: &'m UpdatedModel) -> Self {
         let adds_up = model.adds_up();
         let way = |effect: &SharedHypothesis| match (effect.is_gradient(), effect.only_resists()) {
             (true, _) if adds_up => Way::Gradient,
@@ -295,7 +295,7 @@ fn affine(
     at: At,
     effect: &SharedHypothesis,
     range: Range<usize>,
-    forces: &mut GrownForces,
+    forces: &mut UpdatedForces,
 ) -> Together {
     let At { plan, run, theta, .. } = at;
     let mut elsewhere = theta.to_vec();

@@ -11,7 +11,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::late_speed;
-use super::model::{GrownForces, GrownModel};
+use super::model::{UpdatedForces, UpdatedModel};
 use super::noise::Noise;
 use super::response::Response;
 use super::run_data::RunData;
@@ -62,7 +62,7 @@ pub struct RunNormal {
 #[derive(Clone)]
 pub struct Fit {
     /// The model's structure.
-    pub model: GrownModel,
+    pub model: UpdatedModel,
     /// a, b, c, then the parameters of the effects.
     pub theta: Vec<f64>,
     /// The noise under which it was fitted.
@@ -211,8 +211,8 @@ impl FitProblem {
 fn declared_response(run: &RunData) -> Response {
     let mut response = Response::default();
     let nothing = |_: usize| false;
-    let mut forces = GrownForces::default();
-    GrownModel::default().response((run, &[0.0; 3]), nothing, &mut forces, &mut response);
+    let mut forces = UpdatedForces::default();
+    UpdatedModel::default().response((run, &[0.0; 3]), nothing, &mut forces, &mut response);
     response
 }
 

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::super::run_data::RunData;
 use super::robust::RunFilters;
-use super::{Fit, FitProblem, GrownModel};
+use super::{Fit, FitProblem, UpdatedModel};
 
 /// Models in which only places differ from those of a fit.
 pub struct Nearby<'a> {
@@ -24,7 +24,7 @@ impl<'a> Nearby<'a> {
     /// Cost that a model reaches when all parameters are fitted again, to second order; `run` is
     /// the only run in which it differs from the fit's, by file, `None` when it may in all.
     /// `None` when the parameters are not determined.
-    pub fn cost(&self, model: &GrownModel, run: Option<&str>) -> Option<f64> {
+    pub fn cost(&self, model: &UpdatedModel, run: Option<&str>) -> Option<f64> {
         let theta = &self.fit.theta;
         let (mut information, mut score, mut cost) = self.problem.prior(model, theta);
         let moved = |(index, own): (usize, &RunData)| {

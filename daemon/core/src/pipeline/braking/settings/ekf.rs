@@ -4,7 +4,7 @@ use dynocar_shared::{PipelineKind, Uncertain};
 
 use super::{ADHESION_REFERENCE, BrakeFactor, BrakingSettings, declared};
 use crate::pipeline::Estimator;
-use crate::pipeline::braking::intake::Quantity;
+use crate::pipeline::braking::intake::BrakingCoefficient;
 use crate::pipeline::braking::law::Law;
 use crate::pipeline::braking::motion::Walk;
 use crate::pipeline::braking::tracker::{Prior, PriorScale, Tracker, TrackerModel};
@@ -31,11 +31,11 @@ settings! {
 }
 
 impl EkfSettings {
-    fn relative_walk(&self, quantity: Quantity) -> f64 {
+    fn relative_walk(&self, quantity: BrakingCoefficient) -> f64 {
         self.relative_walk.unwrap_or(match quantity {
-            Quantity::Adhesion => 0.018,
-            Quantity::Friction => 0.03,
-            Quantity::Ratio => 0.004,
+            BrakingCoefficient::Adhesion => 0.018,
+            BrakingCoefficient::Friction => 0.03,
+            BrakingCoefficient::Ratio => 0.004,
         })
     }
 
@@ -47,7 +47,7 @@ impl EkfSettings {
     pub fn build(
         &self,
         kind: PipelineKind,
-        quantity: Quantity,
+        quantity: BrakingCoefficient,
         train: &TrainModel,
     ) -> Result<Box<dyn Estimator>, SettingError> {
         self.braking.check()?;

@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use super::{BrakeFactor, BrakingSettings};
 use crate::pipeline::Estimator;
-use crate::pipeline::braking::intake::Quantity;
+use crate::pipeline::braking::intake::BrakingCoefficient;
 use crate::pipeline::braking::motion::MotionNoise;
 use crate::pipeline::papers::xie::{EmModel, EmWindow, KalmanExpectation, ParticleExpectation};
 use crate::pipeline::settings::{SettingError, require, settings};
@@ -68,7 +68,7 @@ impl EmSettings {
     pub fn build(
         &self,
         kind: PipelineKind,
-        quantity: Quantity,
+        quantity: BrakingCoefficient,
         train: &TrainModel,
     ) -> Result<Box<dyn Estimator>, SettingError> {
         self.check()?;

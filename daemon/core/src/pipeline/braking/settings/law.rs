@@ -4,7 +4,7 @@ use dynocar_shared::{PipelineKind, RailCondition, Uncertain};
 
 use super::BrakingSettings;
 use crate::pipeline::Estimator;
-use crate::pipeline::braking::intake::Quantity;
+use crate::pipeline::braking::intake::BrakingCoefficient;
 use crate::pipeline::braking::law::Law;
 use crate::pipeline::braking::law_bank::LawBank;
 use crate::pipeline::braking::motion::Walk;
@@ -51,6 +51,11 @@ impl LawSettings {
             hypothesis(Law::Demand, self.braking.demand_relative_std),
         ];
         let bank = LawBank::new(hypotheses, self.change_rate_per_s);
-        Ok(self.braking.estimator(PipelineKind::AdhesionLaw, Quantity::Adhesion, train, bank))
+        Ok(self.braking.estimator(
+            PipelineKind::AdhesionLaw,
+            BrakingCoefficient::Adhesion,
+            train,
+            bank,
+        ))
     }
 }

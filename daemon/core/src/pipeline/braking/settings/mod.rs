@@ -16,7 +16,7 @@ use serde::Deserialize;
 use super::engine::Engine;
 use super::estimator::BrakingEstimator;
 use super::gear::DeclaredGear;
-use super::intake::{BrakingIntake, IntakeSettings, Quantity};
+use super::intake::{BrakingCoefficient, BrakingIntake, IntakeSettings};
 use super::motion::MotionNoise;
 use super::report::ReportSettings;
 use crate::pipeline::Estimator;
@@ -85,7 +85,7 @@ impl BrakingSettings {
         }
     }
 
-    fn intake(&self, quantity: Quantity, train: &TrainModel) -> BrakingIntake {
+    fn intake(&self, quantity: BrakingCoefficient, train: &TrainModel) -> BrakingIntake {
         let settings = IntakeSettings {
             interval_s: self.interval_s,
             gap_max_s: self.gap_max_s,
@@ -99,7 +99,7 @@ impl BrakingSettings {
     fn estimator<E: Engine + 'static>(
         &self,
         kind: PipelineKind,
-        quantity: Quantity,
+        quantity: BrakingCoefficient,
         train: &TrainModel,
         engine: E,
     ) -> Box<dyn Estimator> {
@@ -127,10 +127,10 @@ pub enum BrakeFactor {
 }
 
 impl BrakeFactor {
-    pub(in crate::pipeline) fn quantity(self) -> Quantity {
+    pub(in crate::pipeline) fn quantity(self) -> BrakingCoefficient {
         match self {
-            BrakeFactor::Friction => Quantity::Friction,
-            BrakeFactor::Ratio => Quantity::Ratio,
+            BrakeFactor::Friction => BrakingCoefficient::Friction,
+            BrakeFactor::Ratio => BrakingCoefficient::Ratio,
         }
     }
 }
@@ -139,11 +139,11 @@ impl BrakeFactor {
 const ADHESION_REFERENCE: f64 = 0.1;
 
 /// The declared value of a quantity.
-fn declared(quantity: Quantity, train: &TrainModel) -> Option<f64> {
+fn declared(quantity: BrakingCoefficient, train: &TrainModel) -> Option<f64> {
     let gear = DeclaredGear::of(&train.brake_gear);
     match quantity {
-        Quantity::Adhesion => None,
-        Quantity::Friction => gear.map(|gear| gear.friction),
-        Quantity::Ratio => gear.map(|gear| gear.ratio),
+        BrakingCoefficient::Adhesion => None,
+        BrakingCoefficient::Friction => gear.map(|gear| gear.friction),
+        BrakingCoefficient::Ratio => gear.map(|gear| gear.ratio),
     }
 }

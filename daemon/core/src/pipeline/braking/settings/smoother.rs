@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use super::{BrakeFactor, BrakingSettings};
 use crate::pipeline::Estimator;
-use crate::pipeline::braking::intake::Quantity;
+use crate::pipeline::braking::intake::BrakingCoefficient;
 use crate::pipeline::braking::law::{Law, SpeedTable};
 use crate::pipeline::braking::motion::Walk;
 use crate::pipeline::braking::tracker::{Prior, PriorScale, Tracker, TrackerModel};
@@ -57,18 +57,18 @@ impl SmootherSettings {
     /// Unless set: adhesion drifts as both rail laws do at full braking, by about half a percent
     /// of the demand per second in one direction throughout; disc friction drifts faster and by
     /// turns; a braking ratio, and the scale of a known friction curve, hardly move.
-    pub fn walk(&self, quantity: Quantity) -> WalkSettings {
+    pub fn walk(&self, quantity: BrakingCoefficient) -> WalkSettings {
         self.walk.unwrap_or(match quantity {
-            Quantity::Adhesion => WalkSettings::Drift { std_per_s: 0.005, time_s: 120.0 },
-            Quantity::Friction if self.friction_law.is_some() => {
+            BrakingCoefficient::Adhesion => WalkSettings::Drift { std_per_s: 0.005, time_s: 120.0 },
+            BrakingCoefficient::Friction if self.friction_law.is_some() => {
                 WalkSettings::Scale { std_after_1_s: 0.0005 }
             }
-            Quantity::Friction => WalkSettings::Drift { std_per_s: 0.012, time_s: 5.0 },
-            Quantity::Ratio => WalkSettings::Scale { std_after_1_s: 0.004 },
+            BrakingCoefficient::Friction => WalkSettings::Drift { std_per_s: 0.012, time_s: 5.0 },
+            BrakingCoefficient::Ratio => WalkSettings::Scale { std_after_1_s: 0.004 },
         })
     }
 
-    fn checked_walk(&self, quantity: Quantity) -> Result<Walk, SettingError> {
+    fn checked_walk(&self, quantity: BrakingCoefficient) -> Result<Walk, SettingError> {
         match self.walk(quantity) {
             WalkSettings::Drift { std_per_s, time_s } => {
                 check_setting!(std_per_s, "walk.std_per_s", (above 0));
@@ -82,9 +82,9 @@ impl SmootherSettings {
         }
     }
 
-    fn law(&self, quantity: Quantity) -> Result<Law, SettingError> {
+    fn law(&self, quantity: BrakingCoefficient) -> Result<Law, SettingError> {
         match (&self.friction_law, quantity) {
-            (Some(points), Quantity::Friction) => {
+            (Some(points), BrakingCoefficient::Friction) => {
                 SpeedTable::new(points.clone()).map(Law::Table).map_err(|_| SettingError {
                     key: "friction_law",
                     value: points.len() as f64,
@@ -108,7 +108,7 @@ impl SmootherSettings {
     pub fn build(
         &self,
         kind: PipelineKind,
-        quantity: Quantity,
+        quantity: BrakingCoefficient,
         train: &TrainModel,
     ) -> Result<Box<dyn Estimator>, SettingError> {
         self.braking.check()?;

@@ -9,7 +9,7 @@
 
 use dynocar_shared::RejectionReason;
 
-use crate::filter::Line;
+use crate::filter::FittedLine;
 use crate::pipeline::motion::SpeedNoise;
 use crate::pipeline::resistance::regression::{
     CoastingSegment, Columns, PARAMETERS, SPEED_SCALE_MPS,
@@ -33,8 +33,8 @@ const HALF_COUNT_MIN: f64 = 2.0;
 /// integral, and through the speed less all that is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Half {
-    columns: [Line; 1 + PARAMETERS],
-    rest: Line,
+    columns: [FittedLine; 1 + PARAMETERS],
+    rest: FittedLine,
     start_s: f64,
     length_s: f64,
 }

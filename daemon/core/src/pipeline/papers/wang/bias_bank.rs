@@ -123,7 +123,7 @@ impl BiasBank {
     pub fn begin_on_map(&mut self, motion: &Motion) {
         let map = MapError::over(motion, 0.0, self.dynamics.inertia.mps2_per_n_per_kn());
         for Behaviour { filter, model, .. } in self.behaviours.hypotheses_mut() {
-            let std_mps2 = model.std_beside_mps2(map.std_mps2, motion.speed_mps);
+            let std_mps2 = model.std_given_others_mps2(map.std_mps2, motion.speed_mps);
             filter.replace(BIAS, 0.0, std_mps2 * std_mps2);
         }
     }

@@ -72,7 +72,7 @@ impl BiasModel {
 
     /// Standard deviation of the bias where nothing is known of it, beside a map's error of a standard
     /// deviation in m/s² at a speed in m/s.
-    pub fn std_beside_mps2(&self, map_std_mps2: f64, speed_mps: f64) -> f64 {
+    pub fn std_given_others_mps2(&self, map_std_mps2: f64, speed_mps: f64) -> f64 {
         self.std_mps2.hypot(self.of_map(map_std_mps2, speed_mps))
     }
 
@@ -107,11 +107,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bias_beside_an_error_of_the_map_has_the_variance_and_correlation_of_their_sum() {
+    fn a_bias_next_to_an_error_of_the_map_has_the_variance_and_correlation_of_their_sum() {
         let bias = BiasModel::new(0.01, 60.0, false);
         let map = MapError { std_mps2: 0.02, keep: gradient_error_kept(5.0) };
         let (keep, noise_variance) = bias.drift(bias.keep(0.5), &map, 10.0);
-        let both = bias.std_beside_mps2(0.02, 10.0).powi(2);
+        let both = bias.std_given_others_mps2(0.02, 10.0).powi(2);
         assert!((both - 5e-4).abs() < 1e-15);
         let product = 1e-4 * (-0.5_f64 / 60.0).exp() + 4e-4 * (-0.05_f64).exp();
         assert!((both * keep - product).abs() < 1e-15, "what is common to both ends of the step");
@@ -125,7 +125,7 @@ mod tests {
             let bias = BiasModel::new(0.01, time_s, grows);
             let keep = bias.keep(0.2);
             assert_eq!(bias.drift(keep, &map, 3.0), (keep, bias.noise_variance(keep)));
-            assert_eq!(bias.std_beside_mps2(0.0, 3.0), bias.std_mps2);
+            assert_eq!(bias.std_given_others_mps2(0.0, 3.0), bias.std_mps2);
         }
     }
 }

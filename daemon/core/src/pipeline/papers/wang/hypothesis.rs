@@ -71,7 +71,7 @@ impl Hypothesis {
 
     /// Begins on a map whose gradient errs, with a bias of which nothing is known.
     pub fn begin_on_map(&mut self, map: &MapError, speed_mps: f64) {
-        self.regression.restart_bias(self.model.std_beside_mps2(map.std_mps2, speed_mps));
+        self.regression.restart_bias(self.model.std_given_others_mps2(map.std_mps2, speed_mps));
     }
 
     /// Moves on by a step of time.

@@ -59,7 +59,7 @@ impl JointLeastSquares {
         let lasting = self.fit.is_lasting().then_some(Reason::InnovationsNotWhite);
         Case {
             fault: (self.is_fresh_reset && !is_mass_known).then_some(failure),
-            input: self.health.complaint(),
+            input: self.health.input_doubt(),
             is_ready: self.health.used() >= SAMPLES_MIN,
             is_known: is_mass_known && is_resistance_known,
             lacking: if some { Status::Degraded } else { Status::Unestimated },

@@ -229,7 +229,7 @@ impl MassKalman {
         let failure = (Status::Invalid, Reason::NumericalFailure);
         Case {
             fault: self.is_fresh_reset.then_some(failure),
-            input: self.health.complaint().or(self.gate.complaint()),
+            input: self.health.input_doubt().or(self.gate.input_doubt()),
             is_ready: self.is_ready(),
             is_known: self.is_known(),
             lacking: if self.was_known { Status::Degraded } else { Status::Unestimated },

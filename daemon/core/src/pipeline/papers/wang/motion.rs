@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn forces_are_bridged_for_seconds_within_a_stretch() {
+    fn forces_are_bridged_for_seconds_within_a_segment() {
         let motion = |time_ns, stretch| Motion {
             time_ns,
             stretch,

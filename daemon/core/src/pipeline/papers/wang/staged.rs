@@ -233,7 +233,7 @@ impl StagedDescent {
         let is_bracketed = self.mass_bracket() <= BRACKET_MAX;
         Case {
             fault: None,
-            input: self.health.complaint(),
+            input: self.health.input_doubt(),
             is_ready: self.learned >= self.settings.resistance_samples,
             is_known: is_mass_known,
             lacking: if is_begun { Status::Degraded } else { Status::Unestimated },

@@ -294,7 +294,7 @@ impl Estimator for TrajectoryNewton {
             is_ready: self.windows > 0,
             is_at_bound: self.at_bound,
             fault: self.fault,
-            input: self.health.complaint().or(self.gate.complaint()),
+            input: self.health.input_doubt().or(self.gate.input_doubt()),
             doubt: (!self.is_consistent).then_some(Reason::InnovationsTooLarge),
         };
         estimate.write(snapshot);

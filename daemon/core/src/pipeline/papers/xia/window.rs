@@ -1,7 +1,7 @@
 //! The sliding window of Xia 2023: points at even distances, steps between them.
 
 use crate::pipeline::motion::jump_variance;
-use crate::pipeline::papers::xia::trajectory::fit::Stretch;
+use crate::pipeline::papers::xia::trajectory::fit::MotionSegment;
 use crate::pipeline::papers::xia::trajectory::motion::MotionStep;
 use crate::pipeline::papers::xia::trajectory::step::{Step, StepRule};
 
@@ -115,8 +115,8 @@ impl Window {
     }
 
     /// The window as a stretch.
-    pub fn stretch(&self) -> Stretch<'_> {
-        Stretch { steps: &self.steps, speeds_mps: &self.speeds_mps }
+    pub fn stretch(&self) -> MotionSegment<'_> {
+        MotionSegment { steps: &self.steps, speeds_mps: &self.speeds_mps }
     }
 }
 

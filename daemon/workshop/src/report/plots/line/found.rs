@@ -1,6 +1,6 @@
 //! What was found along a line: places with their intervals, errors of the gradient, the residual.
 
-use dynocar_analysis::explain::report::line::{AlongLine, Stretch};
+use dynocar_analysis::explain::report::line::{AlongLine, MarkedInterval};
 use plotters::element::{PathElement, Rectangle, Text};
 use plotters::style::Color;
 use plotters::style::text_anchor::{HPos, VPos};
@@ -35,14 +35,15 @@ pub(super) fn panels(found: &AlongLine) -> Vec<Panel> {
 /// Bars where an effect was found, the first row on top, with whiskers where their ends may lie.
 pub(super) fn bars(
     chart: &mut Chart,
-    stretches: &[Stretch],
+    stretches: &[MarkedInterval],
     from_km: f64,
 ) -> Result<(), PlotError> {
     let rows = rows(stretches);
     let height = 1.0 / rows.len() as f64;
     for (row, run) in rows.iter().enumerate() {
         let at = |share: f64| 1.0 - (row as f64 + share) * height;
-        for Stretch { at_m, ends_m, .. } in stretches.iter().filter(|it| it.run.as_deref() == *run)
+        for MarkedInterval { at_m, ends_m, .. } in
+            stretches.iter().filter(|it| it.run.as_deref() == *run)
         {
             let [from, to] = at_m.map(|end| end / 1e3);
             let (top, bottom) = (at(0.25), at(0.75));

@@ -178,7 +178,7 @@ impl Ground<'_> {
 mod tests {
     use super::*;
     use dynocar_analysis::dataset::parse_track;
-    use dynocar_analysis::explain::report::line::{FoundPlace, Stretch};
+    use dynocar_analysis::explain::report::line::{FoundPlace, MarkedInterval};
     use dynocar_analysis::explain::report::panels::PanelBin;
 
     const LINE: &str = "[track]\nname = \"A & B\"\nlength_m = 2000\n\
@@ -206,8 +206,12 @@ mod tests {
             places: vec![FoundPlace {
                 name: "a local resistance".into(),
                 stretches: vec![
-                    Stretch { at_m: [300.0, 600.0], run: None, ends_m },
-                    Stretch { at_m: [300.0, 400.0], run: Some("7.csv".into()), ends_m: [None; 2] },
+                    MarkedInterval { at_m: [300.0, 600.0], run: None, ends_m },
+                    MarkedInterval {
+                        at_m: [300.0, 400.0],
+                        run: Some("7.csv".into()),
+                        ends_m: [None; 2],
+                    },
                 ],
             }],
             gradient_error: vec![[0.0, 1.0, 0.5], [2000.0, -1.0, 0.5]],

@@ -1,6 +1,6 @@
 //! A property of the line: its data, their range, what a pointer reads of them.
 
-use dynocar_analysis::explain::report::line::Stretch;
+use dynocar_analysis::explain::report::line::MarkedInterval;
 use dynocar_analysis::explain::report::panels::PanelBin;
 
 use crate::report::plots::axes::range_with_zero;
@@ -22,7 +22,7 @@ pub(super) enum Content {
     /// (Chainage in km, value), and half widths of 95 % intervals where they are known.
     Line { points: Vec<(f64, f64)>, halves: Vec<f64> },
     /// Where an effect was found.
-    Places(Vec<Stretch>),
+    Places(Vec<MarkedInterval>),
     /// The residual for travel towards growing (+1) or falling (−1) chainage.
     Means(f64, Vec<PanelBin>),
 }
@@ -102,7 +102,7 @@ pub(super) fn way(direction: f64) -> &'static str {
 }
 
 /// The rows of a panel of places: what holds in all runs, or one row for each run.
-pub(super) fn rows(stretches: &[Stretch]) -> Vec<Option<&str>> {
+pub(super) fn rows(stretches: &[MarkedInterval]) -> Vec<Option<&str>> {
     let mut rows: Vec<Option<&str>> = stretches.iter().map(|it| it.run.as_deref()).collect();
     rows.sort_unstable();
     rows.dedup();
@@ -110,8 +110,8 @@ pub(super) fn rows(stretches: &[Stretch]) -> Vec<Option<&str>> {
 }
 
 /// The stretches in words.
-pub(super) fn told(stretches: &[Stretch]) -> String {
-    let one = |it: &Stretch| {
+pub(super) fn told(stretches: &[MarkedInterval]) -> String {
+    let one = |it: &MarkedInterval| {
         let run = it.run.as_ref().map_or(String::new(), |run| format!(" in {run}"));
         format!("km {:.2} to {:.2}{run}", it.at_m[0] / 1e3, it.at_m[1] / 1e3)
     };

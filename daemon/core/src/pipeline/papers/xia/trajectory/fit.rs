@@ -11,8 +11,8 @@ pub use super::fit_settings::{DavisPrior, FitError, FitSettings, TrajectoryFit};
 use super::integral_start::integral_start;
 use super::residuals::InitialSpeeds;
 use super::search::{Buffers, Search};
+pub use super::step::MotionSegment;
 use super::step::Step;
-pub use super::step::Stretch;
 use crate::train::Davis;
 
 /// Fits trajectories; keeps its buffers between fits.
@@ -44,7 +44,7 @@ impl TrajectoryFitter {
     /// start with known noise.
     pub fn fit(
         &mut self,
-        stretches: &[Stretch<'_>],
+        stretches: &[MotionSegment<'_>],
         start: Option<&Davis>,
         settings: &FitSettings,
     ) -> Result<TrajectoryFit, FitError> {
@@ -77,7 +77,7 @@ impl TrajectoryFitter {
     }
 }
 
-fn check(stretches: &[Stretch<'_>]) -> Result<(), FitError> {
+fn check(stretches: &[MotionSegment<'_>]) -> Result<(), FitError> {
     let mut samples = 0;
     for (index, stretch) in stretches.iter().enumerate() {
         let (steps, speeds) = (stretch.steps.len(), stretch.speeds_mps.len());
@@ -112,7 +112,7 @@ mod tests {
     use crate::force::balance::mps2_per_n_per_kn;
 
     fn fit(steps: &[Step], speeds_mps: &[f64], settings: &FitSettings) -> TrajectoryFit {
-        let stretches = [Stretch { steps, speeds_mps }];
+        let stretches = [MotionSegment { steps, speeds_mps }];
         TrajectoryFitter::default().fit(&stretches, None, settings).unwrap()
     }
 
@@ -137,7 +137,7 @@ mod tests {
     fn every_random_start_ends_at_the_same_coefficients() {
         let steps = steps(StepRule::Distance, 300);
         let speeds = speeds(StepRule::Distance, &steps, &FAST, 12.0);
-        let stretches = [Stretch { steps: &steps, speeds_mps: &speeds }];
+        let stretches = [MotionSegment { steps: &steps, speeds_mps: &speeds }];
         let settings = FitSettings::new(StepRule::Distance);
         let mut random = random(5);
         for _ in 0..50 {
@@ -225,7 +225,7 @@ mod tests {
         let speeds = speeds(StepRule::Distance, &steps, &FAST, 40.0);
         let settings = FitSettings::new(StepRule::Distance);
         let error = |steps: &[Step], speeds_mps: &[f64], settings: &FitSettings| {
-            let stretches = [Stretch { steps, speeds_mps }];
+            let stretches = [MotionSegment { steps, speeds_mps }];
             TrajectoryFitter::default().fit(&stretches, None, settings).unwrap_err()
         };
         let mut holed = speeds.clone();

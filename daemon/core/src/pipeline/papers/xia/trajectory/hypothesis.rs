@@ -213,7 +213,7 @@ pub fn united(one: (&Hypothesis, f64), other: (&Hypothesis, f64)) -> (Hypothesis
 
 #[cfg(test)]
 mod tests {
-    use super::super::fit::{DavisPrior, FitSettings, Stretch, TrajectoryFitter};
+    use super::super::fit::{DavisPrior, FitSettings, MotionSegment, TrajectoryFitter};
     use super::super::test_runs::{FAST, normal, random, speeds, steps};
     use super::*;
     use crate::filter::levenberg_marquardt::ParameterBox;
@@ -274,7 +274,7 @@ mod tests {
                 outlier_threshold: f64::INFINITY,
                 ..FitSettings::new(rule)
             };
-            let stretches = [Stretch { steps: &steps, speeds_mps: &speeds }];
+            let stretches = [MotionSegment { steps: &steps, speeds_mps: &speeds }];
             let batch = TrajectoryFitter::default().fit(&stretches, None, &settings).unwrap();
             let covariance = batch.covariance / batch.inflation;
             for speed_mps in [20.0, 50.0, 75.0] {

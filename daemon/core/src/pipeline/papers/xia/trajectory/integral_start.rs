@@ -13,7 +13,7 @@
 
 use nalgebra::Vector3;
 
-use super::step::{StepRule, Stretch};
+use super::step::{MotionSegment, StepRule};
 use crate::filter::levenberg_marquardt::{
     LeastSquares, Linearisation, ParameterBox, SolverSettings, minimise,
 };
@@ -39,7 +39,7 @@ impl LeastSquares<3> for Linear {
 ///
 /// One pass over the samples, no allocation.
 pub fn integral_start(
-    stretches: &[Stretch<'_>],
+    stretches: &[MotionSegment<'_>],
     rule: StepRule,
     speed_noise_mps: f64,
     prior: Option<&TriangularSystem<3>>,
@@ -71,7 +71,7 @@ pub fn integral_start(
 
 /// Rows \[initial, a, b, c, -left side\] in standard deviations, every one weighted to m/s.
 fn integrated_rows(
-    stretch: &Stretch<'_>,
+    stretch: &MotionSegment<'_>,
     rule: StepRule,
     per_deviation: f64,
 ) -> TriangularAccumulator<5> {
@@ -112,7 +112,7 @@ mod tests {
     use super::*;
     use crate::train::Davis;
 
-    fn start(stretches: &[Stretch<'_>], rule: StepRule) -> Vector3<f64> {
+    fn start(stretches: &[MotionSegment<'_>], rule: StepRule) -> Vector3<f64> {
         let bounds = ParameterBox { low: Vector3::repeat(-10.0), high: Vector3::repeat(10.0) };
         let scales = Vector3::new(1.0, 0.02, 0.001);
         integral_start(stretches, rule, 0.1, None, &bounds, &scales, &scales).unwrap()
@@ -125,8 +125,8 @@ mod tests {
         let (first, second) = speeds.split_at(150);
         // Two stretches with an initial speed each.
         let stretches = [
-            Stretch { steps: &steps[..149], speeds_mps: first },
-            Stretch { steps: &steps[150..], speeds_mps: second },
+            MotionSegment { steps: &steps[..149], speeds_mps: first },
+            MotionSegment { steps: &steps[150..], speeds_mps: second },
         ];
         let found = start(&stretches, StepRule::Distance);
         assert!((found[0] - FAST.a).abs() < 1e-9);
@@ -141,7 +141,7 @@ mod tests {
             let mut random = random(4);
             let mut speeds = speeds(rule, &steps, &FAST, 12.0);
             speeds.iter_mut().for_each(|speed| *speed += 0.1 * normal(&mut random));
-            let found = start(&[Stretch { steps: &steps, speeds_mps: &speeds }], rule);
+            let found = start(&[MotionSegment { steps: &steps, speeds_mps: &speeds }], rule);
             let davis = Davis { a: found[0], b: found[1], c: found[2] };
             for speed_mps in [20.0, 60.0] {
                 let error = davis.w0_n_per_kn(speed_mps) - FAST.w0_n_per_kn(speed_mps);

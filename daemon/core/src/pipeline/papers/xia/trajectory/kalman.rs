@@ -215,7 +215,7 @@ impl Estimator for TrajectoryKalman {
             is_ready: self.updates >= UPDATES_MIN,
             is_at_bound: false,
             fault: self.fault,
-            input: self.health.complaint().or(self.gate.complaint()),
+            input: self.health.input_doubt().or(self.gate.input_doubt()),
             doubt: is_fresh.then_some(Reason::InnovationsTooLarge),
         };
         estimate.write(snapshot);

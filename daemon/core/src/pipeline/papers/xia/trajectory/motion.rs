@@ -134,7 +134,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn two_samples_of_a_stretch_make_a_step_of_mean_force() {
+    fn two_samples_of_a_segment_make_a_step_of_mean_force() {
         let mut tracker = MotionTracker::default();
         assert_eq!(tracker.advance(&sample(0, 10.0, 1.06e4)), Motion::Begin);
         let Motion::Continue(step) = tracker.advance(&sample(1, 10.2, 3.18e4)) else { panic!() };

@@ -35,7 +35,7 @@ const DISTURBANCE: usize = 1;
 /// Innovations beyond so many standard deviations say nothing precise.
 const CLIP_DEVIATIONS: f64 = 4.0;
 /// So many innovations in a row beyond the clip are no outliers: the noise has grown.
-const GROWN_AFTER: u32 = 3;
+const UPDATED_AFTER: u32 = 3;
 /// Samples that the newest mean square looks back over.
 const NEWEST: f64 = 32.0;
 /// The newest mean square of normalised innovations below which the noise has shrunk; white
@@ -207,7 +207,7 @@ impl LearnedNoise {
             self.exceeded = 0;
             self.exceeded_square = 0.0;
         }
-        let has_grown = self.exceeded >= GROWN_AFTER;
+        let has_grown = self.exceeded >= UPDATED_AFTER;
         let has_shrunk = self.newest_square < SHRUNK_BELOW
             && self.speed_variance > own_variance.max(self.rounding_variance);
         if !(model.learns_speed_noise && (has_grown || has_shrunk)) {

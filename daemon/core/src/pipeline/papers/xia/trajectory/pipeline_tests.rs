@@ -253,7 +253,7 @@ fn cruise(seed: u64) -> Vec<ResolvedSample> {
 }
 
 #[test]
-fn in_cruise_the_resistance_there_may_be_used_although_its_coefficients_are_not_told_apart() {
+fn in_cruise_the_resistance_there_may_be_used_although_its_coefficients_are_not_distinguished() {
     const SEEDS: u64 = 30;
     let mut held = 0;
     for seed in 0..SEEDS {

@@ -12,7 +12,7 @@
 use nalgebra::Vector3;
 
 use super::long_run::LongRunVariance;
-use super::step::{Step, StepRule, Stretch};
+use super::step::{MotionSegment, Step, StepRule};
 use crate::filter::levenberg_marquardt::{LeastSquares, Linearisation};
 use crate::filter::triangular::{TriangularAccumulator, TriangularSystem};
 use crate::train::Davis;
@@ -106,7 +106,7 @@ impl Pass {
 
 /// Trajectories of several stretches as a least-squares problem over (a, b, c).
 pub struct Residuals<'a, 'b> {
-    stretches: &'a [Stretch<'a>],
+    stretches: &'a [MotionSegment<'a>],
     rule: StepRule,
     weighting: Weighting,
     prior: Option<TriangularSystem<3>>,
@@ -125,7 +125,7 @@ impl<'a, 'b> Residuals<'a, 'b> {
     /// `prior` is R and z of rows R x + z in standard deviations that are added to the
     /// residuals.
     pub fn new(
-        stretches: &'a [Stretch<'a>],
+        stretches: &'a [MotionSegment<'a>],
         rule: StepRule,
         weighting: Weighting,
         prior: Option<TriangularSystem<3>>,
@@ -173,7 +173,7 @@ impl LeastSquares<3> for Residuals<'_, '_> {
         let mut nested_decrease = 0.0;
         for (index, stretch) in self.stretches.iter().enumerate() {
             let speed_mps = self.initial.current[index].moved(&change);
-            let mut rows = StretchRows {
+            let mut rows = SegmentRows {
                 weighting: &self.weighting,
                 rows: TriangularAccumulator::default(),
                 pass: &mut self.tried_pass,
@@ -221,7 +221,7 @@ impl InitialSpeed {
 }
 
 /// Gathers the rows \[∂r/∂v_0, ∂r/∂a, ∂r/∂b, ∂r/∂c, r\] of one stretch.
-struct StretchRows<'a> {
+struct SegmentRows<'a> {
     weighting: &'a Weighting,
     rows: TriangularAccumulator<5>,
     pass: &'a mut Pass,
@@ -229,8 +229,14 @@ struct StretchRows<'a> {
     record: Option<&'a mut Vec<f64>>,
 }
 
-impl StretchRows<'_> {
-    fn trace(&mut self, stretch: &Stretch<'_>, rule: StepRule, davis: &Davis, initial_mps: f64) {
+impl SegmentRows<'_> {
+    fn trace(
+        &mut self,
+        stretch: &MotionSegment<'_>,
+        rule: StepRule,
+        davis: &Davis,
+        initial_mps: f64,
+    ) {
         let Some((&first_mps, measured)) = stretch.speeds_mps.split_first() else { return };
         let ratio = self.weighting.disturbance_ratio;
         let mut state = Trace {

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::fit_settings::{FitError, FitSettings, SCALES, TrajectoryFit};
 use super::residuals::{InitialSpeeds, Pass, Residuals, Weighting};
-use super::step::Stretch;
+use super::step::MotionSegment;
 use crate::filter::levenberg_marquardt::{LeastSquares, Solution, SolverSettings, minimise};
 use crate::filter::triangular::TriangularSystem;
 use crate::train::Davis;
@@ -47,7 +47,7 @@ pub struct Buffers {
 
 /// A fit under way.
 pub struct Search<'a, 'b> {
-    stretches: &'a [Stretch<'a>],
+    stretches: &'a [MotionSegment<'a>],
     settings: &'a FitSettings,
     prior: Option<TriangularSystem<3>>,
     buffers: &'b mut Buffers,
@@ -57,7 +57,7 @@ pub struct Search<'a, 'b> {
 impl<'a, 'b> Search<'a, 'b> {
     /// A search from the initial speeds in the buffers.
     pub fn new(
-        stretches: &'a [Stretch<'a>],
+        stretches: &'a [MotionSegment<'a>],
         settings: &'a FitSettings,
         prior: Option<TriangularSystem<3>>,
         buffers: &'b mut Buffers,

@@ -38,7 +38,7 @@ pub struct Step {
 
 /// An unbroken trajectory: steps and the speeds measured before, between and after them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stretch<'a> {
+pub struct MotionSegment<'a> {
     /// The steps.
     pub steps: &'a [Step],
     /// One speed in m/s more than steps.

@@ -4,7 +4,7 @@ use super::answer::DavisDeviations;
 use super::evidence::{Fit, FitProblem};
 
 /// Data that take away less than this share of a coefficient's variance do not tell it.
-const TOLD_MIN: f64 = 0.5;
+const ESTIMATED_MIN: f64 = 0.5;
 
 /// Speeds that spread over less than this share of the greatest are one speed.
 const VARIED_MIN: f64 = 0.5;
@@ -20,11 +20,11 @@ pub fn told_by_data(problem: &FitProblem, deviation: &[f64]) -> DavisDeviations 
 }
 
 /// In words which of them the data do not tell, and what would; empty when they tell all.
-pub fn not_told(problem: &FitProblem, fit: &Fit, deviation: &[f64]) -> String {
+pub fn not_informed(problem: &FitProblem, fit: &Fit, deviation: &[f64]) -> String {
     let DavisDeviations { a, b, c } = told_by_data(problem, deviation);
     let names = [("a", a), ("b", b), ("c", c)];
     let names: Vec<&str> =
-        names.into_iter().filter(|(_, told)| *told < TOLD_MIN).map(|(name, _)| name).collect();
+        names.into_iter().filter(|(_, told)| *told < ESTIMATED_MIN).map(|(name, _)| name).collect();
     let mut speeds: Vec<f64> =
         problem.runs.iter().flat_map(|run| run.bins.iter().map(|bin| bin.speed_mps)).collect();
     if names.is_empty() || speeds.is_empty() {

@@ -4,7 +4,7 @@ use dynocar_analysis::dataset::{Dataset, parse_track, parse_train};
 use dynocar_analysis::explain::effects::{Candidate, LIBRARY, Proposal, UNKNOWN};
 use dynocar_analysis::explain::evidence::prepare;
 use dynocar_analysis::explain::evidence::{
-    Fit, FitProblem, GrownModel, Noise, RunData, SampleForces,
+    Fit, FitProblem, Noise, RunData, SampleForces, UpdatedModel,
 };
 use dynocar_analysis::explain::scan::Scan;
 use dynocar_core::terms::wheel;
@@ -13,7 +13,7 @@ use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{
     Effect, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate,
 };
-use dynocar_workshop::grown::grow;
+use dynocar_workshop::updated::grow;
 
 /// A dataset on which every kind can be tried, without wheel slip and outliers.
 fn simulated() -> SimulatedDataset {
@@ -68,13 +68,13 @@ fn assert_same_forces(kind: EffectKind, fit: &Fit, declared: &RunData, grown: &R
 }
 
 #[test]
-fn every_kind_written_as_a_grown_model_is_applied_to_the_bit() {
+fn every_kind_written_as_an_updated_model_is_applied_to_the_bit() {
     let files = dataset_files(&simulated());
     let dataset = read_files(&files);
     let runs = prepare(&dataset).expect("usable runs");
     assert!(runs.iter().all(|run| run.replaced == 0), "no outliers");
     let problem = FitProblem::new(runs.clone(), dataset.train.resistance);
-    let base = problem.fit(&GrownModel::default(), problem.start(&[]), Noise::START);
+    let base = problem.fit(&UpdatedModel::default(), problem.start(&[]), Noise::START);
     let track = dataset.track.as_ref();
     let scan = Scan::new(&problem, &[], &dataset.train, track, &base).expect("a sound fit");
     let mut applied = Vec::new();

@@ -6,7 +6,7 @@ use toml::{Table, Value};
 
 use dynocar_analysis::dataset::DatasetFiles;
 
-use super::error::{GROWN_MARK, GrownError};
+use super::error::{UPDATED_MARK, UpdatedModelError};
 use crate::paths::from_folder;
 use dynocar::dataset::{DatasetFolder, read_text};
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
@@ -32,7 +32,7 @@ pub fn keep_runs(
     manifest: &mut Table,
     source: &DatasetFolder,
     folder: &Path,
-) -> Result<(), GrownError> {
+) -> Result<(), UpdatedModelError> {
     let runs = manifest.get_mut("runs").and_then(Value::as_array_mut);
     for run in runs.into_iter().flatten() {
         let Some(Value::String(file)) = run.get_mut("file") else { continue };
@@ -42,10 +42,10 @@ pub fn keep_runs(
         }
         let target = folder.join(&*file);
         // Runs have no mark of their own.
-        if !is_grown(&folder.join(TRAIN_FILE)) {
+        if !is_updated(&folder.join(TRAIN_FILE)) {
             require_new(&target)?;
         }
-        let text = source.read(file).map_err(|problem| GrownError::Declared {
+        let text = source.read(file).map_err(|problem| UpdatedModelError::Declared {
             label: source.label(file),
             problem: problem.to_string(),
         })?;
@@ -73,14 +73,14 @@ pub fn keep_alignments(track: &mut Table, declared: &Path, folder: &Path) {
 ///
 /// When it is there and cannot be removed.
 pub fn forget(file: &Path) -> Result<(), OutputError> {
-    if !is_grown(file) {
+    if !is_updated(file) {
         return Ok(());
     }
     std::fs::remove_file(file).map_err(|source| OutputError::File { path: file.into(), source })
 }
 
-fn is_grown(file: &Path) -> bool {
-    read_text(file).is_ok_and(|text| text.starts_with(GROWN_MARK))
+fn is_updated(file: &Path) -> bool {
+    read_text(file).is_ok_and(|text| text.starts_with(UPDATED_MARK))
 }
 
 fn seen_from(folder: &Path, file: &Path) -> String {

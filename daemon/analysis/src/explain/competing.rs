@@ -6,11 +6,11 @@ use super::evidence::{EQUAL, Fit};
 use super::selection::{Outcome, Trial};
 
 /// A rival takes away this share of what the accepted effect does of the open-loop error.
-const REDUCTION_SHARE: f64 = 0.7;
+const ERROR_REDUCTION_SHARE: f64 = 0.7;
 
 /// An accepted effect and the kinds that could stand in its place.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Rivals {
+pub struct CompetingHypotheses {
     /// The kind that was accepted.
     pub accepted: EffectKind,
     /// The others.
@@ -22,7 +22,7 @@ pub struct Rivals {
 /// Beside those that the runs could not tell from it whatever they showed, a rival explains the data as
 /// well, takes away about as much of the open-loop error, and has nothing left to explain once the effect
 /// is in: what keeps its evidence acts beside the effect and not in its place.
-pub fn rivals(outcome: &Outcome) -> Vec<Rivals> {
+pub fn rivals(outcome: &Outcome) -> Vec<CompetingHypotheses> {
     let effects = &outcome.fit.model.effects;
     let of = |accepted: EffectKind, tried: &[Trial], twins: &[EffectKind]| {
         let own = tried.iter().find(|trial| trial.kind == accepted);
@@ -34,7 +34,7 @@ pub fn rivals(outcome: &Outcome) -> Vec<Rivals> {
                 kinds.push(kind);
             }
         }
-        Rivals { accepted, kinds }
+        CompetingHypotheses { accepted, kinds }
     };
     let each = effects.iter().map(|effect| {
         let kind = effect.kind();
@@ -51,8 +51,8 @@ fn comes_close(trial: &Trial, accepted: &Trial, outcome: &Outcome) -> bool {
     let last = outcome.rounds.last().into_iter().flatten();
     let left = last.clone().find(|left| left.kind == trial.kind).map_or(0.0, |left| left.evidence);
     trial.kind != EffectKind::Unknown
-        && trial.advantage > accepted.advantage - EQUAL
-        && trial.reduction > REDUCTION_SHARE * accepted.reduction
+        && trial.bic_gain > accepted.bic_gain - EQUAL
+        && trial.reduction > ERROR_REDUCTION_SHARE * accepted.reduction
         && left < 0.5 * trial.evidence
 }
 
@@ -62,7 +62,7 @@ pub fn is_in(fit: &Fit, kind: EffectKind) -> bool {
 }
 
 /// What would tell a kind that is one number of the train or the line.
-pub fn telling_runs(kind: EffectKind) -> &'static str {
+pub fn informative_runs(kind: EffectKind) -> &'static str {
     use EffectKind::{
         AmbientTemperature, CurveResistance, GradientShift, MassChange, RotatingMass, TractionGain,
         TunnelDrag, WheelDiameter, Wind,

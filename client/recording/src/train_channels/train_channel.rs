@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use dynocar::operator::suspicion::Suspicion;
-use dynocar::output::tell;
+use dynocar::output::report_line;
 use dynocar_client::channel::{Receiver, Transport};
 use dynocar_client::{ChannelError, Host, Peer, Role, SnapshotReader, monotonic_now_ns};
 use dynocar_shared::services::{PIPELINES_MAX, SAMPLE_BUFFER};
@@ -17,7 +17,7 @@ const TURN: usize = 4 * SAMPLE_BUFFER;
 
 /// What was last seen of a pipeline.
 #[derive(Clone, Copy, Debug, Default)]
-struct Seen {
+struct LastSnapshot {
     epoch: u64,
     sequence: u64,
     status: (u32, u32),
@@ -30,7 +30,7 @@ struct Seen {
 }
 
 /// One train: its channels, and what was seen of it.
-pub struct Lane {
+pub struct TrainChannel {
     train: TrainId,
     samples: Receiver<TrainSample>,
     snapshots: SnapshotReader,
@@ -38,7 +38,7 @@ pub struct Lane {
     interval_ns: i64,
     /// The newest sample's number.
     newest: Option<u64>,
-    pipelines: [Option<Seen>; PIPELINES_MAX],
+    pipelines: [Option<LastSnapshot>; PIPELINES_MAX],
     daemon: Option<u32>,
     controller: Option<u32>,
     /// True when samples have come since it was last looked who is there.
@@ -49,7 +49,7 @@ pub struct Lane {
     _transport: Transport,
 }
 
-impl Lane {
+impl TrainChannel {
     /// Opens the channels of a train; `name` is what their place is called.
     ///
     /// # Errors
@@ -65,7 +65,7 @@ impl Lane {
         let transport = Transport::open(host, name)?;
         let samples = transport.receiver::<TrainSample>(train)?;
         transport.reserve()?;
-        Ok(Lane {
+        Ok(TrainChannel {
             train,
             samples,
             snapshots,
@@ -126,7 +126,7 @@ impl Lane {
             if is_other_model {
                 sink.event(&model_event(self.train, it))?;
             }
-            *seen = Some(Seen {
+            *seen = Some(LastSnapshot {
                 epoch: it.epoch,
                 sequence: it.sequence,
                 status,
@@ -162,7 +162,11 @@ impl Lane {
     /// When it is not taken.
     pub fn look<S: Sink>(&mut self, host: &Host, sink: &mut S) -> Result<(), S::Error> {
         if self.lost > 0 {
-            tell(&format!("train {}: {} samples lost", self.train, std::mem::take(&mut self.lost)));
+            report_line(&format!(
+                "train {}: {} samples lost",
+                self.train,
+                std::mem::take(&mut self.lost)
+            ));
         }
         let train = self.train;
         let was_driven = std::mem::take(&mut self.is_driven);

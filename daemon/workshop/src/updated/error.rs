@@ -5,7 +5,7 @@ use dynocar::output::OutputError;
 
 /// Why the grown files cannot be written.
 #[derive(Debug, thiserror::Error)]
-pub enum GrownError {
+pub enum UpdatedModelError {
     /// The dataset cannot be read.
     #[error(transparent)]
     Load(#[from] LoadError),
@@ -23,4 +23,4 @@ pub enum GrownError {
 }
 
 /// How a grown file begins.
-pub const GROWN_MARK: &str = "# Grown from ";
+pub const UPDATED_MARK: &str = "# Grown from ";

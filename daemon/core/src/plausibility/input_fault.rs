@@ -26,7 +26,7 @@ named! {
     #[derive(PartialOrd, Ord, Serialize)]
     #[serde(rename_all = "snake_case")]
     #[repr(u8)]
-    Slip ("for machines") {
+    InputFault ("for machines") {
         /// Time in another unit.
         TimeScale = 1 "time_scale";
         /// Speed in another unit.
@@ -54,7 +54,7 @@ named! {
     }
 }
 
-impl Slip {
+impl InputFault {
     /// The member with this number.
     pub fn from_number(number: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|slip| *slip as u8 == number)
@@ -63,7 +63,7 @@ impl Slip {
     /// How much it matters: the pressure enters no balance of forces.
     pub const fn severity(self) -> Severity {
         match self {
-            Slip::PressureScale => Severity::Warning,
+            InputFault::PressureScale => Severity::Warning,
             _ => Severity::Fundamental,
         }
     }
@@ -71,15 +71,17 @@ impl Slip {
     /// Why a pipeline that is fed with it is not to be trusted.
     pub const fn reason(self) -> Reason {
         match self {
-            Slip::TimeScale | Slip::SpeedScale | Slip::PositionScale | Slip::DirectionReversed => {
-                Reason::ImplausibleMotion
-            }
-            Slip::MassScale => Reason::ImplausibleMass,
-            Slip::ForcesSwapped | Slip::ForcesScale | Slip::TractionScale | Slip::BrakeScale => {
-                Reason::ImplausibleForces
-            }
-            Slip::GradientSign | Slip::GradientScale => Reason::ImplausibleGradient,
-            Slip::PressureScale => Reason::ImplausiblePressure,
+            InputFault::TimeScale
+            | InputFault::SpeedScale
+            | InputFault::PositionScale
+            | InputFault::DirectionReversed => Reason::ImplausibleMotion,
+            InputFault::MassScale => Reason::ImplausibleMass,
+            InputFault::ForcesSwapped
+            | InputFault::ForcesScale
+            | InputFault::TractionScale
+            | InputFault::BrakeScale => Reason::ImplausibleForces,
+            InputFault::GradientSign | InputFault::GradientScale => Reason::ImplausibleGradient,
+            InputFault::PressureScale => Reason::ImplausiblePressure,
         }
     }
 
@@ -87,7 +89,7 @@ impl Slip {
     pub const fn concerns(self, kind: PipelineKind) -> bool {
         use PipelineKind::*;
         match self {
-            Slip::PressureScale => matches!(
+            InputFault::PressureScale => matches!(
                 kind,
                 AdhesionEm
                     | AdhesionEkf
@@ -105,15 +107,16 @@ impl Slip {
     /// What the units of the quantity measure.
     pub const fn dimension(self) -> Dimension {
         match self {
-            Slip::TimeScale => Dimension::Time,
-            Slip::SpeedScale => Dimension::Speed,
-            Slip::PositionScale | Slip::DirectionReversed => Dimension::Length,
-            Slip::MassScale => Dimension::Mass,
-            Slip::ForcesSwapped | Slip::ForcesScale | Slip::TractionScale | Slip::BrakeScale => {
-                Dimension::Force
-            }
-            Slip::GradientSign | Slip::GradientScale => Dimension::Ratio,
-            Slip::PressureScale => Dimension::Pressure,
+            InputFault::TimeScale => Dimension::Time,
+            InputFault::SpeedScale => Dimension::Speed,
+            InputFault::PositionScale | InputFault::DirectionReversed => Dimension::Length,
+            InputFault::MassScale => Dimension::Mass,
+            InputFault::ForcesSwapped
+            | InputFault::ForcesScale
+            | InputFault::TractionScale
+            | InputFault::BrakeScale => Dimension::Force,
+            InputFault::GradientSign | InputFault::GradientScale => Dimension::Ratio,
+            InputFault::PressureScale => Dimension::Pressure,
         }
     }
 
@@ -134,7 +137,7 @@ impl Slip {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Finding {
     /// What it is.
-    pub slip: Slip,
+    pub slip: InputFault,
     /// Reported over true value, as far as the samples tell.
     pub factor: f64,
 }
@@ -155,25 +158,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_lead_back_to_the_slip_and_names_are_unique() {
-        for slip in Slip::ALL {
-            assert_eq!(Slip::from_number(slip as u8), Some(slip));
-            assert_eq!(Slip::ALL.iter().filter(|other| other.name() == slip.name()).count(), 1);
+    fn numbers_lead_back_to_the_input_fault_and_names_are_unique() {
+        for slip in InputFault::ALL {
+            assert_eq!(InputFault::from_number(slip as u8), Some(slip));
+            assert_eq!(
+                InputFault::ALL.iter().filter(|other| other.name() == slip.name()).count(),
+                1
+            );
         }
-        assert_eq!(Slip::from_number(0), None);
+        assert_eq!(InputFault::from_number(0), None);
     }
 
     #[test]
     fn the_unit_is_named_that_explains_the_factor() {
-        let unit = |slip: Slip, factor, read_as| {
+        let unit = |slip: InputFault, factor, read_as| {
             let read_as = Unit::find(slip.dimension(), read_as).unwrap();
             Finding { slip, factor }.true_unit(&read_as).map(|unit| unit.name())
         };
-        assert_eq!(unit(Slip::ForcesScale, 0.001, "N"), Some("kN"));
-        assert_eq!(unit(Slip::ForcesScale, 1010.0, "kN"), Some("N"));
-        assert_eq!(unit(Slip::ForcesScale, 0.225, "N"), Some("lbf"));
-        assert_eq!(unit(Slip::SpeedScale, 3.6, "m/s"), Some("km/h"));
-        assert_eq!(unit(Slip::GradientScale, 0.1, "permille"), Some("%"));
-        assert_eq!(unit(Slip::ForcesScale, 50.0, "N"), None);
+        assert_eq!(unit(InputFault::ForcesScale, 0.001, "N"), Some("kN"));
+        assert_eq!(unit(InputFault::ForcesScale, 1010.0, "kN"), Some("N"));
+        assert_eq!(unit(InputFault::ForcesScale, 0.225, "N"), Some("lbf"));
+        assert_eq!(unit(InputFault::SpeedScale, 3.6, "m/s"), Some("km/h"));
+        assert_eq!(unit(InputFault::GradientScale, 0.1, "permille"), Some("%"));
+        assert_eq!(unit(InputFault::ForcesScale, 50.0, "N"), None);
     }
 }

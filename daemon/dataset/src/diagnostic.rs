@@ -9,10 +9,10 @@ use super::quantity::Quantity;
 /// A remark on a run.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "remark", rename_all = "snake_case")]
-pub enum Remark {
+pub enum Diagnostic {
     /// The samples cannot be true: a wrong unit, an exchange, a wrong sign.
     #[error("{}", finding.words(&unit_of(*finding, read_as)))]
-    Slip {
+    InputFault {
         /// What it is, and by how much.
         #[serde(flatten)]
         finding: Finding,
@@ -189,7 +189,7 @@ pub enum Remark {
     },
 }
 
-impl Remark {
+impl Diagnostic {
     /// The name for machines.
     pub const fn code(&self) -> &'static str {
         self.code_and_severity().0
@@ -203,24 +203,26 @@ impl Remark {
     const fn code_and_severity(&self) -> (&'static str, Severity) {
         use Severity::{Fundamental, Info, Warning};
         match self {
-            Remark::Slip { finding, .. } => (finding.slip.name(), finding.slip.severity()),
-            Remark::AgainstDirection { .. } => ("against_direction", Fundamental),
-            Remark::DistanceMismatch { .. } => ("distance_mismatch", Warning),
-            Remark::OffTheLine { .. } => ("off_the_line", Warning),
-            Remark::StartUnknown => ("start_unknown", Info),
-            Remark::NegativeForce { .. } => ("negative_force", Warning),
-            Remark::NegativeSpeed { .. } => ("negative_speed", Warning),
-            Remark::HandleOutOfRange { .. } => ("handle_out_of_range", Warning),
-            Remark::UnusedHandle { .. } => ("unused_handle", Info),
-            Remark::ForceNotRecorded { .. } => ("force_not_recorded", Info),
-            Remark::ForceByPower { .. } => ("force_by_power", Info),
-            Remark::GradientUnknown => ("gradient_unknown", Info),
-            Remark::UnusualStep { .. } => ("unusual_step", Warning),
-            Remark::NoValues { .. } => ("no_values", Info),
-            Remark::NeverMoves { .. } => ("never_moves", Warning),
-            Remark::OneRow => ("one_row", Warning),
-            Remark::StandsStill { .. } => ("stands_still", Warning),
-            Remark::Implausible { .. } => ("implausible", Warning),
+            Diagnostic::InputFault { finding, .. } => {
+                (finding.slip.name(), finding.slip.severity())
+            }
+            Diagnostic::AgainstDirection { .. } => ("against_direction", Fundamental),
+            Diagnostic::DistanceMismatch { .. } => ("distance_mismatch", Warning),
+            Diagnostic::OffTheLine { .. } => ("off_the_line", Warning),
+            Diagnostic::StartUnknown => ("start_unknown", Info),
+            Diagnostic::NegativeForce { .. } => ("negative_force", Warning),
+            Diagnostic::NegativeSpeed { .. } => ("negative_speed", Warning),
+            Diagnostic::HandleOutOfRange { .. } => ("handle_out_of_range", Warning),
+            Diagnostic::UnusedHandle { .. } => ("unused_handle", Info),
+            Diagnostic::ForceNotRecorded { .. } => ("force_not_recorded", Info),
+            Diagnostic::ForceByPower { .. } => ("force_by_power", Info),
+            Diagnostic::GradientUnknown => ("gradient_unknown", Info),
+            Diagnostic::UnusualStep { .. } => ("unusual_step", Warning),
+            Diagnostic::NoValues { .. } => ("no_values", Info),
+            Diagnostic::NeverMoves { .. } => ("never_moves", Warning),
+            Diagnostic::OneRow => ("one_row", Warning),
+            Diagnostic::StandsStill { .. } => ("stands_still", Warning),
+            Diagnostic::Implausible { .. } => ("implausible", Warning),
         }
     }
 }

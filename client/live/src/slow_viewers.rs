@@ -5,7 +5,7 @@
 
 use std::fmt::{Debug, Write};
 
-use dynocar::output::tell;
+use dynocar::output::report_line;
 use tracing::field::{Field, Visit};
 use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::layer::{Context, Layer, SubscriberExt};
@@ -18,12 +18,12 @@ const FULL_QUEUE: &str = "outbox for client ";
 const BROKEN_OFF: [&str; 2] = ["Error receiving from client ", "Error sending message to client "];
 
 /// Tells from now on what the protocol's library has to say of viewers.
-pub fn tell_of_viewers() {
+pub fn report_viewers() {
     // Only a second call fails.
-    let _ = registry().with(Teller).try_init();
+    let _ = registry().with(Reporter).try_init();
 }
 
-struct Teller;
+struct Reporter;
 
 /// The sentence of an event.
 #[derive(Default)]
@@ -38,7 +38,7 @@ impl Visit for Sentence {
     }
 }
 
-impl<S: Subscriber> Layer<S> for Teller {
+impl<S: Subscriber> Layer<S> for Reporter {
     fn on_event(&self, event: &Event<'_>, _: Context<'_, S>) {
         let metadata = event.metadata();
         if !metadata.target().starts_with("foxglove") || *metadata.level() > Level::INFO {
@@ -47,7 +47,7 @@ impl<S: Subscriber> Layer<S> for Teller {
         let mut sentence = Sentence::default();
         event.record(&mut sentence);
         if let Some(words) = words(*metadata.level(), &sentence.0) {
-            tell(&words);
+            report_line(&words);
         }
     }
 }

@@ -4,16 +4,16 @@
 //! Samples are taken at least every few milliseconds, for a channel holds the newest 512 of them; what
 //! is passed over is counted and told.
 
-mod lane;
 mod sink;
+mod train_channel;
 
 use std::time::{Duration, Instant};
 
 use dynocar_client::{Host, Peer, Role};
 use dynocar_shared::TrainId;
 
-use lane::Lane;
 pub use sink::{Sink, event};
+use train_channel::TrainChannel;
 
 /// How long a reader sleeps between two looks at the channels: at 1 kHz a buffer of 512 samples
 /// leaves it a hundred times as long.
@@ -33,14 +33,14 @@ pub struct Wanted {
 }
 
 /// The trains that are read.
-pub struct Lanes {
+pub struct TrainChannels {
     wanted: Wanted,
     name: &'static str,
-    lanes: Vec<Lane>,
+    lanes: Vec<TrainChannel>,
     looked: Option<Instant>,
 }
 
-impl Lanes {
+impl TrainChannels {
     /// Opens the trains that were named; `name` is what the reader's places are called.
     ///
     /// # Errors
@@ -52,14 +52,14 @@ impl Lanes {
         sink: &mut S,
     ) -> Result<Self, S::Error> {
         let named = wanted.trains.clone();
-        let mut lanes = Lanes { wanted, name, lanes: Vec::new(), looked: None };
+        let mut lanes = TrainChannels { wanted, name, lanes: Vec::new(), looked: None };
         named.into_iter().try_for_each(|train| lanes.add(train, sink))?;
         Ok(lanes)
     }
 
     /// The trains that are read by now.
     pub fn trains(&self) -> impl Iterator<Item = TrainId> {
-        self.lanes.iter().map(Lane::train)
+        self.lanes.iter().map(TrainChannel::train)
     }
 
     /// Hands on what has come, and looks from time to time who is there.
@@ -95,7 +95,7 @@ impl Lanes {
 
     fn add<S: Sink>(&mut self, train: TrainId, sink: &mut S) -> Result<(), S::Error> {
         let Wanted { host, snapshot_interval, .. } = &self.wanted;
-        self.lanes.push(Lane::open(host, train, *snapshot_interval, self.name)?);
+        self.lanes.push(TrainChannel::open(host, train, *snapshot_interval, self.name)?);
         sink.opened(train)
     }
 }

@@ -25,16 +25,16 @@ pub fn await_true(what: &str, mut condition: impl FnMut() -> bool) {
 }
 
 /// A folder with a run-time directory and a daemon's configuration.
-pub struct Place {
+pub struct TestSite {
     folder: tempfile::TempDir,
 }
 
-impl Place {
+impl TestSite {
     /// For a train with pipelines of these kinds.
     pub fn new(kinds: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("train.toml"), TRAIN_FILE).unwrap();
-        let place = Place { folder };
+        let place = TestSite { folder };
         let pipelines = kinds.iter().map(|kind| format!("[[pipelines]]\nkind = \"{kind}\"\n"));
         let config = format!(
             "[daemon]\nroot = {:?}\nidle = \"event\"\n[state]\nkeep = false\n[[trains]]\nid = 1\nfile = \"train.toml\"\n{}",
@@ -74,7 +74,7 @@ pub struct Controller {
 
 impl Controller {
     /// Publishes so many samples every 2 ms.
-    pub fn start(place: &Place, at_once: usize) -> Self {
+    pub fn start(place: &TestSite, at_once: usize) -> Self {
         let published = Arc::new(Mutex::new(Vec::new()));
         let stop = Arc::new(AtomicBool::new(false));
         let (done, ends, host) = (Arc::clone(&published), Arc::clone(&stop), place.host());

@@ -17,14 +17,14 @@ const ROUNDS: usize = 31;
 /// A program does not give what is asked of it.
 #[derive(Debug, thiserror::Error)]
 #[error("{program}: expected the times of the cases as JSON, {came}")]
-pub struct BesideError {
+pub struct AgainstError {
     program: PathBuf,
     came: String,
 }
 
 /// Times of a case by two builds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct CaseBeside {
+pub struct CaseAgainst {
     /// Name of the work.
     pub name: String,
     /// Median time in ns of an update of this build.
@@ -44,9 +44,11 @@ pub struct CaseBeside {
 /// # Errors
 ///
 /// When one of them cannot be run, or has no such case.
-pub fn measure(other: &Path, case: &str) -> Result<Vec<CaseBeside>, BesideError> {
-    let ours = std::env::current_exe()
-        .map_err(|error| BesideError { program: "this program".into(), came: error.to_string() })?;
+pub fn measure(other: &Path, case: &str) -> Result<Vec<CaseAgainst>, AgainstError> {
+    let ours = std::env::current_exe().map_err(|error| AgainstError {
+        program: "this program".into(),
+        came: error.to_string(),
+    })?;
     let mut rounds: Vec<[Vec<(String, f64)>; 2]> = Vec::with_capacity(ROUNDS);
     for round in 0..ROUNDS {
         // Who is first turns from round to round.
@@ -64,16 +66,16 @@ pub fn measure(other: &Path, case: &str) -> Result<Vec<CaseBeside>, BesideError>
     Ok(names
         .filter_map(|name| {
             let pairs = rounds.iter().map(|[a, b]| Some((named(a, &name)?, named(b, &name)?)));
-            Some(CaseBeside::of(name.clone(), &pairs.collect::<Option<Vec<_>>>()?))
+            Some(CaseAgainst::of(name.clone(), &pairs.collect::<Option<Vec<_>>>()?))
         })
         .collect())
 }
 
-impl CaseBeside {
+impl CaseAgainst {
     fn of(name: String, pairs: &[(f64, f64)]) -> Self {
         let spread = |of: fn(&(f64, f64)) -> f64| Spread::of(pairs.iter().map(of).collect());
         let ratio = spread(|(ours, other)| ours / other);
-        CaseBeside {
+        CaseAgainst {
             name,
             ns_per_update: spread(|pair| pair.0).median,
             other_ns_per_update: spread(|pair| pair.1).median,
@@ -85,8 +87,8 @@ impl CaseBeside {
 }
 
 /// One measurement of a program: cases by name with the time of an update in ns.
-fn times(program: &Path, case: &str) -> Result<Vec<(String, f64)>, BesideError> {
-    let failed = |came: String| BesideError { program: program.into(), came };
+fn times(program: &Path, case: &str) -> Result<Vec<(String, f64)>, AgainstError> {
+    let failed = |came: String| AgainstError { program: program.into(), came };
     let arguments = ["estimators", "--quick", "--case", case, "--json", "-"];
     let output = Command::new(program).args(arguments).output();
     let output = output.map_err(|error| failed(error.to_string()))?;
@@ -104,7 +106,7 @@ fn times(program: &Path, case: &str) -> Result<Vec<(String, f64)>, BesideError> 
 }
 
 /// The cases as a table for people.
-pub fn table(cases: &[CaseBeside]) -> String {
+pub fn table(cases: &[CaseAgainst]) -> String {
     let mut text = String::from(
         "case                                  ns   other ns    more ns   ratio (quartiles)\n",
     );
@@ -125,7 +127,7 @@ mod tests {
     #[test]
     fn ratios_are_taken_round_by_round_and_a_program_that_measures_nothing_is_named() {
         let pairs = [(100.0, 50.0), (120.0, 60.0), (90.0, 45.0)];
-        let case = CaseBeside::of("case".into(), &pairs);
+        let case = CaseAgainst::of("case".into(), &pairs);
         assert_eq!((case.ratio, case.more_ns), (2.0, 50.0));
         let error = times(Path::new("/bin/true"), "rls").unwrap_err();
         assert!(error.to_string().starts_with("/bin/true: expected the times"), "{error}");

@@ -13,11 +13,11 @@ use serde::{Deserialize, Serialize};
 use crate::event::{Event, EventKind};
 
 /// In the folder of a stretch: why it is kept.
-const STRETCH_FILE: &str = "stretch.toml";
+const EVENT_FILE: &str = "stretch.toml";
 
 /// Why and until when a stretch is kept.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Stretch {
+pub struct KeptEvent {
     /// Files that are begun before belong to it, in s since 1970.
     pub until_unix_s: u64,
     /// Why.
@@ -37,7 +37,7 @@ pub struct Reason {
     pub text: String,
 }
 
-impl Stretch {
+impl KeptEvent {
     /// True until its end.
     pub fn is_open(&self, now: SystemTime) -> bool {
         unix_s(now) <= self.until_unix_s
@@ -51,7 +51,7 @@ impl Stretch {
     pub fn write(&self, storage: &SharedStorage, folder: &Path) -> Result<(), StorageError> {
         // Numbers and texts always have a text in TOML.
         let text = toml::to_string(self).unwrap_or_default();
-        let path = folder.join(STRETCH_FILE);
+        let path = folder.join(EVENT_FILE);
         replace(&**storage, &path, &beside(&path), (text.as_bytes(), &Rights::Usual))
     }
 }
@@ -100,11 +100,11 @@ pub fn forget_unfinished(kept: &Path) {
 }
 
 /// The stretch with the latest end, by what its folder says.
-pub fn newest(kept: &Path) -> Option<(PathBuf, Stretch)> {
+pub fn newest(kept: &Path) -> Option<(PathBuf, KeptEvent)> {
     let folders = fs::read_dir(kept).ok()?.flatten().map(|it| it.path());
     let known = folders.filter_map(|folder| {
-        let text = fs::read_to_string(folder.join(STRETCH_FILE)).ok()?;
-        Some((folder, toml::from_str::<Stretch>(&text).ok()?))
+        let text = fs::read_to_string(folder.join(EVENT_FILE)).ok()?;
+        Some((folder, toml::from_str::<KeptEvent>(&text).ok()?))
     });
     known.max_by_key(|it| it.1.until_unix_s)
 }

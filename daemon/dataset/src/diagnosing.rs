@@ -1,14 +1,14 @@
 //! Looks for what may be remarked on in a run.
 
-use dynocar_core::plausibility::{Findings, Slip};
+use dynocar_core::plausibility::{Findings, InputFault};
 use dynocar_core::train::Drive;
 
+use super::diagnostic::Diagnostic;
 use super::finding_unit::read_as;
 use super::forces::{Force, ForceSource};
 use super::motion::PositionSource;
 use super::quality::RunQuality;
 use super::quantity::Quantity;
-use super::remark::Remark;
 use super::resolved::{Context, GradientSource, Resolved};
 
 /// Below this distance in m, comparisons of position and speed say nothing.
@@ -33,29 +33,30 @@ pub(super) fn remarks(
     run: &Resolved,
     quality: &RunQuality,
     findings: &Findings,
-) -> Vec<Remark> {
-    let slip = |finding| Remark::Slip { finding, read_as: read_as(context.manifest, finding) };
-    let mut remarks: Vec<Remark> = findings.iter().map(slip).collect();
+) -> Vec<Diagnostic> {
+    let slip =
+        |finding| Diagnostic::InputFault { finding, read_as: read_as(context.manifest, finding) };
+    let mut remarks: Vec<Diagnostic> = findings.iter().map(slip).collect();
     of_time(quality, &mut remarks);
     of_content(context, run, quality, &mut remarks);
     remarks.extend(stands_still(run));
     of_position(context, run, quality, findings, &mut remarks);
     if run.speeds.negative > 0 {
-        remarks.push(Remark::NegativeSpeed { count: run.speeds.negative });
+        remarks.push(Diagnostic::NegativeSpeed { count: run.speeds.negative });
     }
     let handles = (Quantity::TractionHandle, Quantity::BrakeHandle);
     of_force(run, &run.forces.traction, Quantity::TractionForce, handles.0, &mut remarks);
     of_force(run, &run.forces.brake, Quantity::BrakeForce, handles.1, &mut remarks);
     of_power(context, run, &mut remarks);
     if run.gradient_source == GradientSource::Unknown {
-        remarks.push(Remark::GradientUnknown);
+        remarks.push(Diagnostic::GradientUnknown);
     }
     of_plausibility(run, &mut remarks);
     remarks
 }
 
 /// What a force from power is reckoned with.
-fn of_power(context: Context, run: &Resolved, remarks: &mut Vec<Remark>) {
+fn of_power(context: Context, run: &Resolved, remarks: &mut Vec<Diagnostic>) {
     if run.forces.traction.source != ForceSource::Power {
         return;
     }
@@ -63,7 +64,7 @@ fn of_power(context: Context, run: &Resolved, remarks: &mut Vec<Remark>) {
     let drive = declared.unwrap_or(Drive::USUAL);
     let has_friction = context.train.brake_gear.friction_brake.is_some()
         && run.table.filled(Quantity::BrakeCylinderPressure).is_some();
-    remarks.push(Remark::ForceByPower {
+    remarks.push(Diagnostic::ForceByPower {
         efficiency: drive.efficiency,
         is_declared: declared.is_some(),
         speed_min_mps: drive.speed_min_mps,
@@ -71,29 +72,34 @@ fn of_power(context: Context, run: &Resolved, remarks: &mut Vec<Remark>) {
     });
 }
 
-fn of_time(quality: &RunQuality, remarks: &mut Vec<Remark>) {
+fn of_time(quality: &RunQuality, remarks: &mut Vec<Diagnostic>) {
     let step_s = quality.order.step_s;
     if step_s > 0.0 && !(USUAL_STEP_S.0..=USUAL_STEP_S.1).contains(&step_s) {
-        remarks.push(Remark::UnusualStep { step_s });
+        remarks.push(Diagnostic::UnusualStep { step_s });
     }
 }
 
 /// What a run lacks altogether.
-fn of_content(context: Context, run: &Resolved, quality: &RunQuality, remarks: &mut Vec<Remark>) {
+fn of_content(
+    context: Context,
+    run: &Resolved,
+    quality: &RunQuality,
+    remarks: &mut Vec<Diagnostic>,
+) {
     let quantities = context.manifest.columns.iter().map(|mapping| mapping.quantity);
     let empty = quantities.filter(|&quantity| run.table.filled(quantity).is_none());
-    remarks.extend(empty.map(|quantity| Remark::NoValues { quantity }));
+    remarks.extend(empty.map(|quantity| Diagnostic::NoValues { quantity }));
     if run.order.in_order.iter().filter(|&&mark| mark).count() < 2 {
-        remarks.push(Remark::OneRow);
+        remarks.push(Diagnostic::OneRow);
     } else if let Some((_, highest_mps)) = quality.speed_range_mps
         && highest_mps < MOVING_MPS
     {
-        remarks.push(Remark::NeverMoves { highest_mps });
+        remarks.push(Diagnostic::NeverMoves { highest_mps });
     }
 }
 
 /// The longest stretch of a moving train in which no column but the time changes.
-fn stands_still(run: &Resolved) -> Option<Remark> {
+fn stands_still(run: &Resolved) -> Option<Diagnostic> {
     let columns: Vec<&[f64]> = run
         .table
         .columns()
@@ -116,7 +122,7 @@ fn stands_still(run: &Resolved) -> Option<Remark> {
     }
     let (for_s, start) = longest?;
     let (from_s, speed_mps) = (run.times_s[start], run.speeds.speed_mps[start]);
-    Some(Remark::StandsStill { from_s, for_s, speed_mps })
+    Some(Diagnostic::StandsStill { from_s, for_s, speed_mps })
 }
 
 fn of_position(
@@ -124,11 +130,11 @@ fn of_position(
     run: &Resolved,
     quality: &RunQuality,
     findings: &Findings,
-    remarks: &mut Vec<Remark>,
+    remarks: &mut Vec<Diagnostic>,
 ) {
     if run.position_source == PositionSource::IntegratedSpeed {
         if context.track.is_some() && run.entry.start_m.is_none() {
-            remarks.push(Remark::StartUnknown);
+            remarks.push(Diagnostic::StartUnknown);
         }
         return;
     }
@@ -147,18 +153,21 @@ fn of_position(
     };
     let net_m = median_m(&rows[rows.len() - few..]) - median_m(&rows[..few]);
     let direction = run.entry.direction;
-    let is_told = |slips: &[Slip]| findings.iter().any(|finding| slips.contains(&finding.slip));
-    if net_m * f64::from(direction) < -DISTANCE_MIN_M && !is_told(&[Slip::DirectionReversed]) {
-        remarks.push(Remark::AgainstDirection { direction, net_m });
+    let is_told =
+        |slips: &[InputFault]| findings.iter().any(|finding| slips.contains(&finding.slip));
+    if net_m * f64::from(direction) < -DISTANCE_MIN_M && !is_told(&[InputFault::DirectionReversed])
+    {
+        remarks.push(Diagnostic::AgainstDirection { direction, net_m });
     }
     let (position_m, speed_m) = (net_m.abs(), quality.distance_m);
     let is_long = position_m.max(speed_m) > DISTANCE_MIN_M;
-    let is_mismatch_told = is_told(&[Slip::TimeScale, Slip::SpeedScale, Slip::PositionScale]);
+    let is_mismatch_told =
+        is_told(&[InputFault::TimeScale, InputFault::SpeedScale, InputFault::PositionScale]);
     if !is_mismatch_told
         && is_long
         && (position_m - speed_m).abs() > DISTANCE_TOLERANCE * position_m.max(speed_m)
     {
-        remarks.push(Remark::DistanceMismatch { position_m, speed_m });
+        remarks.push(Diagnostic::DistanceMismatch { position_m, speed_m });
     }
     let length_m = context.track.and_then(|track| track.length_m);
     // A train may stop with its head at the line's end and its centre half a length outside.
@@ -166,7 +175,7 @@ fn of_position(
     if let (Some(length_m), Some((from_m, to_m))) = (length_m, quality.position_range_m)
         && (from_m < -beyond_m || to_m > length_m + beyond_m)
     {
-        remarks.push(Remark::OffTheLine { from_m, to_m, length_m });
+        remarks.push(Diagnostic::OffTheLine { from_m, to_m, length_m });
     }
 }
 
@@ -175,24 +184,24 @@ fn of_force(
     force: &Force,
     quantity: Quantity,
     handle: Quantity,
-    remarks: &mut Vec<Remark>,
+    remarks: &mut Vec<Diagnostic>,
 ) {
     if force.negative > 0 {
         let lowest_n = force.force_n.iter().copied().fold(f64::INFINITY, f64::min);
-        remarks.push(Remark::NegativeForce { quantity, count: force.negative, lowest_n });
+        remarks.push(Diagnostic::NegativeForce { quantity, count: force.negative, lowest_n });
     }
     if force.handle_out_of_range > 0 {
         let column = run.table.column(handle).unwrap_or_default();
         let lowest = column.iter().copied().fold(f64::INFINITY, f64::min);
         let highest = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let count = force.handle_out_of_range;
-        remarks.push(Remark::HandleOutOfRange { quantity: handle, count, lowest, highest });
+        remarks.push(Diagnostic::HandleOutOfRange { quantity: handle, count, lowest, highest });
     }
     if force.source == ForceSource::Column && run.table.column(handle).is_some() {
-        remarks.push(Remark::UnusedHandle { quantity: handle });
+        remarks.push(Diagnostic::UnusedHandle { quantity: handle });
     }
     if force.source == ForceSource::None {
-        remarks.push(Remark::ForceNotRecorded { quantity });
+        remarks.push(Diagnostic::ForceNotRecorded { quantity });
     }
 }
 
@@ -207,14 +216,14 @@ const PLAUSIBLE: [(Quantity, f64, f64); 7] = [
     (Quantity::Longitude, -180.0, 180.0),
 ];
 
-fn of_plausibility(run: &Resolved, remarks: &mut Vec<Remark>) {
+fn of_plausibility(run: &Resolved, remarks: &mut Vec<Diagnostic>) {
     for (quantity, low, high) in PLAUSIBLE {
         let Some(column) = run.table.column(quantity) else { continue };
         let is_outside = |value: &&f64| !value.is_nan() && !(low..=high).contains(*value);
         let count = column.iter().filter(is_outside).count();
         if count > 0 {
             let unit = quantity.unit().name();
-            remarks.push(Remark::Implausible { quantity, count, low, high, unit });
+            remarks.push(Diagnostic::Implausible { quantity, count, low, high, unit });
         }
     }
 }

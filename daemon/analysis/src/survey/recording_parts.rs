@@ -19,7 +19,7 @@ const TERMINAL_MARGIN_M: f64 = 100.0;
 
 /// A part of a recording that does not come back on itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stretch {
+pub struct RecordingPart {
     /// Number of the recording.
     pub recording: usize,
     /// Way in m by the recording's wheels where it starts.
@@ -30,7 +30,7 @@ pub struct Stretch {
 
 /// Cuts a recording into stretches: where its way follows, for 300 m, a way that it took before
 /// in the same stretch, it has turned. The cut is where it stood longest in between.
-pub fn stretches(number: usize, recording: &Recording) -> Vec<Stretch> {
+pub fn recording_parts(number: usize, recording: &Recording) -> Vec<RecordingPart> {
     let points = recording.points(POINT_STEP_M);
     let mut found = Vec::new();
     let mut from = 0;
@@ -38,7 +38,7 @@ pub fn stretches(number: usize, recording: &Recording) -> Vec<Stretch> {
         let start_m = if from == 0 { 0.0 } else { points[from].0 };
         let Some(turn) = first_return(&points, from) else {
             let to_m = recording.length_m();
-            found.push(Stretch { recording: number, from_m: start_m, to_m });
+            found.push(RecordingPart { recording: number, from_m: start_m, to_m });
             break;
         };
         let (left_m, back_m) = (points[turn.left].0, points[turn.back].0);
@@ -48,7 +48,7 @@ pub fn stretches(number: usize, recording: &Recording) -> Vec<Stretch> {
         } else {
             back_m
         };
-        found.push(Stretch { recording: number, from_m: start_m, to_m: cut_m });
+        found.push(RecordingPart { recording: number, from_m: start_m, to_m: cut_m });
         let next = points.partition_point(|point| point.0 <= cut_m);
         // A cut always leaves points behind, or else the search would not end.
         from = next.max(from + 1);

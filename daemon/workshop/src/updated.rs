@@ -22,14 +22,14 @@ use dynocar::dataset::open;
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::write_in_folder;
 
-pub use error::{GROWN_MARK, GrownError};
+pub use error::{UPDATED_MARK, UpdatedModelError};
 
 /// The files of a grown model: the train, the line where something is known of it, and the dataset.
-pub const GROWN_FILES: [&str; 3] = [TRAIN_FILE, TRACK_FILE, MANIFEST_FILE];
+pub const UPDATED_FILES: [&str; 3] = [TRAIN_FILE, TRACK_FILE, MANIFEST_FILE];
 
 /// What was written.
 #[derive(Clone, Debug, PartialEq)]
-pub struct GrownFiles {
+pub struct UpdatedFiles {
     /// The files of the model and its dataset.
     pub files: Vec<PathBuf>,
     /// Kinds of effects that the formats cannot express.
@@ -43,14 +43,14 @@ pub struct GrownFiles {
 /// # Errors
 ///
 /// When the declared files cannot be read or the grown ones not written.
-pub fn write_grown(
+pub fn write_updated(
     dataset: &Path,
     explanation: &Explanation,
     folder: &Path,
-) -> Result<GrownFiles, GrownError> {
+) -> Result<UpdatedFiles, UpdatedModelError> {
     let (source, head) = open(dataset)?;
     let read = |path: &str| {
-        source.read(path).map_err(|problem: FileProblem| GrownError::Declared {
+        source.read(path).map_err(|problem: FileProblem| UpdatedModelError::Declared {
             label: source.label(path),
             problem: problem.to_string(),
         })
@@ -59,7 +59,7 @@ pub fn write_grown(
     let texts = (read(&train.path)?, track.map(|file| read(&file.path)).transpose()?);
     let labels = (&train.path[..], track.map_or(TRACK_FILE, |file| &file.path));
     let declared = (&texts.0[..], texts.1.as_deref());
-    let mut grown = GrownTables::of(explanation, declared, labels)?;
+    let mut grown = UpdatedTables::of(explanation, declared, labels)?;
     if let (Some(declared), Some(track)) = (track, &mut grown.track) {
         runs::keep_alignments(track, &source.path_of(&declared.path), folder);
     }
@@ -67,19 +67,20 @@ pub fn write_grown(
     runs::keep_runs(&mut manifest, &source, folder)?;
     runs::name_model(&mut manifest, grown.track.is_some());
     let texts = grown.texts(explanation, labels, MANIFEST_FILE);
-    let dataset = grown_text(explanation, MANIFEST_FILE, &dataset.display().to_string(), &manifest);
+    let dataset =
+        updated_text(explanation, MANIFEST_FILE, &dataset.display().to_string(), &manifest);
     if texts.track.is_none() {
         runs::forget(&folder.join(TRACK_FILE))?;
     }
     let all = [Some(texts.train), texts.track, Some(dataset)];
-    let named = GROWN_FILES.into_iter().zip(all).filter_map(|(name, text)| Some((name, text?)));
+    let named = UPDATED_FILES.into_iter().zip(all).filter_map(|(name, text)| Some((name, text?)));
     let files = named.map(|(name, text)| write_in_folder(folder, name, &text));
-    Ok(GrownFiles { files: files.collect::<Result<_, _>>()?, not_expressed: texts.not_expressed })
+    Ok(UpdatedFiles { files: files.collect::<Result<_, _>>()?, not_expressed: texts.not_expressed })
 }
 
 /// A grown model as texts.
 #[derive(Clone, Debug, PartialEq)]
-pub struct GrownTexts {
+pub struct UpdatedTexts {
     /// Of the train.
     pub train: String,
     /// Of the line, where something is known of it.
@@ -94,28 +95,28 @@ pub struct GrownTexts {
 /// # Errors
 ///
 /// When a declared text is no TOML.
-pub fn grown_texts(
+pub fn updated_texts(
     explanation: &Explanation,
     (train, track): (&str, Option<&str>),
     labels: (&str, &str),
     source: &str,
-) -> Result<GrownTexts, GrownError> {
-    Ok(GrownTables::of(explanation, (train, track), labels)?.texts(explanation, labels, source))
+) -> Result<UpdatedTexts, UpdatedModelError> {
+    Ok(UpdatedTables::of(explanation, (train, track), labels)?.texts(explanation, labels, source))
 }
 
 /// A grown model as tables.
-struct GrownTables {
+struct UpdatedTables {
     train: Table,
     track: Option<Table>,
     not_expressed: Vec<String>,
 }
 
-impl GrownTables {
+impl UpdatedTables {
     fn of(
         explanation: &Explanation,
         (train, track): (&str, Option<&str>),
         labels: (&str, &str),
-    ) -> Result<Self, GrownError> {
+    ) -> Result<Self, UpdatedModelError> {
         let mut train = table(train, labels.0)?;
         let declared = track.map(|text| table(text, labels.1)).transpose()?;
         let is_declared = declared.is_some();
@@ -128,26 +129,26 @@ impl GrownTables {
             }
         }
         let track = (is_declared || !track.is_empty()).then_some(track);
-        Ok(GrownTables { train, track, not_expressed })
+        Ok(UpdatedTables { train, track, not_expressed })
     }
 
-    fn texts(self, explanation: &Explanation, labels: (&str, &str), source: &str) -> GrownTexts {
-        GrownTexts {
-            train: grown_text(explanation, labels.0, source, &self.train),
-            track: self.track.map(|track| grown_text(explanation, labels.1, source, &track)),
+    fn texts(self, explanation: &Explanation, labels: (&str, &str), source: &str) -> UpdatedTexts {
+        UpdatedTexts {
+            train: updated_text(explanation, labels.0, source, &self.train),
+            track: self.track.map(|track| updated_text(explanation, labels.1, source, &track)),
             not_expressed: self.not_expressed,
         }
     }
 }
 
-fn grown_text(explanation: &Explanation, label: &str, source: &str, keys: &Table) -> String {
+fn updated_text(explanation: &Explanation, label: &str, source: &str, keys: &Table) -> String {
     let statement = &explanation.answer.statement;
-    format!("{GROWN_MARK}{label} of {source} by `dynocar explain`.\n# {statement}\n{keys}")
+    format!("{UPDATED_MARK}{label} of {source} by `dynocar explain`.\n# {statement}\n{keys}")
 }
 
-fn table(text: &str, label: &str) -> Result<Table, GrownError> {
+fn table(text: &str, label: &str) -> Result<Table, UpdatedModelError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    text.parse().map_err(|error: toml::de::Error| GrownError::Declared {
+    text.parse().map_err(|error: toml::de::Error| UpdatedModelError::Declared {
         label: label.into(),
         problem: error.message().to_string(),
     })
