@@ -8,6 +8,7 @@ use dynocar_shared::{
 };
 
 use super::bank::{Measured, MotionBank};
+use super::braking_watch::BrakingWatch;
 use super::jump_share::JumpShare;
 use super::load::{Change, LoadWatch};
 use super::motion_filter::{LOAD, SPEED, Step, wind_over};
@@ -40,6 +41,15 @@ const COMPLETE: u32 = Quantity::Resistance.bit() | Quantity::Mass.bit();
 const FORCE_RATE_MEMORY_S: f64 = 0.5;
 /// Innovations before they are judged to be alike.
 const JUDGED_MIN: f64 = 100.0;
+/// All that a braking may teach, as it was before.
+#[derive(Clone, Debug)]
+struct Before {
+    bank: MotionBank,
+    noise: SpeedNoise,
+    jumps: JumpShare,
+    monitor: InnovationMonitor,
+}
+
 /// Resistance and mass of a train by Kalman filters over every sample.
 #[derive(Clone, Debug)]
 pub struct TrainKalman {
@@ -60,6 +70,8 @@ pub struct TrainKalman {
     jumps: JumpShare,
     force_rate: f64,
     monitor: InnovationMonitor,
+    braking: BrakingWatch,
+    before_braking: Before,
     systematic: Systematic,
     speeds: SpeedRange,
     health: InputHealth,
@@ -85,7 +97,12 @@ impl TrainKalman {
         settings.check_ranges()?;
         let first = Resistance::declared(&train.resistance, settings.prior_relative_std);
         let bank = first.bank(&settings);
+        let noise = SpeedNoise::guessed(settings.speed_noise_mps);
+        let monitor = InnovationMonitor::new(INNOVATION_MEMORY);
+        let jumps = JumpShare::default();
         Ok(TrainKalman {
+            braking: BrakingWatch::default(),
+            before_braking: Before { bank: bank.clone(), noise, jumps, monitor },
             settings,
             train_kg: train.mass_kg,
             train_length_m: train.length_m,
@@ -95,10 +112,10 @@ impl TrainKalman {
             last: None,
             last_time_ns: None,
             is_fast: false,
-            noise: SpeedNoise::guessed(settings.speed_noise_mps),
-            jumps: JumpShare::default(),
+            noise,
+            jumps,
             force_rate: 0.0,
-            monitor: InnovationMonitor::new(INNOVATION_MEMORY),
+            monitor,
             systematic: Systematic::new(
                 settings.gradient_std_permille,
                 settings.acceleration_scale_std,
@@ -156,6 +173,14 @@ impl TrainKalman {
 
     fn advance(&mut self, from: UnitSample, now: UnitSample, sample: &ResolvedSample) -> Outcome {
         let step = self.step(&from, &now, sample);
+        if self.braking.begins(now.brake) {
+            self.before_braking = Before {
+                bank: self.bank.clone(),
+                noise: self.noise,
+                jumps: self.jumps,
+                monitor: self.monitor,
+            };
+        }
         let before_mps = self.bank.likeliest().belief.mean[SPEED];
         self.bank.predict(&step);
         let moved_mps = (self.bank.likeliest().belief.mean[SPEED] - before_mps).abs();
@@ -165,6 +190,10 @@ impl TrainKalman {
             self.reset();
             return self.begin(now);
         };
+        if self.braking.refuses(measured.trust.normalised) {
+            self.take_back(step.by_wind);
+            return Outcome::Used;
+        }
         self.last = Some(now);
         if measured.trust.is_outlier() {
             self.monitor.break_here();
@@ -177,6 +206,17 @@ impl TrainKalman {
         self.is_fresh_reset &= self.moved_s < self.moved_min_s;
         self.judge(step.by_wind);
         Outcome::Updated
+    }
+
+    /// Forgets a braking that the model cannot explain: its brake does not act as it reports.
+    fn take_back(&mut self, by_wind: f64) {
+        self.bank = self.before_braking.bank.clone();
+        self.noise = self.before_braking.noise;
+        self.jumps = self.before_braking.jumps;
+        self.monitor = self.before_braking.monitor;
+        self.monitor.break_here();
+        self.last = None;
+        self.judge(by_wind);
     }
 
     /// Learns the noise of speeds and of forces that jump from what a speed said.
@@ -308,6 +348,7 @@ impl Gated for TrainKalman {
     fn take(&mut self, sample: &ResolvedSample) -> Outcome {
         if !self.is_under_way(sample) {
             self.last = None;
+            self.braking = BrakingWatch::default();
             return Outcome::Used;
         }
         let now = match UnitSample::of(sample) {
@@ -317,6 +358,11 @@ impl Gated for TrainKalman {
                 return self.health.note(Outcome::Rejected(reason), sample);
             }
         };
+        if self.braking.is_refused() && !self.braking.begins(now.brake) && self.braking.is_refused()
+        {
+            self.last = None;
+            return self.health.note(Outcome::Used, sample);
+        }
         self.noise.rounding.see(now.speed_mps);
         let last = self.last.filter(|last| {
             let since_s = now.seconds_since(last);

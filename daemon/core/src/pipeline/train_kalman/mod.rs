@@ -12,6 +12,7 @@
 
 mod bank;
 mod behaviour;
+mod braking_watch;
 mod estimator;
 mod jump_share;
 mod load;
