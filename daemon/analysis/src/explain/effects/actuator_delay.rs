@@ -8,7 +8,8 @@ use super::{Candidate, Effect, Hypothesis, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::{Scan, Tuple};
 
-/// Where positions are integrated from the speed, they are late with it, and nothing is on time.
+/// Where positions are integrated from the speed, they are late with it; where nothing of the line is felt,
+/// a speed whose odometer is late with it looks the same.
 const NEVER_REPORTED: [EffectKind; 1] = [EffectKind::SpeedDelay];
 /// Delay and lag in s that a fit may start from.
 const STARTS: [[f64; 2]; 4] = [[0.3, 0.3], [1.0, 1.0], [0.2, 2.0], [2.0, 0.3]];
@@ -32,7 +33,9 @@ impl Effect for ActuatorDelay {
             .map(|start| (decrease(scan, start), start))
             .max_by(|one, other| one.0.total_cmp(&other.0));
         let is_any_recorded = scan.problem.runs.iter().any(|run| run.is_position_recorded);
-        let twins: &[EffectKind] = if is_any_recorded { &[] } else { &NEVER_REPORTED };
+        let is_level = scan.track.is_none_or(|track| track.is_level());
+        let is_known = is_any_recorded && !is_level || scan.problem.is_position_ahead();
+        let twins: &[EffectKind] = if is_known { &[] } else { &NEVER_REPORTED };
         let candidate =
             |(_, start): (f64, [f64; 2])| Candidate::new(DelayAndLag { twins }, start.to_vec());
         Proposal::Candidates(best.map(candidate).into_iter().collect())

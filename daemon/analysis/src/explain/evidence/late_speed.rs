@@ -65,8 +65,12 @@ fn late_s(recording: &Recording, from: usize, end: usize) -> Option<f64> {
     late_s.is_finite().then_some(late_s)
 }
 
-/// The mean of the parts of all runs, with its standard deviation; `None` where the position is not
-/// clearly ahead.
+/// By how many s positions show that the speed is late, with the standard deviation; `None` where too few
+/// parts tell.
+///
+/// A speed is late against the line, where the train is by its position. A position that is not clearly
+/// ahead of the speed shows that the speed is not late, or that both are late together: then the line is
+/// felt on time by it, and only the forces seem to act late.
 pub(super) fn pooled_s(parts: &[f64]) -> Option<(f64, f64)> {
     if parts.len() < PARTS_MIN {
         return None;
@@ -75,7 +79,8 @@ pub(super) fn pooled_s(parts: &[f64]) -> Option<(f64, f64)> {
     let mean_s = parts.iter().sum::<f64>() / count;
     let variance = parts.iter().map(|it| (it - mean_s).powi(2)).sum::<f64>() / (count - 1.0);
     let std_s = (variance / count).sqrt().hypot(COMMON_S);
-    (mean_s - AHEAD_STDS * std_s > speed_delay::LEAST_S).then_some((mean_s, std_s))
+    let is_ahead = mean_s - AHEAD_STDS * std_s > speed_delay::LEAST_S;
+    Some((if is_ahead { mean_s } else { 0.0 }, std_s))
 }
 
 #[cfg(test)]
@@ -102,6 +107,18 @@ mod tests {
             }
         };
         Recording::new((0..620).map(sample).collect(), BridgeLimits::default()).unwrap()
+    }
+
+    #[test]
+    fn a_position_that_runs_with_the_speed_shows_no_late_speed() {
+        let (late_s, _) = pooled_s(&[0.8, 0.7, 0.9, 0.8, 0.8]).unwrap();
+        assert!((late_s - 0.8).abs() < 1e-9, "{late_s}");
+        for together in [[0.0, 0.05, -0.05, 0.02, -0.02], [-0.4, -0.5, -0.3, -0.4, -0.4]] {
+            let (late_s, deviation_s) = pooled_s(&together).unwrap();
+            assert_eq!(late_s, 0.0);
+            assert!((0.05..0.1).contains(&deviation_s), "{deviation_s}");
+        }
+        assert_eq!(pooled_s(&[0.8; 4]), None);
     }
 
     #[test]

@@ -43,7 +43,7 @@ pub struct FitProblem {
     declared_responses: Vec<Response>,
     /// Measured way over way by integrated speed, with its standard deviation.
     pub way_ratio: Option<(f64, f64)>,
-    /// Seconds by which the speed is late by the position, with their standard deviation, where it is.
+    /// Seconds by which the speed is late by the position, with their standard deviation.
     speed_late_s: Option<(f64, f64)>,
 }
 
@@ -157,6 +157,11 @@ impl FitProblem {
             way_ratio,
             speed_late_s,
         }
+    }
+
+    /// Whether positions show that the speed is late.
+    pub fn is_position_ahead(&self) -> bool {
+        self.speed_late_s.is_some_and(|(late_s, _)| late_s > 0.0)
     }
 
     /// Standard deviation of the declared a (0), b (1) or c (2).
