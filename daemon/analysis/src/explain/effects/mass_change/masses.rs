@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use dynocar_core::terms::{Entry, Parameter, masses};
 use dynocar_shared::vocabulary::EffectKind;
+use nalgebra::DMatrix;
 
 use super::parts::Part;
 use crate::explain::answer::{Location, MassSection, MassWindow, ParameterValue, RunWindow};
@@ -18,6 +19,8 @@ pub struct Masses {
     /// Of every part, where its ends could be; empty where nothing was chosen.
     edges: Vec<Vec<f64>>,
     parameters: Vec<Parameter>,
+    /// What is known of the factors before the data; `None` where the parts were chosen one by one.
+    information: Option<DMatrix<f64>>,
     choice_cost: f64,
 }
 
@@ -28,10 +31,24 @@ impl Masses {
             parts: Vec::new(),
             edges: Vec::new(),
             parameters: Vec::new(),
+            information: None,
             choice_cost: 0.0,
         };
         masses.push(part, edges, choice_cost);
         masses
+    }
+
+    /// All of some parts, none of them chosen: loads differ from each other as loads do.
+    pub fn of_all(parts: Vec<Part>) -> Self {
+        let count = parts.len();
+        let each = masses::SUSPECT.prior_std.powi(-2);
+        Masses {
+            edges: vec![Vec::new(); count],
+            parameters: vec![masses::PARAMETER; count],
+            information: Some(DMatrix::from_diagonal_element(count, count, each)),
+            choice_cost: 0.0,
+            parts,
+        }
     }
 
     /// Adds a part with a factor of its own.
@@ -59,6 +76,10 @@ impl Hypothesis for Masses {
 
     fn choice_cost(&self) -> f64 {
         self.choice_cost
+    }
+
+    fn prior_information(&self) -> Option<&DMatrix<f64>> {
+        self.information.as_ref()
     }
 
     fn none(&self) -> f64 {

@@ -76,6 +76,18 @@ fn joined(
     })
 }
 
+/// Every stretch between neighbouring stations with a factor of its own: loads that change at every stop.
+fn every(parts: &[(Part, Tuple)]) -> Candidate {
+    let is_within = |part: &Part, other: &Part| {
+        let ([from, to], [low, high]) = (part.ends(), other.ends());
+        !part.is_apart(other) && from <= low && high <= to && part != other
+    };
+    let is_least = |part: &&Part| !parts.iter().any(|(other, _)| is_within(part, other));
+    let least: Vec<Part> = parts.iter().map(|(part, _)| part).filter(is_least).cloned().collect();
+    let start = vec![1.0; least.len()];
+    Candidate::new(Masses::of_all(least), start)
+}
+
 /// One factor in all runs: nothing to choose but whether there are parts at all.
 pub fn everywhere(scan: &Scan) -> Option<Candidate> {
     let [low, high] = span_m(scan)?;
@@ -110,8 +122,9 @@ pub fn all_windows(scan: &Scan) -> Vec<(Part, Tuple)> {
     windows
 }
 
-/// Adds parts one by one, each fitted with a factor of its own, while they explain something.
-pub fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Option<Candidate> {
+/// Adds parts one by one, each fitted with a factor of its own, while they explain something; where no end
+/// of it comes in sight on the line, all of them besides.
+pub fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Vec<Candidate> {
     let part_cost = 2.0 * (parts.len().max(2) as f64).ln();
     let best = |scan: &Scan, tuples: &mut dyn Iterator<Item = (Part, Tuple)>| {
         tuples
@@ -122,7 +135,9 @@ pub fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Option<Candidate> {
             .filter(|(_, estimate, _)| estimate.abs() > LEAST_SHARE)
             .max_by(|one, other| one.0.total_cmp(&other.0))
     };
-    let (_, estimate, part) = best(scan, &mut parts.iter().cloned())?;
+    let Some((_, estimate, part)) = best(scan, &mut parts.iter().cloned()) else {
+        return Vec::new();
+    };
     let edges = |part: &Part| part.edges(parts.iter().map(|(other, _)| other));
     let mut masses = Masses::new(part.clone(), edges(&part), part_cost);
     let mut start = vec![(1.0 + estimate).clamp(0.7, 1.5)];
@@ -151,5 +166,37 @@ pub fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Option<Candidate> {
             _ => break,
         }
     }
-    Some(Candidate::new(masses, start))
+    let is_everywhere =
+        masses.parts().len() == PARTS_MAX && matches!(masses.parts(), [Part::Section { .. }, ..]);
+    let mut candidates = vec![Candidate::new(masses, start)];
+    candidates.extend(is_everywhere.then(|| every(parts)));
+    candidates
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_stretch_between_neighbouring_stations_is_there_once() {
+        let ends = [0.0, 900.0, 2100.0, 3000.0];
+        let section = |from: usize, to: usize, towards: f64| Part::Section {
+            from_m: ends[from],
+            to_m: ends[to],
+            direction: Some(towards),
+        };
+        let mut parts = Vec::new();
+        for towards in [1.0, -1.0] {
+            for from in 0..3 {
+                for to in from + 1..=3 {
+                    parts.push((section(from, to, towards), Tuple::zero(3)));
+                }
+            }
+        }
+        let candidate = every(&parts);
+        assert_eq!(candidate.start, vec![1.0; 6]);
+        assert_eq!(candidate.hypothesis.parameters().len(), 6);
+        let known = candidate.hypothesis.prior_information().unwrap();
+        assert!((known[(0, 0)] - 100.0).abs() < 1e-9 && known[(0, 1)] == 0.0);
+    }
 }

@@ -37,7 +37,7 @@ impl FitProblem {
         }
         for (effect, range) in model.effects.iter().zip(model.ranges()) {
             let Some(own) = effect.prior_information() else { continue };
-            let at = DVector::from_column_slice(&theta[range.clone()]);
+            let at = DVector::from_column_slice(&theta[range.clone()]).add_scalar(-effect.none());
             let pull = own * &at;
             cost += at.dot(&pull);
             let (start, count) = (range.start, range.len());
