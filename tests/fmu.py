@@ -66,7 +66,7 @@ for group, estimator in ESTIMATORS.items():
         elif name == "unexplained_force_n_std":
             same(full, found, answer["unexplained_force_std_n"])
         elif name.startswith("w0") or name == "suspected_effect":
-            continue  # `identify` does not tell them
+            continue  # `identify` does not print them
         elif name.endswith("_std"):
             same(full, found, answer["std"].get(name.removesuffix("_std")))
         else:

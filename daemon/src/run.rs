@@ -235,7 +235,7 @@ fn plan_shadow(
     Some((trains, models))
 }
 
-/// Numbers the lanes of a train, and tells its controllers how many threads and pipelines serve it.
+/// Numbers the lanes of a train, and informs its controllers how many threads and pipelines serve it.
 fn number_lanes(plans: &mut [WorkerPlan], train: TrainId, count: &SampleCount) {
     let (mut threads, mut pipelines) = (0, 0);
     for lane in plans.iter_mut().flat_map(|plan| &mut plan.lanes).filter(|it| it.train == train) {
@@ -248,19 +248,19 @@ fn number_lanes(plans: &mut [WorkerPlan], train: TrainId, count: &SampleCount) {
 
 /// Starts one thread for each plan and waits until all of them have their ports open.
 fn start_workers(plans: Vec<WorkerPlan>) -> Result<Vec<JoinHandle<()>>, RunError> {
-    let (told, started) = sync_channel(plans.len());
+    let (report_start, started) = sync_channel(plans.len());
     let workers = plans
         .into_iter()
         .map(|plan| {
-            let told = told.clone();
+            let report_start = report_start.clone();
             std::thread::Builder::new()
                 .name(plan.thread.name.clone())
                 .stack_size(STACK_BYTES)
-                .spawn(move || work(plan, told))
+                .spawn(move || work(plan, report_start))
                 .map_err(|source| RunError::System { what: "pipeline thread", source })
         })
         .collect::<Result<Vec<_>, _>>()?;
-    drop(told);
+    drop(report_start);
     started.iter().collect::<Result<(), _>>()?;
     Ok(workers)
 }
@@ -311,22 +311,22 @@ fn start_keeper(
         .map_err(|source| RunError::System { what: "state thread", source })
 }
 
-fn work(plan: WorkerPlan, told: SyncSender<Result<(), ChannelError>>) {
+fn work(plan: WorkerPlan, report_start: SyncSender<Result<(), ChannelError>>) {
     prepare_thread(&plan.thread);
     match Worker::start(plan) {
         Ok(mut worker) => {
             // The main thread has given up when it no longer listens; the stop flag says so too.
-            let _ = told.send(Ok(()));
-            drop(told);
+            let _ = report_start.send(Ok(()));
+            drop(report_start);
             worker.run();
         }
         Err(error) => {
-            let _ = told.send(Err(error));
+            let _ = report_start.send(Err(error));
         }
     }
 }
 
-/// Gives the calling thread what its configuration asks for; what the system refuses is told with
+/// Gives the calling thread what its configuration asks for; what the system refuses is reported with
 /// its price, and the daemon goes on.
 fn prepare_thread(thread: &ThreadConfig) {
     let name = thread.name.as_str();

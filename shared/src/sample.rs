@@ -94,7 +94,7 @@ wire_struct! {
         /// When the sample was handed to the channel, in ns of the host's monotonic clock;
         /// the publisher writes it, and latency is counted from it.
         pub published_ns: i64,
-        /// Counts the controller's samples, one by one; a gap tells of lost samples.
+        /// Counts the controller's samples, one by one; a gap means lost samples.
         pub sequence: u64,
         /// The train, see [`TrainId`].
         pub train_id: u64,

@@ -71,7 +71,7 @@ wire_struct! {
         pub missing_manoeuvres: u32,
         /// Suspected missing effect, [`crate::vocabulary::EffectKind`] by number.
         pub suspected_effect: u32,
-        /// Other effects that these data hardly tell from it: one bit for each
+        /// Other effects that these data hardly distinguish from it: one bit for each
         /// [`crate::vocabulary::EffectKind`].
         pub suspected_alternatives: u32,
         /// How long the suspicion has stood, in whole s of the controller's clock.
@@ -190,7 +190,7 @@ impl ParameterSnapshot {
         MassSource::from_number(self.mass_source)
     }
 
-    /// The effects that the data hardly tell from the suspected one.
+    /// The effects that the data hardly distinguish from the suspected one.
     pub fn alternatives(&self) -> impl Iterator<Item = EffectKind> {
         let bits = self.suspected_alternatives;
         EffectKind::ALL.iter().copied().filter(move |kind| bits & kind.bit() != 0)

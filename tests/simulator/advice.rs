@@ -59,7 +59,7 @@ struct Trial {
 
 impl Trial {
     fn new(kind: PipelineKind, seed: u64) -> Trial {
-        // Only who looks for the mass is told a wrong one.
+        // Only who looks for the mass is given a wrong one.
         let is_of_mass = kind == PipelineKind::MassKalman;
         let declared = declared_at(if is_of_mass { 0.9 * MASS_KG } else { MASS_KG });
         let settings = EstimatorSettings::default_of(kind).unwrap();
@@ -220,9 +220,9 @@ fn the_advised_manoeuvre_shows_more_than_most_and_about_as_much_as_the_best() {
         "advised over the best other {against_best:.2?}, over the middle {against_middle:.2?}"
     );
     let [_, best, most] = quantiles(against_best);
-    assert!(best < 1.1 && most < 1.25, "none of the others tells much more: {best}, {most}");
+    assert!(best < 1.1 && most < 1.25, "none of the others shows much more: {best}, {most}");
     let is_ahead = against_middle.iter().all(|&share| share < 0.95);
-    assert!(is_ahead, "most of the others tell less: {against_middle:.2?}");
+    assert!(is_ahead, "most of the others show less: {against_middle:.2?}");
 }
 
 #[test]

@@ -155,9 +155,9 @@ fn write(files: &[(String, String)], slip: Option<InputFault>, folder: &Path) {
     }
 }
 
-/// What a command tells on the terminal, on one line, and its answer, or its error, as where no
+/// What a command prints on the terminal, on one line, and its answer, or its error, as where no
 /// sample is usable.
-fn told(folder: &Path, command: &[&str]) -> (String, Value) {
+fn printed(folder: &Path, command: &[&str]) -> (String, Value) {
     let file = folder.join(format!("{}.json", command[0]));
     let run = Command::new(DYNOCAR)
         .args([command[0], folder.to_str().unwrap()])
@@ -201,7 +201,7 @@ fn every_input_fault_is_named_by_check_identify_and_explain_on_the_terminal_and_
             ];
             let mut explained = Value::Null;
             for command in commands {
-                let (text, answer) = told(folder, command);
+                let (text, answer) = printed(folder, command);
                 assert!(text.contains(&words), "{}: {case}: {text}", command[0]);
                 let is_error = answer["error"]["message"].as_str().is_some();
                 assert!(is_error || has_note(&answer, code), "{}: {case}", command[0]);

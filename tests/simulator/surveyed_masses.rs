@@ -18,7 +18,7 @@ const PIECE: usize = 600;
 /// Lines.
 const SEEDS: std::ops::Range<u64> = 31..35;
 
-/// Masses of the pieces of runs held out less the true one, in standard deviations as told, with the
+/// Masses of the pieces of runs held out less the true one, in standard deviations as reported, with the
 /// gradient's uncertainty and as if nobody had stated it.
 fn errors(kind: PipelineKind) -> [Vec<f64>; 2] {
     let mut both = [Vec::new(), Vec::new()];

@@ -35,7 +35,7 @@ pub struct ExplainArguments {
     /// (none, tunnel_drag, dragging_brake and wind unless chosen) with more runs, then longer ones
     #[arg(long, conflicts_with_all = ["seeds", "threads", "write", "verbose", "world"])]
     growth: bool,
-    /// Tell the outcome of every dataset on standard error
+    /// Print the outcome of every dataset on standard error
     #[arg(long)]
     verbose: bool,
     /// Write the simulated datasets with their truth into this folder

@@ -120,7 +120,7 @@ fn is_exactly(
 ) -> bool {
     let mut expected: Vec<&str> =
         simulated.effects.iter().map(|effect| effect.kind().name()).collect();
-    if let Some(rival) = rival.filter(|rival| rival.is_never_told || verdict == "ambiguous") {
+    if let Some(rival) = rival.filter(|rival| rival.is_never_named || verdict == "ambiguous") {
         expected.push(rival.kind.name());
     }
     let mut found = found.to_vec();

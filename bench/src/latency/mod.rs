@@ -3,7 +3,7 @@
 //!
 //! Every round goes through all cases once, in an order drawn anew from the seed, so that whatever
 //! else the machine does falls on all of them alike. Ratios to the floor are taken within a round;
-//! the median of the rounds is told.
+//! the median of the rounds is reported.
 //!
 //! - [`case`]: what is measured beside what
 //! - [`companion`]: programs that read the same channels

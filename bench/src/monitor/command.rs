@@ -31,7 +31,7 @@ pub struct MonitorArguments {
     /// Datasets at a time
     #[arg(long, default_value_t = 2)]
     threads: usize,
-    /// Tell every suspicion of every dataset on standard error
+    /// Print every suspicion of every dataset on standard error
     #[arg(long)]
     verbose: bool,
     /// Write the result for machines; - for standard output

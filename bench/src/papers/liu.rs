@@ -2,7 +2,7 @@
 //!
 //! The paper's data are not published; its figures stand beside ours on the scenario of
 //! [`scenario`]. Errors are those of w0 over 40 to 72 km/h, where the runs coast, since a, b and
-//! c are hardly told apart there.
+//! c are hardly distinguishable there.
 
 pub mod bound;
 pub mod methods;

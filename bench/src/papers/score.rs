@@ -18,7 +18,7 @@ pub struct Score {
     /// Normalised estimation error squared, per degree of freedom.
     nees: Vec<f64>,
     freedom: f64,
-    /// Least standard deviation of each error, where it was told.
+    /// Least standard deviation of each error, where it was reported.
     bounds: Vec<f64>,
 }
 

@@ -55,7 +55,7 @@ pub fn command() -> clap::Command {
     Arguments::command()
 }
 
-/// Parses the command line, forwards until told to end, reports a failure on standard error.
+/// Parses the command line, forwards until asked to end, reports a failure on standard error.
 pub fn main() -> ExitCode {
     let arguments = match parse::<Arguments>("dynocar forward") {
         Ok(arguments) => arguments,

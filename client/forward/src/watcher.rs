@@ -23,7 +23,7 @@ const POLL: Duration = Duration::from_millis(50);
 const LOOK: Duration = Duration::from_secs(1);
 
 /// After so long without a word a daemon counts as silent: a controller cannot wait so long, a host far away need
-/// not be told of every hesitation.
+/// not be shown every hesitation.
 const SILENT_AFTER: Duration = Duration::from_secs(3);
 
 /// An event: its kind, and in words.
@@ -46,7 +46,7 @@ struct TrainChannel {
     pipelines: BTreeMap<u32, LastSnapshot>,
     is_silent: bool,
     due: Instant,
-    /// Why it cannot be read, as it was last told.
+    /// Why it cannot be read, as it was last reported.
     trouble: String,
 }
 
@@ -68,7 +68,7 @@ impl<'a> Watcher<'a> {
         watcher
     }
 
-    /// Watches until told to end.
+    /// Watches until asked to end.
     pub fn run(&mut self, must_end: &AtomicBool) {
         let mut looked: Option<Instant> = None;
         while !must_end.load(Ordering::Relaxed) {

@@ -36,7 +36,7 @@ pub fn command() -> clap::Command {
     Arguments::command()
 }
 
-/// Parses the command line, serves until told to end, reports a failure on standard error.
+/// Parses the command line, serves until asked to end, reports a failure on standard error.
 pub fn main() -> ExitCode {
     let arguments = match parse::<Arguments>("dynocar live") {
         Ok(arguments) => arguments,

@@ -1,4 +1,4 @@
-//! Reads the channels and serves viewers until it is told to end.
+//! Reads the channels and serves viewers until it is asked to end.
 
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};

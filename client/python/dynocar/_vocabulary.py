@@ -59,7 +59,7 @@ class DaemonState(_Vocabulary):
 class Status(_Vocabulary):
     """What a controller may do with an estimate. Only ``ESTIMATED`` values may be used.
 
-    ``docs/guides/reading.md`` tells what each status and each reason means.
+    ``docs/guides/reading.md`` says what each status and each reason means.
     """
 
     UNESTIMATED = 1  # Not enough data yet; the values are the declared or the initial ones
@@ -176,13 +176,13 @@ class RejectionReason(_Vocabulary):
 
 
 class Manoeuvre(IntFlag):
-    """Manoeuvres that would tell more: bits of missing_manoeuvres."""
+    """Manoeuvres that would show more: bits of missing_manoeuvres."""
 
-    COAST_SLOW = 1 << 0  # Coasting at low speed, which tells of Davis a
-    COAST_FAST = 1 << 1  # Coasting at high speed, which tells of Davis c
-    VARY_SPEED = 1 << 2  # A wider range of speeds, which tells a, b and c apart
-    ACCELERATE = 1 << 3  # Strong traction, which tells of mass
-    BRAKE = 1 << 4  # Strong braking, which tells of adhesion and brake friction
+    COAST_SLOW = 1 << 0  # Coasting at low speed, which determines Davis a
+    COAST_FAST = 1 << 1  # Coasting at high speed, which determines Davis c
+    VARY_SPEED = 1 << 2  # A wider range of speeds, which separates a, b and c
+    ACCELERATE = 1 << 3  # Strong traction, which determines mass
+    BRAKE = 1 << 4  # Strong braking, which determines adhesion and brake friction
     MOVE = 1 << 5  # Any motion
 
 

@@ -51,7 +51,7 @@ def main() -> None:
         for trains in (1, 8, 64):
             fleet = fleet_of(trains, folder / "kinds", folder / f"fleet-{trains}")
             for workers in (1, 2):
-                told = measure(fleet, folder / f"told-{trains}-{workers}", workers)
+                told = measure(fleet, folder / f"report-{trains}-{workers}", workers)
                 print(
                     f"| {trains} | {workers} | {told[0]:.1f} | {told[1]:.2f} | {told[2]:.0f} |",
                     flush=True,

@@ -1,7 +1,7 @@
 """Small fleets from seeds: trains as points of mass with a length on one line, whose truth is known.
 
 A train coasts, pulls and brakes by turns; its recorded speeds and forces are noisy. What acts on it
-beyond what is declared is told by `Truth`.
+beyond what is declared is given by `Truth`.
 """
 
 from __future__ import annotations

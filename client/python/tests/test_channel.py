@@ -321,7 +321,7 @@ def test_numpy_reads_a_snapshot_as_it_lies_in_shared_memory(tmp_path: Path) -> N
         assert np.array_equal(read[name], getattr(raw, name)), name
     with pytest.raises(AttributeError, match="no field 'speed_kmh'"):
         raw.speed_kmh  # type: ignore[attr-defined]
-    # What a type checker is told, and what publish takes, are the same fields.
+    # What a type checker sees, and what publish takes, are the same fields.
     stub = (Path(dynocar.__file__).parent / "_native.pyi").read_text()
     block = stub.split("class ParameterSnapshot:")[1].split("    def ")[0]
     assert tuple(re.findall(r"^    (\w+): ", block, re.MULTILINE)) == names

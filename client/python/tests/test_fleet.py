@@ -108,7 +108,7 @@ def test_a_place_that_one_train_finds_is_the_trains_and_the_others_do_not_count_
     assert effect["belongs_to"] == "train"
     states = {it["train"]: it for it in effect["trains"]}
     assert states["12"]["state"] == "found" and effect["pooled"]["estimates"] == 1
-    # The others were asked with it declared: what they then find tells what theirs is.
+    # The others were asked with it declared: what they then find shows what theirs is.
     absent = [it for it in states.values() if it["state"] == "absent"]
     assert absent and all(abs(it["value"]) <= 2 * it["std"] for it in absent)
     without = [it for it in states.values() if it["state"] in ("cannot_tell", "not_asked")]

@@ -86,7 +86,7 @@ def test_the_pooled_interval_holds_the_truth_in_95_of_100_or_more(trains: int) -
             pooled = pool([Estimate(*it) for it in zip(values, stds)])
             held += pooled.low <= 0 <= pooled.high
             fleets += 1
-    # 600 fleets tell a share to 0.9 %.
+    # 600 fleets measure a share to 0.9 %.
     assert held / fleets >= 0.94
 
 
@@ -140,5 +140,5 @@ def test_trains_that_truly_scatter_are_not_said_to_differ(trains: int) -> None:
     for _ in range(150):
         numbers, _ = simulated(random, trains, 3.0, 0)
         false += any(it.is_found for it in differing(numbers))
-    # 150 fleets tell a share of 5 in 100 to 1.8.
+    # 150 fleets measure a share of 5 in 100 to 1.8.
     assert false / 150 <= 0.05 + 0.018

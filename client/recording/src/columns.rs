@@ -25,7 +25,7 @@ pub enum Source {
     Field(&'static Field),
     /// A parameter's value: repeats what arrays hold.
     Value(Parameter),
-    /// What [`SUFFIXES`] tells of it, by the place there: repeats what arrays hold.
+    /// What [`SUFFIXES`] adds to it, by the place there: repeats what arrays hold.
     Beside(Parameter, usize),
     /// How many samples were refused for a reason: repeats what an array holds.
     Rejected(RejectionReason),
@@ -202,12 +202,12 @@ impl Row {
             }
             (Row::Snapshot(it), Source::Value(of)) => one(words, it.value(of).map(f64::to_bits)),
             (Row::Snapshot(it), Source::Beside(of, place)) => {
-                let told = it.value(of).zip(it.std(of)).map(|(value, std)| match place {
+                let estimate = it.value(of).zip(it.std(of)).map(|(value, std)| match place {
                     0 => std,
                     1 => value - INTERVAL_95 * std,
                     _ => value + INTERVAL_95 * std,
                 });
-                one(words, told.map(f64::to_bits))
+                one(words, estimate.map(f64::to_bits))
             }
             (Row::Snapshot(it), Source::Rejected(of)) => one(words, Some(it.rejected(of).into())),
             (Row::Event(it), Source::Event(place)) => one(words, it.word(place)),

@@ -17,7 +17,7 @@ use crate::schema::{
 const HEAD: &str = "# Fields of a recording
 
 This page is what `dynocar-recording fields` prints; it is made from the same tables as the recordings'
-protobuf messages, the columns of a recording in Parquet and the types for NumPy. How to record is told
+protobuf messages, the columns of a recording in Parquet and the types for NumPy. How to record is described
 in [the guide](guides/recording.md).
 
 *Number* and *type* are those of the protobuf message. A field of which it says *missing unless measured* is

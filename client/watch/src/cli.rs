@@ -39,7 +39,7 @@ pub fn command() -> clap::Command {
     Arguments::command()
 }
 
-/// Parses the command line, watches until told to end, reports a failure on standard error.
+/// Parses the command line, watches until asked to end, reports a failure on standard error.
 pub fn main() -> ExitCode {
     let arguments = match parse::<Arguments>("dynocar watch") {
         Ok(arguments) => arguments,

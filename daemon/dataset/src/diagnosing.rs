@@ -13,7 +13,7 @@ use super::resolved::{Context, GradientSource, Resolved};
 
 /// Below this distance in m, comparisons of position and speed say nothing.
 const DISTANCE_MIN_M: f64 = 200.0;
-/// Rows at either end that tell where a run begins and ends.
+/// Rows at either end that show where a run begins and ends.
 const END_ROWS: usize = 5;
 /// Position and integrated speed may differ by this share: wheel wear, balises, gaps.
 const DISTANCE_TOLERANCE: f64 = 0.05;
@@ -153,17 +153,18 @@ fn of_position(
     };
     let net_m = median_m(&rows[rows.len() - few..]) - median_m(&rows[..few]);
     let direction = run.entry.direction;
-    let is_told =
+    let is_reported =
         |slips: &[InputFault]| findings.iter().any(|finding| slips.contains(&finding.slip));
-    if net_m * f64::from(direction) < -DISTANCE_MIN_M && !is_told(&[InputFault::DirectionReversed])
+    if net_m * f64::from(direction) < -DISTANCE_MIN_M
+        && !is_reported(&[InputFault::DirectionReversed])
     {
         remarks.push(Diagnostic::AgainstDirection { direction, net_m });
     }
     let (position_m, speed_m) = (net_m.abs(), quality.distance_m);
     let is_long = position_m.max(speed_m) > DISTANCE_MIN_M;
-    let is_mismatch_told =
-        is_told(&[InputFault::TimeScale, InputFault::SpeedScale, InputFault::PositionScale]);
-    if !is_mismatch_told
+    let is_mismatch_reported =
+        is_reported(&[InputFault::TimeScale, InputFault::SpeedScale, InputFault::PositionScale]);
+    if !is_mismatch_reported
         && is_long
         && (position_m - speed_m).abs() > DISTANCE_TOLERANCE * position_m.max(speed_m)
     {

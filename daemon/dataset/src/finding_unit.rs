@@ -1,4 +1,4 @@
-//! The unit that a finding is told in.
+//! The unit that a diagnostic is reported in.
 
 use dynocar_core::plausibility::{Finding, InputFault};
 use dynocar_core::units::Unit;
@@ -6,7 +6,7 @@ use dynocar_core::units::Unit;
 use super::manifest::Manifest;
 use super::quantity::Quantity;
 
-/// The quantities that a slip is about, and the unit to tell it in where none of them is mapped.
+/// The quantities that an input fault is about, and the unit to report it in where none of them is mapped.
 pub(super) fn concerned(slip: InputFault) -> (&'static [Quantity], &'static str) {
     use Quantity::*;
     match slip {

@@ -13,7 +13,7 @@ use super::table::Table;
 const NOISE_SHARE: f64 = 0.02;
 /// A difference from the neighbours by less than this share of the greatest force is no spike.
 const SPIKE_SHARE: f64 = 0.3;
-/// Rows further apart than this many s cannot tell a spike from a short application.
+/// Rows further apart than this many s cannot distinguish a spike from a short application.
 const SPIKE_STEP_MAX_S: f64 = 0.5;
 /// A handle outside 0 to 1 by no more than this is noise around the stop.
 const HANDLE_NOISE: f64 = 0.02;

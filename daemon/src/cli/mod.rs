@@ -145,7 +145,7 @@ pub fn main() -> ExitCode {
 }
 
 /// The command line of a program of the project; where it asks for help or is wrong, the exit
-/// status after that was told.
+/// status after that was reported.
 ///
 /// # Errors
 ///
@@ -168,7 +168,7 @@ fn parse_by<A: Parser>(mut command: clap::Command, program: &str) -> Result<A, E
         let message = error.render().to_string();
         let message = message.trim().trim_start_matches("error: ").to_string();
         if let (true, Some(error)) = (wants_json, Failure::Input(message).answer()) {
-            // People know already; that machines cannot be told changes no status.
+            // People know already; that machines cannot be informed changes no status.
             let _ = write_json(Path::new("-"), &failure::ErrorDocument { error });
         }
         return Err(ExitCode::from(2));

@@ -1,4 +1,4 @@
-//! What a pipeline thread tells the main thread, without either waiting.
+//! What a pipeline thread reports to the main thread, without either waiting.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 

@@ -1,4 +1,4 @@
-//! A simulated dataset recorded by a drive that tells its power and no force.
+//! A simulated dataset recorded by a drive that reports its power and no force.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use super::random::{Random, Stream};
 use super::true_run::TRUE_STEP_S;
 use super::{SimulatedDataset, SimulatedRun};
 
-/// A drive and what its recorder tells of it.
+/// A drive and what its recorder reports of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrueDrive {
     /// Share of the electric power that reaches the rims, and of the rims' power that comes back.

@@ -1,7 +1,7 @@
 //! The fit of a whole run with an unknown disturbance: the likeliest ratio, and what the likelihood
 //! leaves open about it costs.
 //!
-//! A run of an hour tells the density of a disturbance within a factor of two or three. The
+//! A run of an hour gives the density of a disturbance within a factor of two or three. The
 //! covariance for the likeliest one is too small as often as that one is, and a fit that finds
 //! no disturbance at all is far too sure. The covariance is therefore averaged over the ratios by
 //! their restricted likelihood, every decade being as likely beforehand.

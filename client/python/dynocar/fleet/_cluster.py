@@ -30,7 +30,7 @@ def connected(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             "threads_per_worker": 1,
             "dashboard_address": ":0",
         }
-        # What becomes of the trains is told below; Dask's own words about its ends are none of it.
+        # What becomes of the trains is reported below; Dask's own words about its ends are none of it.
         options["silence_logs"] = logging.CRITICAL
         # On a busy machine a worker needs long to come back; given up, it would never.
         patience = {"distributed.deploy.lost-worker-timeout": "1 hour"}
@@ -55,7 +55,7 @@ def work_off(
     """Every order's answer by its name; each is kept as a file as soon as it is there.
 
     A worker that dies gives its train back to the others; a train on which four workers died is
-    told as failed (`distributed.scheduler.allowed-failures`).
+    reported as failed (`distributed.scheduler.allowed-failures`).
     """
     of_name = {order.name: order for order in orders}
     answers = {name: read_answer(kept, name) for name in of_name}
@@ -118,7 +118,7 @@ def write_text(file: Path, text: str) -> None:
 
 
 def on_standard_error(words: str) -> None:
-    """Tells on standard error; a reader that has gone away harms nothing."""
+    """Reports on standard error; a reader that has gone away harms nothing."""
     try:
         print(words, file=sys.stderr, flush=True)
     except OSError:

@@ -148,7 +148,7 @@ def _asked(common: Common, answer: Answer | None) -> tuple[str, Estimate | None]
 
     Where it then finds the opposite, its data could have shown the effect, and what is left of it
     is the train's own number. Where it finds nothing, with the effect declared or without, its data
-    do not tell.
+    do not determine it.
     """
     if answer is None:
         return "not_asked", None

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 from ._statistics import Estimate, pool
 
 NORMAL_95 = 1.959963984540054
-# What data hardly tell is not compared: it is mostly what was declared.
+# What data hardly determine is not compared: it is mostly what was declared.
 LEAST_TOLD = 0.5
 # Two stretches are the same place where they share so much of the shorter one.
 SAME_PLACE = 0.5
-# Kinds that act at a place of the line; a tunnel that the map lacks may be told as either.
+# Kinds that act at a place of the line; a tunnel that the map lacks may be reported as either.
 PLACES = ("local_resistance", "tunnel_drag")
 # Values of no effect, where that is not 0.
 NO_EFFECT = {
@@ -44,7 +44,7 @@ class Found(NamedTuple):
 
 
 def estimates(answer: Answer) -> dict[str, Estimate]:
-    """a, b, c less the declared ones, and the mass over the declared one, where the data tell them."""
+    """a, b, c less the declared ones, and the mass over the declared one, where the data determine them."""
     told: dict[str, Estimate] = {}
     explained = answer["answer"]
     if explained["verdict"] != "insufficient_data":

@@ -53,7 +53,7 @@ def explain_fleet(
     only what is missing or has changed. ``month`` (``"2026-05"``) is reported, the last one unless
     it is given; with it only that month and the one before are explained.
 
-    A train that fails is told in ``failed``, and the others are done. Raises ``InputError`` for a
+    A train that fails is reported in ``failed``, and the others are done. Raises ``InputError`` for a
     folder that holds no fleet.
     """
     units = _of_month(_folder.units(Path(folder)), month)

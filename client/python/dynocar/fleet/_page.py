@@ -19,7 +19,7 @@ OWNERS = {
 STATES = {
     "found": "found",
     "absent": "its data show that it is not there",
-    "cannot_tell": "its data do not tell",
+    "cannot_tell": "its data do not show it",
     "not_asked": "was not asked",
     "failed": "asking failed",
 }
@@ -206,7 +206,7 @@ def _trains(report: Report) -> str:
 def _how(report: Report) -> str:
     words = (
         "Means over trains are of random effects: the scatter between trains by restricted maximum "
-        "likelihood, the interval after Knapp and Hartung. Trains are told to differ with false "
+        "likelihood, the interval after Knapp and Hartung. Trains are reported to differ with false "
         "discoveries kept below the rate after Benjamini and Yekutieli. Formulas and their tests: "
         "docs/guides/fleet.md."
     )

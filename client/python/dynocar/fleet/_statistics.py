@@ -1,4 +1,4 @@
-"""Pooling of estimates, and telling which of them differ from the others.
+"""Pooling of estimates, and judging which of them differ from the others.
 
 Nothing here knows of trains; what it promises (coverage, false discoveries) is held over seeded
 simulations by ``tests/test_fleet_statistics.py``.
@@ -155,7 +155,7 @@ def differing(
 
 def _far(of_names: Mapping[str, Estimate]) -> set[str]:
     """Those farther from the median than `FAR` times their own deviation and the one that the median
-    absolute deviation of all tells (Hampel's identifier); of few these tell nothing."""
+    absolute deviation of all decide (Hampel's identifier); of few these say nothing."""
     if len(of_names) < LEAST_FOR_FAR:
         return set()
     middle = median(estimate.value for estimate in of_names.values())

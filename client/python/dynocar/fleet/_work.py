@@ -50,7 +50,7 @@ ASKABLE = ("local_resistance", *FACTORS)
 
 
 def explained(order: Order) -> dict[str, Any] | None:
-    """The answer with its key; nothing where the known one still holds. What is wrong is told, too."""
+    """The answer with its key; nothing where the known one still holds. What is wrong is reported, too."""
     # There is a worker for each core. Read when a process explains for the first time.
     os.environ.setdefault("RAYON_NUM_THREADS", "1")
     unit = order.unit
@@ -113,7 +113,7 @@ def _answer(order: Order, folder: Path) -> dict[str, Any]:
 
 
 def _silent(share: float, what: str) -> None:
-    """A worker tells nobody how far it is."""
+    """A worker reports to nobody how far it is."""
 
 
 def _in_users_words(words: str, folder: Path, sources: dict[str, Path]) -> str:

@@ -69,7 +69,7 @@ struct Housekeeping {
     progress: Arc<Progress>,
     /// The file whose name is on the disk.
     named: PathBuf,
-    is_failure_told: bool,
+    is_failure_reported: bool,
 }
 
 impl Housekeeping {
@@ -79,9 +79,9 @@ impl Housekeeping {
                 match self.settle(&file) {
                     Ok(()) => {
                         self.progress.lasting.store(items, Ordering::Release);
-                        self.is_failure_told = false;
+                        self.is_failure_reported = false;
                     }
-                    Err(source) if !std::mem::replace(&mut self.is_failure_told, true) => {
+                    Err(source) if !std::mem::replace(&mut self.is_failure_reported, true) => {
                         report_line(&SettleError { file, source }.to_string());
                     }
                     Err(_) => {}
@@ -105,7 +105,7 @@ impl Housekeeping {
         Ok(())
     }
 
-    /// A problem of keeping is told, and stops nothing.
+    /// A problem of keeping is reported, and stops nothing.
     fn keep(&mut self, work: impl FnOnce(&mut Keeper, &[PathBuf]) -> Result<(), KeepError>) {
         let Some(keeper) = &mut self.keeper else { return };
         let files: Vec<PathBuf> = numbered(&self.output).into_iter().map(|it| it.1).collect();
@@ -140,7 +140,7 @@ impl Housekeeper {
             keeper: None,
             progress: Arc::clone(&progress),
             named: PathBuf::new(),
-            is_failure_told: false,
+            is_failure_reported: false,
         };
         Housekeeper { place: HousekeepingThread::Here(Box::new(housekeeping)), progress }
     }
@@ -199,7 +199,7 @@ impl Housekeeper {
     pub fn finish(self) {
         if let HousekeepingThread::Beside(tasks, thread) = self.place {
             drop(tasks);
-            // A thread that panicked has told so.
+            // A thread that panicked has reported so.
             let _ = thread.join();
         }
     }

@@ -76,7 +76,7 @@ pub struct Keeper {
     keeping: Keeping,
     /// The newest stretch, which goes on until its end.
     open: Option<(PathBuf, KeptEvent)>,
-    is_full_told: bool,
+    is_full_reported: bool,
     /// No other recorder writes here.
     _lock: File,
 }
@@ -163,7 +163,14 @@ impl Keeper {
         })?;
         forget_unfinished(&ring.join(KEPT_FOLDER));
         let open = kept_event::newest(&ring.join(KEPT_FOLDER));
-        Ok(Keeper { storage, ring: ring.into(), keeping, open, is_full_told: false, _lock: lock })
+        Ok(Keeper {
+            storage,
+            ring: ring.into(),
+            keeping,
+            open,
+            is_full_reported: false,
+            _lock: lock,
+        })
     }
 
     /// Keeps the files that reach back from now by no more than is kept before a moment; `files` are all of
@@ -180,7 +187,7 @@ impl Keeper {
         let (folder, mut stretch) =
             open.unwrap_or_else(|| (self.new_folder(&reason), KeptEvent::default()));
         let is_news = stretch.reasons.last().is_none_or(|last| !last.is_like(&reason));
-        let told =
+        let line =
             format!("kept for good: {}: {} ({})", folder.display(), reason.kind, reason.text);
         if is_news {
             stretch.reasons.push(reason);
@@ -193,7 +200,7 @@ impl Keeper {
             false => Ok(()),
         };
         if is_news && kept.is_ok() {
-            report_line(&told);
+            report_line(&line);
         }
         // One that was not made is not there to go on with.
         self.open = (folder.exists()).then_some((folder, stretch));
@@ -264,13 +271,13 @@ impl Keeper {
         let length = fs::metadata(file).map_or(0, |it| it.len());
         let most = self.keeping.most_bytes;
         if kept_bytes(&self.ring.join(KEPT_FOLDER)) + length > most {
-            if std::mem::replace(&mut self.is_full_told, true) {
+            if std::mem::replace(&mut self.is_full_reported, true) {
                 return Ok(());
             }
             let kept = self.ring.join(KEPT_FOLDER);
             return Err(KeepError::Full { kept, most_mib: most >> 20 });
         }
-        self.is_full_told = false;
+        self.is_full_reported = false;
         self.storage.link(file, &to).map_err(refused(&to))
     }
 }

@@ -2,7 +2,7 @@
 //! for.
 //!
 //! Samples are taken at least every few milliseconds, for a channel holds the newest 512 of them; what
-//! is passed over is counted and told.
+//! is passed over is counted and reported.
 
 mod sink;
 mod train_channel;

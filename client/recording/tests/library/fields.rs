@@ -97,10 +97,14 @@ fn columns_are_the_fields_of_the_messages_with_their_numbers_names_and_types() {
     for (columns, expected) in
         [(&SAMPLES, names("TrainSample")), (&SNAPSHOTS, snapshot), (&EVENTS, names("Event"))]
     {
-        let told: Vec<&str> = columns.iter().map(|it| it.name.as_str()).collect();
-        assert_eq!(told[..2], ["message_number", "log_time"]);
-        assert_eq!(told[2..], expected);
-        assert_eq!(told.iter().collect::<HashSet<_>>().len(), told.len(), "each name once");
+        let column_names: Vec<&str> = columns.iter().map(|it| it.name.as_str()).collect();
+        assert_eq!(column_names[..2], ["message_number", "log_time"]);
+        assert_eq!(column_names[2..], expected);
+        assert_eq!(
+            column_names.iter().collect::<HashSet<_>>().len(),
+            column_names.len(),
+            "each name once"
+        );
         assert!(columns.iter().all(|it| it.vocabulary.is_none() || !it.names().is_empty()));
     }
 }

@@ -131,7 +131,7 @@ impl Drive {
     }
 
     /// In words, with the time in s and the speed in m/s that it ended with.
-    pub fn told(&self, lasted_s: f64, end_mps: f64) -> String {
+    pub fn in_words(&self, lasted_s: f64, end_mps: f64) -> String {
         let from = Speed(self.from_mps);
         match self.kind {
             DriveKind::Coast => format!("{lasted_s:.0} s coasting from {from}"),
@@ -231,7 +231,7 @@ mod tests {
         assert_eq!(driver.force_n(&scene, 40.1), Some(0.0));
         assert_eq!(driver.force_n(&scene, 39.0), Some(0.0));
         assert_eq!(driver.force_n(&scene, 1.9), None);
-        let words = sweep.told(170.4, 30.0);
+        let words = sweep.in_words(170.4, 30.0);
         assert!(words.contains("up to 40 m/s (144 km/h)"), "{words}");
     }
 }

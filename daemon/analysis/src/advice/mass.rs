@@ -1,4 +1,4 @@
-//! What a manoeuvre would tell of the mass, by the pipeline that learns it.
+//! What a manoeuvre would show of the mass, by the pipeline that learns it.
 //!
 //! How sure `mass_kalman` is depends on how the unexplained acceleration behaves, which it weighs by the
 //! innovations. So the pipeline itself is driven: over a minute at the manoeuvre's first speed, under the
@@ -18,7 +18,7 @@ use super::Advice;
 use super::drive::{Drive, DriveKind, Scene};
 use super::noise::Noise;
 
-/// Times in s that a driver may be asked for; traction tells of the mass soon or not at all.
+/// Times in s that a driver may be asked for; traction shows the mass soon or not at all.
 const WITHIN_S: [f64; 2] = [20.0, 60.0];
 /// Shortest step in s that is reckoned with.
 const STEP_MIN_S: f64 = 0.2;
@@ -44,7 +44,7 @@ pub struct MassForecast {
     pub std_t: f64,
 }
 
-/// The manoeuvre that tells most of the mass; `None` where it is known well enough, or none helps.
+/// The manoeuvre that shows most of the mass; `None` where it is known well enough, or none helps.
 pub fn for_mass(
     snapshot: &ParameterSnapshot,
     train: &TrainModel,
@@ -69,7 +69,7 @@ pub fn for_mass(
     let chosen = WITHIN_S.into_iter().find_map(|within_s| within(within_s).filter(is_worth))?;
     Some(Advice {
         parameter: Parameter::Mass,
-        drive: chosen.drive.told(chosen.lasts_s, chosen.end_mps),
+        drive: chosen.drive.in_words(chosen.lasts_s, chosen.end_mps),
         std_now: std_t,
         std_after: chosen.std_t,
     })

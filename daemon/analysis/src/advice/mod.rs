@@ -1,9 +1,9 @@
-//! What to drive next: the manoeuvre that tells most of what is known worst.
+//! What to drive next: the manoeuvre that shows most of what is known worst.
 //!
 //! Everything comes from a snapshot and what is declared of the train: the present covariance, the
 //! noise behind it ([`noise`]), the manoeuvres within the train's limits ([`drive`]), and what the
 //! pipeline's own filter would know after each ([`resistance`], [`mass`]). What driving does not help has its
-//! remedy in words ([`remedy`]). The line is taken as level: a snapshot does not tell where the train is.
+//! remedy in words ([`remedy`]). The line is taken as level: a snapshot does not say where the train is.
 
 pub mod drive;
 pub mod known;
@@ -34,7 +34,7 @@ const COASTING_SHARE: f64 = 1.05;
 /// A manoeuvre with its effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Advice {
-    /// What it tells of.
+    /// What it informs on.
     pub parameter: Parameter,
     /// The manoeuvre in words.
     pub drive: String,
@@ -46,7 +46,7 @@ pub struct Advice {
 
 impl Advice {
     /// In words: "20 s coasting from 25 m/s (90 km/h) halves the interval of c".
-    pub fn told(&self) -> String {
+    pub fn in_words(&self) -> String {
         let name = if self.parameter == Parameter::Mass { "mass" } else { self.parameter.name() };
         let interval = format!("the interval of {name}");
         let effect = match self.std_after / self.std_now {
@@ -59,7 +59,7 @@ impl Advice {
     }
 }
 
-/// What each manoeuvre of the catalogue would tell of a, b and c.
+/// What each manoeuvre of the catalogue would show of a, b and c.
 pub fn forecasts(
     snapshot: &ParameterSnapshot,
     train: &TrainModel,
@@ -99,7 +99,7 @@ pub fn for_resistance(
     let chosen = chosen.filter(|it| share(it) <= WORTH_SHARE)?;
     Some(Advice {
         parameter: DAVIS[worst],
-        drive: chosen.drive.told(chosen.lasts_s, chosen.end_mps),
+        drive: chosen.drive.in_words(chosen.lasts_s, chosen.end_mps),
         std_now: now[worst],
         std_after: chosen.std[worst],
     })

@@ -1,4 +1,4 @@
-//! What a manoeuvre would tell of a, b and c, by the filter that learns them.
+//! What a manoeuvre would show of a, b and c, by the filter that learns them.
 //!
 //! The covariance of a Kalman filter does not depend on what is measured, only on where the train
 //! is driven: so the filter of `trajectory_kalman` itself is driven over the manoeuvre, from the present

@@ -94,7 +94,7 @@ impl DrivenTrain {
         self.speed_mps
     }
 
-    /// Speed in m/s as the train's own sensor tells it.
+    /// Speed in m/s as the train's own sensor shows it.
     pub fn measured_speed_mps(&self) -> f64 {
         let shown_mps = self.sensor.as_ref().map_or(self.speed_mps, |sensor| sensor.shown_mps);
         shown_mps * self.train.corrections.speed_scale

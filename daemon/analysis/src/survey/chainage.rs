@@ -1,4 +1,4 @@
-//! The chainage of every row: what the wheels count, corrected by what GNSS tells.
+//! The chainage of every row: what the wheels count, corrected by what GNSS measures.
 //!
 //! The wheels count the way with a scale error that stays over a pass and slips that add up like
 //! a random walk. A fix lies `lag * speed` behind, since it is older than its stamp, and errs by
@@ -48,7 +48,7 @@ impl WheelsAndLag {
         lag_s: Estimate { value: 0.7, std: 0.7 },
     };
 
-    /// What several passes tell together; the scale may differ by `scale_spread` between them.
+    /// What several passes give together; the scale may differ by `scale_spread` between them.
     pub fn together(passes: &[WheelsAndLag], scale_spread: f64) -> Option<WheelsAndLag> {
         let mean = |of: fn(&WheelsAndLag) -> Estimate, spread: f64| {
             let weight = |pass: &WheelsAndLag| 1.0 / (of(pass).std.powi(2) + spread * spread);
@@ -71,7 +71,7 @@ pub struct Chained {
     pub first_row: usize,
     /// Chainage in m of each row along the way.
     pub chainage_m: Vec<f64>,
-    /// What the pass tells of wheels and lag.
+    /// What the pass shows of wheels and lag.
     pub learned: WheelsAndLag,
 }
 

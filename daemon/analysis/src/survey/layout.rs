@@ -102,7 +102,7 @@ impl Layout {
     }
 
     /// Variance of the mean gradient over 100 m around each piece between neighbouring
-    /// heights: between two heights alone the forces tell little, and nobody feels it.
+    /// heights: between two heights alone the forces show little, and nobody feels it.
     pub fn gradient_variances(
         &self,
         factor: &Factor,

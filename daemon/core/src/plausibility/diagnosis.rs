@@ -116,7 +116,7 @@ fn kinematic(figures: &Figures) -> Option<Finding> {
         let of_unit = slip.misfit(*factor)?;
         Some(match of_forces {
             Some(of_forces) if of_forces > 0.0 => of_unit + (of_forces / expected).ln().abs(),
-            // The forces do not tell: a time in another unit shows in the steps.
+            // The forces do not show it: a time in another unit shows in the steps.
             _ => of_unit + if is_unlikely(*slip) { 1.0 } else { 0.0 },
         })
     };

@@ -22,7 +22,7 @@ pub enum Severity {
 }
 
 named! {
-    /// A slip of the pen or of the wiring; in the order in which they are told.
+    /// A mistake in a file or in the wiring; in the order in which they are reported.
     #[derive(PartialOrd, Ord, Serialize)]
     #[serde(rename_all = "snake_case")]
     #[repr(u8)]
@@ -138,7 +138,7 @@ impl InputFault {
 pub struct Finding {
     /// What it is.
     pub slip: InputFault,
-    /// Reported over true value, as far as the samples tell.
+    /// Reported over true value, as far as the samples show.
     pub factor: f64,
 }
 

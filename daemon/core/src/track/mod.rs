@@ -297,7 +297,7 @@ fn tunnel_profiles(tunnels: &[Tunnel]) -> Result<TunnelProfiles, TrackError> {
     })
 }
 
-/// A greater chainage in m cannot be told from its neighbours to the millimetre, nor be meant.
+/// A greater chainage in m cannot be distinguished from its neighbours to the millimetre, nor be meant.
 const CHAINAGE_MAX_M: f64 = 1e9;
 
 /// A profile that is zero outside the given (start, end, value) intervals.

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 /// Shares of the capital that are bet; the winnings are averaged over them.
 const BETS: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
-/// Capital beyond which counting on tells nothing more.
+/// Capital beyond which counting on adds nothing more.
 const E_VALUE_MAX: f64 = 1e100;
 /// What the confidence sequence may miss the truth by at any time: 95 %.
 const MISS: f64 = 0.05;
@@ -211,7 +211,7 @@ mod tests {
         let mut evidence = Evidence::new(0.1);
         assert_eq!(evidence.error_ratio(), None);
         evidence.take(score_of_ratio(0.6));
-        assert_eq!(evidence.error_ratio(), Some([0.0, RATIO_MAX]), "one trip tells nothing");
+        assert_eq!(evidence.error_ratio(), Some([0.0, RATIO_MAX]), "one trip shows nothing");
         for trip in 0..400 {
             evidence.take(score_of_ratio(0.6) + if trip % 2 == 0 { 0.1 } else { -0.1 });
         }

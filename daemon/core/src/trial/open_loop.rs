@@ -8,7 +8,7 @@ use crate::track::Track;
 use crate::train::TrainModel;
 use crate::validation::ValidSample;
 
-/// Samples nearer in time, in s, to the last that was kept are not: 20 a second tell a motion.
+/// Samples nearer in time, in s, to the last that was kept are not: 20 a second describe a motion.
 const STEP_MIN_S: f64 = 0.05;
 /// A window holds at most so many samples.
 const SAMPLES_MAX: usize = (Restart::WINDOW_S / STEP_MIN_S) as usize + 2;

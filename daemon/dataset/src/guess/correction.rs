@@ -1,4 +1,4 @@
-//! Units that the values alone did not tell, set right by how the train moves.
+//! Units that the values alone did not reveal, set right by how the train moves.
 
 use dynocar_core::plausibility::InputFault;
 
@@ -51,7 +51,7 @@ impl Guess {
     }
 }
 
-/// True for what the balance of forces tells.
+/// True for what the balance of forces shows.
 fn needs_balance(slip: InputFault) -> bool {
     matches!(
         slip,

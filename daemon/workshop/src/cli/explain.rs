@@ -117,7 +117,7 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
     Ok(give(arguments.json.as_deref(), &explanation.answer, || text(&explanation.answer))?)
 }
 
-/// Explains the dataset at a path; `progress` is told how far that is, and may unwind to end it.
+/// Explains the dataset at a path; `progress` is given how far that is, and may unwind to end it.
 ///
 /// # Errors
 ///

@@ -28,7 +28,7 @@ use dynocar::output::{print, require_folder, require_new, write_new_in_folder};
 use letters::Letters;
 
 const WRITER: &str = "dynocar init";
-/// Units that the values did not tell are set right so many times at most.
+/// Units that the values did not reveal are set right so many times at most.
 const CORRECTIONS_MAX: usize = 4;
 
 /// Writes the first description.

@@ -19,7 +19,7 @@ pub struct SurveyAnswer {
     /// What was learned beside the line; absent on a known line.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub learned: Option<LearnedAnswer>,
-    /// What these recordings cannot tell.
+    /// What these recordings do not determine.
     pub cannot_tell: Vec<String>,
 }
 

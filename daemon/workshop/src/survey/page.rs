@@ -54,7 +54,7 @@ pub fn html(
     section("stops", "Stops, and how they repeat", stops(answer));
     section("trips", "Trips", trips(answer));
     section("not-used", "Not used", not_used(answer));
-    section("open", "What these recordings cannot tell", open(answer));
+    section("open", "What these recordings do not determine", open(answer));
     Ok(document(&format!("{name} – survey"), &header, &main, made))
 }
 

@@ -54,9 +54,9 @@ pub fn check(report: &mut Report, folder: &Path) {
     );
     let climbs = outcome.as_ref().map_err(Clone::clone).and_then(|it| found_to_climb(&it.level));
     report.note("bus: its line declared level", climbs);
-    for (place, (told, ..)) in WAYS.iter().enumerate() {
+    for (place, (label, ..)) in WAYS.iter().enumerate() {
         let masses = outcome.as_ref().map_err(Clone::clone).map(|it| &it.masses[place]);
-        report.note(told, masses.and_then(held));
+        report.note(label, masses.and_then(held));
     }
 }
 

@@ -11,7 +11,7 @@ use dynocar_shared::{
 
 /// A standstill of so many s is a stop.
 const STOP_S: f64 = 5.0;
-/// A section that moves for less than this in s tells little.
+/// A section that moves for less than this in s shows little.
 const MOVING_MIN_S: f64 = 20.0;
 /// A slower vehicle stands.
 const STANDING_MPS: f64 = 0.3;

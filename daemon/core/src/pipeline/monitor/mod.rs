@@ -16,7 +16,7 @@
 //! - `onsets`: since when a brake may drag
 //! - `information`: the likelihood ratios
 //! - `verdict`: what speaks for each of them
-//! - `naming`: who is suspected, what is hardly told from it, and when it has ended
+//! - `naming`: who is suspected, what is hardly distinguishable from it, and when it has ended
 //! - `estimator`: the pipeline around all of it
 
 mod covariates;

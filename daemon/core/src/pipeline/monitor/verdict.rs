@@ -40,7 +40,7 @@ pub struct Evidence<'a> {
     pub onsets: &'a Onsets,
     /// True while released brakes hold pressure.
     pub is_pressure_raised: bool,
-    /// True where no earlier pass tells what the place does.
+    /// True where no earlier pass shows what the location does.
     pub is_new_place: bool,
     /// What speaks for an unusual error of the speed's scale.
     pub wheel: f64,

@@ -17,7 +17,7 @@ const STDS_N_PER_KN: [f64; 6] = [0.01, 0.03, 0.1, 0.3, 1.0, 3.0];
 /// Correlation times in s: a gust, a gradient section, a change of wind or weather.
 const TIMES_S: [f64; 3] = [10.0, 60.0, 400.0];
 const MODELS: usize = 1 + STDS_N_PER_KN.len() * TIMES_S.len();
-/// Until the rows tell: a disturbance of 0.1 N/kN over 60 s.
+/// Until the rows show it: a disturbance of 0.1 N/kN over 60 s.
 const LIKELIEST_AT_FIRST: usize = 1 + 2 * TIMES_S.len() + 1;
 /// Rows after which the penalty, which forgetting takes off too, is made up for.
 const RENEWAL_ROWS: u32 = 50;

@@ -59,7 +59,7 @@ settings! {
     /// Settings of `rls`.
     #[derive(Copy)]
     RlsSettings {
-        /// Weight that a row keeps at every new one; what the new row does not tell of is not
+        /// Weight that a row keeps at every new one; what the new row does not inform on is not
         /// forgotten. 1 forgets nothing.
         forgetting: f64 = 0.9998 => (0.5 to 1);
         /// Variance of the start, p0 in Liu 2018, in (N/kN)² of scaled parameters.

@@ -165,7 +165,7 @@ impl BiasBank {
         &self.behaviours.likeliest().filter
     }
 
-    /// Takes a measured speed into every filter that does not hold it for an outlier; tells what
+    /// Takes a measured speed into every filter that does not hold it for an outlier; gives what
     /// the filter made of it that has the most evidence now.
     ///
     /// A speed that is an outlier under one behaviour may be as expected under another, which

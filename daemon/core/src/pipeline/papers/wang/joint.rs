@@ -28,7 +28,7 @@ const REFRESH_EVERY: u32 = 50;
 
 /// Learns z1, z2, z3 and the mass together, see [`super::integrals`].
 ///
-/// Levels and, at stops, the mass are marginalised exactly; what the legs told of the
+/// Levels and, at stops, the mass are marginalised exactly; what the legs showed of the
 /// resistances adds up. Several assumptions on the unexplained acceleration run side by side,
 /// and the one with the most evidence is published.
 #[derive(Clone, Debug)]

@@ -56,5 +56,5 @@ impl LineResistance {
     }
 }
 
-/// Radius in m that curve resistance refers to unless told otherwise.
+/// Radius in m that curve resistance refers to unless set otherwise.
 pub const DEFAULT_REFERENCE_RADIUS_M: f64 = 500.0;

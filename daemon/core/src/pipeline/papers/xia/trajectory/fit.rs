@@ -200,7 +200,7 @@ mod tests {
 
     #[test]
     fn a_prior_binds_what_the_data_leave_open() {
-        // Ten steps of cruise at one speed tell w0 there and nothing else.
+        // Ten steps of cruise at one speed determine w0 there and nothing else.
         let gain = mps2_per_n_per_kn(0.06);
         let drive_mps2 = gain * FAST.w0_n_per_kn(80.0);
         let steps = vec![Step { size: 1.0, drive_mps2, resistance_gain: gain }; 10];

@@ -126,7 +126,7 @@ impl LearnedNoise {
     }
 
     /// Learns from an innovation in m/s, given the variance of the predicted speed; call it
-    /// before the filter takes the measurement. `is_used` tells whether it will. Noise that is
+    /// before the filter takes the measurement. `is_used` says whether it will. Noise that is
     /// given, R and q both, is not learned from.
     ///
     /// # Real-time
