@@ -107,7 +107,7 @@ fn a_wrong_command_line_is_refused_with_what_helps() {
     let message = with(&["--csv", &csv, "--column", "time=A", "--column", "speed=B"]);
     assert!(message.contains("expected every run once, found the file twice"), "{message}");
     let message = refusal(&site, &["init", &new, "--column", "time=A"]);
-    assert!(message.contains("--column: expected recordings beside it"), "{message}");
+    assert!(message.contains("--column: expected recordings with it"), "{message}");
     let printed = done(
         &site,
         &["init", "made", "--csv", &csv, "--column", "time=A", "--column", "speed=B:km/h"],

@@ -1,4 +1,4 @@
-//! Speed of every estimator beside peers in the same run.
+//! Speed of every estimator compared with peers in the same run.
 //!
 //! Peers do the same work on the same data and must give the same answer before anything is
 //! timed, so that no speed is bought with accuracy.

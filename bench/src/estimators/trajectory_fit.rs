@@ -1,4 +1,4 @@
-//! Warm trajectory fits over windows, beside the crate `levenberg-marquardt` (MINPACK's method).
+//! Warm trajectory fits over windows, compared with the crate `levenberg-marquardt` (MINPACK's method).
 
 use std::sync::Arc;
 

@@ -25,7 +25,7 @@ pub struct ExplainArguments {
     /// Only this kind, as tunnel_drag, or none, two_effects, poor_recording; may be repeated
     #[arg(long = "kind", value_name = "NAME")]
     kinds: Vec<String>,
-    /// What is a little wrong beside the effect
+    /// What is a little wrong besides the effect
     #[arg(long, value_enum, default_value_t = World::Plain)]
     world: World,
     /// Datasets at a time

@@ -72,7 +72,7 @@ const POOR: [EffectKind; 6] = [
 /// Standard deviation of a load from run to run where loads change at every stop.
 const LOAD_SCATTER: f64 = 0.012;
 
-/// One row in fifty wildly wrong, beside a little of everything else.
+/// One row in fifty wildly wrong, with a little of everything else.
 const HEAVY: Defects = Defects { outliers: 0.02, ..Defects::ALL };
 
 impl Scenario {

@@ -21,7 +21,7 @@ pub struct Plan<'a> {
     pub seeds: usize,
     /// The first seed.
     pub first_seed: u64,
-    /// What is a little wrong beside the effect.
+    /// What is a little wrong besides the effect.
     pub world: World,
     /// Runs of each dataset.
     pub runs: usize,

@@ -1,6 +1,6 @@
 //! Liu 2018: Davis coefficients from coasting by least squares in all its recursions.
 //!
-//! The paper's data are not published; its figures stand beside ours on the scenario of
+//! The paper's data are not published; its figures stand next to ours on the scenario of
 //! [`scenario`]. Errors are those of w0 over 40 to 72 km/h, where the runs coast, since a, b and
 //! c are hardly distinguishable there.
 

@@ -1,4 +1,4 @@
-//! Errors of a method over the seeds, beside what the method and the bound say of them.
+//! Errors of a method over the seeds, with what the method and the bound say of them.
 
 use dynocar_core::train::Davis;
 use nalgebra::{Matrix3, Vector3};

@@ -151,7 +151,7 @@ class Identified(_Answer):
     dataset: str
     notes: list[Note]
     estimators: list[Estimator]
-    not_run: list[str]  # beside the recommended ones, where nobody chose
+    not_run: list[str]  # in addition to the recommended ones, where nobody chose
     runs: list[Record] | None
     between_runs: list[Record] | None
 

@@ -151,8 +151,8 @@ def assert_is_silent_at_last(reader: dynocar.SnapshotReader) -> None:
 
     wait_for(is_silent)
     snapshot = reader.resistance()
-    told = (snapshot.status.name, snapshot.why, snapshot.is_usable)
-    assert told == ("INVALID", "daemon_silent", False)
+    shown = (snapshot.status.name, snapshot.why, snapshot.is_usable)
+    assert shown == ("INVALID", "daemon_silent", False)
     words = "resistance_kalman invalid (daemon_silent), not usable"
     assert str(snapshot).splitlines()[0] == words
 
@@ -337,8 +337,8 @@ def test_the_page_of_the_fields_says_the_types_for_numpy() -> None:
         ("ParameterSnapshot", dynocar.SNAPSHOT_DTYPE),
     ]:
         table = page.split(f"## `dynocar.{title}`")[1].split("\n## ")[0]
-        told = re.findall(r"^\| `(\w+)` .*\| `(\S+)` at (\d+) \|", table, re.MULTILINE)
+        shown = re.findall(r"^\| `(\w+)` .*\| `(\S+)` at (\d+) \|", table, re.MULTILINE)
         fields = dtype.fields
-        assert fields is not None and [name for name, _, _ in told] == list(fields)
-        for name, kind, offset in told:
+        assert fields is not None and [name for name, _, _ in shown] == list(fields)
+        for name, kind, offset in shown:
             assert (np.dtype(kind), int(offset)) == tuple(fields[name][:2]), name

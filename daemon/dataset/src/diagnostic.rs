@@ -111,7 +111,7 @@ pub enum Diagnostic {
         if *is_declared { "" } else { " as usual, since no efficiency is declared" },
         if *is_brake {
             "; the brake force is what the drive feeds back, so that --traction-only is needed where \
-             a friction brake acts beside it"
+             a friction brake acts in addition to it"
         } else {
             ""
         }

@@ -334,7 +334,7 @@ mod tests {
             "what comes back was lost on the way"
         );
         assert!(found.traction.force_n[2].is_nan() && found.brake.force_n[2].is_nan());
-        assert_eq!(found.brake.force_n[4], 10e3, "the friction brake beside it");
+        assert_eq!(found.brake.force_n[4], 10e3, "the friction brake in addition to it");
         let by_voltage = "line_voltage={column='U',unit='V'}\nline_current={column='I',unit='A'}";
         let found = forces_of(&train, by_voltage, "t,v,U,I\n0,10,500,220\n1,10,500,-140\n");
         assert_eq!(found.traction.force_n, [8000.0, 0.0]);

@@ -177,7 +177,7 @@ pub fn grow(fit: &Fit, train: &mut Table, track: &mut Table) -> Vec<String> {
     not_expressed
 }
 
-/// True for an entry that the files may hold beside what they hold already.
+/// True for an entry that the files may hold in addition to what they hold already.
 fn can_hold(entry: &Entry, train: &Table, track: &Table) -> bool {
     match entry {
         Entry::Number(key, found) => key.allows(joined(key, train, *found)),

@@ -14,7 +14,7 @@ use super::{SimulatedDataset, SimulatedRun};
 pub struct TrueDrive {
     /// Share of the electric power that reaches the rims, and of the rims' power that comes back.
     pub efficiency: f64,
-    /// Power in W that the line feeds beside the drive; `None` for a recorder of the drive's own
+    /// Power in W that the line feeds in addition to the drive; `None` for a recorder of the drive's own
     /// power.
     pub auxiliary_power_w: Option<f64>,
     /// Standard deviation of the recorded power as a share of it.

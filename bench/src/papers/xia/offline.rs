@@ -155,7 +155,7 @@ pub fn noise_free_rows(seeds: Seeds) -> Vec<Row> {
     rows
 }
 
-/// Figure 4: w0 from noisy runs beside the bound.
+/// Figure 4: w0 from noisy runs compared with the bound.
 pub fn noise_rows(seeds: Seeds) -> Vec<Row> {
     let truth = CASES[0];
     let (fast, all) = (fast_speeds_mps(), all_speeds_mps());
@@ -255,7 +255,7 @@ fn paper_minimum(
     Some(Davis { a: found[0], b: found[1], c: found[2] })
 }
 
-/// Cruise under a disturbance that lasts for seconds: output error, as the paper fits, beside
+/// Cruise under a disturbance that lasts for seconds: output error, as the paper fits, against
 /// the fit that estimates the disturbance, and generalised least squares that knows it.
 fn disturbed_row(seeds: Seeds) -> Row {
     let truth = CASES[0];

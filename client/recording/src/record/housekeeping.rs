@@ -1,4 +1,4 @@
-//! What a recorder does with its files beside writing: it brings them to the disk, keeps them and removes them.
+//! What a recorder does with its files besides writing: it brings them to the disk, keeps them and removes them.
 //!
 //! A disk may take seconds for each of these. They are done in the order in which they were asked for, in a
 //! thread of their own while a recorder runs, so that nobody who records waits for them.
@@ -166,7 +166,7 @@ impl Housekeeper {
         Ok(())
     }
 
-    /// Keeps from now on; before it works beside.
+    /// Keeps from now on; before it works in a thread of its own.
     pub fn set_keeper(&mut self, keeper: Keeper) {
         if let HousekeepingThread::Here(housekeeping) = &mut self.place {
             housekeeping.keeper = Some(keeper);

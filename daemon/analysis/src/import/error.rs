@@ -62,7 +62,7 @@ pub enum ImportProblem {
         first_line: usize,
     },
     /// A vehicle of a formation that nobody describes.
-    #[error("{key}: the vehicle '{id}' is described in none of the files; give its file beside")]
+    #[error("{key}: the vehicle '{id}' is described in none of the files; give its file too")]
     NoVehicle {
         /// The place in the formation.
         key: String,

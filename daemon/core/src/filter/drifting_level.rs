@@ -1,4 +1,4 @@
-//! Least squares beside a level that may drift.
+//! Least squares jointly with a level that may drift.
 //!
 //! ```text
 //! y_k       = level_k + x_k · theta + e_k

@@ -19,7 +19,7 @@ pub fn gradient_error_kept(way_m: f64) -> f64 {
     (-2.0 * way_m.abs() / GRADIENT_ERROR_FREE_M).exp()
 }
 
-/// What is known of a line beside its profile: by a survey, or from another project's files.
+/// What is known of a line besides its profile: by a survey, or from another project's files.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrackSurvey {
     /// Gradient for falling chainage as (chainage in m, ‰ climbing positive as the chainage

@@ -16,7 +16,7 @@ pub const POWER_SPEED_MIN_DEFAULT_MPS: f64 = 2.0;
 pub struct Drive {
     /// Mechanical power at the rims over the drive's electric power when it pulls, 0 to 1.
     pub efficiency: f64,
-    /// Power in W that the vehicle takes beside its drive; 0 where the drive's own is recorded.
+    /// Power in W that the vehicle takes in addition to its drive; 0 where the drive's own is recorded.
     pub auxiliary_power_w: f64,
     /// Speed in m/s below which no force is estimated.
     pub speed_min_mps: f64,
@@ -25,7 +25,7 @@ pub struct Drive {
 impl Drive {
     /// Efficiencies that make sense.
     pub const EFFICIENCIES: std::ops::RangeInclusive<f64> = 0.3..=1.0;
-    /// Powers in kW of what is fed beside the drive.
+    /// Powers in kW of what is fed in addition to the drive.
     pub const AUXILIARIES_KW: std::ops::RangeInclusive<f64> = 0.0..=2000.0;
 
     /// A drive of which nothing is declared.

@@ -46,7 +46,7 @@ fn mapped(guess: &Guess) -> Vec<(Quantity, &str, &str, f64)> {
     columns.map(|it| (it.quantity, it.name.text.as_str(), it.unit.name(), it.scale)).collect()
 }
 
-/// What a header of one name is taken for, beside time and speed.
+/// What a header of one name is taken for, besides time and speed.
 fn taken_for(name: &str, values: [f64; 3]) -> Option<(Quantity, &'static str)> {
     let [one, two, three] = values;
     let text = format!("time [s],{name},speed [m/s]\n0,{one},0\n1,{two},1\n2,{three},2\n");

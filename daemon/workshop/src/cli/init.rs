@@ -43,7 +43,7 @@ pub fn execute(arguments: &InitArguments) -> Result<(), Failure> {
     require_folder(folder)?;
     let with_dataset = !arguments.csv.is_empty();
     if !with_dataset && !arguments.column.is_empty() {
-        return Err(Failure::Input("--column: expected recordings beside it: --csv FILE".into()));
+        return Err(Failure::Input("--column: expected recordings with it: --csv FILE".into()));
     }
     let mut names = vec![TRAIN_FILE, DAEMON_FILE];
     names.extend(with_dataset.then_some(MANIFEST_FILE));

@@ -50,7 +50,7 @@ pub fn html(
         }
         section("profile", "Gradient, with its 95 % band", body);
     }
-    section("learned", "What was learned beside it", learned(answer));
+    section("learned", "What was learned jointly with it", learned(answer));
     section("stops", "Stops, and how they repeat", stops(answer));
     section("trips", "Trips", trips(answer));
     section("not-used", "Not used", not_used(answer));

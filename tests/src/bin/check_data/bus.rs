@@ -34,7 +34,7 @@ const RELEASE_PA: [f64; 2] = [17e3, 25e3];
 pub fn check(report: &mut Report, folder: &Path) {
     let whole = surveyed(&folder.join("dataset-raw.toml"));
     report.note(
-        "bus: what is learned beside the line",
+        "bus: what is learned jointly with the line",
         whole.as_ref().map_err(Clone::clone).and_then(learned),
     );
     let outcome = whole.and_then(|answer| left_out(folder, &answer));

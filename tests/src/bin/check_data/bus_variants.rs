@@ -118,7 +118,7 @@ pub fn of_another_day(
     Ok(OtherDay { apart_mps, together_mps })
 }
 
-/// Takes the force of a surveyed dataset from the power that is recorded beside it.
+/// Takes the force of a surveyed dataset from the power that is recorded with it.
 pub fn by_power(surveyed: &Path) -> Result<ByPower, String> {
     let words = |error: std::io::Error| error.to_string();
     let folder = tempfile::tempdir().map_err(words)?;

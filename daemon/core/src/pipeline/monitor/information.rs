@@ -16,7 +16,7 @@ use crate::filter::NotPositiveDefinite;
 /// One value for each parameter of the base model.
 pub type BaseVector = SVector<f64, BASE>;
 type BaseMatrix = SMatrix<f64, BASE, BASE>;
-/// Parameters beside the base model.
+/// Parameters in addition to the base model.
 const BESIDE: usize = PARAMETERS - BASE;
 type BesideVector = SVector<f64, BESIDE>;
 
@@ -46,13 +46,13 @@ pub struct BaseSolution {
     prior_variance: BaseVector,
 }
 
-/// What is believed: the base model, and a suspect beside it.
+/// What is believed: the base model, and a suspect jointly with it.
 #[derive(Clone, Debug)]
 pub struct Believed<'a> {
     /// All parameters.
     pub values: Parameters,
     base: &'a BaseSolution,
-    /// The suspect's place beside the base model, and its variance.
+    /// The suspect's index next to the base model, and its variance.
     suspect: Option<(usize, f64)>,
 }
 
@@ -133,7 +133,7 @@ impl BaseSolution {
         column
     }
 
-    /// A suspect beside the base model.
+    /// A suspect given the base model.
     pub fn alternative(&self, parameter: usize, prior_std: f64) -> Alternative {
         let place = parameter - BASE;
         Alternative::of(self.own[place], self.rest[place], prior_std)
@@ -252,7 +252,7 @@ impl Information {
         Ok(BaseSolution { factor, reduced, columns, own, rest, prior_variance })
     }
 
-    /// A suspect beside the base model and another suspect, both as free as their priors let them be.
+    /// A suspect given the base model and another suspect, both as free as their priors let them be.
     pub fn beyond_another(
         &self,
         base: &BaseSolution,

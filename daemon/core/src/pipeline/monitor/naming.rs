@@ -59,7 +59,7 @@ pub struct Standing<'a> {
     pub net: &'a [f64; CANDIDATES],
     /// Evidence for each by all that was seen, by which they are compared.
     pub rank: &'a [f64; CANDIDATES],
-    /// Evidence for a law of the speed beside the effect that is named.
+    /// Evidence for a law of the speed given the effect that is named.
     pub left_by_name: f64,
     /// Statistics of the innovations without outliers.
     pub cut_innovations: &'a InnovationMonitor,

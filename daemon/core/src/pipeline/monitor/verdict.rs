@@ -26,7 +26,7 @@ const USUAL_STDS: f64 = 2.0;
 const KEPT_AT_STOP: f64 = 0.7;
 /// Share of it that outlasts a block: what is still there shows again within a minute.
 const KEPT_PER_BLOCK: f64 = 0.9;
-/// Rows for which unit variance counts beside the rows seen.
+/// Rows for which unit variance counts against the rows seen.
 const PRIOR_ROWS: f64 = 20.0;
 
 /// What the verdict is formed from.
@@ -101,7 +101,7 @@ impl Verdict {
         self.scale
     }
 
-    /// Notes how strongly one unit of each parameter acted in a block, beside the resistance in
+    /// Notes how strongly one unit of each parameter acted in a block, jointly with the resistance in
     /// the same unit.
     pub fn note_forces(&mut self, units: &Parameters, resistance: f64) {
         self.unit_force *= self.kept_per_row;
@@ -210,7 +210,7 @@ impl Verdict {
         }
     }
 
-    /// What speaks for a law of the speed beside the suspect that is named: what the name leaves.
+    /// What speaks for a law of the speed given the suspect that is named: what the name leaves.
     fn left_by_name(&self, evidence: &Evidence) -> f64 {
         let Some(named) = self.naming.parameter() else { return 0.0 };
         let bands = (FIRST_BAND..FIRST_ONSET).filter(|&band| band != named);

@@ -3,7 +3,7 @@
 //! States are speed, disturbance and the unknowns of the regression. Where the least-squares
 //! pipelines wait for a block of samples, this one corrects at every sample, weighs each speed by
 //! Student's t, lets the coefficients drift, and follows the disturbance as it comes. How noisy
-//! the data are it takes from a least-squares estimator that runs beside it.
+//! the data are it takes from a least-squares estimator that runs in parallel.
 
 use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason};
 use nalgebra::{SMatrix, SVector};
@@ -194,7 +194,7 @@ impl ResistanceKalman {
         corrected.is_ok()
     }
 
-    /// Starts anew at a sample with what the least squares beside have learned: weighing by
+    /// Starts anew at a sample with what the least squares in parallel have learned: weighing by
     /// Student's t, a filter far from the speeds would never come back to them.
     fn recover(&mut self, now: &UnitSample) {
         self.consecutive_outliers = 0;

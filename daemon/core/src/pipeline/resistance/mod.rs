@@ -8,7 +8,7 @@
 //! - `solver` and `coasting` of [`super::papers::liu`]: the paper's recursions and data
 //! - `report`: bounds, excitation, status
 //! - `least_squares`: the pipeline around all of it
-//! - `kalman`: the robust filter over every sample, with a least-squares pipeline beside it
+//! - `kalman`: the robust filter over every sample, with a least-squares pipeline in parallel
 
 mod kalman;
 mod least_squares;

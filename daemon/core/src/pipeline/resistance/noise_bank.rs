@@ -1,4 +1,4 @@
-//! The noise of the rows, learned beside the parameters.
+//! The noise of the rows, learned jointly with the parameters.
 //!
 //! How much of a residual is noise of the speed and how much a slow force that the model does
 //! not know (wind, errors of the gradient profile) decides both the weights of the rows and what
@@ -23,7 +23,7 @@ const LIKELIEST_AT_FIRST: usize = 1 + 2 * TIMES_S.len() + 1;
 const RENEWAL_ROWS: u32 = 50;
 /// Probability beforehand that there is no disturbance; the others share the rest.
 const UNDISTURBED_PRIOR: f64 = 0.95;
-/// Probability of the models that widen the intervals of a filter beside the bank.
+/// Probability of the models that widen the intervals of a filter in parallel with the bank.
 const CREDIBLE: f64 = 0.99;
 /// Models of less weight than this are left out of the mixture.
 const WEIGHT_MIN: f64 = 1e-4;

@@ -263,7 +263,7 @@ fn tunnels(track: &Track) -> String {
     }
 }
 
-/// What was found of the line beside its survey.
+/// What was found of the line besides its survey.
 fn found(track: &Track) -> String {
     let mut text = String::new();
     if track.gradient_shift_m != 0.0 {

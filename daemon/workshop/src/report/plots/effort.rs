@@ -1,4 +1,4 @@
-//! The greatest forces of a train over the speed, beside its resistance.
+//! The greatest forces of a train over the speed, with its resistance.
 
 use dynocar_core::train::{EffortCurve, TrainModel};
 use plotters::backend::SVGBackend;

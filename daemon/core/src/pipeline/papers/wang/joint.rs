@@ -224,7 +224,7 @@ impl JointLeastSquares {
         self.last = Some((expected, rates));
     }
 
-    /// A step with what comes to the level beside the bias: what the trapezoid misses, and what
+    /// A step with what comes to the level in addition to the bias: what the trapezoid misses, and what
     /// the noise of the speed does in the features. There it moves the resistance, and with it
     /// the integral, by a random walk.
     fn step(&mut self, last: &(Motion, Integrals), rates: &Integrals, step_s: f64) -> Step {

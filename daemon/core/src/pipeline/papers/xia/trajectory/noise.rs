@@ -2,7 +2,7 @@
 //!
 //! Recursive maximum likelihood (Ljung, Söderström 1983, section 3.6) for ln R and ln q: the
 //! innovation e of a filter and its variance S have derivatives with respect to both, which
-//! follow scalar recursions beside the filter's own. The step is the score over the Fisher
+//! follow scalar recursions next to the filter's own. The step is the score over the Fisher
 //! information of the samples remembered. While the coefficients are uncertain, the innovations
 //! say little of q, their derivatives are small, and q waits.
 

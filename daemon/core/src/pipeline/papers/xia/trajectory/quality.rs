@@ -2,7 +2,7 @@
 //!
 //! In cruise a and b cannot be distinguished (correlations beyond ±0.9999), while w0 over the
 //! driven speeds is known well. The status therefore rests on w0 over the driven speeds; which
-//! coefficients the data excited is said beside it.
+//! coefficients the data excited is stated with it.
 
 use dynocar_shared::{Manoeuvre, ParameterSnapshot, Reason, Status};
 use nalgebra::{Matrix3, Vector3};
