@@ -565,7 +565,7 @@ dynocar_code dynocar_snapshot_covariance(const dynocar_parameter_snapshot *snaps
 /* generated: stops */
 /* What the rail carries in a stop. */
 enum {
-    DYNOCAR_RAIL_UNLIMITED = 0, /* Any brake force: adhesion and its deviation are not read */
+    DYNOCAR_RAIL_UNLIMITED = 0, /* Any brake force: adhesion and its standard deviation are not read */
     /* Adhesion is one coefficient at all speeds, or a lower bound of it */
     DYNOCAR_RAIL_COEFFICIENT = 1,
     DYNOCAR_RAIL_DRY_LAW = 2, /* Adhesion is a scale of the dry rail's law (Xie 2019) */

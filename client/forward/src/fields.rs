@@ -82,7 +82,7 @@ pub fn each_metric(reading: &Reading<'_>, now_ns: i64, mut give: impl FnMut(Metr
     put("", "age_s", "Age of the newest sample behind the estimate", Value::Number(age_s));
     for (place, &number) in it.parameters.iter().take(it.parameter_count as usize).enumerate() {
         let Some(parameter) = Parameter::from_number(number) else { continue };
-        // A field of this name says it, and another its deviation.
+        // A field of this name says it, and another its standard deviation.
         if parameter == Parameter::UnexplainedForce {
             continue;
         }

@@ -194,7 +194,7 @@ fn only_what_has_changed_is_published_and_what_is_gone_is_null() {
     ];
     assert_eq!(published, expected);
     let nulls = changed.metrics.iter().filter(|it| it.is_null == Some(true) && it.value.is_none());
-    assert_eq!(nulls.count(), 2, "c and its deviation");
+    assert_eq!(nulls.count(), 2, "c and its standard deviation");
     assert!(changed.metrics.iter().all(|it| it.timestamp == Some(3) && it.name.is_none()));
 }
 

@@ -42,7 +42,7 @@ class Code(_Vocabulary):
 class Rail(_Vocabulary):
     """What the rail carries in a stop."""
 
-    UNLIMITED = 0  # Any brake force: adhesion and its deviation are not read
+    UNLIMITED = 0  # Any brake force: adhesion and its standard deviation are not read
     COEFFICIENT = 1  # Adhesion is one coefficient at all speeds, or a lower bound of it
     DRY_LAW = 2  # Adhesion is a scale of the dry rail's law (Xie 2019)
     WET_LAW = 3  # Adhesion is a scale of the wet rail's law (Xie 2019)

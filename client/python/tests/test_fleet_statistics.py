@@ -30,7 +30,7 @@ def test_a_mean_of_equals_is_the_plain_mean_and_its_interval_students() -> None:
     values = [1.0, 2.0, 4.0, 5.0]
     pooled = pool([Estimate(value, 0.1) for value in values])
     assert pooled.mean == pytest.approx(3.0)
-    # Equal deviations: the scatter is the sample's variance less theirs, the interval is Student's.
+    # Equal standard deviations: the scatter is the sample's variance less theirs, the interval is Student's.
     assert pooled.std_between == pytest.approx(math.sqrt(np.var(values, ddof=1) - 0.01))
     assert pooled.std == pytest.approx(np.std(values, ddof=1) / 2)
     assert pooled.high - pooled.mean == pytest.approx(3.1824 * pooled.std, rel=1e-4)
@@ -100,7 +100,7 @@ def test_discoveries_are_those_of_benjamini_and_yekutieli() -> None:
 def simulated(
     random: np.random.Generator, trains: int, scatter: float, away: int
 ) -> tuple[dict[str, dict[str, Estimate]], set[tuple[str, str]]]:
-    """Four parameters of a fleet; in the first, `away` trains lie 10 deviations off."""
+    """Four parameters of a fleet; in the first, `away` trains lie 10 standard deviations off."""
     numbers, true = {}, set()
     for parameter in ("a", "b", "c", "mass"):
         stds = random.uniform(0.5, 2.0, trains)

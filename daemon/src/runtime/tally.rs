@@ -35,7 +35,7 @@ struct Suspect {
     effect: AtomicU64,
     /// Evidence in single precision, and age in s.
     evidence: AtomicU64,
-    /// Force and deviation in single precision.
+    /// Force and standard deviation in single precision.
     force: AtomicU64,
     /// Where the train is, in m.
     position_m: AtomicU64,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 # Fewer others say nothing of their scatter.
 LEAST_OTHERS = 3
-# The first look takes those for far that are so many deviations from the median, of so many: of sets
+# The first look takes those for far that are so many standard deviations from the median, of so many: of sets
 # of 12 normal numbers 1 % have one.
 FAR, LEAST_FOR_FAR = 6.0, 8
 
@@ -62,7 +62,7 @@ class _Means(NamedTuple):
 
 
 def pool(estimates: Sequence[Estimate]) -> Pooled:
-    """The mean under random effects: own deviations and a scatter between the true values.
+    """The mean under random effects: own standard deviations and a scatter between the true values.
 
     The scatter by restricted maximum likelihood (Viechtbauer 2005, J. Educ. Behav. Stat. 30, 261,
     eq. 10), the interval of the mean by Knapp and Hartung (2003, Stat. Med. 22, 2693, eq. 8) with
@@ -127,7 +127,7 @@ def differing(
 ) -> list[Difference]:
     """Which things differ from the others, for each parameter a mapping from name to estimate.
 
-    Each estimate is held against the pooled mean of the others: the difference over its deviation,
+    Each estimate is held against the pooled mean of the others: the difference over its standard deviation,
     of its own variance, the scatter between the others and the variance of their mean. Few others
     say little of their scatter: one standard deviation of its estimate is added to it, and the
     degrees of freedom are Satterthwaite's (1946, Biometrics 2, 110). False discoveries are kept
@@ -154,7 +154,7 @@ def differing(
 
 
 def _far(of_names: Mapping[str, Estimate]) -> set[str]:
-    """Those farther from the median than `FAR` times their own deviation and the one that the median
+    """Those farther from the median than `FAR` times their own standard deviation and the one that the median
     absolute deviation of all decide (Hampel's identifier); of few these say nothing."""
     if len(of_names) < LEAST_FOR_FAR:
         return set()

@@ -25,9 +25,9 @@ const STEP_MIN_S: f64 = 0.2;
 /// Time in s in which the pipeline gets to know the noise.
 const LEAD_IN_S: f64 = 60.0;
 const SEEDS: [u64; 3] = [1, 2, 3];
-/// A deviation of this share of the mass is good enough: load weighing is no better.
+/// A standard deviation of this share of the mass is good enough: load weighing is no better.
 const GOOD_SHARE: f64 = 0.005;
-/// A deviation beyond this share of the present one is not worth the driving.
+/// A standard deviation beyond this share of the present one is not worth the driving.
 const WORTH_SHARE: f64 = 0.9;
 const NS_PER_S: f64 = 1e9;
 
@@ -75,7 +75,7 @@ pub fn for_mass(
     })
 }
 
-/// The mass after a manoeuvre that begins with a deviation in t; `None` when it cannot be driven.
+/// The mass after a manoeuvre that begins with a standard deviation in t; `None` when it cannot be driven.
 pub fn forecast(
     scene: &Scene<'_>,
     std_t: f64,

@@ -75,7 +75,7 @@ pub fn forecasts(
 
 /// The manoeuvre for the worst-known coefficient; `None` where none of three minutes is worth it.
 ///
-/// Worst known is the coefficient whose deviation makes most of the resistance's at the train's highest
+/// Worst known is the coefficient whose standard deviation makes most of the resistance's at the train's highest
 /// speed. The shortest time in which the best manoeuvre halves its interval is advised, else the longest.
 pub fn for_resistance(
     snapshot: &ParameterSnapshot,
@@ -105,7 +105,7 @@ pub fn for_resistance(
     })
 }
 
-/// The forecast that leaves the least of a coefficient's deviation; coasting where it is as good.
+/// The forecast that leaves the least of a coefficient's standard deviation; coasting where it is as good.
 pub fn best(forecasts: &[Forecast], coefficient: usize) -> Option<Forecast> {
     let std = |it: &&Forecast| it.std[coefficient];
     let least = |all: &mut dyn Iterator<Item = &Forecast>| {

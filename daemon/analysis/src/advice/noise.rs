@@ -5,7 +5,7 @@
 //! the manoeuvre: every moment measures w0(v) = a + b v + c v² with the variance d² / dt, and the derivative
 //! of w0 by a is 1. So the growth of the (a, a) entry of the information, the inverse of the
 //! published covariance, gives d, with all that widens the published covariance in it. The noise of
-//! the measured speed follows from the deviation of the unexplained force.
+//! the measured speed follows from the standard deviation of the unexplained force.
 
 use dynocar_core::pipeline::papers::xia::trajectory::index::A;
 use dynocar_core::pipeline::papers::xia::trajectory::kalman::TrajectoryKalmanSettings;
@@ -119,7 +119,7 @@ impl NoiseSeen {
             let before = declared_std(train)[A].powi(-2);
             (information_on_a(newest)? - before) / (newest.samples_used as f64 * step_s)
         };
-        // Only of `trajectory_kalman` does the deviation of the unexplained force show the speed's noise.
+        // Only of `trajectory_kalman` does the standard deviation of the unexplained force show the speed's noise.
         let speed_noise_mps = match newest.pipeline_kind() {
             Some(PipelineKind::TrajectoryKalman) => {
                 speed_noise_mps(newest.unexplained_force_std_n, inertial_mass_kg, step_s)

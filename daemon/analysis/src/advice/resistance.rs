@@ -72,7 +72,7 @@ pub fn forecast(
     is_sound.then_some(Forecast { drive, lasts_s, end_mps: filter.state[SPEED], std })
 }
 
-/// Deviation in m/s of a speed that was followed for long: the filter's at rest, where the
+/// Standard deviation in m/s of a speed that was followed for long: the filter's at rest, where the
 /// variance q Δt that a step adds is what a measurement takes off.
 fn tracked_speed_std(model: &NoiseModel, step_s: f64) -> f64 {
     let added = model.disturbance * model.disturbance * step_s;

@@ -65,7 +65,7 @@ impl Masses {
         let normalised = mean(&|it| ((it.learned_t - it.counted_t) / it.std_t).powi(2)).sqrt();
         let words = format!(
             "{scatter_t:.3} t, correlation {correlation:.3}, offset {:.3} t, {normalised:.1} of its \
-             own deviations, {} sections, nothing said of {}",
+             own standard deviations, {} sections, nothing said of {}",
             learned - counted,
             self.pairs.len(),
             self.silent

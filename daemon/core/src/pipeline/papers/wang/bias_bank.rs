@@ -82,7 +82,7 @@ pub struct BiasBank {
 }
 
 impl BiasBank {
-    /// A bank that knows of the inverse mass a mean and a deviation, both relative to the
+    /// A bank that knows of the inverse mass a mean and a standard deviation, both relative to the
     /// reference; `memory` is the number of samples over which evidence is remembered.
     pub fn new(
         dynamics: Dynamics,

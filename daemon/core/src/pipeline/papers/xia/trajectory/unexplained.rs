@@ -20,7 +20,7 @@ fn variance_share(step_s: f64) -> f64 {
     density * density * 2.0 / (2.0 - gain)
 }
 
-/// The deviation in m/s of the measured speed that a snapshot's `unexplained_force_std_n` was reckoned
+/// The standard deviation in m/s of the measured speed that a snapshot's `unexplained_force_std_n` was reckoned
 /// with, for samples that come every `step_s`.
 pub fn speed_noise_mps(unexplained_force_std_n: f64, inertial_mass_kg: f64, step_s: f64) -> f64 {
     unexplained_force_std_n / (inertial_mass_kg * variance_share(step_s).sqrt())
