@@ -227,7 +227,7 @@ enum {
 enum {
     /* The time is not later than the last accepted one */
     DYNOCAR_REJECTED_TIME_NOT_INCREASING = 0,
-    /* The time jumped ahead by more than a stretch of motion allows */
+    /* The time jumped ahead by more than a motion segment allows */
     DYNOCAR_REJECTED_TIME_JUMP = 1,
     /* The sequence number repeats or runs backwards */
     DYNOCAR_REJECTED_SEQUENCE_NOT_INCREASING = 2,
@@ -324,7 +324,7 @@ typedef struct dynocar_train_sample {
     uint8_t flags;
     /* +1 while the chainage grows in the direction of travel, -1 while it falls */
     int8_t direction;
-    /* Number of the run (trip); filters start a new stretch of motion when it changes */
+    /* Number of the run (trip); filters start a new motion segment when it changes */
     uint32_t run;
     /* Chainage of the train's centre in m */
     double position_m;
@@ -435,7 +435,7 @@ typedef struct dynocar_parameter_snapshot {
     double speed_min_mps;
     /* Highest speed in m/s among the data behind the estimate */
     double speed_max_mps;
-    /* The model of train and line that the pipeline reckons with: the first 8 bytes of SHA-256
+    /* The model of train and line that the pipeline uses: the first 8 bytes of SHA-256
      * over the train's file, a zero byte and the line's file; 0 when it came from no files */
     uint64_t model_hash;
     /* One bit for each DYNOCAR_QUANTITY_... whose values a controller may use now. It changes

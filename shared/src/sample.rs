@@ -104,7 +104,7 @@ wire_struct! {
         pub flags: u8,
         /// +1 while the chainage grows in the direction of travel, -1 while it falls.
         pub direction: i8,
-        /// Number of the run (trip); filters start a new stretch of motion when it changes.
+        /// Number of the run (trip); filters start a new motion segment when it changes.
         pub run: u32,
         /// Chainage of the train's centre in m.
         pub position_m: f64,

@@ -99,7 +99,7 @@ wire_struct! {
         pub speed_min_mps: f64,
         /// Highest speed in m/s among the data behind the estimate.
         pub speed_max_mps: f64,
-        /// The model of train and line that the pipeline reckons with: the first 8 bytes of SHA-256
+        /// The model of train and line that the pipeline uses: the first 8 bytes of SHA-256
         /// over the train's file, a zero byte and the line's file; 0 when it came from no files.
         pub model_hash: u64,
         /// One bit for each [`Quantity`] whose values a controller may use now. It changes seldom: what

@@ -223,7 +223,7 @@ vocabulary! {
     RejectionReason: u32 {
         /// The time is not later than the last accepted one.
         TimeNotIncreasing = 0 "time_not_increasing",
-        /// The time jumped ahead by more than a stretch of motion allows.
+        /// The time jumped ahead by more than a motion segment allows.
         TimeJump = 1 "time_jump",
         /// The sequence number repeats or runs backwards.
         SequenceNotIncreasing = 2 "sequence_not_increasing",

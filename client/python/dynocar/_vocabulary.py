@@ -158,7 +158,7 @@ class RejectionReason(_Vocabulary):
     """Why a sample was not used: places in rejected_by_reason."""
 
     TIME_NOT_INCREASING = 0  # The time is not later than the last accepted one
-    TIME_JUMP = 1  # The time jumped ahead by more than a stretch of motion allows
+    TIME_JUMP = 1  # The time jumped ahead by more than a motion segment allows
     SEQUENCE_NOT_INCREASING = 2  # The sequence number repeats or runs backwards
     WRONG_TRAIN = 3  # The sample is of another train
     MISSING = 4  # A quantity that is needed is missing

@@ -34,9 +34,9 @@ pub(super) fn remarks(
     quality: &RunQuality,
     findings: &Findings,
 ) -> Vec<Diagnostic> {
-    let slip =
+    let fault =
         |finding| Diagnostic::InputFault { finding, read_as: read_as(context.manifest, finding) };
-    let mut remarks: Vec<Diagnostic> = findings.iter().map(slip).collect();
+    let mut remarks: Vec<Diagnostic> = findings.iter().map(fault).collect();
     of_time(quality, &mut remarks);
     of_content(context, run, quality, &mut remarks);
     remarks.extend(stands_still(run));
@@ -98,7 +98,7 @@ fn of_content(
     }
 }
 
-/// The longest stretch of a moving train in which no column but the time changes.
+/// The longest interval of a moving train in which no column but the time changes.
 fn stands_still(run: &Resolved) -> Option<Diagnostic> {
     let columns: Vec<&[f64]> = run
         .table
@@ -154,7 +154,7 @@ fn of_position(
     let net_m = median_m(&rows[rows.len() - few..]) - median_m(&rows[..few]);
     let direction = run.entry.direction;
     let is_reported =
-        |slips: &[InputFault]| findings.iter().any(|finding| slips.contains(&finding.slip));
+        |faults: &[InputFault]| findings.iter().any(|finding| faults.contains(&finding.fault));
     if net_m * f64::from(direction) < -DISTANCE_MIN_M
         && !is_reported(&[InputFault::DirectionReversed])
     {

@@ -204,7 +204,7 @@ impl Diagnostic {
         use Severity::{Fundamental, Info, Warning};
         match self {
             Diagnostic::InputFault { finding, .. } => {
-                (finding.slip.name(), finding.slip.severity())
+                (finding.fault.name(), finding.fault.severity())
             }
             Diagnostic::AgainstDirection { .. } => ("against_direction", Fundamental),
             Diagnostic::DistanceMismatch { .. } => ("distance_mismatch", Warning),

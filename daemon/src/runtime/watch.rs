@@ -121,7 +121,7 @@ impl Watch {
     fn report_changes(&mut self) {
         // Once for all pipelines of a train.
         let known = |(pipeline, last): (&WatchedPipeline, &TallyReading)| {
-            Some((pipeline.train.0, last.implausible?.slip))
+            Some((pipeline.train.0, last.implausible?.fault))
         };
         let mut reported: Vec<(u64, InputFault)> =
             self.pipelines.iter().zip(&self.readings).filter_map(known).collect();
@@ -133,10 +133,10 @@ impl Watch {
             let (name, train) = (pipeline.name.as_str(), pipeline.train.0);
             log.report(name, train, &reading, now);
             if let Some(finding) = reading.implausible
-                && !reported.contains(&(train, finding.slip))
+                && !reported.contains(&(train, finding.fault))
             {
-                reported.push((train, finding.slip));
-                let code = finding.slip.name();
+                reported.push((train, finding.fault));
+                let code = finding.fault.name();
                 warn!(train, code, "the samples cannot be true: {finding}");
             }
             if reading.lost > last.lost {

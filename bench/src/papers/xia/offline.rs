@@ -69,8 +69,8 @@ fn fit(
     bounds: ParameterBox<3>,
 ) -> Option<TrajectoryFit> {
     let settings = FitSettings { bounds, ..FitSettings::new(StepRule::Distance) };
-    let stretches = [MotionSegment { steps: &run.steps, speeds_mps }];
-    TrajectoryFitter::default().fit(&stretches, start, &settings).ok()
+    let segments = [MotionSegment { steps: &run.steps, speeds_mps }];
+    TrajectoryFitter::default().fit(&segments, start, &settings).ok()
 }
 
 fn anywhere() -> ParameterBox<3> {
@@ -267,10 +267,10 @@ fn disturbed_row(seeds: Seeds) -> Row {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let run = cruise.disturbed(&truth, &mut random);
         let speeds = run.measured_mps(0, &mut random);
-        let stretches = [MotionSegment { steps: &run.steps, speeds_mps: &speeds }];
+        let segments = [MotionSegment { steps: &run.steps, speeds_mps: &speeds }];
         let settings = FitSettings { bounds: anywhere(), ..FitSettings::new(StepRule::Distance) };
-        let exact = TrajectoryFitter::default().fit(&stretches, None, &settings);
-        let estimated = likeliest_fit(&stretches, &settings);
+        let exact = TrajectoryFitter::default().fit(&segments, None, &settings);
+        let estimated = likeliest_fit(&segments, &settings);
         for (found, score) in [(exact, &mut output_error), (estimated, &mut ours)] {
             if let Ok(found) = found {
                 score.take_resistance((&found.davis, &found.covariance), &truth, &fast);

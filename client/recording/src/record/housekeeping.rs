@@ -26,7 +26,7 @@ pub enum Task {
         /// Samples, snapshots and events.
         items: u64,
     },
-    /// A file was begun: it belongs to a stretch that is not yet at its end.
+    /// A file was begun: it belongs to an event that is not yet at its end.
     Begun {
         /// The file.
         file: PathBuf,

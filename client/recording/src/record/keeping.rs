@@ -1,8 +1,8 @@
 //! What a flight recorder keeps for good: the files around a moment, under names of their own.
 //!
-//! A file is kept by giving it a second name (a hard link) in the folder of the stretch. So it is kept from
+//! A file is kept by giving it a second name (a hard link) in the folder of the event. So it is kept from
 //! that moment on, whatever happens to the recorder: the ring removes only the first name, and the file that
-//! is being written goes on growing under both. A stretch takes its name when its files and their names are on the
+//! is being written goes on growing under both. An event takes its name when its files and their names are on the
 //! disk, so that a power cut leaves it whole or not at all.
 
 use std::fs::{self, File, TryLockError};
@@ -74,7 +74,7 @@ pub struct Keeper {
     storage: SharedStorage,
     ring: PathBuf,
     keeping: Keeping,
-    /// The newest stretch, which goes on until its end.
+    /// The newest event, which goes on until its end.
     open: Option<(PathBuf, KeptEvent)>,
     is_full_reported: bool,
     /// No other recorder writes here.
@@ -134,7 +134,7 @@ pub fn request(ring: &Path, reason: &str) -> io::Result<bool> {
 }
 
 impl Keeper {
-    /// Takes a ring's folder, which is made where it is not there. A stretch that another recorder has left
+    /// Takes a ring's folder, which is made where it is not there. An event that another recorder has left
     /// open goes on.
     ///
     /// # Errors
@@ -220,7 +220,7 @@ impl Keeper {
         older.iter().filter(is_near).chain(newest).cloned().collect()
     }
 
-    /// Makes a stretch: it takes its name when all of it is on the disk.
+    /// Makes an event: it takes its name when all of it is on the disk.
     fn make(
         &mut self,
         folder: &Path,
@@ -241,7 +241,7 @@ impl Keeper {
         linked
     }
 
-    /// A new file was begun: it belongs to a stretch that is not yet at its end.
+    /// A new file was begun: it belongs to an event that is not yet at its end.
     ///
     /// # Errors
     ///

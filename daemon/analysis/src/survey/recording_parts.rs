@@ -28,8 +28,8 @@ pub struct RecordingPart {
     pub to_m: f64,
 }
 
-/// Cuts a recording into stretches: where its way follows, for 300 m, a way that it took before
-/// in the same stretch, it has turned. The cut is where it stood longest in between.
+/// Cuts a recording into parts: where its way follows, for 300 m, a way that it took before
+/// in the same part, it has turned. The cut is where it stood longest in between.
 pub fn recording_parts(number: usize, recording: &Recording) -> Vec<RecordingPart> {
     let points = recording.points(POINT_STEP_M);
     let mut found = Vec::new();
@@ -56,7 +56,7 @@ pub fn recording_parts(number: usize, recording: &Recording) -> Vec<RecordingPar
     found
 }
 
-/// Where a stretch comes back on itself.
+/// Where a part comes back on itself.
 struct Return {
     /// The earlier point, where the repeated way was left.
     left: usize,

@@ -132,7 +132,7 @@ pub fn survey(
             .ok_or(SurveyError::NoLine { what: "no two passes follow the same way" })?,
     };
     let passes: Vec<_> =
-        cut.par_iter().filter_map(|stretch| pass_of(&ways, stretch, &recordings)).collect();
+        cut.par_iter().filter_map(|part| pass_of(&ways, part, &recordings)).collect();
     let (trips, wheels) = trips(&passes, &ways, &recordings);
     if trips.is_empty() {
         return Err(SurveyError::NoLine { what: "no recording runs along it" });

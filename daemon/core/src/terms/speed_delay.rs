@@ -59,7 +59,7 @@ impl LateSpeed {
         }
     }
 
-    /// The forces in N behind a speed in m/s of a time in ns of a stretch; `None` while none are known.
+    /// The forces in N behind a speed in m/s of a time in ns of a motion segment; `None` while none are known.
     /// What brakes a train that stands moves nothing, and no lag remembers it.
     pub fn forces(
         &mut self,

@@ -206,8 +206,8 @@ impl Track {
         self.gradient_std_permille(centre_m - half_m, centre_m + half_m)
     }
 
-    /// Standard deviation in ‰ of the mean gradient over a stretch, as a survey states it: errors
-    /// of stretches further apart than [`GRADIENT_ERROR_FREE_M`] are their own. `None` when it is not
+    /// Standard deviation in ‰ of the mean gradient over an interval, as a survey states it: errors
+    /// of intervals further apart than [`GRADIENT_ERROR_FREE_M`] are their own. `None` when it is not
     /// stated.
     pub fn gradient_std_permille(&self, from_m: f64, to_m: f64) -> Option<f64> {
         let length_m = to_m - from_m;

@@ -206,7 +206,7 @@ impl Naming {
         }
     }
 
-    /// Innovations larger than small things explain, and no suspect; what earlier stretches spoke for
+    /// Innovations larger than small things explain, and no suspect; what earlier segments spoke for
     /// may be behind it, or a place that was never passed.
     fn unknown(&self, standing: &Standing) -> Option<Named> {
         let evidence = self.unexplained(standing)?;

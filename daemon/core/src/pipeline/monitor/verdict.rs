@@ -60,7 +60,7 @@ pub struct Verdict {
     resistance: Parameters,
     /// Evidence that outlasted stops.
     held: [f64; SUSPECTS],
-    /// Evidence of the stretches between earlier stops, for what is another after each.
+    /// Evidence of the segments between earlier stops, for what is another after each.
     gathered: [f64; SUSPECTS],
     /// Evidence of the rows in hand for each being there.
     own: [f64; CANDIDATES],

@@ -89,7 +89,7 @@ impl ResistanceKalman {
         }
     }
 
-    /// Starts a stretch of motion at a sample: the speed anew, the disturbance as far as it
+    /// Starts a motion segment at a sample: the speed anew, the disturbance as far as it
     /// lasts.
     fn start(&mut self, now: &UnitSample) {
         let variance = self.beside.source.noise().variance_of_sample(0.0);
