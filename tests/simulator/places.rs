@@ -8,7 +8,7 @@ use dynocar_tests::simulator::{Effect, EffectRequest, SimulatorSettings, simulat
 /// Of a fast train on 60 km: 2.7 km each, 1.1 km apart, so that the end of one and the start of the other
 /// are felt together.
 const SEED: u64 = 97_004;
-/// Largest distance in m of an end from the truth; a sample is 16 m of way there.
+/// Largest distance in m of an end from the truth; a sample is 16 m of distance there.
 const END_ERROR_MAX_M: f64 = 30.0;
 
 #[test]

@@ -214,7 +214,7 @@ class Plot(NamedTuple):
 
 
 class GrownFiles(NamedTuple):
-    """A grown model as files, and the kinds of effects that they cannot express."""
+    """An updated model as files, and the kinds of effects that they cannot express."""
 
     files: list[Path]
     not_expressed: list[str]

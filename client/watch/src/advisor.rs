@@ -1,4 +1,4 @@
-//! What to drive next, reckoned now and then.
+//! What to drive next, computed now and then.
 
 use std::sync::Arc;
 

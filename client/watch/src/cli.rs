@@ -23,7 +23,7 @@ use crate::{plain, terminal};
 #[command(name = "dynocar watch", version, about)]
 struct Arguments {
     /// The daemon's configuration: its root, its trains and what is declared of them; what to drive
-    /// next is reckoned within the limits declared there
+    /// next is computed within the limits declared there
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Only this train; may be given several times

@@ -55,7 +55,7 @@ pub(super) fn remarks(
     remarks
 }
 
-/// What a force from power is reckoned with.
+/// What a force from power is computed with.
 fn of_power(context: Context, run: &Resolved, remarks: &mut Vec<Diagnostic>) {
     if run.forces.traction.source != ForceSource::Power {
         return;

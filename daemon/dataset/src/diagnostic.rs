@@ -117,7 +117,7 @@ pub enum Diagnostic {
         }
     )]
     ForceByPower {
-        /// The efficiency that is reckoned with.
+        /// The efficiency that is assumed.
         efficiency: f64,
         /// Whether it is declared.
         is_declared: bool,

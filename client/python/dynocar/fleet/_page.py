@@ -210,7 +210,7 @@ def _how(report: Report) -> str:
         "discoveries kept below the rate after Benjamini and Yekutieli. Formulas and their tests: "
         "docs/guides/fleet.md."
     )
-    return _section("How it is reckoned", words, "")
+    return _section("How it is computed", words, "")
 
 
 def _estimate(estimate: Report) -> tuple[float, float]:

@@ -13,7 +13,7 @@ const SERVICE_BRAKING_MPS2: f64 = 0.5;
 /// No train is asked for more, in m/s.
 const SPEED_MAX_MPS: f64 = 125.0;
 
-/// The train as it is known now: what a manoeuvre is reckoned with.
+/// The train as it is known now: what a manoeuvre is computed with.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene<'a> {
     /// What is declared, above all the limits: effort curves and their highest speed.

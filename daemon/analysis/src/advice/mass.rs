@@ -20,7 +20,7 @@ use super::noise::Noise;
 
 /// Times in s that a driver may be asked for; traction shows the mass soon or not at all.
 const WITHIN_S: [f64; 2] = [20.0, 60.0];
-/// Shortest step in s that is reckoned with.
+/// Shortest step in s that is used.
 const STEP_MIN_S: f64 = 0.2;
 /// Time in s in which the pipeline gets to know the noise.
 const LEAD_IN_S: f64 = 60.0;

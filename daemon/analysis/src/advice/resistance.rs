@@ -15,7 +15,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::drive::{Drive, Scene};
 use super::noise::Noise;
 
-/// Shortest step in s that is reckoned with; samples that come faster are taken together.
+/// Shortest step in s that is used; samples that come faster are taken together.
 const STEP_MIN_S: f64 = 0.2;
 
 /// What a manoeuvre would leave.

@@ -1,6 +1,6 @@
 //! The chainage of every row: what the wheels count, corrected by what GNSS measures.
 //!
-//! The wheels count the way with a scale error that stays over a pass and slips that add up like
+//! The wheels count the distance with a scale error that stays over a pass and slips that add up like
 //! a random walk. A fix lies `lag * speed` behind, since it is older than its stamp, and errs by
 //! some metres that fade over seconds. A Kalman filter with a smoother (Rauch, Tung and Striebel
 //! 1965) over [offset, scale, error of the fix, lag] takes them apart, robust to single wild fixes.
@@ -11,7 +11,7 @@ use super::alignment::{FIX_FADING_S, FIX_STD_M};
 use super::recording::Recording;
 use super::tracking::Placed;
 
-/// Standard deviation in m of the wheels' slip over 1 m; it grows with the root of the way.
+/// Standard deviation in m of the wheels' slip over 1 m; it grows with the root of the distance.
 const SLIP_M: f64 = 0.05;
 /// Part of a fix's error in m that is new in each of them.
 const FIX_WHITE_M: f64 = 0.7;
@@ -35,7 +35,7 @@ pub struct Estimate {
 /// What holds for all passes of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelsAndLag {
-    /// Way over counted way, less 1.
+    /// True over counted distance, less 1.
     pub scale: Estimate,
     /// Age in s of a fix at its stamp.
     pub lag_s: Estimate,

@@ -22,7 +22,7 @@ const TERMINAL_MARGIN_M: f64 = 100.0;
 pub struct RecordingPart {
     /// Number of the recording.
     pub recording: usize,
-    /// Way in m by the recording's wheels where it starts.
+    /// Distance in m by the recording's wheels where it starts.
     pub from_m: f64,
     /// Where it ends.
     pub to_m: f64,
@@ -103,7 +103,7 @@ fn confirmed(twins: &[Option<usize>], from: usize) -> Option<Return> {
     Some(Return { left: twins[back]?, back: from + back, is_opposite: last < first })
 }
 
-/// Way in m where a recording stood longest between two ways; `None` when it did not stand.
+/// Distance in m where a recording stood longest between two ways; `None` when it did not stand.
 fn longest_stand(recording: &Recording, from_m: f64, to_m: f64) -> Option<f64> {
     let raw = recording.raw;
     let rows = recording.row_at(from_m)..recording.row_at(to_m);

@@ -1,6 +1,6 @@
 //! From figures to input faults: which one would make all of them come out as they did.
 //!
-//! | fault by a factor f of reported over true | forces' factor | way by position / by speed | gradient's factor |
+//! | fault by a factor f of reported over true | forces' factor | distance by position / by speed | gradient's factor |
 //! | --- | --- | --- | --- |
 //! | forces | 1/f | 1 | 1 |
 //! | mass | f | 1 | 1 |
@@ -15,7 +15,7 @@ use super::watch::Figures;
 
 /// Factors of forces within these bounds are effects that a train can have.
 const FORCE_FACTORS: (f64, f64) = (0.4, 2.5);
-/// Way by position over way by speed within these bounds is wear, gaps and drift.
+/// Distance by position over distance by speed within these bounds is wear, gaps and drift.
 const WAY_RATIOS: (f64, f64) = (0.8, 1.25);
 /// Masses over the declared one within these bounds are loads, as in validation.
 const MASS_RATIOS: (f64, f64) = (0.2, 5.0);

@@ -14,7 +14,7 @@ pub use profile::{GradientError, LinearProfile, ProfileError, StepProfile};
 /// process along the chainage.
 pub const GRADIENT_ERROR_FREE_M: f64 = 200.0;
 
-/// Share of a surveyed gradient's error that is still there after a way in m.
+/// Share of a surveyed gradient's error that is still there after a distance in m.
 pub fn gradient_error_kept(way_m: f64) -> f64 {
     (-2.0 * way_m.abs() / GRADIENT_ERROR_FREE_M).exp()
 }
@@ -200,7 +200,7 @@ impl Track {
     }
 
     /// Standard deviation in ‰ of the gradient under a train, as a survey states it; `None` when it is
-    /// not stated. How it goes with the way: [`gradient_error_kept`].
+    /// not stated. How it goes with the distance: [`gradient_error_kept`].
     pub fn gradient_std_here_permille(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
         let half_m = 0.5 * train_length_m;
         self.gradient_std_permille(centre_m - half_m, centre_m + half_m)

@@ -18,7 +18,7 @@ const SAMPLES_MAX: usize = (Restart::WINDOW_S / STEP_MIN_S) as usize + 2;
 pub struct WindowError {
     /// Of the speed, over the window's moving samples.
     pub speed: SpeedError,
-    /// Of the way by the predicted speed against the way by position, over the window's length, in
+    /// Of the distance by the predicted speed against the distance by position, over the window's length, in
     /// m/s; what a wrong wheel diameter shows. 0 where no position is known.
     pub way_mps: f64,
 }

@@ -4,7 +4,7 @@
 //! forces, as in [`crate::pipeline::resistance`]. Each suspect adds one column: what one unit of
 //! it would take off the momentum. All columns go through one whitener and into one information
 //! matrix, from which the likelihood ratio of every suspect against the base model follows at
-//! any time, a, b and c being refitted together with it. The way by position against the way by
+//! any time, a, b and c being refitted together with it. The distance by position against the distance by
 //! speed adds the wheels' diameter.
 //!
 //! # Layout, in the order a sample takes

@@ -1,13 +1,13 @@
-//! Whether the wheels are of the declared diameter: the way by speed against the way by position.
+//! Whether the wheels are of the declared diameter: the distance by speed against the distance by position.
 //!
 //! A position that comes from the same wheel shows nothing; fixes at balises, or GNSS, do. The
-//! difference between chainage and integrated speed is `offset - error * way`, so that a straight
-//! line over points some way apart gives the error of the speed's scale. Each unbroken row of
+//! difference between chainage and integrated speed is `offset - error * distance`, so that a straight
+//! line over points some distance apart gives the error of the speed's scale. Each unbroken row of
 //! points has an offset of its own.
 
 use crate::force::ResolvedSample;
 
-/// Way in m between points: fixes lie so far apart.
+/// Distance in m between points: fixes lie so far apart.
 const APART_M: f64 = 500.0;
 /// Standard deviation in m of a point: a fix, and what the odometer drifts until the next.
 const POINT_STD_M: f64 = 5.0;
@@ -35,11 +35,11 @@ struct Row {
 struct Going {
     stretch: u32,
     direction: f64,
-    /// Way by speed in m since the row began.
+    /// Distance by speed in m since the row began.
     way_m: f64,
     /// Time in ns and speed in m/s of the newest sample.
     last: (i64, f64),
-    /// Chainage less way where the row began.
+    /// Chainage less distance where the row began.
     origin_m: f64,
     /// Mean offset since the last point, over so many samples.
     mean_m: f64,
@@ -150,7 +150,7 @@ impl Row {
         let variance = POINT_STD_M * POINT_STD_M;
         let spread = self.way_square - self.way * self.way / self.count;
         let slope_side = self.product - self.way * self.offset / self.count;
-        // The measured way is too long by the error: the offset falls as it grows.
+        // The measured distance is too long by the error: the offset falls as it grows.
         (spread / variance, -slope_side / variance)
     }
 }

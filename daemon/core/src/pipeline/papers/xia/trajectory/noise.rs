@@ -43,7 +43,7 @@ const NEWEST: f64 = 32.0;
 const SHRUNK_BELOW: f64 = 0.25;
 /// Information on ln R and ln q from before any data: standard deviations of 3.
 const PRIOR_INFORMATION: f64 = 0.1;
-/// Information on ln q beyond the first unit that the mean of q is reckoned with at least.
+/// Information on ln q beyond the first unit that the mean of q is computed with at least.
 const LEAST_FREE_INFORMATION: f64 = 1.0;
 /// Largest step of ln R and ln q for one innovation.
 const STEP_MAX: f64 = 0.5;
