@@ -105,7 +105,8 @@ Made by `cargo run --release -p dynocar-bench -- papers --markdown docs/papers.m
 | bound | the Cramér–Rao or posterior Cramér–Rao bound of the scenario, computed in the same run |
 | coverage | share of our 95 % intervals that hold the truth |
 | NEES | mean normalised estimation error squared per degree of freedom, 1 when the covariance is right, with the band that holds it in 99 % of such measurements; where all runs share one curve (Xie 2019 and Jin 2020 but for *drawn coefficients*) the band is as wide as one draw leaves it |
-| promise | whether what the project promises of the row was kept |
+
+A row that breaks what the project promises of it says `BROKEN` in its last cell but one, and what.
 
 Where the paper's method differs from its paper:
 
@@ -121,17 +122,22 @@ pub fn for_documentation(rows: &[Row]) -> String {
     for of_paper in rows.chunk_by(|one, other| one.paper == other.paper) {
         let mut notes = Vec::new();
         let _ = writeln!(text, "\n## {}\n", of_paper[0].paper);
-        let _ = writeln!(text, "| {} | seeds |", HEADINGS[1..].join(" | "));
-        let _ = writeln!(text, "|{}", " --- |".repeat(HEADINGS.len()));
+        let _ = writeln!(text, "| {} | seeds |", HEADINGS[1..12].join(" | "));
+        let _ = writeln!(text, "|{}", " --- |".repeat(HEADINGS.len() - 1));
         for row in of_paper {
             let mut cells = cells(row);
-            for (place, start) in [(2, " (paper's method: "), (12, "; may be wider: ")] {
-                if let Some((cell, note)) = cells[place].split_once(start) {
-                    let note = format!("{}{}", start.trim_start_matches([' ', '(', ';']), note);
-                    cells[place] = format!("{cell} ({})", number_of(&note, &mut notes));
+            for (from, into, start) in [(2, 2, " (paper's method: "), (12, 11, "; may be wider: ")]
+            {
+                if let Some((cell, note)) = cells[from].clone().split_once(start) {
+                    let note = format!("{}{note}", start.trim_start_matches([' ', '(', ';']));
+                    let cell = if from == into { cell } else { cells[into].as_str() };
+                    cells[into] = format!("{cell} ({})", number_of(&note, &mut notes));
                 }
             }
-            let _ = writeln!(text, "| {} | {} |", cells[1..].join(" | "), row.seeds);
+            if cells[12].starts_with("BROKEN") {
+                cells[11] = format!("{} {}", cells[11], cells[12]);
+            }
+            let _ = writeln!(text, "| {} | {} |", cells[1..12].join(" | "), row.seeds);
         }
         for (place, note) in notes.iter().enumerate() {
             let _ = write!(text, "{}({}) {note}.", if place == 0 { "\n" } else { " " }, place + 1);
