@@ -150,7 +150,7 @@ Depends: libc6 (>= ${glibc:-2.31}), libgcc-s1
 Recommends: systemd
 Section: science
 Priority: optional
-Description: learns online how a train really behaves
+Description: estimates resistance, mass, adhesion and brakes of a train as it drives
  A dynamometer car in software. A daemon beside a train controller reads its samples from shared
  memory, learns running resistance, mass, adhesion and brake friction, and answers with estimates
  that say how sure they are. On recorded runs it finds the effect that a model of a train lacks.

@@ -258,7 +258,7 @@ fn notes_on(settings: &SimulatorSettings) -> Vec<String> {
 }
 
 #[test]
-fn no_effect_however_large_and_no_poor_recording_is_taken_for_a_input_fault() {
+fn no_effect_however_large_and_no_poor_recording_is_taken_for_an_input_fault() {
     let none: [String; 0] = [];
     let mut cases: Vec<EffectRequest> = EffectKind::ALL
         .iter()

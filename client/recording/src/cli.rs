@@ -59,7 +59,7 @@ struct RecoverArguments {
     output: PathBuf,
 }
 
-/// Change a recording into a dataset's folder, or a dataset into a recording.
+/// Convert recordings between MCAP, CSV datasets and Parquet.
 #[derive(Debug, Args)]
 pub struct ConvertArguments {
     /// A recording, of one that rotated its files in order; or a dataset's folder or dataset.toml

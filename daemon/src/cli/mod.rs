@@ -44,13 +44,13 @@ enum Command {
     Init(Passed),
     /// Import trains and lines of railtoolkit, TTOBench or OSRD.
     Import(Passed),
-    /// Find the effect that the model lacks, add it, report the error before and after.
+    /// Find which effect the train's model lacks, add it, and report the prediction error before and after.
     Explain(Passed),
     Run(run::RunArguments),
     Health(health::HealthArguments),
     Check(check::CheckArguments),
     Replay(replay::ReplayArguments),
-    /// Estimate resistance, mass, adhesion, friction from recorded runs, as the daemon.
+    /// Estimate resistance, mass, adhesion and friction from recorded runs, with the daemon's own estimators.
     Identify(Passed),
     /// Estimate deceleration and stopping distance from recorded stops, without forces.
     Stops(Passed),
@@ -67,7 +67,7 @@ enum Command {
     FlightRecorder(Passed),
     /// Ask a flight recorder to keep this moment for good
     Keep(Passed),
-    /// Repair a truncated recording
+    /// Repair a truncated recording, or join the files of one that rotated
     Recover(Passed),
     /// Convert recordings between MCAP, CSV datasets and Parquet
     Convert(Passed),
