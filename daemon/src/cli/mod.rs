@@ -44,13 +44,13 @@ enum Command {
     Init(Passed),
     /// Import trains and lines of railtoolkit, TTOBench or OSRD.
     Import(Passed),
-    /// Find which effect the train's model lacks, add it, and report the prediction error before and after.
+    /// Find which effect the model lacks, add it, and report the error before and after.
     Explain(Passed),
     Run(run::RunArguments),
     Health(health::HealthArguments),
     Check(check::CheckArguments),
     Replay(replay::ReplayArguments),
-    /// Estimate resistance, mass, adhesion and friction from recorded runs, with the daemon's own estimators.
+    /// Estimate resistance, mass, adhesion and friction from recorded runs, as the daemon does live.
     Identify(Passed),
     /// Estimate deceleration and stopping distance from recorded stops, without forces.
     Stops(Passed),

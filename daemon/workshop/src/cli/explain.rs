@@ -33,7 +33,7 @@ const PREDICTIONS_HEADER: &str = "time_s,speed_mps\n";
 /// Why nothing is grown from data that cannot be true.
 const IMPOSSIBLE: &str = "no updated model is written: the data cannot be true";
 
-/// Find which effect the train's model lacks, add it, and report the prediction error before and after.
+/// Find which effect the model lacks, add it, and report the error before and after.
 #[derive(Debug, Args)]
 pub struct ExplainArguments {
     /// The dataset's folder, or a recording
