@@ -108,7 +108,7 @@ fn print_case(case: &Case, grade: &Grade) {
         grade.share,
         parameters.join(", ")
     ));
-    dynocar::output::report_line(&format!("    strength {:.2}", grade.acceptance_score));
+    dynocar::output::report_line(&format!("    acceptance score {:.2}", grade.acceptance_score));
     for detail in &grade.details {
         dynocar::output::report_line(&format!("    {detail}"));
     }

@@ -38,7 +38,7 @@ pub struct Grade {
     pub left_ratio: Option<f64>,
     /// The same of the true law with estimated numbers, for a law that no library holds.
     pub attainable_ratio: Option<f64>,
-    /// Greatest strength of a candidate in the first round of the search.
+    /// Greatest acceptance score of a candidate in the first round of the search.
     pub acceptance_score: f64,
 }
 
