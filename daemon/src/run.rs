@@ -1,4 +1,4 @@
-//! The daemon: every stage of the online way on one screen.
+//! The daemon: every stage of the live path on one screen.
 //!
 //! ```text
 //! controller ──TrainSample──▶ validation ─▶ track and forces ─▶ estimator ──ParameterSnapshot──▶ client

@@ -9,7 +9,7 @@
 //!   [`resistance`]: the cases
 //! - [`pipelines`]: every kind of pipeline from sample to snapshot
 //! - [`report`]: the table and the JSON
-//! - [`beside`]: another build of the program beside this one
+//! - [`against`]: another build of the program beside this one
 
 pub mod against;
 pub mod braking;

@@ -60,7 +60,7 @@ pub fn page() -> String {
     for column in SNAPSHOTS.iter() {
         let (name, number) = match column.source {
             Source::Value(it) => (it.full_name().to_owned(), parameter_number(it)),
-            Source::Beside(it, place) => {
+            Source::OfEstimate(it, place) => {
                 let (offset, word, _) = SUFFIXES[place];
                 (suffixed_name(it, word), parameter_number(it) + offset)
             }

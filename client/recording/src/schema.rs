@@ -183,10 +183,10 @@ fn estimate_message() -> Vec<FieldDescriptorProto> {
     let of = |&it: &Parameter| {
         let number = parameter_number(it);
         let value = field(it.full_name(), number, Type::Double, true);
-        let beside = SUFFIXES.map(|(offset, word, _)| {
+        let suffixed = SUFFIXES.map(|(offset, word, _)| {
             field(&suffixed_name(it, word), number + offset, Type::Double, true)
         });
-        std::iter::once(value).chain(beside)
+        std::iter::once(value).chain(suffixed)
     };
     Parameter::ALL.iter().flat_map(of).collect()
 }

@@ -120,7 +120,7 @@ enum HousekeepingThread {
     /// At once, by whoever asks.
     Here(Box<Housekeeping>),
     /// In a thread of its own, which ends when nobody can ask any more.
-    Beside(Sender<Task>, JoinHandle<()>),
+    Running(Sender<Task>, JoinHandle<()>),
 }
 
 /// Has things done with the files of a recording.
@@ -157,7 +157,7 @@ impl Housekeeper {
             let thread = std::thread::Builder::new().name("housekeeping".into());
             let thread = thread.spawn(move || work(&taken, &asked))?;
             let here =
-                std::mem::replace(&mut self.place, HousekeepingThread::Beside(tasks, thread));
+                std::mem::replace(&mut self.place, HousekeepingThread::Running(tasks, thread));
             if let HousekeepingThread::Here(housekeeping) = here {
                 // The thread waits for it.
                 let _ = hand_over.send(housekeeping);
@@ -181,7 +181,7 @@ impl Housekeeper {
         match &mut self.place {
             HousekeepingThread::Here(housekeeping) => housekeeping.take(task),
             // The thread ends after the sender only.
-            HousekeepingThread::Beside(tasks, _) => drop(tasks.send(task)),
+            HousekeepingThread::Running(tasks, _) => drop(tasks.send(task)),
         }
     }
 
@@ -197,7 +197,7 @@ impl Housekeeper {
 
     /// Ends when everything is done.
     pub fn finish(self) {
-        if let HousekeepingThread::Beside(tasks, thread) = self.place {
+        if let HousekeepingThread::Running(tasks, thread) = self.place {
             drop(tasks);
             // A thread that panicked has reported so.
             let _ = thread.join();

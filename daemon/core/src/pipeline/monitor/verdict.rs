@@ -66,7 +66,7 @@ pub struct Verdict {
     own: [f64; CANDIDATES],
     /// The same against the base model, by which candidates are compared: a scale of the forces
     /// that the base model takes up in part is there all the same.
-    beside: [f64; CANDIDATES],
+    given_base: [f64; CANDIDATES],
     naming: Naming,
     scale: f64,
     /// Blocks since the train started from a stop.
@@ -84,7 +84,7 @@ impl Verdict {
             held: [0.0; SUSPECTS],
             gathered: [0.0; SUSPECTS],
             own: [0.0; CANDIDATES],
-            beside: [0.0; CANDIDATES],
+            given_base: [0.0; CANDIDATES],
             naming: Naming::new(settings.evidence_min),
             scale: 1.0,
             leg_blocks: 0,
@@ -180,11 +180,11 @@ impl Verdict {
                 let hint = if is_hinted { PRESSURE_EVIDENCE } else { 0.0 };
                 ratio / self.scale + hint - cost - searched()
             };
-            let [own, beside] = found.unwrap_or_default().map(net);
-            (self.own[candidate], self.beside[candidate]) = (own, beside);
+            let [own, given_base] = found.unwrap_or_default().map(net);
+            (self.own[candidate], self.given_base[candidate]) = (own, given_base);
         }
         self.own[WHEEL] = evidence.wheel - searched();
-        self.beside[WHEEL] = self.own[WHEEL];
+        self.given_base[WHEEL] = self.own[WHEEL];
         self.name(evidence);
     }
 
@@ -192,13 +192,13 @@ impl Verdict {
     /// value, and as the best account of the rows.
     fn unusual(&self, parameter: usize, evidence: &Evidence) -> Option<[(f64, f64); 2]> {
         let usual_std = evidence.base.usual_std(parameter);
-        let (it, beside) = evidence.base.unusual(parameter, suspect_of(parameter).prior_std);
+        let (it, given_base) = evidence.base.unusual(parameter, suspect_of(parameter).prior_std);
         let least = self.least(parameter);
         let usual = (TOLERATED_SHARE * least).max(USUAL_STDS * usual_std);
         let beyond = (it.beyond(usual), it.cost);
-        let is_surer = beyond.0 - beyond.1 > beside.0 - beside.1;
-        let own = if is_surer { beyond } else { beside };
-        is_there(parameter, &it, least).then_some([own, beside])
+        let is_surer = beyond.0 - beyond.1 > given_base.0 - given_base.1;
+        let own = if is_surer { beyond } else { given_base };
+        is_there(parameter, &it, least).then_some([own, given_base])
     }
 
     /// Blocks for which a suspect could act; `None` for a brake that was not yet looked for.
@@ -233,7 +233,7 @@ impl Verdict {
 
     fn name(&mut self, evidence: &Evidence) {
         let mut net = self.own;
-        let mut rank = self.beside;
+        let mut rank = self.given_base;
         for suspect in 0..SUSPECTS {
             self.held[suspect] *= KEPT_PER_BLOCK;
             self.gathered[suspect] *= self.kept_per_row;

@@ -115,8 +115,8 @@ pub fn kalman(
     settings: &KalmanSettings,
 ) -> Result<ResistanceKalman, SettingError> {
     settings.check_ranges()?;
-    let beside = ls(train, &LsSettings { data: settings.data, ..LsSettings::default() })?;
-    Ok(ResistanceKalman::new(train, *settings, beside))
+    let least_squares = ls(train, &LsSettings { data: settings.data, ..LsSettings::default() })?;
+    Ok(ResistanceKalman::new(train, *settings, least_squares))
 }
 
 fn regularised(

@@ -1,4 +1,4 @@
-//! `trajectory_newton`: a trajectory fit over a sliding window, the online way of Xia 2023.
+//! `trajectory_newton`: a trajectory fit over a sliding window, the online scheme of Xia 2023.
 
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 use nalgebra::{Matrix3, Vector3};
