@@ -409,7 +409,8 @@ typedef struct dynocar_parameter_snapshot {
     uint32_t missing_manoeuvres;
     /* Suspected missing effect, DYNOCAR_EFFECT_... */
     uint32_t suspected_effect;
-    /* Other effects that these data hardly distinguish from it: one bit for each DYNOCAR_EFFECT_... */
+    /* Other effects that these data hardly distinguish from it: one bit for each
+     * DYNOCAR_EFFECT_... */
     uint32_t suspected_alternatives;
     /* How long the suspicion has stood, in whole s of the controller's clock */
     uint32_t suspicion_age_s;
@@ -435,8 +436,8 @@ typedef struct dynocar_parameter_snapshot {
     double speed_min_mps;
     /* Highest speed in m/s among the data behind the estimate */
     double speed_max_mps;
-    /* The model of train and line that the pipeline uses: the first 8 bytes of SHA-256
-     * over the train's file, a zero byte and the line's file; 0 when it came from no files */
+    /* The model of train and line that the pipeline uses: the first 8 bytes of SHA-256 over
+     * the train's file, a zero byte and the line's file; 0 when it came from no files */
     uint64_t model_hash;
     /* One bit for each DYNOCAR_QUANTITY_... whose values a controller may use now. It changes
      * seldom: what was usable stays so for half a second of doubt, and what was doubted has to
@@ -565,7 +566,8 @@ dynocar_code dynocar_snapshot_covariance(const dynocar_parameter_snapshot *snaps
 /* generated: stops */
 /* What the rail carries in a stop. */
 enum {
-    DYNOCAR_RAIL_UNLIMITED = 0, /* Any brake force: adhesion and its standard deviation are not read */
+    /* Any brake force: adhesion and its standard deviation are not read */
+    DYNOCAR_RAIL_UNLIMITED = 0,
     /* Adhesion is one coefficient at all speeds, or a lower bound of it */
     DYNOCAR_RAIL_COEFFICIENT = 1,
     DYNOCAR_RAIL_DRY_LAW = 2, /* Adhesion is a scale of the dry rail's law (Xie 2019) */
