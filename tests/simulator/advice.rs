@@ -9,8 +9,8 @@ use std::sync::Arc;
 use dynocar_analysis::advice::drive::{Drive, DriveKind, Scene};
 use dynocar_analysis::advice::known::davis_of;
 use dynocar_analysis::advice::noise::NoiseSeen;
-use dynocar_analysis::advice::resistance::forecast;
-use dynocar_analysis::advice::{best, forecasts, mass};
+use dynocar_analysis::advice::rehearsal::{Known, MASS, forecast};
+use dynocar_analysis::advice::{best, forecasts};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
 use dynocar_core::simulate::motion::{Motion, advance};
 use dynocar_core::train::{Davis, EffortCurve, TrainModel};
@@ -58,11 +58,9 @@ struct Trial {
 }
 
 impl Trial {
-    fn new(kind: PipelineKind, seed: u64) -> Trial {
-        // Only who looks for the mass is given a wrong one.
-        let is_of_mass = kind == PipelineKind::MassKalman;
-        let declared = declared_at(if is_of_mass { 0.9 * MASS_KG } else { MASS_KG });
-        let settings = EstimatorSettings::default_of(kind).unwrap();
+    fn new(seed: u64) -> Trial {
+        let declared = declared_at(0.9 * MASS_KG);
+        let settings = EstimatorSettings::default_of(PipelineKind::TrainKalman).unwrap();
         let estimator = settings.build(&declared).unwrap();
         let truth = TrainModel { resistance: TRUTH, ..(*declared).clone() };
         Trial {
@@ -133,6 +131,16 @@ impl Trial {
         self.hold(speed_mps, 10.0);
     }
 
+    /// The mass in t as it is known, and its standard deviation.
+    fn mass_t(&self) -> (f64, f64) {
+        let snapshot = self.snapshot();
+        (snapshot.value(Parameter::Mass).unwrap(), snapshot.std(Parameter::Mass).unwrap())
+    }
+
+    fn known(&self) -> Known {
+        Known { davis: davis_of(self.snapshot()).unwrap().1, mass_std_t: self.mass_t().1 }
+    }
+
     fn scene<'a>(&self, train: &'a TrainModel) -> Scene<'a> {
         let davis = davis_of(self.snapshot()).map_or(TRUTH, |known| known.0);
         Scene::new(train, davis, MASS_KG, self.snapshot().speed_max_mps)
@@ -166,15 +174,14 @@ fn the_interval_of_the_resistance_after_a_manoeuvre_is_the_one_predicted() {
     for seed in 0..SEEDS {
         let place = |k: usize| 4 * k + seed as usize;
         for k in 0..5 {
-            let mut trial = Trial::new(PipelineKind::TrajectoryKalman, seed);
+            let mut trial = Trial::new(seed);
             trial.drive_about();
             let drives = trial.scene(&train).catalogue(180.0);
             let drive = drives[place(k) % drives.len()];
             trial.begin_at(drive.from_mps);
-            let (_, covariance) = davis_of(trial.snapshot()).unwrap();
-            let noise = trial.noise.noise(trial.snapshot(), &train, MASS_KG).unwrap();
+            let noise = trial.noise.noise(trial.snapshot(), &train).unwrap();
             let expected_by_advice =
-                forecast(&trial.scene(&train), &covariance, &noise, drive).unwrap();
+                forecast(&trial.scene(&train), &trial.known(), &noise, drive).unwrap();
             let now = [0, 1, 2].map(|i| STD(trial.snapshot(), i));
             trial.drive(drive);
             for i in (0..3).filter(|&i| expected_by_advice.std[i] <= SHARE_MAX * now[i]) {
@@ -198,13 +205,13 @@ fn the_advised_manoeuvre_shows_more_than_most_and_about_as_much_as_the_best() {
     let worst = 2;
     let (mut against_best, mut against_middle) = (Vec::new(), Vec::new());
     for seed in 100..110 {
-        let mut first = Trial::new(PipelineKind::TrajectoryKalman, seed);
+        let mut first = Trial::new(seed);
         first.drive_about();
-        let noise = first.noise.noise(first.snapshot(), &train, MASS_KG).unwrap();
-        let all = forecasts(first.snapshot(), &train, MASS_KG, &noise, 60.0);
+        let noise = first.noise.noise(first.snapshot(), &train).unwrap();
+        let all = forecasts(first.snapshot(), &train, first.mass_t(), &noise, 60.0);
         let advised = best(&all, worst).unwrap().drive;
         let left = |drive: Drive| {
-            let mut trial = Trial::new(PipelineKind::TrajectoryKalman, seed);
+            let mut trial = Trial::new(seed);
             trial.drive_about();
             trial.begin_at(drive.from_mps);
             trial.drive(drive);
@@ -230,21 +237,18 @@ fn the_deviation_of_the_mass_after_traction_is_the_one_predicted() {
     let train = declared();
     let mut ratios = Vec::new();
     for seed in 0..SEEDS {
-        let mut resistance = Trial::new(PipelineKind::TrajectoryKalman, seed);
-        let mut trial = Trial::new(PipelineKind::MassKalman, seed);
-        resistance.drive_about();
+        let mut trial = Trial::new(seed);
         trial.drive_about();
-        let noise = resistance.noise.noise(resistance.snapshot(), &train, MASS_KG).unwrap();
         // A stop, after which the mass is another one as far as the pipeline knows.
         trial.hold(0.0, 60.0);
         trial.begin_at(3.0);
-        let std_t = trial.snapshot().std(Parameter::Mass).unwrap();
+        let noise = trial.noise.noise(trial.snapshot(), &train).unwrap();
         let kind = DriveKind::Accelerate;
         let drive = Drive { kind, from_mps: 3.0, to_mps: 38.0, within_s: 20.0 };
         let scene = Scene::new(&train, train.resistance, MASS_KG, 20.0);
-        let expected_by_advice = mass::forecast(&scene, std_t, &noise, drive).unwrap();
+        let expected_by_advice = forecast(&scene, &trial.known(), &noise, drive).unwrap();
         trial.drive(drive);
-        ratios.push(expected_by_advice.std_t / trial.snapshot().std(Parameter::Mass).unwrap());
+        ratios.push(expected_by_advice.std[MASS] / trial.snapshot().std(Parameter::Mass).unwrap());
     }
     let [low, median, high] = quantiles(ratios);
     println!("mass: foretold / found: median {median:.2}, 10 % {low:.2}, 90 % {high:.2}");

@@ -1,6 +1,7 @@
 //! From what the daemon says may be used to what the driver drives by, and whether that was right.
 
 use dynocar_core::train::Davis;
+use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::stopping::RailAdhesion;
 use dynocar_shared::{Parameter, ParameterSnapshot, Quantity, Uncertain};
 
@@ -37,8 +38,12 @@ pub fn learned<'a>(
     {
         let davis = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
         let [a, b, c] = davis.map(|parameter| snapshot.value(parameter).unwrap_or_default());
-        known.davis = Davis { a, b, c };
-        known.w0_std_n_per_kn = at.w0_std_n_per_kn;
+        // The resistance is that of still air; what the wind adds today is the unexplained force.
+        let weight_kn = 1e-3 * known.mass_kg.value * STANDARD_GRAVITY_MPS2;
+        let [unexplained, std] = [snapshot.unexplained_force_n, snapshot.unexplained_force_std_n]
+            .map(|force_n| force_n / weight_kn);
+        known.davis = Davis { a: a + unexplained, b, c };
+        known.w0_std_n_per_kn = at.w0_std_n_per_kn.hypot(std);
     }
     // Where the rail carries less than the brake exerts, the brake shows nothing of itself.
     let rail = usable(Quantity::Adhesion).and_then(RailAdhesion::learned);

@@ -143,7 +143,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_bound_grows_with_what_is_not_known_and_a_input_faultpery_rail_limits_the_brake() {
+    fn a_bound_grows_with_what_is_not_known_and_a_slippery_rail_limits_the_brake() {
         let (exact, ability) = metro();
         let bound = |knowledge: &Knowledge| {
             knowledge.bound_m(&ability, (20.0, 0.0), RailAdhesion::Unlimited, 0.99).unwrap()

@@ -1,8 +1,8 @@
 //! How well resistance and mass can be known at best: the joint Cramér–Rao bound of a drive.
 //!
 //! All that [`World::draw`] draws is unknown at once, each with the variance that it is drawn with:
-//! a, b, c, the loads, the scales and the delay of forces, wheels, rotating mass, and the map's error at
-//! every knot. What measured speeds say of them follows from how the true motion would differ.
+//! a, b, c, the loads, the scales and the delay of forces, brakes from stop to stop, wheels, rotating
+//! mass, the wind of the day, and gusts and the map's error at every knot. What measured speeds say of them follows from how the true motion would differ.
 
 use dynocar_core::force::balance::mps2_per_n_per_kn;
 use dynocar_tests::simulator::Deviations;
@@ -10,17 +10,18 @@ use nalgebra::{DMatrix, DVector, Matrix4};
 
 use super::drive::Truth;
 use super::world::{
-    COEFFICIENT_SHARE, DELAY_STD_S, KNOT_M, LoadSource, ROTATING_MASS_STD, WEIGHING_STD, World,
-    knot_std_permille,
+    BRAKE_STD, COEFFICIENT_SHARE, DELAY_STD_S, GUST_S, KNOT_M, KNOT_OVER_MEAN, LoadSource,
+    ROTATING_MASS_STD, WEIGHING_STD, World, knot_std_permille,
 };
 
-/// Places of the unknowns that every run shares; loads and knots follow.
+/// Places of the unknowns that every run shares; loads, brakes of each way and knots follow.
 const TRACTION_SCALE: usize = 3;
 const BRAKE_SCALE: usize = 4;
 const DELAY: usize = 5;
 const ROTATING_MASS: usize = 6;
 const WHEEL: usize = 7;
-const SHARED: usize = 8;
+const WIND: usize = 8;
+const SHARED: usize = 9;
 /// Time in s between the speeds that are taken in: those between say the same many times.
 const BLOCK_S: f64 = 0.5;
 /// Distance in m between the places under the train at which the map is averaged.
@@ -43,6 +44,10 @@ pub struct Bound {
     load: usize,
     opens_at_stops: bool,
     was_standing: bool,
+    brakes_from: usize,
+    ways: usize,
+    way: usize,
+    gusts_from: usize,
     knots_from: usize,
     map_variance: f64,
     length_m: f64,
@@ -62,8 +67,11 @@ impl Bound {
             LoadSource::Changing => WEIGHING_STD,
         };
         // No train here stops more than once a minute.
-        let loads = if opens_at_stops { (60.0 * hours) as usize + 2 } else { 1 };
-        let knots_from = SHARED + loads;
+        let ways = (60.0 * hours) as usize + 2;
+        let loads = if opens_at_stops { ways } else { 1 };
+        let brakes_from = SHARED + loads;
+        let gusts_from = brakes_from + ways;
+        let knots_from = gusts_from + (3600.0 * hours / GUST_S) as usize + 3;
         let end_m = world.stops_m[world.stops_m.len() - 1] + 1000.0;
         let count = knots_from + (end_m / KNOT_M) as usize + 3;
         let declared = world.declared.resistance;
@@ -73,11 +81,15 @@ impl Bound {
         }
         let usual = Deviations::ROUGH;
         prior[TRACTION_SCALE] = usual.force_share.powi(2);
-        prior[BRAKE_SCALE] = usual.force_share.powi(2);
+        prior[BRAKE_SCALE] = usual.force_share.powi(2) + BRAKE_STD.powi(2);
         prior[DELAY] = DELAY_STD_S.powi(2);
         prior[ROTATING_MASS] = ROTATING_MASS_STD.powi(2);
         prior[WHEEL] = usual.wheel_share.powi(2);
-        prior[SHARED..knots_from].fill((load_std * load_std).max(EXACT));
+        prior[WIND] = usual.day_wind_mps.powi(2);
+        prior[SHARED..brakes_from].fill((load_std * load_std).max(EXACT));
+        prior[brakes_from..gusts_from].fill(world.stop_to_stop_std.powi(2).max(EXACT));
+        let gust_variance = (KNOT_OVER_MEAN * world.gust_std_mps).powi(2);
+        prior[gusts_from..knots_from].fill(gust_variance.max(EXACT));
         let map_variance = knot_std_permille(scenario.map_std_permille).powi(2).max(EXACT);
         prior[knots_from..].fill(map_variance);
         Bound {
@@ -90,6 +102,10 @@ impl Bound {
             load: SHARED,
             opens_at_stops,
             was_standing: true,
+            brakes_from,
+            ways,
+            way: 0,
+            gusts_from,
             knots_from,
             map_variance,
             length_m: world.declared.length_m,
@@ -107,6 +123,9 @@ impl Bound {
                 self.is_met[place] = false;
             }
             self.block_s = 0.0;
+            if !self.was_standing {
+                self.way = (self.way + 1).min(self.ways - 1);
+            }
             if self.opens_at_stops && !self.was_standing && self.load + 1 < SHARED + self.loads {
                 self.load += 1;
             }
@@ -133,7 +152,8 @@ impl Bound {
         let resistance = &world.truth.resistance;
         let gain = mps2_per_n_per_kn(world.truth.rotating_mass_factor);
         let speed_mps = truth.speed_mps;
-        let slope = resistance.b + 2.0 * resistance.c * speed_mps;
+        let by_wind = 2.0 * resistance.c * (speed_mps + truth.headwind_mps);
+        let slope = resistance.b + by_wind;
         let kept = 1.0 - step_s * gain * slope;
         self.met.iter().for_each(|place| self.sensitivity[*place] *= kept);
         let push_mps2 = 0.5 * (last.push_mps2 + truth.push_mps2);
@@ -144,6 +164,11 @@ impl Bound {
         }
         self.meet(TRACTION_SCALE, -step_s * push_mps2.max(0.0));
         self.meet(BRAKE_SCALE, -step_s * push_mps2.min(0.0));
+        self.meet(self.brakes_from + self.way, -step_s * push_mps2.min(0.0));
+        self.meet(WIND, truth.direction * step_s * gain * by_wind);
+        let (knot, share) = truth.gust;
+        self.meet(self.gusts_from + knot, -step_s * gain * by_wind * (1.0 - share));
+        self.meet(self.gusts_from + knot + 1, -step_s * gain * by_wind * share);
         self.meet(DELAY, -(truth.push_mps2 - last.push_mps2));
         self.meet(
             ROTATING_MASS,

@@ -2,10 +2,11 @@
 
 use std::collections::VecDeque;
 
+use dynocar_core::train::Davis;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use rand::RngExt;
 
-use super::world::{Habits, LoadSource, WEIGHING_STD, World, normal};
+use super::world::{GUST_S, Habits, KNOT_OVER_MEAN, LoadSource, WEIGHING_STD, World, normal};
 
 /// Steps of the simulation per cycle of the controller.
 const STEPS: u32 = 10;
@@ -46,6 +47,10 @@ pub struct Truth {
     pub place_m: f64,
     /// 1 along growing chainage, else -1.
     pub direction: f64,
+    /// Headwind in m/s, gusts included.
+    pub headwind_mps: f64,
+    /// Knots of the gusts so far, and how far it is to the next, as a share.
+    pub gust: (usize, f64),
 }
 
 /// A train on its way.
@@ -58,7 +63,7 @@ pub struct Drive {
     place_m: f64,
     speed_mps: f64,
     mass_kg: f64,
-    told_kg: f64,
+    weighed_kg: f64,
     target_mps: f64,
     /// Acceleration in m/s² that the force gives, as commanded and as it acts.
     commanded_mps2: f64,
@@ -68,6 +73,11 @@ pub struct Drive {
     on_its_way: VecDeque<f64>,
     /// Step within a cycle at which a command acts.
     acts_at: u32,
+    /// Exerted brake force over what the brake is taken to exert, on this way.
+    brake_scale: f64,
+    /// Gusts in m/s at the knots before and behind, how many knots there were, and the share on the way.
+    gusts_mps: [f64; 2],
+    gust: (usize, f64),
     cycle: u64,
 }
 
@@ -86,16 +96,20 @@ impl Drive {
             place_m,
             speed_mps: 0.0,
             mass_kg,
-            told_kg: mass_kg,
+            weighed_kg: mass_kg,
             target_mps: 0.0,
             commanded_mps2: 0.0,
             acting_mps2: 0.0,
             reported_mps2: 0.0,
             on_its_way: VecDeque::new(),
             acts_at,
+            brake_scale: 1.0,
+            gusts_mps: [0.0; 2],
+            gust: (0, 0.0),
             cycle: 0,
             world,
         };
+        drive.gusts_mps = [drive.next_gust_mps(), drive.next_gust_mps()];
         drive.weigh();
         drive
     }
@@ -113,12 +127,32 @@ impl Drive {
             push_mps2: self.acting_mps2,
             place_m: self.place_m,
             direction: self.direction,
+            headwind_mps: self.headwind_mps(),
+            gust: self.gust,
+        }
+    }
+
+    fn headwind_mps(&self) -> f64 {
+        let ([from, to], (_, share)) = (self.gusts_mps, self.gust);
+        from + share * (to - from) - self.direction * self.world.wind_mps
+    }
+
+    fn next_gust_mps(&mut self) -> f64 {
+        KNOT_OVER_MEAN * self.world.gust_std_mps * normal(&mut self.world.random)
+    }
+
+    /// The gusts of a cycle later.
+    fn blow(&mut self, cycle_s: f64) {
+        self.gust.1 += cycle_s / GUST_S;
+        if self.gust.1 >= 1.0 {
+            self.gust = (self.gust.0 + 1, self.gust.1 - 1.0);
+            self.gusts_mps = [self.gusts_mps[1], self.next_gust_mps()];
         }
     }
 
     fn weigh(&mut self) {
         let World { scenario, random, .. } = &mut self.world;
-        self.told_kg = match scenario.load {
+        self.weighed_kg = match scenario.load {
             LoadSource::Exact | LoadSource::Unknown => self.mass_kg,
             LoadSource::Weighed(permille) => {
                 let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
@@ -126,7 +160,7 @@ impl Drive {
                 if self.cycle == 0 {
                     self.mass_kg * (1.0 + sign * 1e-3 * f64::from(permille))
                 } else {
-                    self.told_kg
+                    self.weighed_kg
                 }
             }
             LoadSource::Changing => self.mass_kg * (1.0 + WEIGHING_STD * normal(random)),
@@ -137,6 +171,7 @@ impl Drive {
     pub fn advance(&mut self) -> Moment {
         let cycle_s = 1.0 / f64::from(self.world.scenario.rate_hz);
         self.command(cycle_s);
+        self.blow(cycle_s);
         let step_s = cycle_s / f64::from(STEPS);
         let from_mps2 = self.reported_mps2;
         for step in 0..STEPS {
@@ -165,8 +200,11 @@ impl Drive {
         let truth = &self.world.truth;
         let gradient = self.direction * self.world.gradient_permille(self.place_m)[1];
         let gain = 9.806_65e-3 / (1.0 + truth.rotating_mass_factor);
+        let Davis { a, b, c } = truth.resistance;
+        let headwind_mps = self.headwind_mps();
         let acceleration = |speed_mps: f64| {
-            push_mps2 - gain * (gradient + truth.resistance.w0_n_per_kn(speed_mps))
+            let air_mps = speed_mps + headwind_mps;
+            push_mps2 - gain * (gradient + a + b * speed_mps + c * air_mps * air_mps.abs())
         };
         let middle = self.speed_mps + 0.5 * step_s * acceleration(self.speed_mps);
         let next = (self.speed_mps + step_s * acceleration(middle)).max(0.0);
@@ -230,6 +268,8 @@ impl Drive {
 
     fn depart(&mut self) {
         self.phase = Phase::Driving;
+        let World { random, brake_scale, stop_to_stop_std, .. } = &mut self.world;
+        self.brake_scale = *brake_scale * (1.0 + *stop_to_stop_std * normal(random));
         self.commanded_mps2 = 0.0;
         self.target_mps = self.habits.top_mps * (0.75 + 0.25 * self.world.random.random::<f64>());
     }
@@ -264,6 +304,7 @@ impl Drive {
             true => (speed_scale * self.speed_mps + noise_mps).max(0.0),
             false => 0.0,
         };
+        let braked = force_scale[1] / self.brake_scale;
         let cycle_ns = 1_000_000_000 / i64::from(scenario.rate_hz);
         let mut sample = TrainSample::empty(TrainId(1));
         sample.sequence = self.cycle;
@@ -272,10 +313,10 @@ impl Drive {
         sample.set(SampleField::Speed, measured_mps);
         sample.set(SampleField::Position, place_m);
         sample.set(SampleField::TractionForce, force_scale[0] * force_n.max(0.0));
-        sample.set(SampleField::BrakeForce, force_scale[1] * (-force_n).max(0.0));
+        sample.set(SampleField::BrakeForce, braked * (-force_n).max(0.0));
         sample.set(SampleField::Gradient, self.world.gradient_permille(place_m)[0]);
         if scenario.load != LoadSource::Unknown {
-            sample.set(SampleField::Mass, self.told_kg);
+            sample.set(SampleField::Mass, self.weighed_kg);
         }
         Moment { sample, mass_kg: self.mass_kg, w0_n_per_kn, speed_mps: self.speed_mps }
     }

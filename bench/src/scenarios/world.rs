@@ -18,7 +18,7 @@ pub enum Traffic {
     HighSpeed,
 }
 
-/// What is told of the load.
+/// How the load is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LoadSource {
     /// The declared mass is the true one, and the configuration says so.
@@ -36,13 +36,13 @@ pub enum LoadSource {
 pub struct Scenario {
     /// The traffic.
     pub traffic: Traffic,
-    /// What is told of the load.
+    /// How the load is known.
     pub load: LoadSource,
     /// True where forces jump from cycle to cycle; else their change is limited.
     pub jumps: bool,
     /// Samples per second.
     pub rate_hz: u32,
-    /// Standard deviation of the measured speed in m/s.
+    /// Standard deviation of the measured speed in m/s; at 0 there are no gusts either.
     pub speed_noise_mps: f64,
     /// Standard deviation of the measured position in m.
     pub position_noise_m: f64,
@@ -108,11 +108,19 @@ pub const DELAY_STD_S: f64 = 0.05;
 pub const WEIGHING_STD: f64 = 0.03;
 /// Distance in m between the knots of the map's error.
 pub const KNOT_M: f64 = 200.0;
+/// Standard deviation of the brake's force from train to train.
+pub const BRAKE_STD: f64 = 0.02;
+/// Standard deviation of the brake's force from stop to stop.
+pub const STOP_TO_STOP_STD: f64 = 0.015;
+/// Time in s between the knots of the gusts.
+pub const GUST_S: f64 = 20.0;
+/// Standard deviation at knots of what straight lines between them carry on with that of 1.
+pub const KNOT_OVER_MEAN: f64 = 1.22;
 
 /// Standard deviation in ‰ of the map's error at a knot where it is that much on the average: straight
 /// lines between knots vary less.
 pub fn knot_std_permille(map_std_permille: f64) -> f64 {
-    1.22 * map_std_permille
+    KNOT_OVER_MEAN * map_std_permille
 }
 
 /// A seeded draw of a scenario.
@@ -125,6 +133,14 @@ pub struct World {
     pub truth: TrainModel,
     /// Traction and brake force as reported over the true ones.
     pub force_scale: [f64; 2],
+    /// Exerted brake force over what the brake is taken to exert.
+    pub brake_scale: f64,
+    /// Standard deviation of that from stop to stop.
+    pub stop_to_stop_std: f64,
+    /// Wind of the day in m/s along the growing chainage, and the standard deviation of its gusts.
+    pub wind_mps: f64,
+    /// See `wind_mps`.
+    pub gust_std_mps: f64,
     /// Measured speed over the true one.
     pub speed_scale: f64,
     /// How much later in s than reported forces act.
@@ -174,11 +190,17 @@ impl World {
         }
         let end_m = stops_m[stops_m.len() - 1] + 1000.0;
         let gradient = profile(&scenario, &habits, declared.length_m, end_m, &mut random);
+        let brake_scale = 1.0 + BRAKE_STD * normal(&mut random);
+        let wind_mps = usual.day_wind_mps * normal(&mut random);
         World {
             scenario,
             declared,
             truth,
             force_scale,
+            brake_scale,
+            stop_to_stop_std: STOP_TO_STOP_STD,
+            wind_mps,
+            gust_std_mps: if scenario.speed_noise_mps > 0.0 { usual.gust_mps } else { 0.0 },
             speed_scale,
             delay_s,
             gradient,
@@ -192,6 +214,10 @@ impl World {
     pub fn without_mistakes(mut self) -> Self {
         self.truth = self.declared.clone();
         self.force_scale = [1.0, 1.0];
+        self.brake_scale = 1.0;
+        self.stop_to_stop_std = 0.0;
+        self.wind_mps = 0.0;
+        self.gust_std_mps = 0.0;
         self.speed_scale = 1.0;
         self.delay_s = 0.0;
         self.gradient.iter_mut().for_each(|[map, truth]| *truth = *map);

@@ -284,7 +284,7 @@ except KeyboardInterrupt:
 
 def test_ctrl_c_ends_an_explanation() -> None:
     program = Lines(sys.executable, "-c", INTERRUPTED, ROOT / "config/demo")
-    program.wait_for_line("trying effects")
+    program.wait_for_line("fitting a, b, c")
     program.process.send_signal(signal.SIGINT)
     assert program.process.wait(PATIENCE_S) == 0
     program.wait_for_line("interrupted")

@@ -39,7 +39,7 @@ def test_the_package_holds_its_own_types() -> None:
     assert done.returncode == 0, done.stdout
 
 
-def test_what_users_write_is_followed_and_input_faults_are_found(tmp_path: Path) -> None:
+def test_what_users_write_is_followed_and_mistakes_are_found(tmp_path: Path) -> None:
     for name, text in [("right", RIGHT), ("wrong", WRONG)]:
         (tmp_path / f"{name}.py").write_text(text)
     right = checked(tmp_path / "right.py")

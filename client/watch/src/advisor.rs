@@ -5,7 +5,7 @@ use std::sync::Arc;
 use dynocar_analysis::advice::known::davis_of;
 use dynocar_analysis::advice::noise::NoiseSeen;
 use dynocar_analysis::advice::remedy::{in_words, remedy};
-use dynocar_analysis::advice::{for_resistance, mass::for_mass};
+use dynocar_analysis::advice::{for_mass, for_resistance};
 use dynocar_core::train::TrainModel;
 use dynocar_shared::{Manoeuvre, Parameter, Quantity, Status};
 
@@ -60,17 +60,19 @@ impl Advisor {
         };
         let resistance = state.answering(Quantity::Resistance)?;
         let mass = state.answering(Quantity::Mass).filter(|it| it.status == Status::Estimated);
-        let mass_kg = mass.and_then(|it| it.snapshot.value(Parameter::Mass));
-        let mass_kg = mass_kg.map_or(train.mass_kg, |mass_t| 1e3 * mass_t);
-        let Some(noise) = self.noise.noise(&resistance.snapshot, train, mass_kg) else {
+        let mass = mass.and_then(|it| {
+            Some((it.snapshot.value(Parameter::Mass)?, it.snapshot.std(Parameter::Mass)?))
+        });
+        let mass = mass.unwrap_or((1e-3 * train.mass_kg, 0.0));
+        let Some(noise) = self.noise.noise(&resistance.snapshot, train) else {
             return lacking(quantity, pipeline);
         };
         let advice = match quantity {
             Quantity::Mass => {
-                let (davis, _) = davis_of(&resistance.snapshot)?;
+                let davis = davis_of(&resistance.snapshot)?;
                 for_mass(&pipeline.snapshot, train, davis, &noise)
             }
-            _ => for_resistance(&pipeline.snapshot, train, mass_kg, &noise),
+            _ => for_resistance(&pipeline.snapshot, train, mass, &noise),
         };
         advice.map(|advice| advice.in_words())
     }

@@ -1,29 +1,31 @@
-//! What to drive next: the manoeuvre that shows most of what is known worst.
+//! What to drive next: the manoeuvre that narrows most of what is known worst.
 //!
 //! Everything comes from a snapshot and what is declared of the train: the present covariance, the
-//! noise behind it ([`noise`]), the manoeuvres within the train's limits ([`drive`]), and what the
-//! pipeline's own filter would know after each ([`resistance`], [`mass`]). What driving does not help has its
+//! noise behind it ([`noise`]), the manoeuvres within the train's limits ([`drive`]), and what
+//! `train_kalman` would know after each ([`rehearsal`]). What driving does not help has its
 //! remedy in words ([`remedy`]). The line is taken as level: a snapshot does not say where the train is.
 
 pub mod drive;
 pub mod known;
-pub mod mass;
 pub mod noise;
+pub mod rehearsal;
 pub mod remedy;
-pub mod resistance;
 
+use dynocar_core::train::{Davis, TrainModel};
 use dynocar_shared::{Parameter, ParameterSnapshot};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use drive::{DriveKind, Scene};
-use dynocar_core::pipeline::papers::xia::trajectory::index::DAVIS;
-use dynocar_core::train::TrainModel;
 use known::davis_of;
 use noise::Noise;
-use resistance::{Forecast, forecast};
+use rehearsal::{ANSWERED, Forecast, Known, MASS, forecast};
 
 /// Times in s that a driver may be asked for, the shortest first.
 pub const WITHIN_S: [f64; 3] = [20.0, 60.0, 180.0];
+/// The same for the mass: traction shows it soon or not at all.
+const MASS_WITHIN_S: [f64; 2] = [20.0, 60.0];
+/// A standard deviation of this share of the mass is good enough: load weighing is no better.
+const MASS_GOOD_SHARE: f64 = 0.005;
 /// An interval of this share of the present one is worth asking for at once.
 const GOOD_SHARE: f64 = 0.5;
 /// An interval beyond this share of the present one is not worth the driving.
@@ -59,36 +61,39 @@ impl Advice {
     }
 }
 
-/// What each manoeuvre of the catalogue would show of a, b and c.
+/// What each manoeuvre of the catalogue would leave, of a train whose mass in t has a standard deviation,
+/// 0 where it is exact.
 pub fn forecasts(
     snapshot: &ParameterSnapshot,
     train: &TrainModel,
-    mass_kg: f64,
+    (mass_t, mass_std_t): (f64, f64),
     noise: &Noise,
     within_s: f64,
 ) -> Vec<Forecast> {
     let Some((davis, covariance)) = davis_of(snapshot) else { return Vec::new() };
-    let scene = Scene::new(train, davis, mass_kg, snapshot.speed_max_mps);
+    let scene = Scene::new(train, davis, 1e3 * mass_t, snapshot.speed_max_mps);
+    let known = Known { davis: covariance, mass_std_t };
     let drives = scene.catalogue(within_s);
-    drives.into_iter().filter_map(|drive| forecast(&scene, &covariance, noise, drive)).collect()
+    drives.into_iter().filter_map(|drive| forecast(&scene, &known, noise, drive)).collect()
 }
 
 /// The manoeuvre for the worst-known coefficient; `None` where none of three minutes is worth it.
 ///
-/// Worst known is the coefficient whose standard deviation makes most of the resistance's at the train's highest
-/// speed. The shortest time in which the best manoeuvre halves its interval is advised, else the longest.
+/// Worst known is the coefficient whose standard deviation makes most of the resistance's at the train's
+/// highest speed. The shortest time in which the best manoeuvre halves its interval is advised, else the
+/// longest.
 pub fn for_resistance(
     snapshot: &ParameterSnapshot,
     train: &TrainModel,
-    mass_kg: f64,
+    mass: (f64, f64),
     noise: &Noise,
 ) -> Option<Advice> {
     let (davis, covariance) = davis_of(snapshot)?;
     let now = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
-    let top_mps = Scene::new(train, davis, mass_kg, snapshot.speed_max_mps).speed_max_mps;
+    let top_mps = Scene::new(train, davis, 1e3 * mass.0, snapshot.speed_max_mps).speed_max_mps;
     let worst = now.component_mul(&Vector3::new(1.0, top_mps, top_mps * top_mps)).imax();
     let share = |it: &Forecast| it.std[worst] / now[worst];
-    let best_within = |within_s| best(&forecasts(snapshot, train, mass_kg, noise, within_s), worst);
+    let best_within = |within_s| best(&forecasts(snapshot, train, mass, noise, within_s), worst);
     let mut chosen = None;
     for within_s in WITHIN_S {
         chosen = best_within(within_s).or(chosen);
@@ -97,12 +102,43 @@ pub fn for_resistance(
         }
     }
     let chosen = chosen.filter(|it| share(it) <= WORTH_SHARE)?;
-    Some(Advice {
-        parameter: DAVIS[worst],
+    Some(advice(&chosen, worst, now[worst]))
+}
+
+/// The manoeuvre that narrows the mass most, by a resistance and its covariance; `None` where the mass is
+/// known well enough, or none helps.
+pub fn for_mass(
+    snapshot: &ParameterSnapshot,
+    train: &TrainModel,
+    (davis, covariance): (Davis, Matrix3<f64>),
+    noise: &Noise,
+) -> Option<Advice> {
+    let (mass_t, std_t) = (snapshot.value(Parameter::Mass)?, snapshot.std(Parameter::Mass)?);
+    if !(mass_t > 0.0 && std_t > MASS_GOOD_SHARE * mass_t) {
+        return None;
+    }
+    let scene = Scene::new(train, davis, 1e3 * mass_t, snapshot.speed_max_mps);
+    let known = Known { davis: covariance, mass_std_t: std_t };
+    let within = |within_s: f64| {
+        let drives = scene.catalogue(within_s).into_iter();
+        drives
+            .filter(|drive| matches!(drive.kind, DriveKind::Accelerate | DriveKind::Brake))
+            .filter_map(|drive| forecast(&scene, &known, noise, drive))
+            .min_by(|one, other| one.std[MASS].total_cmp(&other.std[MASS]))
+    };
+    let is_worth = |it: &Forecast| it.std[MASS] <= WORTH_SHARE * std_t;
+    let chosen =
+        MASS_WITHIN_S.into_iter().find_map(|within_s| within(within_s).filter(is_worth))?;
+    Some(advice(&chosen, MASS, std_t))
+}
+
+fn advice(chosen: &Forecast, place: usize, std_now: f64) -> Advice {
+    Advice {
+        parameter: ANSWERED[place],
         drive: chosen.drive.in_words(chosen.lasts_s, chosen.end_mps),
-        std_now: now[worst],
-        std_after: chosen.std[worst],
-    })
+        std_now,
+        std_after: chosen.std[place],
+    }
 }
 
 /// The forecast that leaves the least of a coefficient's standard deviation; coasting where it is as good.

@@ -5,16 +5,11 @@
 //! the manoeuvre: every moment measures w0(v) = a + b v + c v² with the variance d² / dt, and the derivative
 //! of w0 by a is 1. So the growth of the (a, a) entry of the information, the inverse of the
 //! published covariance, gives d, with all that widens the published covariance in it. The noise of
-//! the measured speed follows from the standard deviation of the unexplained force.
+//! the measured speed is the one that the pipeline begins with.
 
-use dynocar_core::pipeline::papers::xia::trajectory::index::A;
-use dynocar_core::pipeline::papers::xia::trajectory::kalman::TrajectoryKalmanSettings;
-use dynocar_core::pipeline::papers::xia::trajectory::quality::prior_std;
-use dynocar_core::pipeline::papers::xia::trajectory::unexplained::speed_noise_mps;
-use dynocar_core::pipeline::train_kalman::TrainKalmanSettings;
+use dynocar_core::pipeline::train_kalman::{TrainKalmanSettings, declared_a_std};
 use dynocar_core::train::TrainModel;
 use dynocar_shared::{ParameterSnapshot, PipelineKind};
-use nalgebra::Vector3;
 
 use super::known::davis_of;
 
@@ -37,12 +32,6 @@ const LOOKS: usize = 36;
 const LOOKS_MIN: usize = 4;
 /// Times between samples in s that can be.
 const STEP_S: (f64, f64) = (1e-4, 2.5);
-
-/// Standard deviations of the declared coefficients before any data, as `trajectory_kalman` has them by
-/// default.
-fn declared_std(train: &TrainModel) -> Vector3<f64> {
-    prior_std(train, TrajectoryKalmanSettings::default().prior_relative_std)
-}
 
 /// Follows the snapshots of one pipeline of the resistance.
 #[derive(Clone, Debug, Default)]
@@ -105,27 +94,15 @@ impl NoiseSeen {
 
     /// The noise behind the newest snapshot of the pipeline; `None` while nothing has been learned,
     /// or where the pipeline is none whose noise can be estimated.
-    pub fn noise(
-        &self,
-        newest: &ParameterSnapshot,
-        train: &TrainModel,
-        mass_kg: f64,
-    ) -> Option<Noise> {
+    pub fn noise(&self, newest: &ParameterSnapshot, train: &TrainModel) -> Option<Noise> {
         let step_s = self.step_s?;
-        let inertial_mass_kg = mass_kg * (1.0 + train.rotating_mass_factor);
         let rate = if self.rates.len() >= LOOKS_MIN {
             median(&self.rates)
         } else {
-            let before = declared_std(train)[A].powi(-2);
+            let before = declared_a_std(train).powi(-2);
             (information_on_a(newest)? - before) / (newest.samples_used as f64 * step_s)
         };
-        // Only of `trajectory_kalman` does the standard deviation of the unexplained force show the speed's noise.
-        let speed_noise_mps = match newest.pipeline_kind() {
-            Some(PipelineKind::TrajectoryKalman) => {
-                speed_noise_mps(newest.unexplained_force_std_n, inertial_mass_kg, step_s)
-            }
-            _ => TrainKalmanSettings::default().speed_noise_mps,
-        };
+        let speed_noise_mps = TrainKalmanSettings::default().speed_noise_mps;
         let noise =
             Noise { speed_noise_mps, disturbance_n_per_kn_sqrt_s: rate.sqrt().recip(), step_s };
         let is_known = noise.speed_noise_mps > 0.0 && noise.disturbance_n_per_kn_sqrt_s > 0.0;
@@ -144,7 +121,7 @@ fn information_on_a(snapshot: &ParameterSnapshot) -> Option<f64> {
         return None;
     }
     let (_, covariance) = davis_of(snapshot)?;
-    let information = covariance.cholesky()?.inverse()[(A, A)];
+    let information = covariance.cholesky()?.inverse()[(0, 0)];
     information.is_finite().then_some(information)
 }
 
@@ -157,8 +134,8 @@ fn median(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::advice::rehearsal::ANSWERED;
     use dynocar_core::pipeline::output::write_parameters;
-    use dynocar_core::pipeline::papers::xia::trajectory::index::DAVIS;
     use dynocar_core::train::Davis;
     use nalgebra::{Matrix3, Vector3};
 
@@ -171,9 +148,9 @@ mod tests {
         snapshot.sample_time_ns = (1e9 * time_s) as i64;
         snapshot.sample_sequence = (10.0 * time_s) as u64;
         snapshot.samples_used = snapshot.sample_sequence;
-        snapshot.unexplained_force_std_n = 106.0;
         let covariance = information.try_inverse().unwrap();
-        write_parameters(&mut snapshot, DAVIS, &Vector3::new(1.5, 0.02, 0.003), &covariance);
+        let [a, b, c, _] = ANSWERED;
+        write_parameters(&mut snapshot, [a, b, c], &Vector3::new(1.5, 0.02, 0.003), &covariance);
         snapshot
     }
 
@@ -182,7 +159,7 @@ mod tests {
             rotating_mass_factor: 0.06,
             ..TrainModel::bare("test", 1e5, Davis { a: 1.5, b: 0.02, c: 0.003 })
         };
-        let prior = declared_std(&train);
+        let prior = Vector3::new(declared_a_std(&train), 0.02, 0.002);
         let mut information = Matrix3::from_diagonal(&prior.map(|std| std.powi(-2)));
         let mut seen = NoiseSeen::default();
         let mut newest = snapshot(0.0, &information);
@@ -195,7 +172,7 @@ mod tests {
                 information += row * row.transpose() / (DISTURBANCE * DISTURBANCE);
             }
         }
-        seen.noise(&newest, &train, 1e5)
+        seen.noise(&newest, &train)
     }
 
     #[test]
@@ -205,7 +182,6 @@ mod tests {
             let ratio = noise.disturbance_n_per_kn_sqrt_s / DISTURBANCE;
             assert!((0.95..1.05).contains(&ratio), "{seconds} s: {ratio}");
             assert!((noise.step_s - 0.1).abs() < 1e-9);
-            assert!((noise.speed_noise_mps - 0.02).abs() < 0.001, "{}", noise.speed_noise_mps);
         }
     }
 
@@ -221,6 +197,6 @@ mod tests {
             seen.see(&other);
         });
         let train = TrainModel::bare("test", 1e5, Davis { a: 1.5, b: 0.02, c: 0.003 });
-        assert_eq!(seen.noise(&other, &train, 1e5), None);
+        assert_eq!(seen.noise(&other, &train), None);
     }
 }

@@ -190,7 +190,12 @@ impl Pipeline {
         let is_doubted = self.refused_share > REFUSED_SHARE_MAX || self.implausible().is_some();
         let known = self.estimator.known(self.snapshot.status()) & self.answerable;
         let good = if is_doubted { 0 } else { known };
-        self.snapshot.usable_quantities = self.usable.see(good, sample.time_ns);
+        let is_awaiting = !is_doubted
+            && matches!(
+                self.snapshot.reason(),
+                Some(Reason::EstimateStale | Reason::OnlyLowerBound)
+            );
+        self.snapshot.usable_quantities = self.usable.see(good, is_awaiting, sample.time_ns);
         &self.snapshot
     }
 

@@ -31,7 +31,9 @@ struct Switch {
 impl Switch {
     const OFF: Switch = Switch { is_usable: false, contrary_s: 0.0, enter_s: ENTER_S, used_s: 0.0 };
 
-    fn see(&mut self, is_good: bool, step_s: f64) {
+    /// Takes in whether the estimate is good; where it is not, whether it merely waits for an event, like a
+    /// braking: that ends its use and is no doubt about it.
+    fn see(&mut self, is_good: bool, is_awaiting: bool, step_s: f64) {
         if self.is_usable {
             self.used_s += step_s;
         }
@@ -44,7 +46,7 @@ impl Switch {
         if self.contrary_s < after_s {
             return;
         }
-        if self.is_usable {
+        if self.is_usable && !is_awaiting {
             let is_forgotten = self.used_s >= FORGET_S || self.enter_s == ENTER_S;
             self.enter_s = match is_forgotten {
                 true => RETURN_FIRST_S,
@@ -71,18 +73,18 @@ impl Default for Usable {
 }
 
 impl Usable {
-    /// Takes in which quantities are good at a time of the controller's clock in ns, one bit each; gives
-    /// those that may be used.
+    /// Takes in which quantities are good at a time of the controller's clock in ns, one bit each, and
+    /// whether the others merely wait for an event; gives those that may be used.
     ///
     /// # Real-time
     ///
     /// Bounded work, no allocation.
-    pub fn see(&mut self, good: u32, time_ns: i64) -> u32 {
+    pub fn see(&mut self, good: u32, is_awaiting: bool, time_ns: i64) -> u32 {
         let before_ns = self.last_ns.replace(time_ns).unwrap_or(time_ns);
         let step_s = (time_ns.saturating_sub(before_ns) as f64 * 1e-9).clamp(0.0, BRIDGED_MAX_S);
         let mut usable = 0;
         for (switch, quantity) in self.switches.iter_mut().zip(Quantity::ALL) {
-            switch.see(good & quantity.bit() != 0, step_s);
+            switch.see(good & quantity.bit() != 0, is_awaiting, step_s);
             usable |= u32::from(switch.is_usable) * quantity.bit();
         }
         usable
@@ -97,10 +99,15 @@ mod tests {
 
     /// Changes over so many s at 10 Hz.
     fn changes(duration_s: u32, is_good: impl Fn(u32) -> bool) -> (u32, u32) {
+        changes_of(duration_s, false, is_good)
+    }
+
+    fn changes_of(duration_s: u32, is_awaiting: bool, is_good: impl Fn(u32) -> bool) -> (u32, u32) {
         let mut usable = Usable::default();
         let (mut before, mut changes, mut last) = (0, 0, 0);
         for tick in 0..10 * duration_s {
-            last = usable.see(if is_good(tick) { MASS } else { 0 }, i64::from(tick) * 100_000_000);
+            let good = if is_good(tick) { MASS } else { 0 };
+            last = usable.see(good, is_awaiting, i64::from(tick) * 100_000_000);
             changes += u32::from(last != before);
             before = last;
         }
@@ -125,11 +132,19 @@ mod tests {
     }
 
     #[test]
+    fn an_estimate_that_waits_for_the_next_braking_is_usable_again_with_each() {
+        let is_braking = |tick: u32| tick % 1000 < 200;
+        let (waiting, _) = changes_of(1000, true, is_braking);
+        assert_eq!(waiting, 20, "ten brakings of 20 s");
+        assert!(changes(1000, is_braking).0 <= 6);
+    }
+
+    #[test]
     fn a_clock_that_jumps_counts_for_no_more_than_a_gap() {
         let mut usable = Usable::default();
-        usable.see(MASS, 0);
-        assert_eq!(usable.see(MASS, i64::MIN), 0);
-        usable.see(MASS, 0);
-        assert_eq!(usable.see(0, i64::MAX), 0);
+        usable.see(MASS, false, 0);
+        assert_eq!(usable.see(MASS, false, i64::MIN), 0);
+        usable.see(MASS, false, 0);
+        assert_eq!(usable.see(0, false, i64::MAX), 0);
     }
 }

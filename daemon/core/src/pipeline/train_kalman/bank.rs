@@ -4,7 +4,7 @@ use nalgebra::{Matrix4, Vector4};
 
 use super::behaviour::{BEHAVIOURS, behaviours};
 use super::motion_filter::{
-    DISTURBANCE, LOAD, MotionFilter, RESISTANCE, SPEED, STATES, State, StateCovariance, Step,
+    DISTURBANCE, LOAD, MotionFilter, RESISTANCE, SPEED, STATES, State, StateCovariance, Step, WIND,
 };
 use crate::filter::bank::{Bank, Nats};
 use crate::filter::mixture::Mixture;
@@ -76,13 +76,15 @@ impl MotionBank {
         self.rivals.hypotheses_mut().iter_mut().for_each(|it| change(&mut it.filter.belief));
     }
 
-    /// Begins a motion at a measured speed, after a time in s without a sight of it.
-    pub fn begin(&mut self, speed_mps: f64, noise_variance: f64, gap_s: f64) {
+    /// Begins a motion at a measured speed, after a time in s without a sight of it, of whose wind so
+    /// much is left.
+    pub fn begin(&mut self, speed_mps: f64, noise_variance: f64, gap_s: f64, wind: (f64, f64)) {
         for Rival { filter, outliers } in self.rivals.hypotheses_mut() {
             *outliers = OutlierRow::default();
             filter.belief.replace(SPEED, speed_mps, noise_variance);
             let (keep, renewed) = filter.behaviour.over(gap_s, 0.0, 0.0);
             filter.belief.fade(DISTURBANCE, keep, renewed);
+            filter.belief.fade(WIND, wind.0, wind.1);
         }
     }
 
@@ -151,14 +153,16 @@ impl MotionBank {
         measured.ok_or(NotPositiveDefinite)
     }
 
-    /// What all behaviours say together, each by its share.
+    /// What all behaviours say together, each by its share; the wind is part of the disturbance, with what
+    /// 1 m/s of it adds in N/kN.
     ///
     /// # Real-time
     ///
     /// A few sums for each behaviour, no allocation.
-    pub fn published(&self) -> Published {
-        const PLACES: [usize; 5] = [RESISTANCE, RESISTANCE + 1, RESISTANCE + 2, LOAD, DISTURBANCE];
-        let mut mixture = Mixture::<5>::default();
+    pub fn published(&self, by_wind: f64) -> Published {
+        const PLACES: [usize; 6] =
+            [RESISTANCE, RESISTANCE + 1, RESISTANCE + 2, LOAD, DISTURBANCE, WIND];
+        let mut mixture = Mixture::<6>::default();
         let shares = self.rivals.shares(|_| true);
         for (share, Rival { filter, .. }) in shares.into_iter().zip(self.rivals.hypotheses()) {
             if share > SHARE_MIN {
@@ -171,10 +175,13 @@ impl MotionBank {
             }
         }
         let Gaussian { mean, covariance } = mixture.belief;
+        let variance = covariance[(4, 4)]
+            + 2.0 * by_wind * covariance[(4, 5)]
+            + by_wind * by_wind * covariance[(5, 5)];
         Published {
             mean: mean.fixed_rows::<4>(0).into_owned(),
             covariance: covariance.fixed_view::<4, 4>(0, 0).into_owned(),
-            disturbance: (mean[4], covariance[(4, 4)].max(0.0).sqrt()),
+            disturbance: (mean[4] + by_wind * mean[5], variance.max(0.0).sqrt()),
         }
     }
 

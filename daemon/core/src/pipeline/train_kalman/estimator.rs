@@ -10,7 +10,7 @@ use dynocar_shared::{
 use super::bank::{Measured, MotionBank};
 use super::jump_share::JumpShare;
 use super::load::{Change, LoadWatch};
-use super::motion_filter::{LOAD, SPEED, Step};
+use super::motion_filter::{LOAD, SPEED, Step, wind_over};
 use super::prior::Resistance;
 use super::report::Report;
 use super::settings::TrainKalmanSettings;
@@ -108,7 +108,7 @@ impl TrainKalman {
             moved_s: 0.0,
             moved_min_s: MOVED_MIN_S,
             kept_mass: None,
-            report: Report::new(&bank.published()),
+            report: Report::new(&bank.published(0.0)),
             bank,
             is_fresh_reset: false,
             resets: 0,
@@ -120,7 +120,8 @@ impl TrainKalman {
             .last_time_ns
             .map_or(f64::INFINITY, |last| now.time_ns.saturating_sub(last) as f64 * 1e-9);
         let noise_variance = self.noise.variance_of_sample(f64::INFINITY);
-        self.bank.begin(now.speed_mps, noise_variance, gap_s.max(0.0));
+        let wind = wind_over(gap_s.max(0.0), self.settings.wind_std_mps);
+        self.bank.begin(now.speed_mps, noise_variance, gap_s.max(0.0), wind);
         self.monitor.break_here();
         self.force_rate = 0.0;
         self.last = Some(now);
@@ -139,12 +140,16 @@ impl TrainKalman {
         let steps = (self.train_length_m / (speed_mps * duration_s)).max(1.0);
         let place_s = self.settings.position_std_m / speed_mps;
         let drift = self.settings.drift_n_per_kn_per_sqrt_h.powi(2) * duration_s / 3600.0;
+        let walk = self.settings.brake_scale_per_sqrt_min.powi(2) * duration_s / 60.0;
         Step {
             place_variance: steps * (place_s * (to.known - from.known)).powi(2),
             jump_share: self.jumps.share(),
             force_rate: self.force_rate,
             map_std_permille: sample.gradient_std_permille,
             drift_variance: drift,
+            by_wind: sample.direction * self.first.by_wind(to.speed_mps),
+            wind: wind_over(duration_s, self.settings.wind_std_mps),
+            brake_variance: (walk, self.settings.brake_scale_std.powi(2)),
             ..step
         }
     }
@@ -170,7 +175,7 @@ impl TrainKalman {
         self.systematic.see(step.way_m, sample.position_m, now.speed_mps);
         self.moved_s += step.duration_s;
         self.is_fresh_reset &= self.moved_s < self.moved_min_s;
-        self.judge();
+        self.judge(step.by_wind);
         Outcome::Updated
     }
 
@@ -198,9 +203,10 @@ impl TrainKalman {
         is_alike.then_some(Reason::InnovationsNotWhite)
     }
 
-    fn judge(&mut self) {
+    fn judge(&mut self, by_wind: f64) {
         let inflation = self.long_run().clamp(1.0, LONG_RUN_MAX);
-        self.report.take(&self.bank.published(), inflation, &self.systematic, &self.speeds);
+        let published = self.bank.published(by_wind);
+        self.report.take(&published, inflation, &self.systematic, &self.speeds);
     }
 
     fn reset(&mut self) {
@@ -211,7 +217,7 @@ impl TrainKalman {
         self.jumps = JumpShare::default();
         self.moved_s = 0.0;
         self.moved_min_s = MOVED_MIN_S;
-        self.report = Report::new(&self.bank.published());
+        self.report = Report::new(&self.bank.published(0.0));
         self.is_fresh_reset = true;
         self.resets += 1;
     }
@@ -363,7 +369,7 @@ impl Estimator for TrainKalman {
         let Some((mean, covariance)) = kept.moments(davis) else { return false };
         self.first = Resistance::kept(&mean, &covariance);
         self.bank = self.first.bank(&self.settings);
-        self.report = Report::new(&self.bank.published());
+        self.report = Report::new(&self.bank.published(0.0));
         self.moved_min_s = CONFIRMED_S;
         self.kept_mass = kept.moments([Parameter::Mass]).and_then(|(mass_kg, variance)| {
             let relative_variance = variance[(0, 0)] / (mass_kg[0] * mass_kg[0]);

@@ -22,8 +22,10 @@ pub const TRACTION_SCALE: usize = 6;
 pub const BRAKE_SCALE: usize = 7;
 /// Place of the delay in s of a force behind its report.
 pub const FORCE_DELAY: usize = 8;
+/// Place of the wind along the line in m/s, a headwind where the chainage grows.
+pub const WIND: usize = 9;
 /// Number of states.
-pub const STATES: usize = 9;
+pub const STATES: usize = 10;
 
 /// A state.
 pub type State = SVector<f64, STATES>;
@@ -36,6 +38,15 @@ pub const COEFFICIENTS: usize = 3;
 /// Share of w0 that the integral between two samples, which are taken as joined by straight lines,
 /// is off by from step to step.
 const INTEGRATION_SHARE: f64 = 1e-4;
+
+/// Time in s over which a wind becomes another one.
+const WIND_TIME_S: f64 = 7200.0;
+
+/// Share of a wind that is left after a time in s, and the variance of what comes to it.
+pub fn wind_over(time_s: f64, std_mps: f64) -> (f64, f64) {
+    let keep = (-time_s / WIND_TIME_S).exp();
+    (keep, std_mps * std_mps * (1.0 - keep * keep))
+}
 
 /// What every behaviour takes from a step between two samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,6 +77,13 @@ pub struct Step {
     pub map_std_permille: f64,
     /// Variance in (N/kN)² that comes to each coefficient of the resistance.
     pub drift_variance: f64,
+    /// What 1 m/s of wind along the line adds in N/kN. It goes by the declared air resistance: with the
+    /// one learned so far the product of two unknowns would seem better known than it is.
+    pub by_wind: f64,
+    /// Share of the wind that is left, and the variance in (m/s)² of what comes to it.
+    pub wind: (f64, f64),
+    /// Variance that comes to the scale of the brake force, and its greatest.
+    pub brake_variance: (f64, f64),
 }
 
 impl Step {
@@ -87,6 +105,9 @@ impl Step {
             force_rate: 0.0,
             map_std_permille: 0.0,
             drift_variance: 0.0,
+            by_wind: 0.0,
+            wind: (1.0, 0.0),
+            brake_variance: (0.0, 0.0),
         }
     }
 }
@@ -131,6 +152,7 @@ impl MotionFilter {
         let slope = (resistance(&at_end) - w0_at_start) / (end_mps - start_mps);
         let slope = if slope.is_finite() { slope } else { 0.0 };
 
+        let wind = step.by_wind * state[WIND];
         let seconds = step.duration_s * per_inertia;
         let mut gradient = State::zeros();
         gradient[SPEED] = 1.0 - seconds * slope;
@@ -139,6 +161,7 @@ impl MotionFilter {
         for i in 0..COEFFICIENTS {
             gradient[RESISTANCE + i] = -seconds * mean[i];
         }
+        gradient[WIND] = -seconds * step.by_wind;
         gradient[TRACTION_SCALE] = per_inertia * load * traction;
         gradient[BRAKE_SCALE] = -per_inertia * load * brake;
         gradient[FORCE_DELAY] = -per_inertia * load * change;
@@ -147,7 +170,7 @@ impl MotionFilter {
         self.jump_variance = jump * per_inertia * per_inertia;
         let missed = step.place_variance + (INTEGRATION_SHARE * step.duration_s * w0).powi(2);
         let variance = self.jump_variance + missed * per_inertia * per_inertia;
-        let next_mps = start_mps + per_inertia * (impulse - step.duration_s * w0);
+        let next_mps = start_mps + per_inertia * (impulse - step.duration_s * (w0 + wind));
         self.belief.rewrite(SPEED, next_mps, &gradient, variance);
 
         let (keep, renewed) =
@@ -156,6 +179,11 @@ impl MotionFilter {
         for i in 0..COEFFICIENTS {
             self.belief.disturb(RESISTANCE + i, step.drift_variance);
         }
+        let (keep, renewed) = step.wind;
+        self.belief.fade(WIND, keep, renewed);
+        let (walked, most) = step.brake_variance;
+        let now = self.belief.covariance[(BRAKE_SCALE, BRAKE_SCALE)];
+        self.belief.disturb(BRAKE_SCALE, walked.min((most - now).max(0.0)));
     }
 
     /// Variance in (m/s)² of the speed while a force that acts later by d changes: its impulse is
@@ -187,11 +215,14 @@ mod tests {
             force_rate: 0.0,
             map_std_permille: 0.0,
             drift_variance: 0.0,
+            by_wind: 0.07,
+            wind: (1.0, 0.0),
+            brake_variance: (0.0, 0.0),
         }
     }
 
     fn filter() -> MotionFilter {
-        let mean = State::from([21.0, 0.3, 0.95, 1.6, 0.4, 0.9, 0.01, -0.02, 0.15]);
+        let mean = State::from([21.0, 0.3, 0.95, 1.6, 0.4, 0.9, 0.01, -0.02, 0.15, -1.2]);
         let belief = Gaussian { mean, covariance: StateCovariance::zeros() };
         MotionFilter { behaviour: behaviours()[0], belief, jump_variance: 0.0 }
     }

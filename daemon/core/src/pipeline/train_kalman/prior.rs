@@ -5,10 +5,10 @@ use nalgebra::{Matrix3, Vector3};
 use super::bank::MotionBank;
 use super::motion_filter::{
     BRAKE_SCALE, COEFFICIENTS, FORCE_DELAY, LOAD, RESISTANCE, SPEED, State, StateCovariance,
-    TRACTION_SCALE,
+    TRACTION_SCALE, WIND,
 };
 use super::settings::TrainKalmanSettings;
-use crate::pipeline::resistance::regression::{scaled, unscaling};
+use crate::pipeline::resistance::regression::{regressors, scaled, unscaling};
 use crate::train::Davis;
 
 /// Share of a declared coefficient's standard deviation that comes from w0 at 20 m/s: a declared zero
@@ -31,10 +31,21 @@ impl Resistance {
         Resistance { mean, covariance: Matrix3::from_diagonal(&stds.component_mul(&stds)) }
     }
 
+    /// Standard deviation of a in N/kN.
+    pub fn a_std(&self) -> f64 {
+        self.covariance[(0, 0)].sqrt()
+    }
+
     /// As kept from earlier: Davis a, b, c and their covariance.
     pub fn kept(davis: &Vector3<f64>, covariance: &Matrix3<f64>) -> Self {
         let scale = Matrix3::from_diagonal(&unscaling().map(|factor| 1.0 / factor));
         Resistance { mean: scale * davis, covariance: scale * covariance * scale }
+    }
+
+    /// What a headwind of 1 m/s adds at a speed in m/s, in N/kN.
+    pub fn by_wind(&self, speed_mps: f64) -> f64 {
+        let square = |mps: f64| regressors(mps)[2];
+        0.5 * self.mean[2] * (square(speed_mps + 1.0) - square(speed_mps - 1.0))
     }
 
     /// Filters that believe this, and forces and load as the settings trust them.
@@ -48,8 +59,9 @@ impl Resistance {
         all.fixed_view_mut::<COEFFICIENTS, COEFFICIENTS>(RESISTANCE, RESISTANCE)
             .copy_from(&self.covariance);
         all[(TRACTION_SCALE, TRACTION_SCALE)] = settings.force_scale_std.powi(2);
-        all[(BRAKE_SCALE, BRAKE_SCALE)] = settings.force_scale_std.powi(2);
+        all[(BRAKE_SCALE, BRAKE_SCALE)] = settings.brake_scale_std.powi(2);
         all[(FORCE_DELAY, FORCE_DELAY)] = settings.force_delay_std_s.powi(2);
+        all[(WIND, WIND)] = settings.wind_std_mps.powi(2);
         MotionBank::new(&mean, &all)
     }
 }

@@ -1,5 +1,6 @@
 //! Settings of [`super::TrainKalman`].
 
+use crate::pipeline::braking::DECLARED_BRAKE_STD;
 use crate::pipeline::motion::MOVING_MPS;
 use crate::pipeline::settings::settings;
 
@@ -20,8 +21,15 @@ settings! {
         prior_relative_std: f64 = 0.4 => (0.001 to 10);
         /// Random walk of the resistance in N/kN over an hour of motion: weather, wear.
         drift_n_per_kn_per_sqrt_h: f64 = 0.01 => (0 to 10 "N/kN");
-        /// Standard deviation of the scales of traction and brake force: 0.01 is 1 %.
+        /// Standard deviation of the scale of the traction force: 0.01 is 1 %.
         force_scale_std: f64 = 0.007 => (0.000001 to 0.5);
+        /// Standard deviation of the scale of the brake force, which with friction is what pressure and
+        /// disc should exert, rarely what they do.
+        brake_scale_std: f64 = DECLARED_BRAKE_STD => (0.000001 to 0.5);
+        /// Random walk of that scale over a minute: friction goes with heat, moisture and wear.
+        brake_scale_per_sqrt_min: f64 = 0.015 => (0 to 0.5);
+        /// Standard deviation in m/s of the wind of the day along the line.
+        wind_std_mps: f64 = 1.5 => (0 to 20 "m/s");
         /// Standard deviation in s of the delay of a force behind its report.
         force_delay_std_s: f64 = 0.2 => (0.000001 to 5 "s");
         /// Standard deviation of the scale of accelerations, by wheel diameter and rotating mass,
