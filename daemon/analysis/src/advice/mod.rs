@@ -16,9 +16,9 @@ use dynocar_shared::{Parameter, ParameterSnapshot};
 use nalgebra::{Matrix3, Vector3};
 
 use drive::{DriveKind, Scene};
-use known::davis_of;
+use known::{ANSWERED, davis_of};
 use noise::Noise;
-use rehearsal::{ANSWERED, Forecast, Known, MASS, forecast};
+use rehearsal::{Forecast, Known, MASS, forecast};
 
 /// Times in s that a driver may be asked for, the shortest first.
 pub const WITHIN_S: [f64; 3] = [20.0, 60.0, 180.0];

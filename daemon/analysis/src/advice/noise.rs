@@ -134,7 +134,7 @@ fn median(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::advice::rehearsal::ANSWERED;
+    use crate::advice::known::ANSWERED;
     use dynocar_core::pipeline::output::write_parameters;
     use dynocar_core::train::Davis;
     use nalgebra::{Matrix3, Vector3};
