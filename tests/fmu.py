@@ -66,7 +66,7 @@ for group, estimator in ESTIMATORS.items():
         elif name == "unexplained_force_n_std":
             same(full, found, answer["unexplained_force_std_n"])
         elif name.startswith("w0") or name == "suspected_effect":
-            continue  # `identify` does not tell them
+            continue  # `identify` does not print them
         elif name.endswith("_std"):
             same(full, found, answer["std"].get(name.removesuffix("_std")))
         else:
@@ -75,8 +75,8 @@ for group, estimator in ESTIMATORS.items():
     # A bias of the accelerometer is the filter's own affair, no quantity that a controller asks for.
     groups = [it for it, of in ESTIMATORS.items() if of == estimator]
     outputs = {name.split(".")[1] for name in last if name.split(".")[0] in groups}
-    told = set(answer["values"]) - {"acceleration_bias_mps2"}
-    assert told <= outputs, f"{estimator}: {told - outputs} is no output"
+    printed = set(answer["values"]) - {"acceleration_bias_mps2"}
+    assert printed <= outputs, f"{estimator}: {printed - outputs} is no output"
 
 assert compared > 25, compared
 estimated = [group for group in ESTIMATORS if identified[ESTIMATORS[group]]["status"] == "estimated"]

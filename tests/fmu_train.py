@@ -50,13 +50,13 @@ def drive_by_slopes():
     train.setReal([references[name] for name in inputs], values[0])
     train.setInteger([references["direction"]], [int(signals["direction"][0])])
     train.exitInitializationMode()
-    told = [references[name] for name in outputs]
-    rows = [train.getReal(told)]
+    numbers = [references[name] for name in outputs]
+    rows = [train.getReal(numbers)]
     for k, slope in enumerate(slopes):
         train.setReal([references[name] for name in inputs], values[k])
         train.setRealInputDerivatives([references[name] for name in inputs], [1] * len(inputs), slope)
         train.doStep(times[k], times[k + 1] - times[k])
-        rows.append(train.getReal(told))
+        rows.append(train.getReal(numbers))
     train.terminate()
     train.freeInstance()
     return dict(zip(outputs, numpy.array(rows).T, strict=True))

@@ -269,7 +269,7 @@ try:
     forward = start("forward", programs / "dynocar", "forward", "--broker", f"127.0.0.1:{port}", "--group", "depot",
                     "--node", "edge", "--every-ms", "500", "--queue", str(QUEUE))
     wait(lambda: "cannot be reached" in said("forward"), "the word that there is no broker")
-    wait(lambda: reported_drops() > 0, "drops to be told")
+    wait(lambda: reported_drops() > 0, "drops to be reported")
     full_kib = memory_kib(forward)
 
     # 2. The broker comes: births of all, then what waited, marked as of the past, then what is new.
@@ -284,7 +284,7 @@ try:
     # 3. The broker is killed while it is at work, and comes back.
     broker.kill()
     broker.wait()
-    wait(lambda: said("forward").count("trying again") >= 2, "the loss of the broker to be told")
+    wait(lambda: said("forward").count("trying again") >= 2, "the loss of the broker to be reported")
     broker = while_held(forward, broker_with_host)
     wait(lambda: len(host.births) > len(first_births), "a new birth of the node")
     wait(lambda: len(host.devices) == TRAINS, "new births of all trains")
@@ -342,7 +342,7 @@ try:
     # What a broker has taken and not passed on is lost when it is killed; what it has passed on without having
     # said so may be dropped later. At most a batch for each connection.
     assert abs(came - taken) <= 256 * len(host.births), (came, taken)
-    assert highest == made, "the numbers of publications tell of every one, dropped or not"
+    assert highest == made, "the numbers of publications count every one, dropped or not"
     assert dropped > 0
     assert kib <= MEMORY_MAX_KIB and kib <= full_kib + 24 * 1024, (full_kib, kib)
     unit = host.units["0_trajectory_kalman/resistance_a_n_per_kn"]

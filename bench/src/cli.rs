@@ -44,7 +44,7 @@ enum Command {
     Peer(PeerArguments),
 }
 
-/// Speed of every estimator beside peers that do the same work on the same data.
+/// Speed of every estimator compared with peers that do the same work on the same data.
 #[derive(Debug, Args)]
 struct EstimatorsArguments {
     /// Few rounds: a check that everything runs, not a measurement

@@ -1,4 +1,4 @@
-//! Results for people and for machines, with errors as this program tells them: text and exit status.
+//! Results for people and for machines, with errors as this program reports them: text and exit status.
 
 use std::path::PathBuf;
 

@@ -82,6 +82,6 @@ fn no_pipeline_of_a_healthy_train_is_degraded_by_noise_of_its_position() {
         let suspect = EffectKind::from_number(snapshot.suspected_effect);
         assert_eq!(suspect, Some(EffectKind::None), "{kind} at {time_s} s");
     });
-    // White noise is beyond four deviations of its own statistics now and then.
+    // White noise is beyond four standard deviations of its own statistics now and then.
     assert!(degraded_s < 10.0, "degraded for {degraded_s:.1} s");
 }

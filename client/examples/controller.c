@@ -2,7 +2,7 @@
  * to the built-in parameters whenever that is not usable.
  *
  * controller [train id] [seconds]
- * tells on standard output whenever its resistance comes from another source. Ten seconds of coasting
+ * reports on standard output whenever its resistance comes from another source. Ten seconds of coasting
  * teach the daemon next to nothing: let "dynocar replay config/demo --rate 200" drive train 1 first,
  * and this one drives on with what was learned.
  * README.md beside this folder says how to build it. */

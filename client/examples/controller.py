@@ -3,7 +3,7 @@ built-in parameters whenever that is not usable.
 
     python client/examples/controller.py [train id] [seconds]
 
-tells on standard output whenever its resistance comes from another source. Ten seconds of coasting
+reports on standard output whenever its resistance comes from another source. Ten seconds of coasting
 teach the daemon next to nothing: let ``dynocar replay config/demo --rate 200`` drive train 1 first,
 and this one drives on with what was learned. Python keeps no 1 kHz cycle reliably; it is for tests
 and tools, at 100 Hz here.

@@ -22,7 +22,7 @@ static const dynocar_effort_point EFFORT[] = {{0.0, 1216000.0}, {30.0, 1216000.0
 static const uint32_t ASKED[] = {DYNOCAR_QUANTITY_RESISTANCE, DYNOCAR_QUANTITY_BRAKE_FRICTION,
                                  DYNOCAR_QUANTITY_ADHESION};
 
-/* 1 when the daemon's answer may be used; tells where the value comes from. */
+/* 1 when the daemon's answer may be used; reports where the value comes from. */
 static int learned(dynocar_reader *reader, uint32_t quantity, dynocar_reading *reading)
 {
     dynocar_code code =

@@ -21,7 +21,7 @@ const EFFORT: [EffortPoint; 2] = [
 ];
 const ASKED: [Quantity; 3] = [Quantity::Resistance, Quantity::BrakeFriction, Quantity::Adhesion];
 
-/// What the daemon says of a quantity, as far as it may be used; tells where it comes from.
+/// What the daemon says of a quantity, as far as it may be used; reports where it comes from.
 fn learned(reader: &SnapshotReader, quantity: Quantity) -> Option<&ParameterSnapshot> {
     let answer = reader.quantity(quantity, monotonic_now_ns());
     if let Ok(reading) = &answer

@@ -8,7 +8,7 @@
  *     dynocar_reader_resistance(reader, now_ns, &reading);
  *     if (reading.is_usable) { ... } else { ... the controller's own parameters ... }
  *
- * docs/guides/reading.md tells which pipeline is for what, and what each status and each reason
+ * docs/guides/reading.md says which pipeline is for what, and what each status and each reason
  * means for a controller.
  *
  * Rules
@@ -227,7 +227,7 @@ enum {
 enum {
     /* The time is not later than the last accepted one */
     DYNOCAR_REJECTED_TIME_NOT_INCREASING = 0,
-    /* The time jumped ahead by more than a stretch of motion allows */
+    /* The time jumped ahead by more than a motion segment allows */
     DYNOCAR_REJECTED_TIME_JUMP = 1,
     /* The sequence number repeats or runs backwards */
     DYNOCAR_REJECTED_SEQUENCE_NOT_INCREASING = 2,
@@ -249,14 +249,14 @@ enum {
     DYNOCAR_REJECTED_FROZEN = 15
 };
 
-/* Manoeuvres that would tell more: bits of missing_manoeuvres. */
+/* Manoeuvres that would show more: bits of missing_manoeuvres. */
 enum {
-    DYNOCAR_MANOEUVRE_COAST_SLOW = 1 << 0, /* Coasting at low speed, which tells of Davis a */
-    DYNOCAR_MANOEUVRE_COAST_FAST = 1 << 1, /* Coasting at high speed, which tells of Davis c */
-    /* A wider range of speeds, which tells a, b and c apart */
+    DYNOCAR_MANOEUVRE_COAST_SLOW = 1 << 0, /* Coasting at low speed, which determines Davis a */
+    DYNOCAR_MANOEUVRE_COAST_FAST = 1 << 1, /* Coasting at high speed, which determines Davis c */
+    /* A wider range of speeds, which separates a, b and c */
     DYNOCAR_MANOEUVRE_VARY_SPEED = 1 << 2,
-    DYNOCAR_MANOEUVRE_ACCELERATE = 1 << 3, /* Strong traction, which tells of mass */
-    /* Strong braking, which tells of adhesion and brake friction */
+    DYNOCAR_MANOEUVRE_ACCELERATE = 1 << 3, /* Strong traction, which determines mass */
+    /* Strong braking, which determines adhesion and brake friction */
     DYNOCAR_MANOEUVRE_BRAKE = 1 << 4,
     DYNOCAR_MANOEUVRE_MOVE = 1 << 5 /* Any motion */
 };
@@ -314,7 +314,7 @@ typedef struct dynocar_train_sample {
     /* When the sample was handed to the channel, in ns of the host's monotonic clock; the
      * publisher writes it, and latency is counted from it */
     int64_t published_ns;
-    /* Counts the controller's samples, one by one; a gap tells of lost samples */
+    /* Counts the controller's samples, one by one; a gap means lost samples */
     uint64_t sequence;
     /* The train */
     uint64_t train_id;
@@ -324,7 +324,7 @@ typedef struct dynocar_train_sample {
     uint8_t flags;
     /* +1 while the chainage grows in the direction of travel, -1 while it falls */
     int8_t direction;
-    /* Number of the run (trip); filters start a new stretch of motion when it changes */
+    /* Number of the run (trip); filters start a new motion segment when it changes */
     uint32_t run;
     /* Chainage of the train's centre in m */
     double position_m;
@@ -409,7 +409,8 @@ typedef struct dynocar_parameter_snapshot {
     uint32_t missing_manoeuvres;
     /* Suspected missing effect, DYNOCAR_EFFECT_... */
     uint32_t suspected_effect;
-    /* Other effects that these data hardly tell from it: one bit for each DYNOCAR_EFFECT_... */
+    /* Other effects that these data hardly distinguish from it: one bit for each
+     * DYNOCAR_EFFECT_... */
     uint32_t suspected_alternatives;
     /* How long the suspicion has stood, in whole s of the controller's clock */
     uint32_t suspicion_age_s;
@@ -435,8 +436,8 @@ typedef struct dynocar_parameter_snapshot {
     double speed_min_mps;
     /* Highest speed in m/s among the data behind the estimate */
     double speed_max_mps;
-    /* The model of train and line that the pipeline reckons with: the first 8 bytes of SHA-256
-     * over the train's file, a zero byte and the line's file; 0 when it came from no files */
+    /* The model of train and line that the pipeline uses: the first 8 bytes of SHA-256 over
+     * the train's file, a zero byte and the line's file; 0 when it came from no files */
     uint64_t model_hash;
     /* One bit for each DYNOCAR_QUANTITY_... whose values a controller may use now. It changes
      * seldom: what was usable stays so for half a second of doubt, and what was doubted has to
@@ -519,7 +520,7 @@ dynocar_code dynocar_reader_open(const char *root, uint64_t train_id, dynocar_re
 dynocar_code dynocar_reader_set_stale_after_ns(dynocar_reader *reader, int64_t stale_after_ns);
 
 /* Takes what has come since the last poll: a bounded number of messages. news may be NULL; it
- * gets the number of snapshots that told something new. REAL-TIME */
+ * gets the number of snapshots that brought something new. REAL-TIME */
 dynocar_code dynocar_reader_poll(dynocar_reader *reader, uint32_t *news);
 
 /* Copies the newest polled snapshot of the pipeline that answers a quantity (DYNOCAR_QUANTITY_...);
@@ -565,7 +566,8 @@ dynocar_code dynocar_snapshot_covariance(const dynocar_parameter_snapshot *snaps
 /* generated: stops */
 /* What the rail carries in a stop. */
 enum {
-    DYNOCAR_RAIL_UNLIMITED = 0, /* Any brake force: adhesion and its deviation are not read */
+    /* Any brake force: adhesion and its standard deviation are not read */
+    DYNOCAR_RAIL_UNLIMITED = 0,
     /* Adhesion is one coefficient at all speeds, or a lower bound of it */
     DYNOCAR_RAIL_COEFFICIENT = 1,
     DYNOCAR_RAIL_DRY_LAW = 2, /* Adhesion is a scale of the dry rail's law (Xie 2019) */

@@ -14,7 +14,7 @@ pub enum NoAnswer {
 }
 
 impl NoAnswer {
-    /// The reason's name, beside those of [`dynocar_shared::Reason`].
+    /// The reason's name, in addition to those of [`dynocar_shared::Reason`].
     pub const fn name(self) -> &'static str {
         match self {
             NoAnswer::NoSnapshot => "no_snapshot",

@@ -2,7 +2,7 @@
 //!
 //! Each side keeps a small text file locked while it lives. The kernel drops the lock when the
 //! process dies, however it dies, so that a locked file means a living peer. The files lie
-//! outside the transport and tell schema, layouts and transport version: a peer that shares no
+//! outside the transport and state schema, layouts and transport version: a peer that shares no
 //! memory format with us can still be named in words.
 
 use std::fs::{File, OpenOptions, TryLockError};

@@ -99,7 +99,7 @@ impl SnapshotReader {
         self.stale_after_ns = stale_after_ns;
     }
 
-    /// Takes what has come since the last poll; gives the number of snapshots that told
+    /// Takes what has come since the last poll; gives the number of snapshots that brought
     /// something new.
     ///
     /// # Real-time

@@ -152,12 +152,12 @@ fn a_snapshot_that_cannot_be_true_is_refused_and_counted() {
 fn a_sleeping_thread_is_woken_by_the_next_sample() {
     let bench = bench();
     let host = bench.host.clone();
-    let (told, ready) = std::sync::mpsc::channel();
+    let (send_ready, ready) = std::sync::mpsc::channel();
     let thread = std::thread::spawn(move || {
         let transport = Transport::open(&host, "test-sleeper").unwrap();
         let receiver = transport.receiver::<TrainSample>(TRAIN).unwrap();
         let mut sleeper = Sleeper::open(&transport, &[TRAIN], 1).unwrap();
-        told.send(()).unwrap();
+        send_ready.send(()).unwrap();
         let mut naps = 0;
         let sample = loop {
             let mut found = None;

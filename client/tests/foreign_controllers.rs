@@ -191,7 +191,7 @@ fn the_rust_example_uses_the_daemon_and_falls_back() {
     assert_example_falls_back(&mut Command::new(program));
 }
 
-/// With nobody on the channel both examples reckon with their built-in values.
+/// With nobody on the channel both examples use their built-in values.
 #[test]
 fn the_stopping_examples_in_c_and_rust_say_the_same() {
     let directory = tempfile::tempdir().unwrap();

@@ -20,7 +20,7 @@ fn header_words() -> Vec<String> {
         code += if place == 0 { part } else { part.split_once("*/").unwrap().1 };
     }
     let is_word = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
-    // A word keeps what follows it, so that functions and enumerators can be told apart.
+    // A word keeps what follows it, so that functions and enumerators can be distinguished.
     let mut words = Vec::new();
     let mut rest = code.as_str();
     while let Some(start) = rest.find(is_word) {

@@ -88,14 +88,14 @@ cc -shared -Wl,-soname,"$soname" -Wl,--version-script,"$here/client/exports.map"
     -lpthread -ldl -lm -lgcc_s -o "$root/usr/lib/$soname"
 chmod 644 "$root/usr/lib/$soname"
 ln -s "$soname" "$root/usr/lib/libdynocar_client.so"
-told() { # TEMPLATE TARGET: for those who build with pkg-config or CMake
+install_template() { # TEMPLATE TARGET: for those who build with pkg-config or CMake
     mkdir -p "$root/$(dirname "$2")"
     sed -e "s/@VERSION@/$version/" -e "s/@SONAME@/$soname/" -e "s/@MAJOR@/$major/" \
         -e "s/@MINOR@/$minor/" "$here/client/$1" >"$root/$2"
 }
-told dynocar-client.pc usr/lib/pkgconfig/dynocar-client.pc
-told dynocar-config.cmake usr/lib/cmake/dynocar/dynocar-config.cmake
-told dynocar-config-version.cmake usr/lib/cmake/dynocar/dynocar-config-version.cmake
+install_template dynocar-client.pc usr/lib/pkgconfig/dynocar-client.pc
+install_template dynocar-config.cmake usr/lib/cmake/dynocar/dynocar-config.cmake
+install_template dynocar-config-version.cmake usr/lib/cmake/dynocar/dynocar-config-version.cmake
 put "$libraries/libdynocar_fmu.so" usr/lib/dynocar/libdynocar_fmu.so
 if command -v strip >/dev/null; then
     strip --strip-unneeded "$root"/usr/bin/* "$root/usr/lib/$soname" \
@@ -150,7 +150,7 @@ Depends: libc6 (>= ${glibc:-2.31}), libgcc-s1
 Recommends: systemd
 Section: science
 Priority: optional
-Description: learns online how a train really behaves
+Description: estimates resistance, mass, adhesion and brakes of a train as it drives
  A dynamometer car in software. A daemon beside a train controller reads its samples from shared
  memory, learns running resistance, mass, adhesion and brake friction, and answers with estimates
  that say how sure they are. On recorded runs it finds the effect that a model of a train lacks.

@@ -1,6 +1,6 @@
 //! Where results go: standard output, standard error and files, for every program of the project.
 //!
-//! A reader that has gone away ends the telling and nothing else; a full disk is an error in words.
+//! A reader that has gone away ends the printing and nothing else; a full disk is an error in words.
 //! A file is written beside and takes its name once it is whole, so that whenever the program ends
 //! the old or the new one is there, never a part of one.
 
@@ -54,7 +54,7 @@ pub fn print(text: &str) -> Result<(), OutputError> {
     }
 }
 
-/// Writes a line to standard error. What cannot be written there can be told nowhere.
+/// Writes a line to standard error. What cannot be written there can be reported nowhere.
 pub fn report_line(line: &str) {
     let _ = io::stderr().lock().write_all(format!("{line}\n").as_bytes());
 }

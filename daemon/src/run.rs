@@ -1,4 +1,4 @@
-//! The daemon: every stage of the online way on one screen.
+//! The daemon: every stage of the live path on one screen.
 //!
 //! ```text
 //! controller ──TrainSample──▶ validation ─▶ track and forces ─▶ estimator ──ParameterSnapshot──▶ client
@@ -169,7 +169,7 @@ fn plan_workers(
             epoch,
             spin_us: config.spin_us,
             heartbeat_ms: config.heartbeat_ms,
-            lanes: Vec::new(),
+            channels: Vec::new(),
             stop: Arc::clone(stop),
         })
         .collect();
@@ -189,19 +189,19 @@ fn plan_workers(
             let tally = Arc::new(Tally::default());
             let name = settings.name.clone();
             watched.push(WatchedPipeline { name, train: train.id, tally: Arc::clone(&tally) });
-            let lanes = &mut plans[settings.thread].lanes;
-            match lanes.iter_mut().find(|lane| lane.train == train.id) {
-                Some(lane) => lane.pipelines.push((pipeline, tally)),
+            let channels = &mut plans[settings.thread].channels;
+            match channels.iter_mut().find(|channel| channel.train == train.id) {
+                Some(channel) => channel.pipelines.push((pipeline, tally)),
                 None => {
                     let (count, pipelines) = (Arc::clone(&counts[place]), vec![(pipeline, tally)]);
                     let (train, place, exchange) = (train.id, 0, None);
-                    lanes.push(ChannelPlan { train, count, place, pipelines, exchange });
+                    channels.push(ChannelPlan { train, count, place, pipelines, exchange });
                 }
             }
         }
     }
     for (train, count) in config.trains.iter().zip(counts) {
-        number_lanes(&mut plans, train.id, count);
+        number_channels(&mut plans, train.id, count);
     }
     Ok((plans, watched))
 }
@@ -215,18 +215,19 @@ fn plan_shadow(
     let store = Store::at(&models.directory);
     let mut trains = Vec::new();
     for train in &config.trains {
-        let lanes = plans.iter_mut().flat_map(|plan| &mut plan.lanes);
-        let mut lanes: Vec<&mut ChannelPlan> = lanes.filter(|it| it.train == train.id).collect();
-        lanes.sort_by_key(|lane| lane.place);
-        let exchange = Arc::new(Exchange::new(lanes.len()));
+        let channels = plans.iter_mut().flat_map(|plan| &mut plan.channels);
+        let mut channels: Vec<&mut ChannelPlan> =
+            channels.filter(|it| it.train == train.id).collect();
+        channels.sort_by_key(|channel| channel.place);
+        let exchange = Arc::new(Exchange::new(channels.len()));
         let mut placed = Vec::new();
-        for lane in lanes {
-            lane.exchange = Some(Arc::clone(&exchange));
-            let indices = lane.pipelines.iter().map(|(it, _)| it.snapshot().pipeline_index);
+        for channel in channels {
+            channel.exchange = Some(Arc::clone(&exchange));
+            let indices = channel.pipelines.iter().map(|(it, _)| it.snapshot().pipeline_index);
             placed.extend(indices.map(|index| Placed {
                 settings: config.pipelines[index as usize].clone(),
                 index,
-                seat: lane.place,
+                seat: channel.place,
             }));
         }
         let own = store.train(train.id);
@@ -235,32 +236,34 @@ fn plan_shadow(
     Some((trains, models))
 }
 
-/// Numbers the lanes of a train, and tells its controllers how many threads and pipelines serve it.
-fn number_lanes(plans: &mut [WorkerPlan], train: TrainId, count: &SampleCount) {
+/// Numbers the channels of a train, and informs its controllers how many threads and pipelines serve it.
+fn number_channels(plans: &mut [WorkerPlan], train: TrainId, count: &SampleCount) {
     let (mut threads, mut pipelines) = (0, 0);
-    for lane in plans.iter_mut().flat_map(|plan| &mut plan.lanes).filter(|it| it.train == train) {
-        lane.place = threads;
+    for channel in
+        plans.iter_mut().flat_map(|plan| &mut plan.channels).filter(|it| it.train == train)
+    {
+        channel.place = threads;
         threads += 1;
-        pipelines += lane.pipelines.len();
+        pipelines += channel.pipelines.len();
     }
     count.serve(threads, pipelines);
 }
 
 /// Starts one thread for each plan and waits until all of them have their ports open.
 fn start_workers(plans: Vec<WorkerPlan>) -> Result<Vec<JoinHandle<()>>, RunError> {
-    let (told, started) = sync_channel(plans.len());
+    let (report_start, started) = sync_channel(plans.len());
     let workers = plans
         .into_iter()
         .map(|plan| {
-            let told = told.clone();
+            let report_start = report_start.clone();
             std::thread::Builder::new()
                 .name(plan.thread.name.clone())
                 .stack_size(STACK_BYTES)
-                .spawn(move || work(plan, told))
+                .spawn(move || work(plan, report_start))
                 .map_err(|source| RunError::System { what: "pipeline thread", source })
         })
         .collect::<Result<Vec<_>, _>>()?;
-    drop(told);
+    drop(report_start);
     started.iter().collect::<Result<(), _>>()?;
     Ok(workers)
 }
@@ -311,22 +314,22 @@ fn start_keeper(
         .map_err(|source| RunError::System { what: "state thread", source })
 }
 
-fn work(plan: WorkerPlan, told: SyncSender<Result<(), ChannelError>>) {
+fn work(plan: WorkerPlan, report_start: SyncSender<Result<(), ChannelError>>) {
     prepare_thread(&plan.thread);
     match Worker::start(plan) {
         Ok(mut worker) => {
             // The main thread has given up when it no longer listens; the stop flag says so too.
-            let _ = told.send(Ok(()));
-            drop(told);
+            let _ = report_start.send(Ok(()));
+            drop(report_start);
             worker.run();
         }
         Err(error) => {
-            let _ = told.send(Err(error));
+            let _ = report_start.send(Err(error));
         }
     }
 }
 
-/// Gives the calling thread what its configuration asks for; what the system refuses is told with
+/// Gives the calling thread what its configuration asks for; what the system refuses is reported with
 /// its price, and the daemon goes on.
 fn prepare_thread(thread: &ThreadConfig) {
     let name = thread.name.as_str();

@@ -13,7 +13,7 @@ const BYTES_MAX: u64 = 4 << 30;
 /// What is said of UTF-16 where it is not declared.
 const UTF_16: &str =
     "UTF-16: save the file as UTF-8, or, for runs, set encoding = \"utf-16le\" in [dataset]";
-/// So many bytes tell other formats from text.
+/// So many bytes distinguish other formats from text.
 const HEAD_BYTES: u64 = 1024;
 
 /// What a path leads to that is neither a file nor a folder.

@@ -74,7 +74,7 @@ pub enum UnpackError {
 }
 
 /// Unpacks what a recording holds of a train, its only one where none is named, into a new folder; what the
-/// program remarks on is told.
+/// program remarks on is reported.
 ///
 /// # Errors
 ///
@@ -106,7 +106,7 @@ pub struct Unpacked {
 }
 
 impl Unpacked {
-    /// Unpacks a recording; what the program remarks on is told.
+    /// Unpacks a recording; what the program remarks on is reported.
     ///
     /// # Errors
     ///

@@ -94,7 +94,7 @@ wire_struct! {
         /// When the sample was handed to the channel, in ns of the host's monotonic clock;
         /// the publisher writes it, and latency is counted from it.
         pub published_ns: i64,
-        /// Counts the controller's samples, one by one; a gap tells of lost samples.
+        /// Counts the controller's samples, one by one; a gap means lost samples.
         pub sequence: u64,
         /// The train, see [`TrainId`].
         pub train_id: u64,
@@ -104,7 +104,7 @@ wire_struct! {
         pub flags: u8,
         /// +1 while the chainage grows in the direction of travel, -1 while it falls.
         pub direction: i8,
-        /// Number of the run (trip); filters start a new stretch of motion when it changes.
+        /// Number of the run (trip); filters start a new motion segment when it changes.
         pub run: u32,
         /// Chainage of the train's centre in m.
         pub position_m: f64,

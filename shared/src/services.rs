@@ -32,7 +32,7 @@ pub enum Channel {
     Samples,
     /// Snapshots, from every pipeline to the controller.
     Snapshots,
-    /// Tells the controller which pipeline threads sleep.
+    /// Shows the controller which pipeline threads sleep.
     Sleepers,
 }
 

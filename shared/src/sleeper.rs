@@ -1,4 +1,4 @@
-//! How a pipeline thread tells a controller that it sleeps.
+//! How a pipeline thread informs a controller that it sleeps.
 
 use crate::wire_struct;
 

@@ -71,7 +71,7 @@ wire_struct! {
         pub missing_manoeuvres: u32,
         /// Suspected missing effect, [`crate::vocabulary::EffectKind`] by number.
         pub suspected_effect: u32,
-        /// Other effects that these data hardly tell from it: one bit for each
+        /// Other effects that these data hardly distinguish from it: one bit for each
         /// [`crate::vocabulary::EffectKind`].
         pub suspected_alternatives: u32,
         /// How long the suspicion has stood, in whole s of the controller's clock.
@@ -99,7 +99,7 @@ wire_struct! {
         pub speed_min_mps: f64,
         /// Highest speed in m/s among the data behind the estimate.
         pub speed_max_mps: f64,
-        /// The model of train and line that the pipeline reckons with: the first 8 bytes of SHA-256
+        /// The model of train and line that the pipeline uses: the first 8 bytes of SHA-256
         /// over the train's file, a zero byte and the line's file; 0 when it came from no files.
         pub model_hash: u64,
         /// One bit for each [`Quantity`] whose values a controller may use now. It changes seldom: what
@@ -190,7 +190,7 @@ impl ParameterSnapshot {
         MassSource::from_number(self.mass_source)
     }
 
-    /// The effects that the data hardly tell from the suspected one.
+    /// The effects that the data hardly distinguish from the suspected one.
     pub fn alternatives(&self) -> impl Iterator<Item = EffectKind> {
         let bits = self.suspected_alternatives;
         EffectKind::ALL.iter().copied().filter(move |kind| bits & kind.bit() != 0)

@@ -37,7 +37,7 @@ impl RailAdhesion {
     ///
     /// The coefficient is that of the speed at which the braking was last seen, which is its lowest, and a
     /// rail carries less at higher speeds. So it is taken along the wet law, the steeper of the two: a
-    /// stop from a higher speed is not reckoned with what the rail carried at the end of the last one.
+    /// stop from a higher speed is not computed with what the rail carried at the end of the last one.
     pub fn learned(snapshot: &ParameterSnapshot) -> Option<Self> {
         let value = snapshot.value(Parameter::Adhesion)?;
         let std = snapshot.std(Parameter::Adhesion)?;

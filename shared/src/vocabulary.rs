@@ -223,7 +223,7 @@ vocabulary! {
     RejectionReason: u32 {
         /// The time is not later than the last accepted one.
         TimeNotIncreasing = 0 "time_not_increasing",
-        /// The time jumped ahead by more than a stretch of motion allows.
+        /// The time jumped ahead by more than a motion segment allows.
         TimeJump = 1 "time_jump",
         /// The sequence number repeats or runs backwards.
         SequenceNotIncreasing = 2 "sequence_not_increasing",
@@ -260,15 +260,15 @@ vocabulary! {
     /// A manoeuvre that would excite a direction the data have not excited; bits of
     /// [`crate::ParameterSnapshot::missing_manoeuvres`] are `1 << number`.
     Manoeuvre: u32 {
-        /// Coasting at low speed, which tells of Davis a.
+        /// Coasting at low speed, which determines Davis a.
         CoastSlow = 0 "coast_slow",
-        /// Coasting at high speed, which tells of Davis c.
+        /// Coasting at high speed, which determines Davis c.
         CoastFast = 1 "coast_fast",
-        /// A wider range of speeds, which tells a, b and c apart.
+        /// A wider range of speeds, which separates a, b and c.
         VarySpeed = 2 "vary_speed",
-        /// Strong traction, which tells of mass.
+        /// Strong traction, which determines mass.
         Accelerate = 3 "accelerate",
-        /// Strong braking, which tells of adhesion and brake friction.
+        /// Strong braking, which determines adhesion and brake friction.
         Brake = 4 "brake",
         /// Any motion.
         Move = 5 "move",

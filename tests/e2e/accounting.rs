@@ -139,7 +139,7 @@ fn a_controller_that_was_killed_leaves_no_sample_uncounted() {
     }
 }
 
-/// Publishes at a rate until told to stop.
+/// Publishes at a rate until asked to stop.
 fn publish_at(host: &Host, rate_hz: u64, stop: &AtomicBool) {
     let mut publisher = SamplePublisher::open(host, TRAIN).unwrap();
     let start = Instant::now();

@@ -96,7 +96,7 @@ impl Cast {
         replayer.finish()
     }
 
-    /// The newest snapshot of each pipeline, once all of them reckon with a model.
+    /// The newest snapshot of each pipeline, once all of them use a model.
     fn snapshots_of(&self, model: ModelHash) -> Vec<ParameterSnapshot> {
         let mut reader = SnapshotReader::open(&self.site.host(), TRAIN).unwrap();
         let mut found = Vec::new();

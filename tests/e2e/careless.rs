@@ -226,18 +226,18 @@ fn a_lone_run_is_reported_as_one_of_which_nothing_was_scored_everywhere() {
     let arguments =
         ["explain", &folder, "--json", json.to_str().unwrap(), "--report", page.to_str().unwrap()];
     let output = finished(&arguments.map(OsStr::new));
-    let told = String::from_utf8(output.stdout).unwrap();
+    let printed = String::from_utf8(output.stdout).unwrap();
     let words = "No run is held out (role = \"holdout\"), so that nothing was scored: the open-loop \
                  error on the fit runs, ";
     let line =
-        told.lines().find(|line| line.starts_with(words)).unwrap_or_else(|| panic!("{told}"));
+        printed.lines().find(|line| line.starts_with(words)).unwrap_or_else(|| panic!("{printed}"));
     assert!(
         line.ends_with("is of runs that the model was fitted to, and tells nothing of others.")
     );
     let answer: Value = serde_json::from_slice(&std::fs::read(json).unwrap()).unwrap();
     assert_eq!((&answer["scored_runs"], &answer["unscored"]), (&0.into(), &line.into()));
     let page = std::fs::read_to_string(page).unwrap();
-    assert!(page.contains(&line.replace('"', "&quot;")), "the page tells it, too");
+    assert!(page.contains(&line.replace('"', "&quot;")), "the page says it, too");
 }
 
 #[test]
@@ -245,8 +245,8 @@ fn a_dataset_of_holdout_runs_only_is_called_so() {
     let site = Site::new();
     let folder = dataset(&site, &format!("{MANIFEST}role = \"holdout\"\n"), run().as_bytes());
     let output = finished(&["explain", &folder].map(OsStr::new));
-    let told = String::from_utf8(output.stdout).unwrap();
-    assert!(told.starts_with("No run is there to fit: all 1 are held out.\n"), "{told}");
+    let printed = String::from_utf8(output.stdout).unwrap();
+    assert!(printed.starts_with("No run is there to fit: all 1 are held out.\n"), "{printed}");
 }
 
 #[test]

@@ -44,7 +44,7 @@ fn estimates(snapshot: &ParameterSnapshot) -> Vec<(String, f64, f64)> {
         .iter()
         .filter(|parameter| !davis.contains(parameter))
         .filter_map(|&it| Some((it.to_string(), snapshot.value(it)?, snapshot.std(it)?)))
-        // What is not yet estimated has no deviation.
+        // What is not yet estimated has no standard deviation.
         .filter(|(_, _, std)| *std > 0.0)
         .collect();
     for speed_mps in SPEEDS_MPS {

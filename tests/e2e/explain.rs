@@ -57,11 +57,11 @@ fn a_number_is_no_surer_than_the_map_that_all_runs_share() {
     let explanation = explained(&simulated, folder.path());
     let effect = &explanation.answer.effects[0];
     assert_eq!(effect.kind, "rotating_mass", "{}", explanation.answer.statement);
-    let ParameterValue::Number(told) = effect.std["rotating_mass_factor"] else {
-        panic!("a deviation is a number");
+    let ParameterValue::Number(stated) = effect.std["rotating_mass_factor"] else {
+        panic!("a standard deviation is a number");
     };
     let by_runs_alone = deviations(&explanation.grown).std[3];
-    assert!(told > 1.1 * by_runs_alone, "{told}, and {by_runs_alone} by the runs alone");
+    assert!(stated > 1.1 * by_runs_alone, "{stated}, and {by_runs_alone} by the runs alone");
 }
 
 #[test]

@@ -24,7 +24,7 @@ fn numbers(text: &str) -> impl Iterator<Item = &str> {
         let (name, kind) = rest.split_once(" =")?.0.split_once(": ")?;
         let is_name =
             name.chars().all(|it| it.is_ascii_uppercase() || it.is_ascii_digit() || it == '_');
-        let kinds = ["f64", "usize", "u64", "NullStrength", "RunScatter", "ErrorScale"];
+        let kinds = ["f64", "usize", "u64", "NullScore", "RunScatter", "ErrorScale"];
         let kind = kind.trim_start_matches('[');
         (is_name && kinds.iter().any(|it| kind.starts_with(it))).then_some(name)
     })

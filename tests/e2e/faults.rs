@@ -160,7 +160,8 @@ fn a_full_shared_memory_is_reported_in_words_and_ends_nobody_by_a_signal() {
         // The test's own programs end by a panic that names the error.
         let expected = if *command == daemon { 1 } else { 101 };
         assert_eq!(output.status.code(), Some(expected), "{size}: {}: {said}", output.status);
-        let is_told = said.contains("shared memory is full") || said.contains("SharedMemoryFull");
-        assert!(is_told, "{size}: {said}");
+        let is_reported =
+            said.contains("shared memory is full") || said.contains("SharedMemoryFull");
+        assert!(is_reported, "{size}: {said}");
     }
 }

@@ -53,11 +53,11 @@ fn demo_with_brake_gear(site: &Site) -> PathBuf {
     folder
 }
 
-/// A variable's bits as `identify` would tell them.
-fn expected(snapshot: &ParameterSnapshot, told: SnapshotField, speed_mps: f64) -> u64 {
+/// A variable's bits as `identify` would print them.
+fn expected(snapshot: &ParameterSnapshot, reported: SnapshotField, speed_mps: f64) -> u64 {
     let resistance = snapshot.resistance_at(speed_mps);
     let real = |value: Option<f64>| value.unwrap_or(f64::NAN).to_bits();
-    match told {
+    match reported {
         SnapshotField::Value(parameter) => real(snapshot.value(parameter)),
         SnapshotField::Std(parameter) => real(snapshot.std(parameter)),
         SnapshotField::Resistance => real(resistance.map(|it| it.w0_n_per_kn)),
@@ -80,7 +80,7 @@ fn assert_as_identified(fmu: &Fmu, dataset: &Dataset, count: usize) {
     };
     let snapshots = PIPELINES.map(identified);
     for (reference, variable) in ESTIMATORS.variables.iter().enumerate() {
-        let Meaning::Estimate(of, told) = variable.meaning else { continue };
+        let Meaning::Estimate(of, reported) = variable.meaning else { continue };
         let reference = reference as u32;
         let snapshot = &snapshots[PIPELINES.iter().position(|&kind| kind == of).unwrap()];
         let got = match variable.meaning.kind() {
@@ -88,7 +88,7 @@ fn assert_as_identified(fmu: &Fmu, dataset: &Dataset, count: usize) {
             _ => fmu.integer(reference).unwrap() as u64,
         };
         let name = variable.name;
-        assert_eq!(got, expected(snapshot, told, speed_mps), "{name} after {count} samples");
+        assert_eq!(got, expected(snapshot, reported, speed_mps), "{name} after {count} samples");
     }
 }
 
@@ -156,7 +156,7 @@ fn the_fmu_holds_what_the_standard_asks_for_and_is_the_same_twice() {
         done(&site, &["fmu", "--out", out, "--train", &train, "--track", &track]);
     }
     let bytes = |name: &str| read(site.path().join(name)).unwrap();
-    assert!(bytes("a.fmu") == bytes("b.fmu"), "nothing in it tells of the hour");
+    assert!(bytes("a.fmu") == bytes("b.fmu"), "nothing in it depends on the hour");
     let folder = unpacked(&site, "a.fmu");
     let description = read_to_string(folder.join("modelDescription.xml")).unwrap();
     assert_eq!(description, dynocar_fmu::model_description(&ESTIMATORS));

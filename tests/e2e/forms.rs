@@ -20,7 +20,7 @@ fn simulated(seed: u64) -> (SimulatedDataset, Law) {
 }
 
 /// What is said of a force that must be called unknown, and the error over the true model's.
-fn told(simulated: &SimulatedDataset) -> (ExplainAnswer, Vec<Extra>, f64) {
+fn explained(simulated: &SimulatedDataset) -> (ExplainAnswer, Vec<Extra>, f64) {
     let dataset = read_files(&dataset_files(simulated));
     let explanation = explain(&dataset, &|_, _| {}).expect("usable runs");
     let answer = explanation.answer;
@@ -41,7 +41,7 @@ fn told(simulated: &SimulatedDataset) -> (ExplainAnswer, Vec<Extra>, f64) {
 fn the_edge_of_a_force_is_reported_with_an_interval_and_a_whole_exponent_as_one() {
     let (simulated, law) = simulated(51_007);
     let Law::FastLater { from_s, .. } = law else { panic!("{law:?}") };
-    let (answer, extra, left) = told(&simulated);
+    let (answer, extra, left) = explained(&simulated);
     let [Extra { n_per_kn, factors }] = &extra[..] else { panic!("{}", answer.statement) };
     let [speed, time] = factors[..] else { panic!("{}", answer.statement) };
     assert_eq!((speed.of, speed.form, speed.numbers[1]), (Covariate::Speed, Form::Power, 1.0));
@@ -63,7 +63,7 @@ fn the_edge_of_a_force_is_reported_with_an_interval_and_a_whole_exponent_as_one(
 fn a_force_in_the_cold_is_reported_where_a_library_kind_runs_to_its_bound() {
     let (simulated, law) = simulated(41_014);
     assert!(matches!(law, Law::FastInCold { .. }), "{law:?}");
-    let (answer, extra, left) = told(&simulated);
+    let (answer, extra, left) = explained(&simulated);
     let [Extra { factors, .. }] = &extra[..] else { panic!("{}", answer.statement) };
     let of: Vec<Covariate> = factors.iter().map(|factor| factor.of).collect();
     assert_eq!(of, [Covariate::Speed, Covariate::Temperature], "{}", answer.statement);
@@ -74,7 +74,7 @@ fn a_force_in_the_cold_is_reported_where_a_library_kind_runs_to_its_bound() {
 fn a_force_that_rises_to_a_level_is_reported_though_no_basic_resistance_may_hold_the_level() {
     let (simulated, law) = simulated(51_006);
     assert!(matches!(law, Law::Levelling { .. }), "{law:?}");
-    let (answer, extra, left) = told(&simulated);
+    let (answer, extra, left) = explained(&simulated);
     let [Extra { factors, .. }] = &extra[..] else { panic!("{}", answer.statement) };
     assert_eq!((factors[0].of, factors[0].form), (Covariate::Speed, Form::Rise));
     assert!(left < 1.2, "{left} of the true model's error");
@@ -84,6 +84,6 @@ fn a_force_that_rises_to_a_level_is_reported_though_no_basic_resistance_may_hold
 fn a_force_that_the_noise_would_hold_is_reported() {
     let (simulated, law) = simulated(71_005);
     assert!(matches!(law, Law::FastLater { .. }), "{law:?}");
-    let (answer, _, left) = told(&simulated);
+    let (answer, _, left) = explained(&simulated);
     assert!(left < 1.3, "{left} of the true model's error: {}", answer.statement);
 }

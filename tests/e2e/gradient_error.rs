@@ -1,4 +1,4 @@
-//! A declared gradient that is wrong along the line: told by the direction of travel.
+//! A declared gradient that is wrong along the line: identified by the direction of travel.
 
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::answer::{ParameterValue, Verdict};

@@ -1,4 +1,4 @@
-//! A real daemon fed with samples that cannot be true: degraded, told once in words, and seen by
+//! A real daemon fed with samples that cannot be true: degraded, reported once in words, and seen by
 //! `dynocar health`.
 
 use dynocar_client::{SamplePublisher, SnapshotReader, monotonic_now_ns};
@@ -64,7 +64,7 @@ fn kilonewtons_for_newtons_are_degraded_logged_once_in_words_and_seen_by_health(
     let words = health.output();
     assert!(words.starts_with("train 1: degraded"), "{words}");
     assert!(words.contains("implausible_forces"), "{words}");
-    let told = daemon.errors();
-    assert_eq!(told.matches("the samples cannot be true").count(), 1, "{told}");
-    assert!(told.contains("is the unit kN and not N?"), "{told}");
+    let printed = daemon.errors();
+    assert_eq!(printed.matches("the samples cannot be true").count(), 1, "{printed}");
+    assert!(printed.contains("is the unit kN and not N?"), "{printed}");
 }

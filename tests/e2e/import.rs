@@ -19,7 +19,7 @@ fn corpus(name: &str) -> String {
     format!("{CORPUS}/{name}")
 }
 
-/// Imports a file of the corpus into the folder `made`; gives what was told.
+/// Imports a file of the corpus into the folder `made`; gives what was printed.
 fn import(site: &Site, name: &str, more: &[&str]) -> String {
     let file = corpus(name);
     done(site, &[&["import", &file, "-o", "made"], more].concat())
@@ -40,7 +40,7 @@ fn assert_close(found: f64, expected: f64) {
 #[test]
 fn an_imported_train_is_read_back_with_the_numbers_of_its_source() {
     let site = Site::new();
-    let told = import(&site, "rolling_stock.yaml", &["--train", "ore", "--load", "0.5"]);
+    let printed = import(&site, "rolling_stock.yaml", &["--train", "ore", "--load", "0.5"]);
     let ore = train(&site);
     assert_eq!((ore.name.as_str(), ore.cars), ("Ore train", 3));
     assert_close(ore.mass_kg, 180e3);
@@ -56,16 +56,16 @@ fn an_imported_train_is_read_back_with_the_numbers_of_its_source() {
         "written: made/train.toml",
         "dynocar check made/train.toml --draw made",
     ] {
-        assert!(told.contains(words), "{words}: {told}");
+        assert!(printed.contains(words), "{words}: {printed}");
     }
     let text = read_to_string(site.path().join("made/train.toml")).unwrap();
-    assert!(!text.contains("# DEFAULT") && !told.contains("defaults"), "{text}");
+    assert!(!text.contains("# DEFAULT") && !printed.contains("defaults"), "{text}");
     assert!(done(&site, &["check", "made/train.toml"]).contains("180 t"));
 
     let site = Site::new();
-    let told = import(&site, "osrd_each_kg.json", &[]);
+    let printed = import(&site, "osrd_each_kg.json", &[]);
     assert_close(train(&site).resistance.a, 8.0 / STANDARD_GRAVITY_MPS2);
-    assert!(told.contains("for each kg: 4.49 N/kN at 40.0 m/s"), "{told}");
+    assert!(printed.contains("for each kg: 4.49 N/kN at 40.0 m/s"), "{printed}");
     let site = Site::new();
     import(&site, "osrd_whole.json", &["--mode", "1500V", "--format", "osrd"]);
     assert_eq!(train(&site).traction.unwrap().points(), [(0.0, 100e3), (25.0, 40e3)]);
@@ -74,7 +74,7 @@ fn an_imported_train_is_read_back_with_the_numbers_of_its_source() {
 #[test]
 fn an_imported_line_is_read_back_with_the_numbers_of_its_source() {
     let site = Site::new();
-    let told = import(&site, "ttobench_track.json", &[]);
+    let printed = import(&site, "ttobench_track.json", &[]);
     let line = track(&site);
     assert_eq!(line.length_m, Some(6000.0));
     assert_eq!(line.gradient_permille(1600.0, 0.0), Some(-6.67));
@@ -82,8 +82,8 @@ fn an_imported_line_is_read_back_with_the_numbers_of_its_source() {
     let at_m: Vec<f64> = line.survey.stops.iter().map(|stop| stop.0).collect();
     assert_eq!(at_m, [0.0, 2500.0, 6000.0]);
     assert_close(line.survey.permitted_speed_mps.as_ref().unwrap().value_at(1200.0), 30.0);
-    assert!(told.contains("not taken: 'altitude': track.toml holds gradients"), "{told}");
-    assert!(told.contains("not in the file: tunnels: the format has none"), "{told}");
+    assert!(printed.contains("not taken: 'altitude': track.toml holds gradients"), "{printed}");
+    assert!(printed.contains("not in the file: tunnels: the format has none"), "{printed}");
 
     let site = Site::new();
     import(&site, "running_path_2022.yaml", &[]);
@@ -98,14 +98,17 @@ fn an_imported_line_is_read_back_with_the_numbers_of_its_source() {
 #[test]
 fn what_a_file_does_not_show_is_a_marked_default_unless_somebody_says_it() {
     let site = Site::new();
-    let told = import(&site, "ttobench_train.json", &[]);
+    let printed = import(&site, "ttobench_train.json", &[]);
     let text = read_to_string(site.path().join("made/train.toml")).unwrap();
     assert!(text.contains("length_m = 75.0 ") && text.contains("# DEFAULT; m, over"), "{text}");
-    assert!(told.contains("defaults in train.toml, nobody's figures: length_m = 75.0"), "{told}");
-    assert!(told.contains("not in the file: length_m: the format has none"), "{told}");
+    assert!(
+        printed.contains("defaults in train.toml, nobody's figures: length_m = 75.0"),
+        "{printed}"
+    );
+    assert!(printed.contains("not in the file: length_m: the format has none"), "{printed}");
     let site = Site::new();
-    let told = import(&site, "ttobench_train.json", &["--length-m", "74.08", "--name", "T 1"]);
-    assert!(!told.contains("defaults"), "{told}");
+    let printed = import(&site, "ttobench_train.json", &["--length-m", "74.08", "--name", "T 1"]);
+    assert!(!printed.contains("defaults"), "{printed}");
     let model = train(&site);
     assert_eq!((model.length_m, model.name.as_str()), (74.08, "T 1"));
     assert_close(model.resistance.a, 2200.0 / (150.0 * STANDARD_GRAVITY_MPS2));
@@ -246,8 +249,8 @@ fn every_command_of_the_guide_of_imports_succeeds_on_files_of_that_kind() {
     let commands = blocks(&guide, "sh");
     assert_eq!(commands.len(), 8, "a command that is new needs its files: {commands:?}");
     for line in &commands {
-        let told = run(&site, line);
-        assert!(!line.contains(" --draw ") || told.starts_with("drawn: "), "{line}: {told}");
+        let printed = run(&site, line);
+        assert!(!line.contains(" --draw ") || printed.starts_with("drawn: "), "{line}: {printed}");
     }
     for file in ["my_train/line.svg", "my_train/effort.svg", "metro/track.toml"] {
         assert!(site.path().join(file).is_file(), "{file}");

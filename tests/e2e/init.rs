@@ -30,12 +30,12 @@ fn the_demos_recordings_are_described_as_they_are_by_hand() {
     let runs = ["01", "02", "03", "06"].map(|name| format!("{DEMO}/runs/{name}.csv"));
     let mut arguments = vec!["init", "train", "--mass-t", "1755", "--csv"];
     arguments.extend(runs.iter().map(String::as_str));
-    let told = done(&site, &arguments);
+    let printed = done(&site, &arguments);
     for words in
         ["brake_pressure_pa", "not mapped", "next, once", "dynocar check train/dataset.toml"]
     {
-        let is_there = told.contains(words);
-        assert_eq!(is_there, words != "not mapped", "{words}: {told}");
+        let is_there = printed.contains(words);
+        assert_eq!(is_there, words != "not mapped", "{words}: {printed}");
     }
     let (_, made) = open(&site.path().join("train")).unwrap();
     let (_, by_hand) = open(Path::new(DEMO)).unwrap();
@@ -73,7 +73,7 @@ fn recordings_of_five_houses_in_any_unit_are_described_as_they_were_written() {
             arguments.push(name.clone());
         }
         let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-        let told = done(&site, &arguments);
+        let printed = done(&site, &arguments);
         let (_, made) = open(&site.path().join("made")).unwrap();
         let truth = &files.iter().find(|(name, _)| name == "dataset.toml").unwrap().1;
         let truth = Manifest::parse("dataset.toml", truth).unwrap();
@@ -82,17 +82,23 @@ fn recordings_of_five_houses_in_any_unit_are_described_as_they_were_written() {
             let is_right = made.contains(&column);
             right += usize::from(is_right);
             if !is_right {
-                let is_doubted = told.contains(&format!("doubtful: {}:", column.0));
-                let left_out = told.contains(&format!("not mapped: '{}'", column.1));
-                assert!(is_doubted || left_out, "seed {seed}: {column:?} is wrong, sure:\n{told}");
+                let is_doubted = printed.contains(&format!("doubtful: {}:", column.0));
+                let left_out = printed.contains(&format!("not mapped: '{}'", column.1));
+                assert!(
+                    is_doubted || left_out,
+                    "seed {seed}: {column:?} is wrong, sure:\n{printed}"
+                );
                 wrong.push(format!("seed {seed}: {column:?}"));
             }
         }
-        assert!(made.len() <= columns(&truth).len(), "seed {seed}: something is made up:\n{told}");
+        assert!(
+            made.len() <= columns(&truth).len(),
+            "seed {seed}: something is made up:\n{printed}"
+        );
         done(&site, &["check", "made"]);
     }
     assert!(right > 100, "{right} columns");
-    // What no name gives and no motion tells stays open: °F, and counts of a thousandth.
+    // What no name gives and no motion reveals stays open: °F, and counts of a thousandth.
     assert!(wrong.len() * 15 <= right, "{right} right, wrong: {wrong:#?}");
 }
 
@@ -115,18 +121,24 @@ fn a_unit_that_no_name_gives_is_set_right_by_how_the_train_moves() {
         })
         .collect();
     site.write("slow.csv", &slow);
-    let told = done(&site, &["init", "made", "--csv", "slow.csv"]);
+    let printed = done(&site, &["init", "made", "--csv", "slow.csv"]);
     let text = read_to_string(site.path().join("made/dataset.toml")).unwrap();
     assert!(text.contains("speed = { column = \"v\", unit = \"km/h\" }"), "{text}");
-    assert!(told.contains("doubtful: speed: the name gives no unit; km/h, since in m/s"), "{told}");
+    assert!(
+        printed.contains("doubtful: speed: the name gives no unit; km/h, since in m/s"),
+        "{printed}"
+    );
 }
 
 #[test]
 fn without_recordings_train_and_configuration_are_written_and_pass_the_check() {
     let site = Site::new();
-    let told = done(&site, &["init", "a new/train", "--name", "S 7", "--mass-t", "114.5"]);
-    assert!(told.contains("defaults in train.toml, nobody's figures: length_m = 57.25"), "{told}");
-    assert!(told.contains("dynocar run --config 'a new/train/daemon.toml'"), "{told}");
+    let printed = done(&site, &["init", "a new/train", "--name", "S 7", "--mass-t", "114.5"]);
+    assert!(
+        printed.contains("defaults in train.toml, nobody's figures: length_m = 57.25"),
+        "{printed}"
+    );
+    assert!(printed.contains("dynocar run --config 'a new/train/daemon.toml'"), "{printed}");
     let train = done(&site, &["check", "a new/train/train.toml"]);
     assert!(train.contains("S 7") && train.contains("114.5"), "{train}");
     done(&site, &["check", "a new/train/daemon.toml"]);

@@ -107,12 +107,12 @@ fn a_wrong_command_line_is_refused_with_what_helps() {
     let message = with(&["--csv", &csv, "--column", "time=A", "--column", "speed=B"]);
     assert!(message.contains("expected every run once, found the file twice"), "{message}");
     let message = refusal(&site, &["init", &new, "--column", "time=A"]);
-    assert!(message.contains("--column: expected recordings beside it"), "{message}");
-    let told = done(
+    assert!(message.contains("--column: expected recordings with it"), "{message}");
+    let printed = done(
         &site,
         &["init", "made", "--csv", &csv, "--column", "time=A", "--column", "speed=B:km/h"],
     );
-    assert!(told.contains("told on the command line"), "{told}");
+    assert!(printed.contains("given on the command line"), "{printed}");
     done(&site, &["check", "made"]);
 }
 

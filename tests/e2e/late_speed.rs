@@ -1,4 +1,4 @@
-//! A speed sensor that is late is told as that, and no places are made up for what it does on gradients.
+//! A speed sensor that is late is reported as that, and no places are made up for what it does on gradients.
 
 use dynocar_analysis::explain::answer::{ExplainAnswer, Verdict};
 use dynocar_analysis::explain::explain;
@@ -54,9 +54,9 @@ fn a_late_speed_is_named_whether_dead_time_or_lag_and_no_place_is_made_up() {
 #[test]
 fn on_a_level_line_a_position_of_its_own_shows_and_forces_that_act_late_stay_ambiguous() {
     let late_speed = Effect::SpeedDelay { delay_s: 0.8, lag_s: 0.0 };
-    let told = answer(&dataset_files(&simulated(9202, late_speed, true)));
-    assert_eq!(told.verdict, Verdict::Effect, "{}", told.statement);
-    assert_eq!(named(&told), ["speed_delay"], "{}", told.statement);
+    let explained = answer(&dataset_files(&simulated(9202, late_speed, true)));
+    assert_eq!(explained.verdict, Verdict::Effect, "{}", explained.statement);
+    assert_eq!(named(&explained), ["speed_delay"], "{}", explained.statement);
 
     let late_force = Effect::ActuatorDelay { delay_s: 0.8, lag_s: 0.0 };
     let open = answer(&dataset_files(&simulated(9202, late_force, true)));

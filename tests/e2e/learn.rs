@@ -154,7 +154,7 @@ fn an_undeclared_tunnel_becomes_a_candidate_once_and_is_adopted_and_taken_back_b
     place.record("second", 7..8);
     let said = place.learn(&[]);
     assert!(said.contains(&format!("model {} says so already", candidate.hash)), "{said}");
-    assert_eq!(learned(&models).len(), 1, "told once");
+    assert_eq!(learned(&models).len(), 1, "reported once");
 
     let hash = candidate.hash.to_string();
     let (status, shown, _) = place.say(&["show", &hash[..5]]);
@@ -320,7 +320,7 @@ fn runs_and_names_that_cannot_be_are_refused_or_left_out_in_words() {
     std::fs::write(place.path("runs/half.mcap"), b"\x89MCAP0\r\n and no end").unwrap();
     let said = place.learn(&[]);
     assert!(said.contains("left out: ") && said.contains("bad/dataset.toml"), "{said}");
-    assert!(!place.learn(&[]).contains("left out"), "told once");
+    assert!(!place.learn(&[]).contains("left out"), "reported once");
     let (status, _, empty) = place.say(&["list", "--train", "7"]);
     assert!(status == Some(2) && empty.contains("choose one by --train"), "{empty}");
     let nowhere = ["learn", "--once", "--config"];

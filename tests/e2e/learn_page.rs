@@ -162,10 +162,10 @@ fn the_page_of_what_was_learned_shows_models_decisions_and_events_on_wide_and_na
             "Open questions",
         ];
         assert_eq!(seen["sections"], json!(sections));
-        let told = |row: usize| seen["models"][row].as_array().expect("a row").clone();
+        let cells = |row: usize| seen["models"][row].as_array().expect("a row").clone();
         let shown: Vec<(String, &str)> =
             [(0, "declared"), (1, "in force"), (2, "candidate"), (3, "rejected")]
-                .map(|(row, state)| (told(row)[0].as_str().unwrap().to_owned(), state))
+                .map(|(row, state)| (cells(row)[0].as_str().unwrap().to_owned(), state))
                 .into();
         // Each stands below the one that it grew from, and deeper.
         let expected = [
@@ -176,10 +176,10 @@ fn the_page_of_what_was_learned_shows_models_decisions_and_events_on_wide_and_na
         ];
         assert_eq!(shown, expected);
         for (row, (_, state)) in expected.iter().enumerate() {
-            assert_eq!(told(row)[2], *state);
+            assert_eq!(cells(row)[2], *state);
         }
-        assert_eq!(told(1)[3], "tunnel drag at 12400–13650 m");
-        assert_eq!((&told(1)[4], &told(1)[5]), (&json!("0.842"), &json!("0.317")));
+        assert_eq!(cells(1)[3], "tunnel drag at 12400–13650 m");
+        assert_eq!((&cells(1)[4], &cells(1)[5]), (&json!("0.842"), &json!("0.317")));
         assert_eq!(seen["marked"], 1);
         let plots = seen["plots"].as_array().expect("plots");
         assert_eq!(plots.len(), 1, "one for each width: {plots:?}");

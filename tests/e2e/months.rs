@@ -25,31 +25,31 @@ fn lived(story: Story, span: Span, days: usize) -> Outcome {
 fn an_undeclared_tunnel_is_adopted_within_days_and_the_error_falls() {
     let span = Span { onset: 2, end: 12 };
     let outcome = lived(Story::Appears(EffectKind::TunnelDrag), span, 12);
-    let told = format!("{HEADER}{}", line(&outcome));
+    let printed = format!("{HEADER}{}", line(&outcome));
     let adopted = outcome.first_change(span.onset..span.end, false);
-    assert!(adopted.is_some_and(|day| day <= 10), "{told}");
-    assert!(outcome.adoptions[0].adds.contains("tunnel drag"), "{told}");
-    assert_eq!(outcome.mistakes(), 0, "{told}");
+    assert!(adopted.is_some_and(|day| day <= 10), "{printed}");
+    assert!(outcome.adoptions[0].adds.contains("tunnel drag"), "{printed}");
+    assert_eq!(outcome.mistakes(), 0, "{printed}");
     let before = outcome.error_mps(span.onset..span.onset + 2).unwrap();
-    assert!(outcome.error_mps(11..12).unwrap() < 0.6 * before, "{told}");
+    assert!(outcome.error_mps(11..12).unwrap() < 0.6 * before, "{printed}");
 }
 
 #[test]
 fn what_is_over_is_taken_back() {
     let span = Span { onset: 2, end: 10 };
     let outcome = lived(Story::Winter, span, 16);
-    let told = format!("{HEADER}{}", line(&outcome));
-    assert!(outcome.first_change(span.onset..span.end, false).is_some(), "{told}");
-    assert!(outcome.first_change(span.end..16, true).is_some(), "{told}");
-    assert_eq!(outcome.mistakes(), 0, "{told}");
+    let printed = format!("{HEADER}{}", line(&outcome));
+    assert!(outcome.first_change(span.onset..span.end, false).is_some(), "{printed}");
+    assert!(outcome.first_change(span.end..16, true).is_some(), "{printed}");
+    assert_eq!(outcome.mistakes(), 0, "{printed}");
 }
 
 #[test]
 fn a_brake_that_drags_for_a_day_is_a_maintenance_event_and_no_model() {
     let outcome = lived(Story::BrakeDrags, Span { onset: 2, end: 3 }, 6);
-    let told = format!("{HEADER}{}", line(&outcome));
-    assert!(outcome.events.iter().any(|kind| kind == "dragging_brake"), "{told}");
-    assert!(outcome.adoptions.is_empty(), "{told}");
+    let printed = format!("{HEADER}{}", line(&outcome));
+    assert!(outcome.events.iter().any(|kind| kind == "dragging_brake"), "{printed}");
+    assert!(outcome.adoptions.is_empty(), "{printed}");
 }
 
 #[test]

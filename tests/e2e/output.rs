@@ -130,7 +130,7 @@ fn a_daemon_whose_log_cannot_be_written_serves_and_health_keeps_its_verdict() {
             || "a daemon that is well".into(),
         );
         assert_eq!(verdict(lost(), Stdio::null()), Some(0), "a daemon that is well");
-        assert_eq!(verdict(lost(), lost()), Some(0), "nobody to be told");
+        assert_eq!(verdict(lost(), lost()), Some(0), "nobody to report to");
         assert!(daemon.try_wait().unwrap().is_none(), "the daemon goes on");
         let pid = rustix::process::Pid::from_raw(daemon.id() as i32).unwrap();
         rustix::process::kill_process(pid, Signal::TERM).unwrap();

@@ -88,10 +88,10 @@ fn the_package_is_built_installed_and_runs() {
         let mut query = Command::new("dpkg-query");
         query.arg(format!("--admindir={}", root.join("var/lib/dpkg").display()));
         query.args(["--showformat", "${Status}\n${Conffiles}\n", "--show", "dynocar"]);
-        let told = must_succeed(&mut query);
-        assert!(told.starts_with("install ok installed\n"), "{told}");
+        let printed = must_succeed(&mut query);
+        assert!(printed.starts_with("install ok installed\n"), "{printed}");
         for file in ["/etc/dynocar/daemon.toml ", "/etc/dynocar/train.toml "] {
-            assert!(told.contains(file), "{told}");
+            assert!(printed.contains(file), "{printed}");
         }
     }
     let program = root.join("usr/bin/dynocar");
@@ -134,9 +134,9 @@ fn links_and_runs(root: &Path, folder: &Path) {
     require("pkg-config", "pkg-config");
     let mut asked = Command::new("pkg-config");
     asked.env("PKG_CONFIG_PATH", library.join("pkgconfig"));
-    let told = must_succeed(asked.args(["--cflags", "--libs", "dynocar-client"]));
-    built(&told.split_whitespace().map(String::from).collect::<Vec<_>>());
-    let (source, words) = (folder.join("absent.cpp"), told.split_whitespace());
+    let printed = must_succeed(asked.args(["--cflags", "--libs", "dynocar-client"]));
+    built(&printed.split_whitespace().map(String::from).collect::<Vec<_>>());
+    let (source, words) = (folder.join("absent.cpp"), printed.split_whitespace());
     let text = "#include <dynocar.hpp>\n\
                 int main() { return dynocar::daemon_state(1, \"/nowhere\").state; }\n";
     std::fs::write(&source, text).unwrap();

@@ -1,4 +1,4 @@
-//! Files of ours after a power cut: whole, and never older than what was told to be kept.
+//! Files of ours after a power cut: whole, and never older than what was ordered to be kept.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ const CONTENTS: [&str; 4] =
 fn cut(neglect: Neglect) -> (usize, Option<String>) {
     let path = Path::new("train-1.state");
     let disk = LossyDisk::new(neglect);
-    // Steps by which each content was told to be kept.
+    // Steps by which each content was ordered to be kept.
     let kept: Vec<usize> = CONTENTS
         .iter()
         .map(|content| {

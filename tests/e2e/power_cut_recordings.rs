@@ -180,7 +180,7 @@ fn recovered(contents: &[Vec<u8>]) -> Vec<u64> {
     for (path, content) in files.iter().zip(contents) {
         std::fs::write(path, content).unwrap();
     }
-    // One alone of which there is nothing is told to be none.
+    // One alone of which there is nothing is reported to be none.
     let notes = LossyDisk::new(Neglect::Nothing);
     if files.is_empty() || recover_on(&NotedDisk { notes }, &files, &path).is_err() {
         return Vec::new();
@@ -197,8 +197,8 @@ fn is_whole(sequences: &[u64], oldest: u64, lasting: u64) -> Result<(), String> 
     let there = sequences.iter().filter(|it| (oldest..=lasting).contains(it)).count() as u64;
     if !is_in_order || there < (lasting + 1).saturating_sub(oldest) {
         let (first, last) = (sequences.first(), sequences.last());
-        let told = format!("{first:?} to {last:?}, in order {is_in_order}");
-        return Err(format!("{told}; expected {oldest} to {lasting}, found {there}"));
+        let found = format!("{first:?} to {last:?}, in order {is_in_order}");
+        return Err(format!("{found}; expected {oldest} to {lasting}, found {there}"));
     }
     Ok(())
 }
@@ -257,7 +257,7 @@ fn cut_recovery(neglect: Neglect) -> Option<String> {
         for left in notes.left_after(count) {
             let there = left.get(&to);
             if count == notes.steps() && there != Some(&whole) {
-                return Some("it is lost though it was told to be there".into());
+                return Some("it is lost though it was reported to be there".into());
             }
             let Some(content) = there.filter(|it| **it != whole) else { continue };
             std::fs::write(folder.path().join("left.mcap"), content).unwrap();

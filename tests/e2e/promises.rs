@@ -92,7 +92,7 @@ fn the_reading_guide_has_a_line_for_every_member_of_the_vocabularies() {
             assert!(names.contains(name), "the page has no line for {name}");
         }
         for name in names {
-            assert!(members.contains(name), "the page tells of {name}, which is not there");
+            assert!(members.contains(name), "the page names {name}, which is not there");
         }
     }
     assert_all(&names_in("Every pipeline"), PipelineKind::ALL.iter().map(|it| it.name()));

@@ -121,7 +121,7 @@ fn a_pointer_reads_what_was_recorded_and_a_drag_narrows_the_axis() {
     let run = report.simulated.runs.iter().find(|run| run.plan.file() == file).unwrap();
     let time_s = |sample: &TrainSample| 1e-9 * sample.time_ns as f64;
     let seen = look(&mut browser, TRACE);
-    assert_eq!(seen["reading"], json!([]), "nothing is told before a pointer comes");
+    assert_eq!(seen["reading"], json!([]), "nothing is shown before a pointer comes");
     let whole = labelled(&seen);
     let is_recorded = |seen: &Value, [x_px, _]: [f64; 2]| {
         let (at_s, speed_mps) = (read(seen, "Time in the recording"), read(seen, "measured"));
@@ -187,8 +187,8 @@ fn keys_read_every_run_as_the_table_says_it() {
         let rows = table.as_array().unwrap();
         let row = rows.iter().find(|row| row[0].as_str() == Some(&run.to_string())).unwrap();
         for (name, k) in [("before", 3), ("after", 4)] {
-            let told: f64 = row[k].as_str().unwrap().parse().unwrap();
-            assert!((read(&seen, name) - told).abs() < 1.1e-3, "{name}: {told} in {seen:#}");
+            let printed: f64 = row[k].as_str().unwrap().parse().unwrap();
+            assert!((read(&seen, name) - printed).abs() < 1.1e-3, "{name}: {printed} in {seen:#}");
         }
         runs_read.push(run as u32);
     }

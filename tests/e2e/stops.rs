@@ -20,8 +20,8 @@ fn recording(factor: f64, from_mps: f64) -> (String, f64) {
         let time_s = step_s * f64::from(k);
         let is_braking = time_s >= 30.0;
         if k % 20 == 0 {
-            let told_kmh = (36.0 * speed_mps).round() / 10.0;
-            writeln!(text, "{time_s:.1},{told_kmh:.1},{}", i32::from(is_braking)).unwrap();
+            let shown_kmh = (36.0 * speed_mps).round() / 10.0;
+            writeln!(text, "{time_s:.1},{shown_kmh:.1},{}", i32::from(is_braking)).unwrap();
         }
         if time_s >= 31.0 {
             let deceleration_mps2 = factor * (0.35 + 0.6 / (1.0 + speed_mps / 10.0));
@@ -105,7 +105,7 @@ fn recordings_without_a_stop_and_speeds_never_seen_are_refused_in_words() {
     assert!(words.contains("no run holds a stop"), "{words}");
     let with = site(&[("fit", recording(1.0, 20.0).0)], COLUMNS);
     for (options, expected) in [
-        (["--from", "50"], "nothing is told of faster ones"),
+        (["--from", "50"], "nothing is reported of faster ones"),
         (["--from", "0"], "a speed above 0"),
         (["--repeatability", "2"], "a share above 0"),
     ] {

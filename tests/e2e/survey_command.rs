@@ -85,17 +85,17 @@ fn changed(change: &dyn Fn(&str, String) -> String) -> tempfile::TempDir {
 #[test]
 fn a_closed_pipe_ends_it_quietly_and_a_full_disk_is_reported() {
     let (raw, out) = (surveyed().path("raw"), tempfile::tempdir().unwrap());
-    let told = |standard_output: Stdio| {
+    let printed = |standard_output: Stdio| {
         let mut command = Command::new(DYNOCAR);
         command.arg("survey").arg(&raw).arg("--out").arg(out.path().join("line"));
         let output = command.stdout(standard_output).stderr(Stdio::piped()).output().unwrap();
         (output.status.code(), String::from_utf8(output.stderr).unwrap())
     };
     let (_, writer) = std::io::pipe().unwrap();
-    let (status, words) = told(writer.into());
+    let (status, words) = printed(writer.into());
     assert!(status == Some(0) && !words.contains("panicked"), "{status:?}: {words}");
     let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-    let (status, words) = told(full.into());
+    let (status, words) = printed(full.into());
     assert!(status == Some(1) && words.contains("cannot be written"), "{status:?}: {words}");
 }
 

@@ -1,4 +1,4 @@
-//! What the data cannot tell is said.
+//! What the data do not determine is said.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -53,13 +53,13 @@ fn one_speed_does_not_show_a_b_and_c_apart_and_several_do() {
     let steady = explained(folder.path(), &[19.0]).answer;
     assert!(steady.effects.is_empty(), "{}", steady.statement);
     assert!(steady.statement.contains("hardly tell"), "{}", steady.statement);
-    let told = steady.base.told_by_data;
-    assert!(told.b < 0.3 && told.c < 0.5, "{told:?}");
+    let by_data = steady.base.told_by_data;
+    assert!(by_data.b < 0.3 && by_data.c < 0.5, "{by_data:?}");
     let folder = tempfile::tempdir().unwrap();
     let varied = explained(folder.path(), &[5.0, 12.0, 20.0, 28.0, 9.0]).answer;
     assert!(!varied.statement.contains("hardly tell"), "{}", varied.statement);
-    let told = varied.base.told_by_data;
-    assert!([told.a, told.b, told.c].iter().all(|share| *share > 0.5), "{told:?}");
+    let by_data = varied.base.told_by_data;
+    assert!([by_data.a, by_data.b, by_data.c].iter().all(|share| *share > 0.5), "{by_data:?}");
 }
 
 #[test]
@@ -74,8 +74,11 @@ fn steady_runs_hide_a_rotating_mass_and_level_ones_hold_it_for_a_mass() {
     assert!(steady.statement.contains("could hide in these data"), "{}", steady.statement);
     let folder = tempfile::tempdir().unwrap();
     let level = explained(folder.path(), &[5.0, 20.0, 8.0, 28.0, 4.0, 24.0, 9.0]).answer;
-    let told = of(&level, "rotating_mass").expect("it can be tested");
-    assert!(told.told && told.std.is_some_and(|std| std < 0.01), "{told:?}");
-    assert!(told.alike.contains(&"mass_change"), "{told:?}");
+    let rotating_mass = of(&level, "rotating_mass").expect("it can be tested");
+    assert!(
+        rotating_mass.told && rotating_mass.std.is_some_and(|std| std < 0.01),
+        "{rotating_mass:?}"
+    );
+    assert!(rotating_mass.alike.contains(&"mass_change"), "{rotating_mass:?}");
     assert!(level.statement.contains("look alike"), "{}", level.statement);
 }

@@ -43,11 +43,11 @@ impl Controller {
     fn of(site: &Site) -> Controller {
         let host = site.host();
         let must_end = Arc::new(AtomicBool::new(false));
-        let told = Arc::clone(&must_end);
+        let is_ended = Arc::clone(&must_end);
         let thread = std::thread::spawn(move || {
             let mut publisher = SamplePublisher::open(&host, TRAIN).unwrap();
             let mut speed_mps = 30.0;
-            while !told.load(Ordering::Relaxed) {
+            while !is_ended.load(Ordering::Relaxed) {
                 let mut sample = TrainSample::empty(TRAIN)
                     .with(SampleField::Speed, speed_mps)
                     .with(SampleField::TractionForce, 0.0)

@@ -227,9 +227,9 @@ fn the_advised_manoeuvre_shows_more_than_most_and_about_as_much_as_the_best() {
         "advised over the best other {against_best:.2?}, over the middle {against_middle:.2?}"
     );
     let [_, best, most] = quantiles(against_best);
-    assert!(best < 1.1 && most < 1.25, "none of the others tells much more: {best}, {most}");
+    assert!(best < 1.1 && most < 1.25, "none of the others shows much more: {best}, {most}");
     let is_ahead = against_middle.iter().all(|&share| share < 0.95);
-    assert!(is_ahead, "most of the others tell less: {against_middle:.2?}");
+    assert!(is_ahead, "most of the others show less: {against_middle:.2?}");
 }
 
 #[test]

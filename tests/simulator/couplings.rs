@@ -26,9 +26,10 @@ fn a_locomotive_that_leaps_ahead_of_its_wagons_does_not_pull_harder() {
             };
             let dataset = read_files(&dataset_files(&simulated));
             let answer = explain(&dataset, &|_, _| ()).unwrap().answer;
-            let told = serde_json::to_value(&answer).unwrap();
-            let gain = told["effects"][0]["parameters"]["gain"].as_f64().expect("a gain");
-            let std = told["effects"][0]["std"]["gain"].as_f64().expect("its deviation");
+            let written = serde_json::to_value(&answer).unwrap();
+            let gain = written["effects"][0]["parameters"]["gain"].as_f64().expect("a gain");
+            let std =
+                written["effects"][0]["std"]["gain"].as_f64().expect("its standard deviation");
             eprintln!("seed {seed}: {gain:.4} for {truth:.4}, {:+.1} sd", (gain - truth) / std);
             (gain - truth).powi(2)
         })

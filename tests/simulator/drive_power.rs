@@ -1,5 +1,5 @@
 //! Simulated trains of which the drive's power is recorded and no force: the efficiency that is
-//! told, its interval, and what is explained with it.
+//! estimated, its interval, and what is explained with it.
 
 use dynocar_analysis::dataset::{Dataset, ForceSource};
 use dynocar_analysis::explain::{drive, explain};
@@ -43,16 +43,17 @@ fn held_and_errors(has_auxiliaries: bool) -> (usize, Vec<f64>) {
     let (mut held, mut errors) = (0, Vec::new());
     for seed in SEEDS {
         let truth = true_drive(seed, has_auxiliaries);
-        let told = drive::told(&dataset(seed, &truth, EffectRequest::none())).unwrap().unwrap();
-        let found = told.answer.efficiency;
+        let estimated =
+            drive::told(&dataset(seed, &truth, EffectRequest::none())).unwrap().unwrap();
+        let found = estimated.answer.efficiency;
         let error = found.value - truth.efficiency;
         eprintln!(
-            "seed {seed}: {:.3} told as {:.4} ± {:.4}, auxiliaries {:?} told as {:?} kW",
+            "seed {seed}: {:.3} estimated as {:.4} ± {:.4}, auxiliaries {:?} estimated as {:?} kW",
             truth.efficiency,
             found.value,
             1.96 * found.std,
             truth.auxiliary_power_w,
-            told.answer.auxiliary_power_kw
+            estimated.answer.auxiliary_power_kw
         );
         held += usize::from(error.abs() <= 1.96 * found.std);
         assert!(1.96 * found.std < HALF_WIDTH_MAX, "seed {seed}");

@@ -130,7 +130,7 @@ fn declared_files_are_the_same_with_and_without_the_effect() {
             dataset_files(&simulate(&settings))
         };
         let (effect, null) = (with(&[kind]), with(&[]));
-        // Only the recordings tell.
+        // Only the recordings show it.
         assert_eq!(effect[..3], null[..3], "{kind}");
         assert_ne!(effect[3..], null[3..], "{kind}");
     }

@@ -8,7 +8,7 @@ use dynocar_tests::simulator::{Effect, EffectRequest, SimulatorSettings, simulat
 /// Of a fast train on 60 km: 2.7 km each, 1.1 km apart, so that the end of one and the start of the other
 /// are felt together.
 const SEED: u64 = 97_004;
-/// Largest distance in m of an end from the truth; a sample is 16 m of way there.
+/// Largest distance in m of an end from the truth; a sample is 16 m of distance there.
 const END_ERROR_MAX_M: f64 = 30.0;
 
 #[test]
@@ -21,12 +21,12 @@ fn two_places_felt_together_are_reported_with_their_ends_and_are_no_tunnels() {
     assert_eq!(truth.len(), 2);
     assert!(truth[1].0 - truth[0].1 < 1500.0, "{truth:?}");
     let answer = explain(&read_files(&dataset_files(&simulated)), &|_, _| ()).unwrap().answer;
-    let told = serde_json::to_value(&answer).unwrap();
-    assert_eq!(told["effects"][0]["kind"], "local_resistance", "{}", told["statement"]);
-    assert_eq!(told["effects"].as_array().map(Vec::len), Some(1), "{}", told["statement"]);
+    let written = serde_json::to_value(&answer).unwrap();
+    assert_eq!(written["effects"][0]["kind"], "local_resistance", "{}", written["statement"]);
+    assert_eq!(written["effects"].as_array().map(Vec::len), Some(1), "{}", written["statement"]);
     for (place, &(from_m, to_m)) in truth.iter().enumerate() {
         for (end, true_m) in [from_m, to_m].into_iter().enumerate() {
-            let found_m = &told["effects"][0]["where"]["intervals_m"][place][end];
+            let found_m = &written["effects"][0]["where"]["intervals_m"][place][end];
             let error_m = (found_m.as_f64().expect("an end") - true_m).abs();
             assert!(error_m < END_ERROR_MAX_M, "{found_m} for {true_m} m");
         }

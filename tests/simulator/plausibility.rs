@@ -1,4 +1,4 @@
-//! Slips of the pen in simulated datasets: each is named by `check`, `identify` and `explain`, no
+//! Input faults in simulated datasets: each is named by `check`, `identify` and `explain`, no
 //! pipeline stays trusted, and nothing is said of data that are right, whatever effect acts.
 
 use std::path::Path;
@@ -35,7 +35,7 @@ enum InputFault {
 const FORCES: &[&str] = &["traction_force", "brake_force", "control_force"];
 
 /// What goes wrong, the code of the note, and the reason of the pipelines.
-const SLIPS: [(&str, InputFault, &str, Reason); 17] = [
+const FAULTS: [(&str, InputFault, &str, Reason); 17] = [
     ("kN as N", InputFault::Scale(FORCES, 1e-3), "forces_scale", Reason::ImplausibleForces),
     ("N as kN", InputFault::Scale(FORCES, 1e3), "forces_scale", Reason::ImplausibleForces),
     ("lbf as N", InputFault::Scale(FORCES, 0.224_809), "forces_scale", Reason::ImplausibleForces),
@@ -139,25 +139,25 @@ fn files(settings: &SimulatorSettings) -> Vec<(String, String)> {
     dataset_files(&simulate(settings))
 }
 
-/// Writes a dataset with a slip.
-fn write(files: &[(String, String)], slip: Option<InputFault>, folder: &Path) {
+/// Writes a dataset with an input fault.
+fn write(files: &[(String, String)], fault: Option<InputFault>, folder: &Path) {
     std::fs::create_dir_all(folder.join("runs")).unwrap();
     for (path, text) in files {
-        let changed = |slip: InputFault| {
-            let lines = text.lines().map(|line| slip.line(path, line) + "\n");
+        let changed = |fault: InputFault| {
+            let lines = text.lines().map(|line| fault.line(path, line) + "\n");
             lines.collect::<String>()
         };
-        let text = match slip {
-            Some(slip) if path.ends_with(".toml") => changed(slip),
+        let text = match fault {
+            Some(fault) if path.ends_with(".toml") => changed(fault),
             _ => text.clone(),
         };
         std::fs::write(folder.join(path), text).unwrap();
     }
 }
 
-/// What a command tells on the terminal, on one line, and its answer, or its error, as where no
+/// What a command prints on the terminal, on one line, and its answer, or its error, as where no
 /// sample is usable.
-fn told(folder: &Path, command: &[&str]) -> (String, Value) {
+fn printed(folder: &Path, command: &[&str]) -> (String, Value) {
     let file = folder.join(format!("{}.json", command[0]));
     let run = Command::new(DYNOCAR)
         .args([command[0], folder.to_str().unwrap()])
@@ -184,10 +184,10 @@ const TRAINS: [(u64, TrainType); 2] = [(401, TrainType::Freight), (402, TrainTyp
 fn every_input_fault_is_named_by_check_identify_and_explain_on_the_terminal_and_in_json() {
     for (seed, train_type) in TRAINS {
         let files = files(&settings(seed, train_type, EffectRequest::none()));
-        for (name, slip, code, _) in SLIPS {
+        for (name, fault, code, _) in FAULTS {
             let folder = tempfile::tempdir().unwrap();
             let folder = folder.path();
-            write(&files, Some(slip), folder);
+            write(&files, Some(fault), folder);
             let case = format!("{name}, {}", train_type.name());
             let dataset = dataset::load(folder).unwrap();
             let note = dataset.notes().into_iter().find(|note| note.code == code).unwrap();
@@ -201,13 +201,13 @@ fn every_input_fault_is_named_by_check_identify_and_explain_on_the_terminal_and_
             ];
             let mut explained = Value::Null;
             for command in commands {
-                let (text, answer) = told(folder, command);
+                let (text, answer) = printed(folder, command);
                 assert!(text.contains(&words), "{}: {case}: {text}", command[0]);
                 let is_error = answer["error"]["message"].as_str().is_some();
                 assert!(is_error || has_note(&answer, code), "{}: {case}", command[0]);
                 explained = answer;
             }
-            // Where no sample is usable there is no answer, and the error names the slip.
+            // Where no sample is usable there is no answer, and the error names the input fault.
             if let Some(message) = explained["error"]["message"].as_str() {
                 assert!(message.contains(&words), "explain: {case}: {message}");
                 continue;
@@ -229,9 +229,9 @@ fn every_input_fault_is_named_by_check_identify_and_explain_on_the_terminal_and_
 fn no_pipeline_trusts_samples_that_cannot_be_true() {
     let (seed, train_type) = TRAINS[1];
     let files = files(&settings(seed, train_type, EffectRequest::none()));
-    for (name, slip, _, reason) in SLIPS {
+    for (name, fault, _, reason) in FAULTS {
         let folder = tempfile::tempdir().unwrap();
-        write(&files, Some(slip), folder.path());
+        write(&files, Some(fault), folder.path());
         let dataset = dataset::load(folder.path()).unwrap();
         let samples = published_samples(&dataset, TrainId(1));
         for settings in default_estimators() {

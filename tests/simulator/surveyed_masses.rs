@@ -18,7 +18,7 @@ const PIECE: usize = 600;
 /// Lines.
 const SEEDS: std::ops::Range<u64> = 31..35;
 
-/// Masses of the pieces of runs held out less the true one, in standard deviations as told, with the
+/// Masses of the pieces of runs held out less the true one, in standard deviations as reported, with the
 /// gradient's uncertainty and as if nobody had stated it.
 fn errors(kind: PipelineKind) -> [Vec<f64>; 2] {
     let mut both = [Vec::new(), Vec::new()];
@@ -80,7 +80,7 @@ fn masses_on_a_surveyed_line_are_as_sure_as_they_say() {
         let [stated, unstated] = errors(kind);
         let (stated, count, unstated) = (rms(&stated), stated.len(), rms(&unstated));
         eprintln!("{kind:?}: {count} pieces, {stated:.2}, {unstated:.2} where nothing is stated");
-        assert!((0.7..1.3).contains(&stated), "{kind:?}: {stated} of its own deviations");
+        assert!((0.7..1.3).contains(&stated), "{kind:?}: {stated} of its own standard deviations");
         assert!(unstated > 1.1 * stated, "{kind:?}: the line's uncertainty changes nothing");
     }
 }

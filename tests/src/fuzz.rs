@@ -365,7 +365,7 @@ pub fn run(target: Target, rounds: u64, seed: u64) -> u64 {
             Ok(is_accepted) => accepted += u64::from(is_accepted),
             Err(cause) => {
                 let path = target.folder().join(format!("panic-{seed}-{round}.bin"));
-                // The panic tells more than a failure to keep the input.
+                // The panic says more than a failure to keep the input.
                 let _ = std::fs::write(&path, &input);
                 dynocar::output::report_line(&format!(
                     "{target:?}, seed {seed}, round {round}: {}",

@@ -1,4 +1,4 @@
-//! Timing of an estimator beside its peers, in interleaved rounds.
+//! Timing of an estimator compared with its peers, in interleaved rounds.
 //!
 //! Every contender of a case works on the same data. A round times each of them once, in an
 //! order that turns from round to round, so that a busy machine slows all alike; ratios are
@@ -112,7 +112,7 @@ impl Spread {
     }
 }
 
-/// Time of a peer beside ours.
+/// Time of a peer and of ours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PeerTime {
     /// Name of the peer.

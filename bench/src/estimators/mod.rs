@@ -1,4 +1,4 @@
-//! Speed of every estimator beside peers in the same run.
+//! Speed of every estimator compared with peers in the same run.
 //!
 //! Peers do the same work on the same data and must give the same answer before anything is
 //! timed, so that no speed is bought with accuracy.
@@ -9,7 +9,7 @@
 //!   [`resistance`]: the cases
 //! - [`pipelines`]: every kind of pipeline from sample to snapshot
 //! - [`report`]: the table and the JSON
-//! - [`beside`]: another build of the program beside this one
+//! - [`against`]: another build of the program beside this one
 
 pub mod against;
 pub mod braking;

@@ -1,4 +1,4 @@
-//! Warm trajectory fits over windows, beside the crate `levenberg-marquardt` (MINPACK's method).
+//! Warm trajectory fits over windows, compared with the crate `levenberg-marquardt` (MINPACK's method).
 
 use std::sync::Arc;
 
@@ -80,7 +80,7 @@ impl Windows {
         self
     }
 
-    fn stretch(&self, window: usize) -> MotionSegment<'_> {
+    fn segment(&self, window: usize) -> MotionSegment<'_> {
         let first = window * SLIDE;
         let last = first + self.samples - 1;
         MotionSegment {
@@ -91,7 +91,7 @@ impl Windows {
 
     fn fit(&self, fitter: &mut TrajectoryFitter, window: usize) -> TrajectoryFit {
         fitter
-            .fit(&[self.stretch(window)], Some(&self.warm[window]), &settings())
+            .fit(&[self.segment(window)], Some(&self.warm[window]), &settings())
             .expect("the window determines the coefficients")
     }
 
@@ -124,7 +124,7 @@ fn case(samples: usize, target_ns: f64) -> Case {
         peers: vec![Contender::new("levenberg-marquardt", WINDOWS, move || {
             let mut answers = Vec::with_capacity(3 * WINDOWS);
             for window in 0..WINDOWS {
-                let davis = peer_fit(of_peer.stretch(window), &of_peer.warm[window]);
+                let davis = peer_fit(of_peer.segment(window), &of_peer.warm[window]);
                 of_peer.answer(window, &davis, &mut answers);
             }
             answers
@@ -134,12 +134,12 @@ fn case(samples: usize, target_ns: f64) -> Case {
     }
 }
 
-fn peer_fit(stretch: MotionSegment<'_>, start: &Davis) -> Davis {
-    let point = peer::Vector4::new(start.a, start.b, start.c, stretch.speeds_mps[0]);
-    let samples = stretch.speeds_mps.len();
+fn peer_fit(segment: MotionSegment<'_>, start: &Davis) -> Davis {
+    let point = peer::Vector4::new(start.a, start.b, start.c, segment.speeds_mps[0]);
+    let samples = segment.speeds_mps.len();
     let share = DECREASE / (0.5 * samples as f64);
     let solver = LevenbergMarquardt::new().with_ftol(share);
-    let (problem, report) = solver.minimize(PeerProblem { stretch, point });
+    let (problem, report) = solver.minimize(PeerProblem { segment, point });
     assert!(report.termination.was_successful(), "{:?}", report.termination);
     problem.davis()
 }
@@ -147,7 +147,7 @@ fn peer_fit(stretch: MotionSegment<'_>, start: &Davis) -> Davis {
 /// Residuals of the computed trajectory and of the prior, in standard deviations, over
 /// (a, b, c, v_0).
 struct PeerProblem<'a> {
-    stretch: MotionSegment<'a>,
+    segment: MotionSegment<'a>,
     point: peer::Vector4<f64>,
 }
 
@@ -179,11 +179,11 @@ impl LeastSquaresProblem<f64, peer::Dyn, peer::U4> for PeerProblem<'_> {
     fn residuals(&self) -> Option<peer::DVector<f64>> {
         let davis = self.davis();
         let mut speed_mps = self.point[3];
-        let samples = self.stretch.speeds_mps.len();
+        let samples = self.segment.speeds_mps.len();
         let mut residuals = peer::DVector::zeros(samples + 3);
-        for (i, measured_mps) in self.stretch.speeds_mps.iter().enumerate() {
+        for (i, measured_mps) in self.segment.speeds_mps.iter().enumerate() {
             if i > 0 {
-                let step = &self.stretch.steps[i - 1];
+                let step = &self.segment.steps[i - 1];
                 speed_mps = StepRule::Distance.advance(step, &davis, speed_mps)?.speed_mps;
             }
             residuals[i] = (speed_mps - measured_mps) / SPEED_NOISE_MPS;
@@ -198,11 +198,11 @@ impl LeastSquaresProblem<f64, peer::Dyn, peer::U4> for PeerProblem<'_> {
         let davis = self.davis();
         let (mut speed_mps, mut by_initial) = (self.point[3], 1.0);
         let mut by_davis = Vector3::zeros();
-        let samples = self.stretch.speeds_mps.len();
+        let samples = self.segment.speeds_mps.len();
         let mut jacobian = peer::OMatrix::<f64, peer::Dyn, peer::U4>::zeros(samples + 3);
         for i in 0..samples {
             if i > 0 {
-                let step = &self.stretch.steps[i - 1];
+                let step = &self.segment.steps[i - 1];
                 let advance = StepRule::Distance.advance(step, &davis, speed_mps)?;
                 by_initial *= advance.by_speed;
                 by_davis = by_davis * advance.by_speed + advance.by_davis;

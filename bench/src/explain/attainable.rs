@@ -22,7 +22,7 @@ struct TrueLaw {
     parameters: Vec<Parameter>,
 }
 
-/// The numbers of a law beside its size; one that only scales another is none.
+/// The numbers of a law besides its size; one that only scales another is none.
 fn numbers(law: Law) -> Vec<f64> {
     match law {
         Law::Band { centre_mps, width_mps } => vec![centre_mps, width_mps],

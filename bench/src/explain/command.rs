@@ -25,7 +25,7 @@ pub struct ExplainArguments {
     /// Only this kind, as tunnel_drag, or none, two_effects, poor_recording; may be repeated
     #[arg(long = "kind", value_name = "NAME")]
     kinds: Vec<String>,
-    /// What is a little wrong beside the effect
+    /// What is a little wrong besides the effect
     #[arg(long, value_enum, default_value_t = World::Plain)]
     world: World,
     /// Datasets at a time
@@ -35,7 +35,7 @@ pub struct ExplainArguments {
     /// (none, tunnel_drag, dragging_brake and wind unless chosen) with more runs, then longer ones
     #[arg(long, conflicts_with_all = ["seeds", "threads", "write", "verbose", "world"])]
     growth: bool,
-    /// Tell the outcome of every dataset on standard error
+    /// Print the outcome of every dataset on standard error
     #[arg(long)]
     verbose: bool,
     /// Write the simulated datasets with their truth into this folder
@@ -108,7 +108,7 @@ fn print_case(case: &Case, grade: &Grade) {
         grade.share,
         parameters.join(", ")
     ));
-    dynocar::output::report_line(&format!("    strength {:.2}", grade.acceptance_score));
+    dynocar::output::report_line(&format!("    acceptance score {:.2}", grade.acceptance_score));
     for detail in &grade.details {
         dynocar::output::report_line(&format!("    {detail}"));
     }

@@ -38,7 +38,7 @@ pub struct Grade {
     pub left_ratio: Option<f64>,
     /// The same of the true law with estimated numbers, for a law that no library holds.
     pub attainable_ratio: Option<f64>,
-    /// Greatest strength of a candidate in the first round of the search.
+    /// Greatest acceptance score of a candidate in the first round of the search.
     pub acceptance_score: f64,
 }
 
@@ -120,7 +120,7 @@ fn is_exactly(
 ) -> bool {
     let mut expected: Vec<&str> =
         simulated.effects.iter().map(|effect| effect.kind().name()).collect();
-    if let Some(rival) = rival.filter(|rival| rival.is_never_told || verdict == "ambiguous") {
+    if let Some(rival) = rival.filter(|rival| rival.is_never_named || verdict == "ambiguous") {
         expected.push(rival.kind.name());
     }
     let mut found = found.to_vec();

@@ -51,7 +51,7 @@ pub struct FalseAlarms {
     pub runs: usize,
     /// Those for which an effect was named.
     pub raised: usize,
-    /// Greatest strength of a candidate: quantiles over the nulls, by share.
+    /// Greatest acceptance score of a candidate: quantiles over the nulls, by share.
     pub strength_quantiles: Vec<(f64, f64)>,
 }
 
@@ -94,7 +94,7 @@ pub fn cases(scenarios: &[Scenario], seeds: usize, first_seed: u64, world: World
 }
 
 /// Runs the matrix over [`cases`] of these scenarios, on `threads` threads. Every finished case is
-/// told to `tell`.
+/// reported to `tell`.
 pub fn run(
     scenarios: &[Scenario],
     cases: &[Case],
@@ -228,7 +228,10 @@ pub fn table(matrix: &Matrix) -> String {
     let FalseAlarms { runs, raised, strength_quantiles } = &matrix.false_alarms;
     text += &format!("false alarms: {raised} of {runs}\n");
     for (share, acceptance_score) in strength_quantiles {
-        text += &format!("strength on nulls: {:.0} % below {acceptance_score:.2}\n", 100.0 * share);
+        text += &format!(
+            "acceptance score on nulls: {:.0} % below {acceptance_score:.2}\n",
+            100.0 * share
+        );
     }
     text
 }

@@ -1,7 +1,7 @@
 //! `dynocar explain` over seeded simulations of every kind of effect and of nulls.
 //!
 //! - [`scenario`]: what is simulated
-//! - [`world`]: what is a little wrong beside it
+//! - [`world`]: what is a little wrong besides it
 //! - [`case`]: one simulated dataset, explained in this process
 //! - [`grade`]: the answer against the truth
 //! - [`attainable`]: what the true law leaves when its numbers are estimated

@@ -7,13 +7,13 @@ use dynocar_tests::simulator::{
 
 use super::world::World;
 
-/// A kind that is hardly told from the one that acts.
+/// A kind that is hardly distinguishable from the one that acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rival {
     /// The kind.
     pub kind: EffectKind,
-    /// True when no data of the family tell the two apart.
-    pub is_never_told: bool,
+    /// True when no data of the family distinguish the two.
+    pub is_never_named: bool,
 }
 
 /// A family of datasets; a seed makes one of it.
@@ -72,7 +72,7 @@ const POOR: [EffectKind; 6] = [
 /// Standard deviation of a load from run to run where loads change at every stop.
 const LOAD_SCATTER: f64 = 0.012;
 
-/// One row in fifty wildly wrong, beside a little of everything else.
+/// One row in fifty wildly wrong, with a little of everything else.
 const HEAVY: Defects = Defects { outliers: 0.02, ..Defects::ALL };
 
 impl Scenario {
@@ -178,12 +178,12 @@ impl Scenario {
         }
     }
 
-    /// The kind that is hardly told from the one that acts.
+    /// The kind that is hardly distinguishable from the one that acts.
     pub fn rival(self) -> Option<Rival> {
         match self {
-            Scenario::Alike => Some(Rival { kind: EffectKind::MassChange, is_never_told: true }),
+            Scenario::Alike => Some(Rival { kind: EffectKind::MassChange, is_never_named: true }),
             Scenario::UnmappedTunnel => {
-                Some(Rival { kind: EffectKind::LocalResistance, is_never_told: false })
+                Some(Rival { kind: EffectKind::LocalResistance, is_never_named: false })
             }
             _ => None,
         }

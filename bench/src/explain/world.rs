@@ -1,4 +1,4 @@
-//! What is a little wrong beside the effect.
+//! What is a little wrong besides the effect.
 
 use clap::ValueEnum;
 use dynocar_shared::vocabulary::EffectKind;

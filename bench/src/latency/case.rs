@@ -1,4 +1,4 @@
-//! What is measured beside what.
+//! What is measured together with what.
 
 use dynocar::config::IdleStrategy;
 use dynocar_client::monotonic_now_ns;
@@ -53,7 +53,7 @@ pub struct Case {
     pub answerer: Answerer,
     /// Who reads the same channels.
     pub companions: &'static [Companion],
-    /// Candidates that the daemon tries beside its model.
+    /// Candidates that the daemon tries next to its model.
     pub candidates: u32,
 }
 

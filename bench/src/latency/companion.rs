@@ -49,10 +49,10 @@ impl Companion {
         };
         command.stderr(Stdio::piped());
         let mut peer = Peer::start_command(site, self.name(), command)?;
-        if let Some(told) = peer.take_errors() {
+        if let Some(output) = peer.take_errors() {
             // Its first line: by then its channels are open.
-            let line = BufReader::new(told).lines().next().transpose();
-            line.map_err(system("reading what a process tells"))?;
+            let line = BufReader::new(output).lines().next().transpose();
+            line.map_err(system("reading what a process prints"))?;
         }
         peer.require()?;
         Ok(peer)

@@ -14,7 +14,7 @@ use super::sockets::{CLIENT_SOCKET, SERVER_SOCKET};
 use crate::rig::site::Site;
 use crate::rig::{RigError, system};
 
-/// Sends samples, and tells how far the answers have come.
+/// Sends samples, and counts how far the answers have come.
 pub trait Link {
     /// Sends a sample; gives its sequence number.
     ///

@@ -3,9 +3,9 @@
 //!
 //! Every round goes through all cases once, in an order drawn anew from the seed, so that whatever
 //! else the machine does falls on all of them alike. Ratios to the floor are taken within a round;
-//! the median of the rounds is told.
+//! the median of the rounds is reported.
 //!
-//! - [`case`]: what is measured beside what
+//! - [`case`]: what is measured together with what
 //! - [`companion`]: programs that read the same channels
 //! - [`schedule`]: the open-loop measurement of one slice
 //! - [`link`]: the controller's end of each transport
@@ -46,7 +46,7 @@ use costs::Costs;
 use rest::AtRest;
 use schedule::Schedule;
 
-/// Sample → snapshot through real processes, beside the floor and what a user would pick else.
+/// Sample → snapshot through real processes, compared with the floor and what a user would pick else.
 #[derive(Debug, Args)]
 pub struct LatencyArguments {
     /// Few short rounds of the main cases: a check that everything runs, not a measurement

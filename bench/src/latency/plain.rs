@@ -1,4 +1,4 @@
-//! A listener and a notifier of the plain transport, beside Dynocar's own waking.
+//! A listener and a notifier of the plain transport, compared with Dynocar's own waking.
 
 use std::path::Path;
 

@@ -82,7 +82,7 @@ fn quantile_name(nines: f64) -> String {
 }
 
 fn points(histogram: &Histogram<u64>) -> Vec<(f64, f64)> {
-    // Beyond the longest latency there is nothing more to tell.
+    // Beyond the longest latency there is nothing more to draw.
     let last = (histogram.len().max(1) as f64).log10().min(NINES);
     (0..=200)
         .map(|step| f64::from(step) / 200.0 * NINES)

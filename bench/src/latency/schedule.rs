@@ -26,7 +26,7 @@ pub struct Slice {
     /// From the appointed time of a sample to the poll that brought a snapshot behind which it
     /// stands. A controller or daemon that was held up pays for every sample it kept waiting.
     pub from_appointed: Histogram<u64>,
-    /// From the moment before publishing: what a closed loop would tell.
+    /// From the moment before publishing: what a closed loop would measure.
     pub from_publish: Histogram<u64>,
     /// Where the time from publishing went: until the sample left, until its answer left, until
     /// that was polled. Empty where the peer does not say.
@@ -57,7 +57,7 @@ impl Slice {
 
 /// How long an answer may take before it counts as none, in s.
 pub const ANSWER_WITHIN_S: u64 = 2;
-/// Samples in flight that are told apart; at 10 kHz more than a second.
+/// Samples in flight that are distinguished; at 10 kHz more than a second.
 const IN_FLIGHT: usize = 1 << 14;
 /// Time before an appointment in which nothing else is begun, in ns.
 const QUIET_NS: i64 = 3_000;

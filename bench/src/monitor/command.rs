@@ -19,7 +19,7 @@ pub struct MonitorArguments {
     /// The first seed
     #[arg(long, default_value_t = 1)]
     first_seed: u64,
-    /// What is a little wrong beside the effect
+    /// What is a little wrong besides the effect
     #[arg(long, value_enum, default_value_t = World::Plain)]
     world: World,
     /// Runs of a quarter of an hour in each dataset
@@ -31,7 +31,7 @@ pub struct MonitorArguments {
     /// Datasets at a time
     #[arg(long, default_value_t = 2)]
     threads: usize,
-    /// Tell every suspicion of every dataset on standard error
+    /// Print every suspicion of every dataset on standard error
     #[arg(long)]
     verbose: bool,
     /// Write the result for machines; - for standard output

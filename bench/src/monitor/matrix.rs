@@ -21,7 +21,7 @@ pub struct Plan<'a> {
     pub seeds: usize,
     /// The first seed.
     pub first_seed: u64,
-    /// What is a little wrong beside the effect.
+    /// What is a little wrong besides the effect.
     pub world: World,
     /// Runs of each dataset.
     pub runs: usize,
@@ -73,7 +73,7 @@ pub struct Matrix {
     pub per_100_h: f64,
 }
 
-/// Runs the matrix. Every finished case is told to `tell`.
+/// Runs the matrix. Every finished case is reported to `tell`.
 pub fn run(plan: &Plan<'_>, report: &(dyn Fn(&Case, &Watched) + Sync)) -> Matrix {
     let cases = cases(plan.scenarios, plan.seeds, plan.first_seed, plan.world);
     let watched = over(&cases, plan.threads, |case| {

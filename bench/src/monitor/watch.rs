@@ -32,7 +32,7 @@ pub struct Watched {
     pub raised: Vec<(EffectKind, f64)>,
     /// Time in s during which a suspicion stood that did not hold the effect.
     pub wrong_s: f64,
-    /// Time in s during which alternatives were told.
+    /// Time in s during which alternatives were named.
     pub ambiguous_s: f64,
     /// Time in s during which the effect was named in runs in which it did not act.
     pub stale_s: f64,
@@ -52,8 +52,8 @@ impl Said {
         let leading = EffectKind::from_number(snapshot.suspected_effect).expect("a known kind");
         let leading = Some(leading).filter(|&kind| kind != EffectKind::None);
         let others = snapshot.suspected_alternatives;
-        let is_told = |kind: &EffectKind| leading == Some(*kind) || others & kind.bit() != 0;
-        Said { leading, holds_truth: truth.iter().any(is_told), is_ambiguous: others != 0 }
+        let is_named = |kind: &EffectKind| leading == Some(*kind) || others & kind.bit() != 0;
+        Said { leading, holds_truth: truth.iter().any(is_named), is_ambiguous: others != 0 }
     }
 }
 

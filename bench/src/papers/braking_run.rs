@@ -38,7 +38,7 @@ pub fn resolved(train: &TrainModel, moment: &Moment, is_first: bool) -> Resolved
     }
 }
 
-/// An estimate beside the truth.
+/// An estimate and the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scored {
     /// Time in s of the moment that the estimate belongs to.

@@ -1,8 +1,8 @@
 //! Liu 2018: Davis coefficients from coasting by least squares in all its recursions.
 //!
-//! The paper's data are not published; its figures stand beside ours on the scenario of
+//! The paper's data are not published; its figures stand next to ours on the scenario of
 //! [`scenario`]. Errors are those of w0 over 40 to 72 km/h, where the runs coast, since a, b and
-//! c are hardly told apart there.
+//! c are hardly distinguishable there.
 
 pub mod bound;
 pub mod methods;
@@ -113,14 +113,14 @@ fn whole_runs(runs: &[Vec<Measured>]) -> Option<Estimate> {
     let speed_mps = |sample: &Measured| sample.speed_kmh / 3.6;
     let speeds: Vec<Vec<f64>> =
         runs.iter().map(|run| run.iter().map(speed_mps).collect()).collect();
-    let stretches: Vec<MotionSegment<'_>> = steps
+    let motion_segments: Vec<MotionSegment<'_>> = steps
         .iter()
         .zip(&speeds)
         .map(|(steps, speeds_mps)| MotionSegment { steps, speeds_mps })
         .collect();
     let settings =
         FitSettings { outlier_threshold: OUTLIER_THRESHOLD, ..FitSettings::new(StepRule::Time) };
-    let fit = TrajectoryFitter::default().fit(&stretches, None, &settings).ok()?;
+    let fit = TrajectoryFitter::default().fit(&motion_segments, None, &settings).ok()?;
     Some((fit.davis, fit.covariance))
 }
 

@@ -1,4 +1,4 @@
-//! Accuracy over seeded runs: the papers' figures, their methods and ours beside the bound.
+//! Accuracy over seeded runs: the papers' figures, their methods and ours compared with the bound.
 
 pub mod bound;
 pub mod braking;

@@ -1,4 +1,4 @@
-//! Errors of a method over the seeds, beside what the method and the bound say of them.
+//! Errors of a method over the seeds, with what the method and the bound say of them.
 
 use dynocar_core::train::Davis;
 use nalgebra::{Matrix3, Vector3};
@@ -18,7 +18,7 @@ pub struct Score {
     /// Normalised estimation error squared, per degree of freedom.
     nees: Vec<f64>,
     freedom: f64,
-    /// Least standard deviation of each error, where it was told.
+    /// Least standard deviation of each error, where it was reported.
     bounds: Vec<f64>,
 }
 

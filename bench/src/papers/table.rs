@@ -105,7 +105,8 @@ Made by `cargo run --release -p dynocar-bench -- papers --markdown docs/papers.m
 | bound | the Cramér–Rao or posterior Cramér–Rao bound of the scenario, computed in the same run |
 | coverage | share of our 95 % intervals that hold the truth |
 | NEES | mean normalised estimation error squared per degree of freedom, 1 when the covariance is right, with the band that holds it in 99 % of such measurements; where all runs share one curve (Xie 2019 and Jin 2020 but for *drawn coefficients*) the band is as wide as one draw leaves it |
-| promise | whether what the project promises of the row was kept |
+
+A row that breaks what the project promises of it says `BROKEN` in its last cell but one, and what.
 
 Where the paper's method differs from its paper:
 
@@ -115,20 +116,45 @@ Where the paper's method differs from its paper:
   they settle within 1 to 2 km.
 ";
 
-/// A page of the documentation: one table for each paper.
+/// A page of the documentation: one table for each paper, and below it the notes that several rows share.
 pub fn for_documentation(rows: &[Row]) -> String {
     let mut text = INTRODUCTION.to_owned();
-    let mut paper = "";
-    for row in rows {
-        if row.paper != paper {
-            paper = row.paper;
-            let _ = writeln!(text, "\n## {paper}\n");
-            let _ = writeln!(text, "| {} | seeds |", HEADINGS[1..].join(" | "));
-            let _ = writeln!(text, "|{}", " --- |".repeat(HEADINGS.len()));
+    for of_paper in rows.chunk_by(|one, other| one.paper == other.paper) {
+        let mut notes = Vec::new();
+        let _ = writeln!(text, "\n## {}\n", of_paper[0].paper);
+        let _ = writeln!(text, "| {} | seeds |", HEADINGS[1..12].join(" | "));
+        let _ = writeln!(text, "|{}", " --- |".repeat(HEADINGS.len() - 1));
+        for row in of_paper {
+            let mut cells = cells(row);
+            for (from, into, start) in [(2, 2, " (paper's method: "), (12, 11, "; may be wider: ")]
+            {
+                if let Some((cell, note)) = cells[from].clone().split_once(start) {
+                    let note = format!("{}{note}", start.trim_start_matches([' ', '(', ';']));
+                    let cell = if from == into { cell } else { cells[into].as_str() };
+                    cells[into] = format!("{cell} ({})", number_of(&note, &mut notes));
+                }
+            }
+            if cells[12].starts_with("BROKEN") {
+                cells[11] = format!("{} {}", cells[11], cells[12]);
+            }
+            let _ = writeln!(text, "| {} | {} |", cells[1..12].join(" | "), row.seeds);
         }
-        let _ = writeln!(text, "| {} | {} |", cells(row)[1..].join(" | "), row.seeds);
+        for (place, note) in notes.iter().enumerate() {
+            let _ = write!(text, "{}({}) {note}.", if place == 0 { "\n" } else { " " }, place + 1);
+        }
+        text += if notes.is_empty() { "" } else { "\n" };
     }
     text
+}
+
+/// A note's number, from 1.
+fn number_of(note: &str, notes: &mut Vec<String>) -> usize {
+    let note = note.trim_end_matches(')').to_owned();
+    let place = notes.iter().position(|it| *it == note).unwrap_or_else(|| {
+        notes.push(note);
+        notes.len() - 1
+    });
+    place + 1
 }
 
 #[cfg(test)]
@@ -163,6 +189,14 @@ mod tests {
         let text = for_documentation(&[row(), row()]);
         assert_eq!(text.matches("## Xia 2023").count(), 1);
         assert_eq!(text.matches("| Table 3 |").count(), 2);
+    }
+
+    #[test]
+    fn what_several_rows_say_of_a_method_stands_once_below_their_table() {
+        let with_note = Row { quantity: "mass (paper's method: by hand)".into(), ..row() };
+        let text = for_documentation(&[with_note.clone(), with_note]);
+        assert_eq!(text.matches("| mass (1) |").count(), 2);
+        assert!(text.ends_with("\n(1) paper's method: by hand.\n"), "{text}");
     }
 
     #[test]

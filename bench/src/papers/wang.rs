@@ -25,7 +25,7 @@ use super::seeds::Seeds;
 
 /// Every row of the paper over a number of seeded runs.
 ///
-/// Rows that take a whole crossing beside another, or that hardly scatter, take 20 runs at most;
+/// Rows that take a whole crossing at once, or that hardly scatter, take 20 runs at most;
 /// each row says how many.
 pub fn rows(seeds: Seeds) -> Vec<Row> {
     let mut rows = resistance_rows::rows(seeds);

@@ -61,8 +61,8 @@ mod tests {
             speed_noise_mps: Some(scenario::SPEED_NOISE_MPS),
             ..FitSettings::new(StepRule::Distance)
         };
-        let stretches = [MotionSegment { steps: &run.steps, speeds_mps: &run.speeds_mps }];
-        let fit = TrajectoryFitter::default().fit(&stretches, None, &settings).unwrap();
+        let segments = [MotionSegment { steps: &run.steps, speeds_mps: &run.speeds_mps }];
+        let fit = TrajectoryFitter::default().fit(&segments, None, &settings).unwrap();
         for i in 0..3 {
             let ratio = fit.covariance[(i, i)] / numerical[(i, i)];
             assert!((ratio - 1.0).abs() < 1e-3, "{i}: {ratio}");

@@ -126,7 +126,7 @@ const STOPS: [PublishedStop; 6] = {
 /// Gravity of the papers in m/s².
 pub const PAPER_GRAVITY_MPS2: f64 = 9.8;
 
-/// Stopping distances and times: the paper's recursion in steps of 0.2 s beside ours.
+/// Stopping distances and times: the paper's recursion in steps of 0.2 s and ours.
 fn stops() -> Vec<Row> {
     let train = train();
     let gear = DeclaredGear::of(&train.brake_gear).expect("a declared gear");

@@ -54,7 +54,7 @@ impl Peer {
         Ok(Peer { name: name.to_owned(), child })
     }
 
-    /// What it tells on standard error, where that was asked for.
+    /// What it prints on standard error, where that was asked for.
     pub fn take_errors(&mut self) -> Option<ChildStderr> {
         self.child.stderr.take()
     }

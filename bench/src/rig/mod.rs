@@ -6,7 +6,7 @@
 //! - [`host`]: what the host takes away from threads that are always busy
 //! - [`motion`]: the samples of a train that swings between 10 and 30 m/s
 //! - [`pipelines`]: which pipelines a measurement names
-//! - [`quantiles`]: histograms and what is told of them
+//! - [`quantiles`]: histograms and what is reported of them
 //! - [`usage`]: what the kernel says of a process: processor time, memory, faults, switches
 
 pub mod child;

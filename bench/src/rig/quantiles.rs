@@ -1,9 +1,9 @@
-//! Histograms of latencies, and what is told of them.
+//! Histograms of latencies, and what is reported of them.
 
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
-/// The longest latency told apart, in ns.
+/// The longest latency resolved, in ns.
 const LONGEST_NS: u64 = 60_000_000_000;
 
 /// A histogram of latencies from 1 ns to a minute, to three digits.
@@ -20,7 +20,7 @@ pub fn record(histogram: &mut Histogram<u64>, latency_ns: i64) {
     histogram.saturating_record(latency_ns.clamp(1, LONGEST_NS as i64) as u64);
 }
 
-/// What is told of a histogram, in ns.
+/// What is reported of a histogram, in ns.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quantiles {
     /// Number of latencies.
@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn times_are_reported_in_a_fitting_unit() {
-        let told = [812.0, 4_310.0, 2.2e6].map(for_people);
-        assert_eq!(told, ["812 ns", "4.31 µs", "2.20 ms"]);
+        let printed = [812.0, 4_310.0, 2.2e6].map(for_people);
+        assert_eq!(printed, ["812 ns", "4.31 µs", "2.20 ms"]);
     }
 }

@@ -74,7 +74,7 @@ pub struct Broker {
     stream: TcpStream,
     mqtt: Connection<role::Client>,
     out: Vec<u8>,
-    told: Vec<BrokerEvent>,
+    received: Vec<BrokerEvent>,
     is_accepted: bool,
 }
 
@@ -97,7 +97,7 @@ impl Broker {
         let mut mqtt = Connection::with_options(Version::V5_0, options);
         mqtt.set_auto_pub_response(true);
         let mut broker =
-            Broker { stream, mqtt, out: Vec::new(), told: Vec::new(), is_accepted: false };
+            Broker { stream, mqtt, out: Vec::new(), received: Vec::new(), is_accepted: false };
         let mut connect = Connect::builder()
             .client_id(login.client.as_str())?
             .clean_start(true)
@@ -184,7 +184,7 @@ impl Broker {
         if !self.out.is_empty() {
             self.flush()?;
         }
-        Ok(std::mem::take(&mut self.told))
+        Ok(std::mem::take(&mut self.received))
     }
 
     fn act(&mut self, events: Vec<Event>) -> Result<(), BrokerError> {
@@ -216,9 +216,9 @@ impl Broker {
                 return Err(BrokerError::Refused(it.reason_code().to_string()));
             }
             Packet::V5_0Publish(it) => {
-                self.told.push(BrokerEvent::Command(it.payload().as_slice().to_vec()));
+                self.received.push(BrokerEvent::Command(it.payload().as_slice().to_vec()));
             }
-            Packet::V5_0Pingresp(_) => self.told.push(BrokerEvent::Pong),
+            Packet::V5_0Pingresp(_) => self.received.push(BrokerEvent::Pong),
             Packet::V5_0Disconnect(it) => {
                 let why = it.reason_code().map_or(String::new(), |it| format!(": {it}"));
                 return Err(BrokerError::Closed(why));

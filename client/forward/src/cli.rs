@@ -19,13 +19,14 @@ use crate::node::NodeName;
 /// The port of a broker that is given without one.
 const PORT: &str = "1883";
 
-/// Forward what the daemon knows of its trains to an MQTT 5 broker, as Sparkplug B: one edge node for this
-/// host, a device for each train. Without options it forwards all trains that any daemon of this host serves to
-/// a broker on this host. Whatever the broker does, no controller and no daemon waits for it: what it does not take
-/// waits in a bounded queue, and what the queue cannot hold is dropped and counted. SIGINT, SIGTERM
-/// and SIGHUP end it
+/// Forward estimates and events to an MQTT broker, as Sparkplug B.
+///
+/// MQTT 5, one edge node for this host, a device for each train. Without options it forwards all trains that
+/// any daemon of this host serves to a broker on this host. No controller and no daemon waits for the
+/// broker: what it does not take waits in a bounded queue, and what the queue cannot hold is dropped and
+/// counted. SIGINT, SIGTERM and SIGHUP end it.
 #[derive(Debug, Parser)]
-#[command(name = "dynocar forward", version)]
+#[command(name = "dynocar forward", bin_name = "dynocar forward", version)]
 struct Arguments {
     /// The broker. There is no TLS: leave that to a broker on this host that bridges to another
     #[arg(long, value_name = "HOST[:PORT]", default_value = "127.0.0.1:1883")]
@@ -55,7 +56,7 @@ pub fn command() -> clap::Command {
     Arguments::command()
 }
 
-/// Parses the command line, forwards until told to end, reports a failure on standard error.
+/// Parses the command line, forwards until asked to end, reports a failure on standard error.
 pub fn main() -> ExitCode {
     let arguments = match parse::<Arguments>("dynocar forward") {
         Ok(arguments) => arguments,

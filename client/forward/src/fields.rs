@@ -82,7 +82,7 @@ pub fn each_metric(reading: &Reading<'_>, now_ns: i64, mut give: impl FnMut(Metr
     put("", "age_s", "Age of the newest sample behind the estimate", Value::Number(age_s));
     for (place, &number) in it.parameters.iter().take(it.parameter_count as usize).enumerate() {
         let Some(parameter) = Parameter::from_number(number) else { continue };
-        // A field of this name says it, and another its deviation.
+        // A field of this name says it, and another its standard deviation.
         if parameter == Parameter::UnexplainedForce {
             continue;
         }
@@ -107,7 +107,7 @@ pub fn each_metric(reading: &Reading<'_>, now_ns: i64, mut give: impl FnMut(Metr
     let suspect = EffectKind::from_number(it.suspected_effect).map_or("unknown", EffectKind::name);
     put("", "suspect", "Suspected effect that the model lacks", Value::words(suspect));
     let others = it.alternatives().map(EffectKind::name).collect::<Vec<_>>().join(",");
-    let meaning = "Other effects that these data hardly tell from it, with commas between";
+    let meaning = "Other effects that these data hardly distinguish from it, with commas between";
     put("", "suspect_alternatives", meaning, Value::words(others));
     let source = it.mass_source().map_or("unknown", MassSource::name);
     put("", "mass_source", "Where the mass comes from", Value::words(source));
@@ -123,7 +123,7 @@ pub fn each_metric(reading: &Reading<'_>, now_ns: i64, mut give: impl FnMut(Metr
     put("", "excited", meaning, Value::words(excited));
     let missing = Manoeuvre::ALL.iter().filter(|a| it.missing_manoeuvres & a.bit() != 0);
     let missing = missing.map(|a| a.name()).collect::<Vec<_>>().join(",");
-    let meaning = "Manoeuvres that would tell what the data do not, with commas between";
+    let meaning = "Manoeuvres that would show what the data do not, with commas between";
     put("", "missing_manoeuvres", meaning, Value::words(missing));
 }
 

@@ -1,4 +1,4 @@
-//! Connections to the broker one after the other, until told to end.
+//! Connections to the broker one after the other, until asked to end.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,7 +24,7 @@ const IDLE_PING: Duration = Duration::from_secs(8);
 const RETRY: [Duration; 2] = [Duration::from_millis(500), Duration::from_secs(15)];
 /// How long the end waits for the broker to take what is left.
 const FAREWELL: Duration = Duration::from_secs(3);
-/// How often drops are told at most.
+/// How often drops are reported at most.
 const REPORT_DROPS: Duration = Duration::from_secs(10);
 
 /// What is forwarded, and where to.
@@ -50,12 +50,12 @@ pub fn forward(settings: &Settings, must_end: &AtomicBool) -> Counts {
     let is_all_made = AtomicBool::new(false);
     std::thread::scope(|scope| {
         scope.spawn(|| {
-            let told = ReportAtEnd(&is_all_made);
+            let reported = ReportAtEnd(&is_all_made);
             let (host, trains) = (settings.host.clone(), settings.trains.clone());
             let mut watcher = Watcher::new(host, trains, settings.every, &known);
             watcher.run(must_end);
             // The farewell need not wait until many readers are closed.
-            drop(told);
+            drop(reported);
         });
         send(settings, &known, &is_all_made);
     });
@@ -74,7 +74,7 @@ impl Drop for ReportAtEnd<'_> {
 /// Sends what is known over one connection after the other, until the flag is set and nothing waits.
 pub fn send(settings: &Settings, known: &Mutex<Known>, must_end: &AtomicBool) {
     let (mut attempts, mut connections) = (0, 0);
-    let mut told = String::new();
+    let mut reported = String::new();
     let mut retry = RETRY[0];
     let mut drops = Drops::default();
     while !must_end.load(Ordering::Relaxed) {
@@ -86,7 +86,7 @@ pub fn send(settings: &Settings, known: &Mutex<Known>, must_end: &AtomicBool) {
                 Err(error) => error,
                 Ok(broker) => {
                     connections += 1;
-                    (retry, told) = (RETRY[0], String::new());
+                    (retry, reported) = (RETRY[0], String::new());
                     report_line(&format!(
                         "dynocar forward: connected to {} as {}/{}",
                         settings.login.address, settings.name.group, settings.name.node
@@ -103,12 +103,12 @@ pub fn send(settings: &Settings, known: &Mutex<Known>, must_end: &AtomicBool) {
             };
         locked(known).queue.give_back();
         let words = error.to_string();
-        if told != words {
+        if reported != words {
             report_line(&format!(
                 "dynocar forward: {}: {words}; trying again",
                 settings.login.address
             ));
-            told = words;
+            reported = words;
         }
         let begun = Instant::now();
         while begun.elapsed() < retry && !must_end.load(Ordering::Relaxed) {
@@ -119,23 +119,24 @@ pub fn send(settings: &Settings, known: &Mutex<Known>, must_end: &AtomicBool) {
     }
 }
 
-/// What was told of drops.
+/// When drops were last reported.
 #[derive(Default)]
 struct Drops {
     dropped: u64,
-    told: Option<Instant>,
+    reported: Option<Instant>,
 }
 
 impl Drops {
-    /// Tells people of drops that they do not know of, now and then.
+    /// Warns people of drops that they do not know of, now and then.
     fn report(&mut self, counts: Counts) {
-        if counts.dropped > self.dropped && self.told.is_none_or(|it| it.elapsed() >= REPORT_DROPS)
+        if counts.dropped > self.dropped
+            && self.reported.is_none_or(|it| it.elapsed() >= REPORT_DROPS)
         {
             report_line(&format!(
                 "dynocar forward: {} publications dropped so far",
                 counts.dropped
             ));
-            (self.dropped, self.told) = (counts.dropped, Some(Instant::now()));
+            (self.dropped, self.reported) = (counts.dropped, Some(Instant::now()));
         }
     }
 }
@@ -166,8 +167,8 @@ impl<'a> Sending<'a> {
         let mut own_due = Instant::now() + every;
         let mut ending: Option<Instant> = None;
         loop {
-            for told in self.broker.receive(PAUSE)? {
-                match told {
+            for event in self.broker.receive(PAUSE)? {
+                match event {
                     BrokerEvent::Pong => {
                         self.pinged = None;
                         locked(self.known).queue.take_note();

@@ -14,7 +14,7 @@
 //! - [`queue`]: publications that wait for the broker
 //! - [`node`]: topics, births, deaths and sequence numbers of the edge node, without any socket
 //! - [`broker`]: one connection to the broker
-//! - [`forwarder`]: connections one after the other, until told to end
+//! - [`forwarder`]: connections one after the other, until asked to end
 
 pub mod broker;
 pub mod cli;

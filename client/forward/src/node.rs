@@ -64,7 +64,7 @@ impl Known {
         Known { trains: BTreeMap::new(), queue: Queue::new(queue) }
     }
 
-    /// Puts a publication into the queue; where another had to go for it, that one's train tells everything next.
+    /// Puts a publication into the queue; where another had to go for it, that one's train publishes everything next.
     pub fn publish(&mut self, publication: Option<Publication>) {
         let dropped = publication.and_then(|it| self.queue.push(it));
         if let Some(train) = dropped.and_then(|it| self.trains.get_mut(&it)) {
@@ -88,7 +88,7 @@ pub struct Session {
     /// How many metrics each train was born with.
     born: BTreeMap<TrainId, usize>,
     /// The node's own metrics as they were last published.
-    told: Option<Counts>,
+    published: Option<Counts>,
 }
 
 /// Aliases of the node's own metrics; those of trains are greater.
@@ -110,7 +110,7 @@ impl Session {
             connections,
             seq: 0,
             born: BTreeMap::new(),
-            told: None,
+            published: None,
         }
     }
 
@@ -133,7 +133,7 @@ impl Session {
         self.seq = 0;
         self.born.clear();
         let counts = known.queue.counts();
-        self.told = Some(counts);
+        self.published = Some(counts);
         let version = Value::words(env!("CARGO_PKG_VERSION"));
         let mut metrics = vec![
             self.birth_metric(now_ms),
@@ -141,8 +141,8 @@ impl Session {
             version.born("forward/version", None, "", "Release of dynocar forward", now_ms),
         ];
         let values = self.own(known, counts);
-        metrics.extend(COUNTS.iter().zip(1..).zip(values).map(|((told, alias), value)| {
-            Value::Count(Some(value)).born(told.0, Some(alias), "", told.1, now_ms)
+        metrics.extend(COUNTS.iter().zip(1..).zip(values).map(|((count, alias), value)| {
+            Value::Count(Some(value)).born(count.0, Some(alias), "", count.1, now_ms)
         }));
         let mut births = vec![self.message("NBIRTH", None, metrics, now_ms)];
         let living = known.trains.values().filter(|train| train.is_alive);
@@ -216,7 +216,7 @@ impl Session {
     /// The node's own counts, where they have changed.
     pub fn own_data(&mut self, known: &Known, now_ms: u64) -> Option<Message> {
         let counts = known.queue.counts();
-        if self.told.replace(counts) == Some(counts) {
+        if self.published.replace(counts) == Some(counts) {
             return None;
         }
         let values = self.own(known, counts);

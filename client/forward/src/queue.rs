@@ -16,7 +16,7 @@ use crate::payload::Payload;
 pub struct Publication {
     /// The train.
     pub train: TrainId,
-    /// How many metrics the train had: a birth must have told of as many.
+    /// How many metrics the train had: a birth must have declared as many.
     pub metric_count: usize,
     /// The payload without its number.
     pub payload: Box<[u8]>,

@@ -19,7 +19,7 @@ const OF_TRAIN: (u32, u32) = (u32::MAX, 0);
 #[derive(Clone, Debug)]
 struct Slot {
     name: String,
-    told: MetricMeta,
+    meta: MetricMeta,
     value: Value,
     taken_ms: u64,
     is_changed: bool,
@@ -40,7 +40,7 @@ pub struct Train {
     places: HashMap<((u32, u32), MetricIndex), usize>,
     round: u64,
     publications: u64,
-    must_tell_all: bool,
+    must_publish_all: bool,
 }
 
 impl Train {
@@ -54,7 +54,7 @@ impl Train {
             places: HashMap::new(),
             round: 0,
             publications: 0,
-            must_tell_all: true,
+            must_publish_all: true,
         };
         train.set_number(0);
         train.set_of_train("event", "kind", "The last event", Value::Words(None), 0);
@@ -89,7 +89,7 @@ impl Train {
             for &quantity in Quantity::ALL.iter().filter(|&&quantity| it.answers(quantity)) {
                 answers[quantity as usize] = Some((pipeline.0, it.pipeline_kind()));
             }
-            each_metric(&reading, now_ns, |told, value| self.set(pipeline, told, value, now_ms));
+            each_metric(&reading, now_ns, |meta, value| self.set(pipeline, meta, value, now_ms));
         }
         for &quantity in Quantity::ALL {
             let answer: Option<(u32, Option<PipelineKind>)> = answers[quantity as usize];
@@ -114,13 +114,13 @@ impl Train {
         value: Value,
         now_ms: u64,
     ) {
-        let told = MetricMeta { place: MetricIndex { folder, name }, meaning };
-        self.set(OF_TRAIN, told, value, now_ms);
+        let meta = MetricMeta { place: MetricIndex { folder, name }, meaning };
+        self.set(OF_TRAIN, meta, value, now_ms);
     }
 
-    fn set(&mut self, pipeline: (u32, u32), told: MetricMeta, value: Value, now_ms: u64) {
+    fn set(&mut self, pipeline: (u32, u32), meta: MetricMeta, value: Value, now_ms: u64) {
         let round = if pipeline == OF_TRAIN { 0 } else { self.round };
-        if let Some(&place) = self.places.get(&(pipeline, told.place)) {
+        if let Some(&place) = self.places.get(&(pipeline, meta.place)) {
             let slot = &mut self.slots[place];
             slot.round = round;
             if slot.value != value {
@@ -132,12 +132,12 @@ impl Train {
         if pipeline != OF_TRAIN {
             name = folder(pipeline.0, PipelineKind::from_number(pipeline.1)) + "/";
         }
-        for part in [told.place.folder, "/"].iter().filter(|_| !told.place.folder.is_empty()) {
+        for part in [meta.place.folder, "/"].iter().filter(|_| !meta.place.folder.is_empty()) {
             name += part;
         }
-        name += told.place.name;
-        self.places.insert((pipeline, told.place), self.slots.len());
-        self.slots.push(Slot { name, told, value, taken_ms: now_ms, is_changed: true, round });
+        name += meta.place.name;
+        self.places.insert((pipeline, meta.place), self.slots.len());
+        self.slots.push(Slot { name, meta, value, taken_ms: now_ms, is_changed: true, round });
     }
 
     fn set_number(&mut self, now_ms: u64) {
@@ -148,15 +148,15 @@ impl Train {
 
     /// A publication of what has changed, if anything has.
     pub fn publication(&mut self, now_ms: u64) -> Option<Publication> {
-        let must_tell_all = std::mem::take(&mut self.must_tell_all);
-        if !must_tell_all && !self.slots.iter().any(|slot| slot.is_changed) {
+        let must_publish_all = std::mem::take(&mut self.must_publish_all);
+        if !must_publish_all && !self.slots.iter().any(|slot| slot.is_changed) {
             return None;
         }
         self.publications += 1;
         self.set_number(now_ms);
         let mut metrics = Vec::new();
         for (place, slot) in self.slots.iter_mut().enumerate() {
-            if std::mem::take(&mut slot.is_changed) || must_tell_all {
+            if std::mem::take(&mut slot.is_changed) || must_publish_all {
                 let alias = self.first_alias + place as u64;
                 metrics.push(slot.value.changed(alias, slot.taken_ms));
             }
@@ -183,15 +183,15 @@ impl Train {
         self.publication(now_ms)
     }
 
-    /// Makes the next publication tell everything: one before it was dropped.
+    /// Makes the next publication hold everything: one before it was dropped.
     pub fn report_all(&mut self) {
-        self.must_tell_all = true;
+        self.must_publish_all = true;
     }
 
     /// Every metric as it is now, with its name, type, unit and meaning.
     pub fn born(&self) -> Vec<Metric> {
         let metric = |(place, slot): (usize, &Slot)| {
-            let (unit, meaning) = (slot.told.unit(), slot.told.meaning);
+            let (unit, meaning) = (slot.meta.unit(), slot.meta.meaning);
             let alias = Some(self.first_alias + place as u64);
             slot.value.born(&slot.name, alias, unit, meaning, slot.taken_ms)
         };

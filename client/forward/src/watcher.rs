@@ -23,7 +23,7 @@ const POLL: Duration = Duration::from_millis(50);
 const LOOK: Duration = Duration::from_secs(1);
 
 /// After so long without a word a daemon counts as silent: a controller cannot wait so long, a host far away need
-/// not be told of every hesitation.
+/// not be shown every hesitation.
 const SILENT_AFTER: Duration = Duration::from_secs(3);
 
 /// An event: its kind, and in words.
@@ -46,7 +46,7 @@ struct TrainChannel {
     pipelines: BTreeMap<u32, LastSnapshot>,
     is_silent: bool,
     due: Instant,
-    /// Why it cannot be read, as it was last told.
+    /// Why it cannot be read, as it was last reported.
     trouble: String,
 }
 
@@ -57,18 +57,18 @@ pub struct Watcher<'a> {
     wanted: Vec<TrainId>,
     every: Duration,
     known: &'a Mutex<Known>,
-    lanes: Vec<TrainChannel>,
+    channels: Vec<TrainChannel>,
 }
 
 impl<'a> Watcher<'a> {
     /// A watcher of these trains; of all that are served, when none is named.
     pub fn new(host: Host, wanted: Vec<TrainId>, every: Duration, known: &'a Mutex<Known>) -> Self {
-        let mut watcher = Watcher { host, wanted, every, known, lanes: Vec::new() };
+        let mut watcher = Watcher { host, wanted, every, known, channels: Vec::new() };
         watcher.wanted.clone().into_iter().for_each(|train| watcher.add(train));
         watcher
     }
 
-    /// Watches until told to end.
+    /// Watches until asked to end.
     pub fn run(&mut self, must_end: &AtomicBool) {
         let mut looked: Option<Instant> = None;
         while !must_end.load(Ordering::Relaxed) {
@@ -78,12 +78,12 @@ impl<'a> Watcher<'a> {
                 looked = Some(begun);
                 self.find_trains();
             }
-            for lane in &mut self.lanes {
+            for channel in &mut self.channels {
                 let mut events = Vec::new();
                 if is_look {
-                    lane.look_up(&self.host, &mut events);
+                    channel.look_up(&self.host, &mut events);
                 }
-                lane.poll(events, self.every, self.known);
+                channel.poll(events, self.every, self.known);
             }
             std::thread::sleep(POLL.saturating_sub(begun.elapsed()).max(POLL / 10));
         }
@@ -95,14 +95,14 @@ impl<'a> Watcher<'a> {
         }
         // A directory that cannot be read now may be read in a second.
         for train in Peer::trains(&self.host, Role::Daemon).unwrap_or_default() {
-            if self.lanes.iter().all(|lane| lane.train != train) {
+            if self.channels.iter().all(|channel| channel.train != train) {
                 self.add(train);
             }
         }
     }
 
     fn add(&mut self, train: TrainId) {
-        self.lanes.push(TrainChannel {
+        self.channels.push(TrainChannel {
             train,
             reader: None,
             daemon: None,

@@ -108,7 +108,7 @@ fn a_broker_that_takes_the_connection_and_says_nothing_is_given_up() {
 fn a_command_that_comes_byte_by_byte_is_one_command() {
     let (listener, login) = listener();
     let publish = [&[0x30, 16, 0, 8][..], b"commands", &[0], b"again"].concat();
-    let told = std::thread::scope(|scope| {
+    let events = std::thread::scope(|scope| {
         scope.spawn(|| {
             let (mut stream, _) = client(&listener);
             stream.write_all(ACCEPTED).unwrap();
@@ -121,13 +121,13 @@ fn a_command_that_comes_byte_by_byte_is_one_command() {
             while stream.read(&mut [0; 64]).is_ok_and(|count| count > 0) {}
         });
         let mut broker = connect(&login).unwrap();
-        let (begun, mut told) = (Instant::now(), Vec::new());
-        while told.len() < 2 && begun.elapsed() < WATCHDOG {
-            told.extend(broker.receive(Duration::from_millis(50)).unwrap());
+        let (begun, mut events) = (Instant::now(), Vec::new());
+        while events.len() < 2 && begun.elapsed() < WATCHDOG {
+            events.extend(broker.receive(Duration::from_millis(50)).unwrap());
         }
-        told
+        events
     });
-    assert_eq!(told, [BrokerEvent::Command(b"again".to_vec()), BrokerEvent::Pong]);
+    assert_eq!(events, [BrokerEvent::Command(b"again".to_vec()), BrokerEvent::Pong]);
 }
 
 /// Ends what works until its flag is set, however its test ends.

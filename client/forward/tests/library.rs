@@ -180,8 +180,9 @@ fn only_what_has_changed_is_published_and_what_is_gone_is_null() {
     let changed = Payload::decode(&*train.publication(3).unwrap().payload).unwrap();
     let names: BTreeMap<u64, String> =
         train.born().into_iter().map(|it| (it.alias.unwrap(), it.name.unwrap())).collect();
-    let mut told: Vec<_> = changed.metrics.iter().map(|it| &*names[&it.alias.unwrap()]).collect();
-    told.sort_unstable();
+    let mut published: Vec<_> =
+        changed.metrics.iter().map(|it| &*names[&it.alias.unwrap()]).collect();
+    published.sort_unstable();
     let c = "resistance_c_n_per_kn_per_mps2";
     let folder = "2_trajectory_kalman";
     let expected = [
@@ -191,9 +192,9 @@ fn only_what_has_changed_is_published_and_what_is_gone_is_null() {
         format!("{folder}/std/{c}"),
         "publication".into(),
     ];
-    assert_eq!(told, expected);
+    assert_eq!(published, expected);
     let nulls = changed.metrics.iter().filter(|it| it.is_null == Some(true) && it.value.is_none());
-    assert_eq!(nulls.count(), 2, "c and its deviation");
+    assert_eq!(nulls.count(), 2, "c and its standard deviation");
     assert!(changed.metrics.iter().all(|it| it.timestamp == Some(3) && it.name.is_none()));
 }
 

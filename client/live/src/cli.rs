@@ -10,11 +10,12 @@ use dynocar_recording::cli::WantedArguments;
 
 use crate::live::{Settings, live};
 
-/// Serve samples, snapshots and events to Foxglove or Lichtblick as they come, by the Foxglove WebSocket
-/// protocol: the topics and messages of a recording. Trains and daemons may come and go. It is one more
-/// reader of the trains' channels, which nobody waits for
+/// Serve samples, snapshots and events live to Foxglove or Lichtblick.
+///
+/// By the Foxglove WebSocket protocol, with the topics and messages of a recording. Trains and daemons
+/// may come and go. It is one more reader of the trains' channels, which nobody waits for.
 #[derive(Debug, Parser)]
-#[command(name = "dynocar live", version, about)]
+#[command(name = "dynocar live", bin_name = "dynocar live", version)]
 struct Arguments {
     #[command(flatten)]
     wanted: WantedArguments,
@@ -36,7 +37,7 @@ pub fn command() -> clap::Command {
     Arguments::command()
 }
 
-/// Parses the command line, serves until told to end, reports a failure on standard error.
+/// Parses the command line, serves until asked to end, reports a failure on standard error.
 pub fn main() -> ExitCode {
     let arguments = match parse::<Arguments>("dynocar live") {
         Ok(arguments) => arguments,

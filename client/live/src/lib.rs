@@ -7,10 +7,10 @@
 //!
 //! # Layout
 //!
-//! - [`live`]: reads the channels and serves until it is told to end
+//! - [`live`]: reads the channels and serves until it is asked to end
 //! - [`viewers`]: channels that are advertised while somebody writes them, and their messages
 //! - [`thinning`]: how many samples viewers get
-//! - [`told`]: what is told of viewers
+//! - [`slow_viewers`]: what is reported of viewers
 //! - [`cli`]: the command line
 
 pub mod cli;

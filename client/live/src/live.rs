@@ -1,4 +1,4 @@
-//! Reads the channels and serves viewers until it is told to end.
+//! Reads the channels and serves viewers until it is asked to end.
 
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -49,7 +49,7 @@ pub fn live(settings: &Settings, stop: &AtomicBool) -> Result<(), LiveError> {
 
 async fn serve(settings: &Settings, stop: &AtomicBool) -> Result<(), LiveError> {
     let mut viewers = Viewers::new(settings.samples_hz)?;
-    let mut lanes = TrainChannels::open(settings.wanted.clone(), "dynocar-live", &mut viewers)?;
+    let mut channels = TrainChannels::open(settings.wanted.clone(), "dynocar-live", &mut viewers)?;
     let server = start(settings.address, &viewers).await?;
     let address = SocketAddr::new(settings.address.ip(), server.port());
     if !address.ip().is_loopback() {
@@ -68,7 +68,7 @@ async fn serve(settings: &Settings, stop: &AtomicBool) -> Result<(), LiveError> 
             viewers.set_clock();
             compared = Instant::now();
         }
-        lanes.take(&mut viewers)?;
+        channels.take(&mut viewers)?;
         sleep(PAUSE).await;
     }
     // A viewer that does not answer is not waited for.

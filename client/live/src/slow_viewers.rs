@@ -1,4 +1,4 @@
-//! What is told of viewers that do not keep up.
+//! What is reported of viewers that do not keep up.
 //!
 //! The protocol's library drops the oldest messages of a viewer whose queue is full, and says so in
 //! its log, at most every 30 s; it counts none.
@@ -17,7 +17,7 @@ const FULL_QUEUE: &str = "outbox for client ";
 /// How its sentences about a viewer that broke off begin.
 const BROKEN_OFF: [&str; 2] = ["Error receiving from client ", "Error sending message to client "];
 
-/// Tells from now on what the protocol's library has to say of viewers.
+/// Reports from now on what the protocol's library has to say of viewers.
 pub fn report_viewers() {
     // Only a second call fails.
     let _ = registry().with(Reporter).try_init();
@@ -66,8 +66,8 @@ fn words(level: Level, sentence: &str) -> Option<String> {
             "the viewer at {address} is refused: it does not offer foxglove.sdk.v1"
         ));
     }
-    // That it has gone is told by others.
+    // That it has gone is reported elsewhere.
     let is_known = BROKEN_OFF.iter().any(|it| sentence.starts_with(it));
-    let is_told = level <= Level::WARN && !is_known;
-    is_told.then(|| format!("viewers: {sentence}"))
+    let is_reported = level <= Level::WARN && !is_known;
+    is_reported.then(|| format!("viewers: {sentence}"))
 }

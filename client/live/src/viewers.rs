@@ -100,7 +100,7 @@ impl Viewers {
         &self.context
     }
 
-    /// What a server tells of viewers that come, subscribe and go.
+    /// What a server reports of viewers that come, subscribe and go.
     pub fn listener(&self) -> Arc<dyn ServerListener> {
         Arc::new(Listener { newest: Arc::clone(&self.newest), count: Mutex::new(0) })
     }

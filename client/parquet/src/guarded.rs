@@ -14,7 +14,7 @@ thread_local! {
     static IS_READING: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Reads a file; what the library panics at is told as the file's.
+/// Reads a file; what the library panics at is reported as the file's.
 ///
 /// # Errors
 ///
@@ -25,10 +25,10 @@ pub fn guarded<T, E: From<TableError>>(
 ) -> Result<T, E> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
-        let told_before = take_hook();
+        let former_hook = take_hook();
         set_hook(Box::new(move |panic| {
             if !IS_READING.get() {
-                told_before(panic);
+                former_hook(panic);
             }
         }));
     });

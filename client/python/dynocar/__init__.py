@@ -1,5 +1,5 @@
 """Dynocar in Python: publish samples and poll parameter snapshots as a train controller does, and learn
-from recorded runs how a train really behaves.
+from recorded runs how a train really moves.
 
     import dynocar
 

@@ -145,7 +145,7 @@ class Snapshot:
 
     @property
     def suspected_alternatives(self) -> list[Effect]:
-        """Other effects that these data hardly tell from the suspected one."""
+        """Other effects that these data hardly distinguish from the suspected one."""
         bits = self.raw.suspected_alternatives
         return [effect for effect in Effect if bits >> effect & 1]
 
@@ -284,7 +284,7 @@ class SnapshotReader(_End):
         self._end.set_stale_after_ns(stale_after_ns)
 
     def poll(self) -> int:
-        """Takes what has come since; gives the number of snapshots that told something new."""
+        """Takes what has come since; gives the number of snapshots that brought something new."""
         return self._end.poll()
 
     def quantity(self, quantity: Quantity, now_ns: int | None = None) -> Snapshot:

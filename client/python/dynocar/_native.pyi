@@ -49,7 +49,7 @@ class Reading:
     def snapshot(self) -> ParameterSnapshot: ...
 
 class ParameterSnapshot:
-    """Every field of ``dynocar_parameter_snapshot`` in ``dynocar.h``, which tells their meaning."""
+    """Every field of ``dynocar_parameter_snapshot`` in ``dynocar.h``, which gives their meaning."""
 
     epoch: int
     sequence: int

@@ -22,7 +22,7 @@ from . import _native
 from ._records import Record
 
 PathLike = str | os.PathLike[str]
-# Told the share done, 0 to 1, and what is being done.
+# Given the share done, 0 to 1, and what is being done.
 Progress = Callable[[float, str], object]
 
 
@@ -79,7 +79,7 @@ class _Answer(Record):
 class Checked(_Answer):
     """What was understood of a path: ``dataset``, ``train``, ``track`` or ``daemon``, as it is one.
 
-    ``docs/guides/datasets.md`` tells what the counts mean.
+    ``docs/guides/datasets.md`` says what the counts mean.
     """
 
     _kinds = {"notes": Note}
@@ -112,7 +112,7 @@ class Run(Record):
 
 
 class Dataset(_Answer):
-    """A dataset with its runs. Arrow sees all runs as one table, told apart by the column ``run``."""
+    """A dataset with its runs. Arrow sees all runs as one table, distinguished by the column ``run``."""
 
     _kinds = {"notes": Note, "runs": Run}
     _optional = ("track",)
@@ -151,7 +151,7 @@ class Identified(_Answer):
     dataset: str
     notes: list[Note]
     estimators: list[Estimator]
-    not_run: list[str]  # beside the recommended ones, where nobody chose
+    not_run: list[str]  # in addition to the recommended ones, where nobody chose
     runs: list[Record] | None
     between_runs: list[Record] | None
 
@@ -214,7 +214,7 @@ class Plot(NamedTuple):
 
 
 class GrownFiles(NamedTuple):
-    """A grown model as files, and the kinds of effects that they cannot express."""
+    """An updated model as files, and the kinds of effects that they cannot express."""
 
     files: list[Path]
     not_expressed: list[str]
@@ -281,7 +281,7 @@ def _as(kind: type[Checked] | type[Identified], answer: tuple[str, str]) -> Any:
 def check(path: PathLike) -> Checked:
     """Says what is understood of a dataset, a train, a line or a daemon's configuration.
 
-    What is wrong with it is told by ``valid`` and ``errors`` and raises nothing.
+    What is wrong with it is reported by ``valid`` and ``errors`` and raises nothing.
     """
     return _as(Checked, _native.check(path))  # type: ignore[no-any-return]
 
@@ -327,7 +327,7 @@ def explain(
     it.
 
     ``progress`` is called with the share done and with what is being done; what it raises ends the
-    work. Without it, a line on standard error tells, where that is a terminal.
+    work. Without it, a line on standard error reports it, where that is a terminal.
     """
     is_shown = progress is None and sys.stderr is not None and sys.stderr.isatty()
     try:

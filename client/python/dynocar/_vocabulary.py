@@ -42,7 +42,7 @@ class Code(_Vocabulary):
 class Rail(_Vocabulary):
     """What the rail carries in a stop."""
 
-    UNLIMITED = 0  # Any brake force: adhesion and its deviation are not read
+    UNLIMITED = 0  # Any brake force: adhesion and its standard deviation are not read
     COEFFICIENT = 1  # Adhesion is one coefficient at all speeds, or a lower bound of it
     DRY_LAW = 2  # Adhesion is a scale of the dry rail's law (Xie 2019)
     WET_LAW = 3  # Adhesion is a scale of the wet rail's law (Xie 2019)
@@ -59,7 +59,7 @@ class DaemonState(_Vocabulary):
 class Status(_Vocabulary):
     """What a controller may do with an estimate. Only ``ESTIMATED`` values may be used.
 
-    ``docs/guides/reading.md`` tells what each status and each reason means.
+    ``docs/guides/reading.md`` says what each status and each reason means.
     """
 
     UNESTIMATED = 1  # Not enough data yet; the values are the declared or the initial ones
@@ -158,7 +158,7 @@ class RejectionReason(_Vocabulary):
     """Why a sample was not used: places in rejected_by_reason."""
 
     TIME_NOT_INCREASING = 0  # The time is not later than the last accepted one
-    TIME_JUMP = 1  # The time jumped ahead by more than a stretch of motion allows
+    TIME_JUMP = 1  # The time jumped ahead by more than a motion segment allows
     SEQUENCE_NOT_INCREASING = 2  # The sequence number repeats or runs backwards
     WRONG_TRAIN = 3  # The sample is of another train
     MISSING = 4  # A quantity that is needed is missing
@@ -176,13 +176,13 @@ class RejectionReason(_Vocabulary):
 
 
 class Manoeuvre(IntFlag):
-    """Manoeuvres that would tell more: bits of missing_manoeuvres."""
+    """Manoeuvres that would show more: bits of missing_manoeuvres."""
 
-    COAST_SLOW = 1 << 0  # Coasting at low speed, which tells of Davis a
-    COAST_FAST = 1 << 1  # Coasting at high speed, which tells of Davis c
-    VARY_SPEED = 1 << 2  # A wider range of speeds, which tells a, b and c apart
-    ACCELERATE = 1 << 3  # Strong traction, which tells of mass
-    BRAKE = 1 << 4  # Strong braking, which tells of adhesion and brake friction
+    COAST_SLOW = 1 << 0  # Coasting at low speed, which determines Davis a
+    COAST_FAST = 1 << 1  # Coasting at high speed, which determines Davis c
+    VARY_SPEED = 1 << 2  # A wider range of speeds, which separates a, b and c
+    ACCELERATE = 1 << 3  # Strong traction, which determines mass
+    BRAKE = 1 << 4  # Strong braking, which determines adhesion and brake friction
     MOVE = 1 << 5  # Any motion
 
 

@@ -1,4 +1,4 @@
-//! Long work: the lock of Python's interpreter is free meanwhile, progress is told in the caller's
+//! Long work: the lock of Python's interpreter is free meanwhile, progress is reported in the caller's
 //! thread, and a signal (Ctrl-C) ends it.
 
 use std::panic::resume_unwind;
@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 /// How often signals are looked for.
 pub(crate) const SIGNALS_EVERY: Duration = Duration::from_millis(50);
 
-/// Told the share done, 0 to 1, and what is being done.
+/// Given the share done, 0 to 1, and what is being done.
 pub(crate) type Progress<'p> = &'p (dyn Fn(f64, &str) + Sync);
 
 /// Does the work in a thread of its own and calls `progress` with its steps. When a signal or
@@ -37,12 +37,12 @@ pub(crate) fn in_background<T: Send + 'static>(
     loop {
         let (step, back) = py.detach(move || (steps.recv_timeout(SIGNALS_EVERY), steps));
         steps = back;
-        let told = match (step, progress) {
+        let outcome = match (step, progress) {
             (Err(RecvTimeoutError::Disconnected), _) => break,
             (Ok((share, what)), Some(progress)) => progress.call1((share, what)).map(drop),
             _ => Ok(()),
         };
-        if let Err(error) = told.and_then(|()| py.check_signals()) {
+        if let Err(error) = outcome.and_then(|()| py.check_signals()) {
             is_given_up.store(true, Ordering::Relaxed);
             return Err(error);
         }

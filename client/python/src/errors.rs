@@ -30,6 +30,6 @@ pub(crate) fn of_failure(py: Python<'_>, failure: &Failure) -> PyErr {
     match failure.answer() {
         Some(it) if it.exit_status == 2 => raised(py, "InputError", (it.message, it.file, it.line)),
         Some(it) => raised(py, "WorkError", (it.message,)),
-        None => raised(py, "WorkError", ("the result is bad news, told already",)),
+        None => raised(py, "WorkError", ("the result is bad news, reported already",)),
     }
 }

@@ -1,4 +1,4 @@
-//! `explain`: the answer, the report with its plots, what the grown model predicts, and its files.
+//! `explain`: the answer, the report with its plots, what the updated model predicts, and its files.
 
 use std::path::PathBuf;
 
@@ -71,7 +71,7 @@ impl Explained {
         Ok(drawn.map(|image| (image.name, image.svg)).collect())
     }
 
-    /// Speeds that the grown model predicts, by run.
+    /// Speeds that the updated model predicts, by run.
     fn predictions(&self) -> PyResult<Vec<(String, Table)>> {
         let table = |run: &PredictedRun| -> PyResult<(String, Table)> {
             let columns =
@@ -81,7 +81,7 @@ impl Explained {
         self.explanation.predictions.iter().map(table).collect()
     }
 
-    /// Writes the grown model into a folder; gives the files, and the kinds that they cannot express.
+    /// Writes the updated model into a folder; gives the files, and the kinds that they cannot express.
     fn write_grown(
         &self,
         py: Python<'_>,

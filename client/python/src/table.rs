@@ -11,7 +11,7 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict};
 
-/// Name of the column that tells the runs of a dataset apart.
+/// Name of the column that distinguishes the runs of a dataset.
 const RUN: &str = "run";
 
 /// Named columns of one length, NaN where a value is missing.

@@ -32,7 +32,7 @@ def measure(fleet: Path, out: Path, workers: int) -> tuple[float, float, float]:
     """Wall time in s, processor time for a train in s, greatest memory of a worker in MiB."""
     with connected(None, workers) as client:
         start_s = time.perf_counter()
-        done = explain_fleet(fleet, out, client=client, tell=lambda words: None)
+        done = explain_fleet(fleet, out, client=client, report_line=lambda words: None)
         wall_s = time.perf_counter() - start_s
     assert not done.failed, done.failed
     work = [train["work"] for train in done.report["trains"]]
@@ -51,9 +51,9 @@ def main() -> None:
         for trains in (1, 8, 64):
             fleet = fleet_of(trains, folder / "kinds", folder / f"fleet-{trains}")
             for workers in (1, 2):
-                told = measure(fleet, folder / f"told-{trains}-{workers}", workers)
+                report = measure(fleet, folder / f"report-{trains}-{workers}", workers)
                 print(
-                    f"| {trains} | {workers} | {told[0]:.1f} | {told[1]:.2f} | {told[2]:.0f} |",
+                    f"| {trains} | {workers} | {report[0]:.1f} | {report[1]:.2f} | {report[2]:.0f} |",
                     flush=True,
                 )
 

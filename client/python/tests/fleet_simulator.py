@@ -1,7 +1,7 @@
 """Small fleets from seeds: trains as points of mass with a length on one line, whose truth is known.
 
 A train coasts, pulls and brakes by turns; its recorded speeds and forces are noisy. What acts on it
-beyond what is declared is told by `Truth`.
+beyond what is declared is given by `Truth`.
 """
 
 from __future__ import annotations
@@ -104,14 +104,14 @@ def run(truth: Truth, direction: int, seed: int, seconds: float = 450.0) -> dict
             resistance += further * max(0.0, min(front, end) - max(rear, start)) / LENGTH_M
         if step % RECORDED_EVERY == 0:
             measured = max(0.0, v + random.normal(0, 0.02))
-            told = force * (1 + random.normal(0, 0.004)) if force else 0.0
+            shown = force * (1 + random.normal(0, 0.004)) if force else 0.0
             rows.append(
                 (
                     time_s,
                     round(x + random.normal(0, 0.5), 1),
                     measured,
-                    max(told, 0.0),
-                    max(-told, 0.0),
+                    max(shown, 0.0),
+                    max(-shown, 0.0),
                 )
             )
         v += (

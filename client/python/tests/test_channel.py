@@ -151,8 +151,8 @@ def assert_is_silent_at_last(reader: dynocar.SnapshotReader) -> None:
 
     wait_for(is_silent)
     snapshot = reader.resistance()
-    told = (snapshot.status.name, snapshot.why, snapshot.is_usable)
-    assert told == ("INVALID", "daemon_silent", False)
+    shown = (snapshot.status.name, snapshot.why, snapshot.is_usable)
+    assert shown == ("INVALID", "daemon_silent", False)
     words = "resistance_kalman invalid (daemon_silent), not usable"
     assert str(snapshot).splitlines()[0] == words
 
@@ -321,7 +321,7 @@ def test_numpy_reads_a_snapshot_as_it_lies_in_shared_memory(tmp_path: Path) -> N
         assert np.array_equal(read[name], getattr(raw, name)), name
     with pytest.raises(AttributeError, match="no field 'speed_kmh'"):
         raw.speed_kmh  # type: ignore[attr-defined]
-    # What a type checker is told, and what publish takes, are the same fields.
+    # What a type checker sees, and what publish takes, are the same fields.
     stub = (Path(dynocar.__file__).parent / "_native.pyi").read_text()
     block = stub.split("class ParameterSnapshot:")[1].split("    def ")[0]
     assert tuple(re.findall(r"^    (\w+): ", block, re.MULTILINE)) == names
@@ -337,8 +337,8 @@ def test_the_page_of_the_fields_says_the_types_for_numpy() -> None:
         ("ParameterSnapshot", dynocar.SNAPSHOT_DTYPE),
     ]:
         table = page.split(f"## `dynocar.{title}`")[1].split("\n## ")[0]
-        told = re.findall(r"^\| `(\w+)` .*\| `(\S+)` at (\d+) \|", table, re.MULTILINE)
+        shown = re.findall(r"^\| `(\w+)` .*\| `(\S+)` at (\d+) \|", table, re.MULTILINE)
         fields = dtype.fields
-        assert fields is not None and [name for name, _, _ in told] == list(fields)
-        for name, kind, offset in told:
+        assert fields is not None and [name for name, _, _ in shown] == list(fields)
+        for name, kind, offset in shown:
             assert (np.dtype(kind), int(offset)) == tuple(fields[name][:2]), name

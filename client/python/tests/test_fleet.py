@@ -52,7 +52,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def done(fleet: Path, client: Client, tmp_path_factory: pytest.TempPathFactory) -> Fleet:
-    return explain_fleet(fleet, tmp_path_factory.mktemp("told"), client=client)
+    return explain_fleet(fleet, tmp_path_factory.mktemp("report"), client=client)
 
 
 def answer_of(done: Fleet, name: str) -> Any:
@@ -70,10 +70,10 @@ def test_two_workers_give_the_answer_of_one_process_to_the_last_digit(
         assert answer_of(done, unit.name)["answer"] == json.loads(json.dumps(alone))
     for number in (1, 2):
         simulator.write_dataset(tmp_path / f"csv/{number}", Truth((AT_COMMON,)), number)
-    told = explain_fleet(tmp_path / "csv", tmp_path / "told", client=client)
+    report = explain_fleet(tmp_path / "csv", tmp_path / "report", client=client)
     for number in (1, 2):
         alone = dynocar.explain(tmp_path / f"csv/{number}").to_dict()
-        assert answer_of(told, str(number))["answer"] == json.loads(json.dumps(alone))
+        assert answer_of(report, str(number))["answer"] == json.loads(json.dumps(alone))
 
 
 def test_the_train_with_another_mass_is_distinguished_from_the_others(done: Fleet) -> None:
@@ -108,7 +108,7 @@ def test_a_place_that_one_train_finds_is_the_trains_and_the_others_do_not_count_
     assert effect["belongs_to"] == "train"
     states = {it["train"]: it for it in effect["trains"]}
     assert states["12"]["state"] == "found" and effect["pooled"]["estimates"] == 1
-    # The others were asked with it declared: what they then find tells what theirs is.
+    # The others were asked with it declared: what they then find shows what theirs is.
     absent = [it for it in states.values() if it["state"] == "absent"]
     assert absent and all(abs(it["value"]) <= 2 * it["std"] for it in absent)
     without = [it for it in states.values() if it["state"] in ("cannot_tell", "not_asked")]
@@ -127,24 +127,24 @@ def test_what_came_since_the_month_before_is_reported(done: Fleet) -> None:
 def test_a_restart_does_only_what_is_missing_or_changed(
     fleet: Path, done: Fleet, client: Client, tmp_path: Path
 ) -> None:
-    out, changed = tmp_path / "told", tmp_path / "changed"
+    out, changed = tmp_path / "report", tmp_path / "changed"
     shutil.copytree(done.json_file.parent, out)
     shutil.copytree(fleet, changed)
     lines: list[str] = []
-    again = explain_fleet(changed, out, client=client, tell=lines.append)
+    again = explain_fleet(changed, out, client=client, report_line=lines.append)
     assert lines and all(": kept" in line for line in lines)
     assert again.report == done.report
     (out / "answers/10.2026-05.json").unlink()
     (out / "answers/11.2026-05.json").write_text("{broken")
     (changed / "train=14/day=2026-04-02/up.parquet").unlink()
     lines.clear()
-    explain_fleet(changed, out, client=client, tell=lines.append)
+    explain_fleet(changed, out, client=client, report_line=lines.append)
     redone = {line.split(":")[0] for line in lines if "kept" not in line and "~" not in line}
     assert redone == {"10.2026-05", "11.2026-05", "14.2026-04"}
 
 
 def test_the_report_is_written_anew_from_kept_answers(done: Fleet, tmp_path: Path) -> None:
-    out = tmp_path / "told"
+    out = tmp_path / "report"
     shutil.copytree(done.json_file.parent, out)
     assert write_report(out).report == done.report
     assert write_report(out, month="2026-04").report["month_before"] is None
@@ -161,16 +161,16 @@ def test_a_failed_train_is_reported_and_the_rest_is_done(
     shutil.copytree(fleet, folder, ignore=shutil.ignore_patterns("train=1[2-5]", "day=2026-04*"))
     broken = folder / "train=11/day=2026-05-03/up.parquet"
     broken.write_bytes(b"no parquet")
-    told = explain_fleet(folder, tmp_path / "told", client=client)
-    assert [it["train"] for it in told.report["trains"]] == ["10"]
-    assert [(it["train"], it["month"]) for it in told.failed] == [("11", "2026-05")]
-    assert told.failed[0]["error"].startswith(f"{broken}: not a Parquet file: ")
+    report = explain_fleet(folder, tmp_path / "report", client=client)
+    assert [it["train"] for it in report.report["trains"]] == ["10"]
+    assert [(it["train"], it["month"]) for it in report.failed] == [("11", "2026-05")]
+    assert report.failed[0]["error"].startswith(f"{broken}: not a Parquet file: ")
     assert (
-        "no parquet" not in told.html_file.read_text() and "11 failed" in told.html_file.read_text()
+        "no parquet" not in report.html_file.read_text() and "11 failed" in report.html_file.read_text()
     )
     shutil.copy(fleet / "train=11/day=2026-05-03/up.parquet", broken)
     lines: list[str] = []
-    assert explain_fleet(folder, tmp_path / "told", client=client, tell=lines.append).failed == []
+    assert explain_fleet(folder, tmp_path / "report", client=client, report_line=lines.append).failed == []
     assert {line.rsplit(" (", 1)[0] for line in lines if "~" not in line} == {
         "10.2026-05: kept",
         "11.2026-05: done",
@@ -192,10 +192,10 @@ def test_a_worker_that_dies_is_replaced_and_a_train_that_kills_is_reported(
             os._exit(1)
         return explained(order)
 
-    told = explain_fleet(folder, tmp_path / "told", client=client, work=work)
-    assert [it["train"] for it in told.report["trains"]] == ["10", "12"]
-    assert [it["train"] for it in told.failed] == ["11"]
-    assert told.failed[0]["error"].startswith("the workers that explained it died")
+    report = explain_fleet(folder, tmp_path / "report", client=client, work=work)
+    assert [it["train"] for it in report.report["trains"]] == ["10", "12"]
+    assert [it["train"] for it in report.failed] == ["11"]
+    assert report.failed[0]["error"].startswith("the workers that explained it died")
 
 
 def test_partitions_become_a_dataset_with_every_value(tmp_path: Path) -> None:
@@ -228,8 +228,8 @@ def test_partitions_become_a_dataset_with_every_value(tmp_path: Path) -> None:
     _partitions.write_dataset(unit, written)
     dataset = dynocar.read_dataset(written)
     assert [(run.role, run.direction) for run in dataset.runs] == [("fit", 1), ("holdout", -1)]
-    told = [value for run in dataset.runs for value in run.columns["position_m"]]
-    assert told == columns["position_m"]
+    report = [value for run in dataset.runs for value in run.columns["position_m"]]
+    assert report == columns["position_m"]
     speeds = [value for run in dataset.runs for value in run.columns["speed_mps"]]
     assert speeds[0] != speeds[0] and speeds[1:] == table.column("speed_mps").to_pylist()[1:]
     times = dataset.runs[0].columns["time_s"]
@@ -283,8 +283,8 @@ def test_what_is_wrong_with_a_train_is_named_by_file_and_column(
 ) -> None:
     broken_fleet(tmp_path, change)
     (unit,) = _folder.units(tmp_path)
-    told = explained(Order(unit, False, None, None))
-    assert told is not None and re.search(OF_A_TRAIN[change], told["error"]), told["error"]
+    report = explained(Order(unit, False, None, None))
+    assert report is not None and re.search(OF_A_TRAIN[change], report["error"]), report["error"]
 
 
 @pytest.mark.parametrize("change", OF_THE_FLEET)
@@ -303,15 +303,15 @@ def test_the_command_ends_with_its_status(fleet: Path, done: Fleet, tmp_path: Pa
     folder = tmp_path / "fleet"
     keep = shutil.ignore_patterns("train=1[1-5]", "day=2026-04*")
     shutil.copytree(fleet, folder, ignore=keep)
-    told = command("explain", folder, "-o", tmp_path / "told", "--workers", 1, capture_output=True)
-    assert told.returncode == 0 and "10.2026-05: done (0 left)\n" in told.stderr, told
-    assert told.stdout.startswith("1 trains explained, 2026-05, 0 failed\n")
+    report = command("explain", folder, "-o", tmp_path / "report", "--workers", 1, capture_output=True)
+    assert report.returncode == 0 and "10.2026-05: done (0 left)\n" in report.stderr, report
+    assert report.stdout.startswith("1 trains explained, 2026-05, 0 failed\n")
     (folder / "train=10/day=2026-05-03/up.parquet").write_bytes(b"")
-    told = command("explain", folder, "-o", tmp_path / "told", "--workers", 1, capture_output=True)
-    assert told.returncode == 1 and "failed: 10 2026-05: " in told.stdout
+    report = command("explain", folder, "-o", tmp_path / "report", "--workers", 1, capture_output=True)
+    assert report.returncode == 1 and "failed: 10 2026-05: " in report.stdout
     for arguments, words in [
         (("explain", tmp_path / "none", "-o", tmp_path), "none: no such folder"),
-        (("explain", tmp_path / "told", "-o", tmp_path), "no trains: expected folders train=NAME/"),
+        (("explain", tmp_path / "report", "-o", tmp_path), "no trains: expected folders train=NAME/"),
         (("explain", fleet, "-o", tmp_path, "--month", "May"), "May: expected a month as 2026-05"),
         (
             ("explain", fleet, "-o", tmp_path, "--month", "2025-01"),
@@ -332,14 +332,14 @@ def test_a_reader_that_has_gone_and_a_full_disk_are_met(done: Fleet) -> None:
     out = done.json_file.parent
     read, write = os.pipe()
     os.close(read)
-    told = command("report", out, stdout=write, stderr=subprocess.PIPE)
+    report = command("report", out, stdout=write, stderr=subprocess.PIPE)
     os.close(write)
-    assert (told.returncode, told.stderr) == (0, "")
+    assert (report.returncode, report.stderr) == (0, "")
     with open("/dev/full", "w") as full:
-        told = command("report", out, stdout=full, stderr=subprocess.PIPE)
-    assert told.returncode == 1
+        report = command("report", out, stdout=full, stderr=subprocess.PIPE)
+    assert report.returncode == 1
     assert (
-        told.stderr
+        report.stderr
         == "dynocar.fleet: standard output: cannot be written: No space left on device\n"
     )
 

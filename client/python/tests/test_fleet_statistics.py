@@ -30,7 +30,7 @@ def test_a_mean_of_equals_is_the_plain_mean_and_its_interval_students() -> None:
     values = [1.0, 2.0, 4.0, 5.0]
     pooled = pool([Estimate(value, 0.1) for value in values])
     assert pooled.mean == pytest.approx(3.0)
-    # Equal deviations: the scatter is the sample's variance less theirs, the interval is Student's.
+    # Equal standard deviations: the scatter is the sample's variance less theirs, the interval is Student's.
     assert pooled.std_between == pytest.approx(math.sqrt(np.var(values, ddof=1) - 0.01))
     assert pooled.std == pytest.approx(np.std(values, ddof=1) / 2)
     assert pooled.high - pooled.mean == pytest.approx(3.1824 * pooled.std, rel=1e-4)
@@ -86,7 +86,7 @@ def test_the_pooled_interval_holds_the_truth_in_95_of_100_or_more(trains: int) -
             pooled = pool([Estimate(*it) for it in zip(values, stds)])
             held += pooled.low <= 0 <= pooled.high
             fleets += 1
-    # 600 fleets tell a share to 0.9 %.
+    # 600 fleets measure a share to 0.9 %.
     assert held / fleets >= 0.94
 
 
@@ -100,7 +100,7 @@ def test_discoveries_are_those_of_benjamini_and_yekutieli() -> None:
 def simulated(
     random: np.random.Generator, trains: int, scatter: float, away: int
 ) -> tuple[dict[str, dict[str, Estimate]], set[tuple[str, str]]]:
-    """Four parameters of a fleet; in the first, `away` trains lie 10 deviations off."""
+    """Four parameters of a fleet; in the first, `away` trains lie 10 standard deviations off."""
     numbers, true = {}, set()
     for parameter in ("a", "b", "c", "mass"):
         stds = random.uniform(0.5, 2.0, trains)
@@ -140,5 +140,5 @@ def test_trains_that_truly_scatter_are_not_said_to_differ(trains: int) -> None:
     for _ in range(150):
         numbers, _ = simulated(random, trains, 3.0, 0)
         false += any(it.is_found for it in differing(numbers))
-    # 150 fleets tell a share of 5 in 100 to 1.8.
+    # 150 fleets measure a share of 5 in 100 to 1.8.
     assert false / 150 <= 0.05 + 0.018

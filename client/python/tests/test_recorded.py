@@ -131,9 +131,9 @@ def test_an_explanation_is_an_object(recordings: Path, tmp_path: Path) -> None:
     subprocess.run(["cp", "-r", recordings, folder], check=True)
     # The drive gives more than it reports.
     manifest = (folder / "dataset.toml").read_text()
-    told = 'traction_force = { column = "traction_force_n", unit = "N"'
-    assert told in manifest
-    (folder / "dataset.toml").write_text(manifest.replace(told, f"{told}, scale = 0.85"))
+    stated = 'traction_force = { column = "traction_force_n", unit = "N"'
+    assert stated in manifest
+    (folder / "dataset.toml").write_text(manifest.replace(stated, f"{stated}, scale = 0.85"))
     explanation = dynocar.explain(folder)
     assert explanation.verdict in ("effect", "ambiguous"), explanation
     effect = explanation.effects[0]
@@ -173,12 +173,12 @@ def test_an_explanation_shows_its_report(
 def test_predictions_are_tables(
     explanation: dynocar.Explanation, recordings: Path, tmp_path: Path
 ) -> None:
-    done = dynocar_command("explain", recordings, "--predictions", tmp_path / "told")
+    done = dynocar_command("explain", recordings, "--predictions", tmp_path / "stated")
     assert done.returncode == 0, done.stderr
-    told = pandas.read_csv(tmp_path / "told/06.csv")
+    stated = pandas.read_csv(tmp_path / "stated/06.csv")
     predicted = pandas.DataFrame.from_arrow(explanation.predictions["runs/06.csv"])
-    assert list(predicted.columns) == list(told.columns) == ["time_s", "speed_mps"]
-    np.testing.assert_allclose(predicted.to_numpy(), told.to_numpy(), atol=1e-3)
+    assert list(predicted.columns) == list(stated.columns) == ["time_s", "speed_mps"]
+    np.testing.assert_allclose(predicted.to_numpy(), stated.to_numpy(), atol=1e-3)
     assert set(explanation.predictions) == {f"runs/0{number}.csv" for number in (1, 2, 3, 6)}
 
 
@@ -237,14 +237,14 @@ def test_progress_is_reported_while_other_threads_run(recordings: Path) -> None:
             counts[0] += 1
             time.sleep(0.001)
 
-    def told(share: float, what: str) -> None:
+    def stated(share: float, what: str) -> None:
         assert threading.current_thread() is threading.main_thread()
         steps.append((share, what, counts[0]))
 
     thread = threading.Thread(target=count)
     thread.start()
     try:
-        dynocar.explain(recordings, progress=told)
+        dynocar.explain(recordings, progress=stated)
     finally:
         is_done.set()
         thread.join()
@@ -254,12 +254,12 @@ def test_progress_is_reported_while_other_threads_run(recordings: Path) -> None:
 
 
 def test_what_progress_raises_ends_the_work(recordings: Path) -> None:
-    def told(share: float, what: str) -> None:
+    def stated(share: float, what: str) -> None:
         raise LookupError("enough")
 
     before = threads()
     with pytest.raises(LookupError, match="enough"):
-        dynocar.explain(recordings, progress=told)
+        dynocar.explain(recordings, progress=stated)
     wait_for(lambda: threads() <= before)
 
 
@@ -294,13 +294,13 @@ def test_ctrl_c_ends_an_explanation() -> None:
 def test_a_terminal_sees_how_far_the_work_is(recordings: Path) -> None:
     main, other = os.openpty()
     code = f"import dynocar; dynocar.explain({str(recordings)!r})"
-    told = b""
+    stated = b""
     with subprocess.Popen([sys.executable, "-c", code], stderr=other) as process:
         os.close(other)
         while chunk := read_some(main):
-            told += chunk
+            stated += chunk
         assert process.wait(PATIENCE_S) == 0
-    assert b"100 %  done" in told and told.endswith(b"\r\x1b[K")
+    assert b"100 %  done" in stated and stated.endswith(b"\r\x1b[K")
     quiet = subprocess.run([sys.executable, "-c", code], capture_output=True, timeout=PATIENCE_S)
     assert (quiet.returncode, quiet.stderr, quiet.stdout) == (0, b"", b"")
 

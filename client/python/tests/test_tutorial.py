@@ -16,11 +16,11 @@ NOTEBOOK = ROOT / "docs/tutorial.ipynb"
 
 def words(notebook: Any) -> list[str]:
     """What the cells print or show in words."""
-    told = []
+    shown = []
     for output in (it for cell in notebook.cells if cell.cell_type == "code" for it in cell.outputs):
         text = output.get("text") or output.get("data", {}).get("text/plain", "")
-        told.append(text)
-    return told
+        shown.append(text)
+    return shown
 
 
 def test_the_tutorial_gives_what_it_shows(

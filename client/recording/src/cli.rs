@@ -59,7 +59,7 @@ struct RecoverArguments {
     output: PathBuf,
 }
 
-/// Change a recording into a dataset's folder, or a dataset into a recording.
+/// Convert recordings between MCAP, CSV datasets and Parquet.
 #[derive(Debug, Args)]
 pub struct ConvertArguments {
     /// A recording, of one that rotated its files in order; or a dataset's folder or dataset.toml
@@ -77,7 +77,7 @@ pub struct ConvertArguments {
     /// The line's file, beside --train-file
     #[arg(long, value_name = "FILE", requires = "train_file")]
     track_file: Option<PathBuf>,
-    /// Tell only what is wrong
+    /// Print only what is wrong
     #[arg(long)]
     pub quiet: bool,
 }
@@ -120,7 +120,7 @@ pub struct VerifyArguments {
     /// The recording; of one that rotated, its files in order
     #[arg(required = true)]
     pub recording: Vec<PathBuf>,
-    /// Also say what this configuration of the daemon would have told
+    /// Also say what this configuration of the daemon would have estimated
     #[arg(long, value_name = "FILE")]
     with: Option<PathBuf>,
 }
@@ -251,8 +251,8 @@ impl VerifyArguments {
         if let (Some(other), Some(file)) = (&other, &self.with) {
             let newest = verified.last().map_or(0, |it| it.epoch);
             let recorded = overlay(configurations.of_epoch(newest).0, &recording.samples);
-            let told = overlay(other, &recording.samples);
-            print(&overlay_text(&recorded, &told, &file.display().to_string()))?;
+            let answers = overlay(other, &recording.samples);
+            print(&overlay_text(&recorded, &answers, &file.display().to_string()))?;
         }
         if verified.iter().all(|it| it.outcome == Outcome::Same) {
             Ok(())

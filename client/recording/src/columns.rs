@@ -25,8 +25,8 @@ pub enum Source {
     Field(&'static Field),
     /// A parameter's value: repeats what arrays hold.
     Value(Parameter),
-    /// What [`SUFFIXES`] tells of it, by the place there: repeats what arrays hold.
-    Beside(Parameter, usize),
+    /// What [`SUFFIXES`] adds to it, by the place there: repeats what arrays hold.
+    OfEstimate(Parameter, usize),
     /// How many samples were refused for a reason: repeats what an array holds.
     Rejected(RejectionReason),
     /// A field of an event, by its place.
@@ -75,11 +75,11 @@ pub static SNAPSHOTS: LazyLock<Vec<Column>> = LazyLock::new(|| {
     let parameters = Parameter::ALL.iter().flat_map(|&it| {
         let name = format!("estimate_{}", it.full_name());
         let value = plain(name, "f64", it.meaning(), Source::Value(it));
-        let beside = SUFFIXES.into_iter().enumerate().map(move |(place, (_, word, meaning))| {
+        let suffixed = SUFFIXES.into_iter().enumerate().map(move |(place, (_, word, meaning))| {
             let name = format!("estimate_{}", suffixed_name(it, word));
-            plain(name, "f64", meaning, Source::Beside(it, place))
+            plain(name, "f64", meaning, Source::OfEstimate(it, place))
         });
-        std::iter::once(value).chain(beside).map(nullable)
+        std::iter::once(value).chain(suffixed).map(nullable)
     });
     let rejected = RejectionReason::ALL.iter().map(|&it| {
         plain(format!("rejected_{}", it.name()), "u32", it.meaning(), Source::Rejected(it))
@@ -175,7 +175,7 @@ impl Column {
 
     /// True for a column that only repeats what others hold.
     pub fn is_repetition(&self) -> bool {
-        matches!(self.source, Source::Value(_) | Source::Beside(..) | Source::Rejected(_))
+        matches!(self.source, Source::Value(_) | Source::OfEstimate(..) | Source::Rejected(_))
     }
 }
 
@@ -201,13 +201,13 @@ impl Row {
                 true
             }
             (Row::Snapshot(it), Source::Value(of)) => one(words, it.value(of).map(f64::to_bits)),
-            (Row::Snapshot(it), Source::Beside(of, place)) => {
-                let told = it.value(of).zip(it.std(of)).map(|(value, std)| match place {
+            (Row::Snapshot(it), Source::OfEstimate(of, place)) => {
+                let estimate = it.value(of).zip(it.std(of)).map(|(value, std)| match place {
                     0 => std,
                     1 => value - INTERVAL_95 * std,
                     _ => value + INTERVAL_95 * std,
                 });
-                one(words, told.map(f64::to_bits))
+                one(words, estimate.map(f64::to_bits))
             }
             (Row::Snapshot(it), Source::Rejected(of)) => one(words, Some(it.rejected(of).into())),
             (Row::Event(it), Source::Event(place)) => one(words, it.word(place)),

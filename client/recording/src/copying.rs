@@ -37,7 +37,7 @@ pub struct Copied {
     pub endings: Vec<Ending>,
 }
 
-/// Copies what can be read of files, in their order, into a new one, ours or not; `watcher` is told what
+/// Copies what can be read of files, in their order, into a new one, ours or not; `watcher` is given what
 /// they hold, and `add` writes what is to follow. A file that is attached to several is so once. When it has
 /// returned, the new one is on the disk.
 ///

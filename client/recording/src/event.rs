@@ -53,7 +53,7 @@ kinds! {
     SuspicionEnded = 11 "suspicion_ended";
     /// A person or a program asked to keep this moment for good.
     KeepRequested = 12 "keep_requested";
-    /// A pipeline reckons with another model of train and line than before.
+    /// A pipeline uses another model of train and line than before.
     ModelChanged = 13 "model_changed";
     /// A learner wrote down a maintenance event: a dragging brake, low adhesion, another load.
     MaintenanceFound = 14 "maintenance_found";

@@ -9,7 +9,7 @@ use mcap::records::Metadata;
 
 use crate::reading::{Ending, Item, Raw, ReadError, Visitor, read};
 
-/// Reads the files of a recording that rotated, in order, as if they were one: what each repeats is told
+/// Reads the files of a recording that rotated, in order, as if they were one: what each repeats is given
 /// once. Gives how each ends.
 ///
 /// # Errors

@@ -12,7 +12,7 @@
 //! - [`codec`]: samples and snapshots as messages, and back, to the bit
 //! - [`event`]: what happens around them
 //! - [`topic`]: the streams of messages
-//! - [`lanes`]: what a recorder and a live view read of the trains' channels
+//! - [`train_channels`]: what a recorder and a live view read of the trains' channels
 //! - [`writing`], [`reading`]: MCAP files, written without seeking and read as far as they are whole
 //! - [`joining`]: the files of a recording that rotated, read as one
 //! - [`recording`]: a recording in memory

@@ -17,7 +17,7 @@ use crate::schema::{
 const HEAD: &str = "# Fields of a recording
 
 This page is what `dynocar-recording fields` prints; it is made from the same tables as the recordings'
-protobuf messages, the columns of a recording in Parquet and the types for NumPy. How to record is told
+protobuf messages, the columns of a recording in Parquet and the types for NumPy. How to record is described
 in [the guide](guides/recording.md).
 
 *Number* and *type* are those of the protobuf message. A field of which it says *missing unless measured* is
@@ -60,7 +60,7 @@ pub fn page() -> String {
     for column in SNAPSHOTS.iter() {
         let (name, number) = match column.source {
             Source::Value(it) => (it.full_name().to_owned(), parameter_number(it)),
-            Source::Beside(it, place) => {
+            Source::OfEstimate(it, place) => {
                 let (offset, word, _) = SUFFIXES[place];
                 (suffixed_name(it, word), parameter_number(it) + offset)
             }

@@ -168,7 +168,7 @@ pub struct ChannelInfo {
     pub schema: Option<(String, String, Vec<u8>)>,
 }
 
-/// Who is told what a file holds.
+/// Who is given what a file holds.
 pub trait Visitor {
     /// Something of ours.
     fn item(&mut self, item: Item<'_>);
@@ -181,7 +181,7 @@ impl Visitor for () {
     fn item(&mut self, _: Item<'_>) {}
 }
 
-/// Reads a file, and tells what it holds as far as it is whole.
+/// Reads a file, and gives what it holds as far as it is whole.
 ///
 /// # Errors
 ///

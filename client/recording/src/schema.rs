@@ -58,7 +58,7 @@ pub fn parameter_number(parameter: Parameter) -> u32 {
     parameter as u32
 }
 
-/// What `estimate` tells of a parameter beside its value: how much greater its number is, the word in
+/// What `estimate` says of a parameter in addition to its value: how much greater its number is, the word in
 /// its name, and what it is.
 pub const SUFFIXES: [(u32, &str, &str); 3] = [
     (STD_OFFSET, "std", "Its standard deviation."),
@@ -66,7 +66,7 @@ pub const SUFFIXES: [(u32, &str, &str); 3] = [
     (HIGH_OFFSET, "high", "The upper end of its 95 % interval."),
 ];
 
-/// The name of what is told of a parameter beside its value: the unit stays last.
+/// The name of what is said of a parameter in addition to its value: the unit stays last.
 pub fn suffixed_name(parameter: Parameter, word: &str) -> String {
     let name = parameter.full_name();
     let unit = unit_end(name).0;
@@ -183,10 +183,10 @@ fn estimate_message() -> Vec<FieldDescriptorProto> {
     let of = |&it: &Parameter| {
         let number = parameter_number(it);
         let value = field(it.full_name(), number, Type::Double, true);
-        let beside = SUFFIXES.map(|(offset, word, _)| {
+        let suffixed = SUFFIXES.map(|(offset, word, _)| {
             field(&suffixed_name(it, word), number + offset, Type::Double, true)
         });
-        std::iter::once(value).chain(beside)
+        std::iter::once(value).chain(suffixed)
     };
     Parameter::ALL.iter().flat_map(of).collect()
 }

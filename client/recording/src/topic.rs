@@ -6,7 +6,7 @@ use crate::schema::{EVENT, SAMPLE, SNAPSHOT};
 
 /// The encoding of every message and of its schema.
 pub const ENCODING: &str = "protobuf";
-/// The channel's metadata that tells the layout in shared memory.
+/// The channel's metadata that names the layout in shared memory.
 pub const LAYOUT: &str = "layout";
 
 /// One stream of messages.

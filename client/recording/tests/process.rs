@@ -37,9 +37,9 @@ fn started(place: &TestSite, command: &[&str], to: &str) -> Child {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    let mut told = [0; 14];
-    recorder.stderr.as_mut().unwrap().read_exact(&mut told).unwrap();
-    assert_eq!(&told, b"recording into");
+    let mut printed = [0; 14];
+    recorder.stderr.as_mut().unwrap().read_exact(&mut printed).unwrap();
+    assert_eq!(&printed, b"recording into");
     recorder
 }
 
@@ -112,14 +112,14 @@ fn a_recorder_outlives_daemons_and_controllers_and_what_is_killed_is_verified() 
     assert_eq!((&again.samples, &again.snapshots), (&left.samples, &left.snapshots));
 
     let verified = run(&["verify", "--with"], &[&place.at("daemon.toml"), &whole]);
-    let told = words(&verified);
-    assert_eq!(told.matches("daemon of epoch").count(), 2, "{told}");
-    assert!(told.contains("recorded configuration"), "{told}");
+    let printed = words(&verified);
+    assert_eq!(printed.matches("daemon of epoch").count(), 2, "{printed}");
+    assert!(printed.contains("recorded configuration"), "{printed}");
     // On a machine so busy that samples are lost, daemon and recorder did not take the same.
     let lost = left.snapshots.iter().any(|it| it.samples_lost > 0)
         || count(&place, EventKind::SamplesLost) > 0;
-    assert!(lost || verified.status.success(), "{told}");
-    assert!(lost || !told.contains("cannot"), "{told}");
+    assert!(lost || verified.status.success(), "{printed}");
+    assert!(lost || !printed.contains("cannot"), "{printed}");
 }
 
 #[test]
@@ -153,10 +153,10 @@ fn a_full_disk_ends_only_the_recorder_and_what_was_written_can_be_read() {
         .args([place.at("root"), place.at("run.mcap")])
         .output()
         .unwrap();
-    let told = words(&recorder);
-    assert_eq!(recorder.status.code(), Some(1), "{told}");
-    assert!(told.contains("run.mcap: cannot be written: File too large"), "{told}");
-    assert!(recording(&place).samples.len() > 50, "{told}");
+    let printed = words(&recorder);
+    assert_eq!(recorder.status.code(), Some(1), "{printed}");
+    assert!(printed.contains("run.mcap: cannot be written: File too large"), "{printed}");
+    assert!(recording(&place).samples.len() > 50, "{printed}");
     await_more(&controller, 100);
 }
 
@@ -215,9 +215,9 @@ fn a_closed_pipe_is_no_failure_and_a_full_disk_is_reported_by_the_name_that_was_
             let output = command.stdout(closed).output().unwrap();
             assert_eq!((output.status.code(), words(&output)), (Some(0), String::new()));
             let output = command.stdout(full()).output().unwrap();
-            let told =
+            let printed =
                 format!("{name}: standard output: cannot be written: No space left on device");
-            assert!(words(&output).starts_with(&told), "{}", words(&output));
+            assert!(words(&output).starts_with(&printed), "{}", words(&output));
             assert_eq!(output.status.code(), Some(1));
         }
     }
@@ -258,5 +258,5 @@ fn a_flight_recorder_keeps_what_lies_around_a_suspicion() {
     assert!(recorder.wait().unwrap().success());
     let recording = Recording::load(&ring.join("ring-000001.mcap")).unwrap();
     let raised = recording.events.iter().filter(|it| it.kind == EventKind::SuspicionRaised as i32);
-    assert_eq!(raised.count(), 1, "told once, however long it is suspected");
+    assert_eq!(raised.count(), 1, "reported once, however long it is suspected");
 }

@@ -71,7 +71,7 @@ impl Users {
     ///
     /// [`ChannelError::SharedMemoryFull`].
     pub fn require_free_memory(&self) -> Result<(), ChannelError> {
-        // A system that cannot tell has no limit that we know of.
+        // A system that does not know has no limit that we know of.
         let Ok(memory) = rustix::fs::statvfs(SHARED_MEMORY) else { return Ok(()) };
         let free = memory.f_bavail.saturating_mul(memory.f_frsize);
         if free >= FREE_BYTES_MIN { Ok(()) } else { Err(full(free, FREE_BYTES_MIN)) }

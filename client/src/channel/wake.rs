@@ -46,7 +46,7 @@ fn wake_service(transport: &Transport) -> Result<PortFactory<ipc::Service>, Chan
         .map_err(|error| refused(format!("{error:?}")))
 }
 
-/// A pipeline thread's bed: tells the controllers of its trains, then waits for one of them.
+/// A pipeline thread's bed: informs the controllers of its trains, then waits for one of them.
 #[derive(Debug)]
 pub struct Sleeper {
     listener: Listener<ipc::Service>,
@@ -83,7 +83,7 @@ impl Sleeper {
     }
 
     /// Waits until a controller sends or `timeout` has passed, unless `has_work` after the
-    /// controllers were told.
+    /// controllers were informed.
     pub fn sleep(&mut self, timeout: Duration, has_work: impl FnOnce() -> bool) {
         self.announce(1);
         fence(Ordering::SeqCst);

@@ -14,7 +14,7 @@ pub struct Handle<T> {
     end: T,
 }
 
-/// Tells living threads apart without a system call.
+/// Distinguishes living threads without a system call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct ThreadMark(usize);
 

@@ -107,7 +107,7 @@ pub unsafe extern "C" fn dynocar_reader_set_stale_after_ns(
 }
 
 /// Takes what has come since the last poll; `news` (may be NULL) gets the number of snapshots
-/// that told something new.
+/// that brought something new.
 ///
 /// # Safety
 ///

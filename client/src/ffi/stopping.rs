@@ -11,7 +11,7 @@ pub const EFFORT_POINTS_MAX: usize = 1024;
 vocabulary! {
     /// What the rail carries; `DYNOCAR_RAIL_…` in C.
     Rail: u64 {
-        /// Any brake force: adhesion and its deviation are not read.
+        /// Any brake force: adhesion and its standard deviation are not read.
         Unlimited = 0 "unlimited",
         /// Adhesion is one coefficient at all speeds, or a lower bound of it.
         Coefficient = 1 "coefficient",

@@ -126,7 +126,7 @@ pub fn of_answers() -> Vec<Vocabulary> {
             class: "Status",
             about: "What a controller may do with an estimate.",
             in_c: "Of an estimated one, too, the reason may remark something.",
-            in_python: "Only ``ESTIMATED`` values may be used.\n\n    ``docs/guides/reading.md`` tells \
+            in_python: "Only ``ESTIMATED`` values may be used.\n\n    ``docs/guides/reading.md`` says \
                         what each status and each reason means.\n    ",
             members: members!(Status),
             ..PLAIN
@@ -181,7 +181,7 @@ pub fn of_answers() -> Vec<Vocabulary> {
         Vocabulary {
             prefix: "MANOEUVRE",
             class: "Manoeuvre",
-            about: "Manoeuvres that would tell more: bits of missing_manoeuvres.",
+            about: "Manoeuvres that would show more: bits of missing_manoeuvres.",
             is_bits: true,
             members: members!(Manoeuvre),
             ..PLAIN

@@ -1,4 +1,4 @@
-//! What to drive next, reckoned now and then.
+//! What to drive next, computed now and then.
 
 use std::sync::Arc;
 
@@ -33,16 +33,16 @@ impl Advisor {
 
     /// What to drive next, the resistance first; then what else helps, quantity by quantity.
     pub fn advise(&self, state: &TrainState) -> Vec<String> {
-        let mut told = Vec::new();
+        let mut sentences = Vec::new();
         for &quantity in Quantity::ALL {
             let Some(pipeline) = state.answering(quantity) else { continue };
             let words = match remedy(pipeline.status, pipeline.reason) {
                 Some(words) => Some(format!("{quantity}: {words}")),
                 None => self.to_drive(quantity, pipeline, state),
             };
-            told.extend(words);
+            sentences.extend(words);
         }
-        told
+        sentences
     }
 
     fn to_drive(
@@ -74,7 +74,7 @@ impl Advisor {
             }
             _ => for_resistance(&pipeline.snapshot, train, mass, &noise),
         };
-        advice.map(|advice| advice.told())
+        advice.map(|advice| advice.in_words())
     }
 }
 

@@ -15,15 +15,16 @@ use dynocar_shared::TrainId;
 use crate::watcher::Watcher;
 use crate::{plain, terminal};
 
-/// See in the terminal what the daemon knows of a train, and what to drive next: quantities with 95 %
-/// intervals, residual and suspect, samples used, refused and lost. Without options it shows all trains
-/// that any daemon of this host serves. Where standard output is no terminal it writes a line a second
-/// for each train. NO_COLOR is respected; ? shows the keys
+/// Show in the terminal what is estimated of a train, and what to drive next.
+///
+/// Quantities with 95 % intervals, residual and suspect, samples used, refused and lost. Without options
+/// it shows all trains that any daemon of this host serves. Where standard output is no terminal it
+/// writes a line a second for each train. NO_COLOR is respected; ? shows the keys.
 #[derive(Debug, Parser)]
-#[command(name = "dynocar watch", version, about)]
+#[command(name = "dynocar watch", bin_name = "dynocar watch", version)]
 struct Arguments {
     /// The daemon's configuration: its root, its trains and what is declared of them; what to drive
-    /// next is reckoned within the limits declared there
+    /// next is computed within the limits declared there
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Only this train; may be given several times
@@ -39,7 +40,7 @@ pub fn command() -> clap::Command {
     Arguments::command()
 }
 
-/// Parses the command line, watches until told to end, reports a failure on standard error.
+/// Parses the command line, watches until asked to end, reports a failure on standard error.
 pub fn main() -> ExitCode {
     let arguments = match parse::<Arguments>("dynocar watch") {
         Ok(arguments) => arguments,

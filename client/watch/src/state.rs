@@ -81,7 +81,7 @@ impl PipelineState {
 pub struct TrainState {
     /// Its number.
     pub id: TrainId,
-    /// Its name, where the configuration tells.
+    /// Its name, where the configuration gives it.
     pub name: Option<String>,
     /// Who serves it.
     pub daemon: Daemon,

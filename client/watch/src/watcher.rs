@@ -11,7 +11,7 @@ use crate::state::{Daemon, PipelineState, TrainState};
 
 /// How often daemons are looked for, and points of the plots taken.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
-/// How often it is reckoned what to drive next.
+/// How often it is computed what to drive next.
 const ADVISE_EVERY: Duration = Duration::from_secs(5);
 
 /// Watches trains.

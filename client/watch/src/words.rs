@@ -157,13 +157,13 @@ mod tests {
 
     #[test]
     fn two_digits_of_the_interval_are_shown() {
-        let told = |value, std, unit| {
+        let printed = |value, std, unit| {
             let row = with_interval(value, std, unit);
             [&row.number, row.interval.as_str(), row.unit].join(" ").trim_end().to_owned()
         };
-        assert_eq!(told(1.49832, 0.0274, "N/kN"), "1.498 ± 0.054 N/kN");
-        assert_eq!(told(1697.4, 6.0, "t"), "1697 ± 12 t");
-        assert_eq!(told(0.000_861, 0.000_013, ""), "0.000861 ± 0.000025");
-        assert_eq!(told(0.094, 0.0, ""), "0.094");
+        assert_eq!(printed(1.49832, 0.0274, "N/kN"), "1.498 ± 0.054 N/kN");
+        assert_eq!(printed(1697.4, 6.0, "t"), "1697 ± 12 t");
+        assert_eq!(printed(0.000_861, 0.000_013, ""), "0.000861 ± 0.000025");
+        assert_eq!(printed(0.094, 0.0, ""), "0.094");
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! It knows no channel, clock, file, thread or logger: times and seeds come in as arguments. The
 //! daemon runs these pipelines online, `dynocar identify` offline; both get the same bits from the
-//! same samples. What recorded runs tell beyond that is the library `dynocar_analysis`'s, which is
+//! same samples. What recorded runs show beyond that is the library `dynocar_analysis`'s, which is
 //! built on this one.
 //!
 //! # Layout, in the order a sample takes
@@ -16,7 +16,7 @@
 //! - [`filter`]: recursive estimators of fixed size, without knowledge of trains
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
 //! - [`simulate`]: the speed that a force model predicts over a recorded run
-//! - [`trial`]: which of several models predicts better, told while a train runs
+//! - [`trial`]: which of several models predicts better, judged while a train runs
 //! - [`named!`]: enums whose members have names in files
 
 pub mod filter;

@@ -1,6 +1,6 @@
 //! Gradient from the altitude along the way.
 
-/// Altitudes are averaged over stretches of this many m, so that a standing train does not
+/// Altitudes are averaged over intervals of this many m, so that a standing train does not
 /// outweigh a fast one.
 const CELL_M: f64 = 10.0;
 /// The gradient at a place is fitted over so many m to either side: wide enough for altitudes in
@@ -29,7 +29,7 @@ fn nearest(cells: &[Cell], position_m: f64) -> Option<usize> {
     near.min_by(|one, other| distance_m(one).total_cmp(&distance_m(other)))
 }
 
-/// The mean altitude over a stretch of [`CELL_M`].
+/// The mean altitude over an interval of [`CELL_M`].
 struct Cell {
     position_m: f64,
     altitude_m: f64,

@@ -21,7 +21,7 @@ pub struct Misdeclared {
     pub code: &'static str,
     /// How much it matters.
     pub severity: Severity,
-    /// What is wrong, with figures and the likely slip.
+    /// What is wrong, with figures and the likely input fault.
     pub text: String,
 }
 

@@ -13,7 +13,7 @@ use super::resolved::{Context, GradientSource, Resolved};
 
 /// Below this distance in m, comparisons of position and speed say nothing.
 const DISTANCE_MIN_M: f64 = 200.0;
-/// Rows at either end that tell where a run begins and ends.
+/// Rows at either end that show where a run begins and ends.
 const END_ROWS: usize = 5;
 /// Position and integrated speed may differ by this share: wheel wear, balises, gaps.
 const DISTANCE_TOLERANCE: f64 = 0.05;
@@ -34,9 +34,9 @@ pub(super) fn remarks(
     quality: &RunQuality,
     findings: &Findings,
 ) -> Vec<Diagnostic> {
-    let slip =
+    let fault =
         |finding| Diagnostic::InputFault { finding, read_as: read_as(context.manifest, finding) };
-    let mut remarks: Vec<Diagnostic> = findings.iter().map(slip).collect();
+    let mut remarks: Vec<Diagnostic> = findings.iter().map(fault).collect();
     of_time(quality, &mut remarks);
     of_content(context, run, quality, &mut remarks);
     remarks.extend(stands_still(run));
@@ -55,7 +55,7 @@ pub(super) fn remarks(
     remarks
 }
 
-/// What a force from power is reckoned with.
+/// What a force from power is computed with.
 fn of_power(context: Context, run: &Resolved, remarks: &mut Vec<Diagnostic>) {
     if run.forces.traction.source != ForceSource::Power {
         return;
@@ -98,7 +98,7 @@ fn of_content(
     }
 }
 
-/// The longest stretch of a moving train in which no column but the time changes.
+/// The longest interval of a moving train in which no column but the time changes.
 fn stands_still(run: &Resolved) -> Option<Diagnostic> {
     let columns: Vec<&[f64]> = run
         .table
@@ -153,17 +153,18 @@ fn of_position(
     };
     let net_m = median_m(&rows[rows.len() - few..]) - median_m(&rows[..few]);
     let direction = run.entry.direction;
-    let is_told =
-        |slips: &[InputFault]| findings.iter().any(|finding| slips.contains(&finding.slip));
-    if net_m * f64::from(direction) < -DISTANCE_MIN_M && !is_told(&[InputFault::DirectionReversed])
+    let is_reported =
+        |faults: &[InputFault]| findings.iter().any(|finding| faults.contains(&finding.fault));
+    if net_m * f64::from(direction) < -DISTANCE_MIN_M
+        && !is_reported(&[InputFault::DirectionReversed])
     {
         remarks.push(Diagnostic::AgainstDirection { direction, net_m });
     }
     let (position_m, speed_m) = (net_m.abs(), quality.distance_m);
     let is_long = position_m.max(speed_m) > DISTANCE_MIN_M;
-    let is_mismatch_told =
-        is_told(&[InputFault::TimeScale, InputFault::SpeedScale, InputFault::PositionScale]);
-    if !is_mismatch_told
+    let is_mismatch_reported =
+        is_reported(&[InputFault::TimeScale, InputFault::SpeedScale, InputFault::PositionScale]);
+    if !is_mismatch_reported
         && is_long
         && (position_m - speed_m).abs() > DISTANCE_TOLERANCE * position_m.max(speed_m)
     {

@@ -107,26 +107,26 @@ pub enum Diagnostic {
     /// The force comes from power.
     #[error(
         "no traction_force is mapped: above {speed_min_mps} m/s it is the power of the drive over the \
-         speed, {efficiency} of it{}; explain tells the efficiency{}",
+         speed, {efficiency} of it{}; explain estimates the efficiency{}",
         if *is_declared { "" } else { " as usual, since no efficiency is declared" },
         if *is_brake {
             "; the brake force is what the drive feeds back, so that --traction-only is needed where \
-             a friction brake acts beside it"
+             a friction brake acts in addition to it"
         } else {
             ""
         }
     )]
     ForceByPower {
-        /// The efficiency that is reckoned with.
+        /// The efficiency that is assumed.
         efficiency: f64,
         /// Whether it is declared.
         is_declared: bool,
-        /// Speed in m/s below which no force is told.
+        /// Speed in m/s below which no force is estimated.
         speed_min_mps: f64,
         /// Whether the brake force comes from power too, and from nothing else.
         is_brake: bool,
     },
-    /// Nothing tells the gradient.
+    /// Nothing gives the gradient.
     #[error(
         "the gradient is unknown: there is no gradient in the track, no gradient, specific_force \
          or altitude in the columns"
@@ -204,7 +204,7 @@ impl Diagnostic {
         use Severity::{Fundamental, Info, Warning};
         match self {
             Diagnostic::InputFault { finding, .. } => {
-                (finding.slip.name(), finding.slip.severity())
+                (finding.fault.name(), finding.fault.severity())
             }
             Diagnostic::AgainstDirection { .. } => ("against_direction", Fundamental),
             Diagnostic::DistanceMismatch { .. } => ("distance_mismatch", Warning),

@@ -62,7 +62,7 @@ pub enum FileProblem {
     /// It is neither a file nor a folder: reading it may never end.
     #[error("expected a file, found {0}")]
     NotRegular(&'static str),
-    /// Its first bytes tell of another format.
+    /// Its first bytes show another format.
     #[error("expected text, found {0}")]
     NotText(&'static str),
     /// More bytes than are read.

@@ -1,4 +1,4 @@
-//! The unit that a finding is told in.
+//! The unit that a diagnostic is reported in.
 
 use dynocar_core::plausibility::{Finding, InputFault};
 use dynocar_core::units::Unit;
@@ -6,10 +6,10 @@ use dynocar_core::units::Unit;
 use super::manifest::Manifest;
 use super::quantity::Quantity;
 
-/// The quantities that a slip is about, and the unit to tell it in where none of them is mapped.
-pub(super) fn concerned(slip: InputFault) -> (&'static [Quantity], &'static str) {
+/// The quantities that an input fault is about, and the unit to report it in where none of them is mapped.
+pub(super) fn concerned(fault: InputFault) -> (&'static [Quantity], &'static str) {
     use Quantity::*;
-    match slip {
+    match fault {
         InputFault::TimeScale => (&[Time], "s"),
         InputFault::SpeedScale => (&[Speed], "m/s"),
         InputFault::PositionScale | InputFault::DirectionReversed => (&[Position], "m"),
@@ -25,13 +25,13 @@ pub(super) fn concerned(slip: InputFault) -> (&'static [Quantity], &'static str)
 
 /// The unit in which the manifest reads the quantity of a finding.
 pub(super) fn read_as(manifest: &Manifest, finding: Finding) -> &'static str {
-    let (quantities, otherwise) = concerned(finding.slip);
+    let (quantities, otherwise) = concerned(finding.fault);
     let mapped = quantities.iter().find_map(|&quantity| manifest.mapping(quantity));
     mapped.map_or(otherwise, |mapping| mapping.unit.name())
 }
 
 /// The unit of a finding's quantity with this name.
 pub(super) fn unit_of(finding: Finding, name: &str) -> Unit {
-    let dimension = finding.slip.dimension();
+    let dimension = finding.fault.dimension();
     Unit::find(dimension, name).unwrap_or_else(|| Unit::base_of(dimension))
 }

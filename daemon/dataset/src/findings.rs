@@ -11,7 +11,7 @@ use dynocar_shared::{SampleField, TrainSample};
 
 use super::resolved::DATASET_TRAIN;
 
-/// Judges the samples of a recorded run; positions that were integrated from the speed tell
+/// Judges the samples of a recorded run; positions that were integrated from the speed show
 /// nothing about it.
 pub(super) fn of_samples(
     train: &Arc<TrainModel>,

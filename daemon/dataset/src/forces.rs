@@ -13,7 +13,7 @@ use super::table::Table;
 const NOISE_SHARE: f64 = 0.02;
 /// A difference from the neighbours by less than this share of the greatest force is no spike.
 const SPIKE_SHARE: f64 = 0.3;
-/// Rows further apart than this many s cannot tell a spike from a short application.
+/// Rows further apart than this many s cannot distinguish a spike from a short application.
 const SPIKE_STEP_MAX_S: f64 = 0.5;
 /// A handle outside 0 to 1 by no more than this is noise around the stop.
 const HANDLE_NOISE: f64 = 0.02;
@@ -334,7 +334,7 @@ mod tests {
             "what comes back was lost on the way"
         );
         assert!(found.traction.force_n[2].is_nan() && found.brake.force_n[2].is_nan());
-        assert_eq!(found.brake.force_n[4], 10e3, "the friction brake beside it");
+        assert_eq!(found.brake.force_n[4], 10e3, "the friction brake in addition to it");
         let by_voltage = "line_voltage={column='U',unit='V'}\nline_current={column='I',unit='A'}";
         let found = forces_of(&train, by_voltage, "t,v,U,I\n0,10,500,220\n1,10,500,-140\n");
         assert_eq!(found.traction.force_n, [8000.0, 0.0]);

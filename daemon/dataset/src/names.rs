@@ -53,7 +53,7 @@ fn nearest(word: &str, names: &[String]) -> Option<usize> {
     begun.next().filter(|_| begun.next().is_none() && !word.is_empty())
 }
 
-/// Case and what separates words do not tell names apart for the purpose of a guess.
+/// Case and what separates words do not distinguish names for the purpose of a guess.
 fn folded(name: &str) -> String {
     // A word of any length may come from a file; a name's first letters are enough for a guess.
     let letters = name.chars().take(80).flat_map(char::to_lowercase);

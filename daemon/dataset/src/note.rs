@@ -20,7 +20,7 @@ pub struct Note {
     pub severity: Severity,
     /// The files of the runs it is about; empty when it is about the train or the line.
     pub runs: Vec<String>,
-    /// What it is, with figures and the likely slip.
+    /// What it is, with figures and the likely input fault.
     pub text: String,
 }
 
@@ -53,15 +53,15 @@ pub fn notes<'r>(
     let mut notes: Vec<Note> = of_declared
         .map(|it| Note { code: it.code, severity: it.severity, runs: Vec::new(), text: it.text })
         .collect();
-    // The factors of a slip that several runs share, from the lowest to the highest.
-    let mut slips: Vec<(usize, Finding, &'static str, (f64, f64))> = Vec::new();
+    // The factors of an input fault that several runs share, from the lowest to the highest.
+    let mut faults: Vec<(usize, Finding, &'static str, (f64, f64))> = Vec::new();
     for run in runs {
         for remark in run.remarks.iter().filter(|it| it.severity() > Severity::Info) {
             let same = |note: &Note| note.code == remark.code() && !note.runs.is_empty();
             let known = match remark {
                 Diagnostic::InputFault { finding, read_as } => {
-                    let known = slips.iter_mut().find(|(_, other, unit, (low, _))| {
-                        other.slip == finding.slip
+                    let known = faults.iter_mut().find(|(_, other, unit, (low, _))| {
+                        other.fault == finding.fault
                             && unit == read_as
                             && (*low < 1.0) == (finding.factor < 1.0)
                     });
@@ -77,7 +77,7 @@ pub fn notes<'r>(
                 None => {
                     if let Diagnostic::InputFault { finding, read_as } = remark {
                         let range = (finding.factor, finding.factor);
-                        slips.push((notes.len(), *finding, read_as, range));
+                        faults.push((notes.len(), *finding, read_as, range));
                     }
                     let (code, severity) = (remark.code(), remark.severity());
                     let (runs, text) = (vec![run.file.clone()], remark.to_string());
@@ -86,7 +86,7 @@ pub fn notes<'r>(
             }
         }
     }
-    for (place, finding, read_as, range) in slips {
+    for (place, finding, read_as, range) in faults {
         notes[place].text = finding.words_for(range, &unit_of(finding, read_as));
     }
     notes.sort_by_key(|note| std::cmp::Reverse(note.severity));

@@ -29,7 +29,7 @@ pub(super) struct TimeOrder {
 pub struct OrderCounts {
     /// Median time step in s; 0 with fewer than two rows in order.
     pub step_s: f64,
-    /// True when most steps are alike, so that missing rows can be told.
+    /// True when most steps are alike, so that missing rows can be detected.
     pub is_regular: bool,
     /// Rows that must be taken out, besides repeated ones, for the time to grow.
     pub out_of_order: usize,

@@ -32,7 +32,7 @@ pub enum GradientSource {
     SpecificForce,
     /// The slope of the mapped `altitude` over the distance.
     Altitude,
-    /// Nothing tells.
+    /// Nothing shows it.
     Unknown,
 }
 

@@ -86,7 +86,7 @@ pub struct Run {
 
 impl Run {
     /// The power in W that the traction force comes from, one value for each sample, and whether it
-    /// holds what is fed beside the drive; `None` where the force comes from elsewhere.
+    /// holds what is fed in addition to the drive; `None` where the force comes from elsewhere.
     pub fn power(&self) -> Option<(&[Option<f64>], bool)> {
         if self.traction_source != ForceSource::Power {
             return None;

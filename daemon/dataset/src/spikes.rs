@@ -10,11 +10,11 @@ const SPREAD_QUANTILE: f64 = 0.75;
 const SPIKE_SPREADS: f64 = 8.0;
 
 /// Marks values that stick out from the median of the `N` around them (Hampel's filter, with
-/// the spread taken over the whole run). `N` is odd: with 5, up to two rows in a row can be told,
+/// the spread taken over the whole run). `N` is odd: with 5, up to two rows in a row can be detected,
 /// with 3 a single one.
 ///
 /// Only rows marked in `usable` and not `NaN` take part; the first and last few have too few
-/// neighbours to be told. `least` is the difference below which nothing is a spike.
+/// neighbours to be detected. `least` is the difference below which nothing is a spike.
 pub(super) fn spikes<const N: usize>(values: &[f64], usable: &[bool], least: f64) -> Vec<bool> {
     let mut marks = vec![false; values.len()];
     let rows: Vec<usize> =

@@ -76,7 +76,7 @@ pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
     with_survey(with_corrections(track, &section)?, &section)
 }
 
-/// Adds what a survey knows beside the profile.
+/// Adds what a survey knows besides the profile.
 fn with_survey(mut track: Track, section: &Section) -> Result<Track, DatasetError> {
     let profile = |key: &str, low: f64| -> Result<Option<StepProfile>, DatasetError> {
         let Some((list, places)) = profile(section, key, low)? else { return Ok(None) };
@@ -140,7 +140,7 @@ fn with_corrections(mut track: Track, section: &Section) -> Result<Track, Datase
         (None, Some(_)) => {
             let key = section.full(gradient::ERROR_FALLING);
             let value = "without gradient_error".to_string();
-            let allowed = "the list gradient_error beside it, for growing chainage".to_string();
+            let allowed = "the list gradient_error with it, for growing chainage".to_string();
             let problem = Problem::OutOfRange { key, value, allowed };
             return Err(section.place_of(gradient::ERROR_FALLING).problem(problem));
         }

@@ -37,14 +37,14 @@ pub const ESTIMATORS: Interface = Interface {
 pub(crate) const GUID_DIGITS: [u8; 16] =
     guid::<{ VARIABLES.len() }>(concat!("dynocar ", env!("CARGO_PKG_VERSION")), VARIABLES);
 
-const fn told(
+const fn reported(
     name: &'static str,
     of: PipelineKind,
-    told: SnapshotField,
+    reported: SnapshotField,
     unit: Unit,
     description: &'static str,
 ) -> Variable {
-    row(name, Meaning::Estimate(of, told), unit, description)
+    row(name, Meaning::Estimate(of, reported), unit, description)
 }
 
 const STATUS: &str = "What may be done with it: 2 estimated, may be used";
@@ -73,49 +73,49 @@ const VARIABLES: &[Variable] = &[
     row("wheel_slide", Meaning::WheelSlide, units::NONE, "True while wheel-slide protection is active"),
     row("run", Meaning::Run, units::NONE, "Number of the run (trip); no integral crosses its change"),
 
-    told("resistance.a", RESISTANCE, SnapshotField::Value(Parameter::DavisA), units::NEWTON_PER_KILONEWTON, "Davis a"),
-    told("resistance.a_std", RESISTANCE, SnapshotField::Std(Parameter::DavisA), units::NEWTON_PER_KILONEWTON, STD),
-    told("resistance.b", RESISTANCE, SnapshotField::Value(Parameter::DavisB), units::DAVIS_B, "Davis b"),
-    told("resistance.b_std", RESISTANCE, SnapshotField::Std(Parameter::DavisB), units::DAVIS_B, STD),
-    told("resistance.c", RESISTANCE, SnapshotField::Value(Parameter::DavisC), units::DAVIS_C, "Davis c"),
-    told("resistance.c_std", RESISTANCE, SnapshotField::Std(Parameter::DavisC), units::DAVIS_C, STD),
-    told("resistance.w0", RESISTANCE, SnapshotField::Resistance, units::NEWTON_PER_KILONEWTON, "Basic resistance at the speed of the sample"),
-    told("resistance.w0_std", RESISTANCE, SnapshotField::ResistanceStd, units::NEWTON_PER_KILONEWTON, "Its standard deviation, from the full covariance"),
-    told("resistance.status", RESISTANCE, SnapshotField::Status, units::NONE, STATUS),
-    told("resistance.reason", RESISTANCE, SnapshotField::Reason, units::NONE, REASON),
-    told("resistance.rejected", RESISTANCE, SnapshotField::Rejected, units::NONE, REJECTED),
+    reported("resistance.a", RESISTANCE, SnapshotField::Value(Parameter::DavisA), units::NEWTON_PER_KILONEWTON, "Davis a"),
+    reported("resistance.a_std", RESISTANCE, SnapshotField::Std(Parameter::DavisA), units::NEWTON_PER_KILONEWTON, STD),
+    reported("resistance.b", RESISTANCE, SnapshotField::Value(Parameter::DavisB), units::DAVIS_B, "Davis b"),
+    reported("resistance.b_std", RESISTANCE, SnapshotField::Std(Parameter::DavisB), units::DAVIS_B, STD),
+    reported("resistance.c", RESISTANCE, SnapshotField::Value(Parameter::DavisC), units::DAVIS_C, "Davis c"),
+    reported("resistance.c_std", RESISTANCE, SnapshotField::Std(Parameter::DavisC), units::DAVIS_C, STD),
+    reported("resistance.w0", RESISTANCE, SnapshotField::Resistance, units::NEWTON_PER_KILONEWTON, "Basic resistance at the speed of the sample"),
+    reported("resistance.w0_std", RESISTANCE, SnapshotField::ResistanceStd, units::NEWTON_PER_KILONEWTON, "Its standard deviation, from the full covariance"),
+    reported("resistance.status", RESISTANCE, SnapshotField::Status, units::NONE, STATUS),
+    reported("resistance.reason", RESISTANCE, SnapshotField::Reason, units::NONE, REASON),
+    reported("resistance.rejected", RESISTANCE, SnapshotField::Rejected, units::NONE, REJECTED),
 
-    told("mass.mass_t", MASS, SnapshotField::Value(Parameter::Mass), units::TONNE, "Gross mass"),
-    told("mass.mass_t_std", MASS, SnapshotField::Std(Parameter::Mass), units::TONNE, STD),
-    told("mass.status", MASS, SnapshotField::Status, units::NONE, STATUS),
-    told("mass.reason", MASS, SnapshotField::Reason, units::NONE, REASON),
-    told("mass.rejected", MASS, SnapshotField::Rejected, units::NONE, REJECTED),
+    reported("mass.mass_t", MASS, SnapshotField::Value(Parameter::Mass), units::TONNE, "Gross mass"),
+    reported("mass.mass_t_std", MASS, SnapshotField::Std(Parameter::Mass), units::TONNE, STD),
+    reported("mass.status", MASS, SnapshotField::Status, units::NONE, STATUS),
+    reported("mass.reason", MASS, SnapshotField::Reason, units::NONE, REASON),
+    reported("mass.rejected", MASS, SnapshotField::Rejected, units::NONE, REJECTED),
 
-    told("adhesion.adhesion", ADHESION, SnapshotField::Value(Parameter::Adhesion), units::NONE, "Adhesion of wheel on rail, where the rail was the limit"),
-    told("adhesion.adhesion_std", ADHESION, SnapshotField::Std(Parameter::Adhesion), units::NONE, STD),
-    told("adhesion.adhesion_lower_bound", ADHESION, SnapshotField::Value(Parameter::AdhesionLowerBound), units::NONE, "What the rail carried at least, where the brake was the limit"),
-    told("adhesion.adhesion_lower_bound_std", ADHESION, SnapshotField::Std(Parameter::AdhesionLowerBound), units::NONE, STD),
-    told("adhesion.adhesion_law_scale", ADHESION, SnapshotField::Value(Parameter::AdhesionLawScale), units::NONE, "Scale of the known law of adhesion over speed"),
-    told("adhesion.adhesion_law_scale_std", ADHESION, SnapshotField::Std(Parameter::AdhesionLawScale), units::NONE, STD),
-    told("adhesion.status", ADHESION, SnapshotField::Status, units::NONE, STATUS),
-    told("adhesion.reason", ADHESION, SnapshotField::Reason, units::NONE, REASON),
-    told("adhesion.rejected", ADHESION, SnapshotField::Rejected, units::NONE, REJECTED),
+    reported("adhesion.adhesion", ADHESION, SnapshotField::Value(Parameter::Adhesion), units::NONE, "Adhesion of wheel on rail, where the rail was the limit"),
+    reported("adhesion.adhesion_std", ADHESION, SnapshotField::Std(Parameter::Adhesion), units::NONE, STD),
+    reported("adhesion.adhesion_lower_bound", ADHESION, SnapshotField::Value(Parameter::AdhesionLowerBound), units::NONE, "What the rail carried at least, where the brake was the limit"),
+    reported("adhesion.adhesion_lower_bound_std", ADHESION, SnapshotField::Std(Parameter::AdhesionLowerBound), units::NONE, STD),
+    reported("adhesion.adhesion_law_scale", ADHESION, SnapshotField::Value(Parameter::AdhesionLawScale), units::NONE, "Scale of the known law of adhesion over speed"),
+    reported("adhesion.adhesion_law_scale_std", ADHESION, SnapshotField::Std(Parameter::AdhesionLawScale), units::NONE, STD),
+    reported("adhesion.status", ADHESION, SnapshotField::Status, units::NONE, STATUS),
+    reported("adhesion.reason", ADHESION, SnapshotField::Reason, units::NONE, REASON),
+    reported("adhesion.rejected", ADHESION, SnapshotField::Rejected, units::NONE, REJECTED),
 
-    told("brake_friction.disc_friction", BRAKE, SnapshotField::Value(Parameter::DiscFriction), units::NONE, "Friction of the brake discs; needs the pressure and the gear in the train's file"),
-    told("brake_friction.disc_friction_std", BRAKE, SnapshotField::Std(Parameter::DiscFriction), units::NONE, STD),
-    told("brake_friction.status", BRAKE, SnapshotField::Status, units::NONE, STATUS),
-    told("brake_friction.reason", BRAKE, SnapshotField::Reason, units::NONE, REASON),
-    told("brake_friction.rejected", BRAKE, SnapshotField::Rejected, units::NONE, REJECTED),
+    reported("brake_friction.disc_friction", BRAKE, SnapshotField::Value(Parameter::DiscFriction), units::NONE, "Friction of the brake discs; needs the pressure and the gear in the train's file"),
+    reported("brake_friction.disc_friction_std", BRAKE, SnapshotField::Std(Parameter::DiscFriction), units::NONE, STD),
+    reported("brake_friction.status", BRAKE, SnapshotField::Status, units::NONE, STATUS),
+    reported("brake_friction.reason", BRAKE, SnapshotField::Reason, units::NONE, REASON),
+    reported("brake_friction.rejected", BRAKE, SnapshotField::Rejected, units::NONE, REJECTED),
 
-    told("monitor.unexplained_force_n", MONITOR, SnapshotField::UnexplainedForce, units::NEWTON, "Force that the declared model does not explain, retarding positive"),
-    told("monitor.unexplained_force_n_std", MONITOR, SnapshotField::UnexplainedForceStd, units::NEWTON, STD),
-    told("monitor.suspected_effect", MONITOR, SnapshotField::SuspectedEffect, units::NONE, "The effect that the model may lack"),
-    told("monitor.status", MONITOR, SnapshotField::Status, units::NONE, STATUS),
-    told("monitor.reason", MONITOR, SnapshotField::Reason, units::NONE, REASON),
-    told("monitor.rejected", MONITOR, SnapshotField::Rejected, units::NONE, REJECTED),
+    reported("monitor.unexplained_force_n", MONITOR, SnapshotField::UnexplainedForce, units::NEWTON, "Force that the declared model does not explain, retarding positive"),
+    reported("monitor.unexplained_force_n_std", MONITOR, SnapshotField::UnexplainedForceStd, units::NEWTON, STD),
+    reported("monitor.suspected_effect", MONITOR, SnapshotField::SuspectedEffect, units::NONE, "The effect that the model may lack"),
+    reported("monitor.status", MONITOR, SnapshotField::Status, units::NONE, STATUS),
+    reported("monitor.reason", MONITOR, SnapshotField::Reason, units::NONE, REASON),
+    reported("monitor.rejected", MONITOR, SnapshotField::Rejected, units::NONE, REJECTED),
 ];
 
-/// What is told before the files are read.
+/// What is declared before the files are read.
 static NOTHING: ParameterSnapshot = ParameterSnapshot::empty();
 
 /// The estimators behind an instance.
@@ -146,9 +146,9 @@ impl Estimators {
     }
 
     /// A number, where it is known.
-    pub fn real(&self, of: PipelineKind, told: SnapshotField) -> Option<f64> {
+    pub fn real(&self, of: PipelineKind, reported: SnapshotField) -> Option<f64> {
         let snapshot = self.snapshot(of);
-        match told {
+        match reported {
             SnapshotField::Value(parameter) => snapshot.value(parameter),
             SnapshotField::Std(parameter) => snapshot.std(parameter),
             SnapshotField::Resistance => Some(snapshot.resistance_at(self.speed_mps)?.w0_n_per_kn),
@@ -165,9 +165,9 @@ impl Estimators {
     }
 
     /// A whole number, or the number of a member of a vocabulary.
-    pub fn integer(&self, of: PipelineKind, told: SnapshotField) -> u64 {
+    pub fn integer(&self, of: PipelineKind, reported: SnapshotField) -> u64 {
         let snapshot = self.snapshot(of);
-        match told {
+        match reported {
             SnapshotField::Status => snapshot.status.into(),
             SnapshotField::Reason => snapshot.reason.into(),
             SnapshotField::SuspectedEffect => snapshot.suspected_effect.into(),
@@ -209,8 +209,11 @@ mod tests {
                 |it: &&Variable| matches!(it.meaning, Meaning::Estimate(of, _) if of == kind);
             let names: Vec<_> = VARIABLES.iter().filter(of_kind).map(|it| it.name).collect();
             for group in names.iter().map(|name| name.split('.').next().unwrap()) {
-                for told in ["status", "reason", "rejected"] {
-                    assert!(names.contains(&format!("{group}.{told}").as_str()), "{kind}: {told}");
+                for reported in ["status", "reason", "rejected"] {
+                    assert!(
+                        names.contains(&format!("{group}.{reported}").as_str()),
+                        "{kind}: {reported}"
+                    );
                 }
             }
         }

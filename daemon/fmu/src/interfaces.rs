@@ -7,7 +7,7 @@ use crate::variables::Interface;
 /// Both models.
 pub const INTERFACES: [&Interface; 2] = [&ESTIMATORS, &PLANT];
 
-/// Their GUIDs as a symbol, so that a library tells its own without being loaded.
+/// Their GUIDs as a symbol, so that a library shows its own without being loaded.
 #[unsafe(no_mangle)]
 pub static DYNOCAR_FMU_GUIDS: [[u8; 16]; 2] = [estimators::GUID_DIGITS, plant::GUID_DIGITS];
 

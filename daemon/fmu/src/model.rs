@@ -10,7 +10,9 @@ use crate::error::ModelError;
 use crate::estimators::{ESTIMATORS, Estimators};
 use crate::files::Files;
 use crate::inputs::{Inputs, nanoseconds};
-use crate::plant::{BEGINNING, STEP_MAX_S, least_step_s, require_drivable, told, with_beginning};
+use crate::plant::{
+    BEGINNING, STEP_MAX_S, least_step_s, reported, require_drivable, with_beginning,
+};
 use crate::variables::{Begins, Interface, Kind, Meaning, Variable};
 
 /// Later times in s have no number of ns.
@@ -201,8 +203,8 @@ impl Model {
             Meaning::Begins(Begins::Speed) => self.beginning.speed_mps,
             Meaning::Begins(Begins::Position) => self.beginning.position_m,
             meaning => match (meaning, &self.behind) {
-                (Meaning::Estimate(of, told), Behind::Estimators(it)) => it.real(of, told),
-                (Meaning::Driven(what), Behind::Plant(train)) => Some(told(train, what)),
+                (Meaning::Estimate(of, reported), Behind::Estimators(it)) => it.real(of, reported),
+                (Meaning::Driven(what), Behind::Plant(train)) => Some(reported(train, what)),
                 _ => None,
             }
             .unwrap_or(f64::NAN),
@@ -219,7 +221,7 @@ impl Model {
         let number: u64 = match (variable.meaning, &self.behind) {
             (Meaning::Direction, _) => return Ok(self.inputs.sample.direction.into()),
             (Meaning::Run, _) => self.inputs.sample.run.into(),
-            (Meaning::Estimate(of, told), Behind::Estimators(it)) => it.integer(of, told),
+            (Meaning::Estimate(of, reported), Behind::Estimators(it)) => it.integer(of, reported),
             _ => 0,
         };
         Ok(i32::try_from(number).unwrap_or(i32::MAX))

@@ -48,7 +48,7 @@ const VARIABLES: &[Variable] = &[
     row("direction", Meaning::Direction, units::NONE, "+1 while the chainage grows in the direction of travel, -1 while it falls"),
 
     row("motion.speed_mps", Meaning::Driven(Driven::Speed), units::METRE_PER_SECOND, "True speed, never negative"),
-    row("motion.measured_speed_mps", Meaning::Driven(Driven::MeasuredSpeed), units::METRE_PER_SECOND, "Speed as the train's own sensor tells it, by the scale of the speed that was found"),
+    row("motion.measured_speed_mps", Meaning::Driven(Driven::MeasuredSpeed), units::METRE_PER_SECOND, "Speed as the train's own sensor shows it, by the scale of the speed that was found"),
     row("motion.position_m", Meaning::Driven(Driven::Position), units::METRE, "Chainage of the train's centre by its own motion"),
     row("motion.acceleration_mps2", Meaning::Driven(Driven::Acceleration), units::METRE_PER_SECOND_2, "dv/dt, 0 at rest"),
     row("motion.mass_kg", Meaning::Driven(Driven::Mass), units::KILOGRAM, "Gross mass, with what was found of it"),
@@ -111,7 +111,7 @@ pub(crate) fn least_step_s(train: &DrivenTrain) -> f64 {
 }
 
 /// What a train does; NaN where nothing has been balanced yet.
-pub(crate) fn told(train: &DrivenTrain, what: Driven) -> f64 {
+pub(crate) fn reported(train: &DrivenTrain, what: Driven) -> f64 {
     let balance = train.balance();
     match what {
         Driven::Speed => train.speed_mps(),

@@ -65,7 +65,7 @@ pub enum ModelFile {
     Track,
 }
 
-/// What is told of an estimator's snapshot.
+/// What is reported of an estimator's snapshot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SnapshotField {
     /// A parameter's value.
@@ -106,7 +106,7 @@ pub enum Begins {
 pub enum Driven {
     /// True speed.
     Speed,
-    /// Speed as the train's own sensor tells it.
+    /// Speed as the train's own sensor shows it.
     MeasuredSpeed,
     /// Chainage of its centre.
     Position,
@@ -200,7 +200,7 @@ impl Meaning {
             Meaning::Run | Meaning::Direction => Kind::Integer,
             Meaning::WheelSlide | Meaning::Begins(Begins::HeldAtRest) => Kind::Boolean,
             Meaning::Begins(_) | Meaning::Driven(_) => Kind::Real,
-            Meaning::Estimate(_, told) => match told {
+            Meaning::Estimate(_, reported) => match reported {
                 SnapshotField::Status => Kind::Enumeration(Vocabulary::Status),
                 SnapshotField::Reason => Kind::Enumeration(Vocabulary::Reason),
                 SnapshotField::SuspectedEffect => Kind::Enumeration(Vocabulary::Effect),

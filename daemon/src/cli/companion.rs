@@ -12,7 +12,7 @@ use crate::programs::{call, not_started};
 #[derive(Debug, Args)]
 #[command(disable_help_flag = true)]
 pub struct Passed {
-    /// Options, as the command's own `--help` tells them
+    /// Options, as the command's own `--help` lists them
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "OPTIONS")]
     words: Vec<OsString>,
 }

@@ -22,7 +22,7 @@ pub enum Failure {
     Work(String),
     /// A result cannot be given: exit status 1, or 2 when its name would cost data.
     Output(OutputError),
-    /// The result, already told, is bad news: this exit status.
+    /// The result, already reported, is bad news: this exit status.
     Verdict(u8),
 }
 
@@ -47,7 +47,7 @@ pub struct ErrorDocument {
 }
 
 impl Failure {
-    /// The failure for machines; `None` when the result is told already.
+    /// The failure for machines; `None` when the result is reported already.
     pub fn answer(&self) -> Option<ErrorAnswer> {
         let (message, place, exit_status) = match self {
             Failure::Input(message) => (message.clone(), None, 2),
@@ -63,7 +63,7 @@ impl Failure {
         Some(ErrorAnswer { message, file, line, exit_status })
     }
 
-    /// Tells people on standard error, and machines where they wanted the result.
+    /// Reports to people on standard error, and machines where they wanted the result.
     pub fn report(&self, program: &str, json: Option<&Path>) -> ExitCode {
         let Some(error) = self.answer() else {
             let Failure::Verdict(status) = self else { return ExitCode::FAILURE };

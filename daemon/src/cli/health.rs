@@ -52,17 +52,17 @@ pub fn execute(arguments: &HealthArguments) -> Result<(), Failure> {
     }
     for train in trains {
         let health = look_at(&host, train).map_err(work)?;
-        text += &told(&health);
+        text += &lines_of(&health);
         worst = worst.max(health.verdict);
     }
     if let Err(error) = print(&text) {
-        // The exit status is the verdict, whether or not it can be told in words.
+        // The exit status is the verdict, whether or not it can be printed in words.
         report_line(&format!("dynocar: {error}"));
     }
     if worst == Verdict::Ok { Ok(()) } else { Err(Failure::Verdict(worst.exit_status())) }
 }
 
-fn told(health: &TrainHealth) -> String {
+fn lines_of(health: &TrainHealth) -> String {
     let daemon = health.daemon.as_deref().unwrap_or("nobody serves it");
     let mut text = format!("train {}: {}: {daemon}\n", health.train, health.verdict);
     for it in &health.pipelines {

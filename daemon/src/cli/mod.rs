@@ -44,13 +44,13 @@ enum Command {
     Init(Passed),
     /// Import trains and lines of railtoolkit, TTOBench or OSRD.
     Import(Passed),
-    /// Find the effect that the model lacks, add it, report the error before and after.
+    /// Find which effect the model lacks, add it, and report the error before and after.
     Explain(Passed),
     Run(run::RunArguments),
     Health(health::HealthArguments),
     Check(check::CheckArguments),
     Replay(replay::ReplayArguments),
-    /// Estimate resistance, mass, adhesion, friction from recorded runs, as the daemon.
+    /// Estimate resistance, mass, adhesion and friction from recorded runs, as the daemon does live.
     Identify(Passed),
     /// Estimate deceleration and stopping distance from recorded stops, without forces.
     Stops(Passed),
@@ -67,7 +67,7 @@ enum Command {
     FlightRecorder(Passed),
     /// Ask a flight recorder to keep this moment for good
     Keep(Passed),
-    /// Repair a truncated recording
+    /// Repair a truncated recording, or join the files of one that rotated
     Recover(Passed),
     /// Convert recordings between MCAP, CSV datasets and Parquet
     Convert(Passed),
@@ -145,7 +145,7 @@ pub fn main() -> ExitCode {
 }
 
 /// The command line of a program of the project; where it asks for help or is wrong, the exit
-/// status after that was told.
+/// status after that was reported.
 ///
 /// # Errors
 ///
@@ -168,7 +168,7 @@ fn parse_by<A: Parser>(mut command: clap::Command, program: &str) -> Result<A, E
         let message = error.render().to_string();
         let message = message.trim().trim_start_matches("error: ").to_string();
         if let (true, Some(error)) = (wants_json, Failure::Input(message).answer()) {
-            // People know already; that machines cannot be told changes no status.
+            // People know already; that machines cannot be informed changes no status.
             let _ = write_json(Path::new("-"), &failure::ErrorDocument { error });
         }
         return Err(ExitCode::from(2));

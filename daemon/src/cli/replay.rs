@@ -32,7 +32,7 @@ pub struct ReplayArguments {
     /// Play nothing: compute every snapshot of a recording again and say whether each bit is the same
     #[arg(long, conflicts_with_all = ["run", "rate", "train", "wait"])]
     verify: bool,
-    /// With --verify: also say what another configuration of the daemon would have told
+    /// With --verify: also say what another configuration of the daemon would have estimated
     #[arg(long, value_name = "FILE", requires = "verify")]
     with: Option<PathBuf>,
     /// Only this run, counted from 1

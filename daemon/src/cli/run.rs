@@ -37,7 +37,7 @@ pub fn start_log(config: &DaemonConfig) -> Result<(), Failure> {
     let log = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .with_ansi(false)
-        // A log that cannot be written is told nowhere, and ends no daemon.
+        // A log that cannot be written is reported nowhere, and ends no daemon.
         .log_internal_errors(false);
     let log = match config.log_format {
         LogFormat::Text => log.with_target(false).boxed(),

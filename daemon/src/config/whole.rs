@@ -24,9 +24,9 @@ pub struct TrainConfig {
     pub model_hash: ModelHash,
     /// What the configuration declares, as its files spell it.
     pub text: ModelText,
-    /// The models to be tried beside the one in force; those of the store when absent.
+    /// The models to be tried next to the one in force; those of the store when absent.
     pub candidates: Option<Vec<ModelHash>>,
-    /// Which wheels it runs on; estimates are not kept across a change. Empty when not told.
+    /// Which wheels it runs on; estimates are not kept across a change. Empty when not given.
     pub wheel_set: String,
     /// The pipelines that answer a controller's questions, each by its number.
     pub answers: Answers,

@@ -140,7 +140,7 @@ impl Summary {
         let last = self.dataset.runs.last().and_then(|run| run.samples.last());
         let declared_kg = last.and_then(|sample| sample.get(SampleField::Mass));
         let declared_t = 1e-3 * declared_kg.unwrap_or(self.dataset.train.mass_kg);
-        let told = |it: &ParameterSnapshot| {
+        let sentence = |it: &ParameterSnapshot| {
             let mass_t = it.value(Parameter::Mass)?;
             let half_width_t = 1.96 * it.std(Parameter::Mass)?;
             Some(format!(
@@ -148,7 +148,7 @@ impl Summary {
                  estimated {mass_t:.0} ± {half_width_t:.0} t\n"
             ))
         };
-        self.snapshots.iter().filter(|it| it.answers(Quantity::Mass)).filter_map(told).collect()
+        self.snapshots.iter().filter(|it| it.answers(Quantity::Mass)).filter_map(sentence).collect()
     }
 
     /// Declared and estimated resistance over the driven speeds; empty without motion.

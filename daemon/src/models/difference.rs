@@ -8,7 +8,7 @@ use super::text::{ModelText, TRACK_FILE, TRAIN_FILE};
 
 /// The most characters of a value that are shown.
 const SHOWN_MAX: usize = 60;
-/// Ends of keys and the units that they tell, the longest first.
+/// Ends of keys and the units that they name, the longest first.
 const UNITS: [(&str, &str); 13] = [
     ("_n_per_kn_m", "N/kN·m"),
     ("_n_per_kn", "N/kN"),
@@ -32,7 +32,7 @@ pub struct Difference {
     pub file: &'static str,
     /// The key with its tables.
     pub key: String,
-    /// Its values, with the unit where the key tells it; a dash where there is none.
+    /// Its values, with the unit where the key names it; a dash where there is none.
     pub values: [String; 2],
 }
 

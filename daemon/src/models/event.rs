@@ -8,7 +8,7 @@ use super::moment::Moment;
 use super::origin::Figure;
 use super::text::ModelHash;
 
-/// A stretch of a run in which an event acted.
+/// An interval of a run in which an event acted.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EventWindow {
     /// The run, by its file.

@@ -28,7 +28,7 @@ pub const fn of_reason(reason: Reason) -> &'static str {
         | Reason::ImplausibleMass
         | Reason::ImplausibleGradient
         | Reason::ImplausiblePressure => {
-            "mend units and signs of what the controller sends; the log names the slip"
+            "mend units and signs of what the controller sends; the log names the input fault"
         }
     }
 }

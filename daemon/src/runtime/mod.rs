@@ -6,9 +6,9 @@
 //! - [`affinity`]: binding it to a core
 //! - [`scheduling`]: its real-time priority
 //! - [`memory`]: keeping its memory resident
-//! - [`status_log`]: which changes of status and suspicion the log tells
+//! - [`status_log`]: which changes of status and suspicion the log reports
 //! - [`refusal_log`]: which refused samples it names
-//! - [`tally`]: what it tells the main thread without waiting for it
+//! - [`tally`]: what it reports to the main thread without waiting for it
 //! - [`watch`]: what the main thread does meanwhile: signals, peers, the log
 
 pub mod affinity;

@@ -1,6 +1,6 @@
-//! Which changes of a pipeline's status, or of what it suspects, the log tells.
+//! Which changes of a pipeline's status, or of what it suspects, the log reports.
 //!
-//! A status that was not told lately is told at once. One that comes back is told when it has
+//! A status that was not reported lately is reported at once. One that comes back is reported when it has
 //! stayed for a while, and the longer the oftener it came back: an estimate at the edge of a
 //! threshold flips between two statuses for as long as it is there.
 
@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 /// Status and reason by number.
 pub type State = (u32, u32);
 
-/// How long a status that comes back has to stay until it is told, at first.
+/// How long a status that comes back has to stay until it is reported, at first.
 const STAY_MIN: Duration = Duration::from_secs(2);
-/// And at most; a status that was not told for as long is a new one.
+/// And at most; a status that was not reported for as long is a new one.
 const STAY_MAX: Duration = Duration::from_secs(120);
 /// Statuses that are remembered.
 const REMEMBERED: usize = 8;
@@ -19,21 +19,21 @@ const REMEMBERED: usize = 8;
 /// The statuses of one pipeline as the log knows them.
 #[derive(Clone, Debug)]
 pub struct StatusLog {
-    /// What was told, and when it last held; the newest last.
-    told: Vec<(State, Instant)>,
+    /// What was reported, and when it last held; the newest last.
+    reported: Vec<(State, Instant)>,
     seen: State,
     since: Instant,
     stay: Duration,
-    /// Statuses that came since the last one that was told, with how often each did.
+    /// Statuses that came since the last one that was reported, with how often each did.
     untold: Vec<(State, u64)>,
     changes: u64,
 }
 
 impl StatusLog {
-    /// A log in which nothing has been told.
+    /// A log in which nothing has been reported.
     pub fn new(now: Instant) -> Self {
         StatusLog {
-            told: Vec::new(),
+            reported: Vec::new(),
             seen: (0, 0),
             since: now,
             stay: STAY_MIN,
@@ -42,7 +42,7 @@ impl StatusLog {
         }
     }
 
-    /// Looks at the status; when it is to be told, the statuses that came since the last that was
+    /// Looks at the status; when it is to be reported, the statuses that came since the last that was
     /// and were not, with how often each did.
     pub fn look(&mut self, state: State, now: Instant) -> Option<Vec<(State, u64)>> {
         if state != self.seen {
@@ -53,32 +53,32 @@ impl StatusLog {
             }
             self.changes += 1;
         }
-        self.told.retain(|it| now.duration_since(it.1) < STAY_MAX);
-        let Some(place) = self.told.iter().position(|it| it.0 == state) else {
+        self.reported.retain(|it| now.duration_since(it.1) < STAY_MAX);
+        let Some(place) = self.reported.iter().position(|it| it.0 == state) else {
             self.stay = STAY_MIN;
             return self.report(now);
         };
-        self.told[place].1 = now;
-        if place + 1 == self.told.len() || now.duration_since(self.since) < self.stay {
+        self.reported[place].1 = now;
+        if place + 1 == self.reported.len() || now.duration_since(self.since) < self.stay {
             return None;
         }
-        self.told.remove(place);
+        self.reported.remove(place);
         self.stay = (2 * self.stay).min(STAY_MAX);
         self.report(now)
     }
 
-    /// Changes seen so far, told or not.
+    /// Changes seen so far, reported or not.
     pub fn changes(&self) -> u64 {
         self.changes
     }
 
     fn report(&mut self, now: Instant) -> Option<Vec<(State, u64)>> {
-        if self.told.len() == REMEMBERED {
-            self.told.remove(0);
+        if self.reported.len() == REMEMBERED {
+            self.reported.remove(0);
         }
-        self.told.push((self.seen, now));
+        self.reported.push((self.seen, now));
         let mut untold = std::mem::take(&mut self.untold);
-        // The last of them is the one that is told.
+        // The last of them is the one that is reported.
         untold.iter_mut().filter(|it| it.0 == self.seen).for_each(|it| it.1 -= 1);
         untold.retain(|it| it.1 > 0);
         Some(untold)
@@ -93,8 +93,8 @@ mod tests {
     const AT_BOUND: State = (2, 7);
     const INVALID: State = (4, 3);
 
-    /// What is told of a status by tenth of a second: (time in s, status, untold changes).
-    fn told(state_at: impl Fn(u64) -> State, seconds: u64) -> Vec<(f64, State, u64)> {
+    /// What is reported of a status by tenth of a second: (time in s, status, untold changes).
+    fn reported(state_at: impl Fn(u64) -> State, seconds: u64) -> Vec<(f64, State, u64)> {
         let start = Instant::now();
         let mut log = StatusLog::new(start);
         (0..10 * seconds)
@@ -109,7 +109,7 @@ mod tests {
     #[test]
     fn a_status_that_is_new_is_reported_at_once_and_once() {
         let state = |tenth| if tenth < 45 { GOOD } else { INVALID };
-        assert_eq!(told(state, 60), [(0.0, GOOD, 0), (4.5, INVALID, 0)]);
+        assert_eq!(reported(state, 60), [(0.0, GOOD, 0), (4.5, INVALID, 0)]);
     }
 
     #[test]
@@ -119,9 +119,9 @@ mod tests {
             if tenth < 600 && (tenth / 3) % 2 == 0 { GOOD } else { AT_BOUND }
         };
         let first = [(0.0, GOOD, 0), (0.3, AT_BOUND, 0)];
-        assert_eq!(told(state, 100), first, "what was told last holds again");
+        assert_eq!(reported(state, 100), first, "what was reported last holds again");
         let ends_good = |tenth| if tenth < 600 { state(tenth) } else { GOOD };
-        assert_eq!(told(ends_good, 100), [first[0], first[1], (62.0, GOOD, 198)]);
+        assert_eq!(reported(ends_good, 100), [first[0], first[1], (62.0, GOOD, 198)]);
     }
 
     #[test]
@@ -139,19 +139,19 @@ mod tests {
     #[test]
     fn a_return_that_stays_is_called_soon() {
         let state = |tenth| if (100..105).contains(&tenth) { INVALID } else { GOOD };
-        assert_eq!(told(state, 60), [(0.0, GOOD, 0), (10.0, INVALID, 0), (12.5, GOOD, 0)]);
+        assert_eq!(reported(state, 60), [(0.0, GOOD, 0), (10.0, INVALID, 0), (12.5, GOOD, 0)]);
     }
 
     #[test]
     fn slow_flips_are_reported_ever_more_seldom() {
         let state = |tenth| if (tenth / 50) % 2 == 0 { GOOD } else { AT_BOUND };
-        let told = told(state, 3_600);
-        assert!((3..=8).contains(&told.len()), "720 flips in an hour: {told:?}");
+        let reported = reported(state, 3_600);
+        assert!((3..=8).contains(&reported.len()), "720 flips in an hour: {reported:?}");
     }
 
     #[test]
     fn a_status_comes_as_news_when_it_was_not_reported_for_long() {
         let state = |tenth| if (100..3_000).contains(&tenth) { INVALID } else { GOOD };
-        assert_eq!(told(state, 400), [(0.0, GOOD, 0), (10.0, INVALID, 0), (300.0, GOOD, 0)]);
+        assert_eq!(reported(state, 400), [(0.0, GOOD, 0), (10.0, INVALID, 0), (300.0, GOOD, 0)]);
     }
 }

@@ -1,4 +1,4 @@
-//! What a pipeline thread tells the main thread, without either waiting.
+//! What a pipeline thread reports to the main thread, without either waiting.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 
@@ -35,7 +35,7 @@ struct Suspect {
     effect: AtomicU64,
     /// Evidence in single precision, and age in s.
     evidence: AtomicU64,
-    /// Force and deviation in single precision.
+    /// Force and standard deviation in single precision.
     force: AtomicU64,
     /// Where the train is, in m.
     position_m: AtomicU64,
@@ -149,15 +149,15 @@ fn halves(word: u64) -> (u32, u32) {
     ((word >> 32) as u32, word as u32)
 }
 
-/// A finding in one word: the slip's number, and its factor in single precision.
+/// A finding in one word: the input fault's number, and its factor in single precision.
 fn packed(finding: Option<Finding>) -> u64 {
-    finding.map_or(0, |it| word(u32::from(it.slip as u8), (it.factor as f32).to_bits()))
+    finding.map_or(0, |it| word(u32::from(it.fault as u8), (it.factor as f32).to_bits()))
 }
 
 fn unpacked(word: u64) -> Option<Finding> {
-    let (slip, factor) = halves(word);
-    let slip = InputFault::from_number(slip as u8)?;
-    Some(Finding { slip, factor: f64::from(f32::from_bits(factor)) })
+    let (fault, factor) = halves(word);
+    let fault = InputFault::from_number(fault as u8)?;
+    Some(Finding { fault, factor: f64::from(f32::from_bits(factor)) })
 }
 
 #[cfg(test)]

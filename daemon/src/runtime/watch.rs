@@ -121,9 +121,9 @@ impl Watch {
     fn report_changes(&mut self) {
         // Once for all pipelines of a train.
         let known = |(pipeline, last): (&WatchedPipeline, &TallyReading)| {
-            Some((pipeline.train.0, last.implausible?.slip))
+            Some((pipeline.train.0, last.implausible?.fault))
         };
-        let mut told: Vec<(u64, InputFault)> =
+        let mut reported: Vec<(u64, InputFault)> =
             self.pipelines.iter().zip(&self.readings).filter_map(known).collect();
         let now = Instant::now();
         let mut refused: HashMap<TrainId, [u32; REJECTION_REASONS]> = HashMap::new();
@@ -133,10 +133,10 @@ impl Watch {
             let (name, train) = (pipeline.name.as_str(), pipeline.train.0);
             log.report(name, train, &reading, now);
             if let Some(finding) = reading.implausible
-                && !told.contains(&(train, finding.slip))
+                && !reported.contains(&(train, finding.fault))
             {
-                told.push((train, finding.slip));
-                let code = finding.slip.name();
+                reported.push((train, finding.fault));
+                let code = finding.fault.name();
                 warn!(train, code, "the samples cannot be true: {finding}");
             }
             if reading.lost > last.lost {
@@ -197,7 +197,7 @@ fn report_status(pipeline: &str, train: u64, reading: &TallyReading, untold: &[(
         (status, Reason::from_number(reason).unwrap_or(Reason::None))
     };
     let (status, reason) = words(reading.status);
-    // Changes to and fro that no line of their own tells.
+    // Changes to and fro that no line of their own reports.
     let untold: Vec<String> = untold
         .iter()
         .map(|&(state, count)| (words(state), count))

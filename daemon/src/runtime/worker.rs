@@ -34,7 +34,7 @@ pub struct WorkerPlan {
     /// See [`crate::config::DaemonConfig::heartbeat_ms`].
     pub heartbeat_ms: u64,
     /// The thread's pipelines by train.
-    pub lanes: Vec<ChannelPlan>,
+    pub channels: Vec<ChannelPlan>,
     /// Set when the daemon is to stop.
     pub stop: Arc<AtomicBool>,
 }
@@ -76,7 +76,7 @@ struct TrainChannel {
 
 /// A pipeline thread at work; lives in its own thread, for the ports cannot move.
 pub struct Worker {
-    lanes: Vec<TrainChannel>,
+    channels: Vec<TrainChannel>,
     idler: Idler,
     epoch: u64,
     heartbeat_ns: i64,
@@ -93,20 +93,20 @@ impl Worker {
     /// When a channel cannot be opened.
     pub fn start(plan: WorkerPlan) -> Result<Self, ChannelError> {
         let transport = Transport::open(&plan.host, "dynocar-daemon")?;
-        let trains: Vec<TrainId> = plan.lanes.iter().map(|lane| lane.train).collect();
+        let trains: Vec<TrainId> = plan.channels.iter().map(|channel| channel.train).collect();
         let sleeper = match plan.thread.idle {
             IdleStrategy::Busy => None,
             _ => Some(Sleeper::open(&transport, &trains, plan.epoch)?),
         };
-        let lanes = plan
-            .lanes
+        let channels = plan
+            .channels
             .into_iter()
-            .map(|lane| open_channel_of(&transport, lane, plan.epoch))
+            .map(|channel| open_channel_of(&transport, channel, plan.epoch))
             .collect::<Result<Vec<_>, _>>()?;
         transport.reserve()?;
         let idler = Idler::new(plan.thread.idle, plan.spin_us, plan.heartbeat_ms, sleeper);
         Ok(Worker {
-            lanes,
+            channels,
             idler,
             epoch: plan.epoch,
             heartbeat_ns: plan.heartbeat_ms as i64 * 1_000_000,
@@ -130,8 +130,8 @@ impl Worker {
             if processed {
                 self.idler.had_work(now_ns);
             } else {
-                let lanes = &mut self.lanes;
-                self.idler.pause(now_ns, || look_once_more(lanes));
+                let channels = &mut self.channels;
+                self.idler.pause(now_ns, || look_once_more(channels));
             }
         }
     }
@@ -150,14 +150,14 @@ impl Worker {
     /// One turn for every train; true when there was a sample.
     fn take_turns(&mut self) -> bool {
         let mut processed = false;
-        for lane in &mut self.lanes {
+        for channel in &mut self.channels {
             for _ in 0..TURN {
-                let Some(sample) = lane.next() else { break };
-                for slot in &mut lane.slots {
+                let Some(sample) = channel.next() else { break };
+                for slot in &mut channel.slots {
                     slot.process(&sample, self.epoch);
                 }
-                lane.count.note_taken(lane.place, sample.sequence);
-                (lane.newest, lane.newest_speed_mps) = (sample.sequence, sample.speed_mps);
+                channel.count.note_taken(channel.place, sample.sequence);
+                (channel.newest, channel.newest_speed_mps) = (sample.sequence, sample.speed_mps);
                 processed = true;
             }
         }
@@ -168,11 +168,11 @@ impl Worker {
     fn heartbeat(&mut self, now_ns: i64) {
         self.last_heartbeat_ns = now_ns;
         self.idler.serve_newcomers();
-        for lane in &mut self.lanes {
-            lane.count_what_was_left(self.epoch, now_ns);
-            lane.change_models(self.epoch, now_ns);
+        for channel in &mut self.channels {
+            channel.count_what_was_left(self.epoch, now_ns);
+            channel.change_models(self.epoch, now_ns);
         }
-        for slot in self.lanes.iter_mut().flat_map(|lane| &mut lane.slots) {
+        for slot in self.channels.iter_mut().flat_map(|channel| &mut channel.slots) {
             if now_ns - slot.last_vouched_ns >= self.heartbeat_ns {
                 slot.vouch(now_ns);
             } else {
@@ -281,12 +281,12 @@ fn open_channel_of(
     })
 }
 
-/// True when a sample came while the controllers were told of the sleep; keeps it.
-fn look_once_more(lanes: &mut [TrainChannel]) -> bool {
+/// True when a sample came while the controllers were informed of the sleep; keeps it.
+fn look_once_more(channels: &mut [TrainChannel]) -> bool {
     let mut any = false;
-    for lane in lanes {
-        lane.found = lane.next();
-        any |= lane.found.is_some();
+    for channel in channels {
+        channel.found = channel.next();
+        any |= channel.found.is_some();
     }
     any
 }

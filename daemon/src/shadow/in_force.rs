@@ -42,7 +42,7 @@ fn settle_train(
     Ok(())
 }
 
-/// Whether a model is another, or grew from it; false where the store does not tell.
+/// Whether a model is another, or grew from it; false where the store does not say.
 fn grew_from(models: &TrainModels, model: ModelHash, root: ModelHash) -> bool {
     let parent = |hash: &ModelHash| models.stored(*hash).ok()?.origin.parent;
     // No history is so long, unless somebody wrote one that leads in a circle.

@@ -1,4 +1,4 @@
-//! Which models are on trial beside the one in force.
+//! Which models are on trial next to the one in force.
 
 use crate::models::{Action, ModelHash, ModelsError, TrainModels};
 

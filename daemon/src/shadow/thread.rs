@@ -49,7 +49,7 @@ pub fn start(
             warn!(core, "the thread of models on trial is not bound to its core: {error}");
         }
         match open(&host, trains) {
-            Ok(mut lanes) => run(&mut lanes, &settings, &board, &stop),
+            Ok(mut channels) => run(&mut channels, &settings, &board, &stop),
             Err(error) => warn!("no models are on trial: {error}"),
         }
     };
@@ -58,29 +58,29 @@ pub fn start(
 
 fn open(host: &Host, trains: Vec<ShadowTrain>) -> Result<Vec<TrainChannel>, ChannelError> {
     let transport = Transport::open(host, "dynocar-shadow")?;
-    let lane = |train: ShadowTrain| {
+    let channel = |train: ShadowTrain| {
         let receiver = transport.receiver::<TrainSample>(TrainId(train.id()))?;
         Ok(TrainChannel { train, receiver, heard: Instant::now() })
     };
-    trains.into_iter().map(lane).collect()
+    trains.into_iter().map(channel).collect()
 }
 
-fn run(lanes: &mut [TrainChannel], settings: &ModelsConfig, board: &Board, stop: &AtomicBool) {
+fn run(channels: &mut [TrainChannel], settings: &ModelsConfig, board: &Board, stop: &AtomicBool) {
     let every = Duration::from_secs(settings.interval_s);
     let (mut looked, mut written) = (None::<Instant>, Instant::now());
     info!(store = %settings.directory.display(), "models are tried");
     while !stop.load(Ordering::Relaxed) {
         let is_time_to_look = looked.is_none_or(|at| at.elapsed() >= LOOK);
         let is_time_to_write = written.elapsed() >= every;
-        for lane in lanes.iter_mut() {
-            lane.hear();
+        for channel in channels.iter_mut() {
+            channel.hear();
             if is_time_to_look {
-                lane.train.look(SystemTime::now());
-                board.pin(lane.train.id(), lane.train.figures(), lane.train.events());
+                channel.train.look(SystemTime::now());
+                board.pin(channel.train.id(), channel.train.figures(), channel.train.events());
             }
-            lane.train.go_on();
+            channel.train.go_on();
             if is_time_to_write {
-                lane.train.write(SystemTime::now());
+                channel.train.write(SystemTime::now());
             }
         }
         if is_time_to_look {
@@ -91,8 +91,8 @@ fn run(lanes: &mut [TrainChannel], settings: &ModelsConfig, board: &Board, stop:
         }
         std::thread::sleep(NAP);
     }
-    for lane in lanes {
-        lane.train.write(SystemTime::now());
+    for channel in channels {
+        channel.train.write(SystemTime::now());
     }
 }
 

@@ -56,7 +56,7 @@ pub struct ShadowTrain {
     standing: Standing,
     changing: Option<Changing>,
     /// What the log has said, to say it once.
-    told: HashSet<String>,
+    reported: HashSet<String>,
     newest_speed_mps: f64,
     /// When the store was last changed, as far as it was looked at.
     seen: Option<Vec<SystemTime>>,
@@ -90,7 +90,7 @@ impl ShadowTrain {
             record,
             standing,
             changing: None,
-            told: HashSet::new(),
+            reported: HashSet::new(),
             newest_speed_mps: 0.0,
             seen: None,
             events: BTreeMap::new(),
@@ -247,7 +247,7 @@ impl ShadowTrain {
         Ok(Rival::new(hash.0, open_loop, pipelines, (evidence, ledger)))
     }
 
-    /// Tells which rivals are better, or decides on the first where the rule is to.
+    /// Reports which rivals are better, or decides on the first where the rule is to.
     fn judge(&mut self, now: SystemTime) {
         if self.standing.in_force != self.in_force() {
             return;
@@ -328,7 +328,7 @@ impl ShadowTrain {
         self.trials.change(place);
         self.trials.rivals[place].pipelines = sets.into_iter().flatten().collect();
         info!(train = self.id(), model = %changing.to, before = %from, "in force from now on");
-        self.told.clear();
+        self.reported.clear();
         // Other candidates grew from the model that is in force now.
         self.seen = None;
     }
@@ -341,7 +341,7 @@ impl ShadowTrain {
     }
 
     fn warn_once(&mut self, message: String) {
-        if self.told.insert(message.clone()) {
+        if self.reported.insert(message.clone()) {
             warn!(train = self.id(), "{message}");
         }
     }
@@ -349,7 +349,7 @@ impl ShadowTrain {
     fn report_once(&mut self, message: String) {
         // The figures in it change: once for each model.
         let about = message.split(':').next().unwrap_or_default().to_owned();
-        if self.told.insert(about) {
+        if self.reported.insert(about) {
             info!(train = self.id(), "{message}");
         }
     }

@@ -32,7 +32,7 @@ pub use error::StateError;
 
 use entry::{ModelKey, StateContent, StoredEstimate};
 
-/// Seconds since 1970 by the system's clock, which is only used to tell how old a state is.
+/// Seconds since 1970 by the system's clock, which is only used to judge how old a state is.
 pub fn unix_now_s() -> f64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
 }

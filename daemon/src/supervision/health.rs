@@ -244,8 +244,8 @@ mod tests {
         assert!(degraded(vec![pipeline(Reason::BadInput)]).contains("mend the samples"));
         let fine =
             PipelineHealth { status: Status::Unestimated, ..pipeline(Reason::OnlyLowerBound) };
-        let slips = pipeline(Reason::ImplausibleForces);
-        assert!(degraded(vec![fine, slips]).contains("units and signs"));
+        let faults = pipeline(Reason::ImplausibleForces);
+        assert!(degraded(vec![fine, faults]).contains("units and signs"));
         assert_eq!(train(Verdict::Ok, vec![large]), "nothing");
         assert!(train(Verdict::NoDaemon, vec![]).contains("dynocar run"));
     }

@@ -56,12 +56,12 @@ impl Supervisor {
         Supervisor { socket, feeding: limit_us.map(|limit| Duration::from_micros(limit / 2)) }
     }
 
-    /// Tells the supervisor a state, as `READY=1`.
+    /// Reports a state to the supervisor, as `READY=1`.
     pub fn notify(&self, state: &str) {
         if let Some((socket, address)) = &self.socket
             && let Err(error) = socket.send_to_addr(state.as_bytes(), address)
         {
-            warn!("the supervisor was not told {state:?}: {error}");
+            warn!("the supervisor was not informed of {state:?}: {error}");
         }
     }
 }

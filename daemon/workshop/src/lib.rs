@@ -9,7 +9,7 @@
 //! - [`fmu`]: the estimators as an FMU
 //! - [`annotation`]: an explanation beside the data that it explains
 //! - [`learn`]: recorded runs into candidates for the store
-//! - [`grown`]: the model with its effects as train and track files, and a dataset of them
+//! - [`updated`]: the model with its effects as train and track files, and a dataset of them
 //! - [`paths`]: files as seen from a folder
 //! - [`report`]: an explanation as a page of HTML
 //! - [`run_facts`]: what is shown of a recorded run

@@ -1,4 +1,4 @@
-//! The grown model as files: a train and a line that the daemon loads, and a dataset of both and of
+//! The updated model as files: a train and a line that the daemon loads, and a dataset of both and of
 //! the declared runs.
 //!
 //! The declared files are taken as they are, with every key that somebody wrote into them, and
@@ -24,7 +24,7 @@ use dynocar::output::write_in_folder;
 
 pub use error::{UPDATED_MARK, UpdatedModelError};
 
-/// The files of a grown model: the train, the line where something is known of it, and the dataset.
+/// The files of an updated model: the train, the line where something is known of it, and the dataset.
 pub const UPDATED_FILES: [&str; 3] = [TRAIN_FILE, TRACK_FILE, MANIFEST_FILE];
 
 /// What was written.
@@ -36,7 +36,7 @@ pub struct UpdatedFiles {
     pub not_expressed: Vec<String>,
 }
 
-/// Writes the grown model of a dataset into a folder as a dataset that can be explained again:
+/// Writes the updated model of a dataset into a folder as a dataset that can be explained again:
 /// `train.toml`, `track.toml` where something is known of the line, and a `dataset.toml` that names
 /// both and the runs where they lie. The runs of a recording are written beside it.
 ///
@@ -78,7 +78,7 @@ pub fn write_updated(
     Ok(UpdatedFiles { files: files.collect::<Result<_, _>>()?, not_expressed: texts.not_expressed })
 }
 
-/// A grown model as texts.
+/// An updated model as texts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UpdatedTexts {
     /// Of the train.
@@ -104,7 +104,7 @@ pub fn updated_texts(
     Ok(UpdatedTables::of(explanation, (train, track), labels)?.texts(explanation, labels, source))
 }
 
-/// A grown model as tables.
+/// An updated model as tables.
 struct UpdatedTables {
     train: Table,
     track: Option<Table>,
@@ -177,7 +177,7 @@ pub fn grow(fit: &Fit, train: &mut Table, track: &mut Table) -> Vec<String> {
     not_expressed
 }
 
-/// True for an entry that the files may hold beside what they hold already.
+/// True for an entry that the files may hold in addition to what they hold already.
 fn can_hold(entry: &Entry, train: &Table, track: &Table) -> bool {
     match entry {
         Entry::Number(key, found) => key.allows(joined(key, train, *found)),

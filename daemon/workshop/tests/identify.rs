@@ -135,7 +135,7 @@ fn all_estimators_or_those_named_run_when_asked_for() {
             ["--estimator", "rls", "--estimator", "guess"].as_slice(),
             "guess: expected one of ls, rls, ",
         ),
-        (&["--all", "--estimator", "rls"], "--all: expected no --estimator beside it, got rls"),
+        (&["--all", "--estimator", "rls"], "--all: expected no --estimator with it, got rls"),
     ] {
         let output = asked(folder.path(), arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");

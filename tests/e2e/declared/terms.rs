@@ -38,14 +38,14 @@ pads = 24
 pub const PRESSURE_PA_PER_N: f64 =
     1.0 / (297.0 / 460.0 * std::f64::consts::FRAC_PI_4 * 0.203 * 0.203 * 0.85 * 24.0 * 0.28 * 2.55);
 
-/// A line whose gradient only the samples tell.
+/// A line whose gradient only the samples give.
 pub const TRACK: &str = "
 [track]
 curves = [[1500.0, 2600.0, 400.0], [6200.0, 7000.0, 700.0]]
 tunnels = [[3000.0, 3700.0], [8000.0, 9600.0]]
 ";
 
-/// The gradient that the samples tell.
+/// The gradient that the samples give.
 pub const GRADIENT: &str = "
 gradient = [[0.0, 2.0], [1200.0, -3.0], [2500.0, 4.5], [4100.0, -1.0], [5600.0, -5.0],
             [7300.0, 3.0], [9000.0, -2.0], [11000.0, 1.0]]

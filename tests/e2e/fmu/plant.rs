@@ -35,7 +35,7 @@ fn set(fmu: &Fmu, name: &str, value: f64) {
     assert_eq!(fmu.set_real(reference_in(&PLANT, name), value), Status::Ok, "{}", fmu.said());
 }
 
-/// The FMU of a grown model, unpacked; `grown` holds its files.
+/// The FMU of an updated model, unpacked; `grown` holds its files.
 fn of_updated(site: &Site, grown: &str) -> Fmu {
     done(site, &["fmu", "--plant", "-o", "train.fmu", "--grown", grown]);
     let resources = unpacked(site, "train.fmu").join("resources");
@@ -43,7 +43,7 @@ fn of_updated(site: &Site, grown: &str) -> Fmu {
 }
 
 /// The demo with a train that has been corrected, in a wind in m/s against growing chainage, as a
-/// dataset whose folder holds a grown model too.
+/// dataset whose folder holds an updated model too.
 fn corrected_demo(site: &Site, wind_plus_mps: f64) {
     std::fs::create_dir_all(site.path().join("grown/runs")).unwrap();
     for file in ["dataset.toml", "track.toml", "runs/01.csv", "runs/02.csv", "runs/03.csv"] {

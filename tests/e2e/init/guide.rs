@@ -27,7 +27,7 @@ pub fn install(site: &Site) {
     std::os::unix::fs::symlink(DYNOCAR, site.path().join("bin/dynocar")).unwrap();
 }
 
-/// Runs a line that must succeed in the site's folder; gives what it told people.
+/// Runs a line that must succeed in the site's folder; gives what it printed for people.
 pub fn run(site: &Site, line: &str) -> String {
     let path = std::env::var("PATH").unwrap_or_default();
     let output = Command::new("sh")

@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 mod support;
 use support::PlayedDaemon;
 
-fn told(sample: &TrainSample) -> Value {
+fn described(sample: &TrainSample) -> Value {
     let values: Vec<Option<f64>> =
         SampleField::ALL.iter().map(|&field| sample.get(field)).collect();
     json!({
@@ -52,7 +52,7 @@ fn main() {
             Err(TryRecvError::Disconnected) => return,
         }
         while let Some(sample) = daemon.next_sample() {
-            report(told(&sample));
+            report(described(&sample));
             if is_answering {
                 daemon.answer(&sample);
             }

@@ -47,7 +47,7 @@ fn main() {
     leave(news);
 }
 
-/// Publishes and polls; gives the number of snapshots that told something new.
+/// Publishes and polls; gives the number of snapshots that brought something new.
 fn cycle(publisher: &mut SamplePublisher, reader: &mut SnapshotReader, train: TrainId) -> u64 {
     let mut sample = TrainSample::empty(train).with(SampleField::Speed, 20.0);
     sample.time_ns = monotonic_now_ns();

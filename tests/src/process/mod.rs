@@ -126,7 +126,7 @@ impl Process {
     ///
     /// # Panics
     ///
-    /// When the system does not tell.
+    /// When the system does not say.
     pub fn try_wait(&mut self) -> Option<ExitStatus> {
         self.child.try_wait().expect("an exit status")
     }

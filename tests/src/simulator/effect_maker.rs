@@ -97,7 +97,7 @@ impl EffectScene<'_> {
         best_m
     }
 
-    /// One or two stretches that together are about a tenth of the line, apart from each other.
+    /// One or two intervals that together are about a tenth of the line, apart from each other.
     fn stretches(&self, random: &mut Random) -> Vec<(f64, f64)> {
         let length_m = self.line.length_m;
         let count = random.integer(1, 2);

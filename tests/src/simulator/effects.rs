@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 use super::run_file::run_file;
 use super::unlisted::Unlisted;
 
-/// A stretch of time in one run.
+/// An interval of time in one run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunWindow {
     /// Number of the run, from 0.
@@ -78,7 +78,7 @@ pub enum Effect {
     },
     /// Another mass between certain places.
     MassChangeSections(Vec<MassSection>),
-    /// Another mass in certain stretches of time, with true over declared mass.
+    /// Another mass in certain intervals of time, with true over declared mass.
     MassChangeWindows(Vec<(RunWindow, f64)>),
     /// The reported traction force is not the true one.
     TractionGain {

@@ -6,7 +6,7 @@ use super::random::Random;
 use super::settings::{SimulatorSettings, TrainType};
 use super::train_maker::rounded;
 
-/// A stretch with one speed limit.
+/// A section with one speed limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpeedLimit {
     /// Chainage in m where it starts; it holds until the next.

@@ -1,4 +1,4 @@
-//! A simulated dataset recorded by a drive that tells its power and no force.
+//! A simulated dataset recorded by a drive that reports its power and no force.
 
 use std::fmt::Write as _;
 
@@ -9,12 +9,12 @@ use super::random::{Random, Stream};
 use super::true_run::TRUE_STEP_S;
 use super::{SimulatedDataset, SimulatedRun};
 
-/// A drive and what its recorder tells of it.
+/// A drive and what its recorder reports of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrueDrive {
     /// Share of the electric power that reaches the rims, and of the rims' power that comes back.
     pub efficiency: f64,
-    /// Power in W that the line feeds beside the drive; `None` for a recorder of the drive's own
+    /// Power in W that the line feeds in addition to the drive; `None` for a recorder of the drive's own
     /// power.
     pub auxiliary_power_w: Option<f64>,
     /// Standard deviation of the recorded power as a share of it.

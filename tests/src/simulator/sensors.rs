@@ -139,7 +139,7 @@ pub fn measure_run(
     (0..count)
         .map(|k| {
             let jitter_s = settings.defects.jitter * period_s * random.gaussian();
-            // The stamp tells the instant truly, to a millisecond.
+            // The stamp gives the instant truly, to a millisecond.
             let late_s = if k == 0 { 0.0 } else { jitter_s.clamp(-0.4, 0.4) };
             let time_s = ((k as f64 * period_s + late_s) * 1000.0).round() / 1000.0;
             // A sample at a true instant reads that instant, whatever the rounding.

@@ -137,10 +137,10 @@ impl Scene {
             if !is_wanted(&kind) {
                 continue;
             }
-            let told = format!("{failure:?} at {rate}, seed {seed}, {kind}");
+            let case = format!("{failure:?} at {rate}, seed {seed}, {kind}");
             let mut watched = Watched { kind, tally: Tally::default(), misled_at_end: None };
             let misled = |what| Misled { failure, rate, kind: watched.kind.clone(), what };
-            let last = self.feed(&settings, &spoiled, failure, &told, |run, it| {
+            let last = self.feed(&settings, &spoiled, failure, &case, |run, it| {
                 // Before a train departs, the mass of the run before may stand.
                 let wrong = self.misled(it, run).and_then(|_| self.misled(it, run.max(2) - 1));
                 watched.tally.add(it, wrong.is_some());
@@ -157,7 +157,7 @@ impl Scene {
         settings: &EstimatorSettings,
         spoiled: &Spoiled,
         failure: Option<SensorFailure>,
-        told: &str,
+        case: &str,
         mut look: impl FnMut(u32, &ParameterSnapshot),
     ) -> ParameterSnapshot {
         let train = Arc::new(self.data.declared_train().clone());
@@ -166,17 +166,17 @@ impl Scene {
         let mut pipeline = Pipeline::new(SIMULATED_TRAIN, 0, train, track, estimator);
         for (offered, sample) in (1..).zip(&spoiled.samples) {
             let it = pipeline.process(sample);
-            assert_eq!(it.samples_used + it.samples_rejected, offered, "{told}");
-            assert_finite(it, told);
+            assert_eq!(it.samples_used + it.samples_rejected, offered, "{case}");
+            assert_finite(it, case);
             if offered % LOOK_SAMPLES == 0 || offered == spoiled.samples.len() as u64 {
                 look(sample.run, it);
             }
         }
         let last = *pipeline.snapshot();
         let by_reason: u64 = last.rejected_by_reason.iter().map(|&it| u64::from(it)).sum();
-        assert_eq!(by_reason, last.samples_rejected, "{told}: by reason");
+        assert_eq!(by_reason, last.samples_rejected, "{case}: by reason");
         if failure != Some(SensorFailure::SequenceJump) {
-            assert_eq!(last.samples_lost, spoiled.dropped, "{told}: lost");
+            assert_eq!(last.samples_lost, spoiled.dropped, "{case}: lost");
         }
         last
     }
@@ -204,7 +204,7 @@ impl Scene {
     }
 }
 
-fn assert_finite(it: &ParameterSnapshot, told: &str) {
+fn assert_finite(it: &ParameterSnapshot, case: &str) {
     let others = [
         it.innovation_normalised,
         it.innovation_mean_square,
@@ -216,8 +216,8 @@ fn assert_finite(it: &ParameterSnapshot, told: &str) {
         it.speed_max_mps,
     ];
     let mut all = it.values.iter().chain(&it.covariance).chain(&others);
-    assert!(all.all(|value| value.is_finite()), "{told}: {it:?}");
+    assert!(all.all(|value| value.is_finite()), "{case}: {it:?}");
     for i in 0..it.parameter_count as usize {
-        assert!(it.covariance_at(i, i) >= 0.0, "{told}: a negative variance: {it:?}");
+        assert!(it.covariance_at(i, i) >= 0.0, "{case}: a negative variance: {it:?}");
     }
 }

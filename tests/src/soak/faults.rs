@@ -204,7 +204,7 @@ impl<'a> Cast<'a> {
     }
 
     /// Waits until the client reads on from the daemon that lives.
-    fn await_progress(&mut self, told: &str) {
+    fn await_progress(&mut self, case: &str) {
         let epoch = self.epoch;
         let last = |it: &Process| it.last_line().as_deref().and_then(parse);
         let before = last(&self.client).filter(|seen| seen.epoch == epoch).map_or(0, |it| it.used);
@@ -215,7 +215,7 @@ impl<'a> Cast<'a> {
             },
             || {
                 format!(
-                    "progress in {told}; client {:?}, {}, controller {}, daemon {}",
+                    "progress in {case}; client {:?}, {}, controller {}, daemon {}",
                     self.client.last_line(),
                     self.client.errors(),
                     self.controller.errors(),
@@ -264,14 +264,14 @@ pub fn run(programs: &Programs, rounds: u64, seed: u64) -> Summary {
         let fault = FAULTS[random.random_range(0..FAULTS.len())];
         std::thread::sleep(Duration::from_micros(random.random_range(0..30_000)));
         let pause = Duration::from_millis(random.random_range(0..500));
-        let told = format!("round {round} of seed {seed}, {fault:?} for {pause:?}");
+        let case = format!("round {round} of seed {seed}, {fault:?} for {pause:?}");
         let epoch = cast.epoch;
         cast.commit(fault, pause);
-        cast.await_progress(&told);
+        cast.await_progress(&case);
         summary.polls += cast.check_polls();
         summary.daemons += u64::from(cast.epoch != epoch);
         if round % 100 == 0 {
-            dynocar::output::report_line(&format!("{told}: {summary:?}"));
+            dynocar::output::report_line(&format!("{case}: {summary:?}"));
         }
     }
     cast.client.end(Signal::KILL);

@@ -140,9 +140,13 @@ pub fn measure(programs: &Programs, rounds: u64, seed: u64) -> Vec<Survivors> {
         let mut cast = [daemon, controller, client];
         let ends = cast.each_mut().map(|process| process.try_wait());
         let names = ["daemon", "controller", "client"];
-        let told =
+        let sentences =
             ends.iter().zip(names).filter_map(|(end, name)| Some(format!("{name}: {}", (*end)?)));
-        found.push(Survivors { kind, alive: ends.map(|end| end.is_none()), ends: told.collect() });
+        found.push(Survivors {
+            kind,
+            alive: ends.map(|end| end.is_none()),
+            ends: sentences.collect(),
+        });
     }
     found
 }

@@ -15,7 +15,7 @@ const FILE: &str = "train-1.state";
 /// The writer is killed within so many µs of its first sign of life.
 const KILLED_WITHIN_US: u64 = 8_000;
 
-/// A state that tells which one it is: the number stands in every value.
+/// A state that says which one it is: the number stands in every value.
 fn numbered(number: u64) -> StateContent {
     // Lengths differ, so that a file mixed from two would show.
     let estimate = |pipeline: u64| StoredEstimate {

@@ -67,7 +67,7 @@ fn normal_integral(x: f64) -> f64 {
 }
 
 /// Bound of the covariance of a, b, c (for speeds in m/s), with each run's start speed unknown;
-/// `is_kept` tells which samples of a run there are.
+/// `is_kept` says which samples of a run there are.
 pub fn covariance(condition: Condition, is_kept: impl Fn(usize, usize) -> bool) -> Matrix3<f64> {
     // Per (m/s)².
     let weight = sample_information(condition.outlier_share()) * 3.6 * 3.6;

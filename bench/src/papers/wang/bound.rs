@@ -15,7 +15,7 @@ const UNKNOWNS: usize = 10;
 /// The unknowns and the speed at the start of a leg.
 const WITH_START: usize = UNKNOWNS + 1;
 
-/// What a drive tells of mass and resistance.
+/// What a drive shows of mass and resistance.
 #[derive(Clone, Debug)]
 pub struct Information {
     matrix: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
@@ -41,7 +41,7 @@ impl Information {
         self.matrix[(0, 0)].powf(-0.5)
     }
 
-    /// The same with a constant acceleration of unknown size beside the known forces.
+    /// The same with a constant acceleration of unknown size besides the known forces.
     pub fn mass_std_with_bias(&self) -> f64 {
         // The constant is what the first polynomial of z1 multiplies.
         let (own, cross, other) = (self.matrix[(0, 0)], self.matrix[(0, 1)], self.matrix[(1, 1)]);

@@ -1,7 +1,7 @@
 //! Figure 10: what the learned mass does to the traction energy of a leg.
 //!
 //! The empty train of 110 t runs from the second station to the first. Its controller plans a
-//! speed profile over the place and reckons the force from an assumed mass: 117.1 t, as if the
+//! speed profile over the place and computes the force from an assumed mass: 117.1 t, as if the
 //! testers of Table 3 were always on board, or the mass that the filter has learned on the leg
 //! before.
 

@@ -52,7 +52,7 @@ struct Errors {
     ours: Score,
 }
 
-/// Legs for each seed asked for: a leg is one error, and 200 of them tell a coverage of 95 % only
+/// Legs for each seed asked for: a leg is one error, and 200 of them give a coverage of 95 % only
 /// to 3 %.
 const LEGS_PER_SEED: usize = 5;
 
@@ -148,7 +148,7 @@ fn disturbed_rows(shuttle: &Shuttle, mass_kg: f64, seeds: Seeds) -> [Row; 3] {
     ]
 }
 
-/// What no estimator can tell from mass: the rows show the shift.
+/// What no estimator can distinguish from mass: the rows show the shift.
 fn misdeclared_rows(shuttle: &Shuttle, mass_kg: f64, seeds: Seeds) -> [Row; 2] {
     let seeds = seeds.at_most(20);
     let rotating = Shuttle { inertia_factor: 1.08, ..shuttle.clone() };

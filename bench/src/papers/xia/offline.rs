@@ -69,8 +69,8 @@ fn fit(
     bounds: ParameterBox<3>,
 ) -> Option<TrajectoryFit> {
     let settings = FitSettings { bounds, ..FitSettings::new(StepRule::Distance) };
-    let stretches = [MotionSegment { steps: &run.steps, speeds_mps }];
-    TrajectoryFitter::default().fit(&stretches, start, &settings).ok()
+    let segments = [MotionSegment { steps: &run.steps, speeds_mps }];
+    TrajectoryFitter::default().fit(&segments, start, &settings).ok()
 }
 
 fn anywhere() -> ParameterBox<3> {
@@ -155,7 +155,7 @@ pub fn noise_free_rows(seeds: Seeds) -> Vec<Row> {
     rows
 }
 
-/// Figure 4: w0 from noisy runs beside the bound.
+/// Figure 4: w0 from noisy runs compared with the bound.
 pub fn noise_rows(seeds: Seeds) -> Vec<Row> {
     let truth = CASES[0];
     let (fast, all) = (fast_speeds_mps(), all_speeds_mps());
@@ -255,7 +255,7 @@ fn paper_minimum(
     Some(Davis { a: found[0], b: found[1], c: found[2] })
 }
 
-/// Cruise under a disturbance that lasts for seconds: output error, as the paper fits, beside
+/// Cruise under a disturbance that lasts for seconds: output error, as the paper fits, against
 /// the fit that estimates the disturbance, and generalised least squares that knows it.
 fn disturbed_row(seeds: Seeds) -> Row {
     let truth = CASES[0];
@@ -267,10 +267,10 @@ fn disturbed_row(seeds: Seeds) -> Row {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let run = cruise.disturbed(&truth, &mut random);
         let speeds = run.measured_mps(0, &mut random);
-        let stretches = [MotionSegment { steps: &run.steps, speeds_mps: &speeds }];
+        let segments = [MotionSegment { steps: &run.steps, speeds_mps: &speeds }];
         let settings = FitSettings { bounds: anywhere(), ..FitSettings::new(StepRule::Distance) };
-        let exact = TrajectoryFitter::default().fit(&stretches, None, &settings);
-        let estimated = likeliest_fit(&stretches, &settings);
+        let exact = TrajectoryFitter::default().fit(&segments, None, &settings);
+        let estimated = likeliest_fit(&segments, &settings);
         for (found, score) in [(exact, &mut output_error), (estimated, &mut ours)] {
             if let Ok(found) = found {
                 score.take_resistance((&found.davis, &found.covariance), &truth, &fast);

@@ -92,7 +92,7 @@ fn ours(run: &Run, speeds_mps: &[f64], settings: OnlineSettings) -> Estimates {
         .collect()
 }
 
-/// The bound: a single filter that is told the noise by step, that the forces are exact, and
+/// The bound: a single filter that is given the noise by step, that the forces are exact, and
 /// where the coefficients switch.
 fn informed(
     run: &Run,
@@ -207,8 +207,8 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
         filter.push(&run, &ours(&run, &speeds, settings(davis, std)));
         let noise_mps = |i| if i >= NOISY_FROM { SPEED_NOISE_MPS } else { 1e-3 };
         let switches = SWITCHES.map(|(at, _)| at);
-        let told = informed(&run, &speeds, declared(), noise_mps, &switches);
-        bound.push(&run, &told);
+        let informed_filter = informed(&run, &speeds, declared(), noise_mps, &switches);
+        bound.push(&run, &informed_filter);
         if seed < seeds.first + paper_lines as u64 {
             windows.push(&run, &paper(&run, &speeds, seed));
         }
@@ -253,7 +253,7 @@ fn drawn((mean, std): (Davis, Vector3<f64>), random: &mut ChaCha8Rng) -> Davis {
     }
 }
 
-/// A full speed profile; the forces are exact, which the filter is told.
+/// A full speed profile; the forces are exact, as the filter is set to assume.
 fn exact_forces_row(seeds: Seeds) -> Row {
     let (mean_davis, std) = constant_prior();
     let speeds_mps = all_speeds_mps();
@@ -266,8 +266,9 @@ fn exact_forces_row(seeds: Seeds) -> Row {
         let mut settings = settings(mean_davis, std);
         settings.noise.disturbance = 0.0;
         settings.noise.learns_disturbance = false;
-        let told = informed(&run, &measured, constant_prior(), |_| SPEED_NOISE_MPS, &[]).pop();
-        if let Some((_, Some(bound))) = told
+        let informed_filter =
+            informed(&run, &measured, constant_prior(), |_| SPEED_NOISE_MPS, &[]).pop();
+        if let Some((_, Some(bound))) = informed_filter
             && let Some((davis, Some(covariance))) = ours(&run, &measured, settings).pop()
         {
             score.take_resistance((&davis, &covariance), &truth, &speeds_mps);

@@ -1,7 +1,7 @@
 //! The fit of a whole run with an unknown disturbance: the likeliest ratio, and what the likelihood
 //! leaves open about it costs.
 //!
-//! A run of an hour tells the density of a disturbance within a factor of two or three. The
+//! A run of an hour gives the density of a disturbance within a factor of two or three. The
 //! covariance for the likeliest one is too small as often as that one is, and a fit that finds
 //! no disturbance at all is far too sure. The covariance is therefore averaged over the ratios by
 //! their restricted likelihood, every decade being as likely beforehand.
@@ -26,13 +26,13 @@ const ROUGH_DECREASE: f64 = 2e-4;
 /// The fit at the disturbance ratio of greatest restricted likelihood, by decades and then by quarters
 /// of a decade; its covariance is averaged over all ratios.
 pub fn likeliest_fit(
-    stretches: &[MotionSegment<'_>],
+    segments: &[MotionSegment<'_>],
     settings: &FitSettings,
 ) -> Result<TrajectoryFit, FitError> {
     let mut fitter = TrajectoryFitter::default();
     let mut fit = |start: Option<&Davis>, disturbance_ratio, decrease_tolerance| {
         let settings = FitSettings { disturbance_ratio, decrease_tolerance, ..*settings };
-        fitter.fit(stretches, start, &settings)
+        fitter.fit(segments, start, &settings)
     };
     let mut posterior = RatioPosterior::new();
     let mut davis = None;
@@ -242,8 +242,8 @@ mod tests {
                 let bounds =
                     ParameterBox { low: Vector3::repeat(-1e3), high: Vector3::repeat(1e3) };
                 let settings = FitSettings { bounds, ..FitSettings::new(StepRule::Time) };
-                let stretches = [MotionSegment { steps: &steps, speeds_mps: &speeds }];
-                let fit = likeliest_fit(&stretches, &settings).unwrap();
+                let segments = [MotionSegment { steps: &steps, speeds_mps: &speeds }];
+                let fit = likeliest_fit(&segments, &settings).unwrap();
                 let error =
                     Vector3::new(fit.davis.a - FAST.a, fit.davis.b - FAST.b, fit.davis.c - FAST.c);
                 let weighed = fit.covariance.cholesky().unwrap().solve(&error);

@@ -107,8 +107,8 @@ fn a_viewer_that_reads_nothing_is_reported_of_and_holds_nobody_up() {
     let first = sequence(&mut viewer);
     while sequence(&mut viewer) < first + 2000 {}
     drop(controller);
-    assert_eq!(live.interrupt(), Some(0), "{}", live.told());
-    assert!(live.told().contains("a viewer has come: 2 now"), "{}", live.told());
+    assert_eq!(live.interrupt(), Some(0), "{}", live.printed());
+    assert!(live.printed().contains("a viewer has come: 2 now"), "{}", live.printed());
 }
 
 #[test]
@@ -129,9 +129,9 @@ fn a_taken_port_and_a_wrong_address_are_reported() {
         Command::new(PROGRAM).arg("--root").arg(root).args(options).output().unwrap()
     };
     let taken = run(&["--port", &port]);
-    let told = String::from_utf8_lossy(&taken.stderr);
-    assert_eq!(taken.status.code(), Some(1), "{told}");
-    assert!(told.contains(&format!("ws://127.0.0.1:{port}: cannot be served: ")), "{told}");
+    let printed = String::from_utf8_lossy(&taken.stderr);
+    assert_eq!(taken.status.code(), Some(1), "{printed}");
+    assert!(printed.contains(&format!("ws://127.0.0.1:{port}: cannot be served: ")), "{printed}");
     for options in [["--host", "here"], ["--port", "70000"], ["--samples-hz", "-1"]] {
         assert_eq!(run(&options).status.code(), Some(2), "{options:?}");
     }

@@ -14,7 +14,7 @@ pub const PROGRAM: &str = env!("CARGO_BIN_EXE_dynocar-live");
 /// A live view; killed when it is dropped.
 pub struct Live {
     process: Child,
-    told: Arc<Mutex<String>>,
+    printed: Arc<Mutex<String>>,
     pub port: u16,
 }
 
@@ -29,27 +29,27 @@ impl Live {
             .spawn()
             .unwrap();
         let lines = BufReader::new(process.stderr.take().unwrap()).lines();
-        let told = Arc::new(Mutex::new(String::new()));
-        let listening = Arc::clone(&told);
+        let printed = Arc::new(Mutex::new(String::new()));
+        let listening = Arc::clone(&printed);
         std::thread::spawn(move || {
             for line in lines.map_while(Result::ok) {
                 *listening.lock().unwrap() += &(line + "\n");
             }
         });
-        let mut live = Live { process, told, port: 0 };
+        let mut live = Live { process, printed, port: 0 };
         live.await_reported("serving ws://127.0.0.1:");
-        let told = live.told();
-        let address = told.split("ws://127.0.0.1:").nth(1).unwrap();
+        let printed = live.printed();
+        let address = printed.split("ws://127.0.0.1:").nth(1).unwrap();
         live.port = address.split(';').next().unwrap().parse().unwrap();
         live
     }
 
-    pub fn told(&self) -> String {
-        self.told.lock().unwrap().clone()
+    pub fn printed(&self) -> String {
+        self.printed.lock().unwrap().clone()
     }
 
     pub fn await_reported(&self, words: &str) {
-        await_true(words, || self.told().contains(words));
+        await_true(words, || self.printed().contains(words));
     }
 
     /// Asks it to end, and gives its exit status.

@@ -59,7 +59,11 @@ fn numbers_truths_and_times_of_every_kind_become_cells_and_what_is_missing_is_em
     assert!(text.contains("\n,-1500,") && text.ends_with("\n,250,,,,,,\n"), "{text}");
     let text = rows(&path, &[("since", "s")]);
     assert!(text.contains("\n,-1.500000000,"), "{text}");
-    assert_eq!(rows(&path, &[("speed", "m/s")]).lines().count(), 1, "the header tells the choices");
+    assert_eq!(
+        rows(&path, &[("speed", "m/s")]).lines().count(),
+        1,
+        "the header states the choices"
+    );
 }
 
 /// The demo's files, its runs as Parquet.

@@ -42,7 +42,7 @@ fn the_page_shows_the_arrow_type_of_every_column_and_the_schema_has_them_all() {
         (&*EVENTS, &["Event"]),
     ];
     for (columns, messages) in tables {
-        let mut told = Vec::new();
+        let mut declared = Vec::new();
         for message in messages {
             for [name, column, unit, _] in rows(&page, message) {
                 let name = match *message {
@@ -52,11 +52,11 @@ fn the_page_shows_the_arrow_type_of_every_column_and_the_schema_has_them_all() {
                 };
                 // `valid`, `estimate` and `rejected` are no columns.
                 if !column.is_empty() {
-                    told.push([name, column, unit]);
+                    declared.push([name, column, unit]);
                 }
             }
         }
-        assert_eq!(in_words(&schema(columns), columns), told);
+        assert_eq!(in_words(&schema(columns), columns), declared);
     }
 }
 

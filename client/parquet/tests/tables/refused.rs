@@ -21,15 +21,15 @@ use crate::support::{program, said, shared, table, write};
 fn refusal(path: &Path) -> String {
     let (shown, out) = (path.display().to_string(), path.with_extension("out"));
     let out = out.display().to_string();
-    let mut told = String::new();
+    let mut printed = String::new();
     for arguments in [&["convert", &shown, "-o", &out][..], &["verify", &shown]] {
         let output = program(arguments);
-        told = said(&output);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
-        assert!(told.starts_with(&format!("dynocar-parquet: {shown}")), "{told}");
+        printed = said(&output);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {printed}");
+        assert!(printed.starts_with(&format!("dynocar-parquet: {shown}")), "{printed}");
         assert!(!Path::new(&out).exists());
     }
-    told
+    printed
 }
 
 fn recording(folder: &Path) -> std::path::PathBuf {
@@ -71,8 +71,8 @@ fn other_formats_broken_files_and_tables_of_others_are_named() {
         if let Some(content) = content {
             std::fs::write(at(name), content).unwrap();
         }
-        let told = refusal(&at(name));
-        assert!(told.contains(expected), "{told}");
+        let printed = refusal(&at(name));
+        assert!(printed.contains(expected), "{printed}");
     }
 }
 
@@ -129,8 +129,8 @@ fn a_table_of_another_release_or_without_a_column_or_with_another_is_named() {
     ];
     for (column, other, layout, expected) in cases {
         altered(&path, &from, column, other, layout);
-        let told = refusal(&path);
-        assert!(told.contains(&format!("{shown}: {expected}")), "{told}");
+        let printed = refusal(&path);
+        assert!(printed.contains(&format!("{shown}: {expected}")), "{printed}");
     }
     altered(&path, &from, "", None, None);
     assert_eq!(read(&path).unwrap().messages.len(), rows, "else it is read");

@@ -2,7 +2,7 @@
 
     from dynocar.fleet import explain_fleet
 
-    fleet = explain_fleet("fleet", "told", workers=2)
+    fleet = explain_fleet("fleet", "report", workers=2)
     print([it["train"] for it in fleet.report["differing"] if it["is_found"]])
 
 On the command line ``python -m dynocar.fleet explain FOLDER -o OUT``. Needs ``pip install

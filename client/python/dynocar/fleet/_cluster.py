@@ -16,7 +16,7 @@ from ._extra import needed
 from ._work import Order, explained
 
 Work = Callable[[Order], dict[str, Any] | None]
-Told = Callable[[str], object]
+ReportLine = Callable[[str], object]
 
 
 @contextmanager
@@ -30,7 +30,7 @@ def connected(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             "threads_per_worker": 1,
             "dashboard_address": ":0",
         }
-        # What becomes of the trains is told below; Dask's own words about its ends are none of it.
+        # What becomes of the trains is reported below; Dask's own words about its ends are none of it.
         options["silence_logs"] = logging.CRITICAL
         # On a busy machine a worker needs long to come back; given up, it would never.
         patience = {"distributed.deploy.lost-worker-timeout": "1 hour"}
@@ -50,12 +50,12 @@ def connected(scheduler: str | None, workers: int | None) -> Iterator[Any]:
 
 
 def work_off(
-    client: Any, orders: Iterable[Order], kept: Path, tell: Told, work: Work = explained
+    client: Any, orders: Iterable[Order], kept: Path, report_line: ReportLine, work: Work = explained
 ) -> dict[str, dict[str, Any]]:
     """Every order's answer by its name; each is kept as a file as soon as it is there.
 
     A worker that dies gives its train back to the others; a train on which four workers died is
-    told as failed (`distributed.scheduler.allowed-failures`).
+    reported as failed (`distributed.scheduler.allowed-failures`).
     """
     of_name = {order.name: order for order in orders}
     answers = {name: read_answer(kept, name) for name in of_name}
@@ -69,19 +69,19 @@ def work_off(
     left = len(names)
     # Taken at once: what only a worker holds is computed again when that worker dies.
     done = needed("distributed").as_completed(futures, with_results=True, raise_errors=False)
-    for future, told in done:
+    for future, answer in done:
         name, left = names[future.key], left - 1
         if future.status != "finished":
             unit = of_name[name].unit
-            told = {"train": unit.train, "month": unit.month, "key": None}
-            told["error"] = _why(future)
-        if told is not None:
-            _keep(told, kept / f"{name}.json")
-            answers[name] = told
+            answer = {"train": unit.train, "month": unit.month, "key": None}
+            answer["error"] = _why(future)
+        if answer is not None:
+            _keep(answer, kept / f"{name}.json")
+            answers[name] = answer
         state = (
-            "kept" if told is None else f"failed: {told['error']}" if "error" in told else "done"
+            "kept" if answer is None else f"failed: {answer['error']}" if "error" in answer else "done"
         )
-        tell(f"{name}: {state} ({left} left)")
+        report_line(f"{name}: {state} ({left} left)")
         future.release()
     return {name: answer for name, answer in answers.items() if answer is not None}
 
@@ -118,7 +118,7 @@ def write_text(file: Path, text: str) -> None:
 
 
 def on_standard_error(words: str) -> None:
-    """Tells on standard error; a reader that has gone away harms nothing."""
+    """Reports on standard error; a reader that has gone away harms nothing."""
     try:
         print(words, file=sys.stderr, flush=True)
     except OSError:

@@ -94,7 +94,7 @@ def _common(found: list[Found]) -> Common:
     return Common(f"{kind}@{start:.0f}-{end:.0f}", kind, found[0].line, (start, end), found)
 
 
-def told(
+def common_effects(
     commons: Sequence[Common],
     answers: Mapping[str, Answer],
     asked: Mapping[tuple[str, str], Answer],
@@ -103,10 +103,10 @@ def told(
 
     ``asked`` holds the answers of trains to which an effect was declared, by train and effect.
     """
-    return [_told(common, answers, asked) for common in commons]
+    return [_common_effect(common, answers, asked) for common in commons]
 
 
-def _told(
+def _common_effect(
     common: Common, answers: Mapping[str, Answer], asked: Mapping[tuple[str, str], Answer]
 ) -> dict[str, Any]:
     own = common.estimates()
@@ -148,7 +148,7 @@ def _asked(common: Common, answer: Answer | None) -> tuple[str, Estimate | None]
 
     Where it then finds the opposite, its data could have shown the effect, and what is left of it
     is the train's own number. Where it finds nothing, with the effect declared or without, its data
-    do not tell.
+    do not determine it.
     """
     if answer is None:
         return "not_asked", None
@@ -166,23 +166,23 @@ def _asked(common: Common, answer: Answer | None) -> tuple[str, Estimate | None]
 
 
 def _left(found: Sequence[Found], common: Common, declared: float) -> Estimate | None:
-    """What is left of a declared effect after what was found beside it.
+    """What is left of a declared effect after what was found jointly with it.
 
     Of a place it is the resistance there less that around it, as far as the place is long: that a
     place has less and that all the rest has more are the same, but for a, which is fitted, too.
     """
     name = common.parameter
-    told = [it for it in found if name is not None and name in it.parameters]
-    if not told or name is None:
+    of_name = [it for it in found if name is not None and name in it.parameters]
+    if not of_name or name is None:
         return None
-    value, std = told[0].parameters[name]
+    value, std = of_name[0].parameters[name]
     if common.interval_m is None:
         return Estimate(declared * value, declared * std)
     (start, end), length = common.interval_m, common.interval_m[1] - common.interval_m[0]
 
     def share(low: float, high: float) -> float:
         """Of a stretch, what the places found cover."""
-        at = [it.interval_m for it in told if it.interval_m is not None]
+        at = [it.interval_m for it in of_name if it.interval_m is not None]
         return sum(max(0.0, min(high, b) - max(low, a)) for a, b in at) / (high - low)
 
     around = (share(start - length, start) + share(end, end + length)) / 2

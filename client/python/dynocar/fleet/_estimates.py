@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 from ._statistics import Estimate, pool
 
 NORMAL_95 = 1.959963984540054
-# What data hardly tell is not compared: it is mostly what was declared.
+# What data hardly determine is not compared: it is mostly what was declared.
 LEAST_TOLD = 0.5
 # Two stretches are the same place where they share so much of the shorter one.
 SAME_PLACE = 0.5
-# Kinds that act at a place of the line; a tunnel that the map lacks may be told as either.
+# Kinds that act at a place of the line; a tunnel that the map lacks may be reported as either.
 PLACES = ("local_resistance", "tunnel_drag")
 # Values of no effect, where that is not 0.
 NO_EFFECT = {
@@ -44,15 +44,15 @@ class Found(NamedTuple):
 
 
 def estimates(answer: Answer) -> dict[str, Estimate]:
-    """a, b, c less the declared ones, and the mass over the declared one, where the data tell them."""
-    told: dict[str, Estimate] = {}
+    """a, b, c less the declared ones, and the mass over the declared one, where the data determine them."""
+    estimates: dict[str, Estimate] = {}
     explained = answer["answer"]
     if explained["verdict"] != "insufficient_data":
         base = explained["base"]
         for name in "abc":
             if base["told_by_data"][name] >= LEAST_TOLD and base["std"][name] > 0:
                 away = base[name] - answer["declared_abc"][name]
-                told[name] = Estimate(away, base["std"][name])
+                estimates[name] = Estimate(away, base["std"][name])
     masses = [
         Estimate(run["mass_t"] / run["declared_t"], run["std_t"] / run["declared_t"])
         for run in answer["masses"]
@@ -63,8 +63,8 @@ def estimates(answer: Answer) -> dict[str, Estimate]:
         stated = 1 / sum(1 / mass.std**2 for mass in masses) ** 0.5
         # So that 1.96 of them make 95 % however few runs there are.
         std = max((pooled.high - pooled.low) / 2 / NORMAL_95, stated)
-        told["mass"] = Estimate(pooled.mean, std)
-    return told
+        estimates["mass"] = Estimate(pooled.mean, std)
+    return estimates
 
 
 def effects(answer: Answer) -> list[Found]:

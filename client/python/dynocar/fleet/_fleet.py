@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from .._errors import InputError, WorkError
 from .._recorded import PathLike
 from . import _folder
-from ._cluster import Told, Work, connected, on_standard_error, read_answer, work_off, write_text
+from ._cluster import ReportLine, Work, connected, on_standard_error, read_answer, work_off, write_text
 from ._common import group
 from ._folder import MONTH, Unit
 from ._page import page
@@ -43,7 +43,7 @@ def explain_fleet(
     month: str | None = None,
     traction_only: bool = False,
     client: Any = None,
-    tell: Told = on_standard_error,
+    report_line: ReportLine = on_standard_error,
     work: Work = explained,
 ) -> Fleet:
     """Explains every train of a folder and writes the fleet's report.
@@ -53,7 +53,7 @@ def explain_fleet(
     only what is missing or has changed. ``month`` (``"2026-05"``) is reported, the last one unless
     it is given; with it only that month and the one before are explained.
 
-    A train that fails is told in ``failed``, and the others are done. Raises ``InputError`` for a
+    A train that fails is reported in ``failed``, and the others are done. Raises ``InputError`` for a
     folder that holds no fleet.
     """
     units = _of_month(_folder.units(Path(folder)), month)
@@ -63,9 +63,9 @@ def explain_fleet(
     except OSError as error:
         raise WorkError(f"{kept}: cannot be written: {error.strerror}") from error
     if client is not None:
-        return _explained(client, units, kept, month, traction_only, tell, work)
+        return _explained(client, units, kept, month, traction_only, report_line, work)
     with connected(scheduler, workers) as made:
-        return _explained(made, units, kept, month, traction_only, tell, work)
+        return _explained(made, units, kept, month, traction_only, report_line, work)
 
 
 def _of_month(units: list[Unit], month: str | None) -> list[Unit]:
@@ -87,11 +87,11 @@ def _explained(
     kept: Path,
     month: str | None,
     traction_only: bool,
-    tell: Told,
+    report_line: ReportLine,
     work: Work,
 ) -> Fleet:
     orders = [Order(unit, traction_only, None, None) for unit in units]
-    answers = list(work_off(client, orders, kept, tell, work).values())
+    answers = list(work_off(client, orders, kept, report_line, work).values())
     reported, _ = months_of(answers, month)
     now = of_month(answers, reported)
     of_train = {unit.train: unit for unit in units if unit.month == reported}
@@ -101,7 +101,7 @@ def _explained(
         for train in common.asked(now)
         if (declared := common.declared(now[train])) is not None
     ]
-    asked = list(work_off(client, further, kept, tell, work).values())
+    asked = list(work_off(client, further, kept, report_line, work).values())
     return _written(kept.parent, report(answers, asked, month))
 
 
@@ -123,8 +123,8 @@ def write_report(out: PathLike, *, month: str | None = None) -> Fleet:
     return _written(Path(out), report(answers, asked, month))
 
 
-def _written(out: Path, told: dict[str, Any]) -> Fleet:
-    fleet = Fleet(told, out / "fleet.json", out / "fleet.html")
-    write_text(fleet.json_file, json.dumps(told, indent=1) + "\n")
-    write_text(fleet.html_file, page(told))
+def _written(out: Path, report: dict[str, Any]) -> Fleet:
+    fleet = Fleet(report, out / "fleet.json", out / "fleet.html")
+    write_text(fleet.json_file, json.dumps(report, indent=1) + "\n")
+    write_text(fleet.html_file, page(report))
     return fleet

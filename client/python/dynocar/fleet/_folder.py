@@ -46,7 +46,7 @@ class Unit(NamedTuple):
                     digest = _digest(opened)
             except OSError as error:
                 raise InputError(f"{file}: cannot be read: {error.strerror}", str(file)) from error
-            # Names tell runs apart, and where the fleet lies does not matter.
+            # Names distinguish runs, and where the fleet lies does not matter.
             name = os.path.relpath(file, self.manifest.parent)
             total.update(f"{name}\0{digest}\0".encode())
         return total.hexdigest()

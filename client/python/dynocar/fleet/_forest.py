@@ -60,8 +60,8 @@ def shortened(name: str) -> str:
 
 
 def _tag(name: str, kind: str, **numbers: float) -> str:
-    told = " ".join(f'{key}="{number:.1f}"' for key, number in numbers.items())
-    return f'<{name} class="{kind}" {told}/>'
+    attributes = " ".join(f'{key}="{number:.1f}"' for key, number in numbers.items())
+    return f'<{name} class="{kind}" {attributes}/>'
 
 
 def _line(kind: str, x1: float, y1: float, x2: float, y2: float) -> str:

@@ -13,13 +13,13 @@ from ._statistics import discoveries, normal_tail
 def changes(now: Mapping[str, Answer], before: Mapping[str, Answer]) -> list[dict[str, Any]]:
     """Estimates of the month less those of the month before, for trains that have both, with false
     discoveries kept below 5 % over all of them."""
-    told: list[dict[str, Any]] = []
+    changes: list[dict[str, Any]] = []
     for train in sorted(now.keys() & before.keys()):
         old, new = estimates(before[train]), estimates(now[train])
         for parameter in (name for name in new if name in old):
             change = new[parameter].value - old[parameter].value
             std = math.hypot(new[parameter].std, old[parameter].std)
-            told.append(
+            changes.append(
                 {
                     "train": train,
                     "parameter": parameter,
@@ -31,26 +31,26 @@ def changes(now: Mapping[str, Answer], before: Mapping[str, Answer]) -> list[dic
                     "p_value": 2 * normal_tail(abs(change) / std),
                 }
             )
-    is_found = discoveries([it["p_value"] for it in told], 0.05)
-    return [it | {"is_found": found} for it, found in zip(told, is_found)]
+    is_found = discoveries([it["p_value"] for it in changes], 0.05)
+    return [it | {"is_found": found} for it, found in zip(changes, is_found)]
 
 
 def effects_changed(
     now: Mapping[str, Answer], before: Mapping[str, Answer]
 ) -> list[dict[str, Any]]:
     """Effects that came, went and stayed."""
-    told: list[dict[str, Any]] = []
+    changes: list[dict[str, Any]] = []
     for train in sorted(now.keys() & before.keys()):
         old, new = effects(before[train]), effects(now[train])
         for found in new:
             stayed = any(is_same(found, other) for other in old)
-            told.append(_told(found, "stayed" if stayed else "came"))
+            changes.append(_change(found, "stayed" if stayed else "came"))
         gone = [other for other in old if not any(is_same(found, other) for found in new)]
-        told += [_told(found, "went") for found in gone]
-    return told
+        changes += [_change(found, "went") for found in gone]
+    return changes
 
 
-def _told(found: Found, what: str) -> dict[str, Any]:
+def _change(found: Found, what: str) -> dict[str, Any]:
     return {
         "train": found.train,
         "what": what,

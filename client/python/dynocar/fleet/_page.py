@@ -19,7 +19,7 @@ OWNERS = {
 STATES = {
     "found": "found",
     "absent": "its data show that it is not there",
-    "cannot_tell": "its data do not tell",
+    "cannot_tell": "its data do not show it",
     "not_asked": "was not asked",
     "failed": "asking failed",
 }
@@ -47,7 +47,7 @@ def page(report: Report) -> str:
     policy = "default-src 'none'; style-src 'unsafe-inline'"
     style = Path(__file__).with_name("_page.css").read_text(encoding="utf-8")
     main = "".join(
-        part(report) for part in (_told, _failed, _differing, _common, _changes, _trains, _how)
+        part(report) for part in (_summary, _failed, _differing, _common, _changes, _trains, _how)
     )
     samples = sum(train["samples"] for train in report["trains"])
     runs = sum(train["runs"] for train in report["trains"])
@@ -63,7 +63,7 @@ def page(report: Report) -> str:
     )
 
 
-def _told(report: Report) -> str:
+def _summary(report: Report) -> str:
     """What stands out, in a few lines."""
     lines = []
     for it in report["differing"]:
@@ -79,9 +79,9 @@ def _told(report: Report) -> str:
             lines.append(f"{it['train']} has changed in {PARAMETERS[it['parameter']]}")
     lines += [f"{it['train']} failed" for it in report["failed"]]
     if not lines:
-        return '<div class="told">No train stands out, and no effect was found.</div>\n'
+        return '<div class="summary">No train stands out, and no effect was found.</div>\n'
     items = "".join(f"<li>{escape(line)}</li>" for line in lines)
-    return f'<div class="told open"><ul>{items}</ul></div>\n'
+    return f'<div class="summary open"><ul>{items}</ul></div>\n'
 
 
 def _effect(it: Report) -> str:
@@ -130,7 +130,7 @@ def _differing(report: Report) -> str:
     heads = ["train", "parameter", "its own", "the others", "scatter between them", "z", "p"]
     table = _table(heads, [rows[k] for k in order], [marked[k] for k in order], numbers=5)
     note = (
-        "Each train beside the pooled mean of the others. Coloured: differs by more than the "
+        "Each train against the pooled mean of the others. Coloured: differs by more than the "
         f"intervals say, at most {100 * report['false_discovery_rate']:.0f} % of these falsely in the "
         "mean. The band is the 95 % interval of the others' mean."
     )
@@ -158,7 +158,7 @@ def _common(report: Report) -> str:
         svg = f"<figure>{forest(drawn, band, it['no_effect'])}</figure>" if drawn else ""
         heading, body = escape(_effect(it)), f"{svg}<div>{_table(['train', 'says'], rows)}</div>"
         parts += f'<h3>{heading}</h3><p>{escape(words)}</p><div class="panels">{body}</div>'
-    note = "A train that did not find an effect does not count as zero: what its data say stands beside it."
+    note = "A train that did not find an effect does not count as zero: what its data say stands next to it."
     return _section("Effects over trains", note, parts)
 
 
@@ -179,14 +179,14 @@ def _changes(report: Report) -> str:
     marked = [it["is_found"] for it in report["changes"]]
     order = sorted(range(len(rows)), key=lambda k: not marked[k])
     heads = ["train", "parameter", "before", "now", "change and its 95 % interval", "z"]
-    told = _table(heads, [rows[k] for k in order], [marked[k] for k in order], numbers=4)
+    table = _table(heads, [rows[k] for k in order], [marked[k] for k in order], numbers=4)
     came = [
         [it["train"], it["what"], str(it["kind"]).replace("_", " "), _place(it["interval_m"])]
         for it in report["effects_changed"]
     ]
     if came:
-        told += _table(["train", "effect", "kind", "where"], came)
-    return _section(f"What changed since {report['month_before']}", "", told)
+        table += _table(["train", "effect", "kind", "where"], came)
+    return _section(f"What changed since {report['month_before']}", "", table)
 
 
 def _place(interval: list[float] | None) -> str:
@@ -206,15 +206,15 @@ def _trains(report: Report) -> str:
 def _how(report: Report) -> str:
     words = (
         "Means over trains are of random effects: the scatter between trains by restricted maximum "
-        "likelihood, the interval after Knapp and Hartung. Trains are told to differ with false "
+        "likelihood, the interval after Knapp and Hartung. Trains are reported to differ with false "
         "discoveries kept below the rate after Benjamini and Yekutieli. Formulas and their tests: "
         "docs/guides/fleet.md."
     )
-    return _section("How it is reckoned", words, "")
+    return _section("How it is computed", words, "")
 
 
-def _estimate(told: Report) -> tuple[float, float]:
-    return told["value"], told["std"]
+def _estimate(estimate: Report) -> tuple[float, float]:
+    return estimate["value"], estimate["std"]
 
 
 def _section(heading: str, note: str, body: str) -> str:

@@ -41,7 +41,7 @@ def write_dataset(unit: Unit, folder: Path) -> dict[str, Path]:
 
 
 class _Partition:
-    """One file: a run, or several that its column ``run`` tells apart."""
+    """One file: a run, or several that its column ``run`` distinguishes."""
 
     def __init__(self, file: Path, columns: dict[str, dict[str, Any]], folder: Path) -> None:
         self.file, self.columns, self.folder = file, columns, folder

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from .. import version
-from ._common import group, told
+from ._common import common_effects, group
 from ._estimates import UNITS, Answer, effects, estimates
 from ._months import changes, effects_changed
 from ._statistics import Estimate, differing
@@ -38,7 +38,7 @@ def report(answers: Iterable[Answer], asked: Iterable[Answer], month: str | None
         for it in asked
         if it["month"] == reported and "declared" in it
     }
-    common = told(group(now), now, of_effect)
+    common = common_effects(group(now), now, of_effect)
     return {
         "version": version(),
         "month": reported or None,
@@ -73,7 +73,7 @@ def _train(answer: Answer) -> dict[str, Any]:
 
 
 def _differing(now: Mapping[str, Answer], common: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Each train beside the others: a, b, c, mass, and every factor on a measured force or speed."""
+    """Each train against the others: a, b, c, mass, and every factor on a measured force or speed."""
     numbers: dict[str, dict[str, Estimate]] = {}
     for train in sorted(now):
         for name, estimate in estimates(now[train]).items():

@@ -1,4 +1,4 @@
-"""Pooling of estimates, and telling which of them differ from the others.
+"""Pooling of estimates, and judging which of them differ from the others.
 
 Nothing here knows of trains; what it promises (coverage, false discoveries) is held over seeded
 simulations by ``tests/test_fleet_statistics.py``.
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 # Fewer others say nothing of their scatter.
 LEAST_OTHERS = 3
-# The first look takes those for far that are so many deviations from the median, of so many: of sets
+# The first look takes those for far that are so many standard deviations from the median, of so many: of sets
 # of 12 normal numbers 1 % have one.
 FAR, LEAST_FOR_FAR = 6.0, 8
 
@@ -41,7 +41,7 @@ class Pooled(NamedTuple):
 
 
 class Difference(NamedTuple):
-    """An estimate beside those of the others."""
+    """An estimate against those of the others."""
 
     name: str
     parameter: str
@@ -62,7 +62,7 @@ class _Means(NamedTuple):
 
 
 def pool(estimates: Sequence[Estimate]) -> Pooled:
-    """The mean under random effects: own deviations and a scatter between the true values.
+    """The mean under random effects: own standard deviations and a scatter between the true values.
 
     The scatter by restricted maximum likelihood (Viechtbauer 2005, J. Educ. Behav. Stat. 30, 261,
     eq. 10), the interval of the mean by Knapp and Hartung (2003, Stat. Med. 22, 2693, eq. 8) with
@@ -127,7 +127,7 @@ def differing(
 ) -> list[Difference]:
     """Which things differ from the others, for each parameter a mapping from name to estimate.
 
-    Each estimate is held against the pooled mean of the others: the difference over its deviation,
+    Each estimate is held against the pooled mean of the others: the difference over its standard deviation,
     of its own variance, the scatter between the others and the variance of their mean. Few others
     say little of their scatter: one standard deviation of its estimate is added to it, and the
     degrees of freedom are Satterthwaite's (1946, Biometrics 2, 110). False discoveries are kept
@@ -142,20 +142,20 @@ def differing(
     found = {(it.parameter, it.name) for it in first if it.is_found}
     out = {of: {name for name in names if (of, name) in found} for of, names in out.items()}
     while True:
-        told = _judged(estimates, out, rate)
+        judged = _judged(estimates, out, rate)
         further: dict[str, Difference] = {}
-        for difference in sorted(told, key=lambda it: abs(it.z)):
+        for difference in sorted(judged, key=lambda it: abs(it.z)):
             if difference.is_found and difference.name not in out[difference.parameter]:
                 further[difference.parameter] = difference
         if not further:
-            return told
+            return judged
         for parameter, difference in further.items():
             out[parameter].add(difference.name)
 
 
 def _far(of_names: Mapping[str, Estimate]) -> set[str]:
-    """Those farther from the median than `FAR` times their own deviation and the one that the median
-    absolute deviation of all tells (Hampel's identifier); of few these tell nothing."""
+    """Those farther from the median than `FAR` times their own standard deviation and the one that the median
+    absolute deviation of all decide (Hampel's identifier); of few these say nothing."""
     if len(of_names) < LEAST_FOR_FAR:
         return set()
     middle = median(estimate.value for estimate in of_names.values())
@@ -170,16 +170,16 @@ def _far(of_names: Mapping[str, Estimate]) -> set[str]:
 def _judged(
     estimates: Mapping[str, Mapping[str, Estimate]], out: Mapping[str, set[str]], rate: float
 ) -> list[Difference]:
-    """Each estimate beside the others but those that are out, and which are discoveries."""
-    told = [it for of in estimates for it in _beside_others(of, estimates[of], out[of])]
-    is_found = discoveries([difference.p_value for difference in told], rate)
-    return [difference._replace(is_found=found) for difference, found in zip(told, is_found)]
+    """Each estimate against the others but those that are out, and which are discoveries."""
+    judged = [it for of in estimates for it in _beside_others(of, estimates[of], out[of])]
+    is_found = discoveries([difference.p_value for difference in judged], rate)
+    return [difference._replace(is_found=found) for difference, found in zip(judged, is_found)]
 
 
 def _beside_others(
     parameter: str, of_names: Mapping[str, Estimate], out: set[str]
 ) -> list[Difference]:
-    """Each estimate beside the others that count, where these are enough."""
+    """Each estimate against the others that count, where these are enough."""
     names = list(of_names)
     values, stds = np.array(list(of_names.values())).reshape(-1, 2).T
     counts = np.tile([float(name not in out) for name in names], (len(names), 1))
@@ -198,17 +198,17 @@ def _beside_others(
     z = (values - means.mean) / np.sqrt(variance)
     # Others that happen to lie close together would make themselves seem known: so much, no more.
     freedom = (others - 1) * np.minimum((variance / uncertain) ** 2, 3.0)
-    told = []
+    judged = []
     for k, name in enumerate(names):
         mean, std = float(means.mean[k]), float(means.std[k])
         reach = student_quantile(0.975, others[k] - 1) * std
         between = math.sqrt(float(means.between[k]))
         pooled = Pooled(mean, std, mean - reach, mean + reach, between, int(others[k]))
         p_value = 2 * student_tail(abs(float(z[k])), float(freedom[k]))
-        told.append(
+        judged.append(
             Difference(name, parameter, of_names[name], pooled, float(z[k]), p_value, False)
         )
-    return told
+    return judged
 
 
 def discoveries(p_values: Sequence[float], rate: float) -> list[bool]:

@@ -24,7 +24,7 @@ class Declared(NamedTuple):
     kind: str
     value: float
     interval_m: tuple[float, float] | None
-    # Places that the train finds elsewhere, [start, end, N/kN]: they stay declared beside it.
+    # Places that the train finds elsewhere, [start, end, N/kN]: they stay declared with it.
     beside: tuple[tuple[float, float, float], ...]
 
 
@@ -50,30 +50,30 @@ ASKABLE = ("local_resistance", *FACTORS)
 
 
 def explained(order: Order) -> dict[str, Any] | None:
-    """The answer with its key; nothing where the known one still holds. What is wrong is told, too."""
+    """The answer with its key; nothing where the known one still holds. What is wrong is reported, too."""
     # There is a worker for each core. Read when a process explains for the first time.
     os.environ.setdefault("RAYON_NUM_THREADS", "1")
     unit = order.unit
-    told: dict[str, Any] = {"train": unit.train, "month": unit.month, "key": None}
+    answer: dict[str, Any] = {"train": unit.train, "month": unit.month, "key": None}
     if order.declared is not None:
-        told["declared"] = order.declared._asdict()
+        answer["declared"] = order.declared._asdict()
     try:
-        told["key"] = unit.key(order.options())
-        if told["key"] == order.known_key:
+        answer["key"] = unit.key(order.options())
+        if answer["key"] == order.known_key:
             return None
         wall_s, cpu_s = time.perf_counter(), time.process_time()
         with tempfile.TemporaryDirectory(prefix="dynocar-fleet-") as folder:
-            told |= _answer(order, Path(folder))
-        told["work"] = {
+            answer |= _answer(order, Path(folder))
+        answer["work"] = {
             "wall_s": time.perf_counter() - wall_s,
             "cpu_s": time.process_time() - cpu_s,
             "peak_memory_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
         }
     except (DynocarError, OSError) as error:
-        told["error"] = str(error)
+        answer["error"] = str(error)
     except Exception as error:  # a fault of ours ends one train, not the fleet
-        told["error"] = f"{type(error).__name__}: {error}"
-    return told
+        answer["error"] = f"{type(error).__name__}: {error}"
+    return answer
 
 
 def _answer(order: Order, folder: Path) -> dict[str, Any]:
@@ -113,7 +113,7 @@ def _answer(order: Order, folder: Path) -> dict[str, Any]:
 
 
 def _silent(share: float, what: str) -> None:
-    """A worker tells nobody how far it is."""
+    """A worker reports to nobody how far it is."""
 
 
 def _in_users_words(words: str, folder: Path, sources: dict[str, Path]) -> str:

@@ -61,7 +61,7 @@ pub enum AnnotateError {
 /// What was added.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Annotated {
-    /// Stretches in which an effect acts.
+    /// Intervals in which an effect acts.
     pub effects: usize,
     /// Messages in all.
     pub messages: usize,

@@ -29,7 +29,7 @@ pub struct FlightRecorderArguments {
     #[arg(long, value_name = "N", default_value_t = 4096,
           value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
     ring_mib: u64,
-    /// The most MiB that all that is kept takes; then nothing more is kept, and that is told
+    /// The most MiB that all that is kept takes; then nothing more is kept, and a line says so
     #[arg(long, value_name = "N", default_value_t = 4096,
           value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
     kept_mib: u64,

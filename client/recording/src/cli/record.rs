@@ -113,7 +113,7 @@ pub fn execute(arguments: &RecordArguments) -> Result<(), Failure> {
     run(&settings)
 }
 
-/// Records until it is asked to end, and tells how much that was.
+/// Records until it is asked to end, and reports how much that was.
 ///
 /// # Errors
 ///

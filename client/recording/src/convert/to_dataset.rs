@@ -49,7 +49,7 @@ pub enum ToDatasetError {
         /// Those that there are.
         trains: String,
     },
-    /// Nobody tells the train.
+    /// Nobody names the train.
     #[error(
         "{}: the file of train {train} is not attached: give it by --train-file", path.display()
     )]

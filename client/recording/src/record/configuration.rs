@@ -34,7 +34,7 @@ impl Configuration {
         };
         let path = named.ok_or_else(|| {
             format!(
-                "the daemon (process {process}) does not tell its configuration: none is attached; \
+                "the daemon (process {process}) does not publish its configuration: none is attached; \
                  give it by --config"
             )
         })?;

@@ -135,7 +135,7 @@ impl Files {
     pub fn sample(&mut self, sample: &TrainSample) -> Result<(), RecordError> {
         self.recorded.samples += 1;
         let written = self.writer.sample(sample, sample.published_ns);
-        self.told(written)
+        self.checked(written)
     }
 
     /// Writes a snapshot.
@@ -146,7 +146,7 @@ impl Files {
     pub fn snapshot(&mut self, snapshot: &ParameterSnapshot) -> Result<(), RecordError> {
         self.recorded.snapshots += 1;
         let written = self.writer.snapshot(snapshot);
-        self.told(written)
+        self.checked(written)
     }
 
     /// Writes an event.
@@ -160,7 +160,7 @@ impl Files {
             self.recorded.lost += event.count.unwrap_or(0);
         }
         let written = self.writer.event(event);
-        self.told(written)?;
+        self.checked(written)?;
         if keeping::is_reason(event) {
             self.housekeeper.ask(Task::Keep { event: event.clone() });
         }
@@ -185,7 +185,7 @@ impl Files {
     fn attach_newest(&mut self) -> Result<(), RecordError> {
         let Some((configuration, number, seen_ns)) = &self.configuration else { return Ok(()) };
         let written = attach(&mut self.writer, configuration, *number, *seen_ns);
-        self.told(written)
+        self.checked(written)
     }
 
     /// Hands everything to the system, has it brought to the disk when it is time to, and begins a new file
@@ -200,7 +200,7 @@ impl Files {
         }
         self.writer.set_clock(WallClock::now());
         let written = self.writer.flush();
-        self.told(written)?;
+        self.checked(written)?;
         let is_full = self.rotation.bytes.is_some_and(|most| self.bytes.get() >= most)
             || self.rotation.age.is_some_and(|most| self.begun.elapsed() >= most);
         if is_full {
@@ -227,7 +227,7 @@ impl Files {
         let (writer, bytes) = open(&self.storage, &path)?;
         let full = std::mem::replace(&mut self.writer, writer);
         let written = full.finish().map(|_| ());
-        self.told(written)?;
+        self.checked(written)?;
         self.settle();
         (self.path, self.bytes, self.begun) = (path.clone(), bytes, Instant::now());
         self.attach_newest()?;
@@ -251,7 +251,7 @@ impl Files {
         Ok(self.recorded)
     }
 
-    fn told(&self, written: Result<(), McapError>) -> Result<(), RecordError> {
+    fn checked(&self, written: Result<(), McapError>) -> Result<(), RecordError> {
         written.map_err(|source| RecordError::Write { path: self.path.clone(), source })
     }
 }

@@ -1,4 +1,4 @@
-//! What a recorder does with its files beside writing: it brings them to the disk, keeps them and removes them.
+//! What a recorder does with its files besides writing: it brings them to the disk, keeps them and removes them.
 //!
 //! A disk may take seconds for each of these. They are done in the order in which they were asked for, in a
 //! thread of their own while a recorder runs, so that nobody who records waits for them.
@@ -26,7 +26,7 @@ pub enum Task {
         /// Samples, snapshots and events.
         items: u64,
     },
-    /// A file was begun: it belongs to a stretch that is not yet at its end.
+    /// A file was begun: it belongs to an event that is not yet at its end.
     Begun {
         /// The file.
         file: PathBuf,
@@ -69,7 +69,7 @@ struct Housekeeping {
     progress: Arc<Progress>,
     /// The file whose name is on the disk.
     named: PathBuf,
-    is_failure_told: bool,
+    is_failure_reported: bool,
 }
 
 impl Housekeeping {
@@ -79,9 +79,9 @@ impl Housekeeping {
                 match self.settle(&file) {
                     Ok(()) => {
                         self.progress.lasting.store(items, Ordering::Release);
-                        self.is_failure_told = false;
+                        self.is_failure_reported = false;
                     }
-                    Err(source) if !std::mem::replace(&mut self.is_failure_told, true) => {
+                    Err(source) if !std::mem::replace(&mut self.is_failure_reported, true) => {
                         report_line(&SettleError { file, source }.to_string());
                     }
                     Err(_) => {}
@@ -105,7 +105,7 @@ impl Housekeeping {
         Ok(())
     }
 
-    /// A problem of keeping is told, and stops nothing.
+    /// A problem of keeping is reported, and stops nothing.
     fn keep(&mut self, work: impl FnOnce(&mut Keeper, &[PathBuf]) -> Result<(), KeepError>) {
         let Some(keeper) = &mut self.keeper else { return };
         let files: Vec<PathBuf> = numbered(&self.output).into_iter().map(|it| it.1).collect();
@@ -120,7 +120,7 @@ enum HousekeepingThread {
     /// At once, by whoever asks.
     Here(Box<Housekeeping>),
     /// In a thread of its own, which ends when nobody can ask any more.
-    Beside(Sender<Task>, JoinHandle<()>),
+    Running(Sender<Task>, JoinHandle<()>),
 }
 
 /// Has things done with the files of a recording.
@@ -140,7 +140,7 @@ impl Housekeeper {
             keeper: None,
             progress: Arc::clone(&progress),
             named: PathBuf::new(),
-            is_failure_told: false,
+            is_failure_reported: false,
         };
         Housekeeper { place: HousekeepingThread::Here(Box::new(housekeeping)), progress }
     }
@@ -157,7 +157,7 @@ impl Housekeeper {
             let thread = std::thread::Builder::new().name("housekeeping".into());
             let thread = thread.spawn(move || work(&taken, &asked))?;
             let here =
-                std::mem::replace(&mut self.place, HousekeepingThread::Beside(tasks, thread));
+                std::mem::replace(&mut self.place, HousekeepingThread::Running(tasks, thread));
             if let HousekeepingThread::Here(housekeeping) = here {
                 // The thread waits for it.
                 let _ = hand_over.send(housekeeping);
@@ -166,7 +166,7 @@ impl Housekeeper {
         Ok(())
     }
 
-    /// Keeps from now on; before it works beside.
+    /// Keeps from now on; before it works in a thread of its own.
     pub fn set_keeper(&mut self, keeper: Keeper) {
         if let HousekeepingThread::Here(housekeeping) = &mut self.place {
             housekeeping.keeper = Some(keeper);
@@ -181,7 +181,7 @@ impl Housekeeper {
         match &mut self.place {
             HousekeepingThread::Here(housekeeping) => housekeeping.take(task),
             // The thread ends after the sender only.
-            HousekeepingThread::Beside(tasks, _) => drop(tasks.send(task)),
+            HousekeepingThread::Running(tasks, _) => drop(tasks.send(task)),
         }
     }
 
@@ -197,9 +197,9 @@ impl Housekeeper {
 
     /// Ends when everything is done.
     pub fn finish(self) {
-        if let HousekeepingThread::Beside(tasks, thread) = self.place {
+        if let HousekeepingThread::Running(tasks, thread) = self.place {
             drop(tasks);
-            // A thread that panicked has told so.
+            // A thread that panicked has reported so.
             let _ = thread.join();
         }
     }

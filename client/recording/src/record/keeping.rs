@@ -1,8 +1,8 @@
 //! What a flight recorder keeps for good: the files around a moment, under names of their own.
 //!
-//! A file is kept by giving it a second name (a hard link) in the folder of the stretch. So it is kept from
+//! A file is kept by giving it a second name (a hard link) in the folder of the event. So it is kept from
 //! that moment on, whatever happens to the recorder: the ring removes only the first name, and the file that
-//! is being written goes on growing under both. A stretch takes its name when its files and their names are on the
+//! is being written goes on growing under both. An event takes its name when its files and their names are on the
 //! disk, so that a power cut leaves it whole or not at all.
 
 use std::fs::{self, File, TryLockError};
@@ -74,9 +74,9 @@ pub struct Keeper {
     storage: SharedStorage,
     ring: PathBuf,
     keeping: Keeping,
-    /// The newest stretch, which goes on until its end.
+    /// The newest event, which goes on until its end.
     open: Option<(PathBuf, KeptEvent)>,
-    is_full_told: bool,
+    is_full_reported: bool,
     /// No other recorder writes here.
     _lock: File,
 }
@@ -134,7 +134,7 @@ pub fn request(ring: &Path, reason: &str) -> io::Result<bool> {
 }
 
 impl Keeper {
-    /// Takes a ring's folder, which is made where it is not there. A stretch that another recorder has left
+    /// Takes a ring's folder, which is made where it is not there. An event that another recorder has left
     /// open goes on.
     ///
     /// # Errors
@@ -163,7 +163,14 @@ impl Keeper {
         })?;
         forget_unfinished(&ring.join(KEPT_FOLDER));
         let open = kept_event::newest(&ring.join(KEPT_FOLDER));
-        Ok(Keeper { storage, ring: ring.into(), keeping, open, is_full_told: false, _lock: lock })
+        Ok(Keeper {
+            storage,
+            ring: ring.into(),
+            keeping,
+            open,
+            is_full_reported: false,
+            _lock: lock,
+        })
     }
 
     /// Keeps the files that reach back from now by no more than is kept before a moment; `files` are all of
@@ -180,7 +187,7 @@ impl Keeper {
         let (folder, mut stretch) =
             open.unwrap_or_else(|| (self.new_folder(&reason), KeptEvent::default()));
         let is_news = stretch.reasons.last().is_none_or(|last| !last.is_like(&reason));
-        let told =
+        let line =
             format!("kept for good: {}: {} ({})", folder.display(), reason.kind, reason.text);
         if is_news {
             stretch.reasons.push(reason);
@@ -193,7 +200,7 @@ impl Keeper {
             false => Ok(()),
         };
         if is_news && kept.is_ok() {
-            report_line(&told);
+            report_line(&line);
         }
         // One that was not made is not there to go on with.
         self.open = (folder.exists()).then_some((folder, stretch));
@@ -213,7 +220,7 @@ impl Keeper {
         older.iter().filter(is_near).chain(newest).cloned().collect()
     }
 
-    /// Makes a stretch: it takes its name when all of it is on the disk.
+    /// Makes an event: it takes its name when all of it is on the disk.
     fn make(
         &mut self,
         folder: &Path,
@@ -234,7 +241,7 @@ impl Keeper {
         linked
     }
 
-    /// A new file was begun: it belongs to a stretch that is not yet at its end.
+    /// A new file was begun: it belongs to an event that is not yet at its end.
     ///
     /// # Errors
     ///
@@ -264,13 +271,13 @@ impl Keeper {
         let length = fs::metadata(file).map_or(0, |it| it.len());
         let most = self.keeping.most_bytes;
         if kept_bytes(&self.ring.join(KEPT_FOLDER)) + length > most {
-            if std::mem::replace(&mut self.is_full_told, true) {
+            if std::mem::replace(&mut self.is_full_reported, true) {
                 return Ok(());
             }
             let kept = self.ring.join(KEPT_FOLDER);
             return Err(KeepError::Full { kept, most_mib: most >> 20 });
         }
-        self.is_full_told = false;
+        self.is_full_reported = false;
         self.storage.link(file, &to).map_err(refused(&to))
     }
 }

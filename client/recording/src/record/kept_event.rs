@@ -1,4 +1,4 @@
-//! A stretch that is kept: its folder, and the account of why it is.
+//! An event that is kept: its folder, and the account of why it is.
 
 use std::collections::HashMap;
 use std::fs;
@@ -12,10 +12,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::event::{Event, EventKind};
 
-/// In the folder of a stretch: why it is kept.
+/// In the folder of an event: why it is kept.
 const EVENT_FILE: &str = "stretch.toml";
 
-/// Why and until when a stretch is kept.
+/// Why and until when an event is kept.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KeptEvent {
     /// Files that are begun before belong to it, in s since 1970.
@@ -80,7 +80,7 @@ pub fn unix_s(at: SystemTime) -> u64 {
     at.duration_since(UNIX_EPOCH).map_or(0, |it| it.as_secs())
 }
 
-/// The name under which a stretch or an account comes into being: a ring has one keeper.
+/// The name under which an event or an account comes into being: a ring has one keeper.
 pub fn beside(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!(".{name}.part"))
@@ -99,7 +99,7 @@ pub fn forget_unfinished(kept: &Path) {
     }
 }
 
-/// The stretch with the latest end, by what its folder says.
+/// The event with the latest end, by what its folder says.
 pub fn newest(kept: &Path) -> Option<(PathBuf, KeptEvent)> {
     let folders = fs::read_dir(kept).ok()?.flatten().map(|it| it.path());
     let known = folders.filter_map(|folder| {

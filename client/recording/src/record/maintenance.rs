@@ -38,7 +38,7 @@ impl Maintenance {
         self.looked = Some(Instant::now());
         let mut news = Vec::new();
         for (train, (models, known)) in &mut self.trains {
-            // One that cannot be read is told by those who work on the store.
+            // One that cannot be read is reported by those who work on the store.
             let events = models.events().unwrap_or_default();
             for (number, found) in events.iter().filter(|(number, _)| number > known) {
                 let text = format!("maintenance event {number}: {}", found.sentence);

@@ -127,12 +127,12 @@ pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, Record
         configuration: settings.configuration.clone(),
         maintenance: Maintenance::default(),
     };
-    let mut lanes =
+    let mut channels =
         TrainChannels::open(settings.wanted.clone(), "dynocar-recorder", &mut recorder)?;
     report_line(&format!("recording into {}; Ctrl-C ends it", recorder.files.path().display()));
     let mut flushed = Instant::now();
     while !stop.load(Ordering::Relaxed) {
-        lanes.take(&mut recorder)?;
+        channels.take(&mut recorder)?;
         if flushed.elapsed() >= FLUSH {
             for event in recorder.maintenance.news() {
                 recorder.event(&event)?;
@@ -142,8 +142,8 @@ pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, Record
         }
         std::thread::sleep(PAUSE);
     }
-    lanes.take(&mut recorder)?;
-    for train in lanes.trains() {
+    channels.take(&mut recorder)?;
+    for train in channels.trains() {
         recorder.event(&event(train, EventKind::RecordingEnded, format!("train {train}")))?;
     }
     recorder.files.finish()

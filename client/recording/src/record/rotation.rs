@@ -65,7 +65,7 @@ pub fn remove_oldest(storage: &dyn Storage, output: &Path, written: &Path, rotat
         let is_too_old = oldest.is_some_and(|oldest| *modified < oldest);
         if total > most || is_too_old {
             total -= length;
-            // One that cannot be removed is told of when the disk is full.
+            // One that cannot be removed is reported when the disk is full.
             let _ = storage.remove(path);
         }
     }

@@ -2,7 +2,7 @@
 //! for.
 //!
 //! Samples are taken at least every few milliseconds, for a channel holds the newest 512 of them; what
-//! is passed over is counted and told.
+//! is passed over is counted and reported.
 
 mod sink;
 mod train_channel;
@@ -36,7 +36,7 @@ pub struct Wanted {
 pub struct TrainChannels {
     wanted: Wanted,
     name: &'static str,
-    lanes: Vec<TrainChannel>,
+    channels: Vec<TrainChannel>,
     looked: Option<Instant>,
 }
 
@@ -52,14 +52,14 @@ impl TrainChannels {
         sink: &mut S,
     ) -> Result<Self, S::Error> {
         let named = wanted.trains.clone();
-        let mut lanes = TrainChannels { wanted, name, lanes: Vec::new(), looked: None };
-        named.into_iter().try_for_each(|train| lanes.add(train, sink))?;
-        Ok(lanes)
+        let mut channels = TrainChannels { wanted, name, channels: Vec::new(), looked: None };
+        named.into_iter().try_for_each(|train| channels.add(train, sink))?;
+        Ok(channels)
     }
 
     /// The trains that are read by now.
     pub fn trains(&self) -> impl Iterator<Item = TrainId> {
-        self.lanes.iter().map(TrainChannel::train)
+        self.channels.iter().map(TrainChannel::train)
     }
 
     /// Hands on what has come, and looks from time to time who is there.
@@ -68,7 +68,7 @@ impl TrainChannels {
     ///
     /// When a newcomer's channels cannot be opened, or nothing more is taken.
     pub fn take<S: Sink>(&mut self, sink: &mut S) -> Result<(), S::Error> {
-        self.lanes.iter_mut().try_for_each(|lane| lane.take(sink))?;
+        self.channels.iter_mut().try_for_each(|channel| channel.take(sink))?;
         if self.looked.is_some_and(|it| it.elapsed() < LOOK) {
             return Ok(());
         }
@@ -76,7 +76,7 @@ impl TrainChannels {
             self.add_newcomers(sink)?;
         }
         let host = &self.wanted.host;
-        self.lanes.iter_mut().try_for_each(|lane| lane.look(host, sink))?;
+        self.channels.iter_mut().try_for_each(|channel| channel.look(host, sink))?;
         self.looked = Some(Instant::now());
         Ok(())
     }
@@ -95,7 +95,7 @@ impl TrainChannels {
 
     fn add<S: Sink>(&mut self, train: TrainId, sink: &mut S) -> Result<(), S::Error> {
         let Wanted { host, snapshot_interval, .. } = &self.wanted;
-        self.lanes.push(TrainChannel::open(host, train, *snapshot_interval, self.name)?);
+        self.channels.push(TrainChannel::open(host, train, *snapshot_interval, self.name)?);
         sink.opened(train)
     }
 }

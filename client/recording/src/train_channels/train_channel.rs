@@ -43,7 +43,7 @@ pub struct TrainChannel {
     controller: Option<u32>,
     /// True when samples have come since it was last looked who is there.
     is_driven: bool,
-    /// Samples passed over since that was last told.
+    /// Samples passed over since that was last reported.
     lost: u64,
     /// After the port: the last user goes only when its ports are gone.
     _transport: Transport,
@@ -155,7 +155,7 @@ impl TrainChannel {
         Ok(())
     }
 
-    /// Looks who is there, and tells what has changed; what one left who is gone comes before that.
+    /// Looks who is there, and reports what has changed; what one left who is gone comes before that.
     ///
     /// # Errors
     ///

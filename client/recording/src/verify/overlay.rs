@@ -1,10 +1,10 @@
-//! What another configuration would have told of the same samples.
+//! What another configuration would have estimated from the same samples.
 
 use dynocar::config::DaemonConfig;
 use dynocar::pipelines::build_pipeline;
 use dynocar_shared::{ParameterSnapshot, Quantity, TrainId, TrainSample};
 
-/// What a configuration's pipeline tells of a quantity.
+/// What a configuration's pipeline answers for a quantity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct QuantityAnswer {
     /// The train.
@@ -17,9 +17,9 @@ pub struct QuantityAnswer {
     pub snapshot: ParameterSnapshot,
 }
 
-/// What a configuration tells of every quantity after the last of some samples.
+/// What a configuration answers for every quantity after the last of some samples.
 pub fn overlay(config: &DaemonConfig, samples: &[TrainSample]) -> Vec<QuantityAnswer> {
-    let mut told = Vec::new();
+    let mut answered = Vec::new();
     for train in &config.trains {
         let TrainId(id) = train.id;
         if samples.iter().all(|it| it.train_id != id) {
@@ -33,8 +33,8 @@ pub fn overlay(config: &DaemonConfig, samples: &[TrainSample]) -> Vec<QuantityAn
                 pipeline.process(sample);
             }
             let (pipeline, snapshot) = (settings.name.clone(), *pipeline.snapshot());
-            told.push(QuantityAnswer { train: id, quantity, pipeline, snapshot });
+            answered.push(QuantityAnswer { train: id, quantity, pipeline, snapshot });
         }
     }
-    told
+    answered
 }

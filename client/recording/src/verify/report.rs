@@ -49,7 +49,7 @@ fn rest(it: &Verified) -> String {
     }
 }
 
-/// What two configurations tell after the last sample, side by side.
+/// What two configurations answer after the last sample, side by side.
 pub fn overlay_text(recorded: &[QuantityAnswer], other: &[QuantityAnswer], name: &str) -> String {
     let mut text = format!(
         "after the last sample, each computed from the first recorded one\n{:<44} {:>32} {:>32}\n",
@@ -60,8 +60,8 @@ pub fn overlay_text(recorded: &[QuantityAnswer], other: &[QuantityAnswer], name:
     keys.sort_by_key(|it| (it.0, it.1 as u32));
     keys.dedup();
     for (train, quantity) in keys {
-        let find = |told: &[QuantityAnswer]| {
-            told.iter().find(|it| (it.train, it.quantity) == (train, quantity)).cloned()
+        let find = |answers: &[QuantityAnswer]| {
+            answers.iter().find(|it| (it.train, it.quantity) == (train, quantity)).cloned()
         };
         let (one, two) = (find(recorded), find(other));
         let shown = |it: &Option<QuantityAnswer>, show: &dyn Fn(&QuantityAnswer) -> String| {

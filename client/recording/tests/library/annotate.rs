@@ -72,7 +72,7 @@ fn timeline(runs: &[&[TrainSample]]) -> Timeline {
 #[test]
 fn an_explanation_lies_next_to_the_data_at_the_moments_that_it_speaks_of() {
     let folder = tempfile::tempdir().unwrap();
-    let (plain, annotated) = (folder.path().join("run.mcap"), folder.path().join("told.mcap"));
+    let (plain, annotated) = (folder.path().join("run.mcap"), folder.path().join("annotated.mcap"));
     let samples = samples();
     write(&plain, &samples, &snapshots(&samples, 100));
     let runs: Vec<&[TrainSample]> = samples.chunk_by(|one, next| one.run == next.run).collect();
@@ -112,7 +112,7 @@ fn an_explanation_lies_next_to_the_data_at_the_moments_that_it_speaks_of() {
 #[test]
 fn an_explanation_of_other_runs_is_refused_and_nothing_is_left_behind() {
     let folder = tempfile::tempdir().unwrap();
-    let (plain, annotated) = (folder.path().join("run.mcap"), folder.path().join("told.mcap"));
+    let (plain, annotated) = (folder.path().join("run.mcap"), folder.path().join("annotated.mcap"));
     let samples = samples();
     write(&plain, &samples, &[]);
     let runs: Vec<&[TrainSample]> = samples.chunk_by(|one, next| one.run == next.run).collect();

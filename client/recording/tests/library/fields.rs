@@ -57,8 +57,8 @@ fn names_and_numbers_are_unique_in_every_message_and_numbers_never_meet_the_nest
 #[test]
 fn parameters_have_names_with_units_and_deviations_and_intervals_next_to_them() {
     let of = |&it: &Parameter| {
-        let beside = SUFFIXES.map(|(_, word, _)| suffixed_name(it, word));
-        std::iter::once(it.full_name().to_owned()).chain(beside)
+        let suffixed = SUFFIXES.map(|(_, word, _)| suffixed_name(it, word));
+        std::iter::once(it.full_name().to_owned()).chain(suffixed)
     };
     let names: Vec<String> = Parameter::ALL.iter().flat_map(of).collect();
     let expected = [
@@ -97,10 +97,14 @@ fn columns_are_the_fields_of_the_messages_with_their_numbers_names_and_types() {
     for (columns, expected) in
         [(&SAMPLES, names("TrainSample")), (&SNAPSHOTS, snapshot), (&EVENTS, names("Event"))]
     {
-        let told: Vec<&str> = columns.iter().map(|it| it.name.as_str()).collect();
-        assert_eq!(told[..2], ["message_number", "log_time"]);
-        assert_eq!(told[2..], expected);
-        assert_eq!(told.iter().collect::<HashSet<_>>().len(), told.len(), "each name once");
+        let column_names: Vec<&str> = columns.iter().map(|it| it.name.as_str()).collect();
+        assert_eq!(column_names[..2], ["message_number", "log_time"]);
+        assert_eq!(column_names[2..], expected);
+        assert_eq!(
+            column_names.iter().collect::<HashSet<_>>().len(),
+            column_names.len(),
+            "each name once"
+        );
         assert!(columns.iter().all(|it| it.vocabulary.is_none() || !it.names().is_empty()));
     }
 }

@@ -26,17 +26,17 @@ fn program(arguments: &[&str]) -> Output {
 fn refusal(path: &Path) -> String {
     let out = path.with_extension("out");
     let shown = path.to_str().unwrap();
-    let mut told = String::new();
+    let mut printed = String::new();
     for arguments in
         [["convert", shown, "-o", out.to_str().unwrap()].as_slice(), ["verify", shown].as_slice()]
     {
         let output = program(arguments);
-        told = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
-        assert!(told.starts_with(&format!("dynocar-recording: {shown}: ")), "{told}");
+        printed = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {printed}");
+        assert!(printed.starts_with(&format!("dynocar-recording: {shown}: ")), "{printed}");
         assert!(!out.exists(), "nothing is left of {arguments:?}");
     }
-    told
+    printed
 }
 
 fn recording(folder: &Path) -> PathBuf {
@@ -60,8 +60,8 @@ fn a_file_of_another_format_and_one_that_is_not_there_are_named() {
         if let Some(content) = content {
             std::fs::write(&path, content).unwrap();
         }
-        let told = refusal(&path);
-        assert!(told.contains(expected), "{told}");
+        let printed = refusal(&path);
+        assert!(printed.contains(expected), "{printed}");
     }
 }
 
@@ -85,15 +85,15 @@ fn a_foreign_file_and_one_of_another_schema_are_named_with_what_was_expected() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("foreign.mcap");
     foreign(&path, "foxglove.Image", &BTreeMap::new());
-    let told = refusal(&path);
-    assert!(told.contains("no samples: expected a channel of dynocar.TrainSample"), "{told}");
-    assert!(told.contains("found /camera"), "{told}");
+    let printed = refusal(&path);
+    assert!(printed.contains("no samples: expected a channel of dynocar.TrainSample"), "{printed}");
+    assert!(printed.contains("found /camera"), "{printed}");
     let path = folder.path().join("newer.mcap");
     let layout = [("layout".to_owned(), "dynocar.TrainSample.0123456789abcdef".to_owned())];
     foreign(&path, "dynocar.TrainSample", &layout.into());
-    let told = refusal(&path);
-    assert!(told.contains(TrainSample::WIRE_NAME), "{told}");
-    assert!(told.contains("found dynocar.TrainSample.0123456789abcdef"), "{told}");
+    let printed = refusal(&path);
+    assert!(printed.contains(TrainSample::WIRE_NAME), "{printed}");
+    assert!(printed.contains("found dynocar.TrainSample.0123456789abcdef"), "{printed}");
 }
 
 #[test]

@@ -27,10 +27,10 @@ pub fn samples() -> Vec<TrainSample> {
     published_samples(&dataset, TrainId(1))
 }
 
-/// What the shipped daemon tells of samples: every so many samples a snapshot of each pipeline.
+/// What the shipped daemon answers to samples: every so many samples a snapshot of each pipeline.
 pub fn snapshots(samples: &[TrainSample], every: usize) -> Vec<ParameterSnapshot> {
     let config = DaemonConfig::load(&config_folder().join("daemon.toml")).expect("daemon.toml");
-    let mut told = Vec::new();
+    let mut answers = Vec::new();
     for (index, settings) in config.pipelines.iter().enumerate() {
         let mut pipeline =
             build_pipeline(settings, index as u32, &config.trains[0]).expect("a pipeline");
@@ -40,11 +40,11 @@ pub fn snapshots(samples: &[TrainSample], every: usize) -> Vec<ParameterSnapshot
         for (place, sample) in samples.iter().enumerate() {
             pipeline.process(sample);
             if place % every == 0 || place + 1 == samples.len() {
-                told.push(ParameterSnapshot { epoch: EPOCH, ..*pipeline.snapshot() });
+                answers.push(ParameterSnapshot { epoch: EPOCH, ..*pipeline.snapshot() });
             }
         }
     }
-    told
+    answers
 }
 
 /// Writes a recording as the recorder does, with the shipped configuration attached.

@@ -19,8 +19,8 @@ fn verified(samples: &[TrainSample], snapshots: &[ParameterSnapshot]) -> Vec<Ver
 #[test]
 fn a_recording_from_the_daemons_start_on_is_the_same_to_the_bit() {
     let samples = samples();
-    let told = snapshots(&samples, 40);
-    let verified = verified(&samples, &told);
+    let answers = snapshots(&samples, 40);
+    let verified = verified(&samples, &answers);
     assert_eq!(verified.len(), 3, "the shipped pipelines");
     for it in &verified {
         assert_eq!((it.same, &it.outcome), (it.recorded, &Outcome::Same), "{}", it.name);
@@ -32,7 +32,7 @@ fn a_recording_from_the_daemons_start_on_is_the_same_to_the_bit() {
 fn the_files_of_a_recording_that_rotated_are_verified_as_one_and_only_in_their_order() {
     // One run, for the clock of a dataset begins anew with each.
     let (samples, folder) = (samples()[..700].to_vec(), tempfile::tempdir().unwrap());
-    let told = snapshots(&samples, 20);
+    let answers = snapshots(&samples, 20);
     let files: Vec<PathBuf> =
         (1..=3).map(|it| folder.path().join(format!("run-00000{it}.mcap"))).collect();
     // Each file has the configuration attached, and its share of the messages.
@@ -41,8 +41,8 @@ fn the_files_of_a_recording_that_rotated_are_verified_as_one_and_only_in_their_o
         let newest = |it: &&ParameterSnapshot| {
             share.iter().any(|sample| sample.sequence == it.sample_sequence)
         };
-        let told: Vec<ParameterSnapshot> = told.iter().filter(newest).copied().collect();
-        write(file, share, &told);
+        let answers: Vec<ParameterSnapshot> = answers.iter().filter(newest).copied().collect();
+        write(file, share, &answers);
     }
     let whole = Recording::load_all(&files).unwrap();
     assert_eq!((whole.samples.len(), whole.attachments.len()), (samples.len(), 3));
@@ -77,12 +77,12 @@ fn the_files_of_a_recording_that_rotated_are_verified_as_one_and_only_in_their_o
 #[test]
 fn one_bit_that_is_another_is_found_with_field_and_sample() {
     let samples = samples();
-    let mut told = snapshots(&samples, 40);
-    let place = told.iter().position(|it| it.pipeline_index == 1 && it.sequence > 400).unwrap();
-    let tampered = &mut told[place];
+    let mut answers = snapshots(&samples, 40);
+    let place = answers.iter().position(|it| it.pipeline_index == 1 && it.sequence > 400).unwrap();
+    let tampered = &mut answers[place];
     tampered.covariance[2] = f64::from_bits(tampered.covariance[2].to_bits() ^ 1);
     let sample = tampered.sample_sequence;
-    let verified = verified(&samples, &told);
+    let verified = verified(&samples, &answers);
     match &verified[1].outcome {
         Outcome::Differs(found) => {
             assert_eq!((found.field, found.sample), ("covariance", sample), "{found:?}");
@@ -98,10 +98,10 @@ fn one_bit_that_is_another_is_found_with_field_and_sample() {
 #[test]
 fn a_sample_that_is_another_is_found() {
     let mut samples = samples();
-    let told = snapshots(&samples, 40);
+    let answers = snapshots(&samples, 40);
     let changed = samples.iter().position(|it| it.speed_mps > 5.0).unwrap();
     samples[changed].speed_mps += 0.01;
-    for it in verified(&samples, &told).iter().filter(|it| it.name == "train_kalman") {
+    for it in verified(&samples, &answers).iter().filter(|it| it.name == "train_kalman") {
         let Outcome::Differs(found) = &it.outcome else { panic!("{:?}", it.outcome) };
         assert!(found.sample >= samples[changed].sequence, "{found:?}");
     }
@@ -110,20 +110,20 @@ fn a_sample_that_is_another_is_found() {
 #[test]
 fn a_recording_that_begins_later_says_so_and_one_that_lacks_samples_says_up_to_where() {
     let samples = samples();
-    let told = snapshots(&samples, 40);
-    let late: Vec<_> = told.iter().filter(|it| it.sequence > 300).copied().collect();
+    let answers = snapshots(&samples, 40);
+    let late: Vec<_> = answers.iter().filter(|it| it.sequence > 300).copied().collect();
     for it in verified(&samples[250..], &late) {
         assert_eq!(it.outcome, Outcome::BeginsLate { before: 250 }, "{}", it.name);
     }
     let gap: Vec<_> =
         samples.iter().enumerate().filter(|it| it.0 < 500 || it.0 > 520).map(|it| *it.1).collect();
-    for it in verified(&gap, &told) {
-        let is_told = matches!(
+    for it in verified(&gap, &answers) {
+        let is_reported = matches!(
             it.outcome,
             Outcome::OtherSamples { agree_up_to, .. } if (480..=620).contains(&agree_up_to)
         );
         assert!(
-            is_told || matches!(it.outcome, Outcome::Differs(_)),
+            is_reported || matches!(it.outcome, Outcome::Differs(_)),
             "{}: {:?}",
             it.name,
             it.outcome
@@ -136,8 +136,8 @@ fn a_recording_that_begins_later_says_so_and_one_that_lacks_samples_says_up_to_w
 fn samples_lost_on_the_way_to_the_daemon_alone_are_no_wrong_bits() {
     // The recorder began before the daemon: those samples are nobody's.
     let samples = samples();
-    let told = snapshots(&samples[100..], 40);
-    for it in verified(&samples, &told) {
+    let answers = snapshots(&samples[100..], 40);
+    for it in verified(&samples, &answers) {
         assert_eq!(it.outcome, Outcome::Same, "{}", it.name);
     }
 }

@@ -20,7 +20,7 @@ Unexplained is the force that the model lacks, retarding positive. Evidence is
 twice the log-likelihood ratio for the suspected effect. Small plots show the
 last minutes, one block a second, from their lowest to their highest value.
 
-What to drive next is reckoned from the present covariance on level track, within
+What to drive next is computed from the present covariance on level track, within
 what the train's file declares.";
 
 /// Draws it.

@@ -69,11 +69,11 @@ fn quantities(
         };
         lines.push(Line::raw(words));
     }
-    lines.extend(table.into_iter().map(|row| told(row, columns, palette)));
+    lines.extend(table.into_iter().map(|row| line_of(row, columns, palette)));
     lines
 }
 
-fn told(row: Row, columns: [usize; 3], palette: Palette) -> Line<'static> {
+fn line_of(row: Row, columns: [usize; 3], palette: Palette) -> Line<'static> {
     let [interval, status, reason] = columns;
     let number = format!("{:>9}  ", row.number);
     let interval_and_unit = format!("{} {}", row.interval, row.unit);
@@ -124,7 +124,7 @@ fn advice(train: &TrainState) -> Vec<Line<'static>> {
     if train.advice.is_empty() {
         let words = match train.pipelines.is_empty() {
             true => "nothing is known yet",
-            false => "nothing: no three minutes of driving would tell much more",
+            false => "nothing: no three minutes of driving would show much more",
         };
         return vec![Line::raw(words)];
     }

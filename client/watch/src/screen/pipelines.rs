@@ -13,7 +13,7 @@ use crate::state::{PipelineState, TrainState};
 pub fn draw(frame: &mut Frame<'_>, area: Rect, train: &TrainState, palette: Palette) {
     let mut lines = vec![heading("pipelines", area.width, palette)];
     for pipeline in &train.pipelines {
-        lines.extend(told(pipeline, palette));
+        lines.extend(lines_of(pipeline, palette));
     }
     if train.pipelines.is_empty() {
         lines.push(Line::raw("nothing has come yet"));
@@ -21,7 +21,7 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, train: &TrainState, palette: Pale
     frame.render_widget(Paragraph::new(lines).wrap(Wrap { trim: false }), area);
 }
 
-fn told(pipeline: &PipelineState, palette: Palette) -> Vec<Line<'static>> {
+fn lines_of(pipeline: &PipelineState, palette: Palette) -> Vec<Line<'static>> {
     let it = &pipeline.snapshot;
     let rate = pipeline.history.rate_hz().map_or("…".to_owned(), |rate| format!("{rate:.1}"));
     let age = pipeline.sample_age_s.map_or("no sample".to_owned(), duration);

@@ -13,7 +13,7 @@ const SERVICE_BRAKING_MPS2: f64 = 0.5;
 /// No train is asked for more, in m/s.
 const SPEED_MAX_MPS: f64 = 125.0;
 
-/// The train as it is known now: what a manoeuvre is reckoned with.
+/// The train as it is known now: what a manoeuvre is computed with.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene<'a> {
     /// What is declared, above all the limits: effort curves and their highest speed.
@@ -131,7 +131,7 @@ impl Drive {
     }
 
     /// In words, with the time in s and the speed in m/s that it ended with.
-    pub fn told(&self, lasted_s: f64, end_mps: f64) -> String {
+    pub fn in_words(&self, lasted_s: f64, end_mps: f64) -> String {
         let from = Speed(self.from_mps);
         match self.kind {
             DriveKind::Coast => format!("{lasted_s:.0} s coasting from {from}"),
@@ -231,7 +231,7 @@ mod tests {
         assert_eq!(driver.force_n(&scene, 40.1), Some(0.0));
         assert_eq!(driver.force_n(&scene, 39.0), Some(0.0));
         assert_eq!(driver.force_n(&scene, 1.9), None);
-        let words = sweep.told(170.4, 30.0);
+        let words = sweep.in_words(170.4, 30.0);
         assert!(words.contains("up to 40 m/s (144 km/h)"), "{words}");
     }
 }

@@ -1,11 +1,13 @@
 //! What a snapshot knows of the resistance.
 
-use dynocar_shared::ParameterSnapshot;
+use dynocar_shared::{Parameter, ParameterSnapshot};
 use nalgebra::Matrix3;
 
 use dynocar_core::train::Davis;
 
-use super::rehearsal::ANSWERED;
+/// What the pipeline answers: a, b, c and the mass.
+pub const ANSWERED: [Parameter; 4] =
+    [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC, Parameter::Mass];
 
 /// Coefficients and their covariance out of a snapshot that has all three.
 pub fn davis_of(snapshot: &ParameterSnapshot) -> Option<(Davis, Matrix3<f64>)> {

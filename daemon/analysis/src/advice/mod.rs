@@ -16,9 +16,9 @@ use dynocar_shared::{Parameter, ParameterSnapshot};
 use nalgebra::{Matrix3, Vector3};
 
 use drive::{DriveKind, Scene};
-use known::davis_of;
+use known::{ANSWERED, davis_of};
 use noise::Noise;
-use rehearsal::{ANSWERED, Forecast, Known, MASS, forecast};
+use rehearsal::{Forecast, Known, MASS, forecast};
 
 /// Times in s that a driver may be asked for, the shortest first.
 pub const WITHIN_S: [f64; 3] = [20.0, 60.0, 180.0];
@@ -36,7 +36,7 @@ const COASTING_SHARE: f64 = 1.05;
 /// A manoeuvre with its effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Advice {
-    /// What it tells of.
+    /// What it informs on.
     pub parameter: Parameter,
     /// The manoeuvre in words.
     pub drive: String,
@@ -48,7 +48,7 @@ pub struct Advice {
 
 impl Advice {
     /// In words: "20 s coasting from 25 m/s (90 km/h) halves the interval of c".
-    pub fn told(&self) -> String {
+    pub fn in_words(&self) -> String {
         let name = if self.parameter == Parameter::Mass { "mass" } else { self.parameter.name() };
         let interval = format!("the interval of {name}");
         let effect = match self.std_after / self.std_now {
@@ -135,7 +135,7 @@ pub fn for_mass(
 fn advice(chosen: &Forecast, place: usize, std_now: f64) -> Advice {
     Advice {
         parameter: ANSWERED[place],
-        drive: chosen.drive.told(chosen.lasts_s, chosen.end_mps),
+        drive: chosen.drive.in_words(chosen.lasts_s, chosen.end_mps),
         std_now,
         std_after: chosen.std[place],
     }

@@ -1,8 +1,8 @@
-//! What snapshots of the resistance tell of the noise behind them.
+//! What snapshots of the resistance reveal of the noise behind them.
 //!
 //! A filter of [a, b, c, v] whose force is disturbed with the density d² (d in N/kN √s) gains
 //! information on a, for given b and c, at the rate 1 / d² while the train moves, whatever the speed and
-//! the manoeuvre: every moment tells w0(v) = a + b v + c v² with the variance d² / dt, and the derivative
+//! the manoeuvre: every moment measures w0(v) = a + b v + c v² with the variance d² / dt, and the derivative
 //! of w0 by a is 1. So the growth of the (a, a) entry of the information, the inverse of the
 //! published covariance, gives d, with all that widens the published covariance in it. The noise of
 //! the measured speed is the one that the pipeline begins with.
@@ -93,7 +93,7 @@ impl NoiseSeen {
     }
 
     /// The noise behind the newest snapshot of the pipeline; `None` while nothing has been learned,
-    /// or where the pipeline is none whose noise can be told.
+    /// or where the pipeline is none whose noise can be estimated.
     pub fn noise(&self, newest: &ParameterSnapshot, train: &TrainModel) -> Option<Noise> {
         let step_s = self.step_s?;
         let rate = if self.rates.len() >= LOOKS_MIN {
@@ -105,8 +105,8 @@ impl NoiseSeen {
         let speed_noise_mps = TrainKalmanSettings::default().speed_noise_mps;
         let noise =
             Noise { speed_noise_mps, disturbance_n_per_kn_sqrt_s: rate.sqrt().recip(), step_s };
-        let is_told = noise.speed_noise_mps > 0.0 && noise.disturbance_n_per_kn_sqrt_s > 0.0;
-        (is_told && (noise.speed_noise_mps + noise.disturbance_n_per_kn_sqrt_s).is_finite())
+        let is_known = noise.speed_noise_mps > 0.0 && noise.disturbance_n_per_kn_sqrt_s > 0.0;
+        (is_known && (noise.speed_noise_mps + noise.disturbance_n_per_kn_sqrt_s).is_finite())
             .then_some(noise)
     }
 }
@@ -134,7 +134,7 @@ fn median(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::advice::rehearsal::ANSWERED;
+    use crate::advice::known::ANSWERED;
     use dynocar_core::pipeline::output::write_parameters;
     use dynocar_core::train::Davis;
     use nalgebra::{Matrix3, Vector3};

@@ -11,19 +11,17 @@ use dynocar_core::force::balance::mps2_per_n_per_kn;
 use dynocar_core::pipeline::train_kalman::{TrainKalman, TrainKalmanSettings};
 use dynocar_core::pipeline::{KeptEstimate, Pipeline};
 use dynocar_core::train::{Davis, TrainModel};
-use dynocar_shared::{Parameter, SampleField, TrainId, TrainSample};
+use dynocar_shared::{SampleField, TrainId, TrainSample};
 use nalgebra::{Matrix3, SVector};
 
 use super::drive::{Drive, DriveKind, Scene};
+use super::known::ANSWERED;
 use super::noise::Noise;
 
 /// Shortest step in s; samples that come faster are taken together.
 const STEP_MIN_S: f64 = 0.2;
 /// Time in s in which the pipeline gets to know the noise.
 const LEAD_IN_S: f64 = 30.0;
-/// What the pipeline answers: a, b, c and the mass.
-pub const ANSWERED: [Parameter; 4] =
-    [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC, Parameter::Mass];
 /// Index of the mass among [`ANSWERED`].
 pub const MASS: usize = 3;
 const NS_PER_S: f64 = 1e9;

@@ -56,11 +56,11 @@ mod tests {
     #[test]
     fn every_reservation_that_driving_does_not_lift_has_a_remedy() {
         for &reason in Reason::ALL {
-            let told = remedy(Status::Degraded, Some(reason));
+            let advice = remedy(Status::Degraded, Some(reason));
             let is_driven =
                 matches!(reason, Reason::None | Reason::TooFewSamples | Reason::WeakExcitation);
-            assert_eq!(told.is_none(), is_driven, "{reason}");
-            assert!(told.is_none_or(|words| words.len() <= 72), "fits a line of 80: {reason}");
+            assert_eq!(advice.is_none(), is_driven, "{reason}");
+            assert!(advice.is_none_or(|words| words.len() <= 72), "fits a line of 80: {reason}");
         }
         assert_eq!(remedy(Status::Estimated, Some(Reason::AtBound)), None);
     }

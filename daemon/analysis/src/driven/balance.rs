@@ -17,7 +17,7 @@ pub enum ForcePart {
     Basic,
     /// Curves.
     Curve,
-    /// Tunnels, by their length, as share of c and beside it.
+    /// Tunnels, by their length, as share of c and in addition to it.
     Tunnel,
     /// What the wind adds to the air resistance.
     Wind,

@@ -1,7 +1,7 @@
 //! A train driven by forces: force in, speed out, by the law of the open-loop prediction.
 //!
 //! The forces of a moment come from [`ForceResolver`] and [`SampleForces`], as `explain` takes them
-//! over a recorded run, and each step is [`advance`]: what the grown model predicts there, the train
+//! over a recorded run, and each step is [`advance`]: what the updated model predicts there, the train
 //! drives here. Only the speed at which a resistance is evaluated is its own, not a measured one.
 
 mod balance;
@@ -94,7 +94,7 @@ impl DrivenTrain {
         self.speed_mps
     }
 
-    /// Speed in m/s as the train's own sensor tells it.
+    /// Speed in m/s as the train's own sensor shows it.
     pub fn measured_speed_mps(&self) -> f64 {
         let shown_mps = self.sensor.as_ref().map_or(self.speed_mps, |sensor| sensor.shown_mps);
         shown_mps * self.train.corrections.speed_scale

@@ -1,4 +1,4 @@
-//! The driven train beside the open-loop prediction, and where no recording goes.
+//! The driven train compared with the open-loop prediction, and where no recording goes.
 
 use dynocar_core::simulate::{BridgeLimits, Prediction, Recording, Restart};
 use dynocar_core::track::{Curve, Track};

@@ -62,14 +62,14 @@ pub enum ImportProblem {
         first_line: usize,
     },
     /// A vehicle of a formation that nobody describes.
-    #[error("{key}: the vehicle '{id}' is described in none of the files; give its file beside")]
+    #[error("{key}: the vehicle '{id}' is described in none of the files; give its file too")]
     NoVehicle {
         /// The place in the formation.
         key: String,
         /// The vehicle.
         id: String,
     },
-    /// Davis coefficients whose unit their size does not tell.
+    /// Davis coefficients whose unit their size does not reveal.
     #[error(
         "{key}: {by_force:.3e} N/kN at {speed_mps:.1} m/s if A, B and C are in N for the whole \
          train, {by_mass:.3e} N/kN if for each kg, and neither can be: is the mass of {mass_kg} kg \

@@ -67,7 +67,7 @@ fn xml_root(text: &str) -> Option<&str> {
 /// The kind of a file by its keys, or of those of one project.
 pub(super) fn kind_of(root: &Item, forced: Option<Format>) -> Result<Kind, ImportError> {
     let has = |key: &str| root.get(key).is_some();
-    let told = if has("schema") {
+    let recognised = if has("schema") {
         Some(Format::Railtoolkit)
     } else if has("rolling_resistance") {
         Some(Format::Osrd)
@@ -76,7 +76,7 @@ pub(super) fn kind_of(root: &Item, forced: Option<Format>) -> Result<Kind, Impor
     } else {
         None
     };
-    match forced.or(told) {
+    match forced.or(recognised) {
         Some(Format::Railtoolkit) => railtoolkit(root),
         Some(Format::Osrd) => Ok(Kind::OsrdRollingStock),
         Some(Format::Ttobench) if has("mass") => Ok(Kind::TtobenchTrain),

@@ -1,4 +1,4 @@
-//! What an import gives: a train or a line as far as the file tells, and an account of every field.
+//! What an import gives: a train or a line as far as the file says, and an account of every field.
 
 use dynocar_core::track::Curve;
 use dynocar_core::train::Davis;
@@ -8,7 +8,7 @@ use crate::dataset::SourcePosition;
 /// How a file is to be read where its format leaves a choice.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reading {
-    /// Share of the permitted load that is on the train, 0 to 1, where a file tells the load.
+    /// Share of the permitted load that is on the train, 0 to 1, where a file gives the load.
     pub load_share: f64,
     /// Which of several effort curves counts, by the name of its mode; the file's default without.
     pub mode: Option<String>,
@@ -33,7 +33,7 @@ pub enum FieldOutcome {
         /// Why.
         why: String,
     },
-    /// A key that the file does not tell.
+    /// A key that the file does not give.
     Unknown {
         /// The key.
         key: &'static str,
@@ -89,7 +89,7 @@ impl Account {
     }
 }
 
-/// A train as far as its file tells it, in SI units.
+/// A train as far as its file gives it, in SI units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImportedTrain {
     /// By which it is chosen among others.
@@ -114,7 +114,7 @@ pub struct ImportedTrain {
     pub account: Account,
 }
 
-/// A line as far as its file tells it, in SI units; a list that is `None` is not known.
+/// A line as far as its file gives it, in SI units; a list that is `None` is not known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImportedLine {
     /// By which it is chosen among others.

@@ -1,7 +1,7 @@
 //! Other projects' descriptions of trains and lines, read into what `train.toml` and `track.toml` hold.
 //!
 //! Texts come in; what comes out are numbers in SI units and an account of every field: which key it
-//! became and how, what has no place or is not understood, and which keys the file does not tell.
+//! became and how, what has no place or is not understood, and which keys the file does not give.
 //! Nothing is made up.
 //!
 //! # Layout, in the order of the work
@@ -53,7 +53,7 @@ pub struct Imported {
     pub lines: Vec<ImportedLine>,
 }
 
-/// Reads files, each of the format that its content tells or of the one that is forced. Vehicles and
+/// Reads files, each of the format that its content shows or of the one that is forced. Vehicles and
 /// the trains that they form may stand in several files.
 ///
 /// # Errors

@@ -1,7 +1,7 @@
 //! OSRD's rolling stock: a train with its Davis coefficients and effort curves.
 //!
 //! Some files state A, B and C in N, N/(m/s) and N/(m/s)² for the whole train, others the same for each
-//! kg, and none says which. The two differ by the mass in kg, so that the size tells them apart.
+//! kg, and none says which. The two differ by the mass in kg, so that the size distinguishes them.
 
 use dynocar_core::train::{Davis, TrainModel};
 
@@ -43,7 +43,7 @@ const WITHOUT_PLACE: [(&str, &str); 24] = [
 ];
 /// Resistances in N/kN that a train may have at half of its greatest speed, with room to spare.
 const RESISTANCE_N_PER_KN: (f64, f64) = (0.1, 60.0);
-/// Where a file tells no greatest speed, one that every train reaches.
+/// Where a file gives no greatest speed, one that every train reaches.
 const SPEED_MPS: f64 = 20.0;
 
 /// The train of a file.

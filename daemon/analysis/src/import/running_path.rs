@@ -116,7 +116,7 @@ fn since(from_m: f64, first_m: f64) -> String {
     if from_m == first_m {
         return String::new();
     }
-    format!("; the file tells it from {from_m} m on, and the first value holds before it too")
+    format!("; the file gives it from {from_m} m on, and the first value holds before it too")
 }
 
 const POSITION: &str = "a position in m, within 1e9";

@@ -23,7 +23,7 @@ fn unknown_unit(item: &Item, name: &str, names: impl Iterator<Item = String>) ->
     item.wrong(Problem::UnknownName { what: "unit", name: name.into(), context, choices })
 }
 
-/// A `{ unit, value }` under a key in its dimension's base unit, when there is one; `allowed` tells the
+/// A `{ unit, value }` under a key in its dimension's base unit, when there is one; `allowed` names the
 /// range in it.
 pub(super) fn value(
     root: &Item,

@@ -34,7 +34,7 @@ const KINDS: [(&str, Kind); 4] = [
     ("passenger", Kind::Passenger),
 ];
 
-/// A vehicle as the file tells it.
+/// A vehicle as the file describes it.
 pub(super) struct Vehicle<'t> {
     /// Where it stands.
     pub item: Item<'t>,

@@ -40,7 +40,7 @@ impl Default for FindSettings {
     }
 }
 
-/// What told that the brake was applied.
+/// What showed that the brake was applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FoundBy {
@@ -57,7 +57,7 @@ pub struct Stop {
     pub samples: RangeInclusive<usize>,
     /// The sample from which on the brake was applied in full; `None` where it never was.
     pub full_from: Option<usize>,
-    /// What told that the brake was applied.
+    /// What showed that the brake was applied.
     pub found_by: FoundBy,
 }
 
@@ -106,23 +106,23 @@ fn start(samples: &[TrainSample], end: usize, is_braking: impl Fn(usize) -> bool
     stood.map_or(from, |stood| stood + 1)
 }
 
-/// Whether the brake is applied at each sample; `None` where no sample tells.
+/// Whether the brake is applied at each sample; `None` where no sample shows it.
 fn applied(
     samples: &[TrainSample],
     brake: Option<&EffortCurve>,
     share_min: f64,
 ) -> Option<Vec<bool>> {
     let brake = brake?;
-    let (mut is_applied, mut is_told) = (false, false);
+    let (mut is_applied, mut is_known) = (false, false);
     let applied = samples.iter().map(|sample| {
         if let Some(force_n) = sample.get(SampleField::BrakeForce) {
             is_applied = force_n >= share_min * brake.force_n(sample.speed_mps);
-            is_told = true;
+            is_known = true;
         }
         is_applied
     });
     let applied = applied.collect();
-    is_told.then_some(applied)
+    is_known.then_some(applied)
 }
 
 /// Whether a train loses so much in m/s² over a time in s after a sample, or until it stands.
@@ -147,7 +147,7 @@ mod tests {
     use super::*;
     use dynocar_shared::TrainId;
 
-    /// A minute at 20 m/s, a stop at 1 m/s², ten seconds of standing; the brake as told.
+    /// A minute at 20 m/s, a stop at 1 m/s², ten seconds of standing; the brake as given.
     fn run(brake_n: impl Fn(f64) -> Option<f64>) -> Vec<TrainSample> {
         let sample = |k: i32| {
             let time_s = 0.2 * f64::from(k);

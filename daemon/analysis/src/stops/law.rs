@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::curve::{Curve, Point};
 
-/// Step of the speeds in m/s at which the law is told.
+/// Step of the speeds in m/s at which the law is reported.
 const GRID_MPS: f64 = 1.0;
 /// What the assumed repeatability counts for: as much as that of so many stops more than one.
 const ASSUMED_FREEDOM: f64 = 4.0;
@@ -57,7 +57,7 @@ pub struct StoppingDistance {
 
 impl Law {
     /// The law of some stops, where stops are assumed to repeat within a relative standard
-    /// deviation until there are enough to tell; `None` without a stop whose brake builds up.
+    /// deviation until there are enough to estimate it; `None` without a stop whose brake builds up.
     pub fn of(curves: &[Curve], assumed_repeatability: f64) -> Option<Self> {
         let built: Vec<(&Curve, &Point)> = curves
             .iter()

@@ -54,13 +54,13 @@ pub struct RecordedStop {
     pub distance_m: f64,
     /// Time in s from then to standstill.
     pub time_s: f64,
-    /// What told that the brake was applied.
+    /// What showed that the brake was applied.
     pub found_by: FoundBy,
     /// Whether the brake was applied in full.
     pub manner: Manner,
-    /// Why it tells no law of the brake; `None` for a stop that does.
+    /// Why it shows no law of the brake; `None` for a stop that does.
     pub no_law: Option<String>,
-    /// Deceleration over speed, from fast to slow, of a stop that tells no law.
+    /// Deceleration over speed, from fast to slow, of a stop that shows no law.
     pub decelerations: Vec<SpeedDeceleration>,
     /// For a stop held out: what the law said of it.
     pub predicted: Option<StoppingDistance>,
@@ -77,7 +77,7 @@ pub struct Study {
     pub law: Option<Law>,
     /// How long the next stop is, from slow to fast.
     pub distances: Vec<StoppingDistance>,
-    /// What these stops do not tell.
+    /// What these stops do not determine.
     pub cannot_tell: Vec<String>,
 }
 
@@ -152,7 +152,7 @@ fn found_in(dataset: &Dataset, run: &Run, settings: &StudySettings) -> Vec<Found
     studied.collect()
 }
 
-/// Why a stop tells no law of the brake; `full` is its part under all of the brake.
+/// Why a stop shows no law of the brake; `full` is its part under all of the brake.
 fn why_no_law(full: Option<&Curve>, found_by: FoundBy, share_min: f64) -> Option<String> {
     let Some(curve) = full else {
         return Some(match found_by {
@@ -213,7 +213,7 @@ fn cannot_tell(dataset: &Dataset, found: &[Found], law: Option<&Law>) -> Vec<Str
             found.len()
         ));
     }
-    said.push("how friction divides into coefficient, pressure and ratio: only its course over speed is told".into());
+    said.push("how friction divides into coefficient, pressure and ratio: only its course over speed is determined".into());
     if let Some(Law { stops: 1, .. }) = law {
         said.push(
             "how stops differ: one stop was recorded, and the repeatability is assumed".into(),

@@ -22,7 +22,7 @@ pub struct Observation {
     pub pass: u32,
     /// Place in m along the way, and how far the window reaches to either side.
     pub along_m: f64,
-    /// Half the way in m between the centres of the blocks, 0 for single rows.
+    /// Half the distance in m between the centres of the blocks, 0 for single rows.
     pub reach_m: f64,
     /// Mean speed in m/s.
     pub speed_mps: f64,

@@ -1,6 +1,6 @@
-//! The chainage of every row: what the wheels count, corrected by what GNSS tells.
+//! The chainage of every row: what the wheels count, corrected by what GNSS measures.
 //!
-//! The wheels count the way with a scale error that stays over a pass and slips that add up like
+//! The wheels count the distance with a scale error that stays over a pass and slips that add up like
 //! a random walk. A fix lies `lag * speed` behind, since it is older than its stamp, and errs by
 //! some metres that fade over seconds. A Kalman filter with a smoother (Rauch, Tung and Striebel
 //! 1965) over [offset, scale, error of the fix, lag] takes them apart, robust to single wild fixes.
@@ -11,7 +11,7 @@ use super::alignment::{FIX_FADING_S, FIX_STD_M};
 use super::recording::Recording;
 use super::tracking::Placed;
 
-/// Standard deviation in m of the wheels' slip over 1 m; it grows with the root of the way.
+/// Standard deviation in m of the wheels' slip over 1 m; it grows with the root of the distance.
 const SLIP_M: f64 = 0.05;
 /// Part of a fix's error in m that is new in each of them.
 const FIX_WHITE_M: f64 = 0.7;
@@ -35,7 +35,7 @@ pub struct Estimate {
 /// What holds for all passes of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelsAndLag {
-    /// Way over counted way, less 1.
+    /// True over counted distance, less 1.
     pub scale: Estimate,
     /// Age in s of a fix at its stamp.
     pub lag_s: Estimate,
@@ -48,7 +48,7 @@ impl WheelsAndLag {
         lag_s: Estimate { value: 0.7, std: 0.7 },
     };
 
-    /// What several passes tell together; the scale may differ by `scale_spread` between them.
+    /// What several passes give together; the scale may differ by `scale_spread` between them.
     pub fn together(passes: &[WheelsAndLag], scale_spread: f64) -> Option<WheelsAndLag> {
         let mean = |of: fn(&WheelsAndLag) -> Estimate, spread: f64| {
             let weight = |pass: &WheelsAndLag| 1.0 / (of(pass).std.powi(2) + spread * spread);
@@ -71,7 +71,7 @@ pub struct Chained {
     pub first_row: usize,
     /// Chainage in m of each row along the way.
     pub chainage_m: Vec<f64>,
-    /// What the pass tells of wheels and lag.
+    /// What the pass shows of wheels and lag.
     pub learned: WheelsAndLag,
 }
 

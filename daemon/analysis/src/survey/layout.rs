@@ -102,7 +102,7 @@ impl Layout {
     }
 
     /// Variance of the mean gradient over 100 m around each piece between neighbouring
-    /// heights: between two heights alone the forces tell little, and nobody feels it.
+    /// heights: between two heights alone the forces show little, and nobody feels it.
     pub fn gradient_variances(
         &self,
         factor: &Factor,
@@ -110,7 +110,7 @@ impl Layout {
         common: &CommonCovariance,
     ) -> Vec<Vec<f64>> {
         let inverse = factor.inverse_band();
-        let of_stretch = |from: usize, to: usize| {
+        let of_steps = |from: usize, to: usize| {
             let per_m = 1.0 / ((to - from) as f64 * HEIGHT_STEP_M);
             let row = [(from, -per_m), (to, per_m)];
             let slopes = nalgebra::SVector::<f64, { Common::COUNT }>::from_fn(|index, _| {
@@ -121,7 +121,7 @@ impl Layout {
         let block = |&(first, count): &(usize, usize)| {
             let around = |node: usize| {
                 let from = (node + 1).saturating_sub(STATED_STEPS / 2).max(first);
-                of_stretch(from, (from + STATED_STEPS).min(first + count - 1))
+                of_steps(from, (from + STATED_STEPS).min(first + count - 1))
             };
             (first..first + count - 1).map(around).collect()
         };

@@ -1,4 +1,4 @@
-//! The line that is driven repeatedly, and which stretches are passes of it.
+//! The line that is driven repeatedly, and which parts are passes of it.
 
 use super::alignment::{PassRows, align};
 use super::both_directions::{Compared, compare};
@@ -8,11 +8,11 @@ use super::silence::{TracePoint, filled, trace};
 use super::tracking::follow;
 use super::way::Way;
 
-/// Stretches that are tried as the line, and stretches that each is compared with, at most.
+/// Parts that are tried as the line, and parts that each is compared with, at most.
 const TRIED_MAX: usize = 12;
 /// Passes that the way is laid through, at most: more make it no better than GNSS itself.
 const ALIGNED_MAX: usize = 60;
-/// Distance in m between the points of a stretch.
+/// Distance in m between the points of a part.
 const POINT_STEP_M: f64 = 20.0;
 /// A pass covers at least this share of the line, or `PASS_MIN_M`.
 const PASS_SHARE_MIN: f64 = 0.25;
@@ -74,7 +74,7 @@ impl Ways {
     }
 }
 
-/// A stretch that runs along the line.
+/// A part that runs along the line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pass {
     /// Its rows, as far as they are on the line.
@@ -83,7 +83,7 @@ pub struct Pass {
     pub direction: i8,
 }
 
-/// Finds the line among the stretches of the fit runs; `None` when there is none.
+/// Finds the line among the parts of the fit runs; `None` when there is none.
 pub fn find(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Option<Ways> {
     let fit: Vec<RecordingPart> =
         recording_parts.iter().filter(|it| recordings[it.recording].raw.is_fit).copied().collect();
@@ -130,10 +130,10 @@ pub fn find(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Opti
     Some(Ways { growing, falling, chainage_per_m })
 }
 
-/// The way of a direction from its own stretches: where they differ from the other direction's,
-/// they know better. A single stretch cannot say what of it is the line.
+/// The way of a direction from its own parts: where they differ from the other direction's,
+/// they know better. A single part cannot say what of it is the line.
 fn way_of(template: &Way, along: &[(RecordingPart, PassRows)], recordings: &[Recording]) -> Way {
-    let own: Vec<RecordingPart> = along.iter().map(|(stretch, _)| *stretch).collect();
+    let own: Vec<RecordingPart> = along.iter().map(|(part, _)| *part).collect();
     let first = match own.len() {
         0 | 1 => template.clone(),
         _ => self::template(&own, recordings).unwrap_or_else(|| template.clone()),
@@ -149,23 +149,23 @@ fn thinned(passes: &[PassRows]) -> Vec<PassRows> {
     passes.iter().step_by(step).cloned().collect()
 }
 
-fn rows_of(stretch: &RecordingPart, recordings: &[Recording]) -> std::ops::Range<usize> {
-    let recording = &recordings[stretch.recording];
-    let first = recording.way_m.partition_point(|&way| way < stretch.from_m);
-    let end = recording.way_m.partition_point(|&way| way <= stretch.to_m);
+fn rows_of(part: &RecordingPart, recordings: &[Recording]) -> std::ops::Range<usize> {
+    let recording = &recordings[part.recording];
+    let first = recording.way_m.partition_point(|&way| way < part.from_m);
+    let end = recording.way_m.partition_point(|&way| way <= part.to_m);
     first..end
 }
 
-/// The stretch that the others follow furthest, cut to what at least one other drives too.
+/// The part that the others follow furthest, cut to what at least one other drives too.
 fn template(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Option<Way> {
     let thinned: Vec<&RecordingPart> = {
         let mut long: Vec<&RecordingPart> = recording_parts.iter().collect();
-        long.retain(|stretch| stretch.to_m - stretch.from_m > 100.0);
+        long.retain(|part| part.to_m - part.from_m > 100.0);
         let step = long.len().div_ceil(TRIED_MAX).max(1);
         long.into_iter().step_by(step).collect()
     };
     let traces: Vec<Vec<TracePoint>> =
-        thinned.iter().map(|stretch| trace(stretch, recordings, POINT_STEP_M)).collect();
+        thinned.iter().map(|part| trace(part, recordings, POINT_STEP_M)).collect();
     let points: Vec<Vec<[f64; 2]>> = (0..traces.len()).map(|one| filled(one, &traces)).collect();
     let tried = points.iter().enumerate().filter_map(|(one, nodes)| {
         let way = Way::through(nodes)?;
@@ -183,7 +183,7 @@ fn template(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Opti
     Way::through(&way.nodes_m()[first..=last])
 }
 
-/// For each node of a way how many other stretches drive it, each counted in the direction in
+/// For each node of a way how many other parts drive it, each counted in the direction in
 /// which it drives most of it.
 fn covered(way: &Way, own: usize, recording_parts: &[Vec<[f64; 2]>]) -> Vec<usize> {
     let count = way.nodes_m().len();
@@ -210,30 +210,30 @@ fn covered(way: &Way, own: usize, recording_parts: &[Vec<[f64; 2]>]) -> Vec<usiz
     counts
 }
 
-/// The stretches that run along a way in its direction, with their rows on it.
+/// The parts that run along a way in its direction, with their rows on it.
 fn along(
     way: &Way,
     recording_parts: &[RecordingPart],
     recordings: &[Recording],
 ) -> Vec<(RecordingPart, PassRows)> {
-    let pass = |stretch: &RecordingPart| Some((*stretch, pass_along(way, stretch, recordings)?));
+    let pass = |part: &RecordingPart| Some((*part, pass_along(way, part, recordings)?));
     recording_parts.iter().filter_map(pass).collect()
 }
 
-fn pass_along(way: &Way, stretch: &RecordingPart, recordings: &[Recording]) -> Option<PassRows> {
-    let rows = rows_of(stretch, recordings);
-    let placed = follow(&recordings[stretch.recording], rows.clone(), way);
+fn pass_along(way: &Way, part: &RecordingPart, recordings: &[Recording]) -> Option<PassRows> {
+    let rows = rows_of(part, recordings);
+    let placed = follow(&recordings[part.recording], rows.clone(), way);
     let (first, last) = (placed.first()?, placed.last()?);
     let covered_m = last.chainage_m - first.chainage_m;
     let least_m = (PASS_SHARE_MIN * way.length_m()).min(PASS_MIN_M);
-    let on_line = PassRows { recording: stretch.recording, rows: first.row..last.row + 1 };
+    let on_line = PassRows { recording: part.recording, rows: first.row..last.row + 1 };
     (covered_m >= least_m).then_some(on_line)
 }
 
-/// The pass that a stretch of any role is, if it is one.
-pub fn pass_of(ways: &Ways, stretch: &RecordingPart, recordings: &[Recording]) -> Option<Pass> {
+/// The pass that a part of any role is, if it is one.
+pub fn pass_of(ways: &Ways, part: &RecordingPart, recordings: &[Recording]) -> Option<Pass> {
     let along = |direction: i8| {
-        let rows = pass_along(ways.of(direction)?, stretch, recordings)?;
+        let rows = pass_along(ways.of(direction)?, part, recordings)?;
         Some(Pass { rows, direction })
     };
     let length = |pass: &Pass| pass.rows.rows.len();

@@ -2,7 +2,7 @@
 //!
 //! Heights at nodes 10 m apart are unknown, with a random walk of the gradient between them
 //! (Wahba 1978: a smoothing spline is such a prior); resistance, mass and the time offset of the
-//! forces are estimated beside them. The heights make a banded system, the few common unknowns
+//! forces are estimated jointly with them. The heights make a banded system, the few common unknowns
 //! its border; the mass of each pass is fitted in turns, so that work grows linearly with passes.
 
 use super::balance::Observation;
@@ -60,7 +60,7 @@ pub struct Profile {
     pub common: Common,
     /// Standard deviations of the common unknowns, with the heights' noise let in.
     pub common_std: Common,
-    /// Mass of each pass over its declared one, less 1, beside the common factor.
+    /// Mass of each pass over its declared one, less 1, given the common factor.
     pub pass_mass: Vec<f64>,
     /// Scale in N of the residuals.
     pub residual_n: f64,

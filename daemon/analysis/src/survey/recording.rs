@@ -44,12 +44,12 @@ pub struct Fix {
     pub at_m: [f64; 2],
 }
 
-/// A recording with its way by the wheels and its fixes on the plane.
+/// A recording with its distance by the wheels and its fixes on the plane.
 #[derive(Clone, Debug)]
 pub struct Recording<'r> {
     /// What was recorded.
     pub raw: &'r RawRecording,
-    /// Way in m by integrating the speed, from 0 at the first row.
+    /// Distance in m by integrating the speed, from 0 at the first row.
     pub way_m: Vec<f64>,
     /// Its fixes, thinned to one a second.
     pub fixes: Vec<Fix>,
@@ -85,17 +85,17 @@ impl<'r> Recording<'r> {
         Recording { raw, way_m, fixes }
     }
 
-    /// The first row at or past a way in m.
+    /// The first row at or past a distance in m.
     pub fn row_at(&self, way_m: f64) -> usize {
         self.way_m.partition_point(|&way| way < way_m).min(self.way_m.len().saturating_sub(1))
     }
 
-    /// Length in m of the whole way.
+    /// Length in m of the whole distance.
     pub fn length_m(&self) -> f64 {
         self.way_m.last().copied().unwrap_or(0.0)
     }
 
-    /// Points every `step_m` of the way: (way in m, east and north in m), straight between fixes.
+    /// Points every `step_m` of the distance: (distance in m, east and north in m), straight between fixes.
     pub fn points(&self, step_m: f64) -> Vec<(f64, [f64; 2])> {
         let mut points = Vec::new();
         let mut next_m = self.fixes.first().map_or(0.0, |fix| self.way_m[fix.row]);

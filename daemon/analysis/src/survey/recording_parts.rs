@@ -22,14 +22,14 @@ const TERMINAL_MARGIN_M: f64 = 100.0;
 pub struct RecordingPart {
     /// Number of the recording.
     pub recording: usize,
-    /// Way in m by the recording's wheels where it starts.
+    /// Distance in m by the recording's wheels where it starts.
     pub from_m: f64,
     /// Where it ends.
     pub to_m: f64,
 }
 
-/// Cuts a recording into stretches: where its way follows, for 300 m, a way that it took before
-/// in the same stretch, it has turned. The cut is where it stood longest in between.
+/// Cuts a recording into parts: where its way follows, for 300 m, a way that it took before
+/// in the same part, it has turned. The cut is where it stood longest in between.
 pub fn recording_parts(number: usize, recording: &Recording) -> Vec<RecordingPart> {
     let points = recording.points(POINT_STEP_M);
     let mut found = Vec::new();
@@ -56,7 +56,7 @@ pub fn recording_parts(number: usize, recording: &Recording) -> Vec<RecordingPar
     found
 }
 
-/// Where a stretch comes back on itself.
+/// Where a part comes back on itself.
 struct Return {
     /// The earlier point, where the repeated way was left.
     left: usize,
@@ -103,7 +103,7 @@ fn confirmed(twins: &[Option<usize>], from: usize) -> Option<Return> {
     Some(Return { left: twins[back]?, back: from + back, is_opposite: last < first })
 }
 
-/// Way in m where a recording stood longest between two ways; `None` when it did not stand.
+/// Distance in m where a recording stood longest between two ways; `None` when it did not stand.
 fn longest_stand(recording: &Recording, from_m: f64, to_m: f64) -> Option<f64> {
     let raw = recording.raw;
     let rows = recording.row_at(from_m)..recording.row_at(to_m);

@@ -8,7 +8,7 @@ pub const GAP_MAX_M: f64 = 150.0;
 /// A way around is at most so many times as long as the straight line between its ends.
 const DETOUR_MAX: f64 = 3.0;
 
-/// A point on the way of a stretch.
+/// A point on the way of a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TracePoint {
     /// East and north in m.
@@ -17,9 +17,9 @@ pub struct TracePoint {
     pub is_open: bool,
 }
 
-/// Points every `step_m` along a stretch.
-pub fn trace(stretch: &RecordingPart, recordings: &[Recording], step_m: f64) -> Vec<TracePoint> {
-    let recording = &recordings[stretch.recording];
+/// Points every `step_m` along a part.
+pub fn trace(part: &RecordingPart, recordings: &[Recording], step_m: f64) -> Vec<TracePoint> {
+    let recording = &recordings[part.recording];
     let silences: Vec<(f64, f64)> = recording
         .fixes
         .windows(2)
@@ -31,7 +31,7 @@ pub fn trace(stretch: &RecordingPart, recordings: &[Recording], step_m: f64) -> 
         silences.get(next).is_some_and(|silence| silence.0 < way_m)
     };
     let points = recording.points(step_m).into_iter();
-    let within = points.filter(|point| (stretch.from_m..=stretch.to_m).contains(&point.0));
+    let within = points.filter(|point| (part.from_m..=part.to_m).contains(&point.0));
     within.map(|(way_m, at_m)| TracePoint { at_m, is_open: is_open(way_m) }).collect()
 }
 

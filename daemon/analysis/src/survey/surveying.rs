@@ -61,7 +61,7 @@ pub enum SurveyError {
         /// What was found instead.
         what: &'static str,
     },
-    /// The forces tell nothing.
+    /// The forces show nothing.
     #[error("expected speeds and forces while moving, got none on the line")]
     NoForces,
     /// The balance has no solution.
@@ -97,7 +97,7 @@ pub struct Survey {
     pub not_used: Vec<NotUsed>,
     /// The stops.
     pub stops: Vec<Stop>,
-    /// What GNSS tells of the wheels' scale and its own lag.
+    /// What GNSS shows of the wheels' scale and its own lag.
     pub wheels: WheelsAndLag,
     /// Standard deviation of the wheels' scale with the uncertainty of the way's length.
     pub scale_std: f64,
@@ -132,14 +132,14 @@ pub fn survey(
             .ok_or(SurveyError::NoLine { what: "no two passes follow the same way" })?,
     };
     let passes: Vec<_> =
-        cut.par_iter().filter_map(|stretch| pass_of(&ways, stretch, &recordings)).collect();
+        cut.par_iter().filter_map(|part| pass_of(&ways, part, &recordings)).collect();
     let (trips, wheels) = trips(&passes, &ways, &recordings);
     if trips.is_empty() {
         return Err(SurveyError::NoLine { what: "no recording runs along it" });
     }
     let scale_std = wheels.scale.std.hypot(way_std(&ways));
     if known.is_none() && wheels.scale.value.abs() < 2.0 * scale_std {
-        // As far as anybody can tell the wheels are as declared, and a better measure of length.
+        // As far as anybody can see the wheels are as declared, and a better measure of length.
         ways.chainage_per_m = 1.0 / (1.0 + wheels.scale.value);
     }
     let profile = match known {

@@ -7,7 +7,7 @@ use super::tracking::follow;
 
 /// A trip reaches beyond its first and last fix by so many m and s: it stands there.
 const REACH: (f64, f64) = (30.0, 60.0);
-/// What is not used is told from so many s on.
+/// What is not used is reported from so many s on.
 const NOT_USED_MIN_S: f64 = 5.0;
 /// Wheels of one vehicle differ so little from pass to pass.
 const SCALE_SPREAD: f64 = 0.001;
@@ -51,7 +51,7 @@ pub struct NotUsed {
     pub reason: &'static str,
 }
 
-/// Gives every pass its chainage; what the fit runs tell of wheels and lag comes beside it.
+/// Gives every pass its chainage; what the fit runs show of wheels and lag comes with it.
 pub fn trips(passes: &[Pass], ways: &Ways, recordings: &[Recording]) -> (Vec<Trip>, WheelsAndLag) {
     let placed: Vec<_> = passes
         .iter()

@@ -1,7 +1,7 @@
 //! A bank of hypotheses: filters side by side, each under an assumption of its own, weighed by evidence.
 //!
 //! Which assumptions compete, when a new one joins and how they give way to each other is the affair
-//! of whoever keeps the bank; what each weighs, which is the likeliest and what they say together is told
+//! of whoever keeps the bank; what each weighs, which is the likeliest and what they say together is reported
 //! here (multiple models: Bar-Shalom, Li, Kirubarajan 2001, section 11.6).
 
 use std::marker::PhantomData;

@@ -1,4 +1,4 @@
-//! Least squares beside a level that may drift.
+//! Least squares jointly with a level that may drift.
 //!
 //! ```text
 //! y_k       = level_k + x_k · theta + e_k
@@ -22,7 +22,7 @@ pub const BIAS: usize = 1;
 /// Place where the parameters begin.
 pub const PARAMETERS: usize = 2;
 
-/// What a measurement told of itself when it was absorbed.
+/// What a measurement revealed of itself when it was absorbed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Innovation {
     /// Measured minus predicted over its predicted standard deviation; `None` where the
@@ -66,7 +66,7 @@ impl<const N: usize> DriftingLevel<N> {
         filter
     }
 
-    /// Forgets the level, as after a gap; what it told of the rest stays.
+    /// Forgets the level, as after a gap; what it taught of the rest stays.
     pub fn free_level(&mut self) {
         self.root[LEVEL] = [0.0; N];
         self.target[LEVEL] = 0.0;
@@ -115,7 +115,7 @@ impl<const N: usize> DriftingLevel<N> {
 
     fn admit_bias_noise(&mut self, variance: f64) {
         // The noise w is an unknown of its own, known to be 0 with its variance. Two rotations
-        // take it out of both rows; the row left over only tells of w and is dropped.
+        // take it out of both rows; the row left over only depends on w and is dropped.
         let mut noise = [0.0; N];
         let mut noise_target = 0.0;
         let mut noise_root = 1.0 / variance.sqrt();

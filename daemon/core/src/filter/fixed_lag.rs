@@ -83,7 +83,7 @@ impl<const N: usize, T: Copy> FixedLagSmoother<N, T> {
         }
     }
 
-    /// Keeps the estimates as they are: later measurements tell nothing of them.
+    /// Keeps the estimates as they are: later measurements say nothing of them.
     pub fn freeze(&mut self) {
         for moment in &mut self.moments {
             moment.cross = SVector::zeros();

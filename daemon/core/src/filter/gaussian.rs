@@ -151,7 +151,7 @@ impl<const N: usize> Gaussian<N> {
         noise_variance: f64,
     ) -> SVector<f64, N> {
         let spread = self.covariance.column(i).into_owned();
-        // The inverse is known last: what does not need it is reckoned before.
+        // The inverse is known last: what does not need it is computed before.
         self.mean += (spread * innovation.value) * innovation.inverse_variance;
         let mut row = SVector::zeros();
         row[i] = 1.0;

@@ -29,7 +29,7 @@ pub fn sum(a: &[f64]) -> f64 {
     (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
 }
 
-/// Binary logarithm of the smallest density that is told from 0.
+/// Binary logarithm of the smallest density that is distinguished from 0.
 const SMALLEST: f64 = -300.0;
 
 /// 2^x for x <= 0 with a relative error below 4e-6; 0 below -300 and for NaN.

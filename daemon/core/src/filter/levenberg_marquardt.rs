@@ -14,7 +14,7 @@ pub trait LeastSquares<const N: usize> {
     /// Cost and linear model at a point; `None` where the residuals are not defined.
     fn linearise(&mut self, point: &SVector<f64, N>) -> Option<Linearisation<N>>;
 
-    /// Told after the newest linearised point has become the current one.
+    /// Called after the newest linearised point has become the current one.
     fn accept(&mut self) {}
 }
 

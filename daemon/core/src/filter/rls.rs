@@ -9,7 +9,7 @@ use super::{Gaussian, Innovation, NotPositiveDefinite};
 pub enum Forgetting {
     /// All rows count alike.
     None,
-    /// Only what the newest row tells anew is forgotten (Cao and Schwartz 2000): the estimate
+    /// Only what the newest row adds anew is forgotten (Cao and Schwartz 2000): the estimate
     /// keeps what it knows in unexcited directions.
     Directional(f64),
 }

@@ -24,9 +24,9 @@ use crate::validation::ValidSample;
 pub struct ResolvedSample {
     /// Measurement time, controller's clock, in ns.
     pub time_ns: i64,
-    /// Time in s since the sample before it in the stretch; 0 for the first.
+    /// Time in s since the sample before it in the motion segment; 0 for the first.
     pub step_s: f64,
-    /// Number of the stretch of unbroken motion; integrals never cross its change.
+    /// Number of the motion segment; integrals never cross its change.
     pub stretch: u32,
     /// +1 while the chainage grows in the direction of travel, -1 while it falls.
     pub direction: f64,

@@ -103,7 +103,7 @@ estimator_kinds! {
     Mils(MilsSettings) = Mils, |s, t| boxed(resistance::mils(t, s));
     /// Interval-varying, regularised multi-innovation least squares.
     VMils(MilsSettings) = VMils, |s, t| boxed(resistance::v_mils(t, s));
-    /// Robust Kalman filter of resistance beside a disturbance.
+    /// Robust Kalman filter of resistance jointly with a disturbance.
     ResistanceKalman(KalmanSettings) = ResistanceKalman, |s, t| boxed(resistance::kalman(t, s));
     /// Trajectory fit over a sliding window.
     TrajectoryNewton(TrajectoryNewtonSettings) = TrajectoryNewton,

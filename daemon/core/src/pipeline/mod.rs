@@ -99,7 +99,7 @@ impl Pipeline {
     }
 
     /// Takes the place of another pipeline of the train, with another model: the counts of samples,
-    /// snapshots and resets go on here, this change being one more reset, and a new stretch of motion
+    /// snapshots and resets go on here, this change being one more reset, and a new motion segment
     /// begins; the estimate stays this one's own. The other goes on from here on its own account.
     ///
     /// # Real-time
@@ -178,9 +178,9 @@ impl Pipeline {
         snapshot.sample_sequence = sample.sequence;
         self.write_estimate();
         let is_estimated = self.snapshot.status() == Status::Estimated;
-        if let Some(Finding { slip, .. }) = self.implausible() {
+        if let Some(Finding { fault, .. }) = self.implausible() {
             let snapshot = &mut self.snapshot;
-            snapshot.reason = slip.reason() as u32;
+            snapshot.reason = fault.reason() as u32;
             if is_estimated {
                 snapshot.status = Status::Degraded as u32;
             }
@@ -202,7 +202,7 @@ impl Pipeline {
     /// What cannot be true of the samples lately and spoils the estimate.
     pub fn implausible(&self) -> Option<Finding> {
         let kind = self.estimator.kind();
-        self.plausibility.findings().iter().find(|finding| finding.slip.concerns(kind))
+        self.plausibility.findings().iter().find(|finding| finding.fault.concerns(kind))
     }
 
     /// The snapshot after the last sample.

@@ -6,7 +6,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::InnovationMonitor;
 
-/// A parameter's unit in the contract over the one that estimators reckon in: a snapshot has the
+/// A parameter's unit in the contract over the one that estimators compute in: a snapshot has the
 /// mass in t, everything here has it in kg.
 pub fn contract_unit(parameter: Parameter) -> f64 {
     if parameter == Parameter::Mass { 1e-3 } else { 1.0 }

@@ -28,7 +28,7 @@ const TOLERANCE_SHARE: f64 = 0.08;
 const TOLERANCE_MPS: f64 = 0.5;
 /// The most in m/s² that a train accelerates or brakes by.
 const ACCELERATION_MAX_MPS2: f64 = 2.0;
-/// The quantile of the changes between samples that tells the noise of the forces. It is low, so
+/// The quantile of the changes between samples that measures the noise of the forces. It is low, so
 /// that neither ramps nor failures of half of all samples reach it.
 const NOISE_QUANTILE: f64 = 0.2;
 /// Tolerance over that quantile: 6 standard deviations of the change of a white noise.
@@ -46,7 +46,7 @@ const WITHDRAWN_SHARE_MAX: f64 = 0.05;
 pub enum Verdict {
     /// Take it as it is.
     Take,
-    /// Nothing yet: later samples decide, or it tells nothing new.
+    /// Nothing yet: later samples decide, or it adds nothing new.
     Wait,
     /// Take so many from [`SampleGate::released`], of which this one is the last.
     Release(usize),
@@ -92,7 +92,7 @@ impl Reading {
 pub struct SampleGate {
     /// The last sample taken.
     level: Option<Reading>,
-    /// The newest sample that told something.
+    /// The newest sample that added something.
     newest: Option<Reading>,
     /// True once a sample has agreed with the level.
     is_confirmed: bool,
@@ -180,7 +180,7 @@ impl SampleGate {
         self.unless_in_doubt(Verdict::Take)
     }
 
-    /// A sample that tells nothing new.
+    /// A sample that adds nothing new.
     fn pass_over(&mut self, step_s: f64) -> Verdict {
         self.skipped_s += step_s;
         if self.skipped_s <= BRIDGED_MAX_S {

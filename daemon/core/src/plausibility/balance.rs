@@ -2,8 +2,8 @@
 //!
 //! In the mean of a window of a few seconds, (1 + gamma) dv/dt = T/m - B/m - g i - p - q v². With
 //! right units the factors of traction T, brake B and gradient i are 1; p and q are whatever the
-//! resistance is, so that only pronounced accelerations tell of the forces and a wrong declared
-//! resistance tells nothing.
+//! resistance is, so that only pronounced accelerations reveal the forces and a wrong declared
+//! resistance changes nothing.
 
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use nalgebra::{SMatrix, SVector};
@@ -52,7 +52,7 @@ impl Slope {
     }
 }
 
-/// The factors of traction, brake and gradient, where the motion tells them.
+/// The factors of traction, brake and gradient, where the motion determines them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Slopes {
     /// Of the traction force.

@@ -1,6 +1,6 @@
-//! From figures to slips: which one would make all of them come out as they did.
+//! From figures to input faults: which one would make all of them come out as they did.
 //!
-//! | slip by a factor f of reported over true | forces' factor | way by position / by speed | gradient's factor |
+//! | fault by a factor f of reported over true | forces' factor | distance by position / by speed | gradient's factor |
 //! | --- | --- | --- | --- |
 //! | forces | 1/f | 1 | 1 |
 //! | mass | f | 1 | 1 |
@@ -15,7 +15,7 @@ use super::watch::Figures;
 
 /// Factors of forces within these bounds are effects that a train can have.
 const FORCE_FACTORS: (f64, f64) = (0.4, 2.5);
-/// Way by position over way by speed within these bounds is wear, gaps and drift.
+/// Distance by position over distance by speed within these bounds is wear, gaps and drift.
 const WAY_RATIOS: (f64, f64) = (0.8, 1.25);
 /// Masses over the declared one within these bounds are loads, as in validation.
 const MASS_RATIOS: (f64, f64) = (0.2, 5.0);
@@ -42,9 +42,9 @@ pub struct Findings {
 }
 
 impl Findings {
-    fn add(&mut self, slip: InputFault, factor: f64) {
+    fn add(&mut self, fault: InputFault, factor: f64) {
         if let Some(place) = self.list.iter_mut().find(|place| place.is_none()) {
-            *place = Some(Finding { slip, factor });
+            *place = Some(Finding { fault, factor });
         }
     }
 
@@ -63,12 +63,12 @@ pub fn diagnose(figures: &Figures) -> Findings {
     let mut found = Findings::default();
     let kinematic = kinematic(figures);
     let (forces_by, gradients_by) = match kinematic {
-        Some(Finding { slip: InputFault::SpeedScale, factor }) => (factor, factor),
-        Some(Finding { slip: InputFault::TimeScale, factor }) => (1.0 / factor, 1.0 / factor),
+        Some(Finding { fault: InputFault::SpeedScale, factor }) => (factor, factor),
+        Some(Finding { fault: InputFault::TimeScale, factor }) => (1.0 / factor, 1.0 / factor),
         _ => (1.0, 1.0),
     };
-    if let Some(Finding { slip, factor }) = kinematic {
-        found.add(slip, factor);
+    if let Some(Finding { fault, factor }) = kinematic {
+        found.add(fault, factor);
     }
     let mut forces_by = forces_by;
     if let Some(ratio) = figures.mass_ratio.filter(|&ratio| is_outside(ratio, MASS_RATIOS)) {
@@ -91,11 +91,11 @@ fn is_outside(value: f64, (low, high): (f64, f64)) -> bool {
     !(low..=high).contains(&value)
 }
 
-/// The slip that explains how position and speed go together.
+/// The input fault that explains how position and speed go together.
 fn kinematic(figures: &Figures) -> Option<Finding> {
     let ratio = figures.way_ratio?;
     if (-WAY_RATIOS.1..-WAY_RATIOS.0).contains(&ratio) {
-        return Some(Finding { slip: InputFault::DirectionReversed, factor: ratio });
+        return Some(Finding { fault: InputFault::DirectionReversed, factor: ratio });
     }
     if !(ratio > 0.0) || !is_outside(ratio, WAY_RATIOS) {
         return None;
@@ -107,22 +107,22 @@ fn kinematic(figures: &Figures) -> Option<Finding> {
     ];
     let of_forces = common_factor(figures);
     let has_usual_step = !is_outside(figures.step_s, USUAL_STEP_S);
-    let is_unlikely = |slip| match slip {
+    let is_unlikely = |fault| match fault {
         InputFault::TimeScale => has_usual_step,
         InputFault::PositionScale => !has_usual_step,
         _ => false,
     };
-    let misfit = |(slip, factor, expected): &(InputFault, f64, f64)| {
-        let of_unit = slip.misfit(*factor)?;
+    let misfit = |(fault, factor, expected): &(InputFault, f64, f64)| {
+        let of_unit = fault.misfit(*factor)?;
         Some(match of_forces {
             Some(of_forces) if of_forces > 0.0 => of_unit + (of_forces / expected).ln().abs(),
-            // The forces do not tell: a time in another unit shows in the steps.
-            _ => of_unit + if is_unlikely(*slip) { 1.0 } else { 0.0 },
+            // The forces do not show it: a time in another unit shows in the steps.
+            _ => of_unit + if is_unlikely(*fault) { 1.0 } else { 0.0 },
         })
     };
     let known = candidates.iter().filter_map(|candidate| Some((misfit(candidate)?, candidate)));
-    let (_, (slip, factor, _)) = known.min_by(|one, other| one.0.total_cmp(&other.0))?;
-    Some(Finding { slip: *slip, factor: *factor })
+    let (_, (fault, factor, _)) = known.min_by(|one, other| one.0.total_cmp(&other.0))?;
+    Some(Finding { fault: *fault, factor: *factor })
 }
 
 /// The factor of both forces, when they have one.
@@ -145,18 +145,18 @@ fn of_forces(figures: &Figures, by: f64, is_kinematic: bool, found: &mut Finding
         if common < -FORCE_FACTORS.0 {
             found.add(InputFault::ForcesSwapped, common);
         } else if is_outside(common, FORCE_FACTORS) {
-            let (slip, factor) = blamed(figures, common, is_kinematic);
-            found.add(slip, factor);
+            let (fault, factor) = blamed(figures, common, is_kinematic);
+            found.add(fault, factor);
         }
         return;
     }
     let of_one =
         [(InputFault::TractionScale, slopes.traction), (InputFault::BrakeScale, slopes.brake)];
-    for (slip, slope) in of_one {
+    for (fault, slope) in of_one {
         let Some(Slope { factor, .. }) = slope else { continue };
         let factor = factor / by;
         if is_outside(factor, FORCE_FACTORS) {
-            found.add(slip, 1.0 / factor);
+            found.add(fault, 1.0 / factor);
         }
     }
 }

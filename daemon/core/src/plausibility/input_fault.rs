@@ -22,7 +22,7 @@ pub enum Severity {
 }
 
 named! {
-    /// A slip of the pen or of the wiring; in the order in which they are told.
+    /// A mistake in a file or in the wiring; in the order in which they are reported.
     #[derive(PartialOrd, Ord, Serialize)]
     #[serde(rename_all = "snake_case")]
     #[repr(u8)]
@@ -57,7 +57,7 @@ named! {
 impl InputFault {
     /// The member with this number.
     pub fn from_number(number: u8) -> Option<Self> {
-        Self::ALL.into_iter().find(|slip| *slip as u8 == number)
+        Self::ALL.into_iter().find(|fault| *fault as u8 == number)
     }
 
     /// How much it matters: the pressure enters no balance of forces.
@@ -133,12 +133,12 @@ impl InputFault {
     }
 }
 
-/// A slip with its size.
+/// An input fault with its size.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Finding {
     /// What it is.
-    pub slip: InputFault,
-    /// Reported over true value, as far as the samples tell.
+    pub fault: InputFault,
+    /// Reported over true value, as far as the samples show.
     pub factor: f64,
 }
 
@@ -147,7 +147,7 @@ impl Finding {
     /// factor.
     pub fn true_unit(&self, read_as: &Unit) -> Option<Unit> {
         let misfit = |of: &Unit| (self.factor / read_as.in_terms_of(of)).abs().ln().abs();
-        Unit::of(self.slip.dimension())
+        Unit::of(self.fault.dimension())
             .filter(|of| of.name() != read_as.name() && misfit(of) < UNIT_TOLERANCE)
             .min_by(|one, other| misfit(one).total_cmp(&misfit(other)))
     }
@@ -159,10 +159,10 @@ mod tests {
 
     #[test]
     fn numbers_lead_back_to_the_input_fault_and_names_are_unique() {
-        for slip in InputFault::ALL {
-            assert_eq!(InputFault::from_number(slip as u8), Some(slip));
+        for fault in InputFault::ALL {
+            assert_eq!(InputFault::from_number(fault as u8), Some(fault));
             assert_eq!(
-                InputFault::ALL.iter().filter(|other| other.name() == slip.name()).count(),
+                InputFault::ALL.iter().filter(|other| other.name() == fault.name()).count(),
                 1
             );
         }
@@ -171,9 +171,9 @@ mod tests {
 
     #[test]
     fn the_unit_is_named_that_explains_the_factor() {
-        let unit = |slip: InputFault, factor, read_as| {
-            let read_as = Unit::find(slip.dimension(), read_as).unwrap();
-            Finding { slip, factor }.true_unit(&read_as).map(|unit| unit.name())
+        let unit = |fault: InputFault, factor, read_as| {
+            let read_as = Unit::find(fault.dimension(), read_as).unwrap();
+            Finding { fault, factor }.true_unit(&read_as).map(|unit| unit.name())
         };
         assert_eq!(unit(InputFault::ForcesScale, 0.001, "N"), Some("kN"));
         assert_eq!(unit(InputFault::ForcesScale, 1010.0, "kN"), Some("N"));

@@ -6,8 +6,8 @@
 //! # Layout, in the order of the work
 //!
 //! - [`watch`]: sample by sample, with [`balance`] (forces against acceleration) and [`pressure`]
-//! - [`diagnosis`]: which slip makes all figures come out as they did
-//! - [`input_fault`]: the slips, their names and severity; [`words`]: a finding in a sentence
+//! - [`diagnosis`]: which input fault makes all figures come out as they did
+//! - [`input_fault`]: the input faults, their names and severity; [`words`]: a finding in a sentence
 
 pub mod balance;
 pub mod diagnosis;

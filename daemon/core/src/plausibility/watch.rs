@@ -18,7 +18,7 @@ const STEP_SHARE: f64 = 0.1;
 const MOVING_MPS: f64 = 1.0;
 /// Share of a window that is refused, when any of it is and it counts nevertheless.
 const REFUSED_SHARE_MIN: f64 = 0.9;
-/// Way in m over which position and speed are compared.
+/// Distance in m over which position and speed are compared.
 const WAY_M: f64 = 200.0;
 /// Comparisons of position and speed that the median looks back over, and that are enough.
 const WAYS: usize = 21;
@@ -33,7 +33,7 @@ const MASSES_MIN: f64 = 5.0;
 pub struct Figures {
     /// Acceleration over what the forces and the gradient would give.
     pub slopes: Slopes,
-    /// Way by position, counted in the direction of travel, over way by speed.
+    /// Distance by position, counted in the direction of travel, over distance by speed.
     pub way_ratio: Option<f64>,
     /// Reported over declared mass.
     pub mass_ratio: Option<f64>,

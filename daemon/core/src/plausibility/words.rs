@@ -14,7 +14,7 @@ impl Finding {
     /// The same for factors of several runs, from the lowest to the highest.
     pub fn words_for(&self, (low, high): (f64, f64), read_as: &Unit) -> String {
         let size = size(low, high);
-        let what = match self.slip {
+        let what = match self.fault {
             InputFault::TimeScale => format!("times look {size} by speed, position and forces"),
             InputFault::SpeedScale => {
                 format!("speeds look {size} by position or acceleration")
@@ -34,7 +34,7 @@ impl Finding {
             InputFault::ForcesScale => format!("forces look {size} for how the train accelerates"),
             InputFault::TractionScale | InputFault::BrakeScale => {
                 let force =
-                    if self.slip == InputFault::TractionScale { "traction" } else { "brake" };
+                    if self.fault == InputFault::TractionScale { "traction" } else { "brake" };
                 if self.factor < 0.0 {
                     return format!(
                         "the {force} force acts against what it is for: is its sign or column \
@@ -67,11 +67,11 @@ impl Finding {
 impl fmt::Display for Finding {
     /// In words, for a quantity read in the unit that samples hold.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let base = match self.slip.dimension() {
+        let base = match self.fault.dimension() {
             Dimension::Ratio => Unit::find(Dimension::Ratio, "permille"),
             dimension => Some(Unit::base_of(dimension)),
         };
-        f.write_str(&self.words(&base.unwrap_or_else(|| Unit::base_of(self.slip.dimension()))))
+        f.write_str(&self.words(&base.unwrap_or_else(|| Unit::base_of(self.fault.dimension()))))
     }
 }
 

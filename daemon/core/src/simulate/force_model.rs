@@ -72,7 +72,7 @@ impl ForceModel for QuadraticForces {
 }
 
 /// The declared model at a sample. A gradient that is not known counts as level track;
-/// [`Recording::knows_gradient`] tells.
+/// [`Recording::knows_gradient`] says.
 pub fn declared_polynomial(sample: &ResolvedSample, resistance: Davis) -> Polynomial {
     let Davis { a, b, c } = resistance;
     let acting = ActingForces {

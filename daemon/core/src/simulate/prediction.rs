@@ -40,7 +40,7 @@ impl Restart {
     }
 }
 
-/// Samples whose speeds together tell whether a starting speed is an outlier.
+/// Samples whose speeds together decide whether a starting speed is an outlier.
 const START_SAMPLES: usize = 5;
 /// They lie within this time in s: over a longer one the forces say too little.
 const START_SPAN_S: f64 = 2.5;

@@ -186,7 +186,7 @@ fn bridge(
     filled
 }
 
-/// Gives the samples before the first known gradient its value: an accelerometer tells the
+/// Gives the samples before the first known gradient its value: an accelerometer shows the
 /// gradient only from the second sample on.
 fn hold_ends(samples: &mut [ResolvedSample]) {
     let Some(first) = samples.iter().position(|sample| sample.gradient_permille.is_some()) else {

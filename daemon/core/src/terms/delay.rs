@@ -69,7 +69,7 @@ impl<const N: usize> DelayLine<N> {
     }
 
     /// The numbers that hold at a time in ns behind those that are reported then; `None` while they
-    /// are not. A new stretch of motion forgets what was before it.
+    /// are not. A new motion segment forgets what was before it.
     pub fn acting(
         &mut self,
         (time_ns, stretch): (i64, u32),

@@ -3,7 +3,7 @@
 //! A term says what its numbers do to the forces at a sample, where they stand in `train.toml` or
 //! `track.toml`, within which bounds they make sense, how large they must be to count, and what
 //! one unit of it does where the monitor looks for it. The daemon's forces, `explain`, the
-//! monitor, the simulator and the writer of the grown model all take the law from here, so that
+//! monitor, the simulator and the writer of the updated model all take the law from here, so that
 //! what was found is what is then applied, to the bit.
 
 pub mod adhesion;

@@ -144,7 +144,7 @@ impl Resistance {
             + self.by_factor_n_per_kn(davis, speed_mps)
     }
 
-    /// What tunnels add, in N/kN: by their length, as share of c and beside it.
+    /// What tunnels add, in N/kN: by their length, as share of c and in addition to it.
     #[inline]
     pub fn in_tunnels_n_per_kn(&self, davis: Davis, speed_mps: f64) -> f64 {
         self.tunnel_n_per_kn + (self.c_share * davis.c + self.dc) * speed_mps * speed_mps

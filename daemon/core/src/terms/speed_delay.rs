@@ -1,7 +1,7 @@
 //! A measured speed that is late: the true one of a dead time ago, behind a first-order lag.
 //!
 //! What the wheels' sensor, its filter and its bus lose in time. Behind such a speed everything else
-//! acts as it did when the speed was true: forces, gradient and every resistance. That tells it from
+//! acts as it did when the speed was true: forces, gradient and every resistance. That distinguishes it from
 //! forces that act late, for those leave the gradient on time.
 
 use super::delay::{DelayLine, Forces};
@@ -59,7 +59,7 @@ impl LateSpeed {
         }
     }
 
-    /// The forces in N behind a speed in m/s of a time in ns of a stretch; `None` while none are known.
+    /// The forces in N behind a speed in m/s of a time in ns of a motion segment; `None` while none are known.
     /// What brakes a train that stands moves nothing, and no lag remembers it.
     pub fn forces(
         &mut self,

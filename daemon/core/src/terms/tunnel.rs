@@ -35,7 +35,7 @@ pub const DC: Key = Key {
 /// Single-track tunnels reach several times c; the bound is in N/kN per (m/s)².
 pub const PARAMETERS: [Parameter; 1] =
     [Parameter::new("dc_n_per_kn_per_mps2", (0.0, DC.range[1]), 1e-5)];
-/// A smaller share of c is not told from its error.
+/// A smaller share of c is not distinguishable from its error.
 pub const LEAST_SHARE_OF_C: f64 = 0.08;
 
 /// Tunnels of a length, weighted by the share of the train inside, resist.

@@ -14,12 +14,12 @@ pub use profile::{GradientError, LinearProfile, ProfileError, StepProfile};
 /// process along the chainage.
 pub const GRADIENT_ERROR_FREE_M: f64 = 200.0;
 
-/// Share of a surveyed gradient's error that is still there after a way in m.
+/// Share of a surveyed gradient's error that is still there after a distance in m.
 pub fn gradient_error_kept(way_m: f64) -> f64 {
     (-2.0 * way_m.abs() / GRADIENT_ERROR_FREE_M).exp()
 }
 
-/// What is known of a line beside its profile: by a survey, or from another project's files.
+/// What is known of a line besides its profile: by a survey, or from another project's files.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrackSurvey {
     /// Gradient for falling chainage as (chainage in m, ‰ climbing positive as the chainage
@@ -200,14 +200,14 @@ impl Track {
     }
 
     /// Standard deviation in ‰ of the gradient under a train, as a survey states it; `None` when it is
-    /// not stated. How it goes with the way: [`gradient_error_kept`].
+    /// not stated. How it goes with the distance: [`gradient_error_kept`].
     pub fn gradient_std_here_permille(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
         let half_m = 0.5 * train_length_m;
         self.gradient_std_permille(centre_m - half_m, centre_m + half_m)
     }
 
-    /// Standard deviation in ‰ of the mean gradient over a stretch, as a survey states it: errors
-    /// of stretches further apart than [`GRADIENT_ERROR_FREE_M`] are their own. `None` when it is not
+    /// Standard deviation in ‰ of the mean gradient over an interval, as a survey states it: errors
+    /// of intervals further apart than [`GRADIENT_ERROR_FREE_M`] are their own. `None` when it is not
     /// stated.
     pub fn gradient_std_permille(&self, from_m: f64, to_m: f64) -> Option<f64> {
         let length_m = to_m - from_m;
@@ -297,7 +297,7 @@ fn tunnel_profiles(tunnels: &[Tunnel]) -> Result<TunnelProfiles, TrackError> {
     })
 }
 
-/// A greater chainage in m cannot be told from its neighbours to the millimetre, nor be meant.
+/// A greater chainage in m cannot be distinguished from its neighbours to the millimetre, nor be meant.
 const CHAINAGE_MAX_M: f64 = 1e9;
 
 /// A profile that is zero outside the given (start, end, value) intervals.

@@ -3,7 +3,7 @@
 /// Share of the electric power that reaches the wheels' rims unless a train says otherwise: motors,
 /// converter and gear of drives of the last decades, under load.
 pub const EFFICIENCY_DEFAULT: f64 = 0.85;
-/// Speed in m/s below which power tells no force unless a train says otherwise: a drive that hardly
+/// Speed in m/s below which power determines no force unless a train says otherwise: a drive that hardly
 /// turns turns most of its power into heat.
 pub const POWER_SPEED_MIN_DEFAULT_MPS: f64 = 2.0;
 
@@ -16,16 +16,16 @@ pub const POWER_SPEED_MIN_DEFAULT_MPS: f64 = 2.0;
 pub struct Drive {
     /// Mechanical power at the rims over the drive's electric power when it pulls, 0 to 1.
     pub efficiency: f64,
-    /// Power in W that the vehicle takes beside its drive; 0 where the drive's own is recorded.
+    /// Power in W that the vehicle takes in addition to its drive; 0 where the drive's own is recorded.
     pub auxiliary_power_w: f64,
-    /// Speed in m/s below which no force is told.
+    /// Speed in m/s below which no force is estimated.
     pub speed_min_mps: f64,
 }
 
 impl Drive {
     /// Efficiencies that make sense.
     pub const EFFICIENCIES: std::ops::RangeInclusive<f64> = 0.3..=1.0;
-    /// Powers in kW of what is fed beside the drive.
+    /// Powers in kW of what is fed in addition to the drive.
     pub const AUXILIARIES_KW: std::ops::RangeInclusive<f64> = 0.0..=2000.0;
 
     /// A drive of which nothing is declared.
@@ -42,14 +42,14 @@ impl Drive {
     }
 
     /// Traction minus brake force of the drive in N at a speed in m/s; `None` where it turns too
-    /// slowly for its power to tell.
+    /// slowly for its power to determine the force.
     pub fn force_n(&self, recorded_w: f64, speed_mps: f64) -> Option<f64> {
-        let is_told = recorded_w.is_finite() && speed_mps >= self.speed_min_mps;
-        is_told.then(|| self.mechanical_w(recorded_w) / speed_mps)
+        let is_known = recorded_w.is_finite() && speed_mps >= self.speed_min_mps;
+        is_known.then(|| self.mechanical_w(recorded_w) / speed_mps)
     }
 
     /// What a recorded power in W at a speed in m/s says more of the traction and of the brake force in N
-    /// by this drive than by another; `None` where either tells none.
+    /// by this drive than by another; `None` where either determines none.
     pub fn beyond_n(&self, other: Drive, recorded_w: f64, speed_mps: f64) -> Option<[f64; 2]> {
         let at = |drive: &Drive| drive.force_n(recorded_w, speed_mps);
         let (own_n, other_n) = at(self).zip(at(&other))?;

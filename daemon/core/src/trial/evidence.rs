@@ -4,19 +4,19 @@
 //! of the model in force, e0, and of its rival, e1. The hypothesis to be refuted is that the rival
 //! takes less from the error than the least gain that is worth a change.
 //!
-//! Against it one bets a share of one's capital on each trip. Under the hypothesis no bet makes
-//! capital grow on average, whatever came before, so that one may look after every trip
-//! (Waudby-Smith, Ramdas: *Estimating means of bounded random variables by betting*, 2024). One
-//! gambler begins at each trip, so that a rival which becomes better only in winter is found in
-//! winter; the capital of all of them reaches M no earlier than after M trips on average while the
+//! The evidence against it is an e-process: the factor by which a bet of a fixed share on each trip
+//! grows. While the hypothesis holds no bet grows on average, whatever came before, so that one may
+//! look after every trip (Waudby-Smith, Ramdas: *Estimating means of bounded random variables by
+//! betting*, 2024). A new bet begins at each trip, so that a rival which becomes better only in winter is
+//! found in winter; the sum of all reaches M no earlier than after M trips on average while the
 //! hypothesis holds (Shin, Ramdas, Rinaldo: *E-detectors*, 2024). M is what the configuration
 //! calls `trips_between_mistakes`.
 
 use serde::{Deserialize, Serialize};
 
-/// Shares of the capital that are bet; the winnings are averaged over them.
+/// Shares that are bet on each trip; the e-process values are averaged over them.
 const BETS: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
-/// Capital beyond which counting on tells nothing more.
+/// E-process value beyond which counting on adds nothing more.
 const E_VALUE_MAX: f64 = 1e100;
 /// What the confidence sequence may miss the truth by at any time: 95 %.
 const MISS: f64 = 0.05;
@@ -48,7 +48,7 @@ fn ratio_of_score(score: f64) -> f64 {
 pub struct Evidence {
     /// Share of the error that the rival must take away to count as better.
     least_gain: f64,
-    /// Capital by bet.
+    /// E-process value by bet.
     #[serde(rename = "capital")]
     e_value: [f64; BETS.len()],
     /// Trips that were compared.
@@ -211,7 +211,7 @@ mod tests {
         let mut evidence = Evidence::new(0.1);
         assert_eq!(evidence.error_ratio(), None);
         evidence.take(score_of_ratio(0.6));
-        assert_eq!(evidence.error_ratio(), Some([0.0, RATIO_MAX]), "one trip tells nothing");
+        assert_eq!(evidence.error_ratio(), Some([0.0, RATIO_MAX]), "one trip shows nothing");
         for trip in 0..400 {
             evidence.take(score_of_ratio(0.6) + if trip % 2 == 0 { 0.1 } else { -0.1 });
         }

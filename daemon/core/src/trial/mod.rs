@@ -1,4 +1,4 @@
-//! Models on trial: which of several predicts a train's motion better, told while it runs.
+//! Models on trial: which of several predicts a train's motion better, judged while it runs.
 //!
 //! The model in force and its rivals predict the same samples open loop, restarted every 60 s
 //! ([`open_loop`], by the simulation that judges every model, [`crate::simulate`]). Trip by trip

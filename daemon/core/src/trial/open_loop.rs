@@ -8,7 +8,7 @@ use crate::track::Track;
 use crate::train::TrainModel;
 use crate::validation::ValidSample;
 
-/// Samples nearer in time, in s, to the last that was kept are not: 20 a second tell a motion.
+/// Samples nearer in time, in s, to the last that was kept are not: 20 a second describe a motion.
 const STEP_MIN_S: f64 = 0.05;
 /// A window holds at most so many samples.
 const SAMPLES_MAX: usize = (Restart::WINDOW_S / STEP_MIN_S) as usize + 2;
@@ -18,7 +18,7 @@ const SAMPLES_MAX: usize = (Restart::WINDOW_S / STEP_MIN_S) as usize + 2;
 pub struct WindowError {
     /// Of the speed, over the window's moving samples.
     pub speed: SpeedError,
-    /// Of the way by the predicted speed against the way by position, over the window's length, in
+    /// Of the distance by the predicted speed against the distance by position, over the window's length, in
     /// m/s; what a wrong wheel diameter shows. 0 where no position is known.
     pub way_mps: f64,
 }

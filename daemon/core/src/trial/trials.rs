@@ -80,7 +80,7 @@ impl TripError {
         self.windows += 1.0;
     }
 
-    /// In (m/s)², of speed and way together; `None` without a moving sample.
+    /// In (m/s)², of speed and distance together; `None` without a moving sample.
     fn mean_square(self) -> Option<f64> {
         let of_speed = self.speed.rmse_mps()?;
         Some(of_speed * of_speed + self.way_squares / self.windows)

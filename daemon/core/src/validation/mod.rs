@@ -3,7 +3,7 @@
 //! A [`Validator`] sees every sample of one train in the order of arrival. It refuses what
 //! cannot be true and counts what never came; it never repairs a value. Where the train has
 //! plainly been moved or the clock set (several samples in a row agree with each other but not
-//! with the past), it starts a new stretch of motion instead of refusing for ever.
+//! with the past), it starts a new motion segment instead of refusing for ever.
 
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
@@ -24,7 +24,7 @@ pub struct ValidationLimits {
     pub force_max_per_weight: f64,
     /// Lowest and highest mass in kg.
     pub mass_kg: (f64, f64),
-    /// A longer step in s ends a stretch of motion.
+    /// A longer step in s ends a motion segment.
     pub gap_max_s: f64,
     /// A longer step ahead in s is not believed within a run.
     pub jump_max_s: f64,
@@ -54,9 +54,9 @@ impl ValidationLimits {
 pub struct ValidSample<'a> {
     /// The sample as it came.
     pub sample: &'a TrainSample,
-    /// Time in s since the accepted sample before it; 0 when it starts a stretch.
+    /// Time in s since the accepted sample before it; 0 when it starts a segment.
     pub step_s: f64,
-    /// Number of the stretch of unbroken motion; integrals never cross its change.
+    /// Number of the motion segment; integrals never cross its change.
     pub stretch: u32,
 }
 
@@ -128,7 +128,7 @@ impl Validator {
     }
 
     /// Changes places with the validator of another model of the same train: each goes on counting
-    /// where the other stopped, by its own limits, and begins a new stretch of motion.
+    /// where the other stopped, by its own limits, and begins a new motion segment.
     pub fn exchange(&mut self, other: &mut Validator) {
         std::mem::swap(self, other);
         std::mem::swap(&mut self.limits, &mut other.limits);
@@ -255,7 +255,7 @@ impl Validator {
         if plausible { Ok(()) } else { Err(RejectionReason::OutOfRange) }
     }
 
-    /// The step in s since the last accepted sample, `None` when a new stretch starts here.
+    /// The step in s since the last accepted sample, `None` when a new segment starts here.
     fn check_motion(&self, sample: &TrainSample) -> Result<Option<f64>, RejectionReason> {
         let Some(last) = &self.last else { return Ok(None) };
         if sample.run != last.run {

@@ -76,7 +76,7 @@ pub fn dry(speed_mps: f64) -> f64 {
     0.06 + 46.6 / (260.0 + 3.6 * speed_mps)
 }
 
-/// One sample with the truth beside it.
+/// One sample with the truth next to it.
 pub struct Moment {
     pub sample: TrainSample,
     pub time_s: f64,

@@ -81,7 +81,7 @@ impl Simulation {
         }
     }
 
-    /// Time passes unseen, and the next sample begins a new stretch.
+    /// Time passes unseen, and the next sample begins a new motion segment.
     pub fn gap(&mut self, seconds: f64) {
         self.time_ns += (seconds * 1e9) as i64;
         self.stretch += 1;

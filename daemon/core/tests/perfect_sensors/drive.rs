@@ -39,9 +39,9 @@ pub enum Sensor {
 pub enum Forces {
     /// At once, at any moment between two samples.
     Jumping,
-    /// At a sample, which tells the force that is held until the next.
+    /// At a sample, which gives the force that is held until the next.
     Held,
-    /// At a sample, which tells the force that was held since the one before.
+    /// At a sample, which gives the force that was held since the one before.
     Past,
     /// At 150 kN/s, as actuators do.
     Ramped,

@@ -66,8 +66,8 @@ pub fn run(settings: &EstimatorSettings, drive: &Drive) -> Found {
         found.trusted += 1;
         if let Some(what) = misled(snapshot, carried) {
             found.wrong += 1;
-            let told = || format!("sample {index}, {phase:?}: {what}");
-            found.first_wrong.get_or_insert_with(told);
+            let sentence = || format!("sample {index}, {phase:?}: {what}");
+            found.first_wrong.get_or_insert_with(sentence);
         }
     }
     found

@@ -22,12 +22,12 @@ pub struct Assignment<'c> {
 }
 
 impl<'c> Assignment<'c> {
-    /// Takes what is told for granted, and for every other quantity the column that most speaks for.
+    /// Takes what is declared for granted, and for every other quantity the column that most speaks for.
     ///
     /// # Errors
     ///
-    /// Where what is told cannot be.
-    pub fn new(columns: &'c Columns, told: &[GivenColumn], label: &str) -> GuessResult<Self> {
+    /// Where what is declared cannot be.
+    pub fn new(columns: &'c Columns, given: &[GivenColumn], label: &str) -> GuessResult<Self> {
         let mut assignment = Assignment {
             columns: &columns.columns,
             taken: Vec::new(),
@@ -35,8 +35,8 @@ impl<'c> Assignment<'c> {
             candidates: Vec::new(),
             refused: Vec::new(),
         };
-        for it in told {
-            let problem = assignment.take_reported(it, columns);
+        for it in given {
+            let problem = assignment.take_given(it, columns);
             let place = || SourcePosition::line(label, columns.skip_rows + 1);
             problem.map_err(|problem| GuessError::new(place(), problem))?;
         }
@@ -44,7 +44,7 @@ impl<'c> Assignment<'c> {
             if column.unusable.is_some() || assignment.is_taken(index) {
                 continue;
             }
-            for quantity in Quantity::ALL.into_iter().filter(|it| !reported_of(told, *it)) {
+            for quantity in Quantity::ALL.into_iter().filter(|it| !is_given(given, *it)) {
                 match consider(index, &column.name, &column.all, quantity) {
                     None => {}
                     Some(Ok(candidate)) => assignment.candidates.push(candidate),
@@ -56,9 +56,9 @@ impl<'c> Assignment<'c> {
         Ok(assignment)
     }
 
-    fn take_reported(&mut self, told: &GivenColumn, columns: &Columns) -> Result<(), GuessProblem> {
-        let (name, quantity) = (told.column.clone(), told.quantity);
-        let index = self.columns.iter().position(|column| column.name.text == told.column.trim());
+    fn take_given(&mut self, given: &GivenColumn, columns: &Columns) -> Result<(), GuessProblem> {
+        let (name, quantity) = (given.column.clone(), given.quantity);
+        let index = self.columns.iter().position(|column| column.name.text == given.column.trim());
         let Some(index) = index else {
             return Err(GuessProblem::NoSuchColumn { name, quantity, columns: columns.names() });
         };
@@ -70,17 +70,17 @@ impl<'c> Assignment<'c> {
         if let Err(reason) = reason {
             return Err(GuessProblem::Unfit { name, quantity, reason });
         }
-        let unit = match told.unit {
+        let unit = match given.unit {
             Some(unit) => UnitChoice {
                 spelled: Spelled { unit, scale: 1.0 },
-                reason: "the unit as told".into(),
+                reason: "the unit as given".into(),
                 doubt: None,
             },
             None => choose_unit(quantity, &column.all, named_unit(&column.name, quantity)),
         };
-        let is_unit_open = told.unit.is_none() && named_unit(&column.name, quantity).is_none();
+        let is_unit_open = given.unit.is_none() && named_unit(&column.name, quantity).is_none();
         let mut guessed = self.guessed(index, quantity, unit);
-        guessed.reasons.insert(0, "told on the command line".into());
+        guessed.reasons.insert(0, "given on the command line".into());
         guessed.is_unit_open = is_unit_open && guessed.format.is_none();
         self.taken.push((index, guessed, true));
         Ok(())
@@ -128,10 +128,10 @@ impl<'c> Assignment<'c> {
         found.map(|(index, ..)| &self.columns[*index].all)
     }
 
-    /// Takes a quantity's column for another quantity instead, with a doubt; what was told stays.
+    /// Takes a quantity's column for another quantity instead, with a doubt; what was declared stays.
     pub fn rename(&mut self, from: Quantity, to: Quantity, doubt: &str) {
-        for (_, guessed, is_told) in &mut self.taken {
-            if guessed.quantity == from && !*is_told {
+        for (_, guessed, is_given_here) in &mut self.taken {
+            if guessed.quantity == from && !*is_given_here {
                 guessed.quantity = to;
                 guessed.doubts.insert(0, doubt.into());
                 guessed.rejected.push(format!("not {from}: {doubt}"));
@@ -139,10 +139,10 @@ impl<'c> Assignment<'c> {
         }
     }
 
-    /// Takes a quantity's column for nothing; what was told stays.
+    /// Takes a quantity's column for nothing; what was declared stays.
     pub fn drop(&mut self, quantity: Quantity, reason: &str) {
         let is_it = |guessed: &GuessedColumn| guessed.quantity == quantity;
-        let left_out = self.taken.extract_if(.., |(_, guessed, told)| is_it(guessed) && !*told);
+        let left_out = self.taken.extract_if(.., |(_, guessed, given)| is_it(guessed) && !*given);
         let left_out = left_out.map(|(index, ..)| (index, format!("not {quantity}: {reason}")));
         self.dropped.extend(left_out);
     }
@@ -217,6 +217,6 @@ impl<'c> Assignment<'c> {
     }
 }
 
-fn reported_of(told: &[GivenColumn], quantity: Quantity) -> bool {
-    told.iter().any(|it| it.quantity == quantity)
+fn is_given(given: &[GivenColumn], quantity: Quantity) -> bool {
+    given.iter().any(|it| it.quantity == quantity)
 }

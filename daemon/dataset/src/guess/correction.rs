@@ -1,4 +1,4 @@
-//! Units that the values alone did not tell, set right by how the train moves.
+//! Units that the values alone did not reveal, set right by how the train moves.
 
 use dynocar_core::plausibility::InputFault;
 
@@ -22,12 +22,12 @@ impl Guess {
         for (run, remark) in runs.into_iter().flat_map(of_run) {
             let Diagnostic::InputFault { finding, read_as } = remark else { continue };
             let is_measured = is_mass_known && run.gradient_source != GradientSource::Unknown;
-            if needs_balance(finding.slip) && !is_measured {
+            if needs_balance(finding.fault) && !is_measured {
                 continue;
             }
             let read_as = unit_of(*finding, read_as);
             let Some(unit) = finding.true_unit(&read_as) else { continue };
-            let (quantities, _) = concerned(finding.slip);
+            let (quantities, _) = concerned(finding.fault);
             let is_open = |quantity| {
                 self.column(quantity).is_some_and(|it| it.is_unit_open && it.unit == read_as)
             };
@@ -51,10 +51,10 @@ impl Guess {
     }
 }
 
-/// True for what the balance of forces tells.
-fn needs_balance(slip: InputFault) -> bool {
+/// True for what the balance of forces shows.
+fn needs_balance(fault: InputFault) -> bool {
     matches!(
-        slip,
+        fault,
         InputFault::MassScale
             | InputFault::ForcesScale
             | InputFault::TractionScale

@@ -4,7 +4,7 @@ use crate::TimeFormat;
 use crate::cell::parse_cell;
 use crate::clock::{DayClock, day_of_cell};
 
-/// So many values of a column are kept, evenly spread, to tell its middle and its top.
+/// So many values of a column are kept, evenly spread, to find its middle and its top.
 const KEPT_MAX: usize = 4096;
 
 /// Values spread evenly over all that came.

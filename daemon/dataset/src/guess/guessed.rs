@@ -23,7 +23,7 @@ pub struct GivenColumn {
     pub quantity: Quantity,
     /// Its name in the header.
     pub column: String,
-    /// Its unit; `None` where name and values are to tell it.
+    /// Its unit; `None` where name and values are to reveal it.
     pub unit: Option<Unit>,
 }
 
@@ -65,7 +65,7 @@ pub struct GuessedColumn {
     pub doubts: Vec<String>,
     /// What it was not taken for, and what was not taken for it, each with the reason.
     pub rejected: Vec<String>,
-    /// True where the name gives no unit, so that the values tell it.
+    /// True where the name gives no unit, so that the values reveal it.
     pub is_unit_open: bool,
     /// The middle of its values, in the file's numbers.
     pub middle: f64,

@@ -48,7 +48,7 @@ impl Block {
     }
 }
 
-/// Tells the layout of a file.
+/// Recognises the layout of a file.
 ///
 /// # Errors
 ///
@@ -222,7 +222,7 @@ fn judge_header(label: &str, rows: &[Row], block: Block) -> Result<(), GuessErro
 mod tests {
     use super::*;
 
-    fn told(text: &str) -> (char, Option<char>, usize) {
+    fn recognised(text: &str) -> (char, Option<char>, usize) {
         let layout = layout("a.csv", text).unwrap();
         let decimal = layout.decimal.map(char::from);
         (char::from(layout.delimiter), decimal, layout.header.len())
@@ -234,14 +234,14 @@ mod tests {
 
     #[test]
     fn delimiter_and_decimal_mark_are_distinguished() {
-        assert_eq!(told("t,v\n0,1.5\n1,2.5\n"), (',', Some('.'), 2));
-        assert_eq!(told("t;v\n0;1,5\n1;2,5\n"), (';', Some(','), 2));
-        assert_eq!(told("t;v\n0,5;1,5\n1;2,5\n"), (';', Some(','), 2));
-        assert_eq!(told("t\tv\tF\n0\t1\t3\n"), ('\t', None, 3));
-        assert_eq!(told("t|v\n0|1.5\n"), ('|', Some('.'), 2));
-        assert_eq!(told("t,v\n\"0,5\",\"1,5\"\n"), (',', Some(','), 2));
-        assert_eq!(told("\u{feff}t;v, measured\n0;1.0\n"), (';', Some('.'), 2));
-        assert_eq!(told("t,v,note\n0,1.5,\"a;b\"\n1,1.5,\"c;d\"\n"), (',', Some('.'), 3));
+        assert_eq!(recognised("t,v\n0,1.5\n1,2.5\n"), (',', Some('.'), 2));
+        assert_eq!(recognised("t;v\n0;1,5\n1;2,5\n"), (';', Some(','), 2));
+        assert_eq!(recognised("t;v\n0,5;1,5\n1;2,5\n"), (';', Some(','), 2));
+        assert_eq!(recognised("t\tv\tF\n0\t1\t3\n"), ('\t', None, 3));
+        assert_eq!(recognised("t|v\n0|1.5\n"), ('|', Some('.'), 2));
+        assert_eq!(recognised("t,v\n\"0,5\",\"1,5\"\n"), (',', Some(','), 2));
+        assert_eq!(recognised("\u{feff}t;v, measured\n0;1.0\n"), (';', Some('.'), 2));
+        assert_eq!(recognised("t,v,note\n0,1.5,\"a;b\"\n1,1.5,\"c;d\"\n"), (',', Some('.'), 3));
     }
 
     #[test]

@@ -237,12 +237,12 @@ fn by_likeness(words: &[String], quantity: Quantity) -> Option<(i32, String)> {
 /// a temperature beside the unit of one.
 fn by_unit_alone(name: &Name, quantity: Quantity) -> Option<Match> {
     let unit = spelling::find(quantity.dimension(), name.unit.as_ref()?)?;
-    let is_told = match quantity {
+    let is_known = match quantity {
         Quantity::Speed => contradiction(&name.words, quantity).is_none(),
         Quantity::AmbientTemperature => name.words == ["t"],
         _ => false,
     };
-    if !is_told {
+    if !is_known {
         return None;
     }
     Some(Match { score: ENOUGH + 1, reason: "its unit".into(), unit: Some(unit) })
@@ -260,11 +260,11 @@ fn contradiction(words: &[String], quantity: Quantity) -> Option<String> {
         (OTHER_THINGS, "another thing"),
     ];
     for (list, what) in lists {
-        let is_told = |word: &&String| {
+        let is_known = |word: &&String| {
             let is_in = |it: &&str| word == it || (it.len() >= 4 && word.contains(*it));
             !own.contains(&word.as_str()) && list.iter().any(is_in)
         };
-        if let Some(word) = words.iter().find(is_told) {
+        if let Some(word) = words.iter().find(is_known) {
             return Some(format!("'{word}' names {what}"));
         }
     }

@@ -1,7 +1,7 @@
 //! A description of recordings that nobody has described yet: which column is which quantity, in
 //! which unit.
 //!
-//! Names tell the quantity, names or values the unit. Nothing is taken silently: every guess says
+//! Names give the quantity, names or values the unit. Nothing is taken silently: every guess says
 //! what speaks for it, what makes it doubtful and what was not taken; what says nothing is left
 //! out. How trains move ([`Guess::correct`]) has the last word about a unit that no name gives.
 //!
@@ -37,17 +37,17 @@ pub use problem::{GuessError, GuessProblem};
 
 use super::{Quantity, SourcePosition};
 
-/// Guesses the description of recordings that are laid out alike, and takes what is told for
+/// Guesses the description of recordings that are laid out alike, and takes what is declared for
 /// granted.
 ///
 /// # Errors
 ///
 /// Where a file is none that a dataset can have, or holds no time or no speed that can be
 /// recognised; with file, line and what was expected.
-pub fn guess(files: &[Recording], told: &[GivenColumn]) -> Result<Guess, GuessError> {
+pub fn guess(files: &[Recording], given: &[GivenColumn]) -> Result<Guess, GuessError> {
     let read = columns::Columns::read(files)?;
     let label = files.first().map_or("", |file| file.label);
-    let mut assignment = assignment::Assignment::new(&read, told, label)?;
+    let mut assignment = assignment::Assignment::new(&read, given, label)?;
     forces::settle(&mut assignment);
     for quantity in [Quantity::Time, Quantity::Speed] {
         if !assignment.has(quantity) {

@@ -22,7 +22,7 @@ pub struct UnitChoice {
     pub doubt: Option<String>,
 }
 
-/// Which figure of a column tells its unit.
+/// Which figure of a column reveals its unit.
 #[derive(Clone, Copy)]
 enum Measure {
     /// The greatest magnitude.
@@ -44,7 +44,7 @@ struct Usual {
     units: &'static [&'static str],
 }
 
-/// What is usual of a quantity; `None` where its values tell no unit.
+/// What is usual of a quantity; `None` where its values reveal no unit.
 fn usual(quantity: Quantity) -> Option<Usual> {
     use Measure::{Middle, Span, Step, Top};
     let usual = |measure, low, high, units| Some(Usual { measure, low, high, units });

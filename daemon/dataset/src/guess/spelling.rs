@@ -79,7 +79,7 @@ const FOREIGN: [&str; 21] = [
 ];
 
 /// The unit of a dimension that is spelled so. The dataset's own names come first, then case
-/// tells nothing apart (but mN is no MN).
+/// distinguishes nothing (but mN is no MN).
 pub fn find(dimension: Dimension, text: &str) -> Option<Spelled> {
     let text = text.trim();
     let plain = |unit: Unit| Some(Spelled { unit, scale: 1.0 });
@@ -95,7 +95,7 @@ pub fn find(dimension: Dimension, text: &str) -> Option<Spelled> {
         _ => {}
     }
     let exact = Unit::of(dimension).find(|unit| unit.name() == text);
-    // kN are no knots: capitals tell units of different things apart.
+    // kN are no knots: capitals distinguish units of different things.
     let has_capital = text.chars().any(char::is_uppercase);
     if exact.is_none() && has_capital && Unit::all().any(|unit| unit.name() == text) {
         return None;

@@ -46,7 +46,7 @@ fn mapped(guess: &Guess) -> Vec<(Quantity, &str, &str, f64)> {
     columns.map(|it| (it.quantity, it.name.text.as_str(), it.unit.name(), it.scale)).collect()
 }
 
-/// What a header of one name is taken for, beside time and speed.
+/// What a header of one name is taken for, besides time and speed.
 fn taken_for(name: &str, values: [f64; 3]) -> Option<(Quantity, &'static str)> {
     let [one, two, three] = values;
     let text = format!("time [s],{name},speed [m/s]\n0,{one},0\n1,{two},1\n2,{three},2\n");
@@ -292,15 +292,16 @@ fn what_lacks_time_or_speed_is_refused_with_what_comes_near() {
 fn what_is_reported_is_taken_for_granted() {
     let text = file("A,B,v", |row| [row[0], row[2] * 3.6, 7.0].map(|it| it.to_string()).to_vec());
     let kmh = dynocar_core::units::Unit::find(Speed.dimension(), "km/h");
-    let told = |quantity, column: &str, unit| GivenColumn { quantity, column: column.into(), unit };
+    let given =
+        |quantity, column: &str, unit| GivenColumn { quantity, column: column.into(), unit };
     let files = [Recording { label: "a.csv", text: &text }];
-    let all = [told(Time, "A", None), told(Speed, "B", kmh)];
+    let all = [given(Time, "A", None), given(Speed, "B", kmh)];
     let guessed = guess(&files, &all).unwrap();
     assert_eq!(mapped(&guessed), [(Time, "A", "s", 1.0), (Speed, "B", "km/h", 1.0)]);
-    let refused = |told: GivenColumn| guess(&files, &[told]).unwrap_err().to_string();
-    let message = refused(told(Time, "C", None));
+    let refused = |given: GivenColumn| guess(&files, &[given]).unwrap_err().to_string();
+    let message = refused(given(Time, "C", None));
     assert_eq!(message, "a.csv:1: no column 'C' for time; the columns: 'A', 'B', 'v'");
-    let message = refused(told(Time, "v", None));
+    let message = refused(given(Time, "v", None));
     assert!(message.contains("column 'v' cannot be time: its values do not grow"), "{message}");
 }
 

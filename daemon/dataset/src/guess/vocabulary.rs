@@ -239,7 +239,7 @@ pub const NOT_MEASURED: &[&str] = &[
     "hoechst",
 ];
 
-/// Words of what is told of a measurement instead of it.
+/// Words of what is said of a measurement instead of it.
 pub const ABOUT: &[&str] = &[
     "error", "quality", "status", "valid", "validity", "accuracy", "sigma", "stddev", "id", "name",
     "type", "number", "nr", "flag",

@@ -34,7 +34,7 @@ impl Log {
         Log { name: name.into(), logger, environment }
     }
 
-    /// Tells the simulator why a call was refused.
+    /// Reports to the simulator why a call was refused.
     pub(super) fn report(&self, words: &str) {
         let Some(logger) = self.logger else { return };
         // The message is a format, where these signs have a meaning of their own.
@@ -57,7 +57,7 @@ impl Log {
 
 const FAULT: &str = "a fault inside the FMU; its words went to standard error";
 
-/// Runs the body of an exported function on the model: a refusal is told and becomes an error, and
+/// Runs the body of an exported function on the model: a refusal is reported and becomes an error, and
 /// so does a panic, after which only a reset helps.
 ///
 /// # Safety

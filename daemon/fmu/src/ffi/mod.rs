@@ -1,7 +1,7 @@
 //! The functions that a simulator calls, by the FMI standard 2.0 for co-simulation.
 //!
 //! Thin on purpose: each function checks its pointers and calls the [`Model`](crate::Model) behind the
-//! instance. What is refused is told to the simulator's logger in words and answered by
+//! instance. What is refused is reported to the simulator's logger in words and answered by
 //! [`Status::Error`]; no panic crosses the boundary.
 //!
 //! # Layout

@@ -15,7 +15,7 @@ pub type Boolean = c_int;
 pub enum Status {
     /// All well.
     Ok = 0,
-    /// The call was refused; the logger was told why.
+    /// The call was refused; the logger was given the reason.
     Error = 3,
 }
 

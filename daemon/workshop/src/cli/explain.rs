@@ -31,9 +31,9 @@ use dynocar::output::{
 /// First line of a file with predictions.
 const PREDICTIONS_HEADER: &str = "time_s,speed_mps\n";
 /// Why nothing is grown from data that cannot be true.
-const IMPOSSIBLE: &str = "no grown model is written: the data cannot be true";
+const IMPOSSIBLE: &str = "no updated model is written: the data cannot be true";
 
-/// Find the effect that the model lacks, add it, report the error before and after.
+/// Find which effect the model lacks, add it, and report the error before and after.
 #[derive(Debug, Args)]
 pub struct ExplainArguments {
     /// The dataset's folder, or a recording
@@ -47,7 +47,7 @@ pub struct ExplainArguments {
     /// Write the speeds that the model with the effect predicts for the holdout runs
     #[arg(long, value_name = "DIR")]
     predictions: Option<PathBuf>,
-    /// Write the grown model, and a dataset of it and the runs, into this folder
+    /// Write the updated model, and a dataset of it and the runs, into this folder
     #[arg(long, value_name = "DIR")]
     grown: Option<PathBuf>,
     /// Write a report for people: one HTML page that needs nothing else
@@ -117,7 +117,7 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
     Ok(give(arguments.json.as_deref(), &explanation.answer, || text(&explanation.answer))?)
 }
 
-/// Explains the dataset at a path; `progress` is told how far that is, and may unwind to end it.
+/// Explains the dataset at a path; `progress` is given how far that is, and may unwind to end it.
 ///
 /// # Errors
 ///
@@ -174,7 +174,7 @@ fn unusable(path: &Path, dataset: &Dataset, error: RunDataError) -> Failure {
     Failure::At(SourcePosition::whole(&label), format!("{label}: {source}{notes}"))
 }
 
-/// Writes the grown model of the dataset at a path into a folder.
+/// Writes the updated model of the dataset at a path into a folder.
 ///
 /// # Errors
 ///
@@ -194,7 +194,7 @@ pub fn grow(
     })
 }
 
-/// Refuses a folder in which the files of a grown model would take the place of others.
+/// Refuses a folder in which the files of an updated model would take the place of others.
 fn require_growable(folder: &Path) -> Result<(), OutputError> {
     require_folder(folder)?;
     UPDATED_FILES.iter().try_for_each(|name| require_replaceable(&folder.join(name), UPDATED_MARK))
@@ -202,7 +202,7 @@ fn require_growable(folder: &Path) -> Result<(), OutputError> {
 
 fn report_updated(grown: &UpdatedFiles) {
     for file in &grown.files {
-        report_line(&format!("grown model: {}", file.display()));
+        report_line(&format!("updated model: {}", file.display()));
     }
     if !grown.not_expressed.is_empty() {
         let kinds = grown.not_expressed.join(", ");

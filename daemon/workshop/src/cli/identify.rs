@@ -22,7 +22,7 @@ use dynocar_analysis::identify::{
     default_estimators, identify, recommended_estimators, samples_of_runs,
 };
 
-/// Estimate resistance, mass, adhesion, friction from recorded runs, as the daemon.
+/// Estimate resistance, mass, adhesion and friction from recorded runs, as the daemon does live.
 #[derive(Debug, Args)]
 pub struct IdentifyArguments {
     /// The dataset's folder, or a recording
@@ -65,7 +65,7 @@ impl<'a> Asked<'a> {
         match (all, names) {
             (true, []) => Ok(Asked::All),
             (true, names) => Err(Failure::Input(format!(
-                "--all: expected no --estimator beside it, got {}",
+                "--all: expected no --estimator with it, got {}",
                 names.join(", ")
             ))),
             (false, []) => Ok(Asked::Recommended),
@@ -98,7 +98,7 @@ pub struct IdentifyAnswer {
     notes: Vec<Note>,
     /// From all runs, one after the other.
     estimators: Vec<EstimatorAnswer>,
-    /// Estimators beside the recommended ones, where nobody chose.
+    /// Estimators in addition to the recommended ones, where nobody chose.
     not_run: Vec<&'static str>,
     /// From each run alone.
     #[serde(skip_serializing_if = "Option::is_none")]

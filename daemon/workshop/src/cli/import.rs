@@ -36,7 +36,7 @@ pub struct ImportArguments {
     /// Which line, where the files hold several
     #[arg(long = "line", value_name = "ID")]
     line_id: Option<String>,
-    /// Share of the permitted load that is on the train, 0 to 1, where a file tells the load
+    /// Share of the permitted load that is on the train, 0 to 1, where a file gives the load
     #[arg(long, value_name = "SHARE", default_value = "0", value_parser = share)]
     load: f64,
     /// The mode of traction whose effort curve counts, where a file has several

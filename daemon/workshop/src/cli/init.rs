@@ -28,7 +28,7 @@ use dynocar::output::{print, require_folder, require_new, write_new_in_folder};
 use letters::Letters;
 
 const WRITER: &str = "dynocar init";
-/// Units that the values did not tell are set right so many times at most.
+/// Units that the values did not reveal are set right so many times at most.
 const CORRECTIONS_MAX: usize = 4;
 
 /// Writes the first description.
@@ -43,7 +43,7 @@ pub fn execute(arguments: &InitArguments) -> Result<(), Failure> {
     require_folder(folder)?;
     let with_dataset = !arguments.csv.is_empty();
     if !with_dataset && !arguments.column.is_empty() {
-        return Err(Failure::Input("--column: expected recordings beside it: --csv FILE".into()));
+        return Err(Failure::Input("--column: expected recordings with it: --csv FILE".into()));
     }
     let mut names = vec![TRAIN_FILE, DAEMON_FILE];
     names.extend(with_dataset.then_some(MANIFEST_FILE));

@@ -83,7 +83,7 @@ fn learn(arguments: &LearnArguments) -> Result<(), Failure> {
         let round =
             learner.round(SystemTime::now(), &|| stop.load(Ordering::Relaxed)).map_err(failure)?;
         write_report(report, &learner)?;
-        return Ok(print(&told(&round))?);
+        return Ok(print(&lines_of(&round))?);
     }
     let host = match &config.root {
         Some(root) => Host::at(root),
@@ -122,7 +122,7 @@ fn write_report(file: Option<&Path>, learner: &Learner) -> Result<(), Failure> {
 }
 
 /// A line for each train.
-fn told(round: &Round) -> String {
+fn lines_of(round: &Round) -> String {
     let mut text: String = round.trains.iter().map(of_train).collect();
     if round.is_stopped {
         text += "stopped before the end; what was not concluded is looked at again\n";

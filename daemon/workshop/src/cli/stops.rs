@@ -22,7 +22,7 @@ pub struct StopsArguments {
     /// Predict the next stop from this speed in m/s; may be given several times
     #[arg(long, value_name = "MPS", value_parser = positive)]
     from: Vec<f64>,
-    /// How well stops repeat, as relative standard deviation, until enough of them tell
+    /// How well stops repeat, as relative standard deviation, until enough of them show it
     #[arg(long, value_name = "SHARE", default_value = "0.03", value_parser = share)]
     repeatability: f64,
     /// Least share of the declared brake effort that counts as applied
@@ -86,7 +86,7 @@ pub fn execute(arguments: &StopsArguments) -> Result<(), Failure> {
         let why = match &study.law {
             Some(law) if law.stopping_distance(*speed_mps).is_some() => continue,
             Some(law) => format!(
-                "--from {speed_mps}: the stops were seen from {:.1} m/s down; nothing is told of faster ones",
+                "--from {speed_mps}: the stops were seen from {:.1} m/s down; nothing is reported of faster ones",
                 law.fastest_mps()
             ),
             None => format!("--from {speed_mps}: no run to fit holds a stop by all of the brake"),
@@ -104,7 +104,7 @@ fn text(answer: &StopsAnswer) -> String {
     if let Some(law) = &study.law {
         text += &of_the_brake(study, law);
     }
-    text += "\nnot told by these data\n";
+    text += "\nnot determined by these data\n";
     for line in &study.cannot_tell {
         text += &format!("  {line}\n");
     }

@@ -96,7 +96,7 @@ fn summary(answer: &SurveyAnswer) -> String {
         }
     }
     for open in &answer.cannot_tell {
-        text += &format!("these recordings cannot tell {open}\n");
+        text += &format!("these recordings do not determine {open}\n");
     }
     text + "± is the half width of the 95 % interval\n"
 }

@@ -134,24 +134,24 @@ impl TrainArguments {
     /// # Errors
     ///
     /// What no train has, in words.
-    pub fn told(&self, key: &str, answer: &str) -> Result<Self, String> {
-        let mut told = self.clone();
+    pub fn with_answer(&self, key: &str, answer: &str) -> Result<Self, String> {
+        let mut answered = self.clone();
         match key {
-            "name" => told.name = Some(answer.into()),
+            "name" => answered.name = Some(answer.into()),
             "cars" => {
                 let cars = answer.parse().map_err(|_| format!("{answer}: expected a number"))?;
-                told.cars = Some(cars);
+                answered.cars = Some(cars);
             }
             key => {
                 let number = answer.replace(',', ".").parse();
                 let number = number.map_err(|_| format!("{answer}: expected a number"))?;
-                if let Some(figure) = told.figure(key) {
+                if let Some(figure) = answered.figure(key) {
                     *figure = Some(number);
                 }
             }
         }
-        match told.text("", &Found::default()) {
-            Ok(_) => Ok(told),
+        match answered.text("", &Found::default()) {
+            Ok(_) => Ok(answered),
             Err(failure) => Err(failure.answer().map(|it| it.message).unwrap_or_default()),
         }
     }
@@ -228,7 +228,7 @@ const CURVES: &str = "\
 
 const TRACTION: &str = "
 # The greatest force over the speed: [speed in m/s, force in kN]. With it, handles of 0 to 1 can be
-# read as forces, and units that cannot be are told.
+# read as forces, and units that cannot be are reported.
 # [traction]
 # effort = [[0.0, 200.0], [15.0, 200.0], [45.0, 70.0]]
 ";

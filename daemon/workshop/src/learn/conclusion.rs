@@ -51,14 +51,14 @@ pub struct Conclusion<'a> {
     pub pool: &'a Pool,
     /// What was made of them.
     pub explanation: &'a Explanation,
-    /// The command, as the origin of a model tells it.
+    /// The command, as the origin of a model names it.
     pub command: &'a str,
     /// When it is.
     pub now: Moment,
 }
 
 impl Conclusion<'_> {
-    /// Puts into the store what an explanation tells and the store does not hold yet.
+    /// Puts into the store what an explanation says and the store does not hold yet.
     ///
     /// # Errors
     ///
@@ -101,7 +101,7 @@ impl Conclusion<'_> {
         });
         match same {
             Some(stored) => {
-                info!(train = models.train().0, "found again, told before: {}", stored.hash);
+                info!(train = models.train().0, "found again, reported before: {}", stored.hash);
                 explained.same_as = Some(stored.hash);
             }
             None => {
@@ -157,18 +157,18 @@ impl Conclusion<'_> {
     }
 }
 
-/// Writes an event down unless every run of it was told of before; what is told again is left out.
+/// Writes an event down unless every run of it was reported before; what is reported again is left out.
 fn put_event(models: &TrainModels, mut event: MaintenanceEvent) -> Result<Option<u64>, LearnError> {
     let known = models.events()?;
     let is_known = |window: &EventWindow| {
         let same_kind = known.iter().filter(|(_, other)| other.kind == event.kind);
         same_kind.flat_map(|(_, other)| &other.windows).any(|it| it.sha256 == window.sha256)
     };
-    let (told, new): (Vec<_>, Vec<_>) = event.windows.iter().cloned().partition(is_known);
+    let (known_windows, new): (Vec<_>, Vec<_>) = event.windows.iter().cloned().partition(is_known);
     if new.is_empty() {
         return Ok(None);
     }
-    if !told.is_empty() {
+    if !known_windows.is_empty() {
         event.windows = new;
         event.sentence = sentence(&event);
     }

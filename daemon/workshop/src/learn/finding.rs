@@ -1,5 +1,5 @@
 //! What an explanation means for the store: effects of the train or the line make a candidate, effects of
-//! certain runs are events, and what the data do not tell is an open question.
+//! certain runs are events, and what the data do not determine is an open question.
 
 use std::collections::BTreeMap;
 
@@ -71,7 +71,7 @@ pub fn is_event(effect: &EffectAnswer, not_expressed: &[String]) -> bool {
             || effect.parameters.values().any(by_run))
 }
 
-/// True for an event that is told at once or is over: other kinds that act in the newest of the fit runs
+/// True for an event that is reported at once or is over: other kinds that act in the newest of the fit runs
 /// may be about to last, and are looked at again when there are newer ones.
 pub fn is_to_be_reported(event: &MaintenanceEvent, explanation: &Explanation) -> bool {
     let newest = explanation.problem.runs.last().map(|run| run.file.as_str());
@@ -182,7 +182,7 @@ pub fn sentence(event: &MaintenanceEvent) -> String {
     if sizes.is_empty() { text } else { format!("{text}: {}", sizes.join(", ")) }
 }
 
-/// What the runs do not tell; `None` where they tell enough.
+/// What the runs do not determine; `None` where they determine enough.
 pub fn question(
     answer: &ExplainAnswer,
     train: TrainId,

@@ -37,7 +37,7 @@ pub struct LearnerSettings {
     pub trains: Vec<(TrainId, ModelText)>,
     /// Bounds of what is explained together.
     pub bounds: Bounds,
-    /// The command, as the origin of a model tells it.
+    /// The command, as the origin of a model names it.
     pub command: String,
 }
 
@@ -159,11 +159,11 @@ impl Learner {
         if let Some(since) = since_adopted(&models)? {
             runs.retain(|run| run.recorded >= since);
         }
-        let told = |outcome| TrainRound { train, in_force, runs: runs.len(), outcome };
+        let round_of = |outcome| TrainRound { train, in_force, runs: runs.len(), outcome };
         let choices = pool::choices(&runs, &bounds);
         let digest = digest(in_force, &choices);
         if self.memory.explained.get(&train.to_string()) == Some(&digest) {
-            return Ok(Some(told(Outcome::NothingNew)));
+            return Ok(Some(round_of(Outcome::NothingNew)));
         }
         let outcome = match self.explained(&models, in_force, &choices, now, stop)? {
             Some(outcome) => outcome,
@@ -171,7 +171,7 @@ impl Learner {
         };
         self.memory.explained.insert(train.to_string(), digest);
         self.memory.save(&self.own)?;
-        Ok(Some(told(outcome)))
+        Ok(Some(round_of(outcome)))
     }
 
     /// The model in force; what the configuration declares is put into the store, so that what grows from
@@ -188,7 +188,7 @@ impl Learner {
         Ok(models.put_declared(declared, now)?)
     }
 
-    /// Explains one choice of runs after the other until one tells an effect.
+    /// Explains one choice of runs after the other until one shows an effect.
     fn explained(
         &mut self,
         models: &TrainModels,
@@ -241,7 +241,7 @@ impl Learner {
     }
 }
 
-/// Explains a pool; a run that cannot be used is told once and left out. `None` where too few are left.
+/// Explains a pool; a run that cannot be used is reported once and left out. `None` where too few are left.
 fn explain_pool(
     mut pool: Pool,
     memory: &mut Memory,

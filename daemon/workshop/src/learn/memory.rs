@@ -15,7 +15,7 @@ use dynocar::state::{StateError, file};
 const FILE: &str = "learn.state";
 /// Files that are remembered; more are hashed anew in each round.
 const FILES_MAX: usize = 2000;
-/// Problems and questions that are remembered; more are told again.
+/// Problems and questions that are remembered; more are reported again.
 const REPORTED_MAX: usize = 400;
 
 /// A file whose content is known.
@@ -29,7 +29,7 @@ pub struct KnownFile {
     pub sha256: String,
 }
 
-/// What recorded runs do not tell, with what would.
+/// What recorded runs do not determine, with what would.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct OpenQuestion {
     /// The train.
@@ -68,13 +68,13 @@ pub struct Memory {
     /// Digest of what was explained last, by train.
     #[serde(default)]
     pub explained: BTreeMap<String, String>,
-    /// What was told to be open.
+    /// What was reported as open.
     #[serde(default)]
     pub open: Vec<OpenQuestion>,
 }
 
 impl Memory {
-    /// The memory in a folder. One that is damaged is told of and begun anew.
+    /// The memory in a folder. One that is damaged is reported and begun anew.
     pub fn load(folder: &Path) -> Self {
         let path = folder.join(FILE);
         let read = |text: String| {

@@ -54,7 +54,7 @@ pub struct Pool {
     pub runs: Vec<FoundRun>,
 }
 
-/// The choices of runs that are explained, one after the other until one tells an effect: the recent ones, in
+/// The choices of runs that are explained, one after the other until one shows an effect: the recent ones, in
 /// which something new shows undiluted, then these with a sample of all before.
 pub fn choices(runs: &[FoundRun], bounds: &Bounds) -> Vec<Vec<FoundRun>> {
     let Some(newest) = runs.last() else { return Vec::new() };
@@ -63,7 +63,7 @@ pub fn choices(runs: &[FoundRun], bounds: &Bounds) -> Vec<Vec<FoundRun>> {
     let (older, recent) = runs.split_at(begin);
     let recent = &recent[recent.len().saturating_sub(bounds.runs)..];
     let mut choices = vec![recent.to_vec()];
-    // A quarter is for the older ones in any case: they tell what is new.
+    // A quarter is for the older ones in any case: they show what is new.
     let own = recent.len().min(bounds.runs - bounds.runs / 4);
     let places = spread(older.len(), bounds.runs - own);
     if !places.is_empty() {
@@ -80,7 +80,7 @@ fn spread(length: usize, most: usize) -> BTreeSet<usize> {
     (0..count).map(|k| (2 * k + 1) * length / (2 * count)).collect()
 }
 
-/// Reads runs under a model, the newest first until the bounds are reached; what cannot be read is told once
+/// Reads runs under a model, the newest first until the bounds are reached; what cannot be read is reported once
 /// and left out. `None` where fewer than two are left: one to fit, one to judge.
 pub fn read(
     chosen: &[FoundRun],

@@ -57,7 +57,7 @@ pub struct Places<'a> {
     pub runs: &'a Path,
     /// The learner's own folder.
     pub own: &'a Path,
-    /// All trains, by which folders are told apart.
+    /// All trains, by which folders are distinguished.
     pub trains: &'a [TrainId],
 }
 
@@ -146,7 +146,7 @@ fn is_of(train: TrainId, path: &Path, places: Places) -> bool {
     }
 }
 
-/// The runs of a dataset; none of one that cannot be read, which is told once.
+/// The runs of a dataset; none of one that cannot be read, which is reported once.
 fn runs_in(
     folder: &Path,
     name: &str,
@@ -182,7 +182,7 @@ fn runs_in(
     runs
 }
 
-/// Tells why something is not used, once for each content.
+/// Reports why something is not used, once for each content.
 pub fn report_unusable(memory: &mut Memory, sha256: &str, problem: &str) {
     if memory.unusable.insert(sha256.to_owned(), problem.to_owned()).is_none() {
         warn!("left out: {problem}");

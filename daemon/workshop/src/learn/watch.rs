@@ -85,19 +85,19 @@ impl Suspicions {
     }
 }
 
-/// Runs rounds until it is told to stop; `told` is called after each.
+/// Runs rounds until it is asked to stop; `after_round` is called after each.
 ///
-/// A round that fails is told of, and the next may not fail.
+/// A round that fails is reported, and the next may not fail.
 ///
 /// # Errors
 ///
-/// Only those of `told`.
+/// Only those of `after_round`.
 pub fn watch<E>(
     learner: &mut Learner,
     suspicions: &mut [Suspicions],
     at: Option<TimeOfDay>,
     stop: &AtomicBool,
-    told: &mut dyn FnMut(&Learner, &Round) -> Result<(), E>,
+    after_round: &mut dyn FnMut(&Learner, &Round) -> Result<(), E>,
 ) -> Result<(), E> {
     let is_stopped = || stop.load(Ordering::Relaxed);
     let mut is_due = true;
@@ -123,7 +123,7 @@ pub fn watch<E>(
             let round = learner.round(SystemTime::now(), &is_stopped);
             learned = Instant::now();
             match round {
-                Ok(round) => told(learner, &round)?,
+                Ok(round) => after_round(learner, &round)?,
                 Err(error) => warn!("a round of learning failed, the next may not: {error}"),
             }
         }

@@ -38,7 +38,7 @@
     const half = halves && place ? ` ± ${shown(valueAt(halves, place), halves.digits)}` : "";
     return `${name}: ${shown(valueAt(values, place), values.digits)}${half}${unit && ` ${unit}`}`;
   };
-  // Points beside a line are told with where they are.
+  // Points beside a line are shown with where they are.
   const linesOf = (chart, x, leading) => {
     const place = placeAmong(chart, x);
     const where = chart.points && !leading.points
@@ -223,7 +223,7 @@
   if (figures.length > 0) {
     const hint = document.createElement("p");
     hint.className = "note hint";
-    hint.textContent = "Plots tell their values at the pointer. Drag across one to zoom, double click to see the "
+    hint.textContent = "Plots show their values at the pointer. Drag across one to zoom, double click to see the "
       + "whole again; with the keyboard: arrows, + and −, Escape.";
     figures[0].closest("section").querySelector("h2").after(hint);
   }

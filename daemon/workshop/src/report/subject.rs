@@ -1,4 +1,4 @@
-//! What a page tells of, and why it cannot be made.
+//! What a page is about, and why it cannot be made.
 
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::Explanation;
@@ -20,7 +20,7 @@ pub enum ReportError {
     },
 }
 
-/// Everything that the page tells of.
+/// Everything that the page is about.
 pub struct Subject<'a> {
     /// The dataset.
     pub dataset: &'a Dataset,

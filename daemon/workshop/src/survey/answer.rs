@@ -16,10 +16,10 @@ pub struct SurveyAnswer {
     pub trips: Vec<TripAnswer>,
     /// What is no trip.
     pub not_used: Vec<NotUsedAnswer>,
-    /// What was learned beside the line; absent on a known line.
+    /// What was learned jointly with the line; absent on a known line.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub learned: Option<LearnedAnswer>,
-    /// What these recordings cannot tell.
+    /// What these recordings do not determine.
     pub cannot_tell: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! Raw recordings to a dataset on a surveyed line: reading, writing and telling.
+//! Raw recordings to a dataset on a surveyed line: reading, writing and reporting.
 //!
 //! - [`read`]: a dataset's runs as recordings; a line that was surveyed before
 //! - [`write`](mod@write), [`trip_rows`]: the dataset folder with its trips

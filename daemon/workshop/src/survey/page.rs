@@ -50,11 +50,11 @@ pub fn html(
         }
         section("profile", "Gradient, with its 95 % band", body);
     }
-    section("learned", "What was learned beside it", learned(answer));
+    section("learned", "What was learned jointly with it", learned(answer));
     section("stops", "Stops, and how they repeat", stops(answer));
     section("trips", "Trips", trips(answer));
     section("not-used", "Not used", not_used(answer));
-    section("open", "What these recordings cannot tell", open(answer));
+    section("open", "What these recordings do not determine", open(answer));
     Ok(document(&format!("{name} – survey"), &header, &main, made))
 }
 

@@ -34,7 +34,7 @@ const RELEASE_PA: [f64; 2] = [17e3, 25e3];
 pub fn check(report: &mut Report, folder: &Path) {
     let whole = surveyed(&folder.join("dataset-raw.toml"));
     report.note(
-        "bus: what is learned beside the line",
+        "bus: what is learned jointly with the line",
         whole.as_ref().map_err(Clone::clone).and_then(learned),
     );
     let outcome = whole.and_then(|answer| left_out(folder, &answer));
@@ -54,9 +54,9 @@ pub fn check(report: &mut Report, folder: &Path) {
     );
     let climbs = outcome.as_ref().map_err(Clone::clone).and_then(|it| found_to_climb(&it.level));
     report.note("bus: its line declared level", climbs);
-    for (place, (told, ..)) in WAYS.iter().enumerate() {
+    for (place, (label, ..)) in WAYS.iter().enumerate() {
         let masses = outcome.as_ref().map_err(Clone::clone).map(|it| &it.masses[place]);
-        report.note(told, masses.and_then(held));
+        report.note(label, masses.and_then(held));
     }
 }
 

@@ -28,7 +28,7 @@ pub struct OtherDay {
     together_mps: f64,
 }
 
-/// What the power of six trips tells, and how it fares on the two left out.
+/// What the power of six trips shows, and how it fares on the two left out.
 #[derive(Clone, Copy, Debug)]
 pub struct ByPower {
     efficiency: WithStd,
@@ -59,9 +59,9 @@ pub fn other_days(pairs: &[OtherDay]) -> Result<String, String> {
 pub fn powers(pairs: &[ByPower]) -> Result<String, String> {
     let apart = root_mean_square(pairs.iter().map(|it| it.apart));
     let error_mps = root_mean_square(pairs.iter().map(|it| it.error_mps));
-    let told = |it: WithStd| format!("{:.3} ± {:.3}", it.value, 1.96 * it.std);
-    let efficiencies: Vec<String> = pairs.iter().map(|it| told(it.efficiency)).collect();
-    let kw: Vec<String> = pairs.iter().map(|it| told(it.auxiliaries_kw)).collect();
+    let estimated = |it: WithStd| format!("{:.3} ± {:.3}", it.value, 1.96 * it.std);
+    let efficiencies: Vec<String> = pairs.iter().map(|it| estimated(it.efficiency)).collect();
+    let kw: Vec<String> = pairs.iter().map(|it| estimated(it.auxiliaries_kw)).collect();
     let words = format!(
         "efficiency {}, auxiliaries {} kW, {:.1} % of the recorded force apart, {error_mps:.3} m/s",
         efficiencies.join(", "),
@@ -118,7 +118,7 @@ pub fn of_another_day(
     Ok(OtherDay { apart_mps, together_mps })
 }
 
-/// Takes the force of a surveyed dataset from the power that is recorded beside it.
+/// Takes the force of a surveyed dataset from the power that is recorded with it.
 pub fn by_power(surveyed: &Path) -> Result<ByPower, String> {
     let words = |error: std::io::Error| error.to_string();
     let folder = tempfile::tempdir().map_err(words)?;
@@ -128,11 +128,11 @@ pub fn by_power(surveyed: &Path) -> Result<ByPower, String> {
     let without: Vec<&str> = without.collect();
     std::fs::write(folder.path().join("dataset.toml"), without.join("\n")).map_err(words)?;
     let (recorded, powered) = (loaded(surveyed)?, loaded(folder.path())?);
-    let told = drive::told(&powered).map_err(|error| error.to_string())?.ok_or("no power")?;
-    let apart = apart(&recorded, &powered.with_drive(told.drive))?;
+    let estimated = drive::told(&powered).map_err(|error| error.to_string())?.ok_or("no power")?;
+    let apart = apart(&recorded, &powered.with_drive(estimated.drive))?;
     let error_mps = held_out_mps(&powered)?;
-    let auxiliaries_kw = told.answer.auxiliary_power_kw.ok_or("no auxiliaries")?;
-    Ok(ByPower { efficiency: told.answer.efficiency, auxiliaries_kw, apart, error_mps })
+    let auxiliaries_kw = estimated.answer.auxiliary_power_kw.ok_or("no auxiliaries")?;
+    Ok(ByPower { efficiency: estimated.answer.efficiency, auxiliaries_kw, apart, error_mps })
 }
 
 /// Root mean square difference of the control forces of the runs held out, as a share of that of the

@@ -11,7 +11,7 @@ use dynocar_shared::{
 
 /// A standstill of so many s is a stop.
 const STOP_S: f64 = 5.0;
-/// A section that moves for less than this in s tells little.
+/// A section that moves for less than this in s shows little.
 const MOVING_MIN_S: f64 = 20.0;
 /// A slower vehicle stands.
 const STANDING_MPS: f64 = 0.3;
@@ -65,7 +65,7 @@ impl Masses {
         let normalised = mean(&|it| ((it.learned_t - it.counted_t) / it.std_t).powi(2)).sqrt();
         let words = format!(
             "{scatter_t:.3} t, correlation {correlation:.3}, offset {:.3} t, {normalised:.1} of its \
-             own deviations, {} sections, nothing said of {}",
+             own standard deviations, {} sections, nothing said of {}",
             learned - counted,
             self.pairs.len(),
             self.silent

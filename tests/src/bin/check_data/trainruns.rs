@@ -35,7 +35,7 @@ pub struct TheirTrain {
     speed_max_mps: f64,
 }
 
-/// Their trains, as their results tell them.
+/// Their trains, as their results give them.
 pub const TRAINS: [TheirTrain; 3] = [
     TheirTrain {
         name: "freight",

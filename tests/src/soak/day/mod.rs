@@ -76,7 +76,7 @@ struct Day<'a> {
 /// # Panics
 ///
 /// When memory grows, a sample is not accounted for, a state is not whole, a full disk or an old
-/// state is not told, or the daemon does not go on.
+/// state is not reported, or the daemon does not go on.
 pub fn run(programs: &Programs, hours: usize, seed: u64) -> Vec<Hour> {
     let mut day = Day::new(programs, seed);
     let mut rows = vec![Hour::default(); hours];

@@ -29,7 +29,7 @@ impl StrangeHost {
         let status = command.arg(&library).arg(&source).arg("-ldl").status().expect("a C compiler");
         assert!(status.success(), "the strange host does not compile");
         let path = site.join("strange_host");
-        let control = File::create(&path).expect("a file that tells how strange the host is");
+        let control = File::create(&path).expect("a file that says how strange the host is");
         let folder = folder.canonicalize().expect("a folder");
         let text = |path: &Path| path.to_str().expect("a UTF-8 path").to_owned();
         let host = StrangeHost {

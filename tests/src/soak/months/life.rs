@@ -29,7 +29,7 @@ const DAY_S: u64 = 86_400;
 const MADE: Moment = Moment { unix_s: FIRST_DAY_S };
 /// The learner looks at least so often, in days.
 const LEARNS_EVERY: usize = 7;
-/// Days after an adoption over which both models' errors tell whether it was right.
+/// Days after an adoption over which both models' errors show whether it was right.
 const JUDGED_DAYS: i64 = 5;
 
 /// One train with its world, its store and its learner.
@@ -223,7 +223,7 @@ fn put_others(models: &TrainModels, train: &TrainConfig, declared: ModelHash) {
     }
 }
 
-/// A dataset of some runs; nothing in it tells of the truth.
+/// A dataset of some runs; nothing in it reveals the truth.
 fn dataset_of(world: &World, runs: Vec<crate::simulator::SimulatedRun>) -> SimulatedDataset {
     SimulatedDataset {
         settings: world.settings.clone(),

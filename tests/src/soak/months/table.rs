@@ -17,7 +17,7 @@ pub struct Adoption {
     pub is_rollback: bool,
     /// What the model in force after adds to its parent.
     pub adds: String,
-    /// Whether it predicted the following days better than the one before; `None` where nothing tells.
+    /// Whether it predicted the following days better than the one before; `None` where nothing shows it.
     pub is_right: Option<bool>,
 }
 

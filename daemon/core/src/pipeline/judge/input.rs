@@ -48,7 +48,7 @@ impl InputHealth {
         outcome
     }
 
-    /// Takes in what became of a sample that tells nothing, and gives it back: one at a standstill
+    /// Takes in what became of a sample that shows nothing, and gives it back: one at a standstill
     /// counts neither way.
     pub fn passed(&mut self, outcome: Outcome, sample: &ResolvedSample) -> Outcome {
         if outcome == Outcome::Used { outcome } else { self.note(outcome, sample) }

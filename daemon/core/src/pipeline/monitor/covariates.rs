@@ -15,7 +15,7 @@ pub type Covariates = SVector<f64, COVARIATES>;
 /// A longer gap in s between two samples is the start of a new run.
 const RUN_GAP_S: f64 = 900.0;
 
-/// Tells one run from the next.
+/// Separates one run from the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RunClock {
     last_ns: Option<i64>,

@@ -271,8 +271,8 @@ impl ResidualMonitor {
         });
         self.note_since();
         let suspect = self.verdict.naming().parameter();
-        let beside = suspect.filter(|&parameter| parameter >= BASE);
-        let believed = base.believed(beside.map(|it| (it, suspect_of(it).prior_std)));
+        let suspect_given = suspect.filter(|&parameter| parameter >= BASE);
+        let believed = base.believed(suspect_given.map(|it| (it, suspect_of(it).prior_std)));
         self.model = believed.values;
         let davis = (self.declared_base + self.model.fixed_rows::<BASE>(0))
             .fixed_rows::<DAVIS>(0)

@@ -16,9 +16,9 @@ use crate::filter::NotPositiveDefinite;
 /// One value for each parameter of the base model.
 pub type BaseVector = SVector<f64, BASE>;
 type BaseMatrix = SMatrix<f64, BASE, BASE>;
-/// Parameters beside the base model.
-const BESIDE: usize = PARAMETERS - BASE;
-type BesideVector = SVector<f64, BESIDE>;
+/// Parameters in addition to the base model.
+const SUSPECTS: usize = PARAMETERS - BASE;
+type SuspectVector = SVector<f64, SUSPECTS>;
 
 /// All rows, condensed.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,21 +38,21 @@ pub struct BaseSolution {
     /// L⁻¹ of the right side.
     reduced: BaseVector,
     /// L⁻¹ of the suspects' columns, transposed.
-    columns: SMatrix<f64, BESIDE, BASE>,
+    columns: SMatrix<f64, SUSPECTS, BASE>,
     /// Schur complements of the suspects.
-    own: BesideVector,
+    own: SuspectVector,
     /// Their right sides.
-    rest: BesideVector,
+    rest: SuspectVector,
     prior_variance: BaseVector,
 }
 
-/// What is believed: the base model, and a suspect beside it.
+/// What is believed: the base model, and a suspect jointly with it.
 #[derive(Clone, Debug)]
 pub struct Believed<'a> {
     /// All parameters.
     pub values: Parameters,
     base: &'a BaseSolution,
-    /// The suspect's place beside the base model, and its variance.
+    /// The suspect's index next to the base model, and its variance.
     suspect: Option<(usize, f64)>,
 }
 
@@ -106,8 +106,8 @@ impl BaseSolution {
         let precision = own + 1.0 / prior;
         let cost = (own * prior).ln_1p();
         let ratio = side * side * (1.0 / precision - variance).max(0.0);
-        let beside = (ratio, cost - (own * usual).ln_1p());
-        (Alternative { value: side / precision, precision, cost }, beside)
+        let given_other = (ratio, cost - (own * usual).ln_1p());
+        (Alternative { value: side / precision, precision, cost }, given_other)
     }
 
     /// L⁻¹ of a column.
@@ -133,7 +133,7 @@ impl BaseSolution {
         column
     }
 
-    /// A suspect beside the base model.
+    /// A suspect given the base model.
     pub fn alternative(&self, parameter: usize, prior_std: f64) -> Alternative {
         let place = parameter - BASE;
         Alternative::of(self.own[place], self.rest[place], prior_std)
@@ -229,11 +229,11 @@ impl Information {
             matrix[(i, i)] += self.base_precision[i];
         }
         let factor = matrix.cholesky().ok_or(NotPositiveDefinite)?.unpack();
-        let mut columns: SMatrix<f64, BESIDE, BASE> =
-            self.matrix.fixed_view::<BESIDE, BASE>(BASE, 0).into_owned();
+        let mut columns: SMatrix<f64, SUSPECTS, BASE> =
+            self.matrix.fixed_view::<SUSPECTS, BASE>(BASE, 0).into_owned();
         let mut reduced: BaseVector = self.side.fixed_rows::<BASE>(0).into_owned();
-        let mut own = BesideVector::from_fn(|i, _| self.matrix[(BASE + i, BASE + i)]);
-        let mut rest: BesideVector = self.side.fixed_rows::<BESIDE>(BASE).into_owned();
+        let mut own = SuspectVector::from_fn(|i, _| self.matrix[(BASE + i, BASE + i)]);
+        let mut rest: SuspectVector = self.side.fixed_rows::<SUSPECTS>(BASE).into_owned();
         for k in 0..BASE {
             for before in 0..k {
                 let share = -factor[(k, before)];
@@ -252,7 +252,7 @@ impl Information {
         Ok(BaseSolution { factor, reduced, columns, own, rest, prior_variance })
     }
 
-    /// A suspect beside the base model and another suspect, both as free as their priors let them be.
+    /// A suspect given the base model and another suspect, both as free as their priors let them be.
     pub fn beyond_another(
         &self,
         base: &BaseSolution,
@@ -292,9 +292,9 @@ mod tests {
         }
         let base = information.base().unwrap();
         let alone = base.alternative(two, 1.0);
-        let beside = information.beyond_another(&base, (one, 1.0), (two, 1.0));
+        let given_other = information.beyond_another(&base, (one, 1.0), (two, 1.0));
         assert!(alone.beyond(0.0) > 100.0, "{alone:?}");
-        assert!(beside.beyond(0.0) < 0.05 * alone.beyond(0.0), "{beside:?}");
+        assert!(given_other.beyond(0.0) < 0.05 * alone.beyond(0.0), "{given_other:?}");
         // The same by solving both at once.
         let matrix = nalgebra::Matrix3::from_fn(|i, j| {
             let place = [0, one, two];
@@ -302,7 +302,7 @@ mod tests {
         });
         let side = nalgebra::Vector3::from_fn(|i, _| information.side[[0, one, two][i]]);
         let both = matrix.try_inverse().unwrap() * side;
-        assert!((both[2] - beside.value).abs() < 1e-9, "{both} {beside:?}");
+        assert!((both[2] - given_other.value).abs() < 1e-9, "{both} {given_other:?}");
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! forces, as in [`crate::pipeline::resistance`]. Each suspect adds one column: what one unit of
 //! it would take off the momentum. All columns go through one whitener and into one information
 //! matrix, from which the likelihood ratio of every suspect against the base model follows at
-//! any time, a, b and c being refitted together with it. The way by position against the way by
+//! any time, a, b and c being refitted together with it. The distance by position against the distance by
 //! speed adds the wheels' diameter.
 //!
 //! # Layout, in the order a sample takes
@@ -16,7 +16,7 @@
 //! - `onsets`: since when a brake may drag
 //! - `information`: the likelihood ratios
 //! - `verdict`: what speaks for each of them
-//! - `naming`: who is suspected, what is hardly told from it, and when it has ended
+//! - `naming`: who is suspected, what is hardly distinguishable from it, and when it has ended
 //! - `estimator`: the pipeline around all of it
 
 mod covariates;

@@ -9,7 +9,7 @@ use crate::pipeline::resistance::regression::FORCE_DELAY;
 
 /// A named suspect stays until its evidence is below this share of what named it.
 const STAYS_SHARE: f64 = 0.5;
-/// Another suspect takes over when its evidence is greater by this; below it, the two are told as
+/// Another suspect takes over when its evidence is greater by this; below it, the two are reported as
 /// alternatives.
 const TAKES_OVER_BY: f64 = 5.0;
 /// Blocks in a row for which evidence must last.
@@ -41,7 +41,7 @@ pub struct Named {
     candidate: Option<usize>,
     /// Evidence less what the search costs.
     pub evidence: f64,
-    /// Bits of the effects that are hardly told from it.
+    /// Bits of the effects that are hardly distinguishable from it.
     pub alternatives: u32,
 }
 
@@ -59,13 +59,13 @@ pub struct Standing<'a> {
     pub net: &'a [f64; CANDIDATES],
     /// Evidence for each by all that was seen, by which they are compared.
     pub rank: &'a [f64; CANDIDATES],
-    /// Evidence for a law of the speed beside the effect that is named.
+    /// Evidence for a law of the speed given the effect that is named.
     pub left_by_name: f64,
     /// Statistics of the innovations without outliers.
     pub cut_innovations: &'a InnovationMonitor,
     /// Since when brakes may drag.
     pub onsets: &'a Onsets,
-    /// True where no earlier pass tells what the place does.
+    /// True where no earlier pass shows what the location does.
     pub is_new_place: bool,
     /// True while released brakes hold pressure.
     pub is_pressure_raised: bool,
@@ -167,13 +167,13 @@ impl Naming {
             self.ending = 0.0;
         }
         self.named = match chosen {
-            Some(candidate) => Some(self.told(candidate, least, standing)),
+            Some(candidate) => Some(self.named_from(candidate, least, standing)),
             None => self.unknown(standing),
         };
     }
 
-    /// A candidate as it is told.
-    fn told(&self, candidate: usize, least: f64, standing: &Standing) -> Named {
+    /// A candidate as it is reported.
+    fn named_from(&self, candidate: usize, least: f64, standing: &Standing) -> Named {
         let effect = effect_of(candidate);
         let mut bits = alternatives(candidate, least, standing);
         let is_a_brake = effect == EffectKind::DraggingBrake && !standing.is_pressure_raised;
@@ -206,7 +206,7 @@ impl Naming {
         }
     }
 
-    /// Innovations larger than small things explain, and no suspect; what earlier stretches spoke for
+    /// Innovations larger than small things explain, and no suspect; what earlier segments spoke for
     /// may be behind it, or a place that was never passed.
     fn unknown(&self, standing: &Standing) -> Option<Named> {
         let evidence = self.unexplained(standing)?;
@@ -238,7 +238,7 @@ fn bits_of(is_so: impl Fn(usize) -> bool) -> u32 {
     so.fold(0, |bits, candidate| bits | effect_of(candidate).bit())
 }
 
-/// The effects that are hardly told from the chosen one: by their evidence, or by what they are.
+/// The effects that are hardly distinguishable from the chosen one: by their evidence, or by what they are.
 fn alternatives(chosen: usize, least: f64, standing: &Standing) -> u32 {
     let Standing { net, rank, .. } = *standing;
     let effect = effect_of(chosen);
@@ -246,7 +246,7 @@ fn alternatives(chosen: usize, least: f64, standing: &Standing) -> u32 {
     let is_likely = |other: usize| net[other] > least || rank[other] > 0.0;
     let is_close = |other: usize| is_likely(other) && rank[other] > rank[chosen] - TAKES_OVER_BY;
     let bits = bits_of(is_close) & !effect.bit();
-    // A profile that is moved is one that is wrong; `explain` tells the two apart.
+    // A profile that is moved is one that is wrong; `explain` distinguishes the two.
     let alike =
         if effect == EffectKind::GradientError { EffectKind::GradientShift.bit() } else { 0 };
     bits | alike

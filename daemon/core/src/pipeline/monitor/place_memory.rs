@@ -62,8 +62,8 @@ impl PlaceMemory {
         let (place, index) = place(position_m);
         let cell = &self.cells[place];
         match cell.index == index {
-            true if cell.pass == self.pass => told(&cell.earlier, direction),
-            true => told(&cell.with_pass_closed().earlier, direction),
+            true if cell.pass == self.pass => mean_of_both(&cell.earlier, direction),
+            true => mean_of_both(&cell.with_pass_closed().earlier, direction),
             false => Earlier::default(),
         }
     }
@@ -88,7 +88,7 @@ impl PlaceMemory {
 }
 
 /// The means of both directions, as they act in one.
-fn told([falling, growing]: &[Mean; 2], direction: f64) -> Earlier {
+fn mean_of_both([falling, growing]: &[Mean; 2], direction: f64) -> Earlier {
     let passes = falling.passes + growing.passes;
     if passes == 0.0 {
         return Earlier::default();
@@ -142,7 +142,7 @@ mod tests {
             memory.push(700.0, 1.0, 2.0);
             memory.next_pass();
             let one_way = memory.earlier(700.0, -1.0);
-            assert_eq!((one_way.resistance, one_way.uphill), (2.0, -2.0), "not yet told apart");
+            assert_eq!((one_way.resistance, one_way.uphill), (2.0, -2.0), "not yet distinguished");
             memory.push(700.0, -1.0, back_n_per_kn);
             memory.next_pass();
             let both = memory.earlier(700.0, 1.0);

@@ -2,7 +2,7 @@
 //!
 //! What is never known exactly is among the base model's own parameters: the forces' scales and delay, the
 //! load, the wind of the day, the curve constant, how cold bearings are. Of these an unusual value is an
-//! effect. All other suspects have a column each beside it; the wheels' diameter shows by positions,
+//! effect. All other suspects have a column each in addition to it; the wheels' diameter shows by positions,
 //! without any force.
 
 use dynocar_shared::vocabulary::EffectKind;
@@ -23,7 +23,7 @@ pub const CURVE: usize = UNKNOWNS + 2;
 pub const WARMING: usize = UNKNOWNS + 3;
 /// What counts only where it is unusual, the delay apart.
 pub const UNUSUAL: [usize; 5] = [TRACTION_SCALE, LOAD, DAY_WIND, CURVE, WARMING];
-/// Suspects with a column of their own beside the base model.
+/// Suspects with a column of their own in addition to the base model.
 pub const SUSPECTS: usize = TERMS.len() + BANDS.len();
 /// These: the terms, and laws of the speed that none of them follows.
 pub const BANK: [Suspect; SUSPECTS] = {

@@ -26,7 +26,7 @@ const USUAL_STDS: f64 = 2.0;
 const KEPT_AT_STOP: f64 = 0.7;
 /// Share of it that outlasts a block: what is still there shows again within a minute.
 const KEPT_PER_BLOCK: f64 = 0.9;
-/// Rows for which unit variance counts beside the rows seen.
+/// Rows for which unit variance counts against the rows seen.
 const PRIOR_ROWS: f64 = 20.0;
 
 /// What the verdict is formed from.
@@ -40,7 +40,7 @@ pub struct Evidence<'a> {
     pub onsets: &'a Onsets,
     /// True while released brakes hold pressure.
     pub is_pressure_raised: bool,
-    /// True where no earlier pass tells what the place does.
+    /// True where no earlier pass shows what the location does.
     pub is_new_place: bool,
     /// What speaks for an unusual error of the speed's scale.
     pub wheel: f64,
@@ -60,13 +60,13 @@ pub struct Verdict {
     resistance: Parameters,
     /// Evidence that outlasted stops.
     held: [f64; SUSPECTS],
-    /// Evidence of the stretches between earlier stops, for what is another after each.
+    /// Evidence of the segments between earlier stops, for what is another after each.
     gathered: [f64; SUSPECTS],
     /// Evidence of the rows in hand for each being there.
     own: [f64; CANDIDATES],
     /// The same against the base model, by which candidates are compared: a scale of the forces
     /// that the base model takes up in part is there all the same.
-    beside: [f64; CANDIDATES],
+    given_base: [f64; CANDIDATES],
     naming: Naming,
     scale: f64,
     /// Blocks since the train started from a stop.
@@ -84,7 +84,7 @@ impl Verdict {
             held: [0.0; SUSPECTS],
             gathered: [0.0; SUSPECTS],
             own: [0.0; CANDIDATES],
-            beside: [0.0; CANDIDATES],
+            given_base: [0.0; CANDIDATES],
             naming: Naming::new(settings.evidence_min),
             scale: 1.0,
             leg_blocks: 0,
@@ -101,7 +101,7 @@ impl Verdict {
         self.scale
     }
 
-    /// Notes how strongly one unit of each parameter acted in a block, beside the resistance in
+    /// Notes how strongly one unit of each parameter acted in a block, jointly with the resistance in
     /// the same unit.
     pub fn note_forces(&mut self, units: &Parameters, resistance: f64) {
         self.unit_force *= self.kept_per_row;
@@ -180,11 +180,11 @@ impl Verdict {
                 let hint = if is_hinted { PRESSURE_EVIDENCE } else { 0.0 };
                 ratio / self.scale + hint - cost - searched()
             };
-            let [own, beside] = found.unwrap_or_default().map(net);
-            (self.own[candidate], self.beside[candidate]) = (own, beside);
+            let [own, given_base] = found.unwrap_or_default().map(net);
+            (self.own[candidate], self.given_base[candidate]) = (own, given_base);
         }
         self.own[WHEEL] = evidence.wheel - searched();
-        self.beside[WHEEL] = self.own[WHEEL];
+        self.given_base[WHEEL] = self.own[WHEEL];
         self.name(evidence);
     }
 
@@ -192,13 +192,13 @@ impl Verdict {
     /// value, and as the best account of the rows.
     fn unusual(&self, parameter: usize, evidence: &Evidence) -> Option<[(f64, f64); 2]> {
         let usual_std = evidence.base.usual_std(parameter);
-        let (it, beside) = evidence.base.unusual(parameter, suspect_of(parameter).prior_std);
+        let (it, given_base) = evidence.base.unusual(parameter, suspect_of(parameter).prior_std);
         let least = self.least(parameter);
         let usual = (TOLERATED_SHARE * least).max(USUAL_STDS * usual_std);
         let beyond = (it.beyond(usual), it.cost);
-        let is_surer = beyond.0 - beyond.1 > beside.0 - beside.1;
-        let own = if is_surer { beyond } else { beside };
-        is_there(parameter, &it, least).then_some([own, beside])
+        let is_surer = beyond.0 - beyond.1 > given_base.0 - given_base.1;
+        let own = if is_surer { beyond } else { given_base };
+        is_there(parameter, &it, least).then_some([own, given_base])
     }
 
     /// Blocks for which a suspect could act; `None` for a brake that was not yet looked for.
@@ -210,7 +210,7 @@ impl Verdict {
         }
     }
 
-    /// What speaks for a law of the speed beside the suspect that is named: what the name leaves.
+    /// What speaks for a law of the speed given the suspect that is named: what the name leaves.
     fn left_by_name(&self, evidence: &Evidence) -> f64 {
         let Some(named) = self.naming.parameter() else { return 0.0 };
         let bands = (FIRST_BAND..FIRST_ONSET).filter(|&band| band != named);
@@ -233,7 +233,7 @@ impl Verdict {
 
     fn name(&mut self, evidence: &Evidence) {
         let mut net = self.own;
-        let mut rank = self.beside;
+        let mut rank = self.given_base;
         for suspect in 0..SUSPECTS {
             self.held[suspect] *= KEPT_PER_BLOCK;
             self.gathered[suspect] *= self.kept_per_row;

@@ -1,13 +1,13 @@
-//! Whether the wheels are of the declared diameter: the way by speed against the way by position.
+//! Whether the wheels are of the declared diameter: the distance by speed against the distance by position.
 //!
-//! A position that comes from the same wheel tells nothing; fixes at balises, or GNSS, do. The
-//! difference between chainage and integrated speed is `offset - error * way`, so that a straight
-//! line over points some way apart gives the error of the speed's scale. Each unbroken row of
+//! A position that comes from the same wheel shows nothing; fixes at balises, or GNSS, do. The
+//! difference between chainage and integrated speed is `offset - error * distance`, so that a straight
+//! line over points some distance apart gives the error of the speed's scale. Each unbroken row of
 //! points has an offset of its own.
 
 use crate::force::ResolvedSample;
 
-/// Way in m between points: fixes lie so far apart.
+/// Distance in m between points: fixes lie so far apart.
 const APART_M: f64 = 500.0;
 /// Standard deviation in m of a point: a fix, and what the odometer drifts until the next.
 const POINT_STD_M: f64 = 5.0;
@@ -35,11 +35,11 @@ struct Row {
 struct Going {
     stretch: u32,
     direction: f64,
-    /// Way by speed in m since the row began.
+    /// Distance by speed in m since the row began.
     way_m: f64,
     /// Time in ns and speed in m/s of the newest sample.
     last: (i64, f64),
-    /// Chainage less way where the row began.
+    /// Chainage less distance where the row began.
     origin_m: f64,
     /// Mean offset since the last point, over so many samples.
     mean_m: f64,
@@ -96,7 +96,7 @@ impl WheelScale {
 
     fn restart(&mut self, sample: &ResolvedSample, position_m: f64) {
         if let Some(going) = self.going {
-            let (information, product) = going.row.told();
+            let (information, product) = going.row.gathered();
             self.information += information;
             self.product += product;
         }
@@ -114,7 +114,7 @@ impl WheelScale {
         });
     }
 
-    /// Forgets a share of what rows that ended have told.
+    /// Forgets a share of what rows that ended have shown.
     pub fn forget(&mut self, kept: f64) {
         self.information *= kept;
         self.product *= kept;
@@ -123,7 +123,7 @@ impl WheelScale {
     /// The speed's scale less 1, and twice the log-likelihood ratio of one beyond what is `usual`
     /// against that, less what the freedom of its size costs.
     pub fn evidence(&self, usual: f64) -> (f64, f64) {
-        let (information, product) = self.going.map_or((0.0, 0.0), |going| going.row.told());
+        let (information, product) = self.going.map_or((0.0, 0.0), |going| going.row.gathered());
         let prior = 1.0 / (PRIOR_STD * PRIOR_STD);
         let precision = self.information + information + prior;
         let error = (self.product + product) / precision;
@@ -143,14 +143,14 @@ impl Row {
     }
 
     /// Information on the error of the scale, and its product with it.
-    fn told(&self) -> (f64, f64) {
+    fn gathered(&self) -> (f64, f64) {
         if self.count < 3.0 {
             return (0.0, 0.0);
         }
         let variance = POINT_STD_M * POINT_STD_M;
         let spread = self.way_square - self.way * self.way / self.count;
         let slope_side = self.product - self.way * self.offset / self.count;
-        // The measured way is too long by the error: the offset falls as it grows.
+        // The measured distance is too long by the error: the offset falls as it grows.
         (spread / variance, -slope_side / variance)
     }
 }
@@ -195,14 +195,14 @@ mod tests {
     fn right_wheels_a_wheel_that_counts_its_own_way_and_wild_positions_raise_nothing() {
         let wild = |k: usize| if k % 50 == 7 { 900.0 } else { 0.0 };
         let moved = |k: usize| if k > 1000 { 700.0 } else { 0.0 };
-        for (told, wheels) in [
+        for (case, wheels) in [
             ("right", driven(1.0, true, |_| 0.0)),
             ("its own way", driven(1.02, false, |_| 0.0)),
             ("wild", driven(1.0, true, wild)),
             ("moved for good", driven(1.0, true, moved)),
         ] {
             let (error, evidence) = wheels.evidence(LEAST);
-            assert!(error.abs() < 2e-3 && evidence < 0.0, "{told}: {error}, {evidence}");
+            assert!(error.abs() < 2e-3 && evidence < 0.0, "{case}: {error}, {evidence}");
         }
     }
 }

@@ -4,7 +4,7 @@
 /// the next: in (m/s)² for a change in m/s², likewise in other units.
 ///
 /// Where within the step h the force changed by a is not known: at once at any moment, the trapezoid
-/// errs by up to a h / 2 either way, with a mean square of a² h² / 12. No sample tells that a force
+/// errs by up to a h / 2 either way, with a mean square of a² h² / 12. No sample shows that a force
 /// never jumps, however straight it has run so far, nor that a reading half way is not a mean.
 pub fn jump_variance(change: f64, step_s: f64) -> f64 {
     (step_s * change).powi(2) / 12.0

@@ -3,7 +3,7 @@
 //! - [`STANDING_MPS`], [`MOVING_MPS`], [`BRIDGED_MAX_S`]: when a train stands, moves, and is lost sight of
 //! - [`Trust`], [`OutlierRow`]: how far a measured speed is believed
 //! - [`jump_variance`], [`kink_variance`]: what a trapezoid over a step misses
-//! - [`Rounding`], [`SpeedNoise`]: the steps that a speed is told in, and its noise
+//! - [`Rounding`], [`SpeedNoise`]: the steps that a speed is reported in, and its noise
 //! - [`PositionNoise`]: the noise of a measured position
 //! - [`SpeedRange`]: the speeds driven
 //! - [`StopWatch`], [`is_same_mass`]: when the mass may have changed

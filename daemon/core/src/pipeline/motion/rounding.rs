@@ -1,18 +1,18 @@
-//! The steps that a speed is told in.
+//! The steps that a speed is reported in.
 
 /// Finds the quantum of a speed signal and the noise that it makes.
 ///
 /// Speeds on a grid differ by multiples of its step: the smallest difference ever seen is the step
 /// of a coarse signal, and soon all but nothing for a fine one. Without noise it is the least
 /// change from one sample to the next, which stands for what a model without any error would make
-/// of perfect speeds: no model is that good. A speed that only repeats tells nothing of its step.
+/// of perfect speeds: no model is that good. A speed that only repeats shows nothing of its step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rounding {
     quantum_mps: f64,
     last_mps: Option<f64>,
 }
 
-/// The coarsest step in m/s that speeds are told in: 1 km/h.
+/// The coarsest step in m/s that speeds are reported in: 1 km/h.
 const QUANTUM_MAX_MPS: f64 = 1.0 / 3.6;
 /// Below this a difference in m/s is the rounding of the numbers themselves.
 const DIFFERENCE_MIN_MPS: f64 = 1e-6;

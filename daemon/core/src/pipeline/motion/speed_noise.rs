@@ -14,7 +14,7 @@ const FREEDOM_BEFORE_CLIP: f64 = 20.0;
 /// No speed is known better, in (m/s)².
 const VARIANCE_MIN: f64 = 1e-6;
 
-/// Variance of a speed's white noise, and the steps that the speed is told in.
+/// Variance of a speed's white noise, and the steps that the speed is reported in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpeedNoise {
     /// Variance in (m/s)² before anything was seen, and the degrees of freedom that it counts for.

@@ -3,7 +3,7 @@
 //! States are speed, disturbance and the unknowns of the regression. Where the least-squares
 //! pipelines wait for a block of samples, this one corrects at every sample, weighs each speed by
 //! Student's t, lets the coefficients drift, and follows the disturbance as it comes. How noisy
-//! the data are it takes from a least-squares estimator that runs beside it.
+//! the data are it takes from a least-squares estimator that runs in parallel.
 
 use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason};
 use nalgebra::{SMatrix, SVector};
@@ -47,7 +47,7 @@ pub struct ResistanceKalman {
     /// The weight that normal noise has on average: without it the covariance would be too wide.
     mean_weight: f64,
     train_length_m: f64,
-    beside: ResistanceLeastSquares,
+    least_squares: ResistanceLeastSquares,
     filter: Gaussian<STATES>,
     last: Option<UnitSample>,
     last_time_ns: Option<i64>,
@@ -68,9 +68,9 @@ impl ResistanceKalman {
     pub fn new(
         train: &TrainModel,
         settings: KalmanSettings,
-        beside: ResistanceLeastSquares,
+        least_squares: ResistanceLeastSquares,
     ) -> Self {
-        let declared = beside.declared();
+        let declared = least_squares.declared();
         ResistanceKalman {
             settings,
             mean_weight: mean_student_weight(settings.student_freedom),
@@ -78,21 +78,21 @@ impl ResistanceKalman {
             filter: filter_at(declared),
             last: None,
             last_time_ns: None,
-            noise: beside.bank.likeliest_noise(),
+            noise: least_squares.bank.likeliest_noise(),
             force_rate: 0.0,
             moved_mps: 0.0,
             consecutive_outliers: 0,
             monitor: InnovationMonitor::new(MONITOR_SAMPLES),
-            report: *beside.report(),
+            report: *least_squares.report(),
             resets: 0,
-            beside,
+            least_squares,
         }
     }
 
-    /// Starts a stretch of motion at a sample: the speed anew, the disturbance as far as it
+    /// Starts a motion segment at a sample: the speed anew, the disturbance as far as it
     /// lasts.
     fn start(&mut self, now: &UnitSample) {
-        let variance = self.beside.source.noise().variance_of_sample(0.0);
+        let variance = self.least_squares.source.noise().variance_of_sample(0.0);
         self.filter.replace(SPEED, now.speed_mps, variance);
         let gap_s = self
             .last_time_ns
@@ -172,7 +172,7 @@ impl ResistanceKalman {
     /// Takes a speed into the filter, weighed by Student's t; false when it is sound for
     /// nothing.
     fn correct(&mut self, before: &UnitSample, now: &UnitSample) -> bool {
-        let white = self.beside.source.noise().variance_of_sample(self.moved_mps.abs());
+        let white = self.least_squares.source.noise().variance_of_sample(self.moved_mps.abs());
         let variance = white + self.transient_variance(before, now);
         let Ok(innovation) = self.filter.innovation(SPEED, now.speed_mps, variance) else {
             return false;
@@ -182,7 +182,7 @@ impl ResistanceKalman {
         let weight = student_weight(square, freedom);
         let relative = weight / self.mean_weight;
         let corrected = self.filter.measure(SPEED, now.speed_mps, variance / relative);
-        if self.beside.is_warm() {
+        if self.least_squares.is_warm() {
             self.monitor.push((square * weight).sqrt().copysign(innovation.value));
         }
         let side = if innovation.value > 0.0 { 1 } else { -1 };
@@ -194,14 +194,15 @@ impl ResistanceKalman {
         corrected.is_ok()
     }
 
-    /// Starts anew at a sample with what the least squares beside have learned: weighing by
+    /// Starts anew at a sample with what the least squares in parallel have learned: weighing by
     /// Student's t, a filter far from the speeds would never come back to them.
     fn recover(&mut self, now: &UnitSample) {
         self.consecutive_outliers = 0;
-        let known = self.beside.bank.likeliest_solution().filter(|_| self.beside.is_warm());
+        let known =
+            self.least_squares.bank.likeliest_solution().filter(|_| self.least_squares.is_warm());
         let disturbance = *self.filter.mean.fixed_rows::<1>(DISTURBANCE).as_scalar();
         let variance = self.filter.covariance[(DISTURBANCE, DISTURBANCE)];
-        self.filter = filter_at(known.as_ref().unwrap_or(self.beside.declared()));
+        self.filter = filter_at(known.as_ref().unwrap_or(self.least_squares.declared()));
         self.filter.replace(DISTURBANCE, disturbance, variance);
         self.start(now);
         self.resets += 1;
@@ -221,17 +222,19 @@ impl ResistanceKalman {
     }
 
     fn judge(&mut self) {
-        let noise = self.beside.bank.likeliest_noise();
+        let noise = self.least_squares.bank.likeliest_noise();
         let is_other_model = noise.place != self.noise.place;
         self.noise = noise;
         // While rows are few, the filter's own tangent may lie far from the truth.
-        if (is_other_model || !self.beside.is_warm())
-            && let Some(solution) = self.beside.bank.likeliest_solution()
+        if (is_other_model || !self.least_squares.is_warm())
+            && let Some(solution) = self.least_squares.bank.likeliest_solution()
         {
             self.take_over(&solution);
         }
-        let Some(solution) = self.beside.bank.widened(&self.solution()) else { return };
-        if let Some(report) = self.beside.judged(&solution, &self.monitor, self.disturbance()) {
+        let Some(solution) = self.least_squares.bank.widened(&self.solution()) else { return };
+        if let Some(report) =
+            self.least_squares.judged(&solution, &self.monitor, self.disturbance())
+        {
             self.report = report;
         } else {
             self.reset();
@@ -241,7 +244,7 @@ impl ResistanceKalman {
     /// Goes on with another solution, and with the speed and the disturbance that belong to it;
     /// where the least squares do not know them, they stay what they are for given unknowns.
     fn take_over(&mut self, solution: &Solution) {
-        let Some(motion) = self.beside.motion().or_else(|| self.own_motion()) else {
+        let Some(motion) = self.least_squares.motion().or_else(|| self.own_motion()) else {
             self.reset();
             return;
         };
@@ -298,7 +301,7 @@ impl ResistanceKalman {
 
     /// Starts anew after a numerical failure.
     fn reset(&mut self) {
-        self.filter = filter_at(self.beside.declared());
+        self.filter = filter_at(self.least_squares.declared());
         self.last = None;
         self.resets += 1;
     }
@@ -339,14 +342,14 @@ impl Estimator for ResistanceKalman {
     }
 
     fn update(&mut self, sample: &ResolvedSample) -> Outcome {
-        let outcome = self.beside.update(sample);
+        let outcome = self.least_squares.update(sample);
         let now = match (outcome, UnitSample::of(sample)) {
             (Outcome::Rejected(RejectionReason::Outlier), Ok(now)) => {
                 // A single spike is left out; after a row that does not fit, the speed is anew.
-                if self.beside.has_refused_row() {
+                if self.least_squares.has_refused_row() {
                     self.start(&now);
                 }
-                if let Some(jump_n_per_kn) = self.beside.jump_n_per_kn {
+                if let Some(jump_n_per_kn) = self.least_squares.jump_n_per_kn {
                     self.filter.disturb(DISTURBANCE, jump_n_per_kn.powi(2));
                 }
                 return outcome;
@@ -379,18 +382,18 @@ impl Estimator for ResistanceKalman {
     }
 
     fn write(&self, snapshot: &mut ParameterSnapshot) {
-        self.beside.write_with(&self.report, &self.monitor, snapshot);
+        self.least_squares.write_with(&self.report, &self.monitor, snapshot);
         snapshot.generation += self.resets;
-        let weight_kn = self.beside.weight_kn;
+        let weight_kn = self.least_squares.weight_kn;
         let (value, std) = self.disturbance();
         snapshot.unexplained_force_n = value * weight_kn;
         snapshot.unexplained_force_std_n = std * weight_kn;
     }
 
     fn warm_start(&mut self, kept: &KeptEstimate) -> bool {
-        let is_taken = self.beside.warm_start(kept);
-        self.filter = filter_at(self.beside.declared());
-        self.report = *self.beside.report();
+        let is_taken = self.least_squares.warm_start(kept);
+        self.filter = filter_at(self.least_squares.declared());
+        self.report = *self.least_squares.report();
         is_taken
     }
 }

@@ -32,7 +32,7 @@ const NORMAL_MEDIAN: f64 = 0.6745;
 const REFUSED_BEYOND: f64 = 5.0;
 /// Rows refused one after the other before a force is taken to have come to stay.
 const REFUSALS_BEFORE_JUMP: u32 = 3;
-/// Rows before the solution replaces the declared resistance in telling outliers.
+/// Rows before the solution replaces the declared resistance in detecting outliers.
 const ROWS_BEFORE_OWN: f64 = 12.0;
 
 /// Davis coefficients by one of the least-squares recursions of Liu 2018.
@@ -144,7 +144,7 @@ impl ResistanceLeastSquares {
     }
 
     /// Leaves a row out. After a few in a row it is a force that has come to stay: the
-    /// disturbance is let go, and the next rows tell how large it is.
+    /// disturbance is let go, and the next rows show how large it is.
     fn refuse(&mut self, observation: &Observation, row: &WhiteRow) {
         self.bank.refuse(observation);
         self.solver.skip();
@@ -257,7 +257,7 @@ impl ResistanceLeastSquares {
         snapshot: &mut ParameterSnapshot,
     ) {
         let reason = match self.obstacle {
-            // Without a single row, what is missing tells more than that rows are few.
+            // Without a single row, what is missing says more than that rows are few.
             Some(obstacle) if self.bank.count() == 0.0 => obstacle,
             _ => report.reason,
         };

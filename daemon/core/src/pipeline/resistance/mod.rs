@@ -8,7 +8,7 @@
 //! - `solver` and `coasting` of [`super::papers::liu`]: the paper's recursions and data
 //! - `report`: bounds, excitation, status
 //! - `least_squares`: the pipeline around all of it
-//! - `kalman`: the robust filter over every sample, with a least-squares pipeline beside it
+//! - `kalman`: the robust filter over every sample, with a least-squares pipeline in parallel
 
 mod kalman;
 mod least_squares;
@@ -115,8 +115,8 @@ pub fn kalman(
     settings: &KalmanSettings,
 ) -> Result<ResistanceKalman, SettingError> {
     settings.check_ranges()?;
-    let beside = ls(train, &LsSettings { data: settings.data, ..LsSettings::default() })?;
-    Ok(ResistanceKalman::new(train, *settings, beside))
+    let least_squares = ls(train, &LsSettings { data: settings.data, ..LsSettings::default() })?;
+    Ok(ResistanceKalman::new(train, *settings, least_squares))
 }
 
 fn regularised(

@@ -84,7 +84,7 @@ impl MomentumBlocks {
     }
 
     /// Takes in a sample that moves; gives the block that it closes. `known` is the resistance
-    /// as far as it is known, for telling spikes.
+    /// as far as it is known, for detecting spikes.
     ///
     /// # Errors
     ///

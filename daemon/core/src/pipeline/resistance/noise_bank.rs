@@ -1,4 +1,4 @@
-//! The noise of the rows, learned beside the parameters.
+//! The noise of the rows, learned jointly with the parameters.
 //!
 //! How much of a residual is noise of the speed and how much a slow force that the model does
 //! not know (wind, errors of the gradient profile) decides both the weights of the rows and what
@@ -17,13 +17,13 @@ const STDS_N_PER_KN: [f64; 6] = [0.01, 0.03, 0.1, 0.3, 1.0, 3.0];
 /// Correlation times in s: a gust, a gradient section, a change of wind or weather.
 const TIMES_S: [f64; 3] = [10.0, 60.0, 400.0];
 const MODELS: usize = 1 + STDS_N_PER_KN.len() * TIMES_S.len();
-/// Until the rows tell: a disturbance of 0.1 N/kN over 60 s.
+/// Until the rows show it: a disturbance of 0.1 N/kN over 60 s.
 const LIKELIEST_AT_FIRST: usize = 1 + 2 * TIMES_S.len() + 1;
 /// Rows after which the penalty, which forgetting takes off too, is made up for.
 const RENEWAL_ROWS: u32 = 50;
 /// Probability beforehand that there is no disturbance; the others share the rest.
 const UNDISTURBED_PRIOR: f64 = 0.95;
-/// Probability of the models that widen the intervals of a filter beside the bank.
+/// Probability of the models that widen the intervals of a filter in parallel with the bank.
 const CREDIBLE: f64 = 0.99;
 /// Models of less weight than this are left out of the mixture.
 const WEIGHT_MIN: f64 = 1e-4;

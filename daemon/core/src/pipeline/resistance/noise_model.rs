@@ -7,7 +7,7 @@ use super::regression::{
 };
 use crate::filter::{Sighting, SquareRootInformation};
 
-/// Rows for which the noise model as declared counts beside the rows seen.
+/// Rows for which the noise model as declared counts against the rows seen.
 pub const PRIOR_ROWS: f64 = 3.0;
 /// Coefficients that take up freedom; the other unknowns have priors.
 const FREE: f64 = 3.0;

@@ -77,7 +77,7 @@ pub struct Evidence<'a> {
     pub refused_share: f64,
 }
 
-/// Resistance as a snapshot tells it.
+/// Resistance as a snapshot reports it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report {
     /// What a controller may do with it.

@@ -13,7 +13,7 @@ use crate::train::Davis;
 pub struct UnitSample {
     /// Measurement time in ns.
     pub time_ns: i64,
-    /// Stretch of unbroken motion.
+    /// Motion segment.
     pub stretch: u32,
     /// Speed in m/s.
     pub speed_mps: f64,

@@ -32,10 +32,10 @@ settings! {
         speed_min_mps: f64 = MOVING_MPS => (0.1 to 10 "m/s");
         /// Deviation in m/s from the expected speed that is never called a spike.
         spike_mps: f64 = 0.15 => (0.01 to 10 "m/s");
-        /// Standard deviation of the scales of traction and brake force, found beside the
+        /// Standard deviation of the scales of traction and brake force, found jointly with the
         /// resistance: 0.01 is 1 %.
         force_scale_std: f64 = 0.01 => (0.000001 to 0.5);
-        /// Standard deviation in s of the delay between report and force, found beside the
+        /// Standard deviation in s of the delay between report and force, found jointly with the
         /// resistance; a logger that writes means over a step is off by half a step.
         force_delay_std_s: f64 = 0.3 => (0.000001 to 5 "s");
         /// Standard deviation in m of the position against the gradient profile.
@@ -59,7 +59,7 @@ settings! {
     /// Settings of `rls`.
     #[derive(Copy)]
     RlsSettings {
-        /// Weight that a row keeps at every new one; what the new row does not tell of is not
+        /// Weight that a row keeps at every new one; what the new row does not inform on is not
         /// forgotten. 1 forgets nothing.
         forgetting: f64 = 0.9998 => (0.5 to 1);
         /// Variance of the start, p0 in Liu 2018, in (N/kN)² of scaled parameters.

@@ -19,7 +19,10 @@ fn assert_close(scenario: &Scenario, snapshot: &ParameterSnapshot, tolerance: f6
         let error = scenario.relative_error(snapshot, speed_mps);
         let normalised = scenario.normalised_error(snapshot, speed_mps);
         assert!(error.abs() < tolerance, "{what}, {speed_mps} m/s: off by {error}");
-        assert!(normalised.abs() < 3.5, "{what}, {speed_mps} m/s: {normalised} deviations off");
+        assert!(
+            normalised.abs() < 3.5,
+            "{what}, {speed_mps} m/s: {normalised} standard deviations off"
+        );
     }
 }
 

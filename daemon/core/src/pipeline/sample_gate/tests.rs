@@ -23,14 +23,14 @@ fn sample(index: usize, force_n_per_kn: f64) -> ResolvedSample {
 fn taken(gate: &mut SampleGate, samples: &[ResolvedSample]) -> Vec<(f64, f64, f64)> {
     let mut all = Vec::new();
     for it in samples {
-        let told = |it: &ResolvedSample| {
+        let figures = |it: &ResolvedSample| {
             let force = it.control_force_n().unwrap() / UNIT_N;
             (1e-9 * it.time_ns as f64, force.round(), it.step_s)
         };
         match gate.judge(it) {
-            Verdict::Take => all.push(told(it)),
+            Verdict::Take => all.push(figures(it)),
             Verdict::Release(count) => {
-                all.extend((0..count).map(|index| told(&gate.released(index).unwrap())));
+                all.extend((0..count).map(|index| figures(&gate.released(index).unwrap())));
             }
             Verdict::Wait | Verdict::Refuse(_) => {}
         }

@@ -166,7 +166,7 @@ fn corrections(known: &Corrections) -> Vec<String> {
     if parts.is_empty() { vec!["none that changes anything".into()] } else { parts }
 }
 
-/// The declared resistance in kN at a few speeds, which tells of a wrong unit at a glance.
+/// The declared resistance in kN at a few speeds, which shows a wrong unit at a glance.
 fn resistance_at_speeds(train: &TrainModel) -> String {
     let top_mps = train.speed_max_mps().filter(|&speed| speed > 0.0).unwrap_or(120.0 / 3.6);
     let weight_kn = TrainModel::weight_kn(train.mass_kg);
@@ -263,7 +263,7 @@ fn tunnels(track: &Track) -> String {
     }
 }
 
-/// What was found of the line beside its survey.
+/// What was found of the line besides its survey.
 fn found(track: &Track) -> String {
     let mut text = String::new();
     if track.gradient_shift_m != 0.0 {

@@ -171,9 +171,11 @@ fn notes(manifest: &Manifest, runs: &[Read], of_dataset: &[Note]) -> String {
         let run = runs.iter().flatten().find(|run| run.file == *file);
         run.map_or_else(String::new, |run| run.number.to_string())
     };
-    let is_slip = |note: &&Note| InputFault::ALL.iter().any(|slip| slip.name() == note.code);
-    let told_first = of_dataset.iter().filter(|note| note.runs.is_empty() || is_slip(note));
-    let mut notes: Vec<(String, Vec<String>)> = told_first
+    let is_input_fault =
+        |note: &&Note| InputFault::ALL.iter().any(|fault| fault.name() == note.code);
+    let reported_first =
+        of_dataset.iter().filter(|note| note.runs.is_empty() || is_input_fault(note));
+    let mut notes: Vec<(String, Vec<String>)> = reported_first
         .map(|note| (note.text.clone(), note.runs.iter().map(number).collect()))
         .collect();
     for (index, run) in runs.iter().enumerate() {

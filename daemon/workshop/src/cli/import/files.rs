@@ -8,12 +8,12 @@ use crate::cli::train_text::{Found, TrainArguments, TrainText, converted};
 use crate::track_text::TrackText;
 use dynocar::cli::Failure;
 
-/// The `train.toml`; what the file does not tell and nobody says is a marked default.
+/// The `train.toml`; what the file does not give and nobody says is a marked default.
 ///
 /// # Errors
 ///
 /// A figure that no train has is an input failure.
-pub fn train(train: &ImportedTrain, told: &TrainArguments) -> Result<TrainText, Failure> {
+pub fn train(train: &ImportedTrain, arguments: &TrainArguments) -> Result<TrainText, Failure> {
     let from = |key: &str| origin(&train.account, key);
     let mut figures = vec![
         ("name", Value::String(train.name.clone()), "as the file names it".to_string()),
@@ -29,7 +29,7 @@ pub fn train(train: &ImportedTrain, told: &TrainArguments) -> Result<TrainText, 
     number("c", train.resistance.map(|davis| davis.c));
     figures.extend(train.cars.map(|cars| ("cars", Value::Integer(cars.into()), from("cars"))));
     let writer = format!("dynocar import from {}", train.place);
-    told.text(&writer, &Found { figures, traction: train.traction.clone() })
+    arguments.text(&writer, &Found { figures, traction: train.traction.clone() })
 }
 
 /// From which field a key is.
@@ -43,7 +43,7 @@ fn origin(account: &Account, wanted: &str) -> String {
     format!("from {}", fields.collect::<Vec<_>>().join(" and "))
 }
 
-/// The `track.toml`; a list that the file does not tell is left out, with the reason.
+/// The `track.toml`; a list that the file does not give is left out, with the reason.
 pub fn track(line: &ImportedLine) -> String {
     let words = format!(
         "The line. Written by dynocar import from {}. A list that is left out is not known; an empty \

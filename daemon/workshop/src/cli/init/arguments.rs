@@ -26,7 +26,7 @@ pub struct InitArguments {
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub csv: Vec<PathBuf>,
     /// Say what a column holds, as speed=v_ist:km/h; may be given several times
-    #[arg(long, value_name = "QUANTITY=COLUMN[:UNIT]", value_parser = told)]
+    #[arg(long, value_name = "QUANTITY=COLUMN[:UNIT]", value_parser = given_column)]
     pub column: Vec<GivenColumn>,
     #[command(flatten)]
     pub train: TrainArguments,
@@ -45,7 +45,7 @@ fn nobody_is_there() -> bool {
 }
 
 /// What somebody says of a column: `QUANTITY=COLUMN` or `QUANTITY=COLUMN:UNIT`.
-fn told(text: &str) -> Result<GivenColumn, String> {
+fn given_column(text: &str) -> Result<GivenColumn, String> {
     let expected = "expected QUANTITY=COLUMN or QUANTITY=COLUMN:UNIT, as speed=v_ist:km/h";
     let (name, rest) = text.split_once('=').ok_or(expected)?;
     let names = || Quantity::ALL.map(Quantity::name).join(", ");
@@ -75,12 +75,16 @@ mod tests {
             column: column.into(),
             unit,
         };
-        assert_eq!(told("speed=v_ist:km/h"), Ok(speed("v_ist", kmh)));
-        assert_eq!(told("speed=v_ist"), Ok(speed("v_ist", None)));
-        assert_eq!(told("speed=MVB:v=1:km/h"), Ok(speed("MVB:v=1", kmh)));
-        assert_eq!(told("speed=MVB:v"), Ok(speed("MVB:v", None)));
-        assert!(told("speed").unwrap_err().starts_with("expected QUANTITY=COLUMN"));
-        assert!(told("velocity=v").unwrap_err().contains("'velocity' is no quantity; the quant"));
-        assert!(told("speed= ").is_err());
+        assert_eq!(given_column("speed=v_ist:km/h"), Ok(speed("v_ist", kmh)));
+        assert_eq!(given_column("speed=v_ist"), Ok(speed("v_ist", None)));
+        assert_eq!(given_column("speed=MVB:v=1:km/h"), Ok(speed("MVB:v=1", kmh)));
+        assert_eq!(given_column("speed=MVB:v"), Ok(speed("MVB:v", None)));
+        assert!(given_column("speed").unwrap_err().starts_with("expected QUANTITY=COLUMN"));
+        assert!(
+            given_column("velocity=v")
+                .unwrap_err()
+                .contains("'velocity' is no quantity; the quant")
+        );
+        assert!(given_column("speed= ").is_err());
     }
 }

@@ -34,9 +34,9 @@ pub fn complete(given: &InitArguments) -> Result<InitArguments, Failure> {
             "mass_t" if !arguments.csv.is_empty() => "by the recordings, else 200.0".into(),
             _ => train.default_of(key)?,
         };
-        let answer = ask(words, &default, |answer| train.told(key, answer).map(|_| ()))?;
+        let answer = ask(words, &default, |answer| train.with_answer(key, answer).map(|_| ()))?;
         if let Some(answer) = answer {
-            *train = train.told(key, &answer).map_err(Failure::Input)?;
+            *train = train.with_answer(key, &answer).map_err(Failure::Input)?;
         }
     }
     Ok(arguments)
@@ -61,7 +61,7 @@ fn recordings() -> Result<Vec<PathBuf>, Failure> {
     }
 }
 
-/// An answer that passes, `None` where the default is taken; a wrong one is told and asked for again.
+/// An answer that passes, `None` where the default is taken; a wrong one is reported and asked for again.
 fn ask(
     words: &str,
     default: &str,

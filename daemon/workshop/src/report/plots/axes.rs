@@ -105,7 +105,7 @@ pub(super) fn frame(chart: &Chart) -> Frame {
 
 const TOP_LEFT: (HPos, VPos) = (HPos::Left, VPos::Top);
 
-/// Decimals that tell the labels of an axis apart.
+/// Decimals that distinguish the labels of an axis.
 fn decimals(axis: &Axis) -> usize {
     let step = (axis.range[1] - axis.range[0]).abs() / axis.labels.max(1) as f64;
     (-step.max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize

@@ -1,4 +1,4 @@
-//! The greatest forces of a train over the speed, beside its resistance.
+//! The greatest forces of a train over the speed, with its resistance.
 
 use dynocar_core::train::{EffortCurve, TrainModel};
 use plotters::backend::SVGBackend;
@@ -14,7 +14,7 @@ use super::{AFTER, BEFORE, MEASURED, PlotError, SCALE, for_page};
 const SIZE: (u32, u32) = (980, 380);
 /// Nominal width in px of a letter of the legend.
 const LETTER_PX: f64 = 7.0;
-/// Greatest speed in m/s drawn where the curves tell none.
+/// Greatest speed in m/s drawn where the curves give none.
 const SPEED_MPS: f64 = 40.0;
 /// Points of the resistance.
 const POINTS: u32 = 100;

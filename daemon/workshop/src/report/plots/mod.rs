@@ -92,7 +92,7 @@ pub fn colour_rules() -> String {
     rules
 }
 
-/// Makes a backend's drawing part of the page: it takes its size from the page, tells what it
+/// Makes a backend's drawing part of the page: it takes its size from the page, says what it
 /// shows, and where its charts lie.
 fn for_page(
     drawing: &str,

@@ -14,12 +14,12 @@ pub fn section(subject: &Subject) -> Section {
         ("Candidate", Column::Words),
         ("Evidence alone", Column::Numbers),
         ("Error taken away alone", Column::Numbers),
-        ("Evidence beside what was found", Column::Numbers),
+        ("Evidence given what was found", Column::Numbers),
         ("Outcome", Column::Words),
     ];
     let kept: Vec<(&str, Column)> = head
         .into_iter()
-        .filter(|(name, _)| has_beside || !name.starts_with("Evidence beside"))
+        .filter(|(name, _)| has_beside || !name.starts_with("Evidence given"))
         .collect();
     let mut table = Table::new("All kinds of the library", &kept);
     for row in &subject.data.candidates {

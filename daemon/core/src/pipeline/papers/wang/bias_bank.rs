@@ -82,7 +82,7 @@ pub struct BiasBank {
 }
 
 impl BiasBank {
-    /// A bank that knows of the inverse mass a mean and a deviation, both relative to the
+    /// A bank that knows of the inverse mass a mean and a standard deviation, both relative to the
     /// reference; `memory` is the number of samples over which evidence is remembered.
     pub fn new(
         dynamics: Dynamics,
@@ -165,7 +165,7 @@ impl BiasBank {
         &self.behaviours.likeliest().filter
     }
 
-    /// Takes a measured speed into every filter that does not hold it for an outlier; tells what
+    /// Takes a measured speed into every filter that does not hold it for an outlier; gives what
     /// the filter made of it that has the most evidence now.
     ///
     /// A speed that is an outlier under one behaviour may be as expected under another, which

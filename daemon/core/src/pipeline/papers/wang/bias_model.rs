@@ -70,7 +70,7 @@ impl BiasModel {
         self.std_mps2 * self.std_mps2 * (1.0 - keep * keep)
     }
 
-    /// Standard deviation of the bias where nothing is known of it, beside a map's error of a standard
+    /// Standard deviation of the bias where nothing is known of it, in addition to a map's error of a standard
     /// deviation in m/s² at a speed in m/s.
     pub fn std_given_others_mps2(&self, map_std_mps2: f64, speed_mps: f64) -> f64 {
         self.std_mps2.hypot(self.of_map(map_std_mps2, speed_mps))

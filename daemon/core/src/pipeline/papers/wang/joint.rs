@@ -28,7 +28,7 @@ const REFRESH_EVERY: u32 = 50;
 
 /// Learns z1, z2, z3 and the mass together, see [`super::integrals`].
 ///
-/// Levels and, at stops, the mass are marginalised exactly; what the legs told of the
+/// Levels and, at stops, the mass are marginalised exactly; what the legs showed of the
 /// resistances adds up. Several assumptions on the unexplained acceleration run side by side,
 /// and the one with the most evidence is published.
 #[derive(Clone, Debug)]
@@ -224,7 +224,7 @@ impl JointLeastSquares {
         self.last = Some((expected, rates));
     }
 
-    /// A step with what comes to the level beside the bias: what the trapezoid misses, and what
+    /// A step with what comes to the level in addition to the bias: what the trapezoid misses, and what
     /// the noise of the speed does in the features. There it moves the resistance, and with it
     /// the integral, by a random walk.
     fn step(&mut self, last: &(Motion, Integrals), rates: &Integrals, step_s: f64) -> Step {

@@ -38,8 +38,8 @@ settings! {
 impl JointLeastSquaresSettings {
     /// The behaviours of the unexplained acceleration: none; slow in proportion to speed; small
     /// and large, each slow and gusty. A constant is z1's to explain, so that 'none' stays far
-    /// below what a leg tells of an acceleration, 1e-5 m/s²: otherwise every leg would have a
-    /// constant of its own, and what the legs tell together would count as less than it is.
+    /// below what a leg measures of an acceleration, 1e-5 m/s²: otherwise every leg would have a
+    /// constant of its own, and what the legs show together would count as less than it is.
     pub fn bias_models(&self) -> [BiasModel; JOINT_MODELS] {
         let model =
             |share: f64, time_s, grows| BiasModel::new(share * self.bias_std_mps2, time_s, grows);

@@ -59,7 +59,7 @@ impl MassKalmanSettings {
         Ok(())
     }
 
-    /// The resistance that the filters reckon with.
+    /// The resistance that the filters use.
     pub fn line_resistance(&self, train: &TrainModel) -> LineResistance {
         let davis = |[a, b, c]: [f64; 3]| Davis { a, b, c };
         LineResistance {

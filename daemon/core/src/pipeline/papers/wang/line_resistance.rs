@@ -8,7 +8,7 @@ use crate::train::{Davis, TrainModel};
 ///
 /// The paper's curve resistance z2 knows no radius. Here it holds at a reference radius and
 /// goes with 1/R, as all curve formulas do; on a line of equal radii the two are the same.
-/// All of it comes beside what is declared of curves, tunnels and the rest
+/// All of it comes in addition to what is declared of curves, tunnels and the rest
 /// ([`Motion::known_n_per_kn`]), which acts in any case: the paper declares none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineResistance {
@@ -33,7 +33,7 @@ impl LineResistance {
         }
     }
 
-    /// All that retards in N/kN at a speed in m/s: this resistance beside what is known.
+    /// All that retards in N/kN at a speed in m/s: this resistance plus what is known.
     #[inline]
     pub fn w_n_per_kn(&self, motion: &Motion, speed_mps: f64) -> f64 {
         let curve = self.curve.map_or(0.0, |curve| {
@@ -56,5 +56,5 @@ impl LineResistance {
     }
 }
 
-/// Radius in m that curve resistance refers to unless told otherwise.
+/// Radius in m that curve resistance refers to unless set otherwise.
 pub const DEFAULT_REFERENCE_RADIUS_M: f64 = 500.0;

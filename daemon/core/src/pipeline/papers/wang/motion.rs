@@ -11,7 +11,7 @@ use crate::pipeline::motion::BRIDGED_MAX_S;
 pub struct Motion {
     /// Measurement time in ns.
     pub time_ns: i64,
-    /// Number of the stretch of unbroken motion.
+    /// Number of the motion segment.
     pub stretch: u32,
     /// Speed in m/s.
     pub speed_mps: f64,
@@ -94,7 +94,7 @@ impl Motion {
         })
     }
 
-    /// Time in s since an earlier sample of the same stretch; `None` when forces and speed
+    /// Time in s since an earlier sample of the same motion segment; `None` when forces and speed
     /// between the two are not known well enough to integrate.
     pub fn step_from(&self, earlier: &Motion) -> Option<f64> {
         let step_s = self.time_ns.saturating_sub(earlier.time_ns) as f64 * 1e-9;

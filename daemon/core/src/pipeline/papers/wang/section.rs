@@ -1,4 +1,4 @@
-//! Which of the three resistances a piece of motion tells of.
+//! Which of the three resistances a piece of motion informs on.
 
 use super::motion::Motion;
 

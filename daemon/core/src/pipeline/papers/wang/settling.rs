@@ -1,10 +1,10 @@
-//! When a force has acted for long enough to tell the mass.
+//! When a force has acted for long enough to estimate the mass.
 
 use crate::pipeline::motion::jump_variance;
 
 /// A force that jumped by a somewhere in a step h leaves up to a h / 2 of the speed open, and a mass
 /// wrong by as much over the impulse since. At this impulse over a h that is 5 %, and the speeds
-/// have long told a jump from another mass.
+/// have long distinguished a jump from another mass.
 const IMPULSE_MIN: f64 = 10.0;
 
 /// The impulse of a force since it last jumped.

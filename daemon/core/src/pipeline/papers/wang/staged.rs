@@ -223,7 +223,7 @@ impl StagedDescent {
     /// the mass.
     ///
     /// Either is biased by the noise of its regressor, in opposite directions, so that the true
-    /// mass lies between them (Frisch 1934); a textbook deviation does not tell.
+    /// mass lies between them (Frisch 1934); a textbook standard deviation does not show it.
     fn mass_bracket(&self) -> f64 {
         1.0 / self.mass.sums.explained_share() - 1.0
     }

@@ -1,4 +1,4 @@
-//! `trajectory_newton`: a trajectory fit over a sliding window, the online way of Xia 2023.
+//! `trajectory_newton`: a trajectory fit over a sliding window, the online scheme of Xia 2023.
 
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 use nalgebra::{Matrix3, Vector3};
@@ -133,7 +133,7 @@ impl TrajectoryNewton {
                 let density = self.settings.disturbance_mps2.powi(2) + self.window.missed_density();
                 self.fit.disturbance_ratio = density / self.speed_noise_mps.powi(2);
                 let start = (self.windows > 0).then_some(self.davis);
-                self.fitter.fit(&[self.window.stretch()], start.as_ref(), &self.fit)
+                self.fitter.fit(&[self.window.segment()], start.as_ref(), &self.fit)
             }
             FitMethod::WolfeNewton => self.run_newton(),
         };
@@ -154,17 +154,17 @@ impl TrajectoryNewton {
 
     /// Algorithm 1 from the window before; then the covariance of a fit that is held there.
     fn run_newton(&mut self) -> Result<TrajectoryFit, FitError> {
-        let stretch = self.window.stretch();
+        let segment = self.window.segment();
         let result = wolfe_newton(
-            stretch.steps,
-            stretch.speeds_mps,
+            segment.steps,
+            segment.speeds_mps,
             &self.davis,
             &self.newton,
             &mut self.source,
         );
         let point = Vector3::new(result.davis.a, result.davis.b, result.davis.c);
         let held = FitSettings { bounds: ParameterBox { low: point, high: point }, ..self.fit };
-        self.fitter.fit(&[stretch], Some(&result.davis), &held)
+        self.fitter.fit(&[segment], Some(&result.davis), &held)
     }
 
     fn take_fit(&mut self, fit: &TrajectoryFit) {
@@ -199,9 +199,9 @@ impl TrajectoryNewton {
 
     /// Compares the newest speed with what the fit before predicted for it.
     fn judge_prediction(&mut self) {
-        let stretch = self.window.stretch();
+        let segment = self.window.segment();
         let (Some((end_mps, end_variance)), Some(step), Some(measured_mps)) =
-            (self.end.take(), stretch.steps.last(), stretch.speeds_mps.last())
+            (self.end.take(), segment.steps.last(), segment.speeds_mps.last())
         else {
             self.innovations.break_here();
             self.long_run.break_here();
@@ -213,7 +213,7 @@ impl TrajectoryNewton {
             StepRule::Distance => step.size / measured_mps,
         };
         // The end of a line through n points has about 4 / n of a point's variance.
-        let spread = 1.0 + 4.0 / stretch.steps.len() as f64 + end_variance;
+        let spread = 1.0 + 4.0 / segment.steps.len() as f64 + end_variance;
         let variance = spread * self.speed_noise_mps.powi(2)
             + self.settings.disturbance_mps2.powi(2) * duration_s;
         let normalised = (measured_mps - advance.speed_mps) / variance.sqrt();

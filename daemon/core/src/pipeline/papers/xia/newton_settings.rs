@@ -34,7 +34,7 @@ settings! {
         /// Distance in m between points.
         interval_m: f64 = 100.0 => (1 to 10000 "m");
         /// Standard deviations of the declared coefficients, as a share of each; they bind what a
-        /// window does not tell.
+        /// window does not determine.
         prior_relative_std: f64 = 0.5 => (above 0);
         /// Standard deviation of the measured speed in m/s; learned from the residuals when absent.
         speed_noise_mps: Option<f64> = None => (above 0);

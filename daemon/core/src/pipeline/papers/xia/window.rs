@@ -114,8 +114,8 @@ impl Window {
         self.steps.len()
     }
 
-    /// The window as a stretch.
-    pub fn stretch(&self) -> MotionSegment<'_> {
+    /// The window as a segment.
+    pub fn segment(&self) -> MotionSegment<'_> {
         MotionSegment { steps: &self.steps, speeds_mps: &self.speeds_mps }
     }
 }
@@ -141,10 +141,10 @@ mod tests {
         let closed: Vec<bool> =
             (0..8).map(|i| window.push(&motion(f64::from(i)), 30.0 + f64::from(i))).collect();
         assert_eq!(closed, [false, false, false, true, false, false, false, true]);
-        let stretch = window.stretch();
-        assert_eq!(stretch.speeds_mps, [30.0, 33.0, 37.0]);
-        assert_eq!((stretch.steps[0].size, stretch.steps[0].drive_mps2), (120.0, 1.5));
-        assert!((stretch.steps[1].resistance_gain - 0.009).abs() < 1e-15);
+        let segment = window.segment();
+        assert_eq!(segment.speeds_mps, [30.0, 33.0, 37.0]);
+        assert_eq!((segment.steps[0].size, segment.steps[0].drive_mps2), (120.0, 1.5));
+        assert!((segment.steps[1].resistance_gain - 0.009).abs() < 1e-15);
     }
 
     #[test]
@@ -154,9 +154,9 @@ mod tests {
         for i in 0..5 {
             assert!(window.push(&motion(f64::from(i)), f64::from(i)));
         }
-        let stretch = window.stretch();
-        assert_eq!(stretch.speeds_mps, [2.0, 3.0, 4.0]);
-        assert_eq!((stretch.steps[0].size, stretch.steps[0].drive_mps2), (1.0, 3.0));
+        let segment = window.segment();
+        assert_eq!(segment.speeds_mps, [2.0, 3.0, 4.0]);
+        assert_eq!((segment.steps[0].size, segment.steps[0].drive_mps2), (1.0, 3.0));
         assert_eq!(window.count(), 2);
     }
 }

@@ -165,12 +165,12 @@ impl Ground<'_> {
     }
 
     fn label(&self, panels: &[Panel]) -> String {
-        let told: Vec<String> = panels.iter().map(Panel::told).collect();
+        let described: Vec<String> = panels.iter().map(Panel::described).collect();
         let (name, stops, tunnels) = self.track.map_or(("", 0, 0), |track| {
             (&track.name[..], track.survey.stops.len(), track.tunnels().len())
         });
         let line = format!("The line {name} over its chainage");
-        format!("{line}: {}; {stops} stops, {tunnels} tunnels", told.join("; "))
+        format!("{line}: {}; {stops} stops, {tunnels} tunnels", described.join("; "))
     }
 }
 

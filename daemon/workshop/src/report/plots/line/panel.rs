@@ -79,9 +79,9 @@ impl Panel {
     }
 
     /// What it shows, for those who do not see it.
-    pub fn told(&self) -> String {
+    pub fn described(&self) -> String {
         match &self.content {
-            Content::Places(stretches) => format!("{} {}", self.name, told(stretches)),
+            Content::Places(stretches) => format!("{} {}", self.name, described(stretches)),
             Content::Means(_, bins) => {
                 let most = bins.iter().map(|bin| bin.before_n_per_kn.0.abs()).fold(0.0, f64::max);
                 format!("{}: at most {most:.2} N/kN", self.name)
@@ -110,7 +110,7 @@ pub(super) fn rows(stretches: &[MarkedInterval]) -> Vec<Option<&str>> {
 }
 
 /// The stretches in words.
-pub(super) fn told(stretches: &[MarkedInterval]) -> String {
+pub(super) fn described(stretches: &[MarkedInterval]) -> String {
     let one = |it: &MarkedInterval| {
         let run = it.run.as_ref().map_or(String::new(), |run| format!(" in {run}"));
         format!("km {:.2} to {:.2}{run}", it.at_m[0] / 1e3, it.at_m[1] / 1e3)

@@ -118,20 +118,20 @@ impl JumpBank {
     ) -> Option<Innovation> {
         self.spawn(duration_s);
         let likeliest = self.hypotheses.likeliest_place();
-        let mut told = None;
+        let mut of_likeliest = None;
         for (place, (hypothesis, weight)) in self.hypotheses.weighed_mut().enumerate() {
             hypothesis.predict(rule, step, duration_s, self.doubt.impulse_variance);
             hypothesis.noise.rounding_variance = self.doubt.rounding_variance;
             let innovation = hypothesis.measure(measured_mps, &self.noise, &self.outliers);
             *weight *= if hypothesis.is_sound() { innovation.likelihood } else { 0.0 };
             if place == likeliest {
-                told = Some(innovation);
+                of_likeliest = Some(innovation);
             }
         }
         self.hypotheses.settle();
         // Also drops what became NaN because no weight is above 0.
         self.hypotheses.drop_up_to(WEIGHT_MIN);
-        told.filter(|_| !self.hypotheses().is_empty())
+        of_likeliest.filter(|_| !self.hypotheses().is_empty())
     }
 
     /// Adds the hypothesis that the coefficients jump now.

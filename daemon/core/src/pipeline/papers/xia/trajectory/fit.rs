@@ -1,6 +1,6 @@
 //! Davis coefficients from whole trajectories, offline or over a window.
 //!
-//! All stretches share a, b and c; each has its own initial speed. The start is integral least
+//! All segments share a, b and c; each has its own initial speed. The start is integral least
 //! squares, the search Gauss-Newton with damping within bounds: no restarts are needed. The
 //! noise of the measured speed is estimated with the coefficients unless it is given.
 
@@ -22,17 +22,17 @@ pub struct TrajectoryFitter {
 }
 
 impl TrajectoryFitter {
-    /// A fitter that allocates nothing for so many stretches and samples in all.
-    pub fn with_capacity(stretches: usize, samples: usize) -> Self {
+    /// A fitter that allocates nothing for so many segments and samples in all.
+    pub fn with_capacity(segments: usize, samples: usize) -> Self {
         TrajectoryFitter {
             buffers: Buffers {
-                initial: InitialSpeeds::with_capacity(stretches),
+                initial: InitialSpeeds::with_capacity(segments),
                 residuals: Vec::with_capacity(samples),
             },
         }
     }
 
-    /// Fits all stretches jointly, from integral least squares or from given coefficients.
+    /// Fits all segments jointly, from integral least squares or from given coefficients.
     ///
     /// # Errors
     ///
@@ -44,12 +44,12 @@ impl TrajectoryFitter {
     /// start with known noise.
     pub fn fit(
         &mut self,
-        stretches: &[MotionSegment<'_>],
+        segments: &[MotionSegment<'_>],
         start: Option<&Davis>,
         settings: &FitSettings,
     ) -> Result<TrajectoryFit, FitError> {
         settings.check()?;
-        check(stretches)?;
+        check(segments)?;
         let prior = settings.prior.map(|prior| prior.rows());
         let point = match start {
             Some(davis) => Vector3::new(davis.a, davis.b, davis.c),
@@ -59,7 +59,7 @@ impl TrajectoryFitter {
                 });
                 let noise_mps = settings.speed_noise_mps.unwrap_or(0.1);
                 integral_start(
-                    stretches,
+                    segments,
                     settings.rule,
                     noise_mps,
                     prior.as_ref(),
@@ -67,22 +67,22 @@ impl TrajectoryFitter {
                     &Vector3::from(SCALES),
                     &settings.bounds.clamp(&from),
                 )
-                .ok_or(FitError::NotFinite { stretch: 0 })?
+                .ok_or(FitError::NotFinite { segment: 0 })?
             }
         };
-        self.buffers.initial.reset(stretches.iter().map(|stretch| stretch.speeds_mps[0]));
-        let mut search = Search::new(stretches, settings, prior, &mut self.buffers);
+        self.buffers.initial.reset(segments.iter().map(|segment| segment.speeds_mps[0]));
+        let mut search = Search::new(segments, settings, prior, &mut self.buffers);
         let fitted = search.run(&point)?;
         search.describe(&fitted)
     }
 }
 
-fn check(stretches: &[MotionSegment<'_>]) -> Result<(), FitError> {
+fn check(segments: &[MotionSegment<'_>]) -> Result<(), FitError> {
     let mut samples = 0;
-    for (index, stretch) in stretches.iter().enumerate() {
-        let (steps, speeds) = (stretch.steps.len(), stretch.speeds_mps.len());
+    for (index, segment) in segments.iter().enumerate() {
+        let (steps, speeds) = (segment.steps.len(), segment.speeds_mps.len());
         if speeds != steps + 1 {
-            return Err(FitError::LengthMismatch { stretch: index, steps, speeds });
+            return Err(FitError::LengthMismatch { segment: index, steps, speeds });
         }
         let is_usable = |step: &Step| {
             step.size > 0.0
@@ -90,14 +90,14 @@ fn check(stretches: &[MotionSegment<'_>]) -> Result<(), FitError> {
                 && step.drive_mps2.is_finite()
                 && step.resistance_gain.is_finite()
         };
-        if !(stretch.steps.iter().all(is_usable)
-            && stretch.speeds_mps.iter().all(|speed| speed.is_finite()))
+        if !(segment.steps.iter().all(is_usable)
+            && segment.speeds_mps.iter().all(|speed| speed.is_finite()))
         {
-            return Err(FitError::NotFinite { stretch: index });
+            return Err(FitError::NotFinite { segment: index });
         }
         samples += speeds;
     }
-    let need = stretches.len() + 3;
+    let need = segments.len() + 3;
     if samples < need { Err(FitError::TooFewSamples { need, got: samples }) } else { Ok(()) }
 }
 
@@ -112,8 +112,8 @@ mod tests {
     use crate::force::balance::mps2_per_n_per_kn;
 
     fn fit(steps: &[Step], speeds_mps: &[f64], settings: &FitSettings) -> TrajectoryFit {
-        let stretches = [MotionSegment { steps, speeds_mps }];
-        TrajectoryFitter::default().fit(&stretches, None, settings).unwrap()
+        let segments = [MotionSegment { steps, speeds_mps }];
+        TrajectoryFitter::default().fit(&segments, None, settings).unwrap()
     }
 
     fn free(rule: StepRule) -> FitSettings {
@@ -137,7 +137,7 @@ mod tests {
     fn every_random_start_ends_at_the_same_coefficients() {
         let steps = steps(StepRule::Distance, 300);
         let speeds = speeds(StepRule::Distance, &steps, &FAST, 12.0);
-        let stretches = [MotionSegment { steps: &steps, speeds_mps: &speeds }];
+        let segments = [MotionSegment { steps: &steps, speeds_mps: &speeds }];
         let settings = FitSettings::new(StepRule::Distance);
         let mut random = random(5);
         for _ in 0..50 {
@@ -146,7 +146,7 @@ mod tests {
                 b: 0.2 * random.random::<f64>(),
                 c: 0.01 * random.random::<f64>(),
             };
-            let fit = TrajectoryFitter::default().fit(&stretches, Some(&start), &settings).unwrap();
+            let fit = TrajectoryFitter::default().fit(&segments, Some(&start), &settings).unwrap();
             assert!((fit.davis.a - FAST.a).abs() < 1e-8, "{start:?}: {fit:?}");
         }
     }
@@ -200,7 +200,7 @@ mod tests {
 
     #[test]
     fn a_prior_binds_what_the_data_leave_open() {
-        // Ten steps of cruise at one speed tell w0 there and nothing else.
+        // Ten steps of cruise at one speed determine w0 there and nothing else.
         let gain = mps2_per_n_per_kn(0.06);
         let drive_mps2 = gain * FAST.w0_n_per_kn(80.0);
         let steps = vec![Step { size: 1.0, drive_mps2, resistance_gain: gain }; 10];
@@ -225,8 +225,8 @@ mod tests {
         let speeds = speeds(StepRule::Distance, &steps, &FAST, 40.0);
         let settings = FitSettings::new(StepRule::Distance);
         let error = |steps: &[Step], speeds_mps: &[f64], settings: &FitSettings| {
-            let stretches = [MotionSegment { steps, speeds_mps }];
-            TrajectoryFitter::default().fit(&stretches, None, settings).unwrap_err()
+            let segments = [MotionSegment { steps, speeds_mps }];
+            TrajectoryFitter::default().fit(&segments, None, settings).unwrap_err()
         };
         let mut holed = speeds.clone();
         holed[7] = f64::NAN;
@@ -234,10 +234,10 @@ mod tests {
         backwards[3].size = -100.0;
         assert!(matches!(
             error(&steps, &speeds[1..], &settings),
-            FitError::LengthMismatch { stretch: 0, steps: 20, speeds: 20 }
+            FitError::LengthMismatch { segment: 0, steps: 20, speeds: 20 }
         ));
-        assert_eq!(error(&steps, &holed, &settings), FitError::NotFinite { stretch: 0 });
-        assert_eq!(error(&backwards, &speeds, &settings), FitError::NotFinite { stretch: 0 });
+        assert_eq!(error(&steps, &holed, &settings), FitError::NotFinite { segment: 0 });
+        assert_eq!(error(&backwards, &speeds, &settings), FitError::NotFinite { segment: 0 });
         assert_eq!(
             error(&steps[..2], &speeds[..3], &settings),
             FitError::TooFewSamples { need: 4, got: 3 }

@@ -82,21 +82,23 @@ impl FitSettings {
 /// Why trajectories cannot be fitted.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
-    /// A stretch has not one speed more than steps.
-    #[error("stretch {stretch}: expected one speed more than its {steps} steps, got {speeds}")]
+    /// A motion segment has not one speed more than steps.
+    #[error(
+        "motion segment {segment}: expected one speed more than its {steps} steps, got {speeds}"
+    )]
     LengthMismatch {
-        /// Number of the stretch, from 0.
-        stretch: usize,
+        /// Number of the motion segment, from 0.
+        segment: usize,
         /// Its steps.
         steps: usize,
         /// Its speeds.
         speeds: usize,
     },
     /// A speed, step or setting is not a usable number.
-    #[error("stretch {stretch}: expected finite numbers and steps above 0")]
+    #[error("motion segment {segment}: expected finite numbers and steps above 0")]
     NotFinite {
-        /// Number of the stretch, from 0.
-        stretch: usize,
+        /// Number of the motion segment, from 0.
+        segment: usize,
     },
     /// A setting is out of its range.
     #[error("{key} = {value}: expected {allowed}")]
@@ -142,7 +144,7 @@ pub struct TrajectoryFit {
     pub restricted_log_likelihood: f64,
     /// Root of the mean squared residual in m/s; with exact forces that of the trajectory.
     pub rmse_mps: f64,
-    /// Fitted speed in m/s at the end of the last stretch.
+    /// Fitted speed in m/s at the end of the last segment.
     pub end_speed_mps: f64,
     /// Variance of the disturbance in it, over that of the measured speed.
     pub end_variance: f64,

@@ -274,8 +274,8 @@ mod tests {
                 outlier_threshold: f64::INFINITY,
                 ..FitSettings::new(rule)
             };
-            let stretches = [MotionSegment { steps: &steps, speeds_mps: &speeds }];
-            let batch = TrajectoryFitter::default().fit(&stretches, None, &settings).unwrap();
+            let segments = [MotionSegment { steps: &steps, speeds_mps: &speeds }];
+            let batch = TrajectoryFitter::default().fit(&segments, None, &settings).unwrap();
             let covariance = batch.covariance / batch.inflation;
             for speed_mps in [20.0, 50.0, 75.0] {
                 let powers = Vector3::new(1.0, speed_mps, speed_mps * speed_mps);

@@ -39,7 +39,7 @@ impl LeastSquares<3> for Linear {
 ///
 /// One pass over the samples, no allocation.
 pub fn integral_start(
-    stretches: &[MotionSegment<'_>],
+    segments: &[MotionSegment<'_>],
     rule: StepRule,
     speed_noise_mps: f64,
     prior: Option<&TriangularSystem<3>>,
@@ -48,8 +48,8 @@ pub fn integral_start(
     from: &Vector3<f64>,
 ) -> Option<Vector3<f64>> {
     let mut joint = TriangularAccumulator::<4>::default();
-    for stretch in stretches {
-        let mut rows = integrated_rows(stretch, rule, 1.0 / speed_noise_mps);
+    for segment in segments {
+        let mut rows = integrated_rows(segment, rule, 1.0 / speed_noise_mps);
         for row in &rows.factor()[1..] {
             joint.push(&[row[1], row[2], row[3], row[4]]);
         }
@@ -71,15 +71,15 @@ pub fn integral_start(
 
 /// Rows \[initial, a, b, c, -left side\] in standard deviations, every one weighted to m/s.
 fn integrated_rows(
-    stretch: &MotionSegment<'_>,
+    segment: &MotionSegment<'_>,
     rule: StepRule,
     per_deviation: f64,
 ) -> TriangularAccumulator<5> {
     let mut rows = TriangularAccumulator::default();
     let (mut drive, mut regressors) = (0.0, Vector3::zeros());
-    for (i, &speed_mps) in stretch.speeds_mps.iter().enumerate() {
-        if let Some(step) = i.checked_sub(1).map(|before| &stretch.steps[before]) {
-            let before_mps = stretch.speeds_mps[i - 1];
+    for (i, &speed_mps) in segment.speeds_mps.iter().enumerate() {
+        if let Some(step) = i.checked_sub(1).map(|before| &segment.steps[before]) {
+            let before_mps = segment.speeds_mps[i - 1];
             let resisted_mps = match rule {
                 StepRule::Distance => before_mps,
                 StepRule::Time => 0.5 * (before_mps + speed_mps),
@@ -112,10 +112,10 @@ mod tests {
     use super::*;
     use crate::train::Davis;
 
-    fn start(stretches: &[MotionSegment<'_>], rule: StepRule) -> Vector3<f64> {
+    fn start(segments: &[MotionSegment<'_>], rule: StepRule) -> Vector3<f64> {
         let bounds = ParameterBox { low: Vector3::repeat(-10.0), high: Vector3::repeat(10.0) };
         let scales = Vector3::new(1.0, 0.02, 0.001);
-        integral_start(stretches, rule, 0.1, None, &bounds, &scales, &scales).unwrap()
+        integral_start(segments, rule, 0.1, None, &bounds, &scales, &scales).unwrap()
     }
 
     #[test]
@@ -123,12 +123,12 @@ mod tests {
         let steps = steps(StepRule::Distance, 300);
         let speeds = speeds(StepRule::Distance, &steps, &FAST, 12.0);
         let (first, second) = speeds.split_at(150);
-        // Two stretches with an initial speed each.
-        let stretches = [
+        // Two segments with an initial speed each.
+        let segments = [
             MotionSegment { steps: &steps[..149], speeds_mps: first },
             MotionSegment { steps: &steps[150..], speeds_mps: second },
         ];
-        let found = start(&stretches, StepRule::Distance);
+        let found = start(&segments, StepRule::Distance);
         assert!((found[0] - FAST.a).abs() < 1e-9);
         assert!((found[1] - FAST.b).abs() < 1e-11);
         assert!((found[2] - FAST.c).abs() < 1e-13);

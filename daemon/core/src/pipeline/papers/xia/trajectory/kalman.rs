@@ -145,8 +145,9 @@ impl TrajectoryKalman {
             impulse_variance: jump_variance(motion.drive_change_mps2, motion.duration_s),
             rounding_variance: self.rounding.variance_of_sample(learned, 2.0 * moved_mps.abs()),
         });
-        let told = self.filter.advance(StepRule::Time, &step, motion.duration_s, sample.speed_mps);
-        let Some(innovation) = told else {
+        let absorbed =
+            self.filter.advance(StepRule::Time, &step, motion.duration_s, sample.speed_mps);
+        let Some(innovation) = absorbed else {
             self.fault = Some((Status::Unestimated, Reason::NumericalFailure));
             self.updates = 0;
             return Outcome::Used;

@@ -2,7 +2,7 @@
 //!
 //! Recursive maximum likelihood (Ljung, Söderström 1983, section 3.6) for ln R and ln q: the
 //! innovation e of a filter and its variance S have derivatives with respect to both, which
-//! follow scalar recursions beside the filter's own. The step is the score over the Fisher
+//! follow scalar recursions next to the filter's own. The step is the score over the Fisher
 //! information of the samples remembered. While the coefficients are uncertain, the innovations
 //! say little of q, their derivatives are small, and q waits.
 
@@ -43,7 +43,7 @@ const NEWEST: f64 = 32.0;
 const SHRUNK_BELOW: f64 = 0.25;
 /// Information on ln R and ln q from before any data: standard deviations of 3.
 const PRIOR_INFORMATION: f64 = 0.1;
-/// Information on ln q beyond the first unit that the mean of q is reckoned with at least.
+/// Information on ln q beyond the first unit that the mean of q is computed with at least.
 const LEAST_FREE_INFORMATION: f64 = 1.0;
 /// Largest step of ln R and ln q for one innovation.
 const STEP_MAX: f64 = 0.5;
@@ -126,7 +126,7 @@ impl LearnedNoise {
     }
 
     /// Learns from an innovation in m/s, given the variance of the predicted speed; call it
-    /// before the filter takes the measurement. `is_used` tells whether it will. Noise that is
+    /// before the filter takes the measurement. `is_used` says whether it will. Noise that is
     /// given, R and q both, is not learned from.
     ///
     /// # Real-time

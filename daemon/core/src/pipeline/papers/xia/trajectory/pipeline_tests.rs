@@ -263,7 +263,7 @@ fn in_cruise_the_resistance_there_may_be_used_although_its_coefficients_are_not_
         assert_eq!(said, (Status::Estimated, Some(Reason::WeakExcitation)), "seed {seed}");
         let there = snapshot.resistance_at(15.0).unwrap();
         let normalised = (there.w0_n_per_kn - METRO.w0_n_per_kn(15.0)) / there.w0_std_n_per_kn;
-        assert!(normalised.abs() < 4.0, "seed {seed}: {normalised} deviations off");
+        assert!(normalised.abs() < 4.0, "seed {seed}: {normalised} standard deviations off");
         held += u64::from(normalised.abs() < 1.96);
         let elsewhere = snapshot.resistance_at(40.0).unwrap();
         assert!(elsewhere.is_extrapolated && !there.is_extrapolated);

@@ -1,8 +1,8 @@
 //! What an estimate of (a, b, c) is worth: status, reason, excitation.
 //!
-//! In cruise a and b cannot be told apart (correlations beyond ±0.9999), while w0 over the
+//! In cruise a and b cannot be distinguished (correlations beyond ±0.9999), while w0 over the
 //! driven speeds is known well. The status therefore rests on w0 over the driven speeds; which
-//! coefficients the data excited is said beside it.
+//! coefficients the data excited is stated with it.
 
 use dynocar_shared::{Manoeuvre, ParameterSnapshot, Reason, Status};
 use nalgebra::{Matrix3, Vector3};
@@ -98,7 +98,7 @@ impl Estimate<'_> {
         }
     }
 
-    /// Which coefficients the data told apart.
+    /// Which coefficients the data distinguished.
     pub fn excited(&self) -> [bool; 3] {
         std::array::from_fn(|i| {
             let std = self.covariance[(i, i)].max(0.0).sqrt();

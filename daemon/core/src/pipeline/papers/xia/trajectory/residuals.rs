@@ -6,8 +6,8 @@
 //! that disturbance, and the residual is the innovation over its standard deviation
 //! (prediction error; Ljung 1999, section 7.4). Output error is its limit q = 0.
 //!
-//! The initial speed of each stretch is a parameter. Its column is eliminated stretch by
-//! stretch by orthogonal reflections, so that the work grows with the samples alone.
+//! The initial speed of each segment is a parameter. Its column is eliminated segment by
+//! segment by orthogonal reflections, so that the work grows with the samples alone.
 
 use nalgebra::Vector3;
 
@@ -29,7 +29,7 @@ pub struct Weighting {
     pub outlier_threshold: f64,
 }
 
-/// Row that leads from a change of (a, b, c) to the change of a stretch's initial speed.
+/// Row that leads from a change of (a, b, c) to the change of a segment's initial speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct InitialSpeed {
     speed_mps: f64,
@@ -37,7 +37,7 @@ struct InitialSpeed {
     row: [f64; 5],
 }
 
-/// Initial speeds of all stretches at the current and at the tried parameters.
+/// Initial speeds of all segments at the current and at the tried parameters.
 #[derive(Clone, Debug, Default)]
 pub struct InitialSpeeds {
     current: Vec<InitialSpeed>,
@@ -45,12 +45,9 @@ pub struct InitialSpeeds {
 }
 
 impl InitialSpeeds {
-    /// Room for so many stretches.
-    pub fn with_capacity(stretches: usize) -> Self {
-        InitialSpeeds {
-            current: Vec::with_capacity(stretches),
-            tried: Vec::with_capacity(stretches),
-        }
+    /// Room for so many segments.
+    pub fn with_capacity(segments: usize) -> Self {
+        InitialSpeeds { current: Vec::with_capacity(segments), tried: Vec::with_capacity(segments) }
     }
 
     /// Starts from given speeds; allocates only beyond the capacity.
@@ -81,7 +78,7 @@ pub struct Pass {
     pub log_pivots: f64,
     /// Long-run variance of the residuals in standard deviations.
     pub long_run: LongRunVariance,
-    /// Speed in m/s at the end of the last stretch, led back to its measurement.
+    /// Speed in m/s at the end of the last segment, led back to its measurement.
     pub end_speed_mps: f64,
     /// Variance of the disturbance in it, over that of the measured speed.
     pub end_variance: f64,
@@ -104,9 +101,9 @@ impl Pass {
     }
 }
 
-/// Trajectories of several stretches as a least-squares problem over (a, b, c).
+/// Trajectories of several segments as a least-squares problem over (a, b, c).
 pub struct Residuals<'a, 'b> {
-    stretches: &'a [MotionSegment<'a>],
+    segments: &'a [MotionSegment<'a>],
     rule: StepRule,
     weighting: Weighting,
     prior: Option<TriangularSystem<3>>,
@@ -120,21 +117,21 @@ pub struct Residuals<'a, 'b> {
 }
 
 impl<'a, 'b> Residuals<'a, 'b> {
-    /// The problem at its start `point`, with one initial speed for each stretch in `initial`.
+    /// The problem at its start `point`, with one initial speed for each segment in `initial`.
     ///
     /// `prior` is R and z of rows R x + z in standard deviations that are added to the
     /// residuals.
     pub fn new(
-        stretches: &'a [MotionSegment<'a>],
+        segments: &'a [MotionSegment<'a>],
         rule: StepRule,
         weighting: Weighting,
         prior: Option<TriangularSystem<3>>,
         initial: &'b mut InitialSpeeds,
         point: Vector3<f64>,
     ) -> Self {
-        debug_assert_eq!(stretches.len(), initial.current.len());
+        debug_assert_eq!(segments.len(), initial.current.len());
         Residuals {
-            stretches,
+            segments,
             rule,
             weighting,
             prior,
@@ -171,7 +168,7 @@ impl LeastSquares<3> for Residuals<'_, '_> {
         let mut joint = TriangularAccumulator::<4>::default();
         let mut cost = 0.0;
         let mut nested_decrease = 0.0;
-        for (index, stretch) in self.stretches.iter().enumerate() {
+        for (index, segment) in self.segments.iter().enumerate() {
             let speed_mps = self.initial.current[index].moved(&change);
             let mut rows = SegmentRows {
                 weighting: &self.weighting,
@@ -180,7 +177,7 @@ impl LeastSquares<3> for Residuals<'_, '_> {
                 cost: 0.0,
                 record: self.record.as_deref_mut(),
             };
-            rows.trace(stretch, self.rule, &davis, speed_mps);
+            rows.trace(segment, self.rule, &davis, speed_mps);
             cost += rows.cost;
             let factor = *rows.rows.factor();
             self.initial.tried[index] = InitialSpeed { speed_mps, row: factor[0] };
@@ -220,7 +217,7 @@ impl InitialSpeed {
     }
 }
 
-/// Gathers the rows \[∂r/∂v_0, ∂r/∂a, ∂r/∂b, ∂r/∂c, r\] of one stretch.
+/// Gathers the rows \[∂r/∂v_0, ∂r/∂a, ∂r/∂b, ∂r/∂c, r\] of one segment.
 struct SegmentRows<'a> {
     weighting: &'a Weighting,
     rows: TriangularAccumulator<5>,
@@ -232,12 +229,12 @@ struct SegmentRows<'a> {
 impl SegmentRows<'_> {
     fn trace(
         &mut self,
-        stretch: &MotionSegment<'_>,
+        segment: &MotionSegment<'_>,
         rule: StepRule,
         davis: &Davis,
         initial_mps: f64,
     ) {
-        let Some((&first_mps, measured)) = stretch.speeds_mps.split_first() else { return };
+        let Some((&first_mps, measured)) = segment.speeds_mps.split_first() else { return };
         let ratio = self.weighting.disturbance_ratio;
         let mut state = Trace {
             speed_mps: initial_mps,
@@ -247,7 +244,7 @@ impl SegmentRows<'_> {
         };
         self.pass.long_run.break_here();
         self.add(&mut state, first_mps, 0.0);
-        for (step, &measured_mps) in stretch.steps.iter().zip(measured) {
+        for (step, &measured_mps) in segment.steps.iter().zip(measured) {
             let duration_s = duration_s(rule, step, state.speed_mps);
             let (advance, is_stalled) = rule.advance_or_crawl(step, davis, state.speed_mps);
             self.pass.stalls += usize::from(is_stalled);

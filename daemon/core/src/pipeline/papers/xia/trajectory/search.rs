@@ -39,7 +39,7 @@ impl Fitted {
 /// Memory that a fit keeps for the next.
 #[derive(Clone, Debug, Default)]
 pub struct Buffers {
-    /// Initial speeds, stretch by stretch.
+    /// Initial speeds, segment by segment.
     pub initial: InitialSpeeds,
     /// Residuals of a pass.
     pub residuals: Vec<f64>,
@@ -47,7 +47,7 @@ pub struct Buffers {
 
 /// A fit under way.
 pub struct Search<'a, 'b> {
-    stretches: &'a [MotionSegment<'a>],
+    segments: &'a [MotionSegment<'a>],
     settings: &'a FitSettings,
     prior: Option<TriangularSystem<3>>,
     buffers: &'b mut Buffers,
@@ -57,12 +57,12 @@ pub struct Search<'a, 'b> {
 impl<'a, 'b> Search<'a, 'b> {
     /// A search from the initial speeds in the buffers.
     pub fn new(
-        stretches: &'a [MotionSegment<'a>],
+        segments: &'a [MotionSegment<'a>],
         settings: &'a FitSettings,
         prior: Option<TriangularSystem<3>>,
         buffers: &'b mut Buffers,
     ) -> Self {
-        Search { stretches, settings, prior, buffers, iterations: 0 }
+        Search { segments, settings, prior, buffers, iterations: 0 }
     }
 
     /// Repeats the fit until the noise that weighs the residuals is the noise that they show.
@@ -96,7 +96,7 @@ impl<'a, 'b> Search<'a, 'b> {
         };
         let start = settings.bounds.clamp(point);
         let mut residuals = Residuals::new(
-            self.stretches,
+            self.segments,
             settings.rule,
             weighting,
             self.prior,
@@ -110,10 +110,10 @@ impl<'a, 'b> Search<'a, 'b> {
             relative_tolerance: 1e-14,
         };
         let solution = minimise(&mut residuals, &start, &settings.bounds, &solver)
-            .ok_or(FitError::NotFinite { stretch: 0 })?;
+            .ok_or(FitError::NotFinite { segment: 0 })?;
         let pass = *residuals.pass();
         self.iterations += solution.iterations;
-        let free = pass.count.saturating_sub(3 + self.stretches.len()).max(1) as f64;
+        let free = pass.count.saturating_sub(3 + self.segments.len()).max(1) as f64;
         let shown_mps = noise_mps * (pass.clipped_square / free).sqrt();
         let count = pass.count as f64;
         let log_likelihood =
@@ -142,9 +142,9 @@ impl<'a, 'b> Search<'a, 'b> {
         let start = self.settings.bounds.clamp(point);
         let Buffers { initial, residuals: record } = &mut *self.buffers;
         let mut residuals =
-            Residuals::new(self.stretches, self.settings.rule, weighting, None, initial, start)
+            Residuals::new(self.segments, self.settings.rule, weighting, None, initial, start)
                 .recording(record);
-        residuals.linearise(&start).ok_or(FitError::NotFinite { stretch: 0 })?;
+        residuals.linearise(&start).ok_or(FitError::NotFinite { segment: 0 })?;
         record.iter_mut().for_each(|residual| *residual = residual.abs());
         let middle = record.len() / 2;
         let (_, median, _) = record.select_nth_unstable_by(middle, f64::total_cmp);

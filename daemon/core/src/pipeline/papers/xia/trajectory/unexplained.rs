@@ -20,7 +20,7 @@ fn variance_share(step_s: f64) -> f64 {
     density * density * 2.0 / (2.0 - gain)
 }
 
-/// The deviation in m/s of the measured speed that a snapshot's `unexplained_force_std_n` was reckoned
+/// The standard deviation in m/s of the measured speed that a snapshot's `unexplained_force_std_n` was computed
 /// with, for samples that come every `step_s`.
 pub fn speed_noise_mps(unexplained_force_std_n: f64, inertial_mass_kg: f64, step_s: f64) -> f64 {
     unexplained_force_std_n / (inertial_mass_kg * variance_share(step_s).sqrt())
@@ -93,6 +93,6 @@ mod tests {
         // 0.02 m/s / 20 s on 106 t.
         assert!((snapshot.unexplained_force_std_n - 106.0).abs() < 1.0);
         let noise_mps = speed_noise_mps(snapshot.unexplained_force_std_n, 1.06e5, 0.2);
-        assert!((noise_mps - 0.02).abs() < 1e-9, "what it was reckoned with: {noise_mps}");
+        assert!((noise_mps - 0.02).abs() < 1e-9, "what it was computed with: {noise_mps}");
     }
 }
