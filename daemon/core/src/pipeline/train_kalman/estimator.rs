@@ -1,11 +1,10 @@
 //! The estimator, from samples to its report.
 
+mod judgement;
+
 use std::sync::Arc;
 
-use dynocar_shared::{
-    MassSource, Parameter, ParameterSnapshot, PipelineKind, Quantity, Reason, RejectionReason,
-    Status,
-};
+use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, RejectionReason, Status};
 
 use super::bank::{Measured, MotionBank};
 use super::braking_watch::BrakingWatch;
@@ -17,7 +16,7 @@ use super::report::Report;
 use super::settings::TrainKalmanSettings;
 use super::systematic::Systematic;
 use crate::force::ResolvedSample;
-use crate::pipeline::judge::{Case, InputHealth, LONG_RUN_MAX, long_run_variance};
+use crate::pipeline::judge::{InputHealth, LONG_RUN_MAX};
 use crate::pipeline::motion::{BRIDGED_MAX_S, STANDING_MPS, SpeedNoise, SpeedRange};
 use crate::pipeline::output::{write_innovations, write_status};
 use crate::pipeline::resistance::sample::UnitSample;
@@ -33,14 +32,8 @@ const MOVED_MIN_S: f64 = 20.0;
 const CONFIRMED_S: f64 = 3.0;
 /// Deviations by which a first sample may differ from a kept mass that still counts.
 const KEPT_DEVIATIONS: f64 = 3.0;
-/// Motion in s before the mass is called known.
-const MASS_MOVED_MIN_S: f64 = 3.0;
-/// All that this estimator answers.
-const COMPLETE: u32 = Quantity::Resistance.bit() | Quantity::Mass.bit();
 /// How long a change of force is remembered, in s.
 const FORCE_RATE_MEMORY_S: f64 = 0.5;
-/// Innovations before they are judged to be alike.
-const JUDGED_MIN: f64 = 100.0;
 /// All that a braking may teach, as it was before.
 #[derive(Clone, Debug)]
 struct Before {
@@ -229,20 +222,6 @@ impl TrainKalman {
         self.jumps.learn(measured);
     }
 
-    fn long_run(&self) -> f64 {
-        long_run_variance(self.monitor.mean_square(), self.monitor.correlation())
-    }
-
-    /// Innovations that are alike are made up for by wider intervals, up to a bound.
-    fn contradiction(&self) -> Option<Reason> {
-        if self.monitor.are_too_large() {
-            return Some(Reason::InnovationsTooLarge);
-        }
-        let is_alike =
-            self.monitor.effective_count() >= JUDGED_MIN && self.long_run() > LONG_RUN_MAX;
-        is_alike.then_some(Reason::InnovationsNotWhite)
-    }
-
     fn judge(&mut self, by_wind: f64) {
         let inflation = self.long_run().clamp(1.0, LONG_RUN_MAX);
         let published = self.bank.published(by_wind);
@@ -297,45 +276,6 @@ impl TrainKalman {
         }
         if self.load.departed() {
             self.systematic.start();
-        }
-    }
-
-    /// The quantities known after motion enough: the mass after some seconds of traction, the resistance
-    /// after a while, or once the first samples confirm what was kept.
-    fn known_now(&self) -> u32 {
-        let ready = |quantity: Quantity, after_s: f64| {
-            u32::from(self.moved_s >= after_s.min(self.moved_min_s)) * quantity.bit()
-        };
-        let ready =
-            ready(Quantity::Resistance, MOVED_MIN_S) | ready(Quantity::Mass, MASS_MOVED_MIN_S);
-        self.report.known() & ready
-    }
-
-    fn mass_source(&self) -> MassSource {
-        if self.report.load_variance() < 0.5 * self.load.prior_variance() {
-            MassSource::Learned
-        } else if self.load.is_weighed() {
-            MassSource::Weighed
-        } else {
-            MassSource::Declared
-        }
-    }
-
-    /// What is wrong with the samples lately.
-    fn input_doubt(&self) -> Option<Reason> {
-        self.health.input_doubt().or(self.gate.input_doubt())
-    }
-
-    fn case(&self) -> Case {
-        let failure = (Status::Invalid, Reason::NumericalFailure);
-        Case {
-            fault: self.is_fresh_reset.then_some(failure),
-            input: self.input_doubt(),
-            is_ready: self.moved_s >= self.moved_min_s.min(MASS_MOVED_MIN_S),
-            is_known: self.known_now() == COMPLETE,
-            lacking: Status::Unestimated,
-            contradiction: self.contradiction(),
-            remark: Reason::None,
         }
     }
 }

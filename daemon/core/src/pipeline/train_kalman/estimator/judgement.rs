@@ -1,0 +1,68 @@
+//! What may be said of the estimate.
+
+use dynocar_shared::{MassSource, Quantity, Reason, Status};
+
+use super::{MOVED_MIN_S, TrainKalman};
+use crate::pipeline::judge::{Case, LONG_RUN_MAX, long_run_variance};
+
+/// Motion in s before the mass is called known.
+const MASS_MOVED_MIN_S: f64 = 3.0;
+/// All that this estimator answers.
+const COMPLETE: u32 = Quantity::Resistance.bit() | Quantity::Mass.bit();
+/// Innovations before they are judged to be alike.
+const JUDGED_MIN: f64 = 100.0;
+
+impl TrainKalman {
+    pub(super) fn long_run(&self) -> f64 {
+        long_run_variance(self.monitor.mean_square(), self.monitor.correlation())
+    }
+
+    /// Innovations that are alike are made up for by wider intervals, up to a bound.
+    pub(super) fn contradiction(&self) -> Option<Reason> {
+        if self.monitor.are_too_large() {
+            return Some(Reason::InnovationsTooLarge);
+        }
+        let is_alike =
+            self.monitor.effective_count() >= JUDGED_MIN && self.long_run() > LONG_RUN_MAX;
+        is_alike.then_some(Reason::InnovationsNotWhite)
+    }
+
+    /// The quantities known after motion enough: the mass after some seconds of traction, the resistance
+    /// after a while, or once the first samples confirm what was kept.
+    pub(super) fn known_now(&self) -> u32 {
+        let ready = |quantity: Quantity, after_s: f64| {
+            u32::from(self.moved_s >= after_s.min(self.moved_min_s)) * quantity.bit()
+        };
+        let ready =
+            ready(Quantity::Resistance, MOVED_MIN_S) | ready(Quantity::Mass, MASS_MOVED_MIN_S);
+        self.report.known() & ready
+    }
+
+    pub(super) fn mass_source(&self) -> MassSource {
+        if self.report.load_variance() < 0.5 * self.load.prior_variance() {
+            MassSource::Learned
+        } else if self.load.is_weighed() {
+            MassSource::Weighed
+        } else {
+            MassSource::Declared
+        }
+    }
+
+    /// What is wrong with the samples lately.
+    pub(super) fn input_doubt(&self) -> Option<Reason> {
+        self.health.input_doubt().or(self.gate.input_doubt())
+    }
+
+    pub(super) fn case(&self) -> Case {
+        let failure = (Status::Invalid, Reason::NumericalFailure);
+        Case {
+            fault: self.is_fresh_reset.then_some(failure),
+            input: self.input_doubt(),
+            is_ready: self.moved_s >= self.moved_min_s.min(MASS_MOVED_MIN_S),
+            is_known: self.known_now() == COMPLETE,
+            lacking: Status::Unestimated,
+            contradiction: self.contradiction(),
+            remark: Reason::None,
+        }
+    }
+}
