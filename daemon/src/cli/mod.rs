@@ -50,7 +50,7 @@ enum Command {
     Health(health::HealthArguments),
     Check(check::CheckArguments),
     Replay(replay::ReplayArguments),
-    /// Estimate resistance, mass, adhesion and friction from recorded runs, as the daemon does live.
+    /// Estimate resistance, mass, adhesion and friction from recorded runs.
     Identify(Passed),
     /// Estimate deceleration and stopping distance from recorded stops, without forces.
     Stops(Passed),

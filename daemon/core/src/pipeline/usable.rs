@@ -136,7 +136,7 @@ mod tests {
         let is_braking = |tick: u32| tick % 1000 < 200;
         let (waiting, _) = changes_of(1000, true, is_braking);
         assert_eq!(waiting, 20, "ten brakings of 20 s");
-        assert!(changes(1000, is_braking).0 <= 6);
+        assert!(changes(1000, is_braking).0 < 12, "a doubt each time");
     }
 
     #[test]

@@ -22,7 +22,7 @@ use dynocar_analysis::identify::{
     default_estimators, identify, recommended_estimators, samples_of_runs,
 };
 
-/// Estimate resistance, mass, adhesion and friction from recorded runs, as the daemon does live.
+/// Estimate resistance, mass, adhesion and friction from recorded runs.
 #[derive(Debug, Args)]
 pub struct IdentifyArguments {
     /// The dataset's folder, or a recording
