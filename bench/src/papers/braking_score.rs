@@ -127,6 +127,8 @@ fn braking_settings() -> BrakingSettings {
         uses_speed: false,
         first_speed_std_mps: SPEED_NOISE_MPS / 3.0_f64.sqrt(),
         relative_std_max: 1e6,
+        // The papers' brakes exert what they report.
+        demand_relative_std: 0.03,
         ..BrakingSettings::default()
     }
 }
