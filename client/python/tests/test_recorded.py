@@ -269,15 +269,19 @@ def threads() -> int:
 
 
 INTERRUPTED = """
-import os, sys, time
+import sys, time
 import dynocar
-threads = lambda: len(os.listdir("/proc/self/task"))
-before = threads()
+
+def is_busy():
+    before = time.process_time()
+    time.sleep(0.5)
+    return time.process_time() - before > 0.1
+
 try:
     dynocar.explain(sys.argv[1], progress=lambda share, what: print(what, flush=True))
 except KeyboardInterrupt:
-    while threads() > before:
-        time.sleep(0.01)
+    while is_busy():
+        pass
     print("interrupted", flush=True)
 """
 
