@@ -8,7 +8,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::knowledge::Ability;
-use crate::scenarios::world::{LoadSource, Scenario, Traffic, World, normal};
+use crate::scenarios::world::{BRAKE_STD, LoadSource, Scenario, Traffic, World, normal};
 
 /// What is particular about brakes, rail or daemon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -210,7 +210,7 @@ impl Hidden {
             .map(|(from_m, to_m)| (from_m, to_m, 350.0 + 900.0 * random.random::<f64>()))
             .collect();
         Hidden {
-            brake_scale: service.condition.brake_scale() * (1.0 + 0.02 * normal(random)),
+            brake_scale: service.condition.brake_scale() * (1.0 + BRAKE_STD * normal(random)),
             rail,
             wind_mps: wind_std_mps * normal(random),
             tunnels_m,

@@ -13,14 +13,12 @@ use rand_chacha::ChaCha8Rng;
 use super::knowledge::{Ability, Knowledge};
 use super::leg::{Leg, PIECE_M};
 use super::line::{Condition, Hidden, Service, ability, declared_gear, next_load_kg};
-use crate::scenarios::world::{LoadSource, World, normal};
+use crate::scenarios::world::{LoadSource, STOP_TO_STOP_STD, WEIGHING_STD, World, normal};
 
 /// Longest step of the simulation in s.
 const STEP_MAX_S: f64 = 0.02;
 /// Standard deviation in m of the balises' places before a stop.
 const BALISE_STD_M: f64 = 0.08;
-/// Standard deviation of the brakes' force from stop to stop.
-const STOP_TO_STOP: f64 = 0.015;
 /// Mean time in s by which acting forces are later than reported ones.
 const MEAN_DELAY_S: f64 = 0.1;
 
@@ -95,7 +93,7 @@ impl Train {
         let random = &mut self.random;
         self.mass_kg = next_load_kg(self.service.traffic, self.mass_kg, random);
         let scale = match self.world.scenario.load {
-            LoadSource::Changing => 1.0 + 0.03 * normal(random),
+            LoadSource::Changing => 1.0 + WEIGHING_STD * normal(random),
             LoadSource::Weighed(permille) => {
                 // One weighing, wrong the same way all day.
                 let sign = if self.seed.is_multiple_of(2) { 1.0 } else { -1.0 };
@@ -104,7 +102,7 @@ impl Train {
             LoadSource::Exact | LoadSource::Unknown => 1.0,
         };
         self.weighed_kg = scale * self.mass_kg;
-        self.brake_scale = self.hidden.brake_scale * (1.0 + STOP_TO_STOP * normal(random));
+        self.brake_scale = self.hidden.brake_scale * (1.0 + STOP_TO_STOP_STD * normal(random));
         self.balise_m = BALISE_STD_M * normal(random);
         self.energy_j = 0.0;
     }

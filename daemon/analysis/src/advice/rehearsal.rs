@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use dynocar_core::force::balance::mps2_per_n_per_kn;
 use dynocar_core::pipeline::train_kalman::{TrainKalman, TrainKalmanSettings};
-use dynocar_core::pipeline::{KeptEstimate, Pipeline};
+use dynocar_core::pipeline::{Estimator, KeptEstimate, Pipeline};
 use dynocar_core::train::{Davis, TrainModel};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use nalgebra::{Matrix3, SVector};
@@ -96,13 +96,15 @@ impl<'a> Rehearsal<'a> {
             resistance: scene.davis,
             ..scene.train.clone()
         });
-        let settings = TrainKalmanSettings {
+        let mut settings = TrainKalmanSettings {
             speed_noise_mps: measured_mps.clamp(0.001, 1.0),
-            load_std_percent: if known.mass_std_t > 0.0 { 15.0 } else { 0.0 },
             ..TrainKalmanSettings::default()
         };
+        if known.mass_std_t <= 0.0 {
+            settings.load_std_percent = 0.0;
+        }
         let mut estimator = Box::new(TrainKalman::new(settings, &train).ok()?);
-        dynocar_core::pipeline::Estimator::warm_start(estimator.as_mut(), &known.kept(scene)?);
+        estimator.warm_start(&known.kept(scene)?);
         let id = TrainId(1);
         let gain = mps2_per_n_per_kn(train.rotating_mass_factor);
         Some(Rehearsal {

@@ -21,6 +21,6 @@ pub mod law_bank;
 pub mod motion;
 pub mod report;
 pub mod settings;
+pub mod tracker;
 
 pub(in crate::pipeline) use settings::DECLARED_BRAKE_STD;
-pub mod tracker;

@@ -3,9 +3,10 @@
 /// Brake force in N/kN from which a braking begins, and below which it has ended.
 const BEGINS_N_PER_KN: f64 = 5.0;
 const ENDS_N_PER_KN: f64 = 1.0;
-/// Normalised innovations count no further than this, and their sum over the root of their number may not
-/// lie beyond the limit: white ones do not, and those of a brake some 10 % off neither.
+/// Normalised innovations count no further than this.
 const COUNTS_MAX: f64 = 4.0;
+/// Their sum over the root of their number may not lie beyond this: white ones do not, and those of a brake
+/// some 10 % off neither.
 const LIMIT: f64 = 7.0;
 /// Innovations before they are judged.
 const JUDGED_MIN: f64 = 5.0;
@@ -22,18 +23,22 @@ pub struct BrakingWatch {
 impl BrakingWatch {
     /// Takes in a brake force in N/kN; true when a braking begins with it.
     pub fn begins(&mut self, brake_n_per_kn: f64) -> bool {
-        if brake_n_per_kn < ENDS_N_PER_KN {
-            *self = BrakingWatch::default();
-            return false;
-        }
+        self.end_below(brake_n_per_kn);
         let begins = !self.is_braking && brake_n_per_kn >= BEGINS_N_PER_KN;
         self.is_braking |= begins;
         begins
     }
 
-    /// True from where the braking was refused to its end.
-    pub fn is_refused(&self) -> bool {
+    /// Takes in a brake force in N/kN; true from where the braking was refused to its end.
+    pub fn is_still_refused(&mut self, brake_n_per_kn: f64) -> bool {
+        self.end_below(brake_n_per_kn);
         self.is_refused
+    }
+
+    fn end_below(&mut self, brake_n_per_kn: f64) {
+        if brake_n_per_kn < ENDS_N_PER_KN {
+            *self = BrakingWatch::default();
+        }
     }
 
     /// Takes in a normalised innovation; true when the braking is refused by it.
@@ -67,7 +72,7 @@ mod tests {
         let mut watch = BrakingWatch::default();
         assert!(!watch.refuses(10.0), "no braking");
         watch.begins(40.0);
-        assert!((0..20).any(|_| watch.refuses(3.0)) && !watch.begins(3.0) && watch.is_refused());
-        assert!(!watch.begins(0.5) && !watch.is_refused() && watch.begins(40.0));
+        assert!((0..20).any(|_| watch.refuses(3.0)) && watch.is_still_refused(3.0));
+        assert!(!watch.is_still_refused(0.5) && watch.begins(40.0));
     }
 }

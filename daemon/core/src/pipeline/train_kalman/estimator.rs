@@ -6,9 +6,10 @@ use std::sync::Arc;
 
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, RejectionReason, Status};
 
-use super::bank::{Measured, MotionBank};
+use super::bank::Measured;
 use super::braking_watch::BrakingWatch;
 use super::jump_share::JumpShare;
+use super::learned::Learned;
 use super::load::{Change, LoadWatch};
 use super::motion_filter::{LOAD, SPEED, Step, wind_over};
 use super::prior::Resistance;
@@ -17,16 +18,14 @@ use super::settings::TrainKalmanSettings;
 use super::systematic::Systematic;
 use crate::force::ResolvedSample;
 use crate::pipeline::judge::{InputHealth, LONG_RUN_MAX};
-use crate::pipeline::motion::{BRIDGED_MAX_S, STANDING_MPS, SpeedNoise, SpeedRange};
+use crate::pipeline::motion::{BRIDGED_MAX_S, STANDING_MPS, SpeedRange};
 use crate::pipeline::output::{write_innovations, write_status};
 use crate::pipeline::resistance::sample::UnitSample;
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::SettingError;
-use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
+use crate::pipeline::{Estimator, KeptEstimate, Outcome};
 use crate::train::TrainModel;
 
-/// Innovations that the published statistics look back over.
-const INNOVATION_MEMORY: u32 = 1000;
 /// Motion in s before anything is called known; after a warm start, before it is confirmed.
 const MOVED_MIN_S: f64 = 20.0;
 const CONFIRMED_S: f64 = 3.0;
@@ -34,14 +33,6 @@ const CONFIRMED_S: f64 = 3.0;
 const KEPT_DEVIATIONS: f64 = 3.0;
 /// How long a change of force is remembered, in s.
 const FORCE_RATE_MEMORY_S: f64 = 0.5;
-/// All that a braking may teach, as it was before.
-#[derive(Clone, Debug)]
-struct Before {
-    bank: MotionBank,
-    noise: SpeedNoise,
-    jumps: JumpShare,
-    monitor: InnovationMonitor,
-}
 
 /// Resistance and mass of a train by Kalman filters over every sample.
 #[derive(Clone, Debug)]
@@ -52,19 +43,16 @@ pub struct TrainKalman {
     /// Resistance as declared or kept, scaled, with its covariance.
     first: Resistance,
     gate: SampleGate,
-    bank: MotionBank,
+    learned: Learned,
     load: LoadWatch,
     /// Newest sample of the motion.
     last: Option<UnitSample>,
     last_time_ns: Option<i64>,
     /// True when the speed of the newest sample was at least the lowest that is used.
     is_fast: bool,
-    noise: SpeedNoise,
-    jumps: JumpShare,
     force_rate: f64,
-    monitor: InnovationMonitor,
     braking: BrakingWatch,
-    before_braking: Before,
+    before_braking: Learned,
     systematic: Systematic,
     speeds: SpeedRange,
     health: InputHealth,
@@ -89,13 +77,12 @@ impl TrainKalman {
     ) -> Result<Self, SettingError> {
         settings.check_ranges()?;
         let first = Resistance::declared(&train.resistance, settings.prior_relative_std);
-        let bank = first.bank(&settings);
-        let noise = SpeedNoise::guessed(settings.speed_noise_mps);
-        let monitor = InnovationMonitor::new(INNOVATION_MEMORY);
-        let jumps = JumpShare::default();
+        let learned = Learned::new(&settings, &first);
         Ok(TrainKalman {
+            report: Report::new(&learned.bank.published(0.0)),
             braking: BrakingWatch::default(),
-            before_braking: Before { bank: bank.clone(), noise, jumps, monitor },
+            before_braking: learned.clone(),
+            learned,
             settings,
             train_kg: train.mass_kg,
             train_length_m: train.length_m,
@@ -105,10 +92,7 @@ impl TrainKalman {
             last: None,
             last_time_ns: None,
             is_fast: false,
-            noise,
-            jumps,
             force_rate: 0.0,
-            monitor,
             systematic: Systematic::new(
                 settings.gradient_std_permille,
                 settings.acceleration_scale_std,
@@ -118,8 +102,6 @@ impl TrainKalman {
             moved_s: 0.0,
             moved_min_s: MOVED_MIN_S,
             kept_mass: None,
-            report: Report::new(&bank.published(0.0)),
-            bank,
             is_fresh_reset: false,
             resets: 0,
         })
@@ -129,10 +111,10 @@ impl TrainKalman {
         let gap_s = self
             .last_time_ns
             .map_or(f64::INFINITY, |last| now.time_ns.saturating_sub(last) as f64 * 1e-9);
-        let noise_variance = self.noise.variance_of_sample(f64::INFINITY);
+        let noise_variance = self.learned.noise.variance_of_sample(f64::INFINITY);
         let wind = wind_over(gap_s.max(0.0), self.settings.wind_std_mps);
-        self.bank.begin(now.speed_mps, noise_variance, gap_s.max(0.0), wind);
-        self.monitor.break_here();
+        self.learned.bank.begin(now.speed_mps, noise_variance, gap_s.max(0.0), wind);
+        self.learned.monitor.break_here();
         self.force_rate = 0.0;
         self.last = Some(now);
         Outcome::Used
@@ -153,7 +135,7 @@ impl TrainKalman {
         let walk = self.settings.brake_scale_per_sqrt_min.powi(2) * duration_s / 60.0;
         Step {
             place_variance: steps * (place_s * (to.known - from.known)).powi(2),
-            jump_share: self.jumps.share(),
+            jump_share: self.learned.jumps.share(),
             force_rate: self.force_rate,
             map_std_permille: sample.gradient_std_permille,
             drift_variance: drift,
@@ -167,19 +149,14 @@ impl TrainKalman {
     fn advance(&mut self, from: UnitSample, now: UnitSample, sample: &ResolvedSample) -> Outcome {
         let step = self.step(&from, &now, sample);
         if self.braking.begins(now.brake) {
-            self.before_braking = Before {
-                bank: self.bank.clone(),
-                noise: self.noise,
-                jumps: self.jumps,
-                monitor: self.monitor,
-            };
+            self.before_braking = self.learned.clone();
         }
-        let before_mps = self.bank.likeliest().belief.mean[SPEED];
-        self.bank.predict(&step);
-        let moved_mps = (self.bank.likeliest().belief.mean[SPEED] - before_mps).abs();
-        let noise_variance = self.noise.variance_of_sample(moved_mps);
-        let measured = self.bank.measure(now.speed_mps, noise_variance, &step);
-        let Some(measured) = measured.ok().filter(|_| self.bank.is_sound()) else {
+        let before_mps = self.learned.bank.likeliest().belief.mean[SPEED];
+        self.learned.bank.predict(&step);
+        let moved_mps = (self.learned.bank.likeliest().belief.mean[SPEED] - before_mps).abs();
+        let noise_variance = self.learned.noise.variance_of_sample(moved_mps);
+        let measured = self.learned.bank.measure(now.speed_mps, noise_variance, &step);
+        let Some(measured) = measured.ok().filter(|_| self.learned.bank.is_sound()) else {
             self.reset();
             return self.begin(now);
         };
@@ -189,7 +166,7 @@ impl TrainKalman {
         }
         self.last = Some(now);
         if measured.trust.is_outlier() {
-            self.monitor.break_here();
+            self.learned.monitor.break_here();
             return Outcome::Rejected(RejectionReason::Outlier);
         }
         self.learn(&measured, now.speed_mps);
@@ -203,40 +180,38 @@ impl TrainKalman {
 
     /// Forgets a braking that the model cannot explain: its brake does not act as it reports.
     fn take_back(&mut self, by_wind: f64) {
-        self.bank = self.before_braking.bank.clone();
-        self.noise = self.before_braking.noise;
-        self.jumps = self.before_braking.jumps;
-        self.monitor = self.before_braking.monitor;
-        self.monitor.break_here();
+        self.learned = self.before_braking.clone();
+        self.learned.monitor.break_here();
         self.last = None;
         self.judge(by_wind);
     }
 
     /// Learns the noise of speeds and of forces that jump from what a speed said.
     fn learn(&mut self, measured: &Measured, speed_mps: f64) {
-        self.monitor.push(measured.trust.normalised);
-        let belief = &self.bank.likeliest().belief;
+        self.learned.monitor.push(measured.trust.normalised);
+        let belief = &self.learned.bank.likeliest().belief;
         let residual_mps = speed_mps - belief.mean[SPEED];
         let filtered_variance = belief.covariance[(SPEED, SPEED)];
-        self.noise.take_residual(residual_mps, filtered_variance, measured.trust.weight);
-        self.jumps.learn(measured);
+        self.learned.noise.take_residual(residual_mps, filtered_variance, measured.trust.weight);
+        self.learned.jumps.learn(measured);
     }
 
     fn judge(&mut self, by_wind: f64) {
         let inflation = self.long_run().clamp(1.0, LONG_RUN_MAX);
-        let published = self.bank.published(by_wind);
+        let published = self.learned.bank.published(by_wind);
         self.report.take(&published, inflation, &self.systematic, &self.speeds);
     }
 
     fn reset(&mut self) {
-        self.bank = self.first.bank(&self.settings);
+        self.learned.bank = self.first.bank(&self.settings);
         let load_variance = self.load.prior_variance();
-        self.bank.each(|it| it.replace(LOAD, 1.0, load_variance));
-        self.noise.reset();
-        self.jumps = JumpShare::default();
+        self.learned.bank.each(|it| it.replace(LOAD, 1.0, load_variance));
+        self.learned.noise.reset();
+        self.learned.jumps = JumpShare::default();
+        self.braking = BrakingWatch::default();
         self.moved_s = 0.0;
         self.moved_min_s = MOVED_MIN_S;
-        self.report = Report::new(&self.bank.published(0.0));
+        self.report = Report::new(&self.learned.bank.published(0.0));
         self.is_fresh_reset = true;
         self.resets += 1;
     }
@@ -248,7 +223,7 @@ impl TrainKalman {
         let was_fast = std::mem::replace(&mut self.is_fast, sample.speed_mps >= least_mps);
         match self.last {
             Some(_) => {
-                let believed_mps = self.bank.likeliest().belief.mean[SPEED];
+                let believed_mps = self.learned.bank.likeliest().belief.mean[SPEED];
                 believed_mps >= least_mps && sample.speed_mps > STANDING_MPS
             }
             None => was_fast && sample.speed_mps > STANDING_MPS,
@@ -258,17 +233,23 @@ impl TrainKalman {
     /// Follows the load from sample to sample.
     fn follow_load(&mut self, sample: &ResolvedSample) {
         let change = self.load.see(sample);
+        if change.is_some() {
+            // What was learned before refers to the load before.
+            self.braking = BrakingWatch::default();
+        }
         if let Some((mass_kg, relative_variance)) = self.kept_mass.take() {
             let load = sample.mass_kg / mass_kg;
             let variance = load * load * relative_variance;
             let allowed = KEPT_DEVIATIONS.powi(2) * (variance + self.load.prior_variance());
             if (load - 1.0).powi(2) <= allowed {
-                return self.bank.each(|it| it.replace(LOAD, load, variance));
+                return self.learned.bank.each(|it| it.replace(LOAD, load, variance));
             }
         }
         match change {
-            Some(Change::Anew(variance)) => self.bank.each(|it| it.replace(LOAD, 1.0, variance)),
-            Some(Change::Opened(variance, most)) => self.bank.each(|it| {
+            Some(Change::Anew(variance)) => {
+                self.learned.bank.each(|it| it.replace(LOAD, 1.0, variance))
+            }
+            Some(Change::Opened(variance, most)) => self.learned.bank.each(|it| {
                 let now = it.covariance[(LOAD, LOAD)];
                 it.disturb(LOAD, variance.min((most - now).max(0.0)));
             }),
@@ -298,12 +279,11 @@ impl Gated for TrainKalman {
                 return self.health.note(Outcome::Rejected(reason), sample);
             }
         };
-        if self.braking.is_refused() && !self.braking.begins(now.brake) && self.braking.is_refused()
-        {
+        if self.braking.is_still_refused(now.brake) {
             self.last = None;
             return self.health.note(Outcome::Used, sample);
         }
-        self.noise.rounding.see(now.speed_mps);
+        self.learned.noise.rounding.see(now.speed_mps);
         let last = self.last.filter(|last| {
             let since_s = now.seconds_since(last);
             last.stretch == now.stretch && since_s > 0.0 && since_s <= BRIDGED_MAX_S
@@ -344,7 +324,7 @@ impl Estimator for TrainKalman {
         let declared_kg = self.load.declared_kg(self.train_kg);
         self.report.write(declared_kg, &self.speeds, snapshot);
         write_status(snapshot, self.case().verdict());
-        write_innovations(snapshot, &self.monitor);
+        write_innovations(snapshot, &self.learned.monitor);
         snapshot.mass_source = self.mass_source() as u32;
         snapshot.generation = self.resets;
     }
@@ -354,8 +334,8 @@ impl Estimator for TrainKalman {
         let davis = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
         let Some((mean, covariance)) = kept.moments(davis) else { return false };
         self.first = Resistance::kept(&mean, &covariance);
-        self.bank = self.first.bank(&self.settings);
-        self.report = Report::new(&self.bank.published(0.0));
+        self.learned.bank = self.first.bank(&self.settings);
+        self.report = Report::new(&self.learned.bank.published(0.0));
         self.moved_min_s = CONFIRMED_S;
         self.kept_mass = kept.moments([Parameter::Mass]).and_then(|(mass_kg, variance)| {
             let relative_variance = variance[(0, 0)] / (mass_kg[0] * mass_kg[0]);

@@ -15,6 +15,7 @@ mod behaviour;
 mod braking_watch;
 mod estimator;
 mod jump_share;
+mod learned;
 mod load;
 mod motion_filter;
 mod prior;

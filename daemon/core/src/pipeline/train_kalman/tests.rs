@@ -1,4 +1,4 @@
-//! The estimator across a restart of the daemon.
+//! The estimator across a restart of the daemon and with brakes that do not act as reported.
 
 use std::sync::Arc;
 
@@ -13,14 +13,24 @@ use crate::train::{Davis, TrainModel};
 
 /// A train of 100 t declared and 110 t true that drives about for so many s; what is said of it.
 fn driven(estimator: &mut TrainKalman, from_s: u32, duration_s: u32) -> ParameterSnapshot {
+    braked(estimator, from_s, duration_s, 1.0)
+}
+
+/// The same with a brake that exerts a share of what it reports.
+fn braked(
+    estimator: &mut TrainKalman,
+    from_s: u32,
+    duration_s: u32,
+    share: f64,
+) -> ParameterSnapshot {
     let (w0, gain) = (2.0, 9.806_65e-3 / 1.06);
-    let push = |second: f64| [40.0, 0.0, -40.0, 0.0][(second / 15.0) as usize % 4];
+    let push = |second: f64| -> f64 { [40.0, 0.0, -40.0, 0.0][(second / 15.0) as usize % 4] };
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(u64::from(from_s));
     let mut speed_mps = 20.0;
     let mut snapshot = ParameterSnapshot::empty();
     for tick in 10 * from_s..10 * (from_s + duration_s) {
         let second = 0.1 * f64::from(tick);
-        let force = push(second) / 1.1;
+        let force = (push(second).max(0.0) + share * push(second).min(0.0)) / 1.1;
         speed_mps += 0.1 * gain * (force - w0);
         let coasting = ResolvedSample::coasting();
         estimator.update(&ResolvedSample {
@@ -62,4 +72,15 @@ fn after_a_restart_the_mass_and_the_resistance_are_known_with_the_first_seconds(
     assert!(std(&after, 0) < 1.5 * std(&before, 0));
     // Between the two somebody may have boarded.
     assert!(std(&after, 3) < 0.015 * after.values[3]);
+}
+
+#[test]
+fn a_brake_that_exerts_less_than_reported_leaves_the_mass_right() {
+    for share in [0.9, 0.5] {
+        let mut estimator = estimator();
+        driven(&mut estimator, 0, 120);
+        let after = braked(&mut estimator, 120, 300, share);
+        let mass_t = after.values[3];
+        assert!((mass_t / 110.0 - 1.0).abs() < 0.01, "{share}: {mass_t}");
+    }
 }

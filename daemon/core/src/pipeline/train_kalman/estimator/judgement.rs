@@ -14,16 +14,16 @@ const JUDGED_MIN: f64 = 100.0;
 
 impl TrainKalman {
     pub(super) fn long_run(&self) -> f64 {
-        long_run_variance(self.monitor.mean_square(), self.monitor.correlation())
+        long_run_variance(self.learned.monitor.mean_square(), self.learned.monitor.correlation())
     }
 
     /// Innovations that are alike are made up for by wider intervals, up to a bound.
     pub(super) fn contradiction(&self) -> Option<Reason> {
-        if self.monitor.are_too_large() {
+        if self.learned.monitor.are_too_large() {
             return Some(Reason::InnovationsTooLarge);
         }
         let is_alike =
-            self.monitor.effective_count() >= JUDGED_MIN && self.long_run() > LONG_RUN_MAX;
+            self.learned.monitor.effective_count() >= JUDGED_MIN && self.long_run() > LONG_RUN_MAX;
         is_alike.then_some(Reason::InnovationsNotWhite)
     }
 
