@@ -85,11 +85,15 @@ pub fn drive(arguments: &DriveArguments) -> Result<(), (String, u8)> {
             .collect();
     let scored = scored.map_err(|error| (error.to_string(), 1))?;
     if let Some(file) = &arguments.picture {
-        let ordinary: Vec<Scored> = scored
-            .iter()
-            .filter(|it| it.comparison.scenario.contains(Condition::Ordinary.name()))
-            .cloned()
-            .collect();
+        // One row of each traffic; that of its usual cycle comes first.
+        let mut ordinary: Vec<(Traffic, Scored)> = Vec::new();
+        for (service, it) in chosen.iter().zip(&scored) {
+            let is_drawn = ordinary.iter().any(|(traffic, _)| *traffic == service.traffic);
+            if service.condition == Condition::Ordinary && !is_drawn {
+                ordinary.push((service.traffic, it.clone()));
+            }
+        }
+        let ordinary: Vec<Scored> = ordinary.into_iter().map(|(_, it)| it).collect();
         let drawn = picture::svg(&ordinary).map_err(|error| (error.to_string(), 1))?;
         write_file(file, &drawn).map_err(|error| (error.to_string(), 1))?;
     }
