@@ -20,7 +20,7 @@ pub fn told_by_data(problem: &FitProblem, deviation: &[f64]) -> DavisDeviations 
 }
 
 /// In words which of them the data do not tell, and what would; empty when they tell all.
-pub fn not_informed(problem: &FitProblem, fit: &Fit, deviation: &[f64]) -> String {
+pub fn undetermined(problem: &FitProblem, fit: &Fit, deviation: &[f64]) -> String {
     let DavisDeviations { a, b, c } = told_by_data(problem, deviation);
     let names = [("a", a), ("b", b), ("c", c)];
     let names: Vec<&str> =

@@ -54,7 +54,7 @@ impl<'o> Unexplained<'o> {
     }
 
     /// What explains the residual but is not told, in words; empty for nothing.
-    pub fn not_informed(&self) -> String {
+    pub fn undetermined(&self) -> String {
         let one = |(trial, refusal): &(&Trial, Refusal)| {
             format!(" Not told is {}: {refusal}.", trial.kind.name())
         };

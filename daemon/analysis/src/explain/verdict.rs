@@ -14,7 +14,7 @@ use super::competing::{CompetingHypotheses, is_in, rivals, separating_run};
 use super::effects::ReportContext;
 use super::evidence::{acceptance_score, p_value};
 use super::identifiability::{identifiability, not_held};
-use super::informed::{not_informed, told_by_data};
+use super::informed::{told_by_data, undetermined};
 use super::runners_up::runners_up;
 use super::score::{self, Score};
 use super::selection::{Deviations, Outcome, Search, discounted, few_runs_factor, penalty};
@@ -56,11 +56,11 @@ pub fn answer(
     let (statement, experiment) = if impossible.is_empty() {
         let (text, experiment) =
             statement(search, outcome, verdict, &effects, &rivals, left.as_ref());
-        let not_informed = match verdict {
+        let undetermined = match verdict {
             Verdict::InsufficientData => String::new(),
-            _ => not_informed(search.problem, fit, std) + &not_held(&identifiability),
+            _ => undetermined(search.problem, fit, std) + &not_held(&identifiability),
         };
-        (text + &worse_held_out(&effects, score) + &not_informed, experiment)
+        (text + &worse_held_out(&effects, score) + &undetermined, experiment)
     } else {
         let text = format!("The data cannot be true as described: {}", impossible.join("; "));
         (text, Some("Set right what is named and run this again.".into()))
@@ -255,7 +255,7 @@ fn statement(
 ) -> (String, Option<String>) {
     let described: Vec<String> = effects.iter().map(describe).collect();
     let described = described.join("; ");
-    let not_informed = left.map(Unexplained::not_informed).unwrap_or_default();
+    let undetermined = left.map(Unexplained::undetermined).unwrap_or_default();
     match verdict {
         Verdict::InsufficientData if search.problem.runs.is_empty() => {
             let held_out = search.holdout.len();
@@ -273,17 +273,17 @@ fn statement(
         Verdict::None => {
             let text = "Nothing undeclared is found: the declared model with a, b, c refitted \
                         explains the runs.";
-            (format!("{text}{not_informed}"), None)
+            (format!("{text}{undetermined}"), None)
         }
-        Verdict::Effect => (format!("Found: {described}.{not_informed}"), None),
+        Verdict::Effect => (format!("Found: {described}.{undetermined}"), None),
         Verdict::Unknown => {
             let text = if is_in(&outcome.fit, EffectKind::Unknown) {
                 format!(
                     "The residual is real, but no effect of the library explains it; it lives \
-                     here: {described}.{not_informed}"
+                     here: {described}.{undetermined}"
                 )
             } else {
-                unnamed(left, &described) + &not_informed
+                unnamed(left, &described) + &undetermined
             };
             let experiment = "Drive this range again with other speeds, loads and directions.";
             (text, Some(experiment.into()))
