@@ -58,7 +58,7 @@ impl CallFailure {
     }
 }
 
-/// Calls a program and waits for its end; gives its standard output and what it remarked on.
+/// Calls a program and waits for its end; gives its standard output and its diagnostics.
 ///
 /// # Errors
 ///

@@ -45,8 +45,8 @@ pub fn rows_of(file: &Path, columns: &[ColumnMapping]) -> Result<String, String>
     for it in columns {
         command.arg("--column").arg(&it.column).arg(it.unit.name());
     }
-    let (rows, _) = output_of(PARQUET, &mut command).map_err(|complaint| {
-        let words = complaint.words();
+    let (rows, _) = output_of(PARQUET, &mut command).map_err(|failure| {
+        let words = failure.words();
         words.strip_prefix(&format!("{}: ", file.display())).unwrap_or(&words).to_owned()
     })?;
     String::from_utf8(rows).map_err(|error| error.to_string())
@@ -74,7 +74,7 @@ pub enum UnpackError {
 }
 
 /// Unpacks what a recording holds of a train, its only one where none is named, into a new folder; what the
-/// program remarks on is reported.
+/// program diagnoses is reported.
 ///
 /// # Errors
 ///
@@ -88,7 +88,7 @@ pub fn unpack(recording: &Path, folder: &Path, train: Option<TrainId>) -> Result
         command.arg("--train").arg(train.0.to_string());
     }
     command.arg(recording);
-    let (_, words) = output_of(program, &mut command).map_err(|complaint| match complaint {
+    let (_, words) = output_of(program, &mut command).map_err(|failure| match failure {
         CallFailure::Input(problem) => UnpackError::Content { path: path.clone(), problem },
         CallFailure::Work(problem) => UnpackError::Failed { path: path.clone(), problem },
     })?;
@@ -106,7 +106,7 @@ pub struct Unpacked {
 }
 
 impl Unpacked {
-    /// Unpacks a recording; what the program remarks on is reported.
+    /// Unpacks a recording; what the program diagnoses is reported.
     ///
     /// # Errors
     ///

@@ -179,7 +179,7 @@ fn nothing_is_overwritten_and_nothing_is_written_of_bad_input() {
 /// What a browser makes of a drawing: its root, the number of its lines, its texts.
 fn look(browser: &mut Browser, file: &Path) -> (String, u64, String) {
     browser.open(&format!("file://{}", file.display()));
-    assert!(browser.conduct().complaints.is_empty(), "{:?}", browser.conduct());
+    assert!(browser.conduct().console_errors.is_empty(), "{:?}", browser.conduct());
     let root = browser.value("document.documentElement.tagName");
     let lines = browser.value("document.querySelectorAll('polyline, path, line').length");
     let texts = browser

@@ -78,5 +78,5 @@ fn without_a_position_nothing_shows_a_late_speed_from_late_forces() {
     assert_eq!(open.verdict, Verdict::Ambiguous, "{}", open.statement);
     assert_eq!(named(&open), ["actuator_delay", "speed_delay"], "{}", open.statement);
     let why = open.considered.iter().find(|it| it.kind == EffectKind::SpeedDelay.name()).unwrap();
-    assert!(why.remark.contains("integrated from the speed"), "{}", why.remark);
+    assert!(why.reason.contains("integrated from the speed"), "{}", why.reason);
 }

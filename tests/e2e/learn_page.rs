@@ -147,7 +147,7 @@ fn the_page_of_what_was_learned_shows_models_decisions_and_events_on_wide_and_na
         browser.open(&address);
         let seen = browser.value(LOOK);
         let conduct = browser.conduct();
-        assert_eq!(conduct.complaints, [] as [String; 0]);
+        assert_eq!(conduct.console_errors, [] as [String; 0]);
         assert_eq!(conduct.requests, [address]);
         assert_eq!(seen["inner_width"], width_px);
         assert_eq!(seen["is_wider"], false, "the page scrolls sideways: {seen:#}");

@@ -95,7 +95,7 @@ fn look(report: &Report, width_px: u32, is_dark: bool) -> Value {
     browser.open(&address);
     let seen = browser.value(LOOK);
     let conduct = browser.conduct();
-    assert_eq!(conduct.complaints, [] as [String; 0]);
+    assert_eq!(conduct.console_errors, [] as [String; 0]);
     assert_eq!(conduct.requests, [address]);
     assert_eq!(seen["inner_width"], width_px);
     assert_eq!(seen["scroll_width"], seen["width"], "the page scrolls sideways: {seen:#}");
@@ -173,7 +173,7 @@ fn a_faulty_page_is_seen_to_be_faulty() {
     let mut browser = Browser::start(PHONE_PX, false);
     browser.open(&format!("file://{}", page.display()));
     let conduct = browser.conduct();
-    let has = |words: &str| conduct.complaints.iter().any(|complaint| complaint.contains(words));
+    let has = |words: &str| conduct.console_errors.iter().any(|error| error.contains(words));
     assert!(has("wrong") && has("missing is not defined"), "{conduct:?}");
     assert!(conduct.requests.contains(&"http://127.0.0.1:9/x".to_string()), "{conduct:?}");
     assert!(browser.value("document.documentElement.scrollWidth").as_u64() >= Some(900));

@@ -167,7 +167,7 @@ fn a_pointer_reads_what_was_recorded_and_a_drag_narrows_the_axis() {
     let again = look(&mut browser, TRACE);
     assert_eq!(again["labels"], seen["labels"], "a double click shows the whole");
     assert_eq!(again["has_button"], false);
-    assert_eq!(browser.conduct().complaints, [] as [String; 0]);
+    assert_eq!(browser.conduct().console_errors, [] as [String; 0]);
 }
 
 #[test]

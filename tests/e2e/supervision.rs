@@ -312,8 +312,8 @@ fn the_unit_file_says_what_the_docs_promise() {
         std::fs::write(&copy, here).unwrap();
         let output = Command::new("systemd-analyze").arg("verify").arg(&copy).output().unwrap();
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        let complaints: Vec<&str> =
+        let errors: Vec<&str> =
             said.lines().filter(|line| line.contains("dynocar.service:")).collect();
-        assert!(complaints.is_empty(), "{complaints:?}");
+        assert!(errors.is_empty(), "{errors:?}");
     }
 }

@@ -225,6 +225,6 @@ fn the_page_shows_map_profile_and_every_trip_and_asks_for_nothing() {
     let wide = "document.documentElement.scrollWidth <= document.documentElement.clientWidth";
     assert_eq!(browser.value(wide), true);
     let conduct = browser.conduct();
-    assert!(conduct.complaints.is_empty(), "{:?}", conduct.complaints);
+    assert!(conduct.console_errors.is_empty(), "{:?}", conduct.console_errors);
     assert_eq!(conduct.requests.len(), 1, "{:?}", conduct.requests);
 }

@@ -34,7 +34,7 @@ enum InputFault {
 
 const FORCES: &[&str] = &["traction_force", "brake_force", "control_force"];
 
-/// What goes wrong, the code of the note, and the reason of the pipelines.
+/// What goes wrong, the code of the diagnostic, and the reason of the pipelines.
 const FAULTS: [(&str, InputFault, &str, Reason); 17] = [
     ("kN as N", InputFault::Scale(FORCES, 1e-3), "forces_scale", Reason::ImplausibleForces),
     ("N as kN", InputFault::Scale(FORCES, 1e3), "forces_scale", Reason::ImplausibleForces),
@@ -171,9 +171,10 @@ fn printed(folder: &Path, command: &[&str]) -> (String, Value) {
 }
 
 fn has_note(answer: &Value, code: &str) -> bool {
-    let notes = answer["notes"].as_array().expect("a list of notes");
-    notes.iter().any(|note| {
-        note["code"] == code && note["text"].as_str().is_some_and(|text| text.contains('?'))
+    let diagnostics = answer["notes"].as_array().expect("a list of diagnostics");
+    diagnostics.iter().any(|diagnostic| {
+        diagnostic["code"] == code
+            && diagnostic["text"].as_str().is_some_and(|text| text.contains('?'))
     })
 }
 
@@ -190,9 +191,10 @@ fn every_input_fault_is_named_by_check_identify_and_explain_on_the_terminal_and_
             write(&files, Some(fault), folder);
             let case = format!("{name}, {}", train_type.name());
             let dataset = dataset::load(folder).unwrap();
-            let note = dataset.notes().into_iter().find(|note| note.code == code).unwrap();
-            assert_eq!(note.runs.len(), 3, "{case}: {note}");
-            let words: String = note.text.split_whitespace().take(4).collect::<Vec<_>>().join(" ");
+            let diagnostic = dataset.diagnostics().into_iter().find(|it| it.code == code).unwrap();
+            assert_eq!(diagnostic.runs.len(), 3, "{case}: {diagnostic}");
+            let words: String =
+                diagnostic.text.split_whitespace().take(4).collect::<Vec<_>>().join(" ");
             let report = folder.join("report.html");
             let commands: [&[&str]; 3] = [
                 &["check"],
@@ -212,14 +214,14 @@ fn every_input_fault_is_named_by_check_identify_and_explain_on_the_terminal_and_
                 assert!(message.contains(&words), "explain: {case}: {message}");
                 continue;
             }
-            if note.severity < Severity::Fundamental {
+            if diagnostic.severity < Severity::Fundamental {
                 continue;
             }
             assert_eq!(explained["verdict"], "insufficient_data", "{case}");
             assert_eq!(explained["effects"], Value::Array(Vec::new()), "{case}");
             let page = std::fs::read_to_string(report).unwrap();
-            let (notes, verdict) = (page.find("id=\"notes\""), page.find("id=\"verdict\""));
-            assert!(notes.unwrap() < verdict.unwrap(), "{case}: the notes stand above");
+            let (diagnostics, verdict) = (page.find("id=\"notes\""), page.find("id=\"verdict\""));
+            assert!(diagnostics.unwrap() < verdict.unwrap(), "{case}: the diagnostics stand above");
             assert!(!page.contains("class=\"verdict none\""), "{case}: no green box");
         }
     }
@@ -248,13 +250,13 @@ fn no_pipeline_trusts_samples_that_cannot_be_true() {
     }
 }
 
-/// Notes that are no account of single bad rows.
+/// Diagnostics that are no account of single bad rows.
 fn notes_on(settings: &SimulatorSettings) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
     write(&files(settings), None, folder.path());
-    let notes = dataset::load(folder.path()).unwrap().notes();
+    let diagnostics = dataset::load(folder.path()).unwrap().diagnostics();
     let of_rows = ["off_the_line", "stands_still"];
-    notes.iter().filter(|it| !of_rows.contains(&it.code)).map(ToString::to_string).collect()
+    diagnostics.iter().filter(|it| !of_rows.contains(&it.code)).map(ToString::to_string).collect()
 }
 
 #[test]

@@ -29,7 +29,7 @@ const ARGUMENTS: &str = "--headless --no-sandbox --disable-gpu --disable-quic --
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Conduct {
     /// Errors and warnings of console, scripts and loading.
-    pub complaints: Vec<String>,
+    pub console_errors: Vec<String>,
     /// Addresses it asked for, its own first.
     pub requests: Vec<String>,
 }
@@ -236,14 +236,14 @@ impl Browser {
         let text = |value: &Value| value.to_string();
         match message["method"].as_str().unwrap_or("") {
             "Page.loadEventFired" => self.has_loaded = true,
-            "Runtime.exceptionThrown" => self.conduct.complaints.push(text(parameters)),
+            "Runtime.exceptionThrown" => self.conduct.console_errors.push(text(parameters)),
             "Runtime.consoleAPICalled"
                 if ["error", "warning", "assert"]
                     .contains(&parameters["type"].as_str().unwrap_or("")) =>
             {
-                self.conduct.complaints.push(text(&parameters["args"]));
+                self.conduct.console_errors.push(text(&parameters["args"]));
             }
-            "Log.entryAdded" => self.conduct.complaints.push(text(&parameters["entry"])),
+            "Log.entryAdded" => self.conduct.console_errors.push(text(&parameters["entry"])),
             "Network.requestWillBeSent" => {
                 let address = parameters["request"]["url"].as_str().unwrap_or("").to_string();
                 self.conduct.requests.push(address);

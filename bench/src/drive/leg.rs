@@ -26,7 +26,7 @@ impl Leg {
         from + share * (to - from)
     }
 
-    /// The mean over a stretch in ‰.
+    /// The mean over a section in ‰.
     pub fn mean_slope_permille(&self, from_m: f64, to_m: f64) -> f64 {
         let count = 16;
         let at = |k: i32| from_m + (to_m - from_m) * (f64::from(k) + 0.5) / f64::from(count);

@@ -193,7 +193,7 @@ impl Hidden {
             Traffic::Emu | Traffic::Freight => 3.0,
             Traffic::HighSpeed => 5.0,
         };
-        let stretches = |count: usize, lengths_m: (f64, f64), random: &mut ChaCha8Rng| {
+        let sections = |count: usize, lengths_m: (f64, f64), random: &mut ChaCha8Rng| {
             let piece_m = end_m / count.max(1) as f64;
             let draw = |k: usize| {
                 let length_m = lengths_m.0 + (lengths_m.1 - lengths_m.0) * random.random::<f64>();
@@ -203,9 +203,9 @@ impl Hidden {
             (0..count).map(draw).collect::<Vec<_>>()
         };
         let tunnels = if service.traffic == Traffic::HighSpeed { 8 } else { 0 };
-        let tunnels_m = stretches(tunnels, (1e3, 5e3), random);
+        let tunnels_m = sections(tunnels, (1e3, 5e3), random);
         let curves = if service.traffic == Traffic::HighSpeed { 0.0 } else { end_m / 1500.0 };
-        let curves_m = stretches(curves as usize, (200.0, 600.0), random)
+        let curves_m = sections(curves as usize, (200.0, 600.0), random)
             .into_iter()
             .map(|(from_m, to_m)| (from_m, to_m, 350.0 + 900.0 * random.random::<f64>()))
             .collect();

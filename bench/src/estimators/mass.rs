@@ -47,7 +47,7 @@ fn drive(train: &TrainModel) -> Arc<Drive> {
         };
         let mut motion = Motion {
             time_ns: (index as f64 * STEP_S * 1e9) as i64,
-            stretch: 0,
+            segment: 0,
             speed_mps: train_motion.speed_mps + SPEED_VARIANCE.sqrt() * random.normal(),
             force_n,
             declared_kg: 1e5,

@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::attainable::attainable_mps;
 use super::case::Case;
 use super::place::{ends_within, place_iou};
-use super::scenario::Rival;
+use super::scenario::Competing;
 
 /// How good an answer is.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,15 +69,15 @@ pub fn grade(simulated: &SimulatedDataset, case: &Case, explanation: &Explanatio
     let mut found: Vec<&str> = named.iter().map(String::as_str).collect();
     found.extend(&answer.ambiguous_with);
     let everyday: Vec<&str> = case.world.everyday().iter().map(|kind| kind.name()).collect();
-    let rival = case.scenario.rival();
+    let competing = case.scenario.competing();
     let invented: Vec<String> = found
         .iter()
         .filter(|kind| !truth.contains(kind) && !everyday.contains(kind))
-        .filter(|kind| rival.is_none_or(|rival| rival.kind.name() != **kind))
+        .filter(|kind| competing.is_none_or(|competing| competing.kind.name() != **kind))
         .map(|kind| (*kind).to_string())
         .collect();
     let is_right = if everyday.is_empty() {
-        is_exactly(simulated, rival, verdict, &found)
+        is_exactly(simulated, competing, verdict, &found)
     } else {
         let is_found = truth.iter().all(|kind| found.contains(kind));
         is_found && invented.is_empty() && (verdict != "unknown" || truth.contains(&"unknown"))
@@ -114,14 +114,16 @@ pub fn grade(simulated: &SimulatedDataset, case: &Case, explanation: &Explanatio
 /// Whether the answer names what acts, and nothing else.
 fn is_exactly(
     simulated: &SimulatedDataset,
-    rival: Option<Rival>,
+    competing: Option<Competing>,
     verdict: &str,
     found: &[&str],
 ) -> bool {
     let mut expected: Vec<&str> =
         simulated.effects.iter().map(|effect| effect.kind().name()).collect();
-    if let Some(rival) = rival.filter(|rival| rival.is_never_named || verdict == "ambiguous") {
-        expected.push(rival.kind.name());
+    if let Some(competing) =
+        competing.filter(|competing| competing.is_never_named || verdict == "ambiguous")
+    {
+        expected.push(competing.kind.name());
     }
     let mut found = found.to_vec();
     expected.sort_unstable();
@@ -167,7 +169,7 @@ fn details(
     details.extend(unlisted.map(|effect| format!("truth {effect:?}")));
     let considered = answer.considered.iter().enumerate();
     let considered = considered.filter(|(k, it)| *k < 4 || it.kind == "unknown").map(|it| it.1);
-    details.extend(considered.map(|it| format!("{} {:.0?}: {}", it.kind, it.evidence, it.remark)));
+    details.extend(considered.map(|it| format!("{} {:.0?}: {}", it.kind, it.evidence, it.reason)));
     if !answer.ambiguous_with.is_empty() {
         details.push(format!("or {}", answer.ambiguous_with.join(", ")));
     }

@@ -9,7 +9,7 @@ use super::world::World;
 
 /// A kind that is hardly distinguishable from the one that acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Rival {
+pub struct Competing {
     /// The kind.
     pub kind: EffectKind,
     /// True when no data of the family distinguish the two.
@@ -179,11 +179,13 @@ impl Scenario {
     }
 
     /// The kind that is hardly distinguishable from the one that acts.
-    pub fn rival(self) -> Option<Rival> {
+    pub fn competing(self) -> Option<Competing> {
         match self {
-            Scenario::Alike => Some(Rival { kind: EffectKind::MassChange, is_never_named: true }),
+            Scenario::Alike => {
+                Some(Competing { kind: EffectKind::MassChange, is_never_named: true })
+            }
             Scenario::UnmappedTunnel => {
-                Some(Rival { kind: EffectKind::LocalResistance, is_never_named: false })
+                Some(Competing { kind: EffectKind::LocalResistance, is_never_named: false })
             }
             _ => None,
         }

@@ -15,7 +15,7 @@ pub fn resolved(train: &TrainModel, moment: &Moment, is_first: bool) -> Resolved
     ResolvedSample {
         time_ns: (moment.time_s * 1e9).round() as i64,
         step_s: if is_first { 0.0 } else { STEP_S },
-        stretch: 1,
+        segment: 1,
         direction: 1.0,
         position_m: Some(moment.measured_m),
         speed_mps: moment.measured_mps,

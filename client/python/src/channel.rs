@@ -50,17 +50,17 @@ impl Publisher {
         sent.map_err(|refused| of_code(py, Code::from(refused)))
     }
 
-    /// Waits in short stretches, between which Ctrl-C is heard.
+    /// Waits for short times, between which Ctrl-C is heard.
     fn flush(&self, py: Python<'_>, patience_s: f64) -> PyResult<u64> {
         let patience = Duration::try_from_secs_f64(patience_s.max(0.0)).unwrap_or(Duration::MAX);
         let start = Instant::now();
         loop {
-            let stretch = SIGNALS_EVERY.min(patience.saturating_sub(start.elapsed()));
+            let time = SIGNALS_EVERY.min(patience.saturating_sub(start.elapsed()));
             let begun = Instant::now();
-            let left = self.0.with_patience(py, move |publisher| publisher.flush(stretch))?;
+            let left = self.0.with_patience(py, move |publisher| publisher.flush(time))?;
             py.check_signals()?;
             // What comes back early waits for nobody.
-            let is_hopeless = begun.elapsed() < stretch;
+            let is_hopeless = begun.elapsed() < time;
             if left == 0 || is_hopeless || start.elapsed() >= patience {
                 return Ok(left);
             }

@@ -75,7 +75,7 @@ impl Table {
 }
 
 impl Table {
-    /// A table of one stretch of time.
+    /// A table of one interval of time.
     pub(crate) fn of(columns: Columns) -> PyResult<Self> {
         Ok(Table(vec![batch(None, columns)?]))
     }

@@ -134,7 +134,10 @@ fn a_larger_terminal_gets_more_speeds_and_plots() {
 #[test]
 fn a_suspect_is_reported_with_what_is_hardly_distinguished_from_it() {
     let drawn = screen(&[&suspected()], Choice::default(), (80, 24));
-    assert!(drawn.contains("dragging_brake for 2 min, evidence 46, rivals: wind"), "{drawn}");
+    assert!(
+        drawn.contains("dragging_brake for 2 min, evidence 46, could also be: wind"),
+        "{drawn}"
+    );
 }
 
 #[test]

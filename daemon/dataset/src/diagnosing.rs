@@ -1,10 +1,10 @@
-//! Looks for what may be remarked on in a run.
+//! Looks for what may be diagnosed in a run.
 
-use dynocar_core::plausibility::{Findings, InputFault};
+use dynocar_core::plausibility::{DetectedFaults, InputFault};
 use dynocar_core::train::Drive;
 
 use super::diagnostic::Diagnostic;
-use super::finding_unit::read_as;
+use super::fault_unit::read_as;
 use super::forces::{Force, ForceSource};
 use super::motion::PositionSource;
 use super::quality::RunQuality;
@@ -22,41 +22,43 @@ const LINE_TOLERANCE_M: f64 = 50.0;
 /// Median time steps in s of recordings that make sense.
 const USUAL_STEP_S: (f64, f64) = (0.0005, 60.0);
 
-/// A moving train's columns that all keep their values for so many s are remarked on.
+/// A moving train's columns that all keep their values for so many s are diagnosed.
 const STANDS_STILL_MIN_S: f64 = 10.0;
 /// The speed in m/s from which a train surely moves.
 const MOVING_MPS: f64 = 1.0;
 
 /// Looks for what may be wrong with a run.
-pub(super) fn remarks(
+pub(super) fn diagnostics(
     context: Context,
     run: &Resolved,
     quality: &RunQuality,
-    findings: &Findings,
+    detected: &DetectedFaults,
 ) -> Vec<Diagnostic> {
-    let fault =
-        |finding| Diagnostic::InputFault { finding, read_as: read_as(context.manifest, finding) };
-    let mut remarks: Vec<Diagnostic> = findings.iter().map(fault).collect();
-    of_time(quality, &mut remarks);
-    of_content(context, run, quality, &mut remarks);
-    remarks.extend(stands_still(run));
-    of_position(context, run, quality, findings, &mut remarks);
+    let fault = |detected| Diagnostic::InputFault {
+        detected,
+        read_as: read_as(context.manifest, detected),
+    };
+    let mut diagnostics: Vec<Diagnostic> = detected.iter().map(fault).collect();
+    of_time(quality, &mut diagnostics);
+    of_content(context, run, quality, &mut diagnostics);
+    diagnostics.extend(stands_still(run));
+    of_position(context, run, quality, detected, &mut diagnostics);
     if run.speeds.negative > 0 {
-        remarks.push(Diagnostic::NegativeSpeed { count: run.speeds.negative });
+        diagnostics.push(Diagnostic::NegativeSpeed { count: run.speeds.negative });
     }
     let handles = (Quantity::TractionHandle, Quantity::BrakeHandle);
-    of_force(run, &run.forces.traction, Quantity::TractionForce, handles.0, &mut remarks);
-    of_force(run, &run.forces.brake, Quantity::BrakeForce, handles.1, &mut remarks);
-    of_power(context, run, &mut remarks);
+    of_force(run, &run.forces.traction, Quantity::TractionForce, handles.0, &mut diagnostics);
+    of_force(run, &run.forces.brake, Quantity::BrakeForce, handles.1, &mut diagnostics);
+    of_power(context, run, &mut diagnostics);
     if run.gradient_source == GradientSource::Unknown {
-        remarks.push(Diagnostic::GradientUnknown);
+        diagnostics.push(Diagnostic::GradientUnknown);
     }
-    of_plausibility(run, &mut remarks);
-    remarks
+    of_plausibility(run, &mut diagnostics);
+    diagnostics
 }
 
 /// What a force from power is computed with.
-fn of_power(context: Context, run: &Resolved, remarks: &mut Vec<Diagnostic>) {
+fn of_power(context: Context, run: &Resolved, diagnostics: &mut Vec<Diagnostic>) {
     if run.forces.traction.source != ForceSource::Power {
         return;
     }
@@ -64,7 +66,7 @@ fn of_power(context: Context, run: &Resolved, remarks: &mut Vec<Diagnostic>) {
     let drive = declared.unwrap_or(Drive::USUAL);
     let has_friction = context.train.brake_gear.friction_brake.is_some()
         && run.table.filled(Quantity::BrakeCylinderPressure).is_some();
-    remarks.push(Diagnostic::ForceByPower {
+    diagnostics.push(Diagnostic::ForceByPower {
         efficiency: drive.efficiency,
         is_declared: declared.is_some(),
         speed_min_mps: drive.speed_min_mps,
@@ -72,10 +74,10 @@ fn of_power(context: Context, run: &Resolved, remarks: &mut Vec<Diagnostic>) {
     });
 }
 
-fn of_time(quality: &RunQuality, remarks: &mut Vec<Diagnostic>) {
+fn of_time(quality: &RunQuality, diagnostics: &mut Vec<Diagnostic>) {
     let step_s = quality.order.step_s;
     if step_s > 0.0 && !(USUAL_STEP_S.0..=USUAL_STEP_S.1).contains(&step_s) {
-        remarks.push(Diagnostic::UnusualStep { step_s });
+        diagnostics.push(Diagnostic::UnusualStep { step_s });
     }
 }
 
@@ -84,17 +86,17 @@ fn of_content(
     context: Context,
     run: &Resolved,
     quality: &RunQuality,
-    remarks: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) {
     let quantities = context.manifest.columns.iter().map(|mapping| mapping.quantity);
     let empty = quantities.filter(|&quantity| run.table.filled(quantity).is_none());
-    remarks.extend(empty.map(|quantity| Diagnostic::NoValues { quantity }));
+    diagnostics.extend(empty.map(|quantity| Diagnostic::NoValues { quantity }));
     if run.order.in_order.iter().filter(|&&mark| mark).count() < 2 {
-        remarks.push(Diagnostic::OneRow);
+        diagnostics.push(Diagnostic::OneRow);
     } else if let Some((_, highest_mps)) = quality.speed_range_mps
         && highest_mps < MOVING_MPS
     {
-        remarks.push(Diagnostic::NeverMoves { highest_mps });
+        diagnostics.push(Diagnostic::NeverMoves { highest_mps });
     }
 }
 
@@ -129,12 +131,12 @@ fn of_position(
     context: Context,
     run: &Resolved,
     quality: &RunQuality,
-    findings: &Findings,
-    remarks: &mut Vec<Diagnostic>,
+    detected: &DetectedFaults,
+    diagnostics: &mut Vec<Diagnostic>,
 ) {
     if run.position_source == PositionSource::IntegratedSpeed {
         if context.track.is_some() && run.entry.start_m.is_none() {
-            remarks.push(Diagnostic::StartUnknown);
+            diagnostics.push(Diagnostic::StartUnknown);
         }
         return;
     }
@@ -154,11 +156,11 @@ fn of_position(
     let net_m = median_m(&rows[rows.len() - few..]) - median_m(&rows[..few]);
     let direction = run.entry.direction;
     let is_reported =
-        |faults: &[InputFault]| findings.iter().any(|finding| faults.contains(&finding.fault));
+        |faults: &[InputFault]| detected.iter().any(|detected| faults.contains(&detected.fault));
     if net_m * f64::from(direction) < -DISTANCE_MIN_M
         && !is_reported(&[InputFault::DirectionReversed])
     {
-        remarks.push(Diagnostic::AgainstDirection { direction, net_m });
+        diagnostics.push(Diagnostic::AgainstDirection { direction, net_m });
     }
     let (position_m, speed_m) = (net_m.abs(), quality.distance_m);
     let is_long = position_m.max(speed_m) > DISTANCE_MIN_M;
@@ -168,7 +170,7 @@ fn of_position(
         && is_long
         && (position_m - speed_m).abs() > DISTANCE_TOLERANCE * position_m.max(speed_m)
     {
-        remarks.push(Diagnostic::DistanceMismatch { position_m, speed_m });
+        diagnostics.push(Diagnostic::DistanceMismatch { position_m, speed_m });
     }
     let length_m = context.track.and_then(|track| track.length_m);
     // A train may stop with its head at the line's end and its centre half a length outside.
@@ -176,7 +178,7 @@ fn of_position(
     if let (Some(length_m), Some((from_m, to_m))) = (length_m, quality.position_range_m)
         && (from_m < -beyond_m || to_m > length_m + beyond_m)
     {
-        remarks.push(Diagnostic::OffTheLine { from_m, to_m, length_m });
+        diagnostics.push(Diagnostic::OffTheLine { from_m, to_m, length_m });
     }
 }
 
@@ -185,24 +187,24 @@ fn of_force(
     force: &Force,
     quantity: Quantity,
     handle: Quantity,
-    remarks: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) {
     if force.negative > 0 {
         let lowest_n = force.force_n.iter().copied().fold(f64::INFINITY, f64::min);
-        remarks.push(Diagnostic::NegativeForce { quantity, count: force.negative, lowest_n });
+        diagnostics.push(Diagnostic::NegativeForce { quantity, count: force.negative, lowest_n });
     }
     if force.handle_out_of_range > 0 {
         let column = run.table.column(handle).unwrap_or_default();
         let lowest = column.iter().copied().fold(f64::INFINITY, f64::min);
         let highest = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let count = force.handle_out_of_range;
-        remarks.push(Diagnostic::HandleOutOfRange { quantity: handle, count, lowest, highest });
+        diagnostics.push(Diagnostic::HandleOutOfRange { quantity: handle, count, lowest, highest });
     }
     if force.source == ForceSource::Column && run.table.column(handle).is_some() {
-        remarks.push(Diagnostic::UnusedHandle { quantity: handle });
+        diagnostics.push(Diagnostic::UnusedHandle { quantity: handle });
     }
     if force.source == ForceSource::None {
-        remarks.push(Diagnostic::ForceNotRecorded { quantity });
+        diagnostics.push(Diagnostic::ForceNotRecorded { quantity });
     }
 }
 
@@ -217,14 +219,14 @@ const PLAUSIBLE: [(Quantity, f64, f64); 7] = [
     (Quantity::Longitude, -180.0, 180.0),
 ];
 
-fn of_plausibility(run: &Resolved, remarks: &mut Vec<Diagnostic>) {
+fn of_plausibility(run: &Resolved, diagnostics: &mut Vec<Diagnostic>) {
     for (quantity, low, high) in PLAUSIBLE {
         let Some(column) = run.table.column(quantity) else { continue };
         let is_outside = |value: &&f64| !value.is_nan() && !(low..=high).contains(*value);
         let count = column.iter().filter(is_outside).count();
         if count > 0 {
             let unit = quantity.unit().name();
-            remarks.push(Diagnostic::Implausible { quantity, count, low, high, unit });
+            diagnostics.push(Diagnostic::Implausible { quantity, count, low, high, unit });
         }
     }
 }

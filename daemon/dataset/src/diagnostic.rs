@@ -1,21 +1,21 @@
 //! What looks like a mistake in a run, or should be known before its results are believed.
 
-use dynocar_core::plausibility::{Finding, Severity};
+use dynocar_core::plausibility::{DetectedFault, Severity};
 use serde::Serialize;
 
-use super::finding_unit::unit_of;
+use super::fault_unit::unit_of;
 use super::quantity::Quantity;
 
-/// A remark on a run.
+/// A diagnostic on a run.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "remark", rename_all = "snake_case")]
 pub enum Diagnostic {
     /// The samples cannot be true: a wrong unit, an exchange, a wrong sign.
-    #[error("{}", finding.words(&unit_of(*finding, read_as)))]
+    #[error("{}", detected.words(&unit_of(*detected, read_as)))]
     InputFault {
         /// What it is, and by how much.
         #[serde(flatten)]
-        finding: Finding,
+        detected: DetectedFault,
         /// The unit that the quantity was read in.
         read_as: &'static str,
     },
@@ -203,8 +203,8 @@ impl Diagnostic {
     const fn code_and_severity(&self) -> (&'static str, Severity) {
         use Severity::{Fundamental, Info, Warning};
         match self {
-            Diagnostic::InputFault { finding, .. } => {
-                (finding.fault.name(), finding.fault.severity())
+            Diagnostic::InputFault { detected, .. } => {
+                (detected.fault.name(), detected.fault.severity())
             }
             Diagnostic::AgainstDirection { .. } => ("against_direction", Fundamental),
             Diagnostic::DistanceMismatch { .. } => ("distance_mismatch", Warning),

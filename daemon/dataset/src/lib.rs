@@ -17,7 +17,7 @@
 //! - `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
 //! - `order`, `spikes`, `motion`, `power`, `forces`, [`stamps`], `altitude`: from columns to time, speed,
 //!   position, forces and gradient
-//! - `resolved`, [`run`], [`quality`], `findings`, [`diagnostic`], `remarking`, `declared`, [`note`]: samples,
+//! - `resolved`, [`run`], [`quality`], `detected_faults`, [`diagnostic`], `diagnosing`, `declared`, [`diagnostic`]: samples,
 //!   counts and warnings
 //! - [`guess`]: a description of files that nobody has described yet
 
@@ -25,15 +25,16 @@ mod altitude;
 mod cell;
 pub mod clock;
 mod corrections;
+pub mod dataset_diagnostic;
 mod declared;
+mod detected_faults;
 mod diagnosing;
 pub mod diagnostic;
 mod document;
 pub mod encoding;
 pub mod error;
 mod extra;
-mod finding_unit;
-mod findings;
+mod fault_unit;
 mod forces;
 pub mod guess;
 mod header;
@@ -41,7 +42,6 @@ mod lines;
 pub mod manifest;
 mod motion;
 mod names;
-pub mod note;
 mod order;
 mod power;
 pub mod quality;
@@ -59,6 +59,7 @@ pub mod train_file;
 mod tests;
 
 pub use clock::TimeFormat;
+pub use dataset_diagnostic::DatasetDiagnostic;
 pub use diagnostic::Diagnostic;
 pub use document::top_keys;
 pub use error::{DatasetError, FileProblem, Problem, SourcePosition};
@@ -66,7 +67,6 @@ pub use forces::ForceSource;
 pub use manifest::{ColumnMapping, FileEntry, Manifest, PositionReference, Role, RunEntry};
 pub use motion::PositionSource;
 pub use names::Choices;
-pub use note::Note;
 pub use order::OrderCounts;
 pub use quality::{Phases, RunQuality};
 pub use quantity::Quantity;

@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn steady_rows_have_nothing_to_remark() {
+    fn steady_rows_need_no_diagnostic() {
         let times: Vec<f64> = (0..100).map(|i| 1000.0 + 0.2 * f64::from(i)).collect();
         let order = order_of(&times);
         assert!(order.in_order.iter().all(|&mark| mark));

@@ -3,10 +3,10 @@
 use dynocar_core::train::Drive;
 use dynocar_shared::{SampleField, TrainSample};
 
-use super::diagnosing::remarks;
+use super::detected_faults;
+use super::diagnosing::diagnostics;
 use super::diagnostic::Diagnostic;
 use super::error::{DatasetError, Problem, SourcePosition};
-use super::findings;
 use super::forces::ForceSource;
 use super::manifest::{Manifest, Role, RunEntry};
 use super::motion::PositionSource;
@@ -81,7 +81,7 @@ pub struct Run {
     /// What the data are like.
     pub quality: RunQuality,
     /// What looks like a mistake, or should be known.
-    pub remarks: Vec<Diagnostic>,
+    pub diagnostics: Vec<Diagnostic>,
 }
 
 impl Run {
@@ -170,9 +170,9 @@ pub(super) fn read(
     let samples = resolved.samples(number, context.train);
     let quality = quality::assess(context, &resolved, &samples);
     let is_position_recorded = resolved.position_source == PositionSource::Column;
-    let findings =
-        findings::of_samples(context.train, context.track, &samples, is_position_recorded);
-    let remarks = remarks(context, &resolved, &quality, &findings);
+    let detected =
+        detected_faults::of_samples(context.train, context.track, &samples, is_position_recorded);
+    let diagnostics = diagnostics(context, &resolved, &quality, &detected);
     Ok(Run {
         file: entry.file.clone(),
         number,
@@ -192,7 +192,7 @@ pub(super) fn read(
         brake_source: resolved.forces.brake.source,
         samples,
         quality,
-        remarks,
+        diagnostics,
     })
 }
 

@@ -147,10 +147,10 @@ fn without_positions_they_are_integrated_and_the_run_says_so() {
     assert_eq!(run.position_source, PositionSource::IntegratedSpeed);
     assert_eq!(field(&run, SampleField::Position), [Some(0.0), Some(1.0), Some(4.0)]);
     example.track = true;
-    assert!(example.run().remarks.contains(&Diagnostic::StartUnknown));
+    assert!(example.run().diagnostics.contains(&Diagnostic::StartUnknown));
     example.run = "start_m = 700".into();
     assert_eq!(field(&example.run(), SampleField::Position)[2], Some(704.0));
-    assert!(!example.run().remarks.contains(&Diagnostic::StartUnknown));
+    assert!(!example.run().diagnostics.contains(&Diagnostic::StartUnknown));
 }
 
 #[test]
@@ -181,7 +181,7 @@ fn the_gradients_source_goes_from_track_to_unknown() {
     assert!((slope - 30.0).abs() < 1e-9, "{slope}");
     let unknown = source(&[], false);
     assert_eq!(unknown.gradient_source, GradientSource::Unknown);
-    assert!(unknown.remarks.contains(&Diagnostic::GradientUnknown));
+    assert!(unknown.diagnostics.contains(&Diagnostic::GradientUnknown));
 }
 
 #[test]
@@ -260,7 +260,8 @@ fn likely_mistakes_are_diagnosed() {
     let columns = [("position", "s", "m"), ("brake_force", "B", "kN")];
     let mut example = Example::new(&columns, &format!("t,v,s,B\n{csv}"));
     example.track = true;
-    let remarks: Vec<String> = example.run().remarks.iter().map(ToString::to_string).collect();
+    let diagnostics: Vec<String> =
+        example.run().diagnostics.iter().map(ToString::to_string).collect();
     let expected = [
         "the position changes by -990 m in all, against direction = 1",
         "the position covers 990 m, the integrated speed 3564 m (ratio 0.278): are the units of \
@@ -269,12 +270,12 @@ fn likely_mistakes_are_diagnosed() {
         "brake_force is below zero in 100 rows, down to -80000 N, and those samples are refused: a \
          signed force is a control_force, a negative retarding one needs scale = -1",
     ];
-    assert_eq!(remarks, expected);
+    assert_eq!(diagnostics, expected);
 }
 
 #[test]
 fn a_recorder_that_hangs_while_the_train_moves_is_diagnosed() {
-    let remarks = |hangs_at: &dyn Fn(u32) -> bool, stands: bool| -> Vec<String> {
+    let diagnostics = |hangs_at: &dyn Fn(u32) -> bool, stands: bool| -> Vec<String> {
         let mut csv = String::from("t,v,F,B\n");
         let (mut speed_mps, mut force_kn) = (16.0, 30.0);
         for row in 0..600_u32 {
@@ -287,15 +288,19 @@ fn a_recorder_that_hangs_while_the_train_moves_is_diagnosed() {
         }
         let columns = [("traction_force", "F", "kN"), ("brake_force", "B", "kN")];
         let run = Example::new(&columns, &csv).run();
-        let remarks = run.remarks.iter().map(ToString::to_string);
-        remarks.filter(|remark| remark.contains("every column")).collect()
+        let diagnostics = run.diagnostics.iter().map(ToString::to_string);
+        diagnostics.filter(|diagnostic| diagnostic.contains("every column")).collect()
     };
-    let hung = remarks(&|row| row > 300, false);
+    let hung = diagnostics(&|row| row > 300, false);
     assert_eq!(hung.len(), 1, "{hung:?}");
     let expected = "from 30 s every column but the time keeps its value for 29.9 s, at 17.0 m/s: ";
     assert!(hung[0].starts_with(expected), "{hung:?}");
-    assert_eq!(remarks(&|row| (300..390).contains(&row), false), [] as [String; 0], "nine seconds");
-    assert_eq!(remarks(&|_| false, true), [] as [String; 0], "a train at a stop");
+    assert_eq!(
+        diagnostics(&|row| (300..390).contains(&row), false),
+        [] as [String; 0],
+        "nine seconds"
+    );
+    assert_eq!(diagnostics(&|_| false, true), [] as [String; 0], "a train at a stop");
 }
 
 #[test]

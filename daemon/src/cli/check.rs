@@ -5,7 +5,7 @@ mod daemon;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use dynocar_dataset::{Note, top_keys};
+use dynocar_dataset::{DatasetDiagnostic, top_keys};
 use serde::Serialize;
 
 pub use daemon::{DaemonAnswer, answer, read, report};
@@ -45,7 +45,8 @@ pub struct CheckAnswer<C> {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<ErrorAnswer>,
     /// What may spoil results, the worst first.
-    pub notes: Vec<Note>,
+    #[serde(rename = "notes")]
+    pub diagnostics: Vec<DatasetDiagnostic>,
     /// What was understood.
     #[serde(flatten)]
     pub content: Option<C>,
@@ -84,7 +85,7 @@ pub fn refusal(path: &Path, error: ErrorAnswer) -> CheckAnswer<()> {
         valid: false,
         errors: vec![error.message.clone()],
         error: Some(error),
-        notes: Vec::new(),
+        diagnostics: Vec::new(),
         content: None,
     }
 }
@@ -116,7 +117,7 @@ fn understood<'a>(path: &Path, config: &'a DaemonConfig) -> CheckAnswer<Content<
         valid: true,
         errors: Vec::new(),
         error: None,
-        notes: Vec::new(),
+        diagnostics: Vec::new(),
         content: Some(Content { daemon: answer(config) }),
     }
 }

@@ -1,7 +1,7 @@
 //! What an operator reads, wherever it stands: in the log, in `dynocar health`, on the screen of
 //! `dynocar watch` and in a recording's events.
 //!
-//! - [`suspicion`]: the effect that the model may lack, with its force and its rivals
+//! - [`suspicion`]: the effect that the model may lack, with its force and what else it could be
 //! - [`remedy`]: what to do about it, about a status and about refused samples
 
 pub mod remedy;

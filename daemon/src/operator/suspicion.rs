@@ -66,7 +66,7 @@ impl fmt::Display for Suspicion {
         if others.is_empty() {
             return Ok(());
         }
-        write!(f, ", rivals: {}", others.join(", "))
+        write!(f, ", could also be: {}", others.join(", "))
     }
 }
 
@@ -83,7 +83,7 @@ mod tests {
         (snapshot.suspicion_age_s, snapshot.suspicion_evidence) = (132, 45.6);
         (snapshot.unexplained_force_n, snapshot.unexplained_force_std_n) = (12_340.0, 500.0);
         let suspicion = Suspicion::of(&snapshot).unwrap();
-        let words = "dragging_brake for 2 min, evidence 46, rivals: wind";
+        let words = "dragging_brake for 2 min, evidence 46, could also be: wind";
         assert_eq!(suspicion.to_string(), words);
         assert_eq!(suspicion.force(), "+12.34 ± 0.98 kN");
         snapshot.suspected_effect = 99;

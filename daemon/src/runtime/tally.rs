@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 
 use crossbeam_utils::CachePadded;
-use dynocar_core::plausibility::{Finding, InputFault};
+use dynocar_core::plausibility::{DetectedFault, InputFault};
 use dynocar_shared::ParameterSnapshot;
 use dynocar_shared::snapshot::REJECTION_REASONS;
 
@@ -57,7 +57,7 @@ pub struct TallyReading {
     /// Status and reason of the newest snapshot, by number.
     pub status: (u32, u32),
     /// What cannot be true of the samples lately.
-    pub implausible: Option<Finding>,
+    pub implausible: Option<DetectedFault>,
     /// Samples refused, by number of the reason.
     pub refused: [u32; REJECTION_REASONS],
     /// What is suspected.
@@ -72,7 +72,7 @@ impl Tally {
     /// # Real-time
     ///
     /// Plain stores into memory that only this thread writes.
-    pub fn note(&self, snapshot: &ParameterSnapshot, implausible: Option<Finding>) {
+    pub fn note(&self, snapshot: &ParameterSnapshot, implausible: Option<DetectedFault>) {
         self.counters.used.store(snapshot.samples_used, Relaxed);
         self.counters.rejected.store(snapshot.samples_rejected, Relaxed);
         self.counters.lost.store(snapshot.samples_lost, Relaxed);
@@ -149,15 +149,15 @@ fn halves(word: u64) -> (u32, u32) {
     ((word >> 32) as u32, word as u32)
 }
 
-/// A finding in one word: the input fault's number, and its factor in single precision.
-fn packed(finding: Option<Finding>) -> u64 {
-    finding.map_or(0, |it| word(u32::from(it.fault as u8), (it.factor as f32).to_bits()))
+/// A detected fault in one word: the input fault's number, and its factor in single precision.
+fn packed(detected: Option<DetectedFault>) -> u64 {
+    detected.map_or(0, |it| word(u32::from(it.fault as u8), (it.factor as f32).to_bits()))
 }
 
-fn unpacked(word: u64) -> Option<Finding> {
+fn unpacked(word: u64) -> Option<DetectedFault> {
     let (fault, factor) = halves(word);
     let fault = InputFault::from_number(fault as u8)?;
-    Some(Finding { fault, factor: f64::from(f32::from_bits(factor)) })
+    Some(DetectedFault { fault, factor: f64::from(f32::from_bits(factor)) })
 }
 
 #[cfg(test)]

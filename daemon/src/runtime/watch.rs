@@ -132,12 +132,12 @@ impl Watch {
             let reading = pipeline.tally.read();
             let (name, train) = (pipeline.name.as_str(), pipeline.train.0);
             log.report(name, train, &reading, now);
-            if let Some(finding) = reading.implausible
-                && !reported.contains(&(train, finding.fault))
+            if let Some(detected) = reading.implausible
+                && !reported.contains(&(train, detected.fault))
             {
-                reported.push((train, finding.fault));
-                let code = finding.fault.name();
-                warn!(train, code, "the samples cannot be true: {finding}");
+                reported.push((train, detected.fault));
+                let code = detected.fault.name();
+                warn!(train, code, "the samples cannot be true: {detected}");
             }
             if reading.lost > last.lost {
                 let lost = reading.lost - last.lost;
@@ -190,7 +190,7 @@ impl PipelineLog {
     }
 }
 
-/// A status that wants a person is a warning, with what to do; any other is a remark.
+/// A status that wants a person is a warning, with what to do; any other is information.
 fn report_status(pipeline: &str, train: u64, reading: &TallyReading, untold: &[(State, u64)]) {
     let words = |(status, reason): State| {
         let status = Status::from_number(status).unwrap_or(Status::Invalid);

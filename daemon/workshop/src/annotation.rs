@@ -35,7 +35,7 @@ pub fn annotate(from: &Path, timeline: &Timeline, to: &Path) -> Result<(), Annot
     serde_json::to_writer(&mut file, timeline).map_err(|it| failed(it.to_string()))?;
     let mut command = call(RECORDING);
     command.arg("annotate").arg(from).arg("--timeline").arg(file.path()).arg("--output").arg(to);
-    let (_, words) = output_of(RECORDING, &mut command).map_err(|complaint| match complaint {
+    let (_, words) = output_of(RECORDING, &mut command).map_err(|failure| match failure {
         CallFailure::Input(problem) => AnnotationError::Input(problem),
         CallFailure::Work(problem) => failed(problem),
     })?;

@@ -98,7 +98,7 @@ impl EffectScene<'_> {
     }
 
     /// One or two intervals that together are about a tenth of the line, apart from each other.
-    fn stretches(&self, random: &mut Random) -> Vec<(f64, f64)> {
+    fn sections(&self, random: &mut Random) -> Vec<(f64, f64)> {
         let length_m = self.line.length_m;
         let count = random.integer(1, 2);
         let each_m = (length_m * random.uniform(0.09, 0.14) / count as f64).round();
@@ -172,7 +172,7 @@ pub fn make_effect(
         },
         EffectKind::LocalResistance => Effect::LocalResistance {
             extra_n_per_kn: random.uniform(0.6, 1.4) * w0_n_per_kn,
-            intervals_m: scene.stretches(random),
+            intervals_m: scene.sections(random),
             runs: if random.chance(0.3) { scene.some_runs(random) } else { Vec::new() },
         },
         EffectKind::LowAdhesion => low_adhesion(scene, random),

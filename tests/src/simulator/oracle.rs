@@ -145,7 +145,7 @@ pub fn oracle_forces(
     let mut late = DelayLine::<3>::new(disturbances.speed_delay_s, disturbances.speed_lag_s);
     let samples = recording.samples().iter().enumerate();
     let behind = samples.zip(recording.samples()).map(|(numbered, sample)| {
-        let at = (sample.time_ns, sample.stretch);
+        let at = (sample.time_ns, sample.segment);
         let now = polynomial(numbered);
         let stands = sample.speed_mps <= STANDING_MPS;
         late.acting_unless(at, Some(now), |net_mps2| stands && net_mps2[0] <= 0.0).unwrap_or(now)
@@ -206,7 +206,7 @@ fn acting_forces_n(recording: &Recording, disturbances: &Disturbances) -> Vec<f6
     let acting = |sample: &ResolvedSample| {
         let force = |field: Option<f64>| field.unwrap_or(0.0);
         let reported = [force(sample.traction_force_n), force(sample.brake_force_n)];
-        let at = (sample.time_ns, sample.stretch);
+        let at = (sample.time_ns, sample.segment);
         let [traction_n, brake_n] = late.acting(at, Some(reported)).unwrap_or(reported);
         let brake_n = brake_n / disturbances.brake_gain;
         let carried_n = match (&disturbances.adhesion, sample.position_m) {

@@ -53,7 +53,7 @@ pub fn execute(arguments: &AnnotateArguments) -> Result<(), Failure> {
         error => Failure::Input(error.to_string()),
     })?;
     report_line(&format!(
-        "annotated recording: {}: {} stretches in which an effect acts, {} messages in all",
+        "annotated recording: {}: {} intervals in which an effect acts, {} messages in all",
         output.display(),
         added.effects,
         added.messages

@@ -40,7 +40,7 @@ pub struct Keeping {
 #[derive(Debug, thiserror::Error)]
 pub enum KeepError {
     /// What is kept takes all that it may.
-    #[error("nothing is kept for good: {}: takes its {most_mib} MiB already: move stretches away", kept.display())]
+    #[error("nothing is kept for good: {}: takes its {most_mib} MiB already: move events away", kept.display())]
     Full {
         /// Where it lies.
         kept: PathBuf,
@@ -184,26 +184,26 @@ impl Keeper {
         let reason = Reason::of(event, now);
         let open = self.open.take().filter(|it| it.1.is_open(now));
         let is_new = open.is_none();
-        let (folder, mut stretch) =
+        let (folder, mut event) =
             open.unwrap_or_else(|| (self.new_folder(&reason), KeptEvent::default()));
-        let is_news = stretch.reasons.last().is_none_or(|last| !last.is_like(&reason));
+        let is_news = event.reasons.last().is_none_or(|last| !last.is_like(&reason));
         let line =
             format!("kept for good: {}: {} ({})", folder.display(), reason.kind, reason.text);
         if is_news {
-            stretch.reasons.push(reason);
+            event.reasons.push(reason);
         }
         let until_unix_s = unix_s(now + self.keeping.after);
-        let is_longer = std::mem::replace(&mut stretch.until_unix_s, until_unix_s) != until_unix_s;
+        let is_longer = std::mem::replace(&mut event.until_unix_s, until_unix_s) != until_unix_s;
         let kept = match is_new {
-            true => self.make(&folder, &stretch, &self.near(now, files)),
-            false if is_news || is_longer => Ok(stretch.write(&self.storage, &folder)?),
+            true => self.make(&folder, &event, &self.near(now, files)),
+            false if is_news || is_longer => Ok(event.write(&self.storage, &folder)?),
             false => Ok(()),
         };
         if is_news && kept.is_ok() {
             report_line(&line);
         }
         // One that was not made is not there to go on with.
-        self.open = (folder.exists()).then_some((folder, stretch));
+        self.open = (folder.exists()).then_some((folder, event));
         kept
     }
 
@@ -224,7 +224,7 @@ impl Keeper {
     fn make(
         &mut self,
         folder: &Path,
-        stretch: &KeptEvent,
+        event: &KeptEvent,
         files: &[PathBuf],
     ) -> Result<(), KeepError> {
         let beside = beside(folder);
@@ -234,7 +234,7 @@ impl Keeper {
             self.storage.sync_file(file).map_err(refused(file))
         });
         // What could be kept is, even where the rest could not.
-        stretch.write(&self.storage, &beside)?;
+        event.write(&self.storage, &beside)?;
         self.storage.rename_new(&beside, folder).map_err(refused(folder))?;
         let kept = self.ring.join(KEPT_FOLDER);
         self.storage.sync_directory(&kept).map_err(refused(&kept))?;

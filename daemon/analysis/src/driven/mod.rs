@@ -179,7 +179,7 @@ impl DrivenTrain {
         let speed_scale = self.train.corrections.speed_scale;
         sample.set(SampleField::Speed, motion.speed_mps * speed_scale);
         let resolved =
-            self.forces.resolve(&ValidSample { sample: &sample, step_s: 0.0, stretch: 1 });
+            self.forces.resolve(&ValidSample { sample: &sample, step_s: 0.0, segment: 1 });
         let forces = SampleForces::declared(&resolved, self.train.rotating_mass_factor);
         (Balance::new(forces, self.train.resistance, motion.speed_mps), is_pulled(&resolved))
     }

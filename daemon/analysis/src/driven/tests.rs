@@ -59,7 +59,7 @@ fn a_train_driven_along_a_recording_goes_to_the_bit_as_is_predicted() {
     };
     let mut forces = ForceResolver::new(Arc::clone(&train), Some(Arc::clone(&track)));
     let resolved: Vec<_> = (0..700)
-        .map(|k| forces.resolve(&ValidSample { sample: &at(k), step_s: 0.2, stretch: 1 }))
+        .map(|k| forces.resolve(&ValidSample { sample: &at(k), step_s: 0.2, segment: 1 }))
         .collect();
     let recording = Recording::new(resolved, BridgeLimits::default()).unwrap();
     let law = |k: usize, speed_mps: f64| {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::judged::Judged;
 use super::stop_to_stop::StopToStop;
-use crate::dataset::Note;
+use crate::dataset::DatasetDiagnostic;
 
 named! {
     /// What the data say, in a word.
@@ -28,7 +28,7 @@ named! {
     }
 }
 
-/// A stretch of time in a run, in the recording's own time.
+/// An interval of time in a run, in the recording's own time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RunWindow {
     /// The run's file.
@@ -101,9 +101,9 @@ pub struct Location {
 }
 
 impl ExplainAnswer {
-    /// The notes by which the data cannot be true.
-    pub fn impossibilities(&self) -> impl Iterator<Item = &Note> {
-        self.notes.iter().filter(|note| note.severity == Severity::Fundamental)
+    /// The diagnostics by which the data cannot be true.
+    pub fn impossibilities(&self) -> impl Iterator<Item = &DatasetDiagnostic> {
+        self.diagnostics.iter().filter(|diagnostic| diagnostic.severity == Severity::Fundamental)
     }
 }
 
@@ -235,7 +235,8 @@ pub struct Considered {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub evidence: Option<f64>,
     /// Why it was not chosen, or could not be tested.
-    pub remark: String,
+    #[serde(rename = "remark")]
+    pub reason: String,
 }
 
 /// A value with its standard deviation.
@@ -298,7 +299,8 @@ pub struct ExplainAnswer {
     /// The verdict in a sentence or two.
     pub statement: String,
     /// What may spoil the verdict, the worst first; with a fundamental one there is none.
-    pub notes: Vec<Note>,
+    #[serde(rename = "notes")]
+    pub diagnostics: Vec<DatasetDiagnostic>,
     /// The effects found, the strongest first.
     pub effects: Vec<EffectAnswer>,
     /// Kinds that explain the data as well as the first effect.

@@ -5,7 +5,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use super::evidence::{EQUAL, Fit};
 use super::selection::{Outcome, Trial};
 
-/// A rival takes away this share of what the accepted effect does of the open-loop error.
+/// A competing hypothesis takes away this share of what the accepted effect does of the open-loop error.
 const ERROR_REDUCTION_SHARE: f64 = 0.7;
 
 /// An accepted effect and the kinds that could stand in its place.
@@ -19,10 +19,10 @@ pub struct CompetingHypotheses {
 
 /// For each accepted effect that has some, the kinds that could stand in its place.
 ///
-/// Beside those that the runs could not tell from it whatever they showed, a rival explains the data as
+/// Beside those that the runs could not tell from it whatever they showed, a competing hypothesis explains the data as
 /// well, takes away about as much of the open-loop error, and has nothing left to explain once the effect
 /// is in: what keeps its evidence acts beside the effect and not in its place.
-pub fn rivals(outcome: &Outcome) -> Vec<CompetingHypotheses> {
+pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
     let effects = &outcome.fit.model.effects;
     let of = |accepted: EffectKind, tried: &[Trial], twins: &[EffectKind]| {
         let own = tried.iter().find(|trial| trial.kind == accepted);
@@ -43,7 +43,7 @@ pub fn rivals(outcome: &Outcome) -> Vec<CompetingHypotheses> {
         let first = outcome.rounds.first().map_or(&[][..], |round| &round[..]);
         of(kind, instead.map_or(first, |(_, tried)| tried), effect.twins())
     });
-    each.filter(|rivals| !rivals.kinds.is_empty()).collect()
+    each.filter(|competing| !competing.kinds.is_empty()).collect()
 }
 
 /// Whether a trial could stand in the place of the accepted one.
@@ -80,13 +80,13 @@ pub fn informative_runs(kind: EffectKind) -> &'static str {
 }
 
 /// What is known to separate the kinds that are easily confused.
-pub fn separating_run(kind: EffectKind, rivals: &[EffectKind]) -> String {
+pub fn separating_run(kind: EffectKind, competing: &[EffectKind]) -> String {
     use EffectKind::{
         ActuatorDelay, AmbientTemperature, BearingTemperature, CurveResistance, DraggingBrake,
         GradientError, GradientShift, LocalResistance, MassChange, RotatingMass, SpeedDelay,
         TractionGain, TunnelDrag, WheelDiameter, Wind,
     };
-    let has = |wanted: EffectKind| kind == wanted || rivals.contains(&wanted);
+    let has = |wanted: EffectKind| kind == wanted || competing.contains(&wanted);
     let pairs: [(EffectKind, EffectKind, &str); 13] = [
         (
             GradientError,

@@ -100,9 +100,10 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
         track: dataset.track.as_ref(),
         progress,
     };
-    let notes = dataset.notes();
+    let diagnostics = dataset.diagnostics();
     // An effect that explains wrong units is none.
-    let is_possible = notes.iter().all(|note| note.severity < Severity::Fundamental);
+    let is_possible =
+        diagnostics.iter().all(|diagnostic| diagnostic.severity < Severity::Fundamental);
     let mut outcome = if is_possible { search.run() } else { search.base() };
     if is_possible && Unexplained::of(&search, &outcome).is_some_and(|left| !left.is_noise()) {
         search.look_under_noise(&mut outcome);
@@ -112,7 +113,7 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
     progress(0.95, "scoring the holdout runs");
     let score = Score::of(&problem, &holdout, &outcome.base, &outcome.fit);
     let predictions = score::predictions(&problem, &holdout, &outcome.fit);
-    let mut answer = verdict::answer(&search, &outcome, &deviations, &known, &score, notes);
+    let mut answer = verdict::answer(&search, &outcome, &deviations, &known, &score, diagnostics);
     if let Some(told) = told_drive {
         answer.statement += &told.answer.sentence();
         answer.drive = Some(told.answer);

@@ -10,7 +10,7 @@ use super::answer::{
     BaseAnswer, Considered, DavisDeviations, EffectAnswer, ExplainAnswer, HALF_95, Location,
     ParameterValue, PlaceUncertainty, Verdict,
 };
-use super::competing::{CompetingHypotheses, is_in, rivals, separating_run};
+use super::competing::{CompetingHypotheses, competing_hypotheses, is_in, separating_run};
 use super::effects::ReportContext;
 use super::evidence::{acceptance_score, p_value};
 use super::identifiability::{identifiability, not_held};
@@ -19,7 +19,7 @@ use super::runners_up::runners_up;
 use super::score::{self, Score};
 use super::selection::{Deviations, Outcome, Search, discounted, few_runs_factor, penalty};
 use super::unexplained::Unexplained;
-use crate::dataset::Note;
+use crate::dataset::DatasetDiagnostic;
 
 /// Moving time in s of the fit runs below which nothing is said.
 const MOVING_MIN_S: f64 = 180.0;
@@ -33,29 +33,29 @@ pub fn answer(
     deviations: &Deviations,
     known: &[Option<PlaceUncertainty>],
     score: &Score,
-    notes: Vec<Note>,
+    diagnostics: Vec<DatasetDiagnostic>,
 ) -> ExplainAnswer {
     let (fit, std) = (&outcome.fit, &deviations.std);
     let effects = effect_answers(search, outcome, known, deviations);
-    // What has no name has no rivals either.
+    // What has no name has no competing hypotheses either.
     let is_unknown = is_in(fit, EffectKind::Unknown);
-    let rivals = if is_unknown { Vec::new() } else { rivals(outcome) };
+    let competing = if is_unknown { Vec::new() } else { competing_hypotheses(outcome) };
     let left = Unexplained::of(search, outcome);
-    let verdict = verdict(search, outcome, &rivals, left.as_ref());
+    let verdict = verdict(search, outcome, &competing, left.as_ref());
     let identifiability = match verdict {
         Verdict::InsufficientData => Vec::new(),
         _ => identifiability(search, outcome),
     };
     let [rmse_before, rmse_after] = score.holdout_rmse_mps();
     let pair = |errors: [SpeedError; 2]| Some([errors[0].rmse_mps()?, errors[1].rmse_mps()?]);
-    let impossible: Vec<String> = notes
+    let impossible: Vec<String> = diagnostics
         .iter()
-        .filter(|note| note.severity == Severity::Fundamental)
+        .filter(|diagnostic| diagnostic.severity == Severity::Fundamental)
         .map(ToString::to_string)
         .collect();
     let (statement, experiment) = if impossible.is_empty() {
         let (text, experiment) =
-            statement(search, outcome, verdict, &effects, &rivals, left.as_ref());
+            statement(search, outcome, verdict, &effects, &competing, left.as_ref());
         let undetermined = match verdict {
             Verdict::InsufficientData => String::new(),
             _ => undetermined(search.problem, fit, std) + &not_held(&identifiability),
@@ -68,9 +68,9 @@ pub fn answer(
     ExplainAnswer {
         verdict,
         statement,
-        notes,
+        diagnostics,
         effects,
-        ambiguous_with: rivals.iter().flat_map(|it| &it.kinds).map(|kind| kind.name()).collect(),
+        ambiguous_with: competing.iter().flat_map(|it| &it.kinds).map(|kind| kind.name()).collect(),
         experiment,
         base: BaseAnswer {
             a: fit.theta[0],
@@ -92,7 +92,7 @@ pub fn answer(
         drive: None,
         force_late_s: None,
         unexplained_n_per_kn: left.map(|left| left.n_per_kn),
-        considered: considered(outcome, &rivals),
+        considered: considered(outcome, &competing),
         identifiability,
         predictions: BTreeMap::new(),
     }
@@ -191,7 +191,7 @@ fn effect_answers(
 fn verdict(
     search: &Search,
     outcome: &Outcome,
-    rivals: &[CompetingHypotheses],
+    competing: &[CompetingHypotheses],
     left: Option<&Unexplained>,
 ) -> Verdict {
     if outcome.rounds.is_empty() || moving_s(search) < MOVING_MIN_S {
@@ -215,16 +215,16 @@ fn verdict(
             return Verdict::Unknown;
         }
     }
-    if rivals.is_empty() { Verdict::Effect } else { Verdict::Ambiguous }
+    if competing.is_empty() { Verdict::Effect } else { Verdict::Ambiguous }
 }
 
-fn considered(outcome: &Outcome, rivals: &[CompetingHypotheses]) -> Vec<Considered> {
+fn considered(outcome: &Outcome, competing: &[CompetingHypotheses]) -> Vec<Considered> {
     let mut list: Vec<Considered> = Vec::new();
     if let Some(last) = outcome.rounds.last() {
         for trial in last {
-            let remark = if is_in(&outcome.fit, trial.kind) {
+            let reason = if is_in(&outcome.fit, trial.kind) {
                 "found".into()
-            } else if rivals.iter().any(|it| it.kinds.contains(&trial.kind)) {
+            } else if competing.iter().any(|it| it.kinds.contains(&trial.kind)) {
                 "explains the data as well".into()
             } else {
                 Search::refusal(trial).map_or_else(
@@ -235,12 +235,12 @@ fn considered(outcome: &Outcome, rivals: &[CompetingHypotheses]) -> Vec<Consider
             list.push(Considered {
                 kind: trial.kind.name(),
                 evidence: Some(trial.evidence),
-                remark,
+                reason,
             });
         }
     }
     for (kind, reason) in &outcome.not_testable {
-        list.push(Considered { kind: kind.name(), evidence: None, remark: reason.clone() });
+        list.push(Considered { kind: kind.name(), evidence: None, reason: reason.clone() });
     }
     list
 }
@@ -250,7 +250,7 @@ fn statement(
     outcome: &Outcome,
     verdict: Verdict,
     effects: &[EffectAnswer],
-    rivals: &[CompetingHypotheses],
+    competing: &[CompetingHypotheses],
     left: Option<&Unexplained>,
 ) -> (String, Option<String>) {
     let described: Vec<String> = effects.iter().map(describe).collect();
@@ -293,12 +293,12 @@ fn statement(
                 let names: Vec<&str> = kinds.iter().map(|kind| kind.name()).collect();
                 format!("{} and {}", accepted.name(), names.join(", "))
             };
-            let each: Vec<String> = rivals.iter().map(one).collect();
+            let each: Vec<String> = competing.iter().map(one).collect();
             let text = format!(
                 "An effect acts, but {} explain it equally well on these runs ({described}).",
                 each.join(", as well as ")
             );
-            let runs = rivals.iter().map(|it| separating_run(it.accepted, &it.kinds));
+            let runs = competing.iter().map(|it| separating_run(it.accepted, &it.kinds));
             let mut experiments: Vec<String> = runs.collect();
             experiments.dedup();
             let experiment = (!experiments.is_empty()).then(|| experiments.join(" "));

@@ -45,18 +45,18 @@ pub enum FieldOutcome {
 /// The account of the fields of one train or line, each once.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Account {
-    remarks: Vec<FieldOutcome>,
+    outcomes: Vec<FieldOutcome>,
 }
 
 impl Account {
     /// Everything said, in the order of the work.
-    pub fn remarks(&self) -> &[FieldOutcome] {
-        &self.remarks
+    pub fn outcomes(&self) -> &[FieldOutcome] {
+        &self.outcomes
     }
 
-    fn say(&mut self, remark: FieldOutcome) {
-        if !self.remarks.contains(&remark) {
-            self.remarks.push(remark);
+    fn say(&mut self, outcome: FieldOutcome) {
+        if !self.outcomes.contains(&outcome) {
+            self.outcomes.push(outcome);
         }
     }
 

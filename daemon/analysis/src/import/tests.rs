@@ -44,7 +44,7 @@ fn flat(list: &[(f64, f64)]) -> Vec<f64> {
 
 /// The reason for which a field has no place, or a key is not known.
 fn reason<'a>(account: &'a Account, name: &str) -> &'a str {
-    let of = account.remarks().iter().find_map(|remark| match remark {
+    let of = account.outcomes().iter().find_map(|outcome| match outcome {
         FieldOutcome::Left { field, why } if field == name => Some(why.as_str()),
         FieldOutcome::Unknown { key, why } if *key == name => Some(why.as_str()),
         _ => None,
@@ -138,7 +138,7 @@ fn paths_of_both_schemas_give_gradient_and_permitted_speed() {
     let lines = read(PATH_2024).lines;
     assert_eq!(flat(lines[0].gradient.as_ref().unwrap()), [400.0, 5.0, 900.0, -2.5]);
     assert_close(&flat(lines[0].permitted_speed.as_ref().unwrap()), &[0.0, 20.0, 900.0, 10.0]);
-    let printed = format!("{:?}", lines[0].account.remarks());
+    let printed = format!("{:?}", lines[0].account.outcomes());
     assert!(printed.contains("the file gives it from 400 m on"), "{printed}");
     assert_eq!((lines[1].name.as_str(), &lines[1].gradient), ("back", &None));
     assert_eq!(reason(&lines[1].account, "gradient"), "no section has a resistance");
@@ -193,13 +193,13 @@ fn davis_coefficients_are_reported_by_their_size() {
     let weight_kn = 80.0 * STANDARD_GRAVITY_MPS2;
     assert_close(&davis(tram), &[1200.0 / weight_kn, 90.0 / weight_kn, 1.4 / weight_kn]);
     assert_close(&[tram.rotating_mass_factor.unwrap(), tram.length_m.unwrap()], &[0.05, 42.0]);
-    let printed = format!("{:?}", tram.account.remarks());
+    let printed = format!("{:?}", tram.account.outcomes());
     assert!(printed.contains("for the whole train: 3.24 N/kN at 12.5 m/s"), "{printed}");
     assert_eq!(reason(&tram.account, "hoverboards"), "not understood");
     let express = &read(EXPRESS).trains[0];
     let each = |value: f64| 1000.0 * value / STANDARD_GRAVITY_MPS2;
     assert_close(&davis(express), &[each(0.008), each(0.0003), each(0.000015)]);
-    let printed = format!("{:?}", express.account.remarks());
+    let printed = format!("{:?}", express.account.outcomes());
     assert!(printed.contains("for each kg: 4.49 N/kN at 40.0 m/s"), "{printed}");
     assert_eq!(reason(&express.account, "rotating_mass_factor"), "no inertia_coefficient");
     assert_eq!(reason(&express.account, "effort"), "no effort_curves");

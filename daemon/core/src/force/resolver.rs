@@ -27,7 +27,7 @@ pub struct ResolvedSample {
     /// Time in s since the sample before it in the motion segment; 0 for the first.
     pub step_s: f64,
     /// Number of the motion segment; integrals never cross its change.
-    pub stretch: u32,
+    pub segment: u32,
     /// +1 while the chainage grows in the direction of travel, -1 while it falls.
     pub direction: f64,
     /// Chainage of the train's centre in m.
@@ -115,7 +115,7 @@ impl ResolvedSample {
         ResolvedSample {
             time_ns: 0,
             step_s: 0.0,
-            stretch: 1,
+            segment: 1,
             direction: 1.0,
             position_m: None,
             speed_mps: 20.0,
@@ -141,7 +141,7 @@ impl ResolvedSample {
 
 /// Puts what acts on the train behind a speed that is late.
 fn put_behind(late: &mut LateSpeed, resolved: &mut ResolvedSample) {
-    let at = (resolved.time_ns, resolved.stretch);
+    let at = (resolved.time_ns, resolved.segment);
     let forces = resolved.traction_force_n.zip(resolved.brake_force_n);
     if let Some([traction_n, brake_n]) = late.forces(at, resolved.speed_mps, forces.map(Into::into))
     {
@@ -222,11 +222,11 @@ impl ForceResolver {
         let traction_n = sample.get(SampleField::TractionForce);
         let degc = sample.get(SampleField::AmbientTemperature).or(self.ambient_temperature_degc);
         self.ambient_temperature_degc = degc;
-        self.last = Some((valid.stretch, sample.speed_mps));
+        self.last = Some((valid.segment, sample.speed_mps));
         let mut resolved = ResolvedSample {
             time_ns: sample.time_ns,
             step_s: valid.step_s,
-            stretch: valid.stretch,
+            segment: valid.segment,
             direction,
             position_m,
             speed_mps: wheel::true_speed_mps(sample.speed_mps, known.speed_scale),
@@ -249,7 +249,7 @@ impl ForceResolver {
         };
         if let Some(delay) = &mut self.delay {
             let reported = resolved.traction_force_n.zip(resolved.brake_force_n);
-            let at = (sample.time_ns, valid.stretch);
+            let at = (sample.time_ns, valid.segment);
             if let Some([traction_n, brake_n]) = delay.acting(at, reported.map(Into::into)) {
                 resolved.traction_force_n = Some(traction_n);
                 resolved.brake_force_n = Some(brake_n);
@@ -323,12 +323,12 @@ impl ForceResolver {
         let felt_mps2 = valid.sample.get(SampleField::SpecificForce);
         let specific_force_mps2 = match &mut self.late_speed {
             Some(late) => {
-                late.specific_force_mps2((valid.sample.time_ns, valid.stretch), felt_mps2)
+                late.specific_force_mps2((valid.sample.time_ns, valid.segment), felt_mps2)
             }
             None => felt_mps2,
         }?;
-        let (stretch, last_speed_mps) = self.last?;
-        if stretch != valid.stretch || valid.step_s <= 0.0 {
+        let (segment, last_speed_mps) = self.last?;
+        if segment != valid.segment || valid.step_s <= 0.0 {
             return None;
         }
         let acceleration_mps2 = (valid.sample.speed_mps - last_speed_mps) / valid.step_s;

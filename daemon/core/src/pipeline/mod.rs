@@ -34,7 +34,7 @@ use dynocar_shared::{ParameterSnapshot, Reason, RejectionReason, Status, TrainId
 
 use self::usable::Usable;
 use crate::force::ForceResolver;
-use crate::plausibility::{Finding, Plausibility};
+use crate::plausibility::{DetectedFault, Plausibility};
 use crate::track::Track;
 use crate::train::TrainModel;
 use crate::validation::{ValidationLimits, Validator};
@@ -178,7 +178,7 @@ impl Pipeline {
         snapshot.sample_sequence = sample.sequence;
         self.write_estimate();
         let is_estimated = self.snapshot.status() == Status::Estimated;
-        if let Some(Finding { fault, .. }) = self.implausible() {
+        if let Some(DetectedFault { fault, .. }) = self.implausible() {
             let snapshot = &mut self.snapshot;
             snapshot.reason = fault.reason() as u32;
             if is_estimated {
@@ -200,9 +200,9 @@ impl Pipeline {
     }
 
     /// What cannot be true of the samples lately and spoils the estimate.
-    pub fn implausible(&self) -> Option<Finding> {
+    pub fn implausible(&self) -> Option<DetectedFault> {
         let kind = self.estimator.kind();
-        self.plausibility.findings().iter().find(|finding| finding.fault.concerns(kind))
+        self.plausibility.detected().iter().find(|detected| detected.fault.concerns(kind))
     }
 
     /// The snapshot after the last sample.

@@ -57,7 +57,7 @@ pub enum Verdict {
 /// Force and content of a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Reading {
-    stretch: u32,
+    segment: u32,
     speed_mps: f64,
     driving_n_per_kn: f64,
     content: [Option<f64>; 4],
@@ -69,7 +69,7 @@ impl Reading {
         let is_moving = sample.speed_mps > MOVING_MPS && !sample.is_sliding;
         let driving_n_per_kn = sample.driving_force_n()? / sample.weight_kn;
         (is_moving && driving_n_per_kn.is_finite()).then_some(Reading {
-            stretch: sample.stretch,
+            segment: sample.segment,
             speed_mps: sample.speed_mps,
             driving_n_per_kn,
             content: [
@@ -138,7 +138,7 @@ impl SampleGate {
         let (Some(level), Some(newest)) = (self.level, self.newest) else {
             return self.begin(now);
         };
-        if now.stretch != level.stretch || !(sample.step_s > 0.0) {
+        if now.segment != level.segment || !(sample.step_s > 0.0) {
             return self.begin(now);
         }
         if now.repeats(&newest) {

@@ -10,7 +10,7 @@
 //! | traction and brake exchanged | -1 | 1 | 1 |
 
 use super::balance::Slope;
-use super::input_fault::{Finding, InputFault};
+use super::input_fault::{DetectedFault, InputFault};
 use super::watch::Figures;
 
 /// Factors of forces within these bounds are effects that a train can have.
@@ -32,24 +32,24 @@ const BRAKING_PRESSURE_MIN_PA: f64 = 5e3;
 /// An ordinary one.
 const ORDINARY_PRESSURE_PA: f64 = 1e5;
 
-/// Findings at most.
-const FINDINGS_MAX: usize = 4;
+/// Detected faults at most.
+const DETECTED_MAX: usize = 4;
 
 /// What was found, the most fundamental first.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Findings {
-    list: [Option<Finding>; FINDINGS_MAX],
+pub struct DetectedFaults {
+    list: [Option<DetectedFault>; DETECTED_MAX],
 }
 
-impl Findings {
+impl DetectedFaults {
     fn add(&mut self, fault: InputFault, factor: f64) {
         if let Some(place) = self.list.iter_mut().find(|place| place.is_none()) {
-            *place = Some(Finding { fault, factor });
+            *place = Some(DetectedFault { fault, factor });
         }
     }
 
     /// All of them.
-    pub fn iter(&self) -> impl Iterator<Item = Finding> {
+    pub fn iter(&self) -> impl Iterator<Item = DetectedFault> {
         self.list.into_iter().flatten()
     }
 }
@@ -59,15 +59,17 @@ impl Findings {
 /// # Real-time
 ///
 /// Bounded work, no allocation.
-pub fn diagnose(figures: &Figures) -> Findings {
-    let mut found = Findings::default();
+pub fn diagnose(figures: &Figures) -> DetectedFaults {
+    let mut found = DetectedFaults::default();
     let kinematic = kinematic(figures);
     let (forces_by, gradients_by) = match kinematic {
-        Some(Finding { fault: InputFault::SpeedScale, factor }) => (factor, factor),
-        Some(Finding { fault: InputFault::TimeScale, factor }) => (1.0 / factor, 1.0 / factor),
+        Some(DetectedFault { fault: InputFault::SpeedScale, factor }) => (factor, factor),
+        Some(DetectedFault { fault: InputFault::TimeScale, factor }) => {
+            (1.0 / factor, 1.0 / factor)
+        }
         _ => (1.0, 1.0),
     };
-    if let Some(Finding { fault, factor }) = kinematic {
+    if let Some(DetectedFault { fault, factor }) = kinematic {
         found.add(fault, factor);
     }
     let mut forces_by = forces_by;
@@ -92,10 +94,10 @@ fn is_outside(value: f64, (low, high): (f64, f64)) -> bool {
 }
 
 /// The input fault that explains how position and speed go together.
-fn kinematic(figures: &Figures) -> Option<Finding> {
+fn kinematic(figures: &Figures) -> Option<DetectedFault> {
     let ratio = figures.way_ratio?;
     if (-WAY_RATIOS.1..-WAY_RATIOS.0).contains(&ratio) {
-        return Some(Finding { fault: InputFault::DirectionReversed, factor: ratio });
+        return Some(DetectedFault { fault: InputFault::DirectionReversed, factor: ratio });
     }
     if !(ratio > 0.0) || !is_outside(ratio, WAY_RATIOS) {
         return None;
@@ -122,7 +124,7 @@ fn kinematic(figures: &Figures) -> Option<Finding> {
     };
     let known = candidates.iter().filter_map(|candidate| Some((misfit(candidate)?, candidate)));
     let (_, (fault, factor, _)) = known.min_by(|one, other| one.0.total_cmp(&other.0))?;
-    Some(Finding { fault: *fault, factor: *factor })
+    Some(DetectedFault { fault: *fault, factor: *factor })
 }
 
 /// The factor of both forces, when they have one.
@@ -139,7 +141,7 @@ fn common_factor(figures: &Figures) -> Option<f64> {
     }
 }
 
-fn of_forces(figures: &Figures, by: f64, is_kinematic: bool, found: &mut Findings) {
+fn of_forces(figures: &Figures, by: f64, is_kinematic: bool, found: &mut DetectedFaults) {
     let slopes = figures.slopes;
     if let Some(common) = common_factor(figures).map(|factor| factor / by) {
         if common < -FORCE_FACTORS.0 {
@@ -177,7 +179,7 @@ fn blamed(figures: &Figures, common: f64, is_kinematic: bool) -> (InputFault, f6
     if is_mass { (InputFault::MassScale, common) } else { (InputFault::ForcesScale, 1.0 / common) }
 }
 
-fn of_gradient(figures: &Figures, by: f64, found: &mut Findings) {
+fn of_gradient(figures: &Figures, by: f64, found: &mut DetectedFaults) {
     let Some(slope) = figures.slopes.gradient else { return };
     let factor = slope.factor / by;
     if factor < 0.0 {

@@ -135,14 +135,14 @@ impl InputFault {
 
 /// An input fault with its size.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Finding {
+pub struct DetectedFault {
     /// What it is.
     pub fault: InputFault,
     /// Reported over true value, as far as the samples show.
     pub factor: f64,
 }
 
-impl Finding {
+impl DetectedFault {
     /// The unit that the values are in, when they were read as another and that explains the
     /// factor.
     pub fn true_unit(&self, read_as: &Unit) -> Option<Unit> {
@@ -173,7 +173,7 @@ mod tests {
     fn the_unit_is_named_that_explains_the_factor() {
         let unit = |fault: InputFault, factor, read_as| {
             let read_as = Unit::find(fault.dimension(), read_as).unwrap();
-            Finding { fault, factor }.true_unit(&read_as).map(|unit| unit.name())
+            DetectedFault { fault, factor }.true_unit(&read_as).map(|unit| unit.name())
         };
         assert_eq!(unit(InputFault::ForcesScale, 0.001, "N"), Some("kN"));
         assert_eq!(unit(InputFault::ForcesScale, 1010.0, "kN"), Some("N"));

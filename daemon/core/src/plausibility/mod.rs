@@ -7,7 +7,7 @@
 //!
 //! - [`watch`]: sample by sample, with [`balance`] (forces against acceleration) and [`pressure`]
 //! - [`diagnosis`]: which input fault makes all figures come out as they did
-//! - [`input_fault`]: the input faults, their names and severity; [`words`]: a finding in a sentence
+//! - [`input_fault`]: the input faults, their names and severity; [`words`]: a detected fault in a sentence
 
 pub mod balance;
 pub mod diagnosis;
@@ -20,8 +20,8 @@ use std::sync::Arc;
 
 use dynocar_shared::{RejectionReason, TrainSample};
 
-pub use diagnosis::Findings;
-pub use input_fault::{Finding, InputFault, Severity};
+pub use diagnosis::DetectedFaults;
+pub use input_fault::{DetectedFault, InputFault, Severity};
 
 use crate::train::TrainModel;
 use watch::Watch;
@@ -31,13 +31,13 @@ use watch::Watch;
 pub struct Plausibility {
     train: Arc<TrainModel>,
     watch: Watch,
-    findings: Findings,
+    detected: DetectedFaults,
 }
 
 impl Plausibility {
     /// Nothing seen yet of a train.
     pub fn new(train: Arc<TrainModel>) -> Self {
-        Plausibility { watch: Watch::new(&train), train, findings: Findings::default() }
+        Plausibility { watch: Watch::new(&train), train, detected: DetectedFaults::default() }
     }
 
     /// Takes in a sample with what validation said of it, and the gradient in ‰ along the travel.
@@ -68,12 +68,12 @@ impl Plausibility {
             Err(_) => return,
         };
         if self.watch.take(&self.train, sample, is_valid, gradient_permille) {
-            self.findings = diagnosis::diagnose(&self.watch.figures());
+            self.detected = diagnosis::diagnose(&self.watch.figures());
         }
     }
 
     /// What cannot be true of the samples lately.
-    pub fn findings(&self) -> &Findings {
-        &self.findings
+    pub fn detected(&self) -> &DetectedFaults {
+        &self.detected
     }
 }

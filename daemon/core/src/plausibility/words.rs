@@ -1,12 +1,12 @@
-//! A finding in a sentence.
+//! A detected fault in a sentence.
 
 use std::fmt;
 
-use super::input_fault::{Finding, InputFault};
+use super::input_fault::{DetectedFault, InputFault};
 use crate::units::{Dimension, Unit};
 
-impl Finding {
-    /// The finding in words; `read_as` is the unit that the quantity was read in.
+impl DetectedFault {
+    /// The detected fault in words; `read_as` is the unit that the quantity was read in.
     pub fn words(&self, read_as: &Unit) -> String {
         self.words_for((self.factor, self.factor), read_as)
     }
@@ -64,7 +64,7 @@ impl Finding {
     }
 }
 
-impl fmt::Display for Finding {
+impl fmt::Display for DetectedFault {
     /// In words, for a quantity read in the unit that samples hold.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let base = match self.fault.dimension() {

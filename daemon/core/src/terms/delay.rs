@@ -47,7 +47,7 @@ pub struct DelayLine<const N: usize> {
     past: Vec<(f64, [f64; N])>,
     next: usize,
     count: usize,
-    stretch: u32,
+    segment: u32,
     origin_ns: i64,
     /// Time in s, delayed and lagged numbers of the last sample.
     last: Option<(f64, [f64; N], [f64; N])>,
@@ -62,7 +62,7 @@ impl<const N: usize> DelayLine<N> {
             past: vec![(0.0, [0.0; N]); CAPACITY],
             next: 0,
             count: 0,
-            stretch: 0,
+            segment: 0,
             origin_ns: 0,
             last: None,
         }
@@ -72,23 +72,23 @@ impl<const N: usize> DelayLine<N> {
     /// are not. A new motion segment forgets what was before it.
     pub fn acting(
         &mut self,
-        (time_ns, stretch): (i64, u32),
+        (time_ns, segment): (i64, u32),
         reported: Option<[f64; N]>,
     ) -> Option<[f64; N]> {
-        self.acting_unless((time_ns, stretch), reported, |_| false)
+        self.acting_unless((time_ns, segment), reported, |_| false)
     }
 
     /// The same; what comes out of the dead time and is `held` moves nothing: it holds as it is, and the
     /// lag begins from none behind it.
     pub fn acting_unless(
         &mut self,
-        (time_ns, stretch): (i64, u32),
+        (time_ns, segment): (i64, u32),
         reported: Option<[f64; N]>,
         held: impl FnOnce(&[f64; N]) -> bool,
     ) -> Option<[f64; N]> {
-        if self.count == 0 || stretch != self.stretch {
+        if self.count == 0 || segment != self.segment {
             (self.count, self.next, self.last) = (0, 0, None);
-            (self.stretch, self.origin_ns) = (stretch, time_ns);
+            (self.segment, self.origin_ns) = (segment, time_ns);
         }
         let reported = reported?;
         let time_s = time_ns.saturating_sub(self.origin_ns) as f64 * 1e-9;
@@ -151,8 +151,8 @@ mod tests {
 
     const STEP_S: f64 = 0.1;
 
-    fn at(time_s: f64, stretch: u32) -> (i64, u32) {
-        (5_000_000_000 + (time_s * 1e9).round() as i64, stretch)
+    fn at(time_s: f64, segment: u32) -> (i64, u32) {
+        (5_000_000_000 + (time_s * 1e9).round() as i64, segment)
     }
 
     /// Forces that act at the times of a recording with reported traction and brake forces.

@@ -91,7 +91,7 @@ impl TripError {
 #[derive(Clone, Copy)]
 struct Window {
     begin_ns: i64,
-    stretch: u32,
+    segment: u32,
     first_m: Option<f64>,
     last_m: Option<f64>,
 }
@@ -127,7 +127,7 @@ impl Trials {
         if let Some(valid) = &valid {
             let ends = self.window.is_some_and(|window| {
                 let length_ns = valid.sample.time_ns.saturating_sub(window.begin_ns);
-                window.stretch != valid.stretch || length_ns as f64 * 1e-9 >= Restart::WINDOW_S
+                window.segment != valid.segment || length_ns as f64 * 1e-9 >= Restart::WINDOW_S
             });
             if ends {
                 self.close_window(unix_s);
@@ -142,7 +142,7 @@ impl Trials {
             let position_m = sample.get(SampleField::Position);
             let window = self.window.get_or_insert(Window {
                 begin_ns: sample.time_ns,
-                stretch: valid.stretch,
+                segment: valid.segment,
                 first_m: position_m,
                 last_m: position_m,
             });

@@ -57,7 +57,7 @@ pub struct ValidSample<'a> {
     /// Time in s since the accepted sample before it; 0 when it starts a segment.
     pub step_s: f64,
     /// Number of the motion segment; integrals never cross its change.
-    pub stretch: u32,
+    pub segment: u32,
 }
 
 impl ValidSample<'_> {
@@ -94,7 +94,7 @@ pub struct Validator {
     gap: Option<Gap>,
     last_refused: Option<TrainSample>,
     refusals_in_a_row: u32,
-    stretch: u32,
+    segment: u32,
     lost: u64,
 }
 
@@ -111,7 +111,7 @@ impl Validator {
             gap: None,
             last_refused: None,
             refusals_in_a_row: 0,
-            stretch: 0,
+            segment: 0,
             lost: 0,
         }
     }
@@ -133,9 +133,9 @@ impl Validator {
         std::mem::swap(self, other);
         std::mem::swap(&mut self.limits, &mut other.limits);
         std::mem::swap(&mut self.nominal_mass_kg, &mut other.nominal_mass_kg);
-        let stretch = self.stretch.max(other.stretch);
+        let segment = self.segment.max(other.segment);
         for it in [self, other] {
-            (it.stretch, it.last) = (stretch, None);
+            (it.segment, it.last) = (segment, None);
         }
     }
 
@@ -314,12 +314,12 @@ impl Validator {
 
     fn accept<'a>(&mut self, sample: &'a TrainSample, step_s: Option<f64>) -> ValidSample<'a> {
         if step_s.is_none() {
-            self.stretch = self.stretch.wrapping_add(1);
+            self.segment = self.segment.wrapping_add(1);
         }
         self.last = Some(*sample);
         self.last_refused = None;
         self.refusals_in_a_row = 0;
-        ValidSample { sample, step_s: step_s.unwrap_or(0.0), stretch: self.stretch }
+        ValidSample { sample, step_s: step_s.unwrap_or(0.0), segment: self.segment }
     }
 }
 

@@ -26,7 +26,7 @@ fn steady_motion_passes_in_one_segment() {
     for index in 0..50 {
         let sample = cruising(index);
         let valid = validator.check(&sample).unwrap();
-        assert_eq!(valid.stretch, 1);
+        assert_eq!(valid.segment, 1);
         assert_eq!(valid.step_s, if index == 0 { 0.0 } else { 0.2 });
     }
     assert_eq!(validator.lost(), 0);
@@ -130,7 +130,7 @@ fn a_restarted_controller_starts_a_new_segment_and_its_own_count() {
     let mut restarted = cruising(300);
     (restarted.run, restarted.sequence) = (9, 2);
     let valid = validator.check(&restarted).unwrap();
-    assert_eq!((valid.stretch, valid.step_s), (2, 0.0));
+    assert_eq!((valid.segment, valid.step_s), (2, 0.0));
     assert_eq!(validator.lost(), 1, "its first sample never came");
 }
 
@@ -140,7 +140,7 @@ fn a_long_gap_starts_a_new_segment() {
     validator.check(&cruising(0)).unwrap();
     let mut late = cruising(50);
     late.sequence = 2;
-    assert_eq!(validator.check(&late).unwrap().stretch, 2);
+    assert_eq!(validator.check(&late).unwrap().segment, 2);
     assert_eq!(validator.lost(), 0);
 }
 
@@ -154,7 +154,7 @@ fn a_clock_set_back_is_refused_a_few_times_and_then_believed() {
         .map(|index| {
             let mut sample = cruising(index);
             sample.sequence = 1011 + index;
-            validator.check(&sample).map(|valid| valid.stretch)
+            validator.check(&sample).map(|valid| valid.segment)
         })
         .collect();
     assert!(results[..5].iter().all(|r| *r == Err(RejectionReason::TimeNotIncreasing)));

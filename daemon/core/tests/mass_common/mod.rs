@@ -60,7 +60,7 @@ pub struct Simulation {
     pub slew_n_per_s: f64,
     force_n: f64,
     time_ns: i64,
-    stretch: u32,
+    segment: u32,
     random: ChaCha8Rng,
 }
 
@@ -76,7 +76,7 @@ impl Simulation {
             slew_n_per_s: 80_000.0,
             force_n: 0.0,
             time_ns: 0,
-            stretch: 1,
+            segment: 1,
             random: ChaCha8Rng::seed_from_u64(seed),
         }
     }
@@ -84,7 +84,7 @@ impl Simulation {
     /// Time passes unseen, and the next sample begins a new motion segment.
     pub fn gap(&mut self, seconds: f64) {
         self.time_ns += (seconds * 1e9) as i64;
-        self.stretch += 1;
+        self.segment += 1;
     }
 
     /// Drives through phases; the train stands when it has stopped.
@@ -137,7 +137,7 @@ impl Simulation {
         ResolvedSample {
             time_ns: self.time_ns,
             step_s: PERIOD_S,
-            stretch: self.stretch,
+            segment: self.segment,
             direction: 1.0,
             position_m: None,
             speed_mps: if is_standing { 0.0 } else { measured.max(0.0) },
@@ -213,7 +213,7 @@ pub fn garbage(seed: u64, count: usize) -> Vec<ResolvedSample> {
             7 => sample.mass_kg = value,
             8 => sample.time_ns = i64::MIN,
             9 => sample.time_ns = i64::MAX,
-            10 => sample.stretch = random.random(),
+            10 => sample.segment = random.random(),
             11 => sample.is_sliding = true,
             12 => sample.extra_n_per_kn = value,
             _ => {}

@@ -3,7 +3,7 @@
 use dynocar_core::plausibility::InputFault;
 
 use super::guessed::Guess;
-use crate::finding_unit::{concerned, unit_of};
+use crate::fault_unit::{concerned, unit_of};
 use crate::{Diagnostic, GradientSource, Run};
 
 impl Guess {
@@ -18,23 +18,23 @@ impl Guess {
         runs: impl IntoIterator<Item = &'r Run>,
         is_mass_known: bool,
     ) -> Option<String> {
-        let of_run = |run: &'r Run| run.remarks.iter().map(move |remark| (run, remark));
-        for (run, remark) in runs.into_iter().flat_map(of_run) {
-            let Diagnostic::InputFault { finding, read_as } = remark else { continue };
+        let of_run = |run: &'r Run| run.diagnostics.iter().map(move |diagnostic| (run, diagnostic));
+        for (run, diagnostic) in runs.into_iter().flat_map(of_run) {
+            let Diagnostic::InputFault { detected, read_as } = diagnostic else { continue };
             let is_measured = is_mass_known && run.gradient_source != GradientSource::Unknown;
-            if needs_balance(finding.fault) && !is_measured {
+            if needs_balance(detected.fault) && !is_measured {
                 continue;
             }
-            let read_as = unit_of(*finding, read_as);
-            let Some(unit) = finding.true_unit(&read_as) else { continue };
-            let (quantities, _) = concerned(finding.fault);
+            let read_as = unit_of(*detected, read_as);
+            let Some(unit) = detected.true_unit(&read_as) else { continue };
+            let (quantities, _) = concerned(detected.fault);
             let is_open = |quantity| {
                 self.column(quantity).is_some_and(|it| it.is_unit_open && it.unit == read_as)
             };
             if !quantities.iter().any(|&quantity| is_open(quantity)) {
                 continue;
             }
-            let words = finding.words(&read_as);
+            let words = detected.words(&read_as);
             for column in &mut self.columns {
                 if quantities.contains(&column.quantity) && column.is_unit_open {
                     column.unit = unit;

@@ -16,17 +16,17 @@ fn a_run_without_any_speed_or_with_one_time_only_is_refused() {
 
 #[test]
 fn what_a_run_lacks_altogether_is_diagnosed() {
-    let remarks = |csv: &str| {
+    let diagnostics = |csv: &str| {
         let mapped = [("control_force", "F", "kN")];
         let run = Example::new(&mapped, csv).run();
-        run.remarks.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+        run.diagnostics.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
     };
-    let empty = remarks("t,v,F\n0,1,NaN\n1,2,1e308\n");
+    let empty = diagnostics("t,v,F\n0,1,NaN\n1,2,1e308\n");
     assert!(empty.contains("control_force is mapped, but no row has a value of it"), "{empty}");
-    let standing = remarks("t,v,F\n0,0,0\n1,0.02,1\n");
+    let standing = diagnostics("t,v,F\n0,0,0\n1,0.02,1\n");
     assert!(standing.contains("the train hardly moves, at 0.02 m/s at most"), "{standing}");
-    let single = remarks("t,v,F\n0,10,0\n");
+    let single = diagnostics("t,v,F\n0,10,0\n");
     assert!(single.contains("only one row is in order of time"), "{single}");
-    let driven = remarks("t,v,F\n0,10,0\n1,10.1,1\n");
+    let driven = diagnostics("t,v,F\n0,10,0\n1,10.1,1\n");
     assert!(!["mapped", "hardly", "only"].iter().any(|word| driven.contains(word)), "{driven}");
 }

@@ -15,7 +15,7 @@ use dynocar_analysis::explain::selection::Progress;
 use dynocar_analysis::explain::{Explanation, explain};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::text::{for_shell, notes};
+use super::text::{diagnostics, for_shell};
 use super::threads::Threads;
 use crate::annotation::{AnnotationError, annotate};
 use crate::report;
@@ -170,8 +170,9 @@ fn require_replaceable(file: &Path, mark: &str) -> Result<(), OutputError> {
 fn unusable(path: &Path, dataset: &Dataset, error: RunDataError) -> Failure {
     let RunDataError::Simulate { file, source } = error;
     let label = DatasetFolder::at(path).map_or(file.clone(), |folder| folder.label(&file));
-    let notes: String = dataset.notes().iter().map(|note| format!("; {note}")).collect();
-    Failure::At(SourcePosition::whole(&label), format!("{label}: {source}{notes}"))
+    let diagnostics: String =
+        dataset.diagnostics().iter().map(|diagnostic| format!("; {diagnostic}")).collect();
+    Failure::At(SourcePosition::whole(&label), format!("{label}: {source}{diagnostics}"))
 }
 
 /// Writes the updated model of the dataset at a path into a folder.
@@ -281,7 +282,7 @@ fn write_predictions(
 
 /// The answer for people.
 pub fn text(answer: &ExplainAnswer) -> String {
-    let mut text = notes(&answer.notes) + &format!("{}\n", answer.statement);
+    let mut text = diagnostics(&answer.diagnostics) + &format!("{}\n", answer.statement);
     if let Some(experiment) = &answer.experiment {
         text += &format!("To settle it: {experiment}\n");
     }
@@ -311,7 +312,7 @@ pub fn text(answer: &ExplainAnswer) -> String {
     for considered in &answer.considered {
         let evidence =
             considered.evidence.map_or("     -".into(), |evidence| format!("{evidence:6.0}"));
-        text += &format!("  {evidence}  {:20} {}\n", considered.kind, considered.remark);
+        text += &format!("  {evidence}  {:20} {}\n", considered.kind, considered.reason);
     }
     text
 }

@@ -6,7 +6,7 @@ mod runs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use dynocar_analysis::dataset::{Dataset, Note};
+use dynocar_analysis::dataset::{Dataset, DatasetDiagnostic};
 use dynocar_core::pipeline::EstimatorSettings;
 use dynocar_core::units::Unit;
 use dynocar_shared::TrainId;
@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use self::answer::EstimatorAnswer;
 use self::runs::{EstimatorSpread, RunAnswer};
-use super::text::notes;
+use super::text::diagnostics;
 use dynocar::cli::Failure;
 use dynocar::dataset;
 use dynocar::output::{give, require_file};
@@ -95,7 +95,8 @@ pub struct IdentifyAnswer {
     #[serde(skip)]
     speed_unit: Unit,
     /// What may spoil the results, the worst first.
-    notes: Vec<Note>,
+    #[serde(rename = "notes")]
+    diagnostics: Vec<DatasetDiagnostic>,
     /// From all runs, one after the other.
     estimators: Vec<EstimatorAnswer>,
     /// Estimators in addition to the recommended ones, where nobody chose.
@@ -149,7 +150,7 @@ pub fn answer(question: Question) -> Result<IdentifyAnswer, Failure> {
     Ok(IdentifyAnswer {
         dataset: dataset.name.clone(),
         speed_unit,
-        notes: dataset.notes(),
+        diagnostics: dataset.diagnostics(),
         estimators: learned,
         not_run: if is_chosen { Vec::new() } else { others(&estimators) },
         between_runs: runs.as_deref().map(runs::spreads),
@@ -211,7 +212,7 @@ fn others(estimators: &[EstimatorSettings]) -> Vec<&'static str> {
 
 /// The answer for people.
 pub fn text(answer: &IdentifyAnswer) -> String {
-    let mut text = format!("{}\n{}", answer.dataset, notes(&answer.notes));
+    let mut text = format!("{}\n{}", answer.dataset, diagnostics(&answer.diagnostics));
     for it in &answer.estimators {
         let reason = if it.reason == "none" { String::new() } else { format!(", {}", it.reason) };
         let rejected: u32 = it.samples.rejected.values().sum();

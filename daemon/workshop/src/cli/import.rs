@@ -6,7 +6,7 @@ mod summary;
 use std::path::PathBuf;
 
 use clap::Args;
-use dynocar_analysis::dataset::note::notes;
+use dynocar_analysis::dataset::dataset_diagnostic::diagnostics;
 use dynocar_analysis::dataset::{parse_track, parse_train};
 use dynocar_analysis::import::{Format, ImportError, Reading, Source, import};
 
@@ -84,10 +84,11 @@ pub fn execute(arguments: &ImportArguments) -> Result<(), Failure> {
     // What is written is what the readers take.
     let model = train.as_ref().map(|(_, made)| parse_train(TRAIN_FILE, &made.text)).transpose()?;
     let track = line.as_ref().map(|(_, text)| parse_track(TRACK_FILE, text)).transpose()?;
-    let notes = model.map(|model| notes(&model, track.as_ref(), [])).unwrap_or_default();
+    let diagnostics =
+        model.map(|model| diagnostics(&model, track.as_ref(), [])).unwrap_or_default();
     write_new_in_folder(out, &written)?;
     let names: Vec<&str> = written.iter().map(|(name, _)| *name).collect();
-    Ok(print(&summary::text(out, train.as_ref(), line.as_ref(), &notes, &names))?)
+    Ok(print(&summary::text(out, train.as_ref(), line.as_ref(), &diagnostics, &names))?)
 }
 
 /// The one of several that is wanted; `None` where there is none.

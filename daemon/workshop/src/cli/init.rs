@@ -12,8 +12,8 @@ mod summary;
 
 use std::path::Path;
 
+use dynocar_analysis::dataset::dataset_diagnostic::diagnostics;
 use dynocar_analysis::dataset::guess::{Guess, GuessError, GuessProblem, Recording, guess};
-use dynocar_analysis::dataset::note::notes;
 use dynocar_analysis::dataset::{MANIFEST_FILE, Quantity, SourcePosition};
 use toml::Value;
 
@@ -100,8 +100,8 @@ fn describe(
             && guess.correct(&runs, arguments.train.knows_mass()).is_some();
         corrections += 1;
         if !is_corrected {
-            let notes = notes(&head.train, head.track.as_deref(), &runs);
-            return Ok(Described { guess, encoding, files, notes, text });
+            let diagnostics = diagnostics(&head.train, head.track.as_deref(), &runs);
+            return Ok(Described { guess, encoding, files, diagnostics, text });
         }
     }
 }

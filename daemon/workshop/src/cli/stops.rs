@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use dynocar_analysis::dataset::{Note, Role};
+use dynocar_analysis::dataset::{DatasetDiagnostic, Role};
 use dynocar_analysis::stops::{FindSettings, Law, RecordedStop, Study, StudySettings};
 use serde::Serialize;
 
-use super::text::{TextTable, notes};
+use super::text::{TextTable, diagnostics};
 use dynocar::cli::Failure;
 use dynocar::dataset;
 use dynocar::output::{give, require_file};
@@ -56,7 +56,8 @@ fn share(text: &str) -> Result<f64, String> {
 struct StopsAnswer {
     dataset: String,
     /// What may spoil the results, the worst first.
-    notes: Vec<Note>,
+    #[serde(rename = "notes")]
+    diagnostics: Vec<DatasetDiagnostic>,
     #[serde(flatten)]
     study: Study,
 }
@@ -93,13 +94,19 @@ pub fn execute(arguments: &StopsArguments) -> Result<(), Failure> {
         };
         return Err(Failure::Input(why));
     }
-    let answer = StopsAnswer { dataset: dataset.name.clone(), notes: dataset.notes(), study };
+    let answer =
+        StopsAnswer { dataset: dataset.name.clone(), diagnostics: dataset.diagnostics(), study };
     Ok(give(arguments.json.as_deref(), &answer, || text(&answer))?)
 }
 
 fn text(answer: &StopsAnswer) -> String {
     let study = &answer.study;
-    let mut text = format!("{}\n{}\n{}", answer.dataset, notes(&answer.notes), stops(&study.stops));
+    let mut text = format!(
+        "{}\n{}\n{}",
+        answer.dataset,
+        diagnostics(&answer.diagnostics),
+        stops(&study.stops)
+    );
     text += &modulated(&study.stops);
     if let Some(law) = &study.law {
         text += &of_the_brake(study, law);

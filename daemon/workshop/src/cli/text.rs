@@ -1,20 +1,20 @@
 //! Aligned text for people: what is said of recorded runs and written into files.
 
-use dynocar_analysis::dataset::Note;
+use dynocar_analysis::dataset::DatasetDiagnostic;
 use dynocar_core::plausibility::Severity;
 
 pub use dynocar::cli::text::{TextTable, WIDTH, line, short, wrap};
 
 /// Notes on a dataset, each from a line of its own; those by which it cannot be true say so.
-pub fn notes(notes: &[Note]) -> String {
-    let line = |note: &Note| {
-        let head = match note.severity {
+pub fn diagnostics(diagnostics: &[DatasetDiagnostic]) -> String {
+    let line = |diagnostic: &DatasetDiagnostic| {
+        let head = match diagnostic.severity {
             Severity::Fundamental => "cannot be true",
             _ => "note",
         };
-        format!("{}\n", wrap(&format!("{head}: {note}"), WIDTH).join("\n  "))
+        format!("{}\n", wrap(&format!("{head}: {diagnostic}"), WIDTH).join("\n  "))
     };
-    notes.iter().map(line).collect()
+    diagnostics.iter().map(line).collect()
 }
 
 /// Words without line breaks and other marks that would end a line.

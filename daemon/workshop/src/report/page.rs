@@ -31,7 +31,7 @@ pub fn html(subject: &Subject) -> Result<String, ReportError> {
         reproduce::section(subject),
     ]);
     let name = escape(&subject.dataset.name);
-    let mut main = notes(subject);
+    let mut main = diagnostics(subject);
     main += &verdict(subject);
     main += &contents(&sections);
     for section in &sections {
@@ -87,9 +87,9 @@ fn badge(verdict: Verdict) -> (&'static str, &'static str) {
 }
 
 /// What may spoil the verdict, above it; empty when all is well.
-fn notes(subject: &Subject) -> String {
-    let notes = &subject.explanation.answer.notes;
-    if notes.is_empty() {
+fn diagnostics(subject: &Subject) -> String {
+    let diagnostics = &subject.explanation.answer.diagnostics;
+    if diagnostics.is_empty() {
         return String::new();
     }
     let is_impossible = subject.explanation.answer.impossibilities().next().is_some();
@@ -99,10 +99,10 @@ fn notes(subject: &Subject) -> String {
         "<section id=\"notes\" class=\"notes{class}\" aria-labelledby=\"notes-title\">\n\
          <h2 id=\"notes-title\">{title}</h2>\n<ul>\n"
     );
-    for note in notes {
+    for diagnostic in diagnostics {
         let class =
-            if note.severity == Severity::Fundamental { " class=\"impossible\"" } else { "" };
-        let _ = writeln!(html, "<li{class}>{}</li>", escape(&note.to_string()));
+            if diagnostic.severity == Severity::Fundamental { " class=\"impossible\"" } else { "" };
+        let _ = writeln!(html, "<li{class}>{}</li>", escape(&diagnostic.to_string()));
     }
     html + "</ul>\n</section>\n"
 }

@@ -121,8 +121,8 @@ impl DayTrain {
         let Some(publisher) = &self.publisher else { return };
         let start = Instant::now();
         while publisher.untaken().is_none_or(|untaken| untaken > 0) {
-            let complaint = || format!("train {} is not followed: {}", self.id, daemon.errors());
-            assert!(start.elapsed() < WATCHDOG, "{}", complaint());
+            let failure = || format!("train {} is not followed: {}", self.id, daemon.errors());
+            assert!(start.elapsed() < WATCHDOG, "{}", failure());
             std::thread::sleep(PAUSE);
         }
         self.reader.poll();

@@ -77,7 +77,7 @@ impl Hypothesis for DelayAndLag {
     fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         let mut line = DelayLine::new(parameters[0], parameters[1]);
         for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
-            let at = (sample.time_ns, sample.stretch);
+            let at = (sample.time_ns, sample.segment);
             if let Some(late) = line.acting(at, Some([force.traction_n, force.brake_n])) {
                 [force.traction_n, force.brake_n] = late;
             }

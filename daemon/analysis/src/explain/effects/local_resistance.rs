@@ -16,13 +16,13 @@ pub struct LocalResistance;
 
 #[derive(Clone, Debug)]
 struct Local {
-    stretches: Intervals,
+    sections: Intervals,
     length_m: f64,
     /// Files of the runs; `None` for all.
     runs: Option<Vec<String>>,
     choice_cost: f64,
     map_error: f64,
-    /// The only fit run, whose passage could as well be a stretch of time.
+    /// The only fit run, whose passage could as well be an interval of time.
     only: Option<Arc<Passage>>,
 }
 
@@ -42,7 +42,7 @@ impl Passage {
         Passage { file: run.file.clone(), samples }
     }
 
-    /// The stretches of time in which the train's centre is inside intervals in m.
+    /// The sections of time in which the train's centre is inside intervals in m.
     fn windows(&self, intervals_m: &[[f64; 2]]) -> Vec<RunWindow> {
         let window = |&[from_m, to_m]: &[f64; 2]| {
             let mut inside = self.samples.iter().filter(|(_, at_m)| (from_m..=to_m).contains(at_m));
@@ -74,7 +74,7 @@ impl Effect for LocalResistance {
         };
         let candidate = |runs: Option<Vec<String>>| {
             let hypothesis = Local {
-                stretches: found.stretches(),
+                sections: found.sections(),
                 length_m: scan.train.length_m,
                 runs,
                 choice_cost: found.choice_cost,
@@ -104,7 +104,7 @@ impl Local {
         if self.runs.as_ref().is_some_and(|runs| !runs.contains(&run.file)) {
             return;
         }
-        let Ok(profile) = place::profile(&self.stretches.intervals_m, n_per_kn) else { return };
+        let Ok(profile) = place::profile(&self.sections.intervals_m, n_per_kn) else { return };
         for (own, sample) in of_samples.iter_mut().zip(&run.samples()[first..]) {
             if let Some(position_m) = sample.position_m {
                 act(own, profile.mean_around(position_m, self.length_m));
@@ -148,16 +148,16 @@ impl Hypothesis for Local {
 
     fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
         let row = |&[from_m, to_m]: &[f64; 2]| vec![from_m, to_m, parameters[0]];
-        let rows = self.stretches.intervals_m.iter().map(row).collect();
+        let rows = self.sections.intervals_m.iter().map(row).collect();
         self.runs.is_none().then(|| vec![Entry::Rows(place::LIST, rows)])
     }
 
     fn ends(&self) -> Vec<End> {
-        self.stretches.ends()
+        self.sections.ends()
     }
 
     fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
-        Some(Arc::new(Local { stretches: self.stretches.moved(end, at)?, ..self.clone() }))
+        Some(Arc::new(Local { sections: self.sections.moved(end, at)?, ..self.clone() }))
     }
 
     fn chosen_runs(&self) -> Option<&[String]> {
@@ -177,7 +177,7 @@ impl Hypothesis for Local {
     }
 
     fn place(&self) -> Location {
-        let intervals_m = &self.stretches.intervals_m;
+        let intervals_m = &self.sections.intervals_m;
         let windows = self.only.as_ref().map(|only| only.windows(intervals_m));
         Location { runs: self.runs.clone(), windows, ..Location::of_intervals(intervals_m.clone()) }
     }

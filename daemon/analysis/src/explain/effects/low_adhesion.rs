@@ -31,7 +31,7 @@ enum Form {
 struct Slippery {
     form: Form,
     /// `None` for everywhere.
-    stretches: Option<Intervals>,
+    sections: Option<Intervals>,
     /// Files of the runs; `None` for all.
     runs: Option<Vec<String>>,
     choice_cost: f64,
@@ -94,7 +94,7 @@ fn places(
     form: Form,
     cap: f64,
 ) -> Vec<(f64, Form, Candidate)> {
-    let candidate = |found: &Found, stretches: Option<Intervals>| {
+    let candidate = |found: &Found, sections: Option<Intervals>| {
         let runs = found.files(scan);
         let start = match form {
             Form::Cap => vec![cap.max(0.006)],
@@ -102,7 +102,7 @@ fn places(
         };
         let (choice_cost, map_error) = (found.choice_cost, found.map_error);
         let value = found.gain - choice_cost;
-        let hypothesis = Slippery { form, stretches, runs, choice_cost, map_error };
+        let hypothesis = Slippery { form, sections, runs, choice_cost, map_error };
         (value, form, Candidate::new(hypothesis, start))
     };
     let mut candidates = Vec::new();
@@ -115,10 +115,10 @@ fn places(
     if scan.problem.way_ratio.is_some()
         && let Some(found) = find(scan, shape, Inside::Centre, true)
     {
-        candidates.push(candidate(&found, Some(found.stretches())));
+        candidates.push(candidate(&found, Some(found.sections())));
         if found.runs.is_some() {
             let all = Found { runs: None, ..found };
-            candidates.push(candidate(&all, Some(all.stretches())));
+            candidates.push(candidate(&all, Some(all.sections())));
         }
     }
     candidates
@@ -161,8 +161,8 @@ impl Hypothesis for Slippery {
             return;
         }
         for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
-            let is_there = self.stretches.as_ref().is_none_or(|stretches| {
-                Inside::Centre.share(sample.position_m, &stretches.intervals_m) > 0.0
+            let is_there = self.sections.as_ref().is_none_or(|sections| {
+                Inside::Centre.share(sample.position_m, &sections.intervals_m) > 0.0
             });
             if is_there {
                 force.brake_n = match self.form {
@@ -177,12 +177,12 @@ impl Hypothesis for Slippery {
     }
 
     fn ends(&self) -> Vec<End> {
-        self.stretches.as_ref().map_or_else(Vec::new, Intervals::ends)
+        self.sections.as_ref().map_or_else(Vec::new, Intervals::ends)
     }
 
     fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
-        let stretches = Some(self.stretches.as_ref()?.moved(end, at)?);
-        Some(Arc::new(Slippery { stretches, ..self.clone() }))
+        let sections = Some(self.sections.as_ref()?.moved(end, at)?);
+        Some(Arc::new(Slippery { sections, ..self.clone() }))
     }
 
     fn chosen_runs(&self) -> Option<&[String]> {
@@ -194,7 +194,7 @@ impl Hypothesis for Slippery {
     }
 
     fn place(&self) -> Location {
-        let intervals_m = self.stretches.as_ref().map(|stretches| stretches.intervals_m.clone());
+        let intervals_m = self.sections.as_ref().map(|sections| sections.intervals_m.clone());
         Location { runs: self.runs.clone(), intervals_m, ..Location::default() }
     }
 }

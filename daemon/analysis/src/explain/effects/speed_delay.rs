@@ -85,7 +85,7 @@ impl Hypothesis for DelayAndLag {
     fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         let mut late = LateSpeed::new(parameters[0], parameters[1]);
         for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
-            let at = (sample.time_ns, sample.stretch);
+            let at = (sample.time_ns, sample.segment);
             let now = Some([force.traction_n, force.brake_n]);
             if let Some(acting) = late.forces(at, sample.speed_mps, now) {
                 [force.traction_n, force.brake_n] = acting;

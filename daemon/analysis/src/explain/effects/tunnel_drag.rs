@@ -55,7 +55,7 @@ impl Effect for TunnelDrag {
             return Proposal::Candidates(candidates);
         };
         let hypothesis = Tunnels {
-            found: Some(found.stretches()),
+            found: Some(found.sections()),
             length_m,
             mapped_m: mapped_m(track),
             choice_cost: found.choice_cost + UNMAPPED_COST,
@@ -148,7 +148,7 @@ impl Hypothesis for Tunnels {
     }
 
     fn place(&self) -> Location {
-        let found = self.found.as_ref().map(|stretches| &stretches.intervals_m);
+        let found = self.found.as_ref().map(|sections| &sections.intervals_m);
         Location::of_intervals(found.unwrap_or(&self.mapped_m).clone())
     }
 

@@ -109,11 +109,11 @@ mod tests {
 
     #[test]
     fn an_end_moves_by_itself_and_never_into_a_neighbour() {
-        let stretches = two();
-        let ends = stretches.ends();
-        let moved = stretches.moved(&ends[1], 2500.0).unwrap();
+        let sections = two();
+        let ends = sections.ends();
+        let moved = sections.moved(&ends[1], 2500.0).unwrap();
         assert_eq!(moved.intervals_m, [[1000.0, 2500.0], [3000.0, 3500.0]]);
-        assert_eq!(stretches.moved(&ends[1], 3200.0), None);
-        assert_eq!(stretches.moved(&ends[0], 2000.0), None);
+        assert_eq!(sections.moved(&ends[1], 3200.0), None);
+        assert_eq!(sections.moved(&ends[0], 2000.0), None);
     }
 }

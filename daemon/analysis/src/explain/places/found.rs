@@ -24,7 +24,7 @@ pub struct Found {
 
 impl Found {
     /// Its intervals, as ends that were estimated.
-    pub fn stretches(&self) -> Intervals {
+    pub fn sections(&self) -> Intervals {
         Intervals { intervals_m: self.intervals_m.clone(), span_m: self.span_m }
     }
 

@@ -32,7 +32,7 @@ pub struct CandidateRow {
 pub fn rows(explanation: &Explanation) -> Vec<CandidateRow> {
     let outcome = &explanation.outcome;
     let found: Vec<&str> = explanation.answer.effects.iter().map(|effect| effect.kind).collect();
-    let rivals = &explanation.answer.ambiguous_with;
+    let competing = &explanation.answer.ambiguous_with;
     let first = outcome.rounds.first().map_or(&[][..], |round| &round[..]);
     let has_several = outcome.rounds.len() > 1;
     let last = outcome.rounds.last().filter(|_| has_several).map_or(&[][..], |round| &round[..]);
@@ -55,7 +55,7 @@ pub fn rows(explanation: &Explanation) -> Vec<CandidateRow> {
                 beside,
                 reason: String::new(),
             };
-            row.reason = reason(explanation, &row, rivals.contains(&kind));
+            row.reason = reason(explanation, &row, competing.contains(&kind));
             row
         })
         .collect();
@@ -81,9 +81,9 @@ fn reason(explanation: &Explanation, row: &CandidateRow, is_rival: bool) -> Stri
     let found = explanation.answer.effects.iter().map(|e| words::kind_name(e.kind).to_string());
     let found = words::joined(&found.collect::<Vec<_>>());
     let alone = row.alone.unwrap_or(0.0);
-    let remark = || {
+    let considered = || {
         let own = explanation.answer.considered.iter().find(|it| it.kind == row.kind);
-        own.map_or(String::new(), |it| it.remark.clone())
+        own.map_or(String::new(), |it| it.reason.clone())
     };
     if row.is_found {
         return "part of the model".into();
@@ -95,6 +95,6 @@ fn reason(explanation: &Explanation, row: &CandidateRow, is_rival: bool) -> Stri
         Some(beside) if alone > SCORE_MIN && beside <= SCORE_MIN => {
             format!("borrows from the same residual: adds nothing beside {found}")
         }
-        _ => remark(),
+        _ => considered(),
     }
 }

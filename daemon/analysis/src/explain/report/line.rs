@@ -11,7 +11,7 @@ use crate::explain::Explanation;
 use crate::explain::answer::{EffectAnswer, HALF_95, ParameterValue, RunWindow, WindowUncertainty};
 use crate::explain::evidence::RunData;
 
-/// A stretch of the line where an effect was found.
+/// A section of the line where an effect was found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MarkedInterval {
     /// Lower and upper chainage in m.
@@ -28,7 +28,7 @@ pub struct FoundPlace {
     /// The kind, in words.
     pub name: String,
     /// Stretches of the line.
-    pub stretches: Vec<MarkedInterval>,
+    pub sections: Vec<MarkedInterval>,
 }
 
 /// What was found along the line.
@@ -57,17 +57,17 @@ impl AlongLine {
         let all: Vec<&RunData> = runs.iter().chain(&explanation.holdout).collect();
         let places = effects.iter().map(|effect| FoundPlace {
             name: words::kind_name(effect.kind).into(),
-            stretches: stretches(effect, &all),
+            sections: sections(effect, &all),
         });
         AlongLine {
             residual: residual.collect(),
-            places: places.filter(|place| !place.stretches.is_empty()).collect(),
+            places: places.filter(|place| !place.sections.is_empty()).collect(),
             gradient_error: effects.iter().flat_map(gradient_error).collect(),
         }
     }
 }
 
-fn stretches(effect: &EffectAnswer, runs: &[&RunData]) -> Vec<MarkedInterval> {
+fn sections(effect: &EffectAnswer, runs: &[&RunData]) -> Vec<MarkedInterval> {
     let (place, known) = (&effect.place, effect.place.uncertainty_95.as_ref());
     if let Some(intervals_m) = &place.intervals_m {
         let ends_m = known.and_then(|it| it.intervals_m.as_ref());

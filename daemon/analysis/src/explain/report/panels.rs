@@ -126,7 +126,7 @@ impl Zones {
                 && (self.intervals_m.is_empty() || sample.position_m.is_some_and(is_inside))
                 && of_speed.iter().all(|it| within(it, sample.speed_mps))
         };
-        stretches(run, acts)
+        sections(run, acts)
     }
 
     /// Stretches of time in s, in the recording's own count, in which an effect acts on a run.
@@ -136,7 +136,7 @@ impl Zones {
         let is_inside = |position_m: f64| {
             self.intervals_m.iter().any(|[from, to]| (*from..=*to).contains(&position_m))
         };
-        times.extend(stretches(run, |sample, _| sample.position_m.is_some_and(is_inside)));
+        times.extend(sections(run, |sample, _| sample.position_m.is_some_and(is_inside)));
         times
     }
 
@@ -164,13 +164,13 @@ impl Zones {
 }
 
 /// Stretches of a run's time in s, in the recording's own count, in which something holds.
-fn stretches(run: &RunData, holds: impl Fn(&ResolvedSample, f64) -> bool) -> Vec<[f64; 2]> {
+fn sections(run: &RunData, holds: impl Fn(&ResolvedSample, f64) -> bool) -> Vec<[f64; 2]> {
     let mut times = Vec::new();
     let mut open: Option<[f64; 2]> = None;
     for (sample, time_s) in run.samples().iter().zip(run.recording.time_s()) {
         let time_s = run.offset_s + time_s;
         match (holds(sample, time_s), &mut open) {
-            (true, Some(stretch)) => stretch[1] = time_s,
+            (true, Some(section)) => section[1] = time_s,
             (true, None) => open = Some([time_s, time_s]),
             (false, _) => times.extend(open.take()),
         }

@@ -25,13 +25,13 @@ pub fn sentence(answer: &ExplainAnswer, errors: &Errors) -> String {
         }
         Verdict::Effect => format!("Found: {found}. {}", gained(errors)),
         Verdict::Ambiguous => {
-            let rivals: Vec<String> =
+            let competing: Vec<String> =
                 answer.ambiguous_with.iter().map(|kind| kind_name(kind).into()).collect();
-            let is_or_are = if rivals.len() == 1 { "explains" } else { "explain" };
+            let is_or_are = if competing.len() == 1 { "explains" } else { "explain" };
             format!(
                 "Something undeclared acts, but these runs cannot tell what: it may be {found}; \
                  {} {is_or_are} them as well. {}",
-                joined(&rivals),
+                joined(&competing),
                 gained(errors)
             )
         }
@@ -143,7 +143,7 @@ pub fn placed(place: &Location) -> String {
         joined(&shown)
     };
     if let Some(intervals) = &place.intervals_m {
-        parts.push(stretches(intervals));
+        parts.push(sections(intervals));
     }
     if let Some(windows) = &place.windows {
         let all = windows
@@ -169,7 +169,7 @@ pub fn placed(place: &Location) -> String {
 }
 
 /// Stretches of the line; many are counted, not listed.
-fn stretches(intervals_m: &[[f64; 2]]) -> String {
+fn sections(intervals_m: &[[f64; 2]]) -> String {
     let km = |m: f64| m / 1000.0;
     if intervals_m.len() > PLACES_MAX {
         let low = intervals_m.iter().map(|interval| interval[0]).fold(f64::INFINITY, f64::min);
@@ -251,7 +251,7 @@ mod tests {
         ExplainAnswer {
             verdict: Verdict::Ambiguous,
             statement: String::new(),
-            notes: Vec::new(),
+            diagnostics: Vec::new(),
             effects: vec![effect("local_resistance", "extra_n_per_kn")],
             ambiguous_with: vec!["tunnel_drag"],
             experiment: None,

@@ -67,7 +67,7 @@ pub struct ResidualWindow {
     pub after_n_per_kn: f64,
 }
 
-/// A stretch of a run in which an effect acts.
+/// A section of a run in which an effect acts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ActingEffect {
     /// The effect's kind.

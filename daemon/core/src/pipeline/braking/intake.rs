@@ -124,7 +124,7 @@ pub struct BrakingIntake {
 
 #[derive(Clone, Copy, Debug)]
 struct Braking {
-    stretch: u32,
+    segment: u32,
     origin_m: f64,
     collected: Collected,
 }
@@ -145,7 +145,7 @@ impl BrakingIntake {
         let gap_max_s = self.settings.gap_max_s;
         self.braking = self.braking.filter(|braking| {
             let collected_s = braking.collected.span_s() + sample.step_s;
-            braking.stretch == sample.stretch && collected_s <= gap_max_s
+            braking.segment == sample.segment && collected_s <= gap_max_s
         });
         let known = match self.known(sample) {
             Ok(Some(known)) if sample.speed_mps >= self.settings.speed_min_mps => known,
@@ -171,8 +171,8 @@ impl BrakingIntake {
         }
         let along_m = sample.direction * position_m;
         let Some(braking) = &mut self.braking else {
-            let (stretch, collected) = (sample.stretch, Collected::from(known));
-            self.braking = Some(Braking { stretch, origin_m: along_m, collected });
+            let (segment, collected) = (sample.segment, Collected::from(known));
+            self.braking = Some(Braking { segment, origin_m: along_m, collected });
             return Intake::Start(observation(sample, 0.0, &known));
         };
         // A little less, so that jitter of the clock does not halve the rate.

@@ -135,7 +135,7 @@ fn case(
         contradiction: is_too_large.then_some(Reason::InnovationsTooLarge),
         // Only friction times ratio acts on the train, and the other factor is held as declared:
         // who reckons with both has the force that acts.
-        remark: match quantity {
+        caveat: match quantity {
             BrakingCoefficient::Adhesion => Reason::None,
             BrakingCoefficient::Friction | BrakingCoefficient::Ratio => Reason::NotIdentifiable,
         },

@@ -33,7 +33,7 @@ pub struct Case {
     /// What contradicts an estimate that is known.
     pub contradiction: Option<Reason>,
     /// What is to be said of one that nothing contradicts.
-    pub remark: Reason,
+    pub caveat: Reason,
 }
 
 impl Case {
@@ -51,7 +51,7 @@ impl Case {
         } else if let Some(reason) = self.contradiction {
             (Status::Degraded, reason)
         } else {
-            (Status::Estimated, self.remark)
+            (Status::Estimated, self.caveat)
         }
     }
 }
@@ -69,7 +69,7 @@ mod tests {
             is_known: true,
             lacking: Status::Unestimated,
             contradiction: None,
-            remark: Reason::AtBound,
+            caveat: Reason::AtBound,
         };
         let contradiction = Some(Reason::InnovationsTooLarge);
         let input = Some(Reason::BadInput);

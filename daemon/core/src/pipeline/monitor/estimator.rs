@@ -375,7 +375,7 @@ impl Estimator for ResidualMonitor {
             is_known: true,
             lacking: Status::Unestimated,
             contradiction: named.map(|_| Reason::InnovationsNotWhite),
-            remark: Reason::None,
+            caveat: Reason::None,
         };
         write_status(snapshot, case.verdict());
         write_innovations(snapshot, &self.innovations);

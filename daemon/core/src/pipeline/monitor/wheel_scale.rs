@@ -33,7 +33,7 @@ struct Row {
 /// The row of points that is growing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Going {
-    stretch: u32,
+    segment: u32,
     direction: f64,
     /// Distance by speed in m since the row began.
     way_m: f64,
@@ -69,7 +69,7 @@ impl WheelScale {
         let going = self
             .going
             .as_mut()
-            .filter(|going| going.stretch == sample.stretch && going.direction == sample.direction);
+            .filter(|going| going.segment == sample.segment && going.direction == sample.direction);
         let Some(going) = going else { return self.restart(sample, position_m) };
         let (last_ns, last_mps) = going.last;
         let step_s = sample.time_ns.saturating_sub(last_ns) as f64 * 1e-9;
@@ -101,7 +101,7 @@ impl WheelScale {
             self.product += product;
         }
         self.going = Some(Going {
-            stretch: sample.stretch,
+            segment: sample.segment,
             direction: sample.direction,
             way_m: 0.0,
             last: (sample.time_ns, sample.speed_mps),
@@ -170,7 +170,7 @@ mod tests {
                 let since_fix_m = if has_balises { true_way_m % 1000.0 } else { true_way_m };
                 let shown_m = true_way_m - since_fix_m + scale * since_fix_m;
                 wheels.push(&ResolvedSample {
-                    stretch: run as u32,
+                    segment: run as u32,
                     time_ns: 200_000_000 * k as i64,
                     direction,
                     position_m: Some(5000.0 + direction * shown_m + spoil(k)),

@@ -27,7 +27,7 @@ pub struct PositionNoise {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct PositionPair {
-    stretch: u32,
+    segment: u32,
     time_ns: i64,
     along_m: f64,
     speed_mps: f64,
@@ -45,14 +45,14 @@ impl PositionNoise {
             return;
         };
         let now = PositionPair {
-            stretch: sample.stretch,
+            segment: sample.segment,
             time_ns: sample.time_ns,
             along_m: sample.direction * position_m,
             speed_mps: sample.speed_mps,
         };
         let rest_m = self.last.replace(now).and_then(|last| {
             let step_s = now.time_ns.saturating_sub(last.time_ns) as f64 * 1e-9;
-            let is_step = last.stretch == now.stretch && step_s > 0.0 && step_s <= BRIDGED_MAX_S;
+            let is_step = last.segment == now.segment && step_s > 0.0 && step_s <= BRIDGED_MAX_S;
             let driven_m = 0.5 * step_s * (last.speed_mps + now.speed_mps);
             is_step.then_some(now.along_m - last.along_m - driven_m)
         });

@@ -35,17 +35,17 @@ impl StopWatch {
     }
 
     /// Takes one sample in; true at the first moving sample after the mass may have changed.
-    pub fn departs(&mut self, time_ns: i64, stretch: u32, speed_mps: f64) -> bool {
+    pub fn departs(&mut self, time_ns: i64, segment: u32, speed_mps: f64) -> bool {
         if !speed_mps.is_finite() {
             return false;
         }
-        if let Some((last_ns, last_stretch)) = self.last
-            && last_stretch != stretch
+        if let Some((last_ns, last_segment)) = self.last
+            && last_segment != segment
         {
             let gap_ns = time_ns.saturating_sub(last_ns);
             self.is_due |= gap_ns >= self.stop_min_ns || gap_ns <= 0;
         }
-        self.last = Some((time_ns, stretch));
+        self.last = Some((time_ns, segment));
         if speed_mps <= STANDING_MPS {
             let since_ns = *self.standing_since_ns.get_or_insert(time_ns);
             self.is_due |= time_ns.saturating_sub(since_ns) >= self.stop_min_ns;

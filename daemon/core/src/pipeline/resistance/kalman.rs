@@ -360,7 +360,7 @@ impl Estimator for ResistanceKalman {
                 return outcome;
             }
         };
-        match self.last.filter(|last| last.stretch == now.stretch) {
+        match self.last.filter(|last| last.segment == now.segment) {
             Some(before) => {
                 self.propagate(&before, &now);
                 if !self.correct(&before, &now) {

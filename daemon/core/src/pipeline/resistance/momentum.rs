@@ -99,7 +99,7 @@ impl MomentumBlocks {
         known: &Davis,
     ) -> Result<Option<MomentumBlock>, RejectionReason> {
         self.watch.noise.rounding.see(now.speed_mps);
-        let Some(chain) = self.chain.as_mut().filter(|chain| chain.last.stretch == now.stretch)
+        let Some(chain) = self.chain.as_mut().filter(|chain| chain.last.segment == now.segment)
         else {
             self.chain = Some(Chain::start(now));
             return Ok(None);
@@ -239,7 +239,7 @@ mod tests {
     fn a_new_segment_of_motion_starts_a_new_chain() {
         let mut samples = driven(&DAVIS, 25.0, 0.0, 0.2);
         for sample in &mut samples[150..] {
-            sample.stretch = 2;
+            sample.segment = 2;
             sample.speed_mps -= 3.0;
         }
         let blocks = blocks_of(&samples);

@@ -160,7 +160,7 @@ fn case(evidence: &Evidence, (w0, w0_std): (f64, f64), excited: u32, is_at_bound
         contradiction: has_structure
             .then_some(Reason::InnovationsNotWhite)
             .or(is_too_large.then_some(Reason::InnovationsTooLarge)),
-        remark: if excited != (1 << PARAMETERS) - 1 {
+        caveat: if excited != (1 << PARAMETERS) - 1 {
             Reason::WeakExcitation
         } else if is_at_bound {
             Reason::AtBound

@@ -14,7 +14,7 @@ pub struct UnitSample {
     /// Measurement time in ns.
     pub time_ns: i64,
     /// Motion segment.
-    pub stretch: u32,
+    pub segment: u32,
     /// Speed in m/s.
     pub speed_mps: f64,
     /// Traction minus brake minus all that is known to retard, in N/kN.
@@ -46,7 +46,7 @@ impl UnitSample {
         };
         Ok(UnitSample {
             time_ns: sample.time_ns,
-            stretch: sample.stretch,
+            segment: sample.segment,
             speed_mps: sample.speed_mps,
             driving: per_weight(sample.driving_force_n())?,
             traction: per_weight(sample.traction_force_n)?,
@@ -122,7 +122,7 @@ pub(in crate::pipeline) mod tests {
     pub fn unit_sample(time_s: f64, speed_mps: f64, driving: f64) -> UnitSample {
         UnitSample {
             time_ns: (time_s * 1e9).round() as i64,
-            stretch: 1,
+            segment: 1,
             speed_mps,
             driving,
             traction: driving.max(0.0),

@@ -142,7 +142,7 @@ fn samples_that_cannot_be_judged_pass_to_the_estimator() {
         ResolvedSample { weight_kn: 0.0, ..sample(1, 0.0) },
         ResolvedSample { is_sliding: true, ..sample(1, 0.0) },
         ResolvedSample { step_s: f64::NAN, ..sample(1, 0.0) },
-        ResolvedSample { stretch: 9, ..sample(1, 0.0) },
+        ResolvedSample { segment: 9, ..sample(1, 0.0) },
     ];
     for it in odd {
         gate.judge(&sample(0, 50.0));

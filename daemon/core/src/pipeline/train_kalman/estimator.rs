@@ -286,7 +286,7 @@ impl Gated for TrainKalman {
         self.learned.noise.rounding.see(now.speed_mps);
         let last = self.last.filter(|last| {
             let since_s = now.seconds_since(last);
-            last.stretch == now.stretch && since_s > 0.0 && since_s <= BRIDGED_MAX_S
+            last.segment == now.segment && since_s > 0.0 && since_s <= BRIDGED_MAX_S
         });
         let outcome = match last {
             Some(last) => self.advance(last, now, sample),

@@ -67,7 +67,7 @@ impl LoadWatch {
     /// Takes a sample in; what it changes in what is known of the load.
     pub fn see(&mut self, sample: &ResolvedSample) -> Option<Change> {
         self.is_weighed = sample.is_mass_measured;
-        self.has_departed = self.stops.departs(sample.time_ns, sample.stretch, sample.speed_mps);
+        self.has_departed = self.stops.departs(sample.time_ns, sample.segment, sample.speed_mps);
         let before_kg = self.declared_kg.replace(sample.mass_kg);
         let anew = Change::Anew(self.prior_variance());
         let Some(before_kg) = before_kg else { return Some(anew) };

@@ -87,7 +87,7 @@ pub struct Step {
 }
 
 impl Step {
-    /// Between two samples of one stretch; what is learned on the way is the caller's to fill in.
+    /// Between two samples of one segment; what is learned on the way is the caller's to fill in.
     pub fn between(from: &UnitSample, to: &UnitSample) -> Self {
         let duration_s = to.seconds_since(from);
         let half_s = 0.5 * duration_s;

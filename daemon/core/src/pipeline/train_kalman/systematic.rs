@@ -5,7 +5,7 @@ use nalgebra::{Matrix4, Vector4};
 use crate::pipeline::resistance::regression::regressors;
 use crate::track::GRADIENT_ERROR_FREE_M;
 
-/// The stretch of line that was driven, and the scales that cannot be found.
+/// The segment of line that was driven, and the scales that cannot be found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Systematic {
     /// Standard deviation in ‰ of gradients where no survey states one.

@@ -73,7 +73,8 @@ enum RunOutcome<'a> {
         traction_source: ForceSource,
         brake_source: ForceSource,
         quality: &'a RunQuality,
-        remarks: &'a [Diagnostic],
+        #[serde(rename = "remarks")]
+        diagnostics: &'a [Diagnostic],
     },
     Failed {
         error: String,
@@ -167,7 +168,7 @@ pub(super) fn answer<'a>(path: &Path, understood: &'a Understood) -> CheckAnswer
         valid: errors.is_empty(),
         errors,
         error: first.and_then(|error| Failure::from(error).answer()),
-        notes: understood.notes(),
+        diagnostics: understood.diagnostics(),
         content: Some(content),
     }
 }
@@ -196,7 +197,7 @@ fn dataset<'a>(manifest: &'a Manifest, runs: &'a [Result<Run, DatasetError>]) ->
                 traction_source: run.traction_source,
                 brake_source: run.brake_source,
                 quality: &run.quality,
-                remarks: &run.remarks,
+                diagnostics: &run.diagnostics,
             },
         },
     };

@@ -12,9 +12,9 @@ use crate::cli::text::{self, WIDTH, line, short, wrap};
 /// The whole report.
 pub(super) fn report(understood: &Understood) -> String {
     match understood {
-        Understood::Train(model) => match &text::notes(&understood.notes())[..] {
+        Understood::Train(model) => match &text::diagnostics(&understood.diagnostics())[..] {
             "" => train(model),
-            notes => format!("{}\nnotes\n{notes}", train(model)),
+            diagnostics => format!("{}\nnotes\n{diagnostics}", train(model)),
         },
         Understood::Track(line) => track(line),
         Understood::Daemon(config) => daemon::report(config),
@@ -28,7 +28,7 @@ pub(super) fn report(understood: &Understood) -> String {
                 train(&head.train),
                 track,
                 columns(&head.manifest),
-                runs::report(&head.manifest, read, &understood.notes()),
+                runs::report(&head.manifest, read, &understood.diagnostics()),
             ];
             parts.join("\n")
         }

@@ -2,8 +2,8 @@
 
 use dynocar_analysis::dataset::quality::{QuantityCount, ReasonCount};
 use dynocar_analysis::dataset::{
-    DatasetError, Diagnostic, ForceSource, GradientSource, Manifest, Note, PositionSource,
-    Quantity, Role, Run, is_parquet,
+    DatasetDiagnostic, DatasetError, Diagnostic, ForceSource, GradientSource, Manifest,
+    PositionSource, Quantity, Role, Run, is_parquet,
 };
 use dynocar_core::plausibility::InputFault;
 
@@ -12,8 +12,12 @@ use crate::run_facts::{mass_t, recorded, recorded_in_words};
 
 type Read = Result<Run, DatasetError>;
 
-/// The tables and notes of all runs.
-pub(super) fn report(manifest: &Manifest, runs: &[Read], of_dataset: &[Note]) -> String {
+/// The tables and diagnostics of all runs.
+pub(super) fn report(
+    manifest: &Manifest,
+    runs: &[Read],
+    of_dataset: &[DatasetDiagnostic],
+) -> String {
     let count = |role| manifest.runs.iter().filter(|run| run.role == role).count();
     let (fit, holdout) = (count(Role::Fit), count(Role::Holdout));
     let mut text = format!("runs     {}: {fit} to fit, {holdout} held out\n", runs.len());
@@ -24,7 +28,7 @@ pub(super) fn report(manifest: &Manifest, runs: &[Read], of_dataset: &[Note]) ->
     text += &data_table(runs).to_string();
     text.push('\n');
     text += &sources(runs);
-    text += &notes(manifest, runs, of_dataset);
+    text += &diagnostics(manifest, runs, of_dataset);
     text
 }
 
@@ -165,40 +169,42 @@ fn source(name: &str, runs: &[Read], of: impl Fn(&Run) -> &'static str) -> Strin
     format!("  {name:12}{}\n", parts.join("; "))
 }
 
-/// What to know, each note once with its runs, first what cannot be true; nothing when all is well.
-fn notes(manifest: &Manifest, runs: &[Read], of_dataset: &[Note]) -> String {
+/// What to know, each diagnostic once with its runs, first what cannot be true; nothing when all is well.
+fn diagnostics(manifest: &Manifest, runs: &[Read], of_dataset: &[DatasetDiagnostic]) -> String {
     let number = |file: &String| {
         let run = runs.iter().flatten().find(|run| run.file == *file);
         run.map_or_else(String::new, |run| run.number.to_string())
     };
-    let is_input_fault =
-        |note: &&Note| InputFault::ALL.iter().any(|fault| fault.name() == note.code);
-    let reported_first =
-        of_dataset.iter().filter(|note| note.runs.is_empty() || is_input_fault(note));
-    let mut notes: Vec<(String, Vec<String>)> = reported_first
-        .map(|note| (note.text.clone(), note.runs.iter().map(number).collect()))
+    let is_input_fault = |diagnostic: &&DatasetDiagnostic| {
+        InputFault::ALL.iter().any(|fault| fault.name() == diagnostic.code)
+    };
+    let reported_first = of_dataset
+        .iter()
+        .filter(|diagnostic| diagnostic.runs.is_empty() || is_input_fault(diagnostic));
+    let mut diagnostics: Vec<(String, Vec<String>)> = reported_first
+        .map(|diagnostic| (diagnostic.text.clone(), diagnostic.runs.iter().map(number).collect()))
         .collect();
     for (index, run) in runs.iter().enumerate() {
         let of_run = match run {
-            Ok(run) => notes_on(manifest, run),
+            Ok(run) => diagnostics_of(manifest, run),
             Err(error) => vec![error.to_string()],
         };
         let number = (index + 1).to_string();
-        for note in of_run {
-            match notes.iter_mut().find(|(other, _)| *other == note) {
+        for diagnostic in of_run {
+            match diagnostics.iter_mut().find(|(other, _)| *other == diagnostic) {
                 Some((_, numbers)) => numbers.push(number.clone()),
-                None => notes.push((note, vec![number.clone()])),
+                None => diagnostics.push((diagnostic, vec![number.clone()])),
             }
         }
     }
     let mut text = String::new();
-    for (note, numbers) in notes {
+    for (diagnostic, numbers) in diagnostics {
         let runs = match numbers.len() {
             0 => "train and line".into(),
             1 => format!("run {}", numbers[0]),
             _ => format!("runs {}", numbers.join(", ")),
         };
-        let lines = wrap(&format!("{runs}: {note}"), WIDTH);
+        let lines = wrap(&format!("{runs}: {diagnostic}"), WIDTH);
         text += &format!("  {}\n", lines.join("\n    "));
     }
     if text.is_empty() { text } else { format!("\nnotes\n{text}") }
@@ -216,12 +222,12 @@ fn time(manifest: &Manifest, run: &Run, time_s: f64) -> String {
     format!("{hour:02}:{minute:02}:{:06.3}", of_day_s - 60.0 * minutes)
 }
 
-fn notes_on(manifest: &Manifest, run: &Run) -> Vec<String> {
+fn diagnostics_of(manifest: &Manifest, run: &Run) -> Vec<String> {
     let quality = &run.quality;
-    let mut notes = Vec::new();
+    let mut diagnostics = Vec::new();
     let mut list = |counts: Vec<String>, what: &str| {
         if !counts.is_empty() {
-            notes.push(format!("{what}: {}", counts.join(", ")));
+            diagnostics.push(format!("{what}: {}", counts.join(", ")));
         }
     };
     let by_quantity = |counts: &[QuantityCount]| {
@@ -238,19 +244,21 @@ fn notes_on(manifest: &Manifest, run: &Run) -> Vec<String> {
     });
     list(refused.collect(), "refused by validation");
     if quality.rows_without_time > 0 {
-        notes.push(format!("rows without a time, not usable: {}", quality.rows_without_time));
+        diagnostics.push(format!("rows without a time, not usable: {}", quality.rows_without_time));
     }
     if quality.lines.short > 0 {
-        notes.push(format!("rows with fewer cells than the header: {}", quality.lines.short));
+        diagnostics.push(format!("rows with fewer cells than the header: {}", quality.lines.short));
     }
     if quality.lines.truncated {
-        notes.push("the file breaks off within its last line, which is not used".into());
+        diagnostics.push("the file breaks off within its last line, which is not used".into());
     }
     if !quality.order.is_regular {
-        notes.push("the time step varies, so that missing rows cannot be counted".into());
+        diagnostics.push("the time step varies, so that missing rows cannot be counted".into());
     }
-    let by_run =
-        run.remarks.iter().filter(|remark| !matches!(remark, Diagnostic::InputFault { .. }));
-    notes.extend(by_run.map(ToString::to_string));
-    notes
+    let by_run = run
+        .diagnostics
+        .iter()
+        .filter(|diagnostic| !matches!(diagnostic, Diagnostic::InputFault { .. }));
+    diagnostics.extend(by_run.map(ToString::to_string));
+    diagnostics
 }

@@ -1,7 +1,7 @@
 //! What was understood of a path.
 
-use dynocar_analysis::dataset::note::notes;
-use dynocar_analysis::dataset::{DatasetError, DatasetHead, Note, Run};
+use dynocar_analysis::dataset::dataset_diagnostic::diagnostics;
+use dynocar_analysis::dataset::{DatasetDiagnostic, DatasetError, DatasetHead, Run};
 use dynocar_core::track::Track;
 use dynocar_core::train::TrainModel;
 
@@ -32,12 +32,12 @@ impl Understood {
     }
 
     /// What may spoil results, the worst first.
-    pub(super) fn notes(&self) -> Vec<Note> {
+    pub(super) fn diagnostics(&self) -> Vec<DatasetDiagnostic> {
         match self {
             Understood::Dataset(head, runs) => {
-                notes(&head.train, head.track.as_deref(), runs.iter().flatten())
+                diagnostics(&head.train, head.track.as_deref(), runs.iter().flatten())
             }
-            Understood::Train(train) => notes(train, None, []),
+            Understood::Train(train) => diagnostics(train, None, []),
             Understood::Track(_) | Understood::Daemon(_) => Vec::new(),
         }
     }

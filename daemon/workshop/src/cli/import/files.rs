@@ -34,7 +34,7 @@ pub fn train(train: &ImportedTrain, arguments: &TrainArguments) -> Result<TrainT
 
 /// From which field a key is.
 fn origin(account: &Account, wanted: &str) -> String {
-    let fields = account.remarks().iter().filter_map(|remark| match remark {
+    let fields = account.outcomes().iter().filter_map(|outcome| match outcome {
         FieldOutcome::Taken { field, key, .. } if key.split(", ").any(|key| key == wanted) => {
             Some(field.as_str())
         }
@@ -51,8 +51,8 @@ pub fn track(line: &ImportedLine) -> String {
         line.place
     );
     let mut head = comment("", &words);
-    for remark in line.account.remarks() {
-        if let FieldOutcome::Unknown { key, why } = remark {
+    for outcome in line.account.outcomes() {
+        if let FieldOutcome::Unknown { key, why } = outcome {
             head += &comment("  ", &format!("{key} is not known: {why}."));
         }
     }

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use dynocar_analysis::dataset::Note;
+use dynocar_analysis::dataset::DatasetDiagnostic;
 use dynocar_analysis::import::{Account, FieldOutcome, ImportedLine, ImportedTrain};
 
-use crate::cli::text::{TextTable, entry, for_shell, notes, on_one_line};
+use crate::cli::text::{TextTable, diagnostics, entry, for_shell, on_one_line};
 use crate::cli::train_text::TrainText;
 
 /// What was taken, what was not, what is left to do.
@@ -13,7 +13,7 @@ pub fn text(
     folder: &Path,
     train: Option<&(&ImportedTrain, TrainText)>,
     line: Option<&(&ImportedLine, String)>,
-    of_result: &[Note],
+    of_result: &[DatasetDiagnostic],
     written: &[&str],
 ) -> String {
     let mut text = String::new();
@@ -31,7 +31,7 @@ pub fn text(
         text += &account(&line.account);
         text.push('\n');
     }
-    text += &notes(of_result);
+    text += &diagnostics(of_result);
     let paths = || written.iter().map(|name| folder.join(name).display().to_string());
     text += &format!("written: {}\n\nnext:\n", paths().collect::<Vec<_>>().join(", "));
     for path in paths() {
@@ -44,8 +44,8 @@ pub fn text(
 fn account(account: &Account) -> String {
     let mut table = TextTable::new(&["field", "taken as", "how"], &[0, 1, 2]);
     let mut rest = String::new();
-    for remark in account.remarks() {
-        match remark {
+    for outcome in account.outcomes() {
+        match outcome {
             FieldOutcome::Taken { field, key, how } => {
                 table.push(vec![on_one_line(field), (*key).into(), on_one_line(how)]);
             }

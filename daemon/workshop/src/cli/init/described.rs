@@ -1,6 +1,6 @@
 //! What is written, and what was understood of recordings.
 
-use dynocar_analysis::dataset::Note;
+use dynocar_analysis::dataset::DatasetDiagnostic;
 use dynocar_analysis::dataset::guess::Guess;
 use encoding_rs::Encoding;
 
@@ -16,7 +16,7 @@ pub struct Described {
     /// The runs' files, as the dataset names them.
     pub files: Vec<String>,
     /// What cannot be true of the runs as they were understood, the worst first.
-    pub notes: Vec<Note>,
+    pub diagnostics: Vec<DatasetDiagnostic>,
     /// `dataset.toml`.
     pub text: String,
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::described::{DAEMON_FILE, Described};
-use crate::cli::text::{TextTable, entry, for_shell, notes};
+use crate::cli::text::{TextTable, diagnostics, entry, for_shell};
 use crate::cli::train_text::{TRAIN_FILE, TrainText};
 use dynocar_analysis::dataset::MANIFEST_FILE;
 use encoding_rs::UTF_8;
@@ -81,7 +81,7 @@ fn recordings(described: &Described) -> String {
             text += &entry("", &format!("doubtful: {}: {doubt}", column.quantity));
         }
     }
-    text + &notes(&described.notes)
+    text + &diagnostics(&described.diagnostics)
 }
 
 /// The commands that come next.

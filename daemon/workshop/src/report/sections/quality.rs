@@ -37,7 +37,7 @@ pub fn section(subject: &Subject) -> Section {
     body += &runs_table(&used);
     body += &counts_table(&used);
     body += &sources(subject);
-    body += &remarks(subject);
+    body += &diagnostics(subject);
     Section { id: "quality", title: "Data quality", body }
 }
 
@@ -172,17 +172,17 @@ fn sources(subject: &Subject) -> String {
     html + "</dl>\n"
 }
 
-fn remarks(subject: &Subject) -> String {
+fn diagnostics(subject: &Subject) -> String {
     let mut by_text: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for run in &subject.dataset.runs {
-        for remark in &run.remarks {
-            by_text.entry(remark.to_string()).or_default().push(run.number.to_string());
+        for diagnostic in &run.diagnostics {
+            by_text.entry(diagnostic.to_string()).or_default().push(run.number.to_string());
         }
     }
     if by_text.is_empty() {
         return String::new();
     }
-    let mut html = String::from("<h3>Remarks</h3>\n<ul class=\"remarks\">\n");
+    let mut html = String::from("<h3>Diagnostics</h3>\n<ul class=\"remarks\">\n");
     for (text, runs) in by_text {
         let _ = writeln!(html, "<li>Run {}: {}</li>", runs.join(", "), escape(&text));
     }

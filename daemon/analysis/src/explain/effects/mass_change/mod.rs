@@ -1,4 +1,4 @@
-//! Another mass than declared: between certain places in one direction, or in certain stretches
+//! Another mass than declared: between certain places in one direction, or in certain sections
 //! of time of a run. Mass changes while the train stands.
 
 mod masses;

@@ -23,7 +23,7 @@ fn shape(run: &RunData, index: usize) -> f64 {
     -sample.control_force_n().unwrap_or(0.0) / sample.inertial_mass_kg
 }
 
-/// Every stretch between two stations in one direction, with its tuple; none where positions are not
+/// Every section between two stations in one direction, with its tuple; none where positions are not
 /// measured, for then the runs share no places.
 pub fn all_sections(scan: &Scan) -> Vec<(Part, Tuple)> {
     if scan.problem.way_ratio.is_none() {
@@ -76,7 +76,7 @@ fn joined(
     })
 }
 
-/// Every stretch between neighbouring stations with a factor of its own: loads that change at every stop.
+/// Every section between neighbouring stations with a factor of its own: loads that change at every stop.
 fn every(parts: &[(Part, Tuple)]) -> Candidate {
     let is_within = |part: &Part, other: &Part| {
         let ([from, to], [low, high]) = (part.ends(), other.ends());
@@ -101,7 +101,7 @@ pub fn everywhere(scan: &Scan) -> Option<Candidate> {
     Some(Candidate::new(Masses::new(part, Vec::new(), choice_cost), start))
 }
 
-/// Every stretch between two stops of a run, with its tuple.
+/// Every section between two stops of a run, with its tuple.
 pub fn all_windows(scan: &Scan) -> Vec<(Part, Tuple)> {
     let mut windows = Vec::new();
     for run in &scan.problem.runs {
@@ -178,7 +178,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_stretch_between_neighbouring_stations_is_there_once() {
+    fn every_section_between_neighbouring_stations_is_there_once() {
         let ends = [0.0, 900.0, 2100.0, 3000.0];
         let section = |from: usize, to: usize, towards: f64| Part::Section {
             from_m: ends[from],

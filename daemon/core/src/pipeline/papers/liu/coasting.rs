@@ -96,7 +96,7 @@ impl CoastingSegments {
         }
         let settle_s = self.settings.coasting_settle_s;
         let continues = |chain: &&mut Chain| {
-            chain.last.stretch == now.stretch && chain.integral[1] < CHAIN_MAX_S
+            chain.last.segment == now.segment && chain.integral[1] < CHAIN_MAX_S
         };
         let Some(chain) = self.chain.as_mut().filter(continues) else {
             self.chain = Some(Chain::start(now, settle_s));

@@ -277,7 +277,7 @@ mod tests {
     fn motion(k: i64, force_n: f64) -> Motion {
         Motion {
             time_ns: k * 200_000_000,
-            stretch: 1,
+            segment: 1,
             speed_mps: 0.0,
             force_n,
             declared_kg: 1e5,

@@ -282,7 +282,7 @@ impl Estimator for JointLeastSquares {
     }
 
     fn update(&mut self, sample: &ResolvedSample) -> Outcome {
-        if self.stops.departs(sample.time_ns, sample.stretch, sample.speed_mps) {
+        if self.stops.departs(sample.time_ns, sample.segment, sample.speed_mps) {
             let relative_std = 0.01 * self.settings.mass_change_std_percent;
             self.bank
                 .hypotheses_mut()

@@ -64,7 +64,7 @@ impl JointLeastSquares {
             is_known: is_mass_known && is_resistance_known,
             lacking: if some { Status::Degraded } else { Status::Unestimated },
             contradiction: lasting.or_else(|| self.monitor.contradiction()),
-            remark: Reason::None,
+            caveat: Reason::None,
         }
     }
 

@@ -234,7 +234,7 @@ impl MassKalman {
             is_known: self.is_known(),
             lacking: if self.was_known { Status::Degraded } else { Status::Unestimated },
             contradiction: self.monitor.contradiction(),
-            remark: Reason::None,
+            caveat: Reason::None,
         }
     }
 }
@@ -274,7 +274,7 @@ impl Estimator for MassKalman {
         if self.stops.is_first() {
             self.begin_with(sample.mass_kg);
         }
-        if self.stops.departs(sample.time_ns, sample.stretch, sample.speed_mps) {
+        if self.stops.departs(sample.time_ns, sample.segment, sample.speed_mps) {
             self.reopen(sample.mass_kg);
         }
         self.pass(sample)

@@ -12,7 +12,7 @@ pub struct Motion {
     /// Measurement time in ns.
     pub time_ns: i64,
     /// Number of the motion segment.
-    pub stretch: u32,
+    pub segment: u32,
     /// Speed in m/s.
     pub speed_mps: f64,
     /// Traction minus brake in N.
@@ -45,7 +45,7 @@ impl Motion {
         let known_n_per_kn = sample.known_n_per_kn().ok_or(RejectionReason::Missing)?;
         let motion = Motion {
             time_ns: sample.time_ns,
-            stretch: sample.stretch,
+            segment: sample.segment,
             speed_mps: sample.speed_mps,
             force_n,
             declared_kg: sample.mass_kg,
@@ -98,7 +98,7 @@ impl Motion {
     /// between the two are not known well enough to integrate.
     pub fn step_from(&self, earlier: &Motion) -> Option<f64> {
         let step_s = self.time_ns.saturating_sub(earlier.time_ns) as f64 * 1e-9;
-        (self.stretch == earlier.stretch && step_s > 0.0 && step_s <= BRIDGED_MAX_S)
+        (self.segment == earlier.segment && step_s > 0.0 && step_s <= BRIDGED_MAX_S)
             .then_some(step_s)
     }
 }
@@ -119,9 +119,9 @@ mod tests {
 
     #[test]
     fn forces_are_bridged_for_seconds_within_a_segment() {
-        let motion = |time_ns, stretch| Motion {
+        let motion = |time_ns, segment| Motion {
             time_ns,
-            stretch,
+            segment,
             speed_mps: 10.0,
             force_n: 0.0,
             declared_kg: 1e5,

@@ -54,7 +54,7 @@ mod tests {
     fn at(curvature_per_m: f64, tunnel_share: f64) -> Motion {
         Motion {
             time_ns: 0,
-            stretch: 1,
+            segment: 1,
             speed_mps: 10.0,
             force_n: 0.0,
             declared_kg: 1e5,

@@ -238,7 +238,7 @@ impl StagedDescent {
             is_known: is_mass_known,
             lacking: if is_begun { Status::Degraded } else { Status::Unestimated },
             contradiction: (!is_bracketed).then_some(Reason::NotIdentifiable),
-            remark: Reason::None,
+            caveat: Reason::None,
         }
     }
 }
@@ -249,7 +249,7 @@ impl Estimator for StagedDescent {
     }
 
     fn update(&mut self, sample: &ResolvedSample) -> Outcome {
-        if self.stops.departs(sample.time_ns, sample.stretch, sample.speed_mps) {
+        if self.stops.departs(sample.time_ns, sample.segment, sample.speed_mps) {
             self.mass.sums = MeanSquare::default();
         }
         let motion = match Motion::seen(sample, self.settings.speed_min_mps, &mut self.last) {

@@ -62,7 +62,7 @@ impl TrainKalman {
             is_known: self.known_now() == COMPLETE,
             lacking: Status::Unestimated,
             contradiction: self.contradiction(),
-            remark: Reason::None,
+            caveat: Reason::None,
         }
     }
 }

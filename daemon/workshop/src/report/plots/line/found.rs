@@ -16,7 +16,7 @@ pub(super) fn panels(found: &AlongLine) -> Vec<Panel> {
         panels.push(Panel { name, unit, content });
     };
     for place in &found.places {
-        let content = Content::Places(place.stretches.clone());
+        let content = Content::Places(place.sections.clone());
         push(format!("Found: {}", place.name), "", content);
     }
     if !found.gradient_error.is_empty() {
@@ -35,15 +35,15 @@ pub(super) fn panels(found: &AlongLine) -> Vec<Panel> {
 /// Bars where an effect was found, the first row on top, with whiskers where their ends may lie.
 pub(super) fn bars(
     chart: &mut Chart,
-    stretches: &[MarkedInterval],
+    sections: &[MarkedInterval],
     from_km: f64,
 ) -> Result<(), PlotError> {
-    let rows = rows(stretches);
+    let rows = rows(sections);
     let height = 1.0 / rows.len() as f64;
     for (row, run) in rows.iter().enumerate() {
         let at = |share: f64| 1.0 - (row as f64 + share) * height;
         for MarkedInterval { at_m, ends_m, .. } in
-            stretches.iter().filter(|it| it.run.as_deref() == *run)
+            sections.iter().filter(|it| it.run.as_deref() == *run)
         {
             let [from, to] = at_m.map(|end| end / 1e3);
             let (top, bottom) = (at(0.25), at(0.75));

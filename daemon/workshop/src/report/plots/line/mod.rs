@@ -102,7 +102,7 @@ impl Ground<'_> {
             }
             Content::Places(_) => (ACTING, Vec::new()),
             Content::Means(..) => {
-                let found = self.found.places.iter().flat_map(|place| &place.stretches);
+                let found = self.found.places.iter().flat_map(|place| &place.sections);
                 (ACTING, found.filter(|it| it.run.is_none()).map(|it| it.at_m).collect())
             }
         };
@@ -122,7 +122,7 @@ impl Ground<'_> {
                 let line = PathElement::new(points.clone(), stroke(AFTER, 1.4));
                 chart.draw_series([line])?;
             }
-            Content::Places(stretches) => found::bars(&mut chart, stretches, x[0])?,
+            Content::Places(sections) => found::bars(&mut chart, sections, x[0])?,
             Content::Means(_, bins) => means(&mut chart, bins, self.has_effect, x)?,
         }
         Ok(chart)
@@ -205,7 +205,7 @@ mod tests {
             residual: vec![(1.0, vec![bin(0.2), bin(1.6)]), (-1.0, vec![bin(0.4), bin(1.8)])],
             places: vec![FoundPlace {
                 name: "a local resistance".into(),
-                stretches: vec![
+                sections: vec![
                     MarkedInterval { at_m: [300.0, 600.0], run: None, ends_m },
                     MarkedInterval {
                         at_m: [300.0, 400.0],

@@ -38,8 +38,8 @@ impl Panel {
 
     pub fn height(&self) -> u32 {
         match &self.content {
-            Content::Places(stretches) => {
-                PLACES_HEIGHT + ROW_HEIGHT * (rows(stretches).len() as u32 - 1)
+            Content::Places(sections) => {
+                PLACES_HEIGHT + ROW_HEIGHT * (rows(sections).len() as u32 - 1)
             }
             _ => HEIGHT,
         }
@@ -81,7 +81,7 @@ impl Panel {
     /// What it shows, for those who do not see it.
     pub fn described(&self) -> String {
         match &self.content {
-            Content::Places(stretches) => format!("{} {}", self.name, described(stretches)),
+            Content::Places(sections) => format!("{} {}", self.name, described(sections)),
             Content::Means(_, bins) => {
                 let most = bins.iter().map(|bin| bin.before_n_per_kn.0.abs()).fold(0.0, f64::max);
                 format!("{}: at most {most:.2} N/kN", self.name)
@@ -102,18 +102,18 @@ pub(super) fn way(direction: f64) -> &'static str {
 }
 
 /// The rows of a panel of places: what holds in all runs, or one row for each run.
-pub(super) fn rows(stretches: &[MarkedInterval]) -> Vec<Option<&str>> {
-    let mut rows: Vec<Option<&str>> = stretches.iter().map(|it| it.run.as_deref()).collect();
+pub(super) fn rows(sections: &[MarkedInterval]) -> Vec<Option<&str>> {
+    let mut rows: Vec<Option<&str>> = sections.iter().map(|it| it.run.as_deref()).collect();
     rows.sort_unstable();
     rows.dedup();
     rows
 }
 
-/// The stretches in words.
-pub(super) fn described(stretches: &[MarkedInterval]) -> String {
+/// The sections in words.
+pub(super) fn described(sections: &[MarkedInterval]) -> String {
     let one = |it: &MarkedInterval| {
         let run = it.run.as_ref().map_or(String::new(), |run| format!(" in {run}"));
         format!("km {:.2} to {:.2}{run}", it.at_m[0] / 1e3, it.at_m[1] / 1e3)
     };
-    stretches.iter().map(one).collect::<Vec<_>>().join(", ")
+    sections.iter().map(one).collect::<Vec<_>>().join(", ")
 }

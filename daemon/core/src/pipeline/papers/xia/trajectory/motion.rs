@@ -56,7 +56,7 @@ pub struct MotionTracker {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Anchor {
-    stretch: u32,
+    segment: u32,
     speed_mps: f64,
     drive_mps2: f64,
 }
@@ -84,9 +84,9 @@ impl MotionTracker {
         if !(drive_mps2.is_finite() && resistance_gain.is_finite() && speed_mps.is_finite()) {
             return Motion::Unusable(RejectionReason::NotFinite);
         }
-        self.last = Some(Anchor { stretch: sample.stretch, speed_mps, drive_mps2 });
+        self.last = Some(Anchor { segment: sample.segment, speed_mps, drive_mps2 });
         match last {
-            Some(last) if last.stretch == sample.stretch && sample.step_s > 0.0 => {
+            Some(last) if last.segment == sample.segment && sample.step_s > 0.0 => {
                 Motion::Continue(MotionStep {
                     duration_s: sample.step_s,
                     distance_m: 0.5 * (last.speed_mps + speed_mps) * sample.step_s,
@@ -110,7 +110,7 @@ pub(super) mod tests {
         ResolvedSample {
             time_ns: i64::from(index) * 200_000_000,
             step_s: if index == 0 { 0.0 } else { 0.2 },
-            stretch: 1,
+            segment: 1,
             direction: 1.0,
             position_m: None,
             speed_mps,
@@ -147,12 +147,12 @@ pub(super) mod tests {
     fn no_step_leads_across_a_gap_a_stop_a_slide_or_a_missing_force() {
         let missing = ResolvedSample { traction_force_n: None, ..sample(1, 10.0, 0.0) };
         let sliding = ResolvedSample { is_sliding: true, ..sample(1, 10.0, 0.0) };
-        let next_stretch = ResolvedSample { stretch: 2, ..sample(1, 10.0, 0.0) };
+        let next_segment = ResolvedSample { segment: 2, ..sample(1, 10.0, 0.0) };
         for (between, expected) in [
             (missing, Motion::Unusable(RejectionReason::Missing)),
             (sliding, Motion::Unusable(RejectionReason::WheelSlide)),
             (sample(1, 0.0, 0.0), Motion::Standstill),
-            (next_stretch, Motion::Begin),
+            (next_segment, Motion::Begin),
         ] {
             let mut tracker = MotionTracker::default();
             tracker.advance(&sample(0, 10.0, 0.0));

@@ -175,7 +175,7 @@ fn numbers_that_are_none_never_reach_a_snapshot() {
                 30 => sample.gradient_permille = Some(f64::NAN),
                 40 => sample.inertial_mass_kg = 0.0,
                 50 => sample.step_s = f64::NAN,
-                60 => sample.stretch += 1,
+                60 => sample.segment += 1,
                 70 => sample.is_sliding = true,
                 _ => {}
             }

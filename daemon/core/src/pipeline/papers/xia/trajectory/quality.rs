@@ -84,11 +84,11 @@ impl Estimate<'_> {
                 .contradiction()
                 .or((self.inflation > LONG_RUN_MAX).then_some(Reason::InnovationsNotWhite))
                 .or(self.doubt),
-            remark: self.remark(),
+            caveat: self.caveat(),
         }
     }
 
-    fn remark(&self) -> Reason {
+    fn caveat(&self) -> Reason {
         if self.is_at_bound {
             Reason::AtBound
         } else if self.excited() == [true; 3] {

@@ -1,0 +1,103 @@
+//! What is to be known before results from a dataset are believed, each thing once.
+
+use dynocar_core::plausibility::{DetectedFault, Severity};
+use dynocar_core::track::Track;
+use dynocar_core::train::TrainModel;
+use serde::Serialize;
+
+use super::Dataset;
+use super::declared::misdeclared;
+use super::diagnostic::Diagnostic;
+use super::fault_unit::unit_of;
+use super::run::Run;
+
+/// A diagnostic on a dataset.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DatasetDiagnostic {
+    /// Its name for machines.
+    pub code: &'static str,
+    /// How much it matters.
+    pub severity: Severity,
+    /// The files of the runs it is about; empty when it is about the train or the line.
+    pub runs: Vec<String>,
+    /// What it is, with figures and the likely input fault.
+    pub text: String,
+}
+
+impl std::fmt::Display for DatasetDiagnostic {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match &self.runs[..] {
+            [] => f.write_str(&self.text),
+            [run] => write!(f, "{run}: {}", self.text),
+            [first, .., last] => {
+                write!(f, "{first} … {last} ({} runs): {}", self.runs.len(), self.text)
+            }
+        }
+    }
+}
+
+impl Dataset {
+    /// What may spoil results from these runs, the worst first.
+    pub fn diagnostics(&self) -> Vec<DatasetDiagnostic> {
+        diagnostics(&self.train, self.track.as_deref(), &self.runs)
+    }
+}
+
+/// What may spoil results from runs of a train on a line, the worst first.
+pub fn diagnostics<'r>(
+    train: &TrainModel,
+    track: Option<&Track>,
+    runs: impl IntoIterator<Item = &'r Run>,
+) -> Vec<DatasetDiagnostic> {
+    let of_declared = misdeclared(train, track).into_iter();
+    let mut diagnostics: Vec<DatasetDiagnostic> = of_declared
+        .map(|it| DatasetDiagnostic {
+            code: it.code,
+            severity: it.severity,
+            runs: Vec::new(),
+            text: it.text,
+        })
+        .collect();
+    // The factors of an input fault that several runs share, from the lowest to the highest.
+    let mut faults: Vec<(usize, DetectedFault, &'static str, (f64, f64))> = Vec::new();
+    for run in runs {
+        for diagnostic in run.diagnostics.iter().filter(|it| it.severity() > Severity::Info) {
+            let same = |other: &DatasetDiagnostic| {
+                other.code == diagnostic.code() && !other.runs.is_empty()
+            };
+            let known = match diagnostic {
+                Diagnostic::InputFault { detected, read_as } => {
+                    let known = faults.iter_mut().find(|(_, other, unit, (low, _))| {
+                        other.fault == detected.fault
+                            && unit == read_as
+                            && (*low < 1.0) == (detected.factor < 1.0)
+                    });
+                    known.map(|(place, .., range)| {
+                        *range = (range.0.min(detected.factor), range.1.max(detected.factor));
+                        *place
+                    })
+                }
+                new => diagnostics
+                    .iter()
+                    .position(|other| same(other) && other.text == new.to_string()),
+            };
+            match known {
+                Some(place) => diagnostics[place].runs.push(run.file.clone()),
+                None => {
+                    if let Diagnostic::InputFault { detected, read_as } = diagnostic {
+                        let range = (detected.factor, detected.factor);
+                        faults.push((diagnostics.len(), *detected, read_as, range));
+                    }
+                    let (code, severity) = (diagnostic.code(), diagnostic.severity());
+                    let (runs, text) = (vec![run.file.clone()], diagnostic.to_string());
+                    diagnostics.push(DatasetDiagnostic { code, severity, runs, text });
+                }
+            }
+        }
+    }
+    for (place, detected, read_as, range) in faults {
+        diagnostics[place].text = detected.words_for(range, &unit_of(detected, read_as));
+    }
+    diagnostics.sort_by_key(|diagnostic| std::cmp::Reverse(diagnostic.severity));
+    diagnostics
+}

@@ -1,0 +1,37 @@
+//! The unit that a diagnostic is reported in.
+
+use dynocar_core::plausibility::{DetectedFault, InputFault};
+use dynocar_core::units::Unit;
+
+use super::manifest::Manifest;
+use super::quantity::Quantity;
+
+/// The quantities that an input fault is about, and the unit to report it in where none of them is mapped.
+pub(super) fn concerned(fault: InputFault) -> (&'static [Quantity], &'static str) {
+    use Quantity::*;
+    match fault {
+        InputFault::TimeScale => (&[Time], "s"),
+        InputFault::SpeedScale => (&[Speed], "m/s"),
+        InputFault::PositionScale | InputFault::DirectionReversed => (&[Position], "m"),
+        InputFault::MassScale => (&[TrainMass], "t"),
+        InputFault::BrakeScale => (&[BrakeForce, ControlForce], "kN"),
+        InputFault::ForcesSwapped | InputFault::ForcesScale | InputFault::TractionScale => {
+            (&[TractionForce, BrakeForce, ControlForce], "kN")
+        }
+        InputFault::GradientSign | InputFault::GradientScale => (&[Gradient], "permille"),
+        InputFault::PressureScale => (&[BrakeCylinderPressure], "Pa"),
+    }
+}
+
+/// The unit in which the manifest reads the quantity of a detected fault.
+pub(super) fn read_as(manifest: &Manifest, detected: DetectedFault) -> &'static str {
+    let (quantities, otherwise) = concerned(detected.fault);
+    let mapped = quantities.iter().find_map(|&quantity| manifest.mapping(quantity));
+    mapped.map_or(otherwise, |mapping| mapping.unit.name())
+}
+
+/// The unit of a detected fault's quantity with this name.
+pub(super) fn unit_of(detected: DetectedFault, name: &str) -> Unit {
+    let dimension = detected.fault.dimension();
+    Unit::find(dimension, name).unwrap_or_else(|| Unit::base_of(dimension))
+}
