@@ -36,7 +36,8 @@ pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
         }
         CompetingHypotheses { accepted, kinds }
     };
-    let each = effects.iter().map(|effect| {
+    let named = effects.iter().filter(|effect| outcome.is_named(effect.kind()));
+    let each = named.map(|effect| {
         let kind = effect.kind();
         let instead =
             outcome.instead.iter().find(|(stands, _)| effects.len() > 1 && *stands == kind);

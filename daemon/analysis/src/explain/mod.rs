@@ -12,7 +12,7 @@
 //! - [`selection`]: the search for effects, its significance, evidence by run
 //! - [`gradient_prior`], [`map_error`]: how maps err; the finished model beside what the map's own error makes all runs err alike
 //! - [`score`], `stop_runs`, [`stop_to_stop`], [`judged`], `bootstrap`: open-loop prediction of fit and holdout runs
-//! - [`unexplained`], [`informed`], [`identifiability`], [`competing`], [`runners_up`], [`verdict`], [`answer`]: the statement
+//! - [`unexplained`], [`informed`], [`identifiability`], [`competing`], [`runners_up`], [`verdict`], `described`, [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
 //!
 //! [`explain`] runs it all.
@@ -20,6 +20,7 @@
 pub mod answer;
 mod bootstrap;
 pub mod competing;
+mod described;
 pub mod drive;
 pub mod effects;
 pub mod evidence;

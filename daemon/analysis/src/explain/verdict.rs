@@ -7,12 +7,13 @@ use dynocar_core::simulate::SpeedError;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::{
-    BaseAnswer, Considered, DavisDeviations, EffectAnswer, ExplainAnswer, HALF_95, Location,
-    ParameterValue, PlaceUncertainty, Verdict,
+    BaseAnswer, Considered, DavisDeviations, EffectAnswer, ExplainAnswer, Location,
+    PlaceUncertainty, Verdict,
 };
 use super::competing::{CompetingHypotheses, competing_hypotheses, is_in, separating_run};
+use super::described::{describe, describe_place, small};
 use super::effects::ReportContext;
-use super::evidence::{acceptance_score, p_value};
+use super::evidence::{SCORE_MIN, acceptance_score, p_value};
 use super::identifiability::{identifiability, not_held};
 use super::informed::{told_by_data, undetermined};
 use super::runners_up::runners_up;
@@ -152,6 +153,7 @@ fn effect_answers(
         .iter()
         .zip(fit.model.ranges())
         .enumerate()
+        .filter(|(_, (effect, _))| outcome.is_named(effect.kind()))
         .map(|(index, (effect, range))| {
             let rest = search.without(fit, index);
             let decrease = discounted(fit, index, rest.cost - fit.cost);
@@ -173,7 +175,9 @@ fn effect_answers(
                 place: Location { uncertainty_95: known[index].clone(), ..effect.place() },
                 parameters: reported.values,
                 std: reported.deviations,
-                p_value: p_value(acceptance_score(decrease - penalty(fit, index), reduction)),
+                p_value: p_value(
+                    acceptance_score(decrease - penalty(fit, index), reduction).max(SCORE_MIN),
+                ),
                 error_reduction: reduction,
                 runners_up: if effect.kind() == EffectKind::Unknown {
                     runners_up(search, outcome)
@@ -239,6 +243,10 @@ fn considered(outcome: &Outcome, competing: &[CompetingHypotheses]) -> Vec<Consi
             });
         }
     }
+    for trial in outcome.small_trials() {
+        let reason = format!("certain and small: {}", small(trial));
+        list.push(Considered { kind: trial.kind.name(), evidence: Some(trial.evidence), reason });
+    }
     for (kind, reason) in &outcome.not_testable {
         list.push(Considered { kind: kind.name(), evidence: None, reason: reason.clone() });
     }
@@ -273,7 +281,12 @@ fn statement(
         Verdict::None => {
             let text = "Nothing undeclared is found: the declared model with a, b, c refitted \
                         explains the runs.";
-            (format!("{text}{undetermined}"), None)
+            let small: Vec<String> = outcome.small_trials().map(small).collect();
+            let small = match &small[..] {
+                [] => String::new(),
+                all => format!(" Certain, and too small to matter: {}.", all.join(", ")),
+            };
+            (format!("{text}{small}{undetermined}"), None)
         }
         Verdict::Effect => (format!("Found: {described}.{undetermined}"), None),
         Verdict::Unknown => {
@@ -320,81 +333,4 @@ fn unnamed(left: Option<&Unexplained>, found: &str) -> String {
         text += &format!(" Beside it is found: {found}.");
     }
     text
-}
-
-fn describe(effect: &EffectAnswer) -> String {
-    let mut parts = Vec::new();
-    for (name, value) in &effect.parameters {
-        if let ParameterValue::Formula(formula) = value {
-            parts.insert(0, formula.clone());
-        }
-        if let (ParameterValue::Number(value), Some(ParameterValue::Number(deviation))) =
-            (value, effect.std.get(name))
-        {
-            parts.push(match HALF_95 * deviation {
-                // A reference that was chosen and not estimated.
-                0.0 => format!("{name} = {value}"),
-                half_width => format!("{name} = {value:.4} ± {half_width:.4}"),
-            });
-        }
-    }
-    parts.extend(effect.parameters.values().find_map(mass_factors));
-    parts.extend(describe_place(&effect.place));
-    parts.extend(effect.place.uncertainty_95.as_ref().and_then(precision));
-    format!("{} ({})", effect.kind, parts.join(", "))
-}
-
-/// Where something acts.
-fn describe_place(place: &Location) -> Vec<String> {
-    let mut parts = Vec::new();
-    if let Some(intervals) = &place.intervals_m {
-        let shown = intervals.iter().take(4).map(|[from, to]| format!("{from:.0}–{to:.0} m"));
-        let more = if intervals.len() > 4 { " …" } else { "" };
-        parts.push(format!("at {}{more}", shown.collect::<Vec<_>>().join(", ")));
-    }
-    if let Some(windows) = &place.windows {
-        let shown =
-            windows.iter().map(|w| format!("{} {:.0}–{:.0} s", w.run, w.t_start_s, w.t_end_s));
-        parts.push(format!("in {}", shown.collect::<Vec<_>>().join(", ")));
-    }
-    if let Some(runs) = &place.runs {
-        parts.push(format!("in {}", runs.join(", ")));
-    }
-    if let Some(covariate) = &place.covariate {
-        let [low, high] = covariate.range;
-        parts.push(format!("{} from {low:.1} to {high:.1}", covariate.name));
-    }
-    parts
-}
-
-/// How well the ends of a place are known: half of the widest 95 % interval.
-fn precision(known: &PlaceUncertainty) -> Option<String> {
-    let half = |interval: [f64; 2]| 0.5 * (interval[1] - interval[0]);
-    let widest = |ends: &mut dyn Iterator<Item = [f64; 2]>| ends.map(half).reduce(f64::max);
-    let ends_m = widest(&mut known.intervals_m.iter().flatten().flatten().copied());
-    let windows = known.windows.iter().flatten();
-    let ends_s = widest(&mut windows.flat_map(|it| [Some(it.t_start_s), it.t_end_s]).flatten());
-    let range = widest(&mut known.range.iter().flatten().flatten().copied());
-    let shown = [
-        ends_m.map(|half| format!("{half:.0} m")),
-        ends_s.map(|half| format!("{half:.0} s")),
-        range.filter(|_| ends_m.is_none()).map(|half| format!("{half:.1}")),
-    ];
-    let shown: Vec<String> = shown.into_iter().flatten().collect();
-    if ends_m.or(ends_s) == Some(0.0) {
-        return Some("ends certain".into());
-    }
-    (!shown.is_empty()).then(|| format!("ends known to ± {} or better", shown.join(", ± ")))
-}
-
-/// What a list of mass factors says; a section in both directions once.
-fn mass_factors(value: &ParameterValue) -> Option<String> {
-    let mut factors: Vec<f64> = match value {
-        ParameterValue::Sections(list) => list.iter().map(|section| section.mass_factor).collect(),
-        ParameterValue::Windows(list) => list.iter().map(|window| window.mass_factor).collect(),
-        _ => return None,
-    };
-    factors.dedup();
-    let listed: Vec<String> = factors.iter().map(|factor| format!("{factor:.3}")).collect();
-    Some(format!("mass_factor = {}", listed.join(", ")))
 }

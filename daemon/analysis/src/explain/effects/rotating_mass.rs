@@ -5,7 +5,7 @@ use dynocar_core::terms::{Entry, Parameter, rotating};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Proposal};
-use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::evidence::{RunData, RunScatter, SampleForces};
 use crate::explain::scan::Scan;
 
 /// The kind.
@@ -42,6 +42,11 @@ impl Hypothesis for Gamma {
 
     fn none(&self) -> f64 {
         self.declared
+    }
+
+    /// Force sensors that are all a little off act as another inertia.
+    fn shared_error(&self) -> f64 {
+        RunScatter::USUAL.force * (1.0 + self.declared)
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {

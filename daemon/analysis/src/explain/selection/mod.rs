@@ -2,13 +2,16 @@
 
 mod acceptance;
 mod by_run;
+mod outcome;
 mod outside;
 mod price;
 mod search;
+mod small;
 mod steps;
 
 pub use acceptance::Refusal;
 pub use by_run::{Deviations, deviations, few_runs_factor, without_each_run};
+pub use outcome::{Outcome, Trial};
 pub use price::{discounted, model_penalty, penalty};
-pub use search::{OBSERVATIONS_MIN, Outcome, Search, Trial};
+pub use search::{OBSERVATIONS_MIN, Search};
 pub use steps::Progress;

@@ -4,8 +4,9 @@
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::acceptance::is_possible;
+use super::outcome::{Outcome, Trial};
 use super::price::penalty;
-use super::search::{Outcome, STIFF, Search, Trial};
+use super::search::{STIFF, Search};
 use crate::explain::effects::{Effect, UNKNOWN, a_form_explains_more, leaves_a_force};
 use crate::explain::evidence::{EQUAL, Fit, SCORE_MIN};
 use crate::explain::scan::Scan;

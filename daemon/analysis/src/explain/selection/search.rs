@@ -7,17 +7,18 @@ use dynocar_core::train::TrainModel;
 use dynocar_shared::vocabulary::EffectKind;
 use rayon::prelude::*;
 
+use super::acceptance::is_accepted;
+use super::outcome::{Outcome, Trial};
 use super::price::{at_bound, discounted, model_penalty, penalty};
 use super::steps::{Progress, Steps, round_share};
 use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal, UNKNOWN};
-use crate::explain::evidence::{
-    EQUAL, Fit, FitProblem, Noise, RunData, SCORE_MIN, UpdatedModel, acceptance_score,
-};
+use crate::explain::evidence::{EQUAL, Fit, FitProblem, Noise, RunData, UpdatedModel};
 use crate::explain::scan::Scan;
 use crate::explain::score::{FitErrors, reduction};
 
-/// Effects at most.
+/// Named effects at most, and rounds: what is taken in and dropped again must come to an end.
 const EFFECTS_MAX: usize = 4;
+const ROUNDS_MAX: usize = 10;
 /// Kinds that get a noise of their own and a second localisation in each round.
 const FINALISTS: usize = 5;
 /// A finalist's advantage: not far below none, and no less than this share of the greatest.
@@ -31,50 +32,6 @@ const MANY_OBSERVATIONS: usize = 5_000;
 pub(super) const STIFF: [f64; 2] = [0.01, 1e-4];
 /// Less observations than this tell nothing.
 pub const OBSERVATIONS_MIN: usize = 80;
-
-/// One candidate, fitted together with everything accepted so far.
-#[derive(Clone)]
-pub struct Trial {
-    /// Its kind.
-    pub kind: EffectKind,
-    /// The fitted model; the candidate is its last effect.
-    pub fit: Fit,
-    /// Decrease of -2 log likelihood by it, less its price: what kinds are compared by.
-    pub bic_gain: f64,
-    /// The same after the discount for errors that all runs share: what must be more than chance.
-    pub evidence: f64,
-    /// Share of the open-loop error that it takes away, of the fit runs and of each by what the others
-    /// say of it, whichever is less; 0 where the evidence does not ask for it.
-    pub reduction: f64,
-}
-
-impl Trial {
-    /// The number of the candidate among the effects of its model.
-    pub fn last(&self) -> usize {
-        self.fit.model.effects.len() - 1
-    }
-
-    /// What decides.
-    pub fn acceptance_score(&self) -> f64 {
-        acceptance_score(self.evidence, self.reduction)
-    }
-}
-
-/// What the search found.
-#[derive(Clone)]
-pub struct Outcome {
-    /// The declared model with a, b, c refitted.
-    pub base: Fit,
-    /// The model with all accepted effects.
-    pub fit: Fit,
-    /// The best trial of each kind in each round, the strongest first; the last round is the one
-    /// in which nothing more was accepted.
-    pub rounds: Vec<Vec<Trial>>,
-    /// Where several effects were found, what was tried in the place of each.
-    pub instead: Vec<(EffectKind, Vec<Trial>)>,
-    /// Kinds that the data do not allow to test, and why.
-    pub not_testable: Vec<(EffectKind, String)>,
-}
 
 /// The search over one dataset.
 pub struct Search<'a> {
@@ -130,6 +87,7 @@ impl Search<'_> {
             rounds: Vec::new(),
             instead: Vec::new(),
             not_testable: Vec::new(),
+            small: Vec::new(),
         }
     }
 
@@ -139,18 +97,28 @@ impl Search<'_> {
         if outcome.base.observations() < OBSERVATIONS_MIN {
             return outcome;
         }
-        while outcome.fit.model.effects.len() < EFFECTS_MAX {
+        while outcome.fit.model.effects.len() < EFFECTS_MAX + outcome.small.len()
+            && outcome.rounds.len() < ROUNDS_MAX
+        {
             let trials = self.round(&outcome.fit, &mut outcome.not_testable);
             let next = self.best(&trials).map(|trial| trial.fit.clone());
+            let small = Self::certain_and_small(&trials).filter(|_| next.is_none());
+            let small = small.map(|trial| (trial.kind, trial.fit.clone()));
             outcome.rounds.push(trials);
+            if let Some((kind, fit)) = small {
+                outcome.small.push(kind);
+                outcome.fit = fit;
+                continue;
+            }
             let Some(next) = next else { break };
             outcome.fit = next;
             if outcome.fit.model.effects.len() > 1 {
                 (self.progress)(round_share(outcome.rounds.len(), 0.0), "swapping effects");
-                outcome.instead = self.swap(&mut outcome.fit);
-                self.prune(&mut outcome.fit);
+                outcome.instead = self.swap(&mut outcome.fit, &outcome.small);
+                self.prune(&mut outcome.fit, &outcome.small);
             }
         }
+        self.name_or_forget_small(&mut outcome);
         outcome
     }
 
@@ -341,9 +309,12 @@ impl Search<'_> {
 
     /// Takes each effect out in turn and looks whether another kind does better in its place; what was
     /// tried in the place of each kind that stands after it.
-    fn swap(&self, fit: &mut Fit) -> Vec<(EffectKind, Vec<Trial>)> {
+    fn swap(&self, fit: &mut Fit, small: &[EffectKind]) -> Vec<(EffectKind, Vec<Trial>)> {
         let mut tried = Vec::new();
         for index in 0..fit.model.effects.len() {
+            if small.contains(&fit.model.effects[index].kind()) {
+                continue;
+            }
             let rest = self.without(fit, index);
             let trials = self.round(&rest, &mut Vec::new());
             let mut stands = fit.model.effects[index].kind();
@@ -359,13 +330,17 @@ impl Search<'_> {
     }
 
     /// Drops effects that the others have made needless.
-    fn prune(&self, fit: &mut Fit) {
+    fn prune(&self, fit: &mut Fit, small: &[EffectKind]) {
         let mut index = 0;
         while index < fit.model.effects.len() && fit.model.effects.len() > 1 {
+            if small.contains(&fit.model.effects[index].kind()) {
+                index += 1;
+                continue;
+            }
             let rest = self.without(fit, index);
             let evidence = Self::total(&rest) - Self::total(fit);
             let reduction = reduction(self.problem, &rest, fit);
-            if acceptance_score(evidence, reduction) < SCORE_MIN || at_bound(fit, index).is_some() {
+            if !is_accepted(fit, index, evidence, reduction) || at_bound(fit, index).is_some() {
                 *fit = rest;
             } else {
                 index += 1;

@@ -1,0 +1,91 @@
+//! Effects in words, for the statement.
+
+use super::answer::{EffectAnswer, HALF_95, Location, ParameterValue, PlaceUncertainty};
+use super::selection::Trial;
+
+/// An effect with its numbers, where it acts, and how surely that is known.
+pub(super) fn describe(effect: &EffectAnswer) -> String {
+    let mut parts = Vec::new();
+    for (name, value) in &effect.parameters {
+        if let ParameterValue::Formula(formula) = value {
+            parts.insert(0, formula.clone());
+        }
+        if let (ParameterValue::Number(value), Some(ParameterValue::Number(deviation))) =
+            (value, effect.std.get(name))
+        {
+            parts.push(match HALF_95 * deviation {
+                // A reference that was chosen and not estimated.
+                0.0 => format!("{name} = {value}"),
+                half_width => format!("{name} = {value:.4} ± {half_width:.4}"),
+            });
+        }
+    }
+    parts.extend(effect.parameters.values().find_map(mass_factors));
+    parts.extend(describe_place(&effect.place));
+    parts.extend(effect.place.uncertainty_95.as_ref().and_then(precision));
+    format!("{} ({})", effect.kind, parts.join(", "))
+}
+
+/// Where something acts.
+pub(super) fn describe_place(place: &Location) -> Vec<String> {
+    let mut parts = Vec::new();
+    if let Some(intervals) = &place.intervals_m {
+        let shown = intervals.iter().take(4).map(|[from, to]| format!("{from:.0}–{to:.0} m"));
+        let more = if intervals.len() > 4 { " …" } else { "" };
+        parts.push(format!("at {}{more}", shown.collect::<Vec<_>>().join(", ")));
+    }
+    if let Some(windows) = &place.windows {
+        let shown =
+            windows.iter().map(|w| format!("{} {:.0}–{:.0} s", w.run, w.t_start_s, w.t_end_s));
+        parts.push(format!("in {}", shown.collect::<Vec<_>>().join(", ")));
+    }
+    if let Some(runs) = &place.runs {
+        parts.push(format!("in {}", runs.join(", ")));
+    }
+    if let Some(covariate) = &place.covariate {
+        let [low, high] = covariate.range;
+        parts.push(format!("{} from {low:.1} to {high:.1}", covariate.name));
+    }
+    parts
+}
+
+/// How well the ends of a place are known: half of the widest 95 % interval.
+fn precision(known: &PlaceUncertainty) -> Option<String> {
+    let half = |interval: [f64; 2]| 0.5 * (interval[1] - interval[0]);
+    let widest = |ends: &mut dyn Iterator<Item = [f64; 2]>| ends.map(half).reduce(f64::max);
+    let ends_m = widest(&mut known.intervals_m.iter().flatten().flatten().copied());
+    let windows = known.windows.iter().flatten();
+    let ends_s = widest(&mut windows.flat_map(|it| [Some(it.t_start_s), it.t_end_s]).flatten());
+    let range = widest(&mut known.range.iter().flatten().flatten().copied());
+    let shown = [
+        ends_m.map(|half| format!("{half:.0} m")),
+        ends_s.map(|half| format!("{half:.0} s")),
+        range.filter(|_| ends_m.is_none()).map(|half| format!("{half:.1}")),
+    ];
+    let shown: Vec<String> = shown.into_iter().flatten().collect();
+    if ends_m.or(ends_s) == Some(0.0) {
+        return Some("ends certain".into());
+    }
+    (!shown.is_empty()).then(|| format!("ends known to ± {} or better", shown.join(", ± ")))
+}
+
+/// What a list of mass factors says; a section in both directions once.
+fn mass_factors(value: &ParameterValue) -> Option<String> {
+    let mut factors: Vec<f64> = match value {
+        ParameterValue::Sections(list) => list.iter().map(|section| section.mass_factor).collect(),
+        ParameterValue::Windows(list) => list.iter().map(|window| window.mass_factor).collect(),
+        _ => return None,
+    };
+    factors.dedup();
+    let listed: Vec<String> = factors.iter().map(|factor| format!("{factor:.3}")).collect();
+    Some(format!("mass_factor = {}", listed.join(", ")))
+}
+
+/// What is certain and small: its kind with its numbers.
+pub(super) fn small(trial: &Trial) -> String {
+    let effect = &trial.fit.model.effects[trial.last()];
+    let parameters = effect.parameters().iter().zip(trial.fit.effect_parameters(trial.last()));
+    let each = parameters.map(|(spec, value)| format!("{} = {value:.4}", spec.name));
+    let numbers = each.collect::<Vec<_>>().join(", ");
+    format!("{} ({numbers})", trial.kind.name())
+}

@@ -1,0 +1,67 @@
+//! What the search tries and finds.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use crate::explain::evidence::{Fit, acceptance_score};
+
+/// One candidate, fitted together with everything accepted so far.
+#[derive(Clone)]
+pub struct Trial {
+    /// Its kind.
+    pub kind: EffectKind,
+    /// The fitted model; the candidate is its last effect.
+    pub fit: Fit,
+    /// Decrease of -2 log likelihood by it, less its price: what kinds are compared by.
+    pub bic_gain: f64,
+    /// The same after the discount for errors that all runs share: what must be more than chance.
+    pub evidence: f64,
+    /// Share of the open-loop error that it takes away, of the fit runs and of each by what the others
+    /// say of it, whichever is less; 0 where the evidence does not ask for it.
+    pub reduction: f64,
+}
+
+impl Trial {
+    /// The number of the candidate among the effects of its model.
+    pub fn last(&self) -> usize {
+        self.fit.model.effects.len() - 1
+    }
+
+    /// What decides.
+    pub fn acceptance_score(&self) -> f64 {
+        acceptance_score(self.evidence, self.reduction)
+    }
+}
+
+/// What the search found.
+#[derive(Clone)]
+pub struct Outcome {
+    /// The declared model with a, b, c refitted.
+    pub base: Fit,
+    /// The model with all accepted effects.
+    pub fit: Fit,
+    /// The best trial of each kind in each round, the strongest first; the last round is the one
+    /// in which nothing more was accepted.
+    pub rounds: Vec<Vec<Trial>>,
+    /// Where several effects were found, what was tried in the place of each.
+    pub instead: Vec<(EffectKind, Vec<Trial>)>,
+    /// Kinds that the data do not allow to test, and why.
+    pub not_testable: Vec<(EffectKind, String)>,
+    /// Kinds that are certain and small: part of the model, and not named.
+    pub small: Vec<EffectKind>,
+}
+
+impl Outcome {
+    /// Whether an effect of the model is named: it is more than a small, certain error of what is declared.
+    pub fn is_named(&self, kind: EffectKind) -> bool {
+        !self.small.contains(&kind)
+    }
+
+    /// The trials of what is certain and small, as they were when it was taken in.
+    pub fn small_trials(&self) -> impl Iterator<Item = &Trial> {
+        let of = |kind: &EffectKind| {
+            let rounds = self.rounds.iter().rev().flatten();
+            rounds.clone().find(|trial| trial.kind == *kind)
+        };
+        self.small.iter().filter_map(of)
+    }
+}

@@ -1,0 +1,61 @@
+//! What is certain and small: an error of what is declared that every railway has, which is part of the model
+//! without being named.
+//!
+//! Forces a tenth of a second late, wheels and force sensors a few thousandths off: thousands of samples make
+//! them certain, and they take little from the open-loop error. Left out of the model they would stand in its
+//! noise and hide what matters.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::acceptance::{CERTAIN, Refusal, is_accepted};
+use super::outcome::{Outcome, Trial};
+use super::price::penalty;
+use super::search::Search;
+use crate::explain::score::reduction;
+
+/// Kinds by which clocks, wheels and force sensors are always a little off, the most usual first.
+const EVERYDAY: [EffectKind; 4] = [
+    EffectKind::ActuatorDelay,
+    EffectKind::WheelDiameter,
+    EffectKind::TractionGain,
+    EffectKind::SpeedDelay,
+];
+
+impl Search<'_> {
+    /// The trial of the most usual everyday kind that is certain, and only for its size no effect.
+    pub(super) fn certain_and_small(trials: &[Trial]) -> Option<&Trial> {
+        let is_small = |trial: &&Trial| {
+            let refusal = Self::refusal(trial);
+            trial.evidence > CERTAIN
+                && matches!(refusal, Some(Refusal::Immaterial | Refusal::Weak(_)))
+        };
+        let of = |kind: &EffectKind| trials.iter().find(|trial| trial.kind == *kind);
+        EVERYDAY.iter().filter_map(of).find(is_small)
+    }
+
+    /// Names what has turned out to matter beside the effects that were found, and forgets what is small
+    /// where nothing was.
+    pub(super) fn name_or_forget_small(&self, outcome: &mut Outcome) {
+        let kinds: Vec<EffectKind> =
+            outcome.fit.model.effects.iter().map(|effect| effect.kind()).collect();
+        outcome.small.retain(|small| kinds.contains(small));
+        if kinds.len() == outcome.small.len() {
+            outcome.fit = outcome.base.clone();
+            return;
+        }
+        for (index, kind) in kinds.into_iter().enumerate() {
+            if outcome.is_named(kind) {
+                continue;
+            }
+            let fit = &outcome.fit;
+            let rest = self.without(fit, index);
+            let evidence = rest.cost - fit.cost - penalty(fit, index);
+            let effect = &fit.model.effects[index];
+            let is_material = effect.is_material(fit.effect_parameters(index), fit.theta[2]);
+            let reduction = reduction(self.problem, &rest, fit);
+            if is_material && is_accepted(fit, index, evidence, reduction) {
+                outcome.small.retain(|small| *small != kind);
+            }
+        }
+    }
+}
