@@ -101,19 +101,19 @@ Made by `cargo run --release -p dynocar-bench -- papers --markdown docs/papers.m
 
 | column | meaning |
 | --- | --- |
-| paper's method, baseline | the corrected formulas, faithfully, on the same data as ours |
-| bound | the Cramér–Rao or posterior Cramér–Rao bound of the scenario, computed in the same run |
+| paper's method, baseline | the corrected formulas on the same data as ours |
+| bound | Cramér–Rao or posterior Cramér–Rao bound, computed in the same run |
 | coverage | share of our 95 % intervals that hold the truth |
-| NEES | mean normalised estimation error squared per degree of freedom, 1 when the covariance is right, with the band that holds it in 99 % of such measurements; where all runs share one curve (Xie 2019 and Jin 2020 but for *drawn coefficients*) the band is as wide as one draw leaves it |
+| NEES | 1 when the covariance is right; the band holds it in 99 % of such measurements. Where all runs share one curve (Xie 2019, Jin 2020, except *drawn coefficients*) it is as wide as one draw leaves it |
 
-A row that breaks what the project promises of it says `BROKEN` in its last cell but one, and what.
+Rows that break what the project promises say `BROKEN` and what.
 
-Where the paper's method differs from its paper:
+Deviations from the papers:
 
-- Liu: segments end where a noisy speed first reaches a bound, which biases w0 by -1.7 %. V-MILS has no printed rule for bad data; the gate used here acts on rows that a spike has already spoilt.
-  The size of the outliers (here 1 to 5 km/h) is not given.
-- Xia: windows of 2 km settle late to 0.1 N/kN, since Newton's method seldom reaches the printed tolerance within 100 iterations where the Hessian is not positive definite; to 0.2 N/kN
-  they settle within 1 to 2 km.
+- Liu: segments end where a noisy speed first reaches a bound, which biases w0 by -1.7 %. V-MILS prints no rule for bad data; the gate here acts on rows that a
+  spike has already spoilt. The size of outliers is assumed (1 to 5 km/h).
+- Xia: windows of 2 km settle late to 0.1 N/kN, since Newton's method seldom reaches the printed tolerance within 100 iterations where the Hessian is not positive definite;
+  to 0.2 N/kN they settle within 1 to 2 km.
 ";
 
 /// A page of the documentation: one table for each paper, and below it the notes that several rows share.
