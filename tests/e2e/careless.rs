@@ -231,9 +231,7 @@ fn a_lone_run_is_reported_as_one_of_which_nothing_was_scored_everywhere() {
                  error on the fit runs, ";
     let line =
         printed.lines().find(|line| line.starts_with(words)).unwrap_or_else(|| panic!("{printed}"));
-    assert!(
-        line.ends_with("is of runs that the model was fitted to, and tells nothing of others.")
-    );
+    assert!(line.ends_with("is of runs that the model was fitted to, and says nothing of others."));
     let answer: Value = serde_json::from_slice(&std::fs::read(json).unwrap()).unwrap();
     assert_eq!((&answer["scored_runs"], &answer["unscored"]), (&0.into(), &line.into()));
     let page = std::fs::read_to_string(page).unwrap();

@@ -44,7 +44,7 @@ fn held_and_errors(has_auxiliaries: bool) -> (usize, Vec<f64>) {
     for seed in SEEDS {
         let truth = true_drive(seed, has_auxiliaries);
         let estimated =
-            drive::told(&dataset(seed, &truth, EffectRequest::none())).unwrap().unwrap();
+            drive::estimated(&dataset(seed, &truth, EffectRequest::none())).unwrap().unwrap();
         let found = estimated.answer.efficiency;
         let error = found.value - truth.efficiency;
         eprintln!(

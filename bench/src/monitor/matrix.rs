@@ -73,7 +73,7 @@ pub struct Matrix {
     pub per_100_h: f64,
 }
 
-/// Runs the matrix. Every finished case is reported to `tell`.
+/// Runs the matrix. Every finished case is reported to `progress`.
 pub fn run(plan: &Plan<'_>, report: &(dyn Fn(&Case, &Watched) + Sync)) -> Matrix {
     let cases = cases(plan.scenarios, plan.seeds, plan.first_seed, plan.world);
     let watched = over(&cases, plan.threads, |case| {

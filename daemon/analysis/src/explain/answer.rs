@@ -15,7 +15,7 @@ named! {
     #[derive(Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
     Verdict ("as in answers for machines") {
-        /// Nothing undeclared acts, as far as the data tell.
+        /// Nothing undeclared acts, as far as the data show.
         None "none";
         /// One or more effects of the library act.
         Effect "effect";
@@ -259,7 +259,7 @@ pub struct DriveAnswer {
     /// The declared efficiency, with which forces were read; absent where the usual one was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub declared_efficiency: Option<f64>,
-    /// What lies at a bound of what is looked for: it is not told, and the declared drive stays.
+    /// What lies at a bound of what is looked for: it is not identified, and the declared drive stays.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_bound: Option<&'static str>,
 }
@@ -339,7 +339,7 @@ pub struct ExplainAnswer {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drive: Option<DriveAnswer>,
     /// Seconds by which forces act before their stamps; absent where samples are dense or it is not
-    /// told.
+    /// estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force_late_s: Option<WithStd>,
     /// What stays unexplained and is taken for noise: a force of this standard deviation in N/kN

@@ -19,7 +19,7 @@ pub struct CompetingHypotheses {
 
 /// For each accepted effect that has some, the kinds that could stand in its place.
 ///
-/// Beside those that the runs could not tell from it whatever they showed, a competing hypothesis explains the data as
+/// Beside those that the runs could not distinguish from it whatever they showed, a competing hypothesis explains the data as
 /// well, takes away about as much of the open-loop error, and has nothing left to explain once the effect
 /// is in: what keeps its evidence acts beside the effect and not in its place.
 pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
@@ -62,7 +62,7 @@ pub fn is_in(fit: &Fit, kind: EffectKind) -> bool {
     fit.model.effects.iter().any(|effect| effect.kind() == kind)
 }
 
-/// What would tell a kind that is one number of the train or the line.
+/// What would determine a kind that is one number of the train or the line.
 pub fn informative_runs(kind: EffectKind) -> &'static str {
     use EffectKind::{
         AmbientTemperature, CurveResistance, GradientShift, MassChange, RotatingMass, TractionGain,

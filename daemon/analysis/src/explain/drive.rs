@@ -1,8 +1,8 @@
-//! The efficiency of a drive whose force is not recorded but its power: a scale that the runs tell
+//! The efficiency of a drive whose force is not recorded but its power: a scale that the runs determine
 //! through the mass, before anything undeclared is looked for.
 //!
 //! The efficiency acts one way when the drive pulls and the other way when it brakes, and so do
-//! the auxiliaries: what is told of them holds for the declared mass.
+//! the auxiliaries: what is estimated of them holds for the declared mass.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ const PARAMETERS: [Parameter; 2] = [
 ];
 /// Below this speed in m/s a drive takes nothing.
 const RESTING_MPS: f64 = 0.05;
-/// So many samples at rest tell what is fed beside the drive.
+/// So many samples at rest show what is fed beside the drive.
 const RESTING_MIN: usize = 30;
 /// What is fed beside a drive that drives differs from what is fed at rest by this share at least.
 const DRIVING_SHARE: f64 = 0.25;
@@ -154,7 +154,7 @@ impl Hypothesis for OpenDrive {
     }
 }
 
-/// A drive as the runs tell it.
+/// A drive as the runs show it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EstimatedDrive {
     /// With what was found.
@@ -163,13 +163,13 @@ pub struct EstimatedDrive {
     pub answer: DriveAnswer,
 }
 
-/// What the fit runs of a dataset tell of the drive whose power they record; `None` where no force
-/// comes from power, or too little is driven to tell.
+/// What the fit runs of a dataset say of the drive whose power they record; `None` where no force
+/// comes from power, or too little is driven to estimate it.
 ///
 /// # Errors
 ///
 /// When a run has no usable sample.
-pub fn told(dataset: &Dataset) -> Result<Option<EstimatedDrive>, RunDataError> {
+pub fn estimated(dataset: &Dataset) -> Result<Option<EstimatedDrive>, RunDataError> {
     if dataset.runs.iter().all(|run| run.power().is_none()) {
         return Ok(None);
     }
@@ -215,13 +215,13 @@ fn reported_by(
         declared_efficiency: declared.map(|drive| drive.efficiency),
         at_bound,
     };
-    // What lies at a bound is not told.
+    // What lies at a bound is not identified.
     let drive = if at_bound.is_some() { open.declared } else { at };
     Some(EstimatedDrive { drive, answer })
 }
 
 impl DriveAnswer {
-    /// What is told of the drive, as a sentence to follow another.
+    /// What is estimated of the drive, as a sentence to follow another.
     pub fn sentence(&self) -> String {
         let WithStd { value, std } = self.efficiency;
         let read = match self.declared_efficiency {
@@ -230,15 +230,15 @@ impl DriveAnswer {
         };
         if let Some(name) = self.at_bound {
             return format!(
-                " The force comes from power, and these runs do not tell the drive's efficiency \
+                " The force comes from power, and these runs do not determine the drive's efficiency \
                  ({name} at its bound; {read}): it stays."
             );
         }
-        let auxiliaries = self.auxiliary_power_kw.map_or(String::new(), |told| {
+        let auxiliaries = self.auxiliary_power_kw.map_or(String::new(), |estimated| {
             format!(
                 " and {:.1} ± {:.1} kW for what is fed beside it",
-                told.value,
-                HALF_95 * told.std
+                estimated.value,
+                HALF_95 * estimated.std
             )
         });
         format!(

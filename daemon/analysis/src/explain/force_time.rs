@@ -58,12 +58,12 @@ impl Hypothesis for LateStamps {
 }
 
 /// By how many s the fit runs of a dataset stamp forces late; `None` where samples are dense, where
-/// they act after their stamps, or where it is not told.
+/// they act after their stamps, or where it is not identifiable.
 ///
 /// # Errors
 ///
 /// When a run has no usable sample.
-pub fn told(dataset: &Dataset) -> Result<Option<WithStd>, RunDataError> {
+pub fn estimated(dataset: &Dataset) -> Result<Option<WithStd>, RunDataError> {
     let step_s = dataset.runs.iter().map(|run| run.quality.order.step_s).fold(0.0, f64::max);
     if step_s < STEP_MIN_S {
         return Ok(None);
@@ -84,7 +84,7 @@ pub fn told(dataset: &Dataset) -> Result<Option<WithStd>, RunDataError> {
     Ok((counts && stamps::is_stamped_late(late.value, late.std)).then_some(late))
 }
 
-/// What is told of it, as a sentence to follow another.
+/// What is estimated of it, as a sentence to follow another.
 pub fn sentence(late: WithStd) -> String {
     format!(
         " Forces act {:.2} ± {:.2} s before their stamps and were taken where they act.",

@@ -54,7 +54,7 @@ pub struct ReportContext<'a> {
     pub c_covariance: f64,
     /// Mean weight of the fit runs in kN.
     pub weight_kn: f64,
-    /// By how much a standard deviation that is told by the scatter between runs is enlarged.
+    /// By how much a standard deviation that comes from the scatter between runs is enlarged.
     pub few_runs_factor: f64,
 }
 
@@ -214,7 +214,7 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         None
     }
 
-    /// Kinds that none of the runs at hand could tell from it.
+    /// Kinds that none of the runs at hand could distinguish from it.
     fn twins(&self) -> &[EffectKind] {
         &[]
     }

@@ -2,7 +2,7 @@
 //!
 //! Every kind of the library that is one number of the whole train or line is put beside the finished
 //! model, at no effect, and what the data say of it there is read from the information matrix: how
-//! surely it is none, and whether it can be told from each of the others.
+//! surely it is none, and whether it is distinguishable from each of the others.
 
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{Cholesky, DMatrix};
@@ -39,7 +39,7 @@ pub fn identifiability(search: &Search, outcome: &Outcome) -> Vec<Identifiabilit
         let last = free.len() - 1;
         Some(covariance[(last, last)].sqrt()).filter(|std| std.is_finite())
     };
-    let is_told = |own: usize, std: Option<f64>| {
+    let is_determined = |own: usize, std: Option<f64>| {
         let hypothesis = &kinds[own].hypothesis;
         let counts =
             |size: f64| hypothesis.is_material(&[hypothesis.none() + size], outcome.fit.theta[2]);
@@ -47,9 +47,9 @@ pub fn identifiability(search: &Search, outcome: &Outcome) -> Vec<Identifiabilit
     };
     let one = |own: usize| {
         let alone = std(own, None);
-        let told = is_told(own, alone);
+        let told = is_determined(own, alone);
         let is_alike =
-            |&other: &usize| other != own && told && !is_told(own, std(own, Some(other)));
+            |&other: &usize| other != own && told && !is_determined(own, std(own, Some(other)));
         let alike = (0..kinds.len()).filter(is_alike);
         let hypothesis = &kinds[own].hypothesis;
         Identifiability {
@@ -63,7 +63,7 @@ pub fn identifiability(search: &Search, outcome: &Outcome) -> Vec<Identifiabilit
     (0..kinds.len()).map(one).collect()
 }
 
-/// In words what the data would not show, which kinds they cannot tell apart, and what would; empty where
+/// In words what the data would not show, which kinds they cannot distinguish, and what would; empty where
 /// they hold all.
 pub fn not_held(all: &[Identifiability]) -> String {
     let would = |own: &Identifiability| {
@@ -74,12 +74,12 @@ pub fn not_held(all: &[Identifiability]) -> String {
         .filter(|own| !own.told)
         .map(|own| match own.hidden_up_to() {
             Some(most) => format!(
-                "{} ({} is known to ± {most:.3} only; {} would tell)",
+                "{} ({} is known to ± {most:.3} only; {} would determine it)",
                 own.kind,
                 own.parameter,
                 would(own)
             ),
-            None => format!("{} ({} would tell)", own.kind, would(own)),
+            None => format!("{} ({} would determine it)", own.kind, would(own)),
         })
         .collect();
     let mut text = String::new();

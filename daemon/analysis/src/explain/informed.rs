@@ -1,9 +1,9 @@
-//! Whether the data tell a, b and c at all.
+//! Whether the data determine a, b and c at all.
 
 use super::answer::DavisDeviations;
 use super::evidence::{Fit, FitProblem};
 
-/// Data that take away less than this share of a coefficient's variance do not tell it.
+/// Data that take away less than this share of a coefficient's variance do not determine it.
 const ESTIMATED_MIN: f64 = 0.5;
 
 /// Speeds that spread over less than this share of the greatest are one speed.
@@ -19,7 +19,7 @@ pub fn told_by_data(problem: &FitProblem, deviation: &[f64]) -> DavisDeviations 
     DavisDeviations { a: share(0), b: share(1), c: share(2) }
 }
 
-/// In words which of them the data do not tell, and what would; empty when they tell all.
+/// In words which of them the data do not determine, and what would; empty when they determine all.
 pub fn undetermined(problem: &FitProblem, fit: &Fit, deviation: &[f64]) -> String {
     let DavisDeviations { a, b, c } = told_by_data(problem, deviation);
     let names = [("a", a), ("b", b), ("c", c)];
@@ -35,13 +35,13 @@ pub fn undetermined(problem: &FitProblem, fit: &Fit, deviation: &[f64]) -> Strin
     let (slow_mps, usual_mps, fast_mps) = (at(0.05), at(0.5), at(0.95));
     let usual = fit.theta[0] + usual_mps * (fit.theta[1] + usual_mps * fit.theta[2]);
     let way = if fast_mps - slow_mps < VARIED_MIN * fast_mps {
-        "Other speeds would tell them, best by coasting"
+        "Other speeds would determine them, best by coasting"
     } else {
         "More runs would, or quieter ones"
     };
     format!(
-        " These data hardly tell {}: nine tenths of the motion lie between {slow_mps:.1} and \
-         {fast_mps:.1} m/s, and what is told of {} is mostly the declared tolerance. Their sum at \
+        " These data hardly determine {}: nine tenths of the motion lie between {slow_mps:.1} and \
+         {fast_mps:.1} m/s, and what is known of {} is mostly the declared tolerance. Their sum at \
          {usual_mps:.1} m/s is {usual:.2} N/kN. {way}.",
         names.join(", "),
         if names.len() == 1 { "it" } else { "them" },

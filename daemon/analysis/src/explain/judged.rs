@@ -27,7 +27,7 @@ pub struct Judged {
     pub count: usize,
     /// Error in m/s: before and after.
     pub error_mps: [f64; 2],
-    /// 95 % intervals of the two; absent where nothing tells.
+    /// 95 % intervals of the two; absent where nothing gives them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interval_95_mps: Option<[[f64; 2]; 2]>,
     /// 1 - after / before.

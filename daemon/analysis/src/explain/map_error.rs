@@ -2,7 +2,7 @@
 //!
 //! Every gradient of a map is a little wrong, and each run over it errs alike: what the runs agree on may be
 //! the map's. The finished model is fitted once more with that error beside it, a Gaussian process along the
-//! line. What the data cannot tell from it is not told, and what they can is told better.
+//! line. What the data cannot distinguish from it is less sure, and what they can is surer.
 
 use super::effects::map_error;
 use super::evidence::Fit;
@@ -12,7 +12,7 @@ use super::selection::{Deviations, Outcome, Search, deviations};
 
 /// Moves the models without and with the effects that were found to where they fit best beside the map's
 /// error; how surely the parameters of the latter are known then. Where nothing was found they stay: a, b
-/// and c alone are not told better.
+/// and c alone are not known better.
 pub fn given_map_error(search: &Search, outcome: &mut Outcome) -> Deviations {
     let Some(joint) = joint(search, &outcome.fit) else { return deviations(&outcome.fit) };
     let count = outcome.fit.theta.len();

@@ -85,10 +85,10 @@ pub struct Explanation {
 /// When a run has no usable sample.
 pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, RunDataError> {
     progress(0.0, "reading the runs");
-    let told_drive = drive::told(dataset)?;
-    let retaken = told_drive.as_ref().map(|told| dataset.with_drive(told.drive));
+    let estimated_drive = drive::estimated(dataset)?;
+    let retaken = estimated_drive.as_ref().map(|it| dataset.with_drive(it.drive));
     let dataset = retaken.as_ref().unwrap_or(dataset);
-    let late = force_time::told(dataset)?;
+    let late = force_time::estimated(dataset)?;
     let moved = late.map(|late| dataset.with_forces_moved(late.value));
     let dataset = moved.as_ref().unwrap_or(dataset);
     let (fit_runs, holdout): (Vec<RunData>, Vec<RunData>) =
@@ -115,9 +115,9 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
     let score = Score::of(&problem, &holdout, &outcome.base, &outcome.fit);
     let predictions = score::predictions(&problem, &holdout, &outcome.fit);
     let mut answer = verdict::answer(&search, &outcome, &deviations, &known, &score, diagnostics);
-    if let Some(told) = told_drive {
-        answer.statement += &told.answer.sentence();
-        answer.drive = Some(told.answer);
+    if let Some(estimated) = estimated_drive {
+        answer.statement += &estimated.answer.sentence();
+        answer.drive = Some(estimated.answer);
     }
     if let Some(late) = late {
         answer.statement += &force_time::sentence(late);

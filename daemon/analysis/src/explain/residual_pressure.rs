@@ -72,7 +72,7 @@ fn onset_s(points: &[(f64, f64)], baseline_pa: f64) -> Option<f64> {
 }
 
 /// Windows, in the recordings' own time, in which the cylinders of some runs keep a pressure;
-/// `None` when no pressure tells anything.
+/// `None` when no pressure says anything.
 pub fn windows<'r>(runs: impl Iterator<Item = &'r RunData> + Clone) -> Option<Vec<RunWindow>> {
     let points: Vec<(&RunData, Vec<(f64, f64)>)> = runs.map(|run| (run, released(run))).collect();
     let medians: Vec<f64> = points

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use dynocar_core::simulate::{Recording, STANDING_MPS, departs};
 
-/// A run that moves for less time in s is a shunt in a queue, and tells little.
+/// A run that moves for less time in s is a shunt in a queue, and says little.
 const STOP_RUN_MOVING_MIN_S: f64 = 10.0;
 
 /// The runs from stop to stop that can be simulated from departure to standstill: first sample,

@@ -53,10 +53,10 @@ impl<'o> Unexplained<'o> {
         )
     }
 
-    /// What explains the residual but is not told, in words; empty for nothing.
+    /// What explains the residual but is not determined, in words; empty for nothing.
     pub fn undetermined(&self) -> String {
         let one = |(trial, refusal): &(&Trial, Refusal)| {
-            format!(" Not told is {}: {refusal}.", trial.kind.name())
+            format!(" Not determined is {}: {refusal}.", trial.kind.name())
         };
         self.refused.iter().map(one).collect()
     }

@@ -127,7 +127,7 @@ fn unscored(search: &Search, score: &Score) -> Option<String> {
     let figure = match (before, after) {
         (Some(before), Some(after)) => format!(
             ": the open-loop error on the fit runs, {before:.3} m/s before and {after:.3} m/s \
-             after, is of runs that the model was fitted to, and tells nothing of others"
+             after, is of runs that the model was fitted to, and says nothing of others"
         ),
         _ => String::new(),
     };
@@ -274,7 +274,7 @@ fn statement(
             let moving_s = moving_s(search);
             let observations = outcome.base.observations();
             let text = format!(
-                "The fit runs hold {moving_s:.0} s of usable motion ({observations} observations): too little to tell."
+                "The fit runs hold {moving_s:.0} s of usable motion ({observations} observations): too little to explain."
             );
             (text, Some("Record several runs of some minutes, in both directions.".into()))
         }

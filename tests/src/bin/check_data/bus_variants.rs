@@ -128,7 +128,8 @@ pub fn by_power(surveyed: &Path) -> Result<ByPower, String> {
     let without: Vec<&str> = without.collect();
     std::fs::write(folder.path().join("dataset.toml"), without.join("\n")).map_err(words)?;
     let (recorded, powered) = (loaded(surveyed)?, loaded(folder.path())?);
-    let estimated = drive::told(&powered).map_err(|error| error.to_string())?.ok_or("no power")?;
+    let estimated =
+        drive::estimated(&powered).map_err(|error| error.to_string())?.ok_or("no power")?;
     let apart = apart(&recorded, &powered.with_drive(estimated.drive))?;
     let error_mps = held_out_mps(&powered)?;
     let auxiliaries_kw = estimated.answer.auxiliary_power_kw.ok_or("no auxiliaries")?;

@@ -1,6 +1,6 @@
 //! A brake that does not release: a constant force from some instant to the end of the run.
 //!
-//! Where the brake cylinders keep some pressure while no brake is reported, that tells the
+//! Where the brake cylinders keep some pressure while no brake is reported, that shows the
 //! windows too, in holdout runs as well, whose speeds are not looked at.
 
 use std::sync::Arc;

@@ -56,7 +56,7 @@ impl Effect for GradientError {
             return Proposal::NotTestable("positions are not measured".into());
         };
         if runs.len() < RUNS_MIN {
-            return Proposal::NotTestable("one passage does not tell what stays".into());
+            return Proposal::NotTestable("one passage does not show what stays".into());
         }
         let is_one_way = runs.iter().all(|run| run.direction == runs[0].direction);
         let mut profiles = vec![Profile::new(span_m, MAP, 1, is_one_way)];

@@ -1,5 +1,5 @@
 //! A measured speed that is late. Forces that act late leave the gradient on time, a late speed does
-//! not: what the line does tells the two apart, and so does a position that runs ahead of the speed.
+//! not: what the line does distinguishes the two, and so does a position that runs ahead of the speed.
 
 use dynocar_core::terms::speed_delay::{self, LateSpeed};
 use dynocar_core::terms::{Entry, Parameter};

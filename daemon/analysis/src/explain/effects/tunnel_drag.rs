@@ -1,7 +1,7 @@
 //! Air resistance in tunnels: c v² is larger for the part of the train inside.
 //!
 //! A map without a tunnel is no proof that there is none: beside the mapped tunnels, places are
-//! looked for where c v² is larger. Trains that pass a place at different speeds tell that from a
+//! looked for where c v² is larger. Trains that pass a place at different speeds distinguish that from a
 //! constant resistance there.
 
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{End, Inside, Intervals, find};
 use crate::explain::scan::Scan;
 
-/// Motion in s inside mapped tunnels that tells of them.
+/// Motion in s inside mapped tunnels that says something of them.
 const MAPPED_MIN_S: f64 = 10.0;
 /// A tunnel that nobody mapped is less likely than some resistance at a place.
 const UNMAPPED_COST: f64 = 4.0;
@@ -158,7 +158,7 @@ impl Hypothesis for Tunnels {
         let force_per_unit = 1.0 * context.weight_kn;
         reported.push("dc_n_per_mps2", extra * force_per_unit, extra_deviation * force_per_unit);
         let c = context.c;
-        // A c that is not told from none makes no factor.
+        // A c that is not distinguishable from none makes no factor.
         if c > context.c_deviation {
             // Delta method for 1 + extra / c.
             let (by_extra, by_c) = (1.0 / c, -extra / (c * c));

@@ -1,5 +1,5 @@
 //! Wheels of another diameter than declared: measured speed = scale * true speed, and the odometer
-//! with it. Balises tell it from the rotating mass: they correct the position.
+//! with it. Balises distinguish it from the rotating mass: they correct the position.
 
 use dynocar_core::terms::{Entry, Parameter, wheel};
 use dynocar_shared::vocabulary::EffectKind;

@@ -1,4 +1,4 @@
-//! The position against the integrated speed, in time: what tells a speed that is late.
+//! The position against the integrated speed, in time: what shows a speed that is late.
 //!
 //! Behind a speed that is late by some time, the way by position is ahead of the way by integrated
 //! speed by as much as the train drives in that time: more, the faster it is. An odometer that is late
@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::bins::SEGMENT_GAP_MAX_S;
 
-/// Least time in s and range of speeds in m/s of a part from stand to stand that tells.
+/// Least time in s and range of speeds in m/s of a part from stand to stand that says.
 const PART_MIN_S: f64 = 20.0;
 const RANGE_MIN_MPS: f64 = 5.0;
 /// Fewer parts do not show how they differ.
@@ -66,7 +66,7 @@ fn late_s(recording: &Recording, from: usize, end: usize) -> Option<f64> {
 }
 
 /// By how many s positions show that the speed is late, with the standard deviation; `None` where too few
-/// parts tell.
+/// parts say.
 ///
 /// A speed is late against the line, where the train is by its position. A position that is not clearly
 /// ahead of the speed shows that the speed is not late, or that both are late together: then the line is

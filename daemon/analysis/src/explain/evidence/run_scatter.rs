@@ -2,7 +2,7 @@
 //! resistance of the day, and the instant that a force is stamped with.
 //!
 //! Each run has a factor of its own on the control force and on the basic resistance, near 1 with
-//! a standard deviation that the runs tell themselves, and a small delay of its own. They are
+//! a standard deviation that is estimated from the runs, and a small delay of its own. They are
 //! integrated out of every fit, so that what is common to all runs is judged by the scatter
 //! between them, and a few hundredths of a second between force and speed bend no resistance.
 

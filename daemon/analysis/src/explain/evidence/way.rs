@@ -1,4 +1,4 @@
-//! The way by position against the way by integrated speed: what tells a wheel's diameter.
+//! The way by position against the way by integrated speed: what shows a wheel's diameter.
 
 use dynocar_core::simulate::Recording;
 
@@ -7,9 +7,9 @@ use super::bins::SEGMENT_GAP_MAX_S;
 /// Way by position over way by integrated speed, and its standard deviation.
 ///
 /// Balises correct the position while the odometer shares the error of the wheel diameter, so
-/// that the ratio over many kilometres tells the diameter. Between two corrections the odometer
-/// drifts by that error, so that what lies before the first and behind the last tells nothing, and
-/// would tell a wheel nearer to the declared one than it is.
+/// that the ratio over many kilometres shows the diameter. Between two corrections the odometer
+/// drifts by that error, so that what lies before the first and behind the last says nothing, and
+/// would show a wheel nearer to the declared one than it is.
 pub(super) fn way_ratio(recording: &Recording) -> Option<(f64, f64)> {
     const END_ERROR_M: f64 = 10.0;
     const CORRECTION_MIN_M: f64 = 1.0;

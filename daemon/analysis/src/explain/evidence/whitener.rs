@@ -124,7 +124,7 @@ impl Walk {
         let added = fading_var * fading_noise(fade, step_s, fading_s);
         let white = Matrix2::new(self.noise.white_density * step_s, 0.0, 0.0, 0.0);
         belief.predict(Vector2::zeros(), &moved, &(added + white));
-        // Without mean and observation only the variances are told.
+        // Without mean and observation only the variances are known.
         let Ok(innovation) = belief.innovation(LEVEL, 0.0, bin_var) else { return (step, 1.0) };
         step.gain = belief.take(LEVEL, &innovation, bin_var);
         step.per_deviation = innovation.inverse_variance.sqrt();

@@ -31,8 +31,8 @@ pub(super) fn best_runs(
         let mut sum = Tuple::zero(scan.fit.theta.len());
         let mut chosen = Vec::new();
         // A chosen run shows the force by itself.
-        let tells = |own: &&(usize, f64, f64)| own.1 > EQUAL && own.2 * sign > 0.0;
-        for &(index, _, _) in order.iter().filter(tells) {
+        let speaks_for_it = |own: &&(usize, f64, f64)| own.1 > EQUAL && own.2 * sign > 0.0;
+        for &(index, _, _) in order.iter().filter(speaks_for_it) {
             sum.add(&tuples[index]);
             chosen.push(index);
             let (gain, estimate) = scan.gain(&sum);

@@ -89,7 +89,7 @@ fn reason(explanation: &Explanation, row: &CandidateRow, is_rival: bool) -> Stri
         return "part of the model".into();
     }
     if is_rival {
-        return format!("explains the runs as well as {found}: not told apart");
+        return format!("explains the runs as well as {found}: not distinguishable");
     }
     match row.beside {
         Some(beside) if alone > SCORE_MIN && beside <= SCORE_MIN => {

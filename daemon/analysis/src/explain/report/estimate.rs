@@ -7,7 +7,7 @@ use crate::explain::answer::HALF_95;
 pub struct Estimate {
     /// The value.
     pub value: f64,
-    /// The interval; `None` where nothing tells.
+    /// The interval; `None` where nothing gives one.
     pub interval: Option<[f64; 2]>,
 }
 

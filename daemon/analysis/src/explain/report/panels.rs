@@ -237,7 +237,7 @@ fn unevenness(panel: &Panel) -> f64 {
     sum / panel.bins.len() as f64
 }
 
-/// Covariance of the grown model's parameters, with the deviations that are told.
+/// Covariance of the updated model's parameters, with the deviations that are reported.
 pub(super) fn covariance(explanation: &Explanation) -> DMatrix<f64> {
     let Deviations { std: deviations, covariance } = &explanation.deviations;
     let count = deviations.len();

@@ -105,7 +105,7 @@ fn figures(meaning: &str, value: &ParameterValue, std: Option<&ParameterValue>) 
             let (run, from, to) = (&w.run, w.t_start_s, w.t_end_s);
             (format!("mass factor in {run}, {from:.0} to {to:.0} s"), w.mass_factor)
         })),
-        // The formula is told with the effect; its numbers stand here.
+        // The formula stands with the effect; its numbers stand here.
         ParameterValue::Formula(_) => Vec::new(),
         ParameterValue::Profile(entries) => each(
             &mut entries

@@ -16,7 +16,7 @@ pub fn sentence(answer: &ExplainAnswer, errors: &Errors) -> String {
     let found = found.join("; and ");
     match answer.verdict {
         Verdict::None => {
-            "Nothing undeclared acts, as far as these runs tell: the declared model with a, b and \
+            "Nothing undeclared acts, as far as these runs show: the declared model with a, b and \
              c refitted explains them."
                 .into()
         }
@@ -29,7 +29,7 @@ pub fn sentence(answer: &ExplainAnswer, errors: &Errors) -> String {
                 answer.ambiguous_with.iter().map(|kind| kind_name(kind).into()).collect();
             let is_or_are = if competing.len() == 1 { "explains" } else { "explain" };
             format!(
-                "Something undeclared acts, but these runs cannot tell what: it may be {found}; \
+                "Something undeclared acts, but these runs do not show what: it may be {found}; \
                  {} {is_or_are} them as well. {}",
                 joined(&competing),
                 gained(errors)
@@ -304,7 +304,7 @@ mod tests {
         assert_eq!(
             sentence(&answer, &errors),
             format!(
-                "Something undeclared acts, but these runs cannot tell what: it may be a local \
+                "Something undeclared acts, but these runs do not show what: it may be a local \
                  resistance {size}; tunnel drag explains them as well. {gained}"
             )
         );

@@ -8,7 +8,7 @@ use crate::explain::evidence::{Fit, FitProblem, PRIOR_RUNS, RunData, RunNormal};
 
 /// A parameter at its bound is held there to this share of what is looked for.
 const HELD_SHARE: f64 = 1e-4;
-/// Less runs than these tell nothing of each other.
+/// Less runs than these say nothing of each other.
 const RUNS_MIN: usize = 2;
 
 /// By how much the parameters move when each run is left out, to second order; `None` for a run
@@ -23,7 +23,7 @@ fn moves_without_each_run(fit: &Fit) -> Vec<Option<DVector<f64>>> {
 }
 
 /// The parameters fitted without each run, to second order and within their bounds: what the other
-/// runs say of it. What they do not tell is at none, but a parameter of a single run (its wind, a load
+/// runs say of it. What they do not determine is at none, but a parameter of a single run (its wind, a load
 /// in it) stays as it was fitted: it says nothing of other runs. With a single run all stay.
 pub fn without_each_run(problem: &FitProblem, fit: &Fit) -> Vec<Vec<f64>> {
     let count = fit.theta.len();
@@ -79,7 +79,7 @@ fn students_factor(freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |student| student.inverse_cdf(0.975) / HALF_95)
 }
 
-/// By how much a standard deviation that only the scatter between so many runs tells is enlarged.
+/// By how much a standard deviation that only the scatter between so many runs gives is enlarged.
 pub fn few_runs_factor(runs: usize) -> f64 {
     students_factor((runs as f64 - 1.0).max(2.0))
 }
@@ -118,7 +118,7 @@ pub fn deviations(fit: &Fit) -> Deviations {
     for moved in moves.iter().flatten() {
         scatter += moved.component_mul(moved);
     }
-    // What one run alone tells scatters with none.
+    // What one run alone determines scatters with none.
     let least = if moves.iter().all(Option::is_some) { 0.0 } else { 1.0 };
     let left = (runs - 1.0) / runs;
     let freedom = PRIOR_RUNS + runs - 1.0;

@@ -30,7 +30,7 @@ const FINALIST_ERROR_REDUCTION: f64 = 0.02;
 const MANY_OBSERVATIONS: usize = 5_000;
 /// Shares of the slow part of a noise under which a kind looks again.
 pub(super) const STIFF: [f64; 2] = [0.01, 1e-4];
-/// Less observations than this tell nothing.
+/// Less observations than this show nothing.
 pub const OBSERVATIONS_MIN: usize = 80;
 
 /// The search over one dataset.

@@ -1,4 +1,4 @@
-//! Coefficients that only braking tells: adhesion (Xie 2019), disc friction and braking ratio
+//! Coefficients that only braking shows: adhesion (Xie 2019), disc friction and braking ratio
 //! (Jin 2020).
 //!
 //! # Layout

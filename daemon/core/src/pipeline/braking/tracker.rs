@@ -128,7 +128,7 @@ struct Moment {
 
 /// An innovation beyond so many standard deviations is refused.
 const OUTLIER_GATE: f64 = 5.0;
-/// Forgetting factors of the mean innovations that tell of a change: one for a sudden one, one
+/// Forgetting factors of the mean innovations that show a change: one for a sudden one, one
 /// for a small one.
 const CHANGE_FORGETTING: [f64; 2] = [0.8, 0.95];
 /// A mean innovation beyond so many of its standard deviations is a change.

@@ -20,7 +20,7 @@ const BEST_FOR_PRODUCTS: usize = 3;
 /// first factor: else the variants of one crowd out the others.
 const REFINED: usize = 8;
 const REFINED_ALIKE: usize = 2;
-/// Exponents of the speed in a product that are tried as they are: one number less is to be told.
+/// Exponents of the speed in a product that are tried as they are: one number less is to be estimated.
 const WHOLE_EXPONENTS: [f64; 2] = [1.0, 2.0];
 
 /// What the form that explains most does beyond its price, before its numbers are fitted.

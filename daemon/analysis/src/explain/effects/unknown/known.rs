@@ -4,7 +4,7 @@ use dynocar_core::terms::extra::{Covariate, Factor, Form};
 
 use crate::explain::scan::Scan;
 
-/// So many bins tell too little, or a share of them where there are few.
+/// So many bins show too little, or a share of them where there are few.
 const FEW_BINS: usize = 8;
 const FEW_SHARE: f64 = 0.03;
 
@@ -16,7 +16,7 @@ pub struct Known {
     pub values: Vec<Vec<Option<f64>>>,
     /// Least value.
     pub low: f64,
-    /// Of less, there are too few values to tell anything.
+    /// Of less, there are too few values to show anything.
     pub least: f64,
     /// Greatest value.
     pub high: f64,

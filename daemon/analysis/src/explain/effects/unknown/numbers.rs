@@ -3,7 +3,7 @@
 use dynocar_core::terms::extra::Form;
 
 /// Numbers of a form that are fitted, with their bounds for a covariate over the range from `low`
-/// to `high`; below `least` there are too few data to tell anything.
+/// to `high`; below `least` there are too few data to show anything.
 pub fn fitted_numbers(form: Form, [least, low, high]: [f64; 3]) -> Vec<(usize, (f64, f64))> {
     let width = high - low;
     match form {

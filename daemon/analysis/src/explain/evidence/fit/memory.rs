@@ -2,7 +2,7 @@
 //!
 //! Effects are of three ways. Resistances that only add to the others, and gradients, are integrated by
 //! themselves for a unit of what they are proportional to. All others act on the forces together; where that
-//! is one effect in which the forces are affine, two looks at the samples tell it for all parameters.
+//! is one effect in which the forces are affine, two looks at the samples give it for all parameters.
 
 use std::ops::Range;
 

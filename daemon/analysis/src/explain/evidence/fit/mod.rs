@@ -222,7 +222,7 @@ fn declared_response(run: &RunData) -> Response {
 }
 
 /// The ratios of all runs together. Wheel creep, rounding and the places where a run starts are
-/// common to the runs: below `COMMON` nothing is told.
+/// common to the runs: below `COMMON` nothing is seen.
 fn pooled_way_ratio(runs: &[RunData]) -> Option<(f64, f64)> {
     const COMMON: f64 = 0.001;
     let mut ratios: Vec<f64> = runs.iter().filter_map(|run| Some(run.way_ratio?.0)).collect();

@@ -25,7 +25,7 @@ use crate::pipeline::settings::{SettingError, require, settings};
 use crate::train::TrainModel;
 
 settings! {
-    /// What every braking pipeline is told of motion, measurement and braking.
+    /// What every braking pipeline knows beforehand of motion, measurement and braking.
     ///
     /// The defaults of the noise are those of the papers' simulation: a position measured within
     /// 0.1 m, and process noise uniform within 0.1 m and 0.1 km/h over steps of 0.2 s.
