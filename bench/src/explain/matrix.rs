@@ -94,7 +94,7 @@ pub fn cases(scenarios: &[Scenario], seeds: usize, first_seed: u64, world: World
 }
 
 /// Runs the matrix over [`cases`] of these scenarios, on `threads` threads. Every finished case is
-/// reported to `progress`.
+/// reported to `report`.
 pub fn run(
     scenarios: &[Scenario],
     cases: &[Case],

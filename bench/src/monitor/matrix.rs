@@ -73,7 +73,7 @@ pub struct Matrix {
     pub per_100_h: f64,
 }
 
-/// Runs the matrix. Every finished case is reported to `progress`.
+/// Runs the matrix. Every finished case is reported to `report`.
 pub fn run(plan: &Plan<'_>, report: &(dyn Fn(&Case, &Watched) + Sync)) -> Matrix {
     let cases = cases(plan.scenarios, plan.seeds, plan.first_seed, plan.world);
     let watched = over(&cases, plan.threads, |case| {

@@ -109,14 +109,17 @@ pub(super) fn is_accepted(fit: &Fit, index: usize, evidence: f64, reduction: f64
 
 /// Whether an effect is certain, however little it takes from the error: strong evidence for one number of the
 /// whole train or line, which the runs agree on. What is looked for at many places or in some of the runs must
-/// take more from the error; loads, winds and slippery rails, which change from run to run, unmapped tunnels and forms without
-/// a name are never certain so.
+/// take more from the error. Never certain so are loads, winds and slippery rails, which change from run to run, a late
+/// speed, which late forces look like, unmapped tunnels and forms without a name.
 fn is_certain(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> bool {
-    use EffectKind::{DraggingBrake, LocalResistance, LowAdhesion, MassChange, Unknown, Wind};
+    use EffectKind::{
+        DraggingBrake, LocalResistance, LowAdhesion, MassChange, SpeedDelay, Unknown, Wind,
+    };
     let effect = &fit.model.effects[index];
     let is_chosen_among_many = matches!(effect.kind(), DraggingBrake | LocalResistance);
-    let needs_the_score = matches!(effect.kind(), LowAdhesion | MassChange | Unknown | Wind)
-        || (effect.place().intervals_m.is_some() && !is_chosen_among_many);
+    let needs_the_score =
+        matches!(effect.kind(), LowAdhesion | MassChange | SpeedDelay | Unknown | Wind)
+            || (effect.place().intervals_m.is_some() && !is_chosen_among_many);
     let runs_agree = || {
         let std = deviations(fit).std[fit.model.ranges()[index].start];
         let size = effect.size(fit.effect_parameters(index)).abs();
