@@ -60,7 +60,7 @@ fn a_number_is_no_surer_than_the_map_that_all_runs_share() {
     let ParameterValue::Number(stated) = effect.std["rotating_mass_factor"] else {
         panic!("a standard deviation is a number");
     };
-    let by_runs_alone = deviations(&explanation.grown).std[3];
+    let by_runs_alone = deviations(&explanation.grown).covariance[(3, 3)].sqrt();
     assert!(stated > 1.1 * by_runs_alone, "{stated}, and {by_runs_alone} by the runs alone");
 }
 

@@ -101,6 +101,12 @@ pub struct Location {
 }
 
 impl ExplainAnswer {
+    /// Adds what limits the verdict.
+    pub fn add_caveat(&mut self, sentence: &str) {
+        self.statement += sentence;
+        self.caveats.push(sentence.trim().to_owned());
+    }
+
     /// The diagnostics by which the data cannot be true.
     pub fn impossibilities(&self) -> impl Iterator<Item = &DatasetDiagnostic> {
         self.diagnostics.iter().filter(|diagnostic| diagnostic.severity == Severity::Fundamental)
@@ -296,8 +302,14 @@ pub struct DavisDeviations {
 pub struct ExplainAnswer {
     /// The verdict.
     pub verdict: Verdict,
-    /// The verdict in a sentence or two.
+    /// The verdict in a sentence or two, with all caveats.
     pub statement: String,
+    /// The verdict without its caveats.
+    #[serde(skip)]
+    pub verdict_words: String,
+    /// What limits it, a sentence or two each.
+    #[serde(skip)]
+    pub caveats: Vec<String>,
     /// What may spoil the verdict, the worst first; with a fundamental one there is none.
     #[serde(rename = "notes")]
     pub diagnostics: Vec<DatasetDiagnostic>,

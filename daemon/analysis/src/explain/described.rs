@@ -50,7 +50,7 @@ pub(super) fn describe_place(place: &Location) -> Vec<String> {
 }
 
 /// How well the ends of a place are known: half of the widest 95 % interval.
-fn precision(known: &PlaceUncertainty) -> Option<String> {
+pub fn precision(known: &PlaceUncertainty) -> Option<String> {
     let half = |interval: [f64; 2]| 0.5 * (interval[1] - interval[0]);
     let widest = |ends: &mut dyn Iterator<Item = [f64; 2]>| ends.map(half).reduce(f64::max);
     let ends_m = widest(&mut known.intervals_m.iter().flatten().flatten().copied());

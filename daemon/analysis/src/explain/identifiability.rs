@@ -10,6 +10,7 @@ use nalgebra::{Cholesky, DMatrix};
 use super::answer::{HALF_95, Identifiability};
 use super::competing::{informative_runs, is_in, separating_run};
 use super::effects::{Candidate, LIBRARY};
+use super::report::words::number;
 use super::selection::{Outcome, Search};
 
 /// The kinds that are one number of the whole train or line, and not found.
@@ -64,8 +65,8 @@ pub fn identifiability(search: &Search, outcome: &Outcome) -> Vec<Identifiabilit
 }
 
 /// In words what the data would not show, which kinds they cannot distinguish, and what would; empty where
-/// they hold all.
-pub fn not_held(all: &[Identifiability]) -> String {
+/// they hold all; a sentence or two each.
+pub fn not_held(all: &[Identifiability]) -> Vec<String> {
     let would = |own: &Identifiability| {
         EffectKind::from_name(own.kind).map_or("more runs", informative_runs)
     };
@@ -74,18 +75,21 @@ pub fn not_held(all: &[Identifiability]) -> String {
         .filter(|own| !own.told)
         .map(|own| match own.hidden_up_to() {
             Some(most) => format!(
-                "{} ({} is known to ± {most:.3} only; {} would determine it)",
+                "{} ({} is known to ± {} only; {} would determine it)",
                 own.kind,
                 own.parameter,
+                number(most, Some(most)),
                 would(own)
             ),
             None => format!("{} ({} would determine it)", own.kind, would(own)),
         })
         .collect();
-    let mut text = String::new();
+    let mut caveats = Vec::new();
     if !hidden.is_empty() {
-        text +=
-            &format!(" An effect that matters could hide in these data: {}.", hidden.join(", "));
+        caveats.push(format!(
+            " An effect that matters could hide in these data: {}.",
+            hidden.join(", ")
+        ));
     }
     for (index, own) in all.iter().enumerate() {
         let pair = |other: &&Identifiability| own.alike.contains(&other.kind);
@@ -95,8 +99,8 @@ pub fn not_held(all: &[Identifiability]) -> String {
                 [Some(one), Some(other)] => separating_run(one, &[other]),
                 _ => String::new(),
             };
-            text += &format!(" {} and {} look alike in them. {run}", own.kind, other.kind);
+            caveats.push(format!(" {} and {} look alike in them. {run}", own.kind, other.kind));
         }
     }
-    text
+    caveats
 }

@@ -12,7 +12,7 @@
 //! - [`selection`]: the search for effects, its significance, evidence by run
 //! - [`gradient_prior`], [`map_error`]: how maps err; the finished model beside what the map's own error makes all runs err alike
 //! - [`score`], `stop_runs`, [`stop_to_stop`], [`judged`], `bootstrap`: open-loop prediction of fit and holdout runs
-//! - [`unexplained`], [`informed`], [`identifiability`], [`competing`], [`runners_up`], [`verdict`], `described`, [`answer`]: the statement
+//! - [`unexplained`], [`informed`], [`identifiability`], [`competing`], [`runners_up`], [`verdict`], [`described`], [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
 //!
 //! [`explain`] runs it all.
@@ -20,7 +20,7 @@
 pub mod answer;
 mod bootstrap;
 pub mod competing;
-mod described;
+pub mod described;
 pub mod drive;
 pub mod effects;
 pub mod evidence;
@@ -116,11 +116,11 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
     let predictions = score::predictions(&problem, &holdout, &outcome.fit);
     let mut answer = verdict::answer(&search, &outcome, &deviations, &known, &score, diagnostics);
     if let Some(estimated) = estimated_drive {
-        answer.statement += &estimated.answer.sentence();
+        answer.add_caveat(&estimated.answer.sentence());
         answer.drive = Some(estimated.answer);
     }
     if let Some(late) = late {
-        answer.statement += &force_time::sentence(late);
+        answer.add_caveat(&force_time::sentence(late));
         answer.force_late_s = Some(late);
     }
     let acceptance_score = Search::greatest_score(&outcome);

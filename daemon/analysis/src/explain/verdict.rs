@@ -49,26 +49,29 @@ pub fn answer(
     };
     let [rmse_before, rmse_after] = score.holdout_rmse_mps();
     let pair = |errors: [SpeedError; 2]| Some([errors[0].rmse_mps()?, errors[1].rmse_mps()?]);
-    let impossible: Vec<String> = diagnostics
-        .iter()
-        .filter(|diagnostic| diagnostic.severity == Severity::Fundamental)
-        .map(ToString::to_string)
-        .collect();
-    let (statement, experiment) = if impossible.is_empty() {
-        let (text, experiment) =
-            statement(search, outcome, verdict, &effects, &competing, left.as_ref());
-        let undetermined = match verdict {
-            Verdict::InsufficientData => String::new(),
-            _ => undetermined(search.problem, fit, std) + &not_held(&identifiability),
-        };
-        (text + &worse_held_out(&effects, score) + &undetermined, experiment)
-    } else {
-        let text = format!("The data cannot be true as described: {}", impossible.join("; "));
-        (text, Some("Set right what is named and run this again.".into()))
+    let left = left.as_ref();
+    let Words { verdict_words, caveats, experiment } = match impossible(&diagnostics) {
+        Some(words) => words,
+        None => {
+            let (verdict_words, experiment) =
+                statement(search, outcome, verdict, &effects, &competing, left);
+            let mut caveats = vec![worse_held_out(&effects, score)];
+            if verdict != Verdict::InsufficientData {
+                caveats.push(undetermined(search.problem, fit, std));
+                caveats.extend(not_held(&identifiability));
+            }
+            Words { verdict_words, caveats, experiment }
+        }
     };
     ExplainAnswer {
         verdict,
-        statement,
+        statement: verdict_words.clone() + &caveats.concat(),
+        verdict_words,
+        caveats: caveats
+            .iter()
+            .map(|it| it.trim().to_owned())
+            .filter(|it| !it.is_empty())
+            .collect(),
         diagnostics,
         effects,
         ambiguous_with: competing.iter().flat_map(|it| &it.kinds).map(|kind| kind.name()).collect(),
@@ -97,6 +100,24 @@ pub fn answer(
         identifiability,
         predictions: BTreeMap::new(),
     }
+}
+
+/// What the verdict is in words.
+struct Words {
+    verdict_words: String,
+    caveats: Vec<String>,
+    experiment: Option<String>,
+}
+
+/// The words where the data cannot be true.
+fn impossible(diagnostics: &[DatasetDiagnostic]) -> Option<Words> {
+    let fundamental = diagnostics.iter().filter(|it| it.severity == Severity::Fundamental);
+    let faults: Vec<String> = fundamental.map(ToString::to_string).collect();
+    (!faults.is_empty()).then(|| Words {
+        verdict_words: format!("The data cannot be true as described: {}", faults.join("; ")),
+        caveats: Vec::new(),
+        experiment: Some("Set right what is named and run this again.".into()),
+    })
 }
 
 /// That the runs held out are predicted worse with what was found; empty when they are not.

@@ -7,15 +7,14 @@ use std::time::Duration;
 
 use clap::Args;
 use dynocar_analysis::dataset::{Dataset, DatasetFiles, Role, SourcePosition};
-use dynocar_analysis::explain::answer::{ExplainAnswer, RunnerUp};
 use dynocar_analysis::explain::evidence::RunDataError;
-use dynocar_analysis::explain::judged::Metric;
 use dynocar_analysis::explain::report::timeline::Timeline;
 use dynocar_analysis::explain::selection::Progress;
 use dynocar_analysis::explain::{Explanation, explain};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::text::{diagnostics, for_shell};
+pub use super::explained::text;
+use super::text::for_shell;
 use super::threads::Threads;
 use crate::annotation::{AnnotationError, annotate};
 use crate::report;
@@ -278,41 +277,4 @@ fn write_predictions(
         files.insert(run.file.clone(), path.display().to_string());
     }
     Ok(files)
-}
-
-/// The answer for people.
-pub fn text(answer: &ExplainAnswer) -> String {
-    let mut text = diagnostics(&answer.diagnostics) + &format!("{}\n", answer.statement);
-    if let Some(experiment) = &answer.experiment {
-        text += &format!("To settle it: {experiment}\n");
-    }
-    let (base, std) = (&answer.base, &answer.base.std);
-    let [a, b, c] = [std.a, std.b, std.c].map(|deviation| 1.96 * deviation);
-    text += &format!(
-        "a = {:.3} ± {a:.3} N/kN, b = {:.4} ± {b:.4}, c = {:.6} ± {c:.6} (95 %, v in m/s)\n",
-        base.a, base.b, base.c
-    );
-    if let Some(judged) = answer.judged.filter(|it| it.metric == Metric::StopToStop) {
-        let [before, after] = judged.error_mps;
-        text += &format!(
-            "holdout runs{}: {before:.3} m/s before, {after:.3} m/s after\n",
-            judged.predicted()
-        );
-    }
-    if let (Some(before), Some(after)) = (answer.rmse_before, answer.rmse_after) {
-        text += &format!("holdout runs, open loop: {before:.3} m/s before, {after:.3} m/s after\n");
-    }
-    if let Some(unscored) = &answer.unscored {
-        text += &format!("{unscored}\n");
-    }
-    for other in answer.effects.iter().flat_map(|effect| &effect.runners_up) {
-        let RunnerUp { formula, evidence_less } = other;
-        text += &format!("another form, evidence less by {evidence_less:.0}: {formula}\n");
-    }
-    for considered in &answer.considered {
-        let evidence =
-            considered.evidence.map_or("     -".into(), |evidence| format!("{evidence:6.0}"));
-        text += &format!("  {evidence}  {:20} {}\n", considered.kind, considered.reason);
-    }
-    text
 }

@@ -4,6 +4,7 @@
 pub mod check;
 mod completions;
 pub mod explain;
+mod explained;
 mod fmu;
 pub mod identify;
 mod import;

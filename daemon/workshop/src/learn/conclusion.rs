@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use dynocar_analysis::explain::Explanation;
-use dynocar_analysis::explain::answer::Verdict;
+use dynocar_analysis::explain::answer::{EffectAnswer, Verdict};
+use dynocar_analysis::explain::evidence::{SCORE_MIN, p_value};
 use tracing::{info, warn};
 
 use super::error::LearnError;
@@ -121,7 +122,10 @@ impl Conclusion<'_> {
         let is_held = |kind: &str| !grown.not_expressed.iter().any(|it| it == kind);
         let effects: Vec<_> =
             answer.effects.iter().filter(|it| is_held(it.kind)).map(found_effect).collect();
-        let Some(error) = improvement(answer).filter(|_| !effects.is_empty()) else {
+        // What is certain and takes little from the error improves no prediction.
+        let matters = |it: &EffectAnswer| is_held(it.kind) && it.p_value < p_value(SCORE_MIN);
+        let is_important = answer.effects.iter().any(matters);
+        let Some(error) = improvement(answer).filter(|_| is_important) else {
             return Ok(None);
         };
         let folder = models.folder().join(in_force.to_string());

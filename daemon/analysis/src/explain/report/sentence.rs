@@ -79,7 +79,8 @@ pub fn described(effect: &EffectAnswer) -> String {
     format!("{kind}{place}{size}")
 }
 
-fn sizes(effect: &EffectAnswer) -> Vec<String> {
+/// The numbers of an effect, each with its meaning, unit and 95 % interval.
+pub fn sizes(effect: &EffectAnswer) -> Vec<String> {
     let number_of = |value: Option<&ParameterValue>| match value {
         Some(ParameterValue::Number(value)) => Some(*value),
         _ => None,
@@ -252,6 +253,8 @@ mod tests {
             verdict: Verdict::Ambiguous,
             statement: String::new(),
             diagnostics: Vec::new(),
+            verdict_words: String::new(),
+            caveats: Vec::new(),
             effects: vec![effect("local_resistance", "extra_n_per_kn")],
             ambiguous_with: vec!["tunnel_drag"],
             experiment: None,

@@ -2,6 +2,7 @@
 
 mod acceptance;
 mod by_run;
+mod certainty;
 mod outcome;
 mod outside;
 mod price;

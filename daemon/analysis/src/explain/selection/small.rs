@@ -7,7 +7,8 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::acceptance::{CERTAIN, Refusal, is_accepted};
+use super::acceptance::Refusal;
+use super::certainty::{CERTAIN, is_accepted};
 use super::outcome::{Outcome, Trial};
 use super::price::penalty;
 use super::search::Search;

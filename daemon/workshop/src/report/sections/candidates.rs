@@ -48,9 +48,8 @@ pub fn section(subject: &Subject) -> Section {
     } else {
         body += &table.html();
     }
-    let not_held = not_held(&subject.explanation.answer.identifiability);
-    if !not_held.is_empty() {
-        body += &format!("<p>{}</p>\n", escape(not_held.trim()));
+    for caveat in not_held(&subject.explanation.answer.identifiability) {
+        body += &format!("<p>{}</p>\n", escape(caveat.trim()));
     }
     let forms = subject.explanation.answer.effects.iter().flat_map(|effect| &effect.runners_up);
     let forms: Vec<String> = forms

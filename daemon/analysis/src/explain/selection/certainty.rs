@@ -1,0 +1,48 @@
+//! What accepts an effect: that it takes much from the error for its evidence, or that it is certain.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::by_run::deviations;
+use crate::explain::evidence::{Fit, SCORE_MIN, acceptance_score};
+
+/// Evidence beyond which one number of the whole train or line is certain. Where nothing acts it is at most 2, and
+/// where everything declared is a little off, at most 26 for what is not in that world.
+pub(super) const CERTAIN: f64 = 40.0;
+/// Standard deviations by the scatter between the runs that such a number is then away from none.
+const CERTAIN_STDS: f64 = 4.0;
+/// Evidence times the share that it takes from the error, for what is chosen among many places or runs: at most 2.3
+/// where nothing acts.
+const CHOSEN_MIN: f64 = 6.0;
+/// Fewer runs agree on nothing.
+const CERTAIN_RUNS_MIN: usize = 3;
+
+/// Whether an effect of a fitted model is more than chance and more than what declared figures are good for: it
+/// takes much from the error for its evidence, or is certain.
+pub(super) fn is_accepted(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> bool {
+    acceptance_score(evidence, reduction) > SCORE_MIN || is_certain(fit, index, evidence, reduction)
+}
+
+/// Whether an effect is certain, however little it takes from the error: strong evidence for one number of the
+/// whole train or line, which the runs agree on. What is looked for at many places or in some of the runs must
+/// take more from the error. Never certain so are loads, winds and slippery rails, which change from run to run, a late
+/// speed, which late forces look like, unmapped tunnels and forms without a name.
+fn is_certain(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> bool {
+    use EffectKind::{
+        DraggingBrake, LocalResistance, LowAdhesion, MassChange, SpeedDelay, Unknown, Wind,
+    };
+    let effect = &fit.model.effects[index];
+    let is_chosen_among_many = matches!(effect.kind(), DraggingBrake | LocalResistance);
+    let needs_the_score =
+        matches!(effect.kind(), LowAdhesion | MassChange | SpeedDelay | Unknown | Wind)
+            || (effect.place().intervals_m.is_some() && !is_chosen_among_many);
+    let runs_agree = || {
+        let std = deviations(fit).std[fit.model.ranges()[index].start];
+        let size = effect.size(fit.effect_parameters(index)).abs();
+        size > CERTAIN_STDS * std
+    };
+    evidence > CERTAIN
+        && !needs_the_score
+        && (!is_chosen_among_many || evidence * reduction > CHOSEN_MIN)
+        && fit.runs.len() >= CERTAIN_RUNS_MIN
+        && runs_agree()
+}

@@ -1,0 +1,124 @@
+//! The answer of `dynocar explain` for people: a verdict of at most two sentences, then a list of what was
+//! found, where, how large, what it removes from the error, and what to do.
+
+use dynocar::operator::remedy::of_suspect;
+use dynocar_analysis::explain::answer::{EffectAnswer, ExplainAnswer, HALF_95, RunnerUp, Verdict};
+use dynocar_analysis::explain::described::precision;
+use dynocar_analysis::explain::judged::Metric;
+use dynocar_analysis::explain::report::{sentence, words};
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::text::{WIDTH, diagnostics, wrap};
+
+/// Columns of a row before its words.
+const INDENT: usize = 12;
+
+/// The answer for people.
+pub fn text(answer: &ExplainAnswer) -> String {
+    let mut text = diagnostics(&answer.diagnostics) + &plain(&verdict(answer));
+    for effect in &answer.effects {
+        text += "\n";
+        text += &found(answer, effect);
+    }
+    text += "\n";
+    text += &limits(answer);
+    text += &figures(answer);
+    for considered in &answer.considered {
+        let evidence =
+            considered.evidence.map_or("     -".into(), |evidence| format!("{evidence:6.0}"));
+        text += &format!("  {evidence}  {:20} {}\n", considered.kind, considered.reason);
+    }
+    text
+}
+
+/// The verdict; what was found stands in the list.
+fn verdict(answer: &ExplainAnswer) -> String {
+    match (answer.verdict, answer.effects.len()) {
+        (Verdict::Effect, 1) => "Found: the declared model lacks one effect.".into(),
+        (Verdict::Effect, count) => format!("Found: the declared model lacks {count} effects."),
+        (Verdict::Ambiguous, _) => {
+            "Found: the declared model lacks an effect, and these runs fit more than one.".into()
+        }
+        (Verdict::Unknown, 1..) => {
+            "The residual is real, but no effect of the library explains it.".into()
+        }
+        _ => answer.verdict_words.clone(),
+    }
+}
+
+/// An effect, a row for each question.
+fn found(answer: &ExplainAnswer, effect: &EffectAnswer) -> String {
+    let kind = EffectKind::from_name(effect.kind);
+    let mut rows = row("what", &format!("{} ({})", words::kind_name(effect.kind), effect.kind));
+    let place = sentence::placed(&effect.place);
+    let ends = effect.place.uncertainty_95.as_ref().and_then(precision);
+    rows += &row(
+        "where",
+        &match ends {
+            _ if place.is_empty() => "everywhere".to_owned(),
+            Some(ends) => format!("{place}, {ends}"),
+            None => place,
+        },
+    );
+    for size in sentence::sizes(effect) {
+        rows += &row("size", &size);
+    }
+    let percent = 100.0 * effect.error_reduction;
+    rows += &row(
+        "removes",
+        &match percent {
+            0.5.. => format!("{percent:.0} % of the open-loop error of the fit runs"),
+            _ => "little of the open-loop error of the fit runs, but is certain".into(),
+        },
+    );
+    if answer.verdict == Verdict::Ambiguous {
+        let others: Vec<String> =
+            answer.ambiguous_with.iter().map(|kind| words::kind_name(kind).into()).collect();
+        rows += &row("or else", &words::joined(&others));
+    }
+    for RunnerUp { formula, evidence_less } in &effect.runners_up {
+        rows += &row("or else", &format!("{formula} (evidence less by {evidence_less:.0})"));
+    }
+    if let Some(kind) = kind.filter(|kind| *kind != EffectKind::Unknown) {
+        rows += &row("to do", of_suspect(kind));
+    }
+    rows
+}
+
+/// What limits the answer, and which runs would settle it.
+fn limits(answer: &ExplainAnswer) -> String {
+    let caveats = answer.caveats.iter().map(|caveat| row("note", caveat));
+    let experiment = answer.experiment.iter().map(|experiment| row("next", experiment));
+    let unscored = answer.unscored.iter().map(|unscored| row("note", unscored));
+    caveats.chain(experiment).chain(unscored).collect()
+}
+
+/// Coefficients and errors.
+fn figures(answer: &ExplainAnswer) -> String {
+    let (base, std) = (&answer.base, &answer.base.std);
+    let [a, b, c] = [std.a, std.b, std.c].map(|deviation| HALF_95 * deviation);
+    let mut text = format!(
+        "a = {:.3} ± {a:.3} N/kN, b = {:.4} ± {b:.4}, c = {:.6} ± {c:.6} (95 %, v in m/s)\n",
+        base.a, base.b, base.c
+    );
+    if let Some(judged) = answer.judged.filter(|it| it.metric == Metric::StopToStop) {
+        let [before, after] = judged.error_mps;
+        let predicted = judged.predicted();
+        text += &format!("holdout runs{predicted}: {before:.3} m/s before, {after:.3} m/s after\n");
+    }
+    if let (Some(before), Some(after)) = (answer.rmse_before, answer.rmse_after) {
+        text += &format!("holdout runs, open loop: {before:.3} m/s before, {after:.3} m/s after\n");
+    }
+    text
+}
+
+/// A label and its words, in lines below each other.
+fn row(label: &str, words: &str) -> String {
+    let lines = wrap(words, WIDTH - INDENT);
+    let next = format!("\n{:INDENT$}", "");
+    format!("  {label:<width$}{}\n", lines.join(&next), width = INDENT - 2)
+}
+
+fn plain(words: &str) -> String {
+    format!("{}\n", wrap(words, WIDTH).join("\n"))
+}
