@@ -7,8 +7,8 @@ use dynocar_core::simulate::SpeedError;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::{
-    BaseAnswer, Considered, DavisDeviations, EffectAnswer, ExplainAnswer, Location,
-    PlaceUncertainty, Verdict,
+    BaseAnswer, Considered, DavisDeviations, EffectAnswer, ExplainAnswer, Identifiability,
+    Location, PlaceUncertainty, Verdict,
 };
 use super::competing::{CompetingHypotheses, competing_hypotheses, is_in, separating_run};
 use super::described::{describe, describe_place, small};
@@ -43,10 +43,8 @@ pub fn answer(
     let competing = if is_unknown { Vec::new() } else { competing_hypotheses(outcome) };
     let left = Unexplained::of(search, outcome);
     let verdict = verdict(search, outcome, &competing, left.as_ref());
-    let identifiability = match verdict {
-        Verdict::InsufficientData => Vec::new(),
-        _ => identifiability(search, outcome),
-    };
+    let is_enough = verdict != Verdict::InsufficientData;
+    let identifiability = if is_enough { identifiability(search, outcome) } else { Vec::new() };
     let [rmse_before, rmse_after] = score.holdout_rmse_mps();
     let pair = |errors: [SpeedError; 2]| Some([errors[0].rmse_mps()?, errors[1].rmse_mps()?]);
     let left = left.as_ref();
@@ -55,11 +53,11 @@ pub fn answer(
         None => {
             let (verdict_words, experiment) =
                 statement(search, outcome, verdict, &effects, &competing, left);
-            let mut caveats = vec![worse_held_out(&effects, score)];
-            if verdict != Verdict::InsufficientData {
-                caveats.push(undetermined(search.problem, fit, std));
-                caveats.extend(not_held(&identifiability));
-            }
+            let caveats = if is_enough {
+                caveats(search, outcome, &effects, score, std, &identifiability)
+            } else {
+                Vec::new()
+            };
             Words { verdict_words, caveats, experiment }
         }
     };
@@ -67,11 +65,7 @@ pub fn answer(
         verdict,
         statement: verdict_words.clone() + &caveats.concat(),
         verdict_words,
-        caveats: caveats
-            .iter()
-            .map(|it| it.trim().to_owned())
-            .filter(|it| !it.is_empty())
-            .collect(),
+        caveats: trimmed(&caveats),
         diagnostics,
         effects,
         ambiguous_with: competing.iter().flat_map(|it| &it.kinds).map(|kind| kind.name()).collect(),
@@ -100,6 +94,27 @@ pub fn answer(
         identifiability,
         predictions: BTreeMap::new(),
     }
+}
+
+/// What limits a verdict.
+fn caveats(
+    search: &Search,
+    outcome: &Outcome,
+    effects: &[EffectAnswer],
+    score: &Score,
+    std: &[f64],
+    identifiability: &[Identifiability],
+) -> Vec<String> {
+    let mut caveats = vec![worse_held_out(effects, score)];
+    caveats.push(undetermined(search.problem, &outcome.fit, std));
+    caveats.extend(not_held(identifiability));
+    caveats
+}
+
+/// Sentences without the space before them, and none that is empty.
+fn trimmed(sentences: &[String]) -> Vec<String> {
+    let trimmed = sentences.iter().map(|it| it.trim().to_owned());
+    trimmed.filter(|it| !it.is_empty()).collect()
 }
 
 /// What the verdict is in words.
