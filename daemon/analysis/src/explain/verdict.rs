@@ -13,7 +13,7 @@ use super::answer::{
 use super::competing::{CompetingHypotheses, competing_hypotheses, is_in, separating_run};
 use super::described::{describe, describe_place, small};
 use super::effects::ReportContext;
-use super::evidence::{SCORE_MIN, acceptance_score, p_value};
+use super::evidence::{acceptance_score, p_value};
 use super::identifiability::{identifiability, not_held};
 use super::informed::{told_by_data, undetermined};
 use super::runners_up::runners_up;
@@ -211,9 +211,7 @@ fn effect_answers(
                 place: Location { uncertainty_95: known[index].clone(), ..effect.place() },
                 parameters: reported.values,
                 std: reported.deviations,
-                p_value: p_value(
-                    acceptance_score(decrease - penalty(fit, index), reduction).max(SCORE_MIN),
-                ),
+                p_value: p_value(acceptance_score(decrease - penalty(fit, index), reduction)),
                 error_reduction: reduction,
                 runners_up: if effect.kind() == EffectKind::Unknown {
                     runners_up(search, outcome)
