@@ -25,16 +25,20 @@ pub(super) fn is_accepted(fit: &Fit, index: usize, evidence: f64, reduction: f64
 /// Whether an effect is certain, however little it takes from the error: strong evidence for one number of the
 /// whole train or line, which the runs agree on. What is looked for at many places or in some of the runs must
 /// take more from the error. Never certain so are loads, winds and slippery rails, which change from run to run, a late
-/// speed, which late forces look like, unmapped tunnels and forms without a name.
+/// speed, which late forces look like, unmapped tunnels, forms without a name, and a local resistance beside a
+/// fitted gradient, whose straight pieces leave such.
 fn is_certain(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> bool {
     use EffectKind::{
         DraggingBrake, LocalResistance, LowAdhesion, MassChange, SpeedDelay, Unknown, Wind,
     };
     let effect = &fit.model.effects[index];
     let is_chosen_among_many = matches!(effect.kind(), DraggingBrake | LocalResistance);
-    let needs_the_score =
-        matches!(effect.kind(), LowAdhesion | MassChange | SpeedDelay | Unknown | Wind)
-            || (effect.place().intervals_m.is_some() && !is_chosen_among_many);
+    let is_beside_a_gradient = fit.model.effects.iter().any(|other| other.is_gradient());
+    let needs_the_score = match effect.kind() {
+        LowAdhesion | MassChange | SpeedDelay | Unknown | Wind => true,
+        LocalResistance => is_beside_a_gradient,
+        _ => effect.place().intervals_m.is_some(),
+    };
     let runs_agree = || {
         let std = deviations(fit).std[fit.model.ranges()[index].start];
         let size = effect.size(fit.effect_parameters(index)).abs();
