@@ -105,7 +105,7 @@ fn caveats(
     std: &[f64],
     identifiability: &[Identifiability],
 ) -> Vec<String> {
-    let mut caveats = vec![worse_held_out(effects, score)];
+    let mut caveats = vec![worse_held_out(effects, score), small_beside(outcome, effects)];
     caveats.push(undetermined(search.problem, &outcome.fit, std));
     caveats.extend(not_held(identifiability));
     caveats
@@ -133,6 +133,15 @@ fn impossible(diagnostics: &[DatasetDiagnostic]) -> Option<Words> {
         caveats: Vec::new(),
         experiment: Some("Set right what is named and run this again.".into()),
     })
+}
+
+/// What is certain and small in the model beside the effects that are named; empty without either.
+fn small_beside(outcome: &Outcome, effects: &[EffectAnswer]) -> String {
+    let small: Vec<String> = outcome.small_trials().map(small).collect();
+    if small.is_empty() || effects.is_empty() {
+        return String::new();
+    }
+    format!(" Certain, small, and part of the updated model: {}.", small.join(", "))
 }
 
 /// That the runs held out are predicted worse with what was found; empty when they are not.

@@ -18,7 +18,7 @@ pub fn text(answer: &ExplainAnswer) -> String {
     let mut text = diagnostics(&answer.diagnostics) + &plain(&verdict(answer));
     for effect in &answer.effects {
         text += "\n";
-        text += &found(answer, effect);
+        text += &found(effect);
     }
     text += "\n";
     text += &limits(answer);
@@ -40,14 +40,19 @@ fn verdict(answer: &ExplainAnswer) -> String {
             "Found: the declared model lacks an effect, and these runs fit more than one.".into()
         }
         (Verdict::Unknown, 1..) => {
-            "The residual is real, but no effect of the library explains it.".into()
+            let is_form = answer.effects.iter().any(|it| it.kind == EffectKind::Unknown.name());
+            let left = answer.unexplained_n_per_kn.filter(|_| !is_form).map_or(
+                String::new(),
+                |left| format!(" A force of {left:.2} N/kN on average over a minute stays beside what is found."),
+            );
+            format!("The residual is real, but no effect of the library explains it.{left}")
         }
         _ => answer.verdict_words.clone(),
     }
 }
 
 /// An effect, a row for each question.
-fn found(answer: &ExplainAnswer, effect: &EffectAnswer) -> String {
+fn found(effect: &EffectAnswer) -> String {
     let kind = EffectKind::from_name(effect.kind);
     let mut rows = row("what", &format!("{} ({})", words::kind_name(effect.kind), effect.kind));
     let place = sentence::placed(&effect.place);
@@ -68,14 +73,9 @@ fn found(answer: &ExplainAnswer, effect: &EffectAnswer) -> String {
         "removes",
         &match percent {
             0.5.. => format!("{percent:.0} % of the open-loop error of the fit runs"),
-            _ => "little of the open-loop error of the fit runs, but is certain".into(),
+            _ => "none of the open-loop error of the fit runs".into(),
         },
     );
-    if answer.verdict == Verdict::Ambiguous {
-        let others: Vec<String> =
-            answer.ambiguous_with.iter().map(|kind| words::kind_name(kind).into()).collect();
-        rows += &row("or else", &words::joined(&others));
-    }
     for RunnerUp { formula, evidence_less } in &effect.runners_up {
         rows += &row("or else", &format!("{formula} (evidence less by {evidence_less:.0})"));
     }
@@ -85,12 +85,15 @@ fn found(answer: &ExplainAnswer, effect: &EffectAnswer) -> String {
     rows
 }
 
-/// What limits the answer, and which runs would settle it.
+/// What else explains the runs, what limits the answer, and which runs would settle it.
 fn limits(answer: &ExplainAnswer) -> String {
+    let others: Vec<String> =
+        answer.ambiguous_with.iter().map(|kind| words::kind_name(kind).into()).collect();
+    let others = (!others.is_empty()).then(|| row("or else", &words::joined(&others)));
     let caveats = answer.caveats.iter().map(|caveat| row("note", caveat));
     let experiment = answer.experiment.iter().map(|experiment| row("next", experiment));
     let unscored = answer.unscored.iter().map(|unscored| row("note", unscored));
-    caveats.chain(experiment).chain(unscored).collect()
+    others.into_iter().chain(caveats).chain(experiment).chain(unscored).collect()
 }
 
 /// Coefficients and errors.

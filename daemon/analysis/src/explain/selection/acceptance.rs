@@ -5,6 +5,7 @@ use super::outcome::{Outcome, Trial};
 use super::price::at_bound;
 use super::search::Search;
 use crate::explain::effects::AtBound;
+
 /// Why an effect is not accepted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refusal {
