@@ -5,177 +5,18 @@
 //! are not `Send`: open them in the thread that uses them.
 
 mod count;
+mod ends;
+mod held;
 mod ports;
+mod service;
+mod transport;
 mod users;
 mod wake;
 mod wire;
 
 pub use count::SampleCount;
+pub use ends::Ends;
 pub use ports::{Receiver, Sender};
+pub use transport::Transport;
 pub use wake::{Sleeper, Waker};
 pub use wire::{Payload, Wire};
-
-use std::sync::Arc;
-use std::time::{Duration, Instant};
-
-use dynocar_shared::TrainId;
-use iceoryx2::prelude::{
-    Node, NodeBuilder, NodeName, ServiceName, SignalHandlingMode, ipc, set_log_level_from_env_or,
-};
-use iceoryx2::service::builder::publish_subscribe::{
-    PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
-};
-use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
-
-use crate::error::ChannelError;
-use crate::host::Host;
-use users::Users;
-
-/// How long a service that is being made or destroyed by another process is waited for.
-const SETTLING_TIME: Duration = Duration::from_millis(800);
-
-/// This thread's access to the transport.
-#[derive(Debug)]
-pub struct Transport {
-    node: Node<ipc::Service>,
-    /// After the node: the last user goes only when its ports are gone.
-    users: Arc<Users>,
-}
-
-impl Transport {
-    /// Enters the transport under a name for diagnosis.
-    ///
-    /// Leaves the process's signal handlers alone, and clears away what dead processes left.
-    ///
-    /// # Errors
-    ///
-    /// When the run-time directory or the shared memory cannot be used.
-    pub fn open(host: &Host, name: &str) -> Result<Self, ChannelError> {
-        set_log_level_from_env_or(iceoryx2::prelude::LogLevel::Fatal);
-        let refused = |reason: String| ChannelError::Transport { what: "node".into(), reason };
-        let users = Users::enter(host)?;
-        users.require_free_memory()?;
-        let name = NodeName::new(name).map_err(|error| refused(format!("{error:?}")))?;
-        let node = NodeBuilder::new()
-            .name(&name)
-            .config(&host.transport_config()?)
-            .signal_handling_mode(SignalHandlingMode::Disabled)
-            .create::<ipc::Service>()
-            .map_err(|error| refused(format!("{error:?}")))?;
-        users.close_to_others();
-        Ok(Transport { node, users: Arc::new(users) })
-    }
-
-    /// Opens a sending port of a train's channel.
-    ///
-    /// # Errors
-    ///
-    /// When the channel is of another layout or the shared memory cannot be used.
-    pub fn sender<T: Payload>(&self, train: TrainId) -> Result<Sender<T>, ChannelError> {
-        Sender::new(&self.service::<T>(train)?, train, &self.users)
-    }
-
-    /// Opens a receiving port of a train's channel.
-    ///
-    /// # Errors
-    ///
-    /// When the channel is of another layout or the shared memory cannot be used.
-    pub fn receiver<T: Payload>(&self, train: TrainId) -> Result<Receiver<T>, ChannelError> {
-        Receiver::new(&self.service::<T>(train)?, train, &self.users)
-    }
-
-    /// Reserves the memory of all ports opened so far; to be called once all are.
-    ///
-    /// # Errors
-    ///
-    /// When there is not enough.
-    pub fn reserve(&self) -> Result<(), ChannelError> {
-        self.users.reserve()
-    }
-
-    fn service<T: Payload>(
-        &self,
-        train: TrainId,
-    ) -> Result<PortFactory<ipc::Service, Wire<T>, ()>, ChannelError> {
-        let text = service_name::<T>(train);
-        let refused =
-            |reason: String| ChannelError::Transport { what: format!("service {text}"), reason };
-        let name = ServiceName::new(&text).map_err(|error| refused(format!("{error:?}")))?;
-        let start = Instant::now();
-        loop {
-            let result = self
-                .node
-                .service_builder(&name)
-                .publish_subscribe::<Wire<T>>()
-                .enable_safe_overflow(true)
-                .history_size(T::HISTORY)
-                .subscriber_max_buffer_size(T::BUFFER)
-                .subscriber_max_borrowed_samples(1)
-                .max_publishers(T::SENDERS_MAX)
-                .max_subscribers(T::RECEIVERS_MAX)
-                .max_nodes(T::SENDERS_MAX + T::RECEIVERS_MAX)
-                .open_or_create();
-            match result {
-                Ok(service) => return Ok(service),
-                Err(error) if is_settling(&error) && start.elapsed() < SETTLING_TIME => {
-                    std::thread::sleep(Duration::from_millis(2));
-                }
-                Err(PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(
-                    PublishSubscribeOpenError::ExceedsMaxNumberOfNodes,
-                )) => return Err(no_place_left::<T>(train, T::SENDERS_MAX + T::RECEIVERS_MAX)),
-                Err(error) => return Err(refused(explain(&error))),
-            }
-        }
-    }
-}
-
-/// The refusal where every place of a channel is taken.
-fn no_place_left<T: Payload>(train: TrainId, limit: usize) -> ChannelError {
-    ChannelError::NoPlaceLeft { train, channel: T::CHANNEL.name(), limit }
-}
-
-fn service_name<T: Payload>(train: TrainId) -> String {
-    let mut name = String::new();
-    // Writing into a String cannot fail.
-    let _ = T::CHANNEL.write_service_name(train, &mut name);
-    name
-}
-
-/// True for what passes by itself while another process makes or removes the service.
-fn is_settling(error: &PublishSubscribeOpenOrCreateError) -> bool {
-    use PublishSubscribeOpenOrCreateError as Error;
-    match error {
-        Error::PublishSubscribeOpenError(error) => matches!(
-            error,
-            PublishSubscribeOpenError::IsMarkedForDestruction
-                | PublishSubscribeOpenError::HangsInCreation
-                | PublishSubscribeOpenError::DoesNotExist
-                | PublishSubscribeOpenError::ServiceInCorruptedState
-        ),
-        Error::PublishSubscribeCreateError(error) => matches!(
-            error,
-            PublishSubscribeCreateError::AlreadyExists
-                | PublishSubscribeCreateError::IsBeingCreatedByAnotherInstance
-                | PublishSubscribeCreateError::HangsInCreation
-                | PublishSubscribeCreateError::ServiceInCorruptedState
-        ),
-        Error::SystemInFlux => true,
-    }
-}
-
-/// The transport's refusal with what a user can do about it, where we know it.
-fn explain(error: &PublishSubscribeOpenOrCreateError) -> String {
-    use PublishSubscribeOpenError as Open;
-    use PublishSubscribeOpenOrCreateError as Error;
-    let hint = match error {
-        Error::PublishSubscribeOpenError(Open::IncompatibleTypes) => {
-            "; a process of another Dynocar release uses this channel: stop it, or update"
-        }
-        Error::PublishSubscribeOpenError(Open::ServiceInCorruptedState) => {
-            "; files in the run-time directory or /dev/shm were removed or overwritten: stop every \
-             process of this channel and start again"
-        }
-        _ => "",
-    };
-    format!("{error:?}{hint}")
-}

@@ -1,5 +1,6 @@
-//! Sending and receiving ends.
+//! Sending and receiving ends, the transport's ports behind trait objects.
 
+use std::fmt::Debug;
 use std::sync::Arc;
 
 use dynocar_shared::TrainId;
@@ -7,16 +8,42 @@ use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{BackpressureStrategy, ipc};
-use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
-use super::no_place_left;
+use super::service::{Entrance, no_place_left};
 use super::users::Users;
 use super::wire::{Payload, Wire};
 use crate::error::{ChannelError, SendRefused};
 
-type Service<T> = PortFactory<ipc::Service, Wire<T>, ()>;
+/// What a sender asks of its port.
+trait Send<T>: Debug {
+    fn send(&self, message: &T) -> Result<(), SendRefused>;
+    fn serve_newcomers(&self);
+}
 
-fn refused<T: Payload>(train: TrainId, port: &str, reason: impl std::fmt::Debug) -> ChannelError {
+impl<T: Payload> Send<T> for Publisher<ipc::Service, Wire<T>, ()> {
+    fn send(&self, message: &T) -> Result<(), SendRefused> {
+        let slot = self.loan_uninit().map_err(|_| SendRefused)?;
+        slot.write_payload(Wire(*message)).send().map(|_| ()).map_err(|_| SendRefused)
+    }
+
+    fn serve_newcomers(&self) {
+        // A newcomer that cannot be connected is tried again with the next message.
+        let _ = self.update_connections();
+    }
+}
+
+/// What a receiver asks of its port.
+trait Receive<T>: Debug {
+    fn next(&self) -> Option<T>;
+}
+
+impl<T: Payload> Receive<T> for Subscriber<ipc::Service, Wire<T>, ()> {
+    fn next(&self) -> Option<T> {
+        self.receive().ok().flatten().map(|message| message.payload().0)
+    }
+}
+
+fn refused<T: Payload>(train: TrainId, port: &str, reason: impl Debug) -> ChannelError {
     let channel = T::CHANNEL.name();
     ChannelError::Transport {
         what: format!("{port} of train {train}'s {channel}"),
@@ -27,30 +54,31 @@ fn refused<T: Payload>(train: TrainId, port: &str, reason: impl std::fmt::Debug)
 /// The sending end of a channel.
 #[derive(Debug)]
 pub struct Sender<T: Payload> {
-    publisher: Publisher<ipc::Service, Wire<T>, ()>,
+    port: Box<dyn Send<T>>,
     _users: Arc<Users>,
 }
 
-impl<T: Payload> Sender<T> {
-    pub(super) fn new(
-        service: &Service<T>,
-        train: TrainId,
-        users: &Arc<Users>,
-    ) -> Result<Self, ChannelError> {
-        let publisher = service
-            .publisher_builder()
-            .max_loaned_samples(1)
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .create()
-            .map_err(|error| match error {
-                PublisherCreateError::ExceedsMaxSupportedPublishers => {
-                    no_place_left::<T>(train, T::SENDERS_MAX)
-                }
-                error => refused::<T>(train, "sender", error),
-            })?;
-        Ok(Sender { publisher, _users: Arc::clone(users) })
-    }
+/// Opens a sending end; called for each payload in this crate alone.
+pub(super) fn open_sender<T: Payload>(
+    entrance: &Entrance,
+    train: TrainId,
+) -> Result<Sender<T>, ChannelError> {
+    let publisher = entrance
+        .service::<T>(train)?
+        .publisher_builder()
+        .max_loaned_samples(1)
+        .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .create()
+        .map_err(|error| match error {
+            PublisherCreateError::ExceedsMaxSupportedPublishers => {
+                no_place_left::<T>(train, T::SENDERS_MAX)
+            }
+            error => refused::<T>(train, "sender", error),
+        })?;
+    Ok(Sender { port: Box::new(publisher), _users: Arc::clone(&entrance.users) })
+}
 
+impl<T: Payload> Sender<T> {
     /// Sends a message to every receiver; never waits.
     ///
     /// # Errors
@@ -62,42 +90,42 @@ impl<T: Payload> Sender<T> {
     /// No system call, save when a receiver has come or gone since. The transport takes one
     /// reference count of fixed size from the heap and gives it back within the call.
     pub fn send(&self, message: &T) -> Result<(), SendRefused> {
-        let slot = self.publisher.loan_uninit().map_err(|_| SendRefused)?;
-        slot.write_payload(Wire(*message)).send().map(|_| ()).map_err(|_| SendRefused)
+        self.port.send(message)
     }
 
     /// Hands the history to receivers that have come since the last message.
     pub fn serve_newcomers(&self) {
-        // A newcomer that cannot be connected is tried again with the next message.
-        let _ = self.publisher.update_connections();
+        self.port.serve_newcomers();
     }
 }
 
 /// The receiving end of a channel.
 #[derive(Debug)]
 pub struct Receiver<T: Payload> {
-    subscriber: Subscriber<ipc::Service, Wire<T>, ()>,
+    port: Box<dyn Receive<T>>,
     _users: Arc<Users>,
 }
 
-impl<T: Payload> Receiver<T> {
-    pub(super) fn new(
-        service: &Service<T>,
-        train: TrainId,
-        users: &Arc<Users>,
-    ) -> Result<Self, ChannelError> {
-        let subscriber =
-            service.subscriber_builder().buffer_size(T::BUFFER).create().map_err(|error| {
-                match error {
-                    SubscriberCreateError::ExceedsMaxSupportedSubscribers => {
-                        no_place_left::<T>(train, T::RECEIVERS_MAX)
-                    }
-                    error => refused::<T>(train, "receiver", error),
-                }
-            })?;
-        Ok(Receiver { subscriber, _users: Arc::clone(users) })
-    }
+/// Opens a receiving end; called for each payload in this crate alone.
+pub(super) fn open_receiver<T: Payload>(
+    entrance: &Entrance,
+    train: TrainId,
+) -> Result<Receiver<T>, ChannelError> {
+    let subscriber = entrance
+        .service::<T>(train)?
+        .subscriber_builder()
+        .buffer_size(T::BUFFER)
+        .create()
+        .map_err(|error| match error {
+            SubscriberCreateError::ExceedsMaxSupportedSubscribers => {
+                no_place_left::<T>(train, T::RECEIVERS_MAX)
+            }
+            error => refused::<T>(train, "receiver", error),
+        })?;
+    Ok(Receiver { port: Box::new(subscriber), _users: Arc::clone(&entrance.users) })
+}
 
+impl<T: Payload> Receiver<T> {
     /// Takes the next message, copied out of the shared memory; `None` when there is none.
     ///
     /// A sender that cannot be connected counts as silent.
@@ -106,6 +134,6 @@ impl<T: Payload> Receiver<T> {
     ///
     /// No system call and no allocation, save when a sender has come or gone since.
     pub fn receive(&self) -> Option<T> {
-        self.subscriber.receive().ok().flatten().map(|message| message.payload().0)
+        self.port.next()
     }
 }

@@ -17,6 +17,7 @@ use iceoryx2::port::notifier::Notifier;
 use iceoryx2::prelude::{CallbackProgression, ServiceName, ipc};
 use iceoryx2::service::port_factory::event::PortFactory;
 
+use super::held::Held;
 use super::{Receiver, Sender, Transport};
 use crate::clock::monotonic_now_ns;
 use crate::error::ChannelError;
@@ -36,7 +37,7 @@ fn wake_service(transport: &Transport) -> Result<PortFactory<ipc::Service>, Chan
     };
     let name = ServiceName::new(WAKE_SERVICE).map_err(|error| refused(format!("{error:?}")))?;
     transport
-        .node
+        .node()
         .service_builder(&name)
         .event()
         .max_listeners(LISTENERS_MAX)
@@ -49,7 +50,7 @@ fn wake_service(transport: &Transport) -> Result<PortFactory<ipc::Service>, Chan
 /// A pipeline thread's bed: informs the controllers of its trains, then waits for one of them.
 #[derive(Debug)]
 pub struct Sleeper {
-    listener: Listener<ipc::Service>,
+    listener: Held<Listener<ipc::Service>>,
     senders: Vec<Sender<SleeperState>>,
     state: SleeperState,
 }
@@ -79,7 +80,7 @@ impl Sleeper {
             listener_low: id as u64,
             sleeping: 0,
         };
-        Ok(Sleeper { listener, senders, state })
+        Ok(Sleeper { listener: Held::new(listener), senders, state })
     }
 
     /// Waits until a controller sends or `timeout` has passed, unless `has_work` after the
@@ -89,7 +90,7 @@ impl Sleeper {
         fence(Ordering::SeqCst);
         if !has_work() {
             // A failed wait is a short one: the caller looks for samples and comes back.
-            let _ = self.listener.timed_wait(|_| {}, timeout);
+            let _ = self.listener.get().timed_wait(|_| {}, timeout);
         }
         self.announce(0);
     }
@@ -111,7 +112,7 @@ impl Sleeper {
 /// A controller's account of who sleeps.
 #[derive(Debug)]
 pub struct Waker {
-    notifier: Notifier<ipc::Service>,
+    notifier: Held<Notifier<ipc::Service>>,
     receiver: Receiver<SleeperState>,
     known: [Option<SleeperState>; SLEEPERS_MAX],
     newcomer_until_ns: i64,
@@ -129,7 +130,8 @@ impl Waker {
         })?;
         let receiver = transport.receiver::<SleeperState>(train)?;
         let newcomer_until_ns = monotonic_now_ns() + NEWCOMER_NS;
-        Ok(Waker { notifier, receiver, known: [None; SLEEPERS_MAX], newcomer_until_ns })
+        let known = [None; SLEEPERS_MAX];
+        Ok(Waker { notifier: Held::new(notifier), receiver, known, newcomer_until_ns })
     }
 
     /// Wakes who sleeps; to be called after each sample, with the host's monotonic time.
@@ -163,7 +165,7 @@ impl Waker {
 
     fn notify_sleepers(&mut self, wake_strangers: bool) {
         let known = &self.known;
-        self.notifier.for_each_listener(|listener, details| {
+        self.notifier.get().for_each_listener(|listener, details| {
             let id = details.listener_id.value();
             let state = known.iter().flatten().find(|state| state.listener() == id);
             if state.map_or(wake_strangers, |state| state.sleeping != 0) {
