@@ -31,6 +31,7 @@ pub mod stopping;
 pub mod vocabulary;
 
 pub use adhesion::{RailCondition, Uncertain};
+pub use quantile::HALF_95;
 pub use resistance::ResistanceEstimate;
 pub use sample::{SampleField, TrainId, TrainSample};
 pub use services::SCHEMA_MAJOR;

@@ -6,12 +6,12 @@
 use std::sync::LazyLock;
 
 use dynocar_shared::schema::{Field, Missing, unit_of};
-use dynocar_shared::{Parameter, ParameterSnapshot, RejectionReason, TrainSample};
+use dynocar_shared::{HALF_95, Parameter, ParameterSnapshot, RejectionReason, TrainSample};
 
 use crate::event::{EVENT_FIELDS, Event, EventField};
 use crate::schema::{
-    INTERVAL_95, SAMPLE_FIELDS, SNAPSHOT_FIELDS, SUFFIXES, members_of, suffixed_name,
-    vocabulary_of, vocabulary_of_type,
+    SAMPLE_FIELDS, SNAPSHOT_FIELDS, SUFFIXES, members_of, suffixed_name, vocabulary_of,
+    vocabulary_of_type,
 };
 
 /// Where a column's values come from.
@@ -204,8 +204,8 @@ impl Row {
             (Row::Snapshot(it), Source::OfEstimate(of, place)) => {
                 let estimate = it.value(of).zip(it.std(of)).map(|(value, std)| match place {
                     0 => std,
-                    1 => value - INTERVAL_95 * std,
-                    _ => value + INTERVAL_95 * std,
+                    1 => value - HALF_95 * std,
+                    _ => value + HALF_95 * std,
                 });
                 one(words, estimate.map(f64::to_bits))
             }

@@ -36,9 +36,6 @@ pub const STD_OFFSET: u32 = 100;
 pub const LOW_OFFSET: u32 = 200;
 /// The upper end of its 95 % interval has a number that is so much greater.
 pub const HIGH_OFFSET: u32 = 300;
-/// Half width of a 95 % interval over the standard deviation.
-pub const INTERVAL_95: f64 = 1.96;
-
 /// The fields of a sample, in order.
 pub static SAMPLE_FIELDS: LazyLock<Vec<Field>> = LazyLock::new(|| sample_fields().collect());
 /// The fields of a snapshot, in order.

@@ -1,8 +1,8 @@
 //! Numbers with intervals and units, and what is said of a train, for screen and lines alike.
 
-use dynocar::operator::suspicion::{INTERVAL_95, Suspicion, force_words};
+use dynocar::operator::suspicion::{Suspicion, force_words};
 use dynocar::operator::{duration, refusals};
-use dynocar_shared::{Parameter, Quantity, Status};
+use dynocar_shared::{HALF_95, Parameter, Quantity, Status};
 
 use crate::state::{Daemon, PipelineState, TrainState};
 
@@ -105,7 +105,7 @@ fn unit(parameter: Parameter) -> &'static str {
 
 /// A value with its interval, to two digits of the interval.
 fn with_interval(value: f64, std: f64, unit: &'static str) -> Row {
-    let half = INTERVAL_95 * std;
+    let half = HALF_95 * std;
     let digits = digits(half);
     let interval = if half > 0.0 { format!("± {half:.digits$}") } else { String::new() };
     Row { number: format!("{value:.digits$}"), interval, unit, ..Row::default() }

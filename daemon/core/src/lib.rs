@@ -17,6 +17,7 @@
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
 //! - [`simulate`]: the speed that a force model predicts over a recorded run
 //! - [`trial`]: which of several models predicts better, judged while a train runs
+//! - [`remedy`]: what a person does about a reason or a refused sample
 //! - [`named!`]: enums whose members have names in files
 
 pub mod filter;
@@ -24,6 +25,7 @@ pub mod force;
 mod named;
 pub mod pipeline;
 pub mod plausibility;
+pub mod remedy;
 pub mod simulate;
 pub mod terms;
 pub mod track;

@@ -1,5 +1,6 @@
 //! What the data of a run are like: counts, ranges and what the train did.
 
+use dynocar_core::terms::wheel::STILL_MPS;
 use dynocar_core::validation::{ValidationLimits, Validator};
 use dynocar_shared::{RejectionReason, SampleField, TrainSample};
 use serde::Serialize;
@@ -10,8 +11,6 @@ use super::quantity::Quantity;
 use super::resolved::{Context, DATASET_TRAIN, Resolved};
 use super::table::LineCounts;
 
-/// Below this speed in m/s the train stands.
-const STANDSTILL_MPS: f64 = 0.1;
 /// A force below this share of the greatest one counts as none.
 const COASTING_SHARE: f64 = 0.005;
 
@@ -257,7 +256,7 @@ fn phases(run: &Resolved, ordered: &[usize]) -> Phases {
         let control_n = run.forces.traction.force_n[row] - run.forces.brake.force_n[row];
         let phase = if run.order.counts.is_gap(step_s) || speed_mps.is_nan() {
             &mut phases.unknown_s
-        } else if speed_mps < STANDSTILL_MPS {
+        } else if speed_mps < STILL_MPS {
             &mut phases.standstill_s
         } else if control_n.is_nan() {
             &mut phases.unknown_s

@@ -1,6 +1,8 @@
 //! What the demo found.
 
-use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Quantity, Reason, SampleField};
+use dynocar_shared::{
+    HALF_95, Parameter, ParameterSnapshot, PipelineKind, Quantity, Reason, SampleField,
+};
 use serde::Serialize;
 
 use dynocar_dataset::Dataset;
@@ -142,7 +144,7 @@ impl Summary {
         let declared_t = 1e-3 * declared_kg.unwrap_or(self.dataset.train.mass_kg);
         let sentence = |it: &ParameterSnapshot| {
             let mass_t = it.value(Parameter::Mass)?;
-            let half_width_t = 1.96 * it.std(Parameter::Mass)?;
+            let half_width_t = HALF_95 * it.std(Parameter::Mass)?;
             Some(format!(
                 "\nmass on the last run: declared {declared_t:.0} t, \
                  estimated {mass_t:.0} ± {half_width_t:.0} t\n"
@@ -172,7 +174,7 @@ impl Summary {
             let declared = self.dataset.train.resistance.w0_n_per_kn(speed_mps);
             text += &format!("{speed_mps:>8.1} {declared:>9.3}");
             for estimate in estimates.iter().filter_map(|it| it.resistance_at(speed_mps)) {
-                let half_width = 1.96 * estimate.w0_std_n_per_kn;
+                let half_width = HALF_95 * estimate.w0_std_n_per_kn;
                 text +=
                     &format!(" {:>17}", format!("{:.3} ± {half_width:.3}", estimate.w0_n_per_kn));
             }

@@ -4,7 +4,7 @@ use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
 use dynocar_client::{Reading, SnapshotReader};
-use dynocar_shared::{ParameterSnapshot, PipelineKind};
+use dynocar_shared::{HALF_95, ParameterSnapshot, PipelineKind};
 
 use dynocar_dataset::Dataset;
 
@@ -85,7 +85,7 @@ fn describe_estimate(snapshot: &ParameterSnapshot) -> String {
         .iter()
         .filter_map(|&speed_mps| {
             let estimate = snapshot.resistance_at(speed_mps)?;
-            let half_width = 1.96 * estimate.w0_std_n_per_kn;
+            let half_width = HALF_95 * estimate.w0_std_n_per_kn;
             Some(format!("w0({speed_mps:.0} m/s) {:.2} ± {half_width:.2}", estimate.w0_n_per_kn))
         })
         .collect();
@@ -96,7 +96,7 @@ fn describe_estimate(snapshot: &ParameterSnapshot) -> String {
     (0..count)
         .filter_map(|place| {
             let parameter = dynocar_shared::Parameter::from_number(snapshot.parameters[place])?;
-            let half_width = 1.96 * snapshot.std(parameter)?;
+            let half_width = HALF_95 * snapshot.std(parameter)?;
             Some(format!("{} {:.3} ± {half_width:.3}", parameter.name(), snapshot.values[place]))
         })
         .collect::<Vec<_>>()

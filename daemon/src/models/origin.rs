@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use dynocar_shared::HALF_95;
 use serde::{Deserialize, Serialize};
 
 use super::moment::Moment;
@@ -19,7 +20,7 @@ pub struct Figure {
 impl Figure {
     /// Half the width of the 95 % interval.
     pub fn half_width(self) -> f64 {
-        1.96 * self.std
+        HALF_95 * self.std
     }
 
     /// True where the 95 % intervals of both overlap.

@@ -2,9 +2,9 @@
 //! `dynocar watch` and in a recording's events.
 //!
 //! - [`suspicion`]: the effect that the model may lack, with its force and what else it could be
-//! - [`remedy`]: what to do about it, about a status and about refused samples
+//!
+//! What to do about it is in [`dynocar_core::remedy`] and [`dynocar_core::terms::KINDS`].
 
-pub mod remedy;
 pub mod suspicion;
 
 use dynocar_shared::RejectionReason;

@@ -2,13 +2,10 @@
 
 use std::fmt;
 
-use dynocar_shared::ParameterSnapshot;
 use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::{HALF_95, ParameterSnapshot};
 
 use super::duration;
-
-/// Half width of a 95 % interval over the standard deviation.
-pub const INTERVAL_95: f64 = 1.96;
 
 /// What a pipeline suspects.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,7 +51,7 @@ impl Suspicion {
 
 /// A force in N with its 95 % interval, in kN.
 pub fn force_words(force_n: f64, force_std_n: f64) -> String {
-    format!("{:+.2} ± {:.2} kN", 1e-3 * force_n, 1e-3 * INTERVAL_95 * force_std_n)
+    format!("{:+.2} ± {:.2} kN", 1e-3 * force_n, 1e-3 * HALF_95 * force_std_n)
 }
 
 impl fmt::Display for Suspicion {

@@ -5,11 +5,11 @@
 
 use std::time::{Duration, Instant};
 
+use dynocar_core::remedy::of_refusal;
 use dynocar_shared::RejectionReason;
 use dynocar_shared::snapshot::REJECTION_REASONS;
 
 use crate::operator::refusals;
-use crate::operator::remedy::of_refusal;
 
 /// How long what follows is gathered.
 const GATHER: Duration = Duration::from_secs(60);

@@ -8,6 +8,8 @@ use std::time::{Duration, Instant};
 use dynocar_client::channel::SampleCount;
 use dynocar_client::{Announcement, ChannelError, Host, Peer, Role};
 use dynocar_core::plausibility::InputFault;
+use dynocar_core::remedy::{of_reason, of_refusal};
+use dynocar_core::terms::KindRow;
 use dynocar_shared::snapshot::REJECTION_REASONS;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Reason, RejectionReason, Status, TrainId};
@@ -16,7 +18,6 @@ use tracing::{info, warn};
 use super::refusal_log::RefusalLog;
 use super::status_log::{State, StatusLog};
 use super::tally::{Tally, TallyReading};
-use crate::operator::remedy::{of_reason, of_refusal, of_suspect};
 use crate::operator::{refusals, refused_words};
 use crate::supervision::health::Verdict;
 
@@ -182,7 +183,7 @@ impl PipelineLog {
         let (suspect, force) = (suspicion.name(), suspicion.force());
         let near_km = reading.position_m.is_finite().then_some(1e-3 * reading.position_m);
         let near_km = near_km.map(|it| format!("{it:.3}"));
-        let remedy = of_suspect(suspicion.effect.unwrap_or(EffectKind::Unknown));
+        let remedy = KindRow::of(suspicion.effect.unwrap_or(EffectKind::Unknown)).to_do;
         warn!(
             pipeline,
             train, suspect, force, near_km, "the model lacks a force: {suspicion}; to do: {remedy}"

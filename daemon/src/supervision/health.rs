@@ -4,10 +4,11 @@ use std::fmt;
 use std::time::{Duration, Instant};
 
 use dynocar_client::{ChannelError, Host, Peer, Role, SnapshotReader, monotonic_now_ns};
+use dynocar_core::remedy::{of_reason, of_refusal};
+use dynocar_core::terms::KindRow;
 use dynocar_shared::{PipelineKind, Reason, RejectionReason, Status, TrainId};
 
 use crate::operator::refusals;
-use crate::operator::remedy::{of_reason, of_refusal, of_suspect};
 use crate::operator::suspicion::Suspicion;
 
 /// How long a first snapshot is waited for; a daemon vouches for its snapshots each 0.1 s.
@@ -130,7 +131,7 @@ impl TrainHealth {
         let mut amiss = self.pipelines.iter().filter(|it| it.verdict() == Verdict::Degraded);
         let suspect = self.pipelines.iter().find_map(|it| it.suspicion?.effect);
         if let Some(effect) = suspect {
-            return of_suspect(effect);
+            return KindRow::of(effect).to_do;
         }
         let Some(first) = amiss.next() else { return Verdict::Degraded.remedy() };
         match first.reason {
@@ -245,7 +246,7 @@ mod tests {
         let fine =
             PipelineHealth { status: Status::Unestimated, ..pipeline(Reason::OnlyLowerBound) };
         let faults = pipeline(Reason::ImplausibleForces);
-        assert!(degraded(vec![fine, faults]).contains("units and signs"));
+        assert!(degraded(vec![fine, faults]).contains("unit, sign and order"));
         assert_eq!(train(Verdict::Ok, vec![large]), "nothing");
         assert!(train(Verdict::NoDaemon, vec![]).contains("dynocar run"));
     }

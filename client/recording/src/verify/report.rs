@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use dynocar_shared::schema::unit_of;
-use dynocar_shared::{Parameter, ParameterSnapshot, Quantity, Reason};
+use dynocar_shared::{HALF_95, Parameter, ParameterSnapshot, Quantity, Reason};
 
 use super::{Outcome, QuantityAnswer, STAMPS, Verified};
 
@@ -97,7 +97,7 @@ fn status(it: &ParameterSnapshot) -> String {
 
 fn value(it: &ParameterSnapshot, parameter: Parameter) -> String {
     match (it.value(parameter), it.std(parameter)) {
-        (Some(value), Some(std)) => format!("{value:.6} ± {:.6}", 1.96 * std),
+        (Some(value), Some(std)) => format!("{value:.6} ± {:.6}", HALF_95 * std),
         _ => "-".into(),
     }
 }

@@ -4,11 +4,13 @@
 //! model, at no effect, and what the data say of it there is read from the information matrix: how
 //! surely it is none, and whether it is distinguishable from each of the others.
 
+use dynocar_core::terms::KindRow;
+use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{Cholesky, DMatrix};
 
-use super::answer::{HALF_95, Identifiability};
-use super::competing::{informative_runs, is_in, separating_run};
+use super::answer::Identifiability;
+use super::competing::{is_in, separating_run};
 use super::effects::{Candidate, LIBRARY};
 use super::report::words::number;
 use super::selection::{Outcome, Search};
@@ -68,7 +70,7 @@ pub fn identifiability(search: &Search, outcome: &Outcome) -> Vec<Identifiabilit
 /// they hold all; a sentence or two each.
 pub fn not_held(all: &[Identifiability]) -> Vec<String> {
     let would = |own: &Identifiability| {
-        EffectKind::from_name(own.kind).map_or("more runs", informative_runs)
+        EffectKind::from_name(own.kind).map_or("more runs", |kind| KindRow::of(kind).determined_by)
     };
     let hidden: Vec<String> = all
         .iter()
@@ -97,7 +99,7 @@ pub fn not_held(all: &[Identifiability]) -> Vec<String> {
             let kinds = [own.kind, other.kind].map(EffectKind::from_name);
             let run = match kinds {
                 [Some(one), Some(other)] => separating_run(one, &[other]),
-                _ => String::new(),
+                _ => "",
             };
             caveats.push(format!(" {} and {} look alike in them. {run}", own.kind, other.kind));
         }

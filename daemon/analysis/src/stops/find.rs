@@ -5,10 +5,9 @@ use std::ops::RangeInclusive;
 use dynocar_shared::{SampleField, TrainSample};
 use serde::Serialize;
 
+use dynocar_core::terms::wheel::STANDING_MPS;
 use dynocar_core::train::EffortCurve;
 
-/// At most this speed in m/s is standing.
-const STANDING_MPS: f64 = 0.3;
 /// Below this speed in m/s a driver may let the brake go, so that the stop is soft.
 const SOFT_MPS: f64 = 2.0;
 /// Without a record of the brake, a train that loses less than this in m/s² is not braking.

@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use dynocar_core::terms::wheel::STILL_MPS;
+
 use super::recording::Recording;
 
 /// Distance in m between the points that are looked at.
@@ -12,8 +14,6 @@ pub const SAME_WAY_M: f64 = 40.0;
 const RETURN_MIN_M: f64 = 200.0;
 /// A return counts once this many points follow an earlier way.
 const RETURN_POINTS: usize = 15;
-/// Below this speed in m/s a vehicle stands.
-pub const STANDING_MPS: f64 = 0.1;
 /// Around a loop at the end of a line, its stand is looked for so many m further.
 const TERMINAL_MARGIN_M: f64 = 100.0;
 
@@ -115,7 +115,7 @@ fn longest_stand(recording: &Recording, from_m: f64, to_m: f64) -> Option<f64> {
             Some((at_m, stood_s)) if way_m - at_m < 5.0 => Some((at_m, stood_s)),
             _ => None,
         };
-        if raw.speed_mps[row] < STANDING_MPS {
+        if raw.speed_mps[row] < STILL_MPS {
             let (at_m, stood_s) = stand.unwrap_or((way_m, 0.0));
             stand = Some((at_m, stood_s + step_s));
             if stood_s + step_s > longest.0 {

@@ -1,10 +1,10 @@
 //! Where the passes stand.
 
+use dynocar_core::terms::wheel::STILL_MPS;
+
 use super::chainage::Estimate;
 use super::recording::RawRecording;
 
-/// Below this speed in m/s a vehicle stands.
-const STANDING_MPS: f64 = 0.1;
 /// A shorter stand in s without open doors is no stop.
 const STAND_MIN_S: f64 = 8.0;
 /// Stands nearer than this many m are at the same stop.
@@ -33,7 +33,7 @@ pub fn stands(raw: &RawRecording, first_row: usize, chainage_m: &[f64]) -> Vec<f
     let mut from: Option<usize> = None;
     for index in 0..=chainage_m.len() {
         let row = first_row + index;
-        let stands = index < chainage_m.len() && raw.speed_mps[row] < STANDING_MPS;
+        let stands = index < chainage_m.len() && raw.speed_mps[row] < STILL_MPS;
         match (stands, from) {
             (true, None) => from = Some(index),
             (false, Some(start)) => {

@@ -1,9 +1,7 @@
 //! When a train departs.
 
 use crate::force::ResolvedSample;
-
-/// Up to this speed in m/s a train stands; below it a wheel sensor sees nothing.
-pub const STANDING_MPS: f64 = 0.3;
+pub use crate::terms::wheel::STANDING_MPS;
 
 /// True for the last sample of a stand: a train departs after it.
 #[inline]

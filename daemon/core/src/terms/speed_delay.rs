@@ -5,6 +5,7 @@
 //! forces that act late, for those leave the gradient on time.
 
 use super::delay::{DelayLine, Forces};
+use super::wheel::STANDING_MPS;
 use super::{Joined, Key, Parameter, Resistance};
 
 /// Dead time in s.
@@ -28,11 +29,10 @@ pub const LAG: Key = Key {
 /// Delay and lag.
 pub const PARAMETERS: [Parameter; 2] =
     [Parameter::new("delay_s", (0.0, 4.0), 0.05), Parameter::new("lag_s", (0.0, 4.0), 0.05)];
-/// A shorter delay and lag together in s are within a cycle of most controllers.
-pub const LEAST_S: f64 = 0.15;
+/// A shorter delay and lag together in s are not distinguishable from forces that act as late as they usually do, where
+/// the map is a little off.
+pub const LEAST_S: f64 = 0.25;
 
-/// At most this speed in m/s is standing.
-const STANDING_MPS: f64 = 0.3;
 /// Numbers of a sample that act on the train without being a force of its own: gradient and the parts
 /// of the resistance.
 const RESISTING: usize = 1 + Resistance::PARTS;

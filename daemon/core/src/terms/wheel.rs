@@ -2,6 +2,10 @@
 
 use super::{Joined, Key, Parameter};
 
+/// Up to this speed in m/s a train stands; below it a wheel sensor sees nothing.
+pub const STANDING_MPS: f64 = 0.3;
+/// A recorded speed in m/s below which a vehicle surely stands, however it was measured.
+pub const STILL_MPS: f64 = 0.1;
 /// Measured over true speed.
 pub const SPEED_SCALE: Key = Key {
     table: "corrections",

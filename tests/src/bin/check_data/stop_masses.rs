@@ -5,6 +5,7 @@ use std::sync::Arc;
 use dynocar_analysis::dataset::{Dataset, Role, Run};
 use dynocar_analysis::identify::identify;
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_core::terms::wheel::STANDING_MPS;
 use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, SampleField, Status, TrainId, TrainSample,
 };
@@ -13,8 +14,6 @@ use dynocar_shared::{
 const STOP_S: f64 = 5.0;
 /// A section that moves for less than this in s shows little.
 const MOVING_MIN_S: f64 = 20.0;
-/// A slower vehicle stands.
-const STANDING_MPS: f64 = 0.3;
 
 /// Learned and counted mass of one section, in t.
 #[derive(Clone, Copy, Debug)]

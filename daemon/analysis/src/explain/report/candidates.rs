@@ -1,5 +1,6 @@
 //! What else was considered, and why it lost.
 
+use dynocar_core::terms::KindRow;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::words;
@@ -48,7 +49,7 @@ pub fn rows(explanation: &Explanation) -> Vec<CandidateRow> {
             let reduction = reduction(&explanation.problem, &outcome.base, &trial.fit);
             let mut row = CandidateRow {
                 kind,
-                title: words::kind(trial.kind),
+                title: KindRow::of(trial.kind).title,
                 is_found,
                 alone: Some(trial.evidence),
                 reduction: Some(reduction),
@@ -67,7 +68,7 @@ pub fn rows(explanation: &Explanation) -> Vec<CandidateRow> {
     let not_testable = outcome.not_testable.iter().filter(|(kind, _)| of(first, *kind).is_none());
     rows.extend(not_testable.map(|(kind, why)| CandidateRow {
         kind: kind.name(),
-        title: words::kind(*kind),
+        title: KindRow::of(*kind).title,
         is_found: false,
         alone: None,
         reduction: None,

@@ -1,6 +1,7 @@
 //! What the residual is plotted against.
 
 use dynocar_core::force::ResolvedSample;
+use dynocar_core::terms::KindRow;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::windows::Window;
@@ -61,28 +62,12 @@ impl Covariate {
     pub const ALWAYS: [Covariate; 4] =
         [Covariate::Chainage, Covariate::Speed, Covariate::TimeSinceStart, Covariate::Run];
 
-    /// The one on which a kind is seen best.
+    /// The one over which a kind is seen best.
     pub fn of_kind(kind: EffectKind) -> Option<Self> {
-        use EffectKind as Kind;
-        Some(match kind {
-            Kind::TunnelDrag
-            | Kind::GradientShift
-            | Kind::GradientError
-            | Kind::LocalResistance => Covariate::Chainage,
-            Kind::CurveResistance => Covariate::Curvature,
-            Kind::Wind => Covariate::Direction,
-            Kind::WheelDiameter => Covariate::Speed,
-            Kind::MassChange | Kind::RotatingMass | Kind::SpeedDelay => Covariate::Acceleration,
-            Kind::TractionGain | Kind::LowAdhesion => Covariate::ControlForce,
-            Kind::ActuatorDelay => Covariate::ForceChange,
-            Kind::BearingTemperature => Covariate::TimeSinceStart,
-            Kind::AmbientTemperature => Covariate::Temperature,
-            Kind::DraggingBrake => Covariate::Run,
-            Kind::Unknown | Kind::None => return None,
-        })
+        KindRow::of(kind).seen_over.and_then(Covariate::of_name)
     }
 
-    /// The one that a place names.
+    /// The one that a place or a kind's row names.
     pub fn of_name(name: &str) -> Option<Self> {
         Some(match name {
             "chainage_m" => Covariate::Chainage,
@@ -91,6 +76,10 @@ impl Covariate {
             "traction_force_n" | "brake_force_n" => Covariate::ControlForce,
             "ambient_temperature_degc" => Covariate::Temperature,
             "run" => Covariate::Run,
+            "direction" => Covariate::Direction,
+            "curvature_per_m" => Covariate::Curvature,
+            "force_change_n_per_s" => Covariate::ForceChange,
+            "acceleration_mps2" => Covariate::Acceleration,
             _ => return None,
         })
     }
@@ -181,6 +170,20 @@ impl Covariate {
                 Some(run.offset_s + 0.5 * (first.time_s + last.time_s))
             }
             Covariate::TimeInRun(_) => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use dynocar_core::terms::KINDS;
+
+    use super::*;
+
+    #[test]
+    fn what_a_kind_is_seen_over_is_a_covariate() {
+        for row in &KINDS {
+            assert_eq!(Covariate::of_kind(row.kind).is_some(), row.seen_over.is_some(), "{row:?}");
         }
     }
 }

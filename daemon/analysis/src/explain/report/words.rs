@@ -1,35 +1,12 @@
 //! Names and units for people.
 
+use dynocar_core::terms::KindRow;
 use dynocar_shared::vocabulary::EffectKind;
-
-/// Name of a kind in a running text.
-pub fn kind(kind: EffectKind) -> &'static str {
-    match kind {
-        EffectKind::None => "nothing undeclared",
-        EffectKind::TunnelDrag => "tunnel drag",
-        EffectKind::CurveResistance => "curve resistance",
-        EffectKind::Wind => "wind along the line",
-        EffectKind::DraggingBrake => "a dragging brake",
-        EffectKind::WheelDiameter => "a wrong wheel diameter",
-        EffectKind::GradientShift => "a gradient profile shifted along the line",
-        EffectKind::MassChange => "a changed mass",
-        EffectKind::TractionGain => "a wrong scale of the reported traction force",
-        EffectKind::ActuatorDelay => "delayed forces",
-        EffectKind::SpeedDelay => "a measured speed that is late",
-        EffectKind::RotatingMass => "another rotating mass than declared",
-        EffectKind::BearingTemperature => "cold bearings that warm up",
-        EffectKind::AmbientTemperature => "resistance that follows the outside temperature",
-        EffectKind::LocalResistance => "a local resistance",
-        EffectKind::LowAdhesion => "low adhesion",
-        EffectKind::GradientError => "a gradient that is wrong along the line",
-        EffectKind::Unknown => "something outside the library",
-    }
-}
 
 /// Name of a kind as the answer writes it, for a running text.
 pub fn kind_name(name: &str) -> &str {
     match EffectKind::from_name(name) {
-        Some(known) => kind(known),
+        Some(known) => KindRow::of(known).title,
         None => name,
     }
 }

@@ -24,8 +24,8 @@ pub use speed_noise::SpeedNoise;
 pub use speed_range::SpeedRange;
 pub use stop_watch::{StopWatch, is_same_mass};
 
-/// Speed in m/s up to which a train counts as standing; below it a wheel sensor sees nothing.
-pub const STANDING_MPS: f64 = 0.3;
+pub use crate::terms::wheel::STANDING_MPS;
+
 /// Speed in m/s up to which nothing is learned of a train's motion: holding brakes, slack and starting
 /// resistance are no part of the model.
 pub const MOVING_MPS: f64 = 1.0;

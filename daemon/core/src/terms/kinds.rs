@@ -1,0 +1,266 @@
+//! Each kind of effect in words: one row, from which report, log, watch and the answer of `explain` take theirs.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+/// A kind of effect in words.
+#[derive(Debug)]
+pub struct KindRow {
+    /// The kind.
+    pub kind: EffectKind,
+    /// Its name in a running text.
+    pub title: &'static str,
+    /// What a person does where it acts, in one line without a full stop.
+    pub to_do: &'static str,
+    /// The quantity over which it is seen best, by its name in answers; `None` where there is none.
+    pub seen_over: Option<&'static str>,
+    /// Runs that would determine it, where it is one number of the train or the line.
+    pub determined_by: &'static str,
+    /// Kinds that it is easily confused with, and the run that separates the two.
+    pub separated_from: &'static [(EffectKind, &'static str)],
+}
+
+const MORE_RUNS: &str = "more runs";
+const LET_EXPLAIN: &str = "record a run and let `dynocar explain` say which force the model lacks";
+const DECLARE_IT: &str =
+    "declare it: `dynocar explain` on a recorded run writes it into the line's files";
+const WEATHER: &str = "nothing on the train: the weather passes; `dynocar explain` gives its size";
+const CHECK_PROFILE: &str = "check the line's gradient profile and where it begins";
+const HARDER: &str = "harder accelerating and braking";
+
+/// A pair of kinds stands in the row of the first of them.
+pub const KINDS: [KindRow; 18] = [
+    KindRow {
+        kind: EffectKind::None,
+        title: "nothing undeclared",
+        to_do: LET_EXPLAIN,
+        seen_over: None,
+        determined_by: MORE_RUNS,
+        separated_from: &[],
+    },
+    KindRow {
+        kind: EffectKind::TunnelDrag,
+        title: "tunnel drag",
+        to_do: DECLARE_IT,
+        seen_over: Some("chainage_m"),
+        determined_by: "fast passes of the tunnels",
+        separated_from: &[
+            (EffectKind::Wind, "Pass the portals in both directions and on another day."),
+            (EffectKind::LocalResistance, "Pass the place at clearly different speeds."),
+        ],
+    },
+    KindRow {
+        kind: EffectKind::CurveResistance,
+        title: "curve resistance",
+        to_do: DECLARE_IT,
+        seen_over: Some("curvature_per_m"),
+        determined_by: "more passes of the sharpest curves",
+        separated_from: &[(
+            EffectKind::GradientShift,
+            "Pass the curves in both directions: a gradient changes its sign.",
+        )],
+    },
+    KindRow {
+        kind: EffectKind::Wind,
+        title: "wind along the line",
+        to_do: WEATHER,
+        seen_over: Some("direction"),
+        determined_by: "fast runs in both directions on one day",
+        separated_from: &[],
+    },
+    KindRow {
+        kind: EffectKind::DraggingBrake,
+        title: "a dragging brake",
+        to_do: "look at the next stop whether every brake releases and no disc is hot",
+        seen_over: Some("run"),
+        determined_by: MORE_RUNS,
+        separated_from: &[
+            (
+                EffectKind::BearingTemperature,
+                "Read the brake-cylinder pressure while released, and let the train run on.",
+            ),
+            (
+                EffectKind::LocalResistance,
+                "Pass the place in further runs: a place stays, a brake moves with its train.",
+            ),
+            (
+                EffectKind::AmbientTemperature,
+                "Read the brake-cylinder pressure while released, and record runs on a mild day.",
+            ),
+        ],
+    },
+    KindRow {
+        kind: EffectKind::WheelDiameter,
+        title: "a wrong wheel diameter",
+        to_do: "check the wheel diameter set in the speed sensor",
+        seen_over: Some("speed_mps"),
+        determined_by: "positions over several kilometres",
+        separated_from: &[],
+    },
+    KindRow {
+        kind: EffectKind::GradientShift,
+        title: "a gradient profile shifted along the line",
+        to_do: CHECK_PROFILE,
+        seen_over: Some("chainage_m"),
+        determined_by: "more passes of the steepest changes of gradient",
+        separated_from: &[],
+    },
+    KindRow {
+        kind: EffectKind::MassChange,
+        title: "a changed mass",
+        to_do: "check the declared mass against the load",
+        seen_over: Some("acceleration_mps2"),
+        determined_by: HARDER,
+        separated_from: &[
+            (
+                EffectKind::TractionGain,
+                "Coast down a known gradient: a mass is felt there, a gain is not.",
+            ),
+            (
+                EffectKind::RotatingMass,
+                "Pass a steep gradient at other loads: the rotating mass does not feel it.",
+            ),
+        ],
+    },
+    KindRow {
+        kind: EffectKind::TractionGain,
+        title: "a wrong scale of the reported traction force",
+        to_do: "check the scale of the reported forces",
+        seen_over: Some("traction_force_n"),
+        determined_by: HARDER,
+        separated_from: &[],
+    },
+    KindRow {
+        kind: EffectKind::ActuatorDelay,
+        title: "delayed forces",
+        to_do: "check how late forces act after they are reported",
+        seen_over: Some("force_change_n_per_s"),
+        determined_by: MORE_RUNS,
+        separated_from: &[(
+            EffectKind::SpeedDelay,
+            "Record a position of its own (GNSS, balises) on steep and changing gradients: the line acts at \
+             once on a train, a late speed shows it late.",
+        )],
+    },
+    KindRow {
+        kind: EffectKind::RotatingMass,
+        title: "another rotating mass than declared",
+        to_do: "check the declared rotating mass",
+        seen_over: Some("acceleration_mps2"),
+        determined_by: HARDER,
+        separated_from: &[
+            (
+                EffectKind::TractionGain,
+                "Compare accelerating with braking: a gain acts on traction only.",
+            ),
+            (
+                EffectKind::WheelDiameter,
+                "Compare the odometer with balises over several kilometres.",
+            ),
+        ],
+    },
+    KindRow {
+        kind: EffectKind::BearingTemperature,
+        title: "cold bearings that warm up",
+        to_do: WEATHER,
+        seen_over: Some("time_since_start_s"),
+        determined_by: MORE_RUNS,
+        separated_from: &[],
+    },
+    KindRow {
+        kind: EffectKind::AmbientTemperature,
+        title: "resistance that follows the outside temperature",
+        to_do: WEATHER,
+        seen_over: Some("ambient_temperature_degc"),
+        determined_by: "runs on colder and warmer days",
+        separated_from: &[(
+            EffectKind::BearingTemperature,
+            "Start warm on a cold day and cold on a warm one.",
+        )],
+    },
+    KindRow {
+        kind: EffectKind::LocalResistance,
+        title: "a local resistance",
+        to_do: "look at the track and the overhead line at that place",
+        seen_over: Some("chainage_m"),
+        determined_by: MORE_RUNS,
+        separated_from: &[],
+    },
+    KindRow {
+        kind: EffectKind::LowAdhesion,
+        title: "low adhesion",
+        to_do: "expect long braking distances: the rail carries less than the brake asks",
+        seen_over: Some("traction_force_n"),
+        determined_by: MORE_RUNS,
+        separated_from: &[],
+    },
+    KindRow {
+        kind: EffectKind::Unknown,
+        title: "something outside the library",
+        to_do: LET_EXPLAIN,
+        seen_over: None,
+        determined_by: MORE_RUNS,
+        separated_from: &[],
+    },
+    KindRow {
+        kind: EffectKind::GradientError,
+        title: "a gradient that is wrong along the line",
+        to_do: CHECK_PROFILE,
+        seen_over: Some("chainage_m"),
+        determined_by: MORE_RUNS,
+        separated_from: &[(
+            EffectKind::LocalResistance,
+            "Drive the line in the other direction: a gradient changes its sign there.",
+        )],
+    },
+    KindRow {
+        kind: EffectKind::SpeedDelay,
+        title: "a measured speed that is late",
+        to_do: "check how old a speed is when the controller reads it",
+        seen_over: Some("acceleration_mps2"),
+        determined_by: MORE_RUNS,
+        separated_from: &[],
+    },
+];
+
+impl KindRow {
+    /// The row of a kind.
+    pub const fn of(kind: EffectKind) -> &'static KindRow {
+        &KINDS[kind as usize]
+    }
+}
+
+/// What separates a kind from the first that it is confused with among others; `None` where no row of any
+/// of them says.
+pub fn separating_run(kind: EffectKind, others: &[EffectKind]) -> Option<&'static str> {
+    let has = |wanted: EffectKind| kind == wanted || others.contains(&wanted);
+    let rows = KINDS.iter().filter(|row| has(row.kind)).flat_map(|row| row.separated_from);
+    rows.clone().find(|(other, _)| has(*other)).map(|(_, run)| *run)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_kind_has_its_row_and_what_to_do_is_one_plain_line() {
+        assert_eq!(KINDS.len(), EffectKind::ALL.len());
+        for &kind in EffectKind::ALL {
+            let row = KindRow::of(kind);
+            assert_eq!(row.kind, kind);
+            assert!((10..120).contains(&row.to_do.len()) && !row.to_do.ends_with('.'), "{row:?}");
+        }
+    }
+
+    #[test]
+    fn a_pair_stands_in_one_row_only() {
+        let pairs: Vec<[EffectKind; 2]> = KINDS
+            .iter()
+            .flat_map(|row| row.separated_from.iter().map(|(other, _)| [row.kind, *other]))
+            .collect();
+        for (k, [one, other]) in pairs.iter().enumerate() {
+            assert_ne!(one, other);
+            assert!(!pairs[k + 1..].contains(&[*other, *one]), "{one:?} and {other:?}");
+            assert_eq!(separating_run(*one, &[*other]), separating_run(*other, &[*one]));
+        }
+    }
+}
