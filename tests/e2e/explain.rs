@@ -302,10 +302,27 @@ fn an_effect_that_predicts_the_runs_held_out_worse_is_reported_as_that() {
     };
     let effects = EffectRequest::Exactly(vec![place]);
     let simulated = simulate(&SimulatorSettings::new(SEED, effects));
-    let answer = explained(&simulated, folder.path()).answer;
+    let explanation = explained(&simulated, folder.path());
+    let answer = &explanation.answer;
     assert_eq!(answer.effects[0].kind, "local_resistance", "{}", answer.statement);
     assert!(answer.rmse_after > answer.rmse_before, "{}", answer.statement);
     assert!(answer.statement.contains("held out are predicted worse"), "{}", answer.statement);
+
+    // What it means on the fit runs: 2 N/kN over the distance driven there.
+    let (mut work_kj, mut distance_m) = (0.0, 0.0);
+    for run in &explanation.problem.runs {
+        for pair in run.samples().windows(2) {
+            let step_m = pair[1].speed_mps * 1e-9 * (pair[1].time_ns - pair[0].time_ns) as f64;
+            let is_inside = pair[1].position_m.is_some_and(|at| (4000.0..8000.0).contains(&at));
+            work_kj += if is_inside { 2e-3 * pair[1].weight_kn * step_m } else { 0.0 };
+            distance_m += step_m;
+        }
+    }
+    let meaning = &answer.effects[0].meaning;
+    let expected_kwh = work_kj / 3600.0 * 1e5 / distance_m;
+    assert!((meaning.energy_kwh_per_100_km / expected_kwh - 1.0).abs() < 0.1, "{meaning:?}");
+    let [without, with] = meaning.distance_error_60_s_m.expect("runs of more than a minute");
+    assert!(with < 0.5 * without, "{meaning:?}");
 }
 
 #[test]

@@ -176,10 +176,20 @@ class Place(Record):
     uncertainty_95: Record | None
 
 
+class Meaning(Record):
+    """What an effect means on the runs that were fitted."""
+
+    _optional = ("share_of_traction_energy", "distance_error_60_s_m")
+
+    energy_kwh_per_100_km: float  # what it takes from the train; negative where it gives
+    share_of_traction_energy: float | None
+    distance_error_60_s_m: list[float] | None  # a minute ahead: without and with the effect
+
+
 class FoundEffect(Record):
     """An effect that the declared model lacks."""
 
-    _kinds = {"where": Place}
+    _kinds = {"where": Place, "meaning": Meaning}
     _optional = ("runners_up",)
 
     kind: str
@@ -188,6 +198,7 @@ class FoundEffect(Record):
     std: Record  # standard deviations of the parameters
     p_value: float  # chance that the search finds as much where nothing acts
     error_reduction: float  # share of the open-loop error on the fit runs
+    meaning: Meaning
     runners_up: list[Record] | None
 
 

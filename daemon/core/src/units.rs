@@ -53,6 +53,8 @@ pub struct Unit {
 
 /// Newtons in a pound-force: 0.45359237 kg at 9.80665 m/s² (NIST SP 811, appendix B.8).
 const POUND_FORCE_N: f64 = 4.4482216152605;
+/// Joules in a kilowatt hour.
+pub const J_PER_KWH: f64 = 3.6e6;
 /// Metres per second in a mile per hour: 1609.344 m in 3600 s.
 const MILE_PER_HOUR_MPS: f64 = 0.44704;
 

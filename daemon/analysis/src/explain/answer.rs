@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use dynocar_core::named;
 use dynocar_core::plausibility::Severity;
+use dynocar_shared::HALF_95;
 use serde::{Deserialize, Serialize};
 
 use super::judged::Judged;
@@ -175,6 +176,20 @@ pub enum ParameterValue {
     Formula(String),
 }
 
+/// The work of an effect, and how far off a prediction ends without and with it, both on the fit runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Meaning {
+    /// Work in kWh that it takes from the train on 100 km; negative where it gives.
+    pub energy_kwh_per_100_km: f64,
+    /// The same over the work of the traction; absent where nothing pulls.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub share_of_traction_energy: Option<f64>,
+    /// Root mean square in m by which the train is elsewhere than predicted a minute before: without and
+    /// with the effect; absent where no run drives a minute without a gap.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distance_error_60_s_m: Option<[f64; 2]>,
+}
+
 /// An effect that was found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EffectAnswer {
@@ -191,6 +206,8 @@ pub struct EffectAnswer {
     pub p_value: f64,
     /// Share of the open-loop error on the fit runs that goes when the effect is added last.
     pub error_reduction: f64,
+    /// What that is in kWh and metres.
+    pub meaning: Meaning,
     /// For an effect outside the library, forms that explain less of the data, the best first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub runners_up: Vec<RunnerUp>,
@@ -204,9 +221,6 @@ pub struct RunnerUp {
     /// By how much its evidence is less, in units of -2 log likelihood.
     pub evidence_less: f64,
 }
-
-/// Half of a 95 % interval in standard deviations.
-pub const HALF_95: f64 = 1.96;
 
 /// What the data say of one number at no effect.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -1,6 +1,8 @@
 //! Effects in words, for the statement.
 
-use super::answer::{EffectAnswer, HALF_95, Location, ParameterValue, PlaceUncertainty};
+use dynocar_shared::HALF_95;
+
+use super::answer::{EffectAnswer, Location, ParameterValue, PlaceUncertainty};
 use super::selection::Trial;
 
 /// An effect with its numbers, where it acts, and how surely that is known.

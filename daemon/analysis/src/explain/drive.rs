@@ -8,10 +8,11 @@ use std::sync::Arc;
 
 use dynocar_core::terms::Parameter;
 use dynocar_core::train::Drive;
+use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 
-use super::answer::{DriveAnswer, HALF_95, WithStd};
+use super::answer::{DriveAnswer, WithStd};
 use super::effects::{AtBound, Hypothesis};
 use super::evidence::{
     FitProblem, Noise, RunData, RunDataError, SampleForces, UpdatedModel, prepare,

@@ -8,9 +8,10 @@ use std::sync::Arc;
 use dynocar_core::terms::Parameter;
 
 use crate::dataset::stamps;
+use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::answer::{HALF_95, WithStd};
+use super::answer::WithStd;
 use super::effects::Hypothesis;
 use super::evidence::{
     FitProblem, Noise, RunData, RunDataError, SampleForces, UpdatedModel, prepare,

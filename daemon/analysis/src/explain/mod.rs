@@ -12,7 +12,8 @@
 //! - [`selection`]: the search for effects, its significance, evidence by run
 //! - [`gradient_prior`], [`map_error`]: how maps err; the finished model beside what the map's own error makes all runs err alike
 //! - [`score`], `stop_runs`, [`stop_to_stop`], [`judged`], `bootstrap`: open-loop prediction of fit and holdout runs
-//! - [`unexplained`], [`informed`], [`identifiability`], [`competing`], [`runners_up`], [`verdict`], [`described`], [`answer`]: the statement
+//! - [`unexplained`], [`informed`], [`identifiability`], [`competing`], [`runners_up`], [`meaning`], [`verdict`],
+//!   [`described`], [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
 //!
 //! [`explain`] runs it all.
@@ -31,6 +32,7 @@ pub mod identifiability;
 pub mod informed;
 pub mod judged;
 pub mod map_error;
+pub mod meaning;
 pub mod places;
 pub mod report;
 pub mod residual_pressure;

@@ -8,7 +8,7 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::{
     BaseAnswer, Considered, DavisDeviations, EffectAnswer, ExplainAnswer, Identifiability,
-    Location, PlaceUncertainty, Verdict,
+    Location, Meaning, PlaceUncertainty, Verdict,
 };
 use super::competing::{CompetingHypotheses, competing_hypotheses, is_in, separating_run};
 use super::described::{describe, describe_place, small};
@@ -222,6 +222,7 @@ fn effect_answers(
                 std: reported.deviations,
                 p_value: p_value(acceptance_score(decrease - penalty(fit, index), reduction)),
                 error_reduction: reduction,
+                meaning: Meaning::of(search.problem, fit, index, &rest),
                 runners_up: if effect.kind() == EffectKind::Unknown {
                     runners_up(search, outcome)
                 } else {
@@ -355,7 +356,7 @@ fn statement(
                 each.join(", as well as ")
             );
             let runs = competing.iter().map(|it| separating_run(it.accepted, &it.kinds));
-            let mut experiments: Vec<String> = runs.collect();
+            let mut experiments: Vec<&str> = runs.collect();
             experiments.dedup();
             let experiment = (!experiments.is_empty()).then(|| experiments.join(" "));
             (text, experiment)

@@ -1,11 +1,12 @@
 //! The answer of `dynocar explain` for people: a verdict of at most two sentences, then a list of what was
 //! found, where, how large, what it removes from the error, and what to do.
 
-use dynocar::operator::remedy::of_suspect;
-use dynocar_analysis::explain::answer::{EffectAnswer, ExplainAnswer, HALF_95, RunnerUp, Verdict};
+use dynocar_analysis::explain::answer::{EffectAnswer, ExplainAnswer, RunnerUp, Verdict};
 use dynocar_analysis::explain::described::precision;
 use dynocar_analysis::explain::judged::Metric;
 use dynocar_analysis::explain::report::{sentence, words};
+use dynocar_core::terms::KindRow;
+use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::text::{WIDTH, diagnostics, wrap};
@@ -76,11 +77,15 @@ fn found(effect: &EffectAnswer) -> String {
             _ => "none of the open-loop error of the fit runs".into(),
         },
     );
+    let means = sentence::meaning(&effect.meaning);
+    if !means.is_empty() {
+        rows += &row("means", &means);
+    }
     for RunnerUp { formula, evidence_less } in &effect.runners_up {
         rows += &row("or else", &format!("{formula} (evidence less by {evidence_less:.0})"));
     }
     if let Some(kind) = kind.filter(|kind| *kind != EffectKind::Unknown) {
-        rows += &row("to do", of_suspect(kind));
+        rows += &row("to do", KindRow::of(kind).to_do);
     }
     rows
 }

@@ -9,7 +9,7 @@ use clap::Args;
 use dynocar_analysis::dataset::{Dataset, DatasetDiagnostic};
 use dynocar_core::pipeline::EstimatorSettings;
 use dynocar_core::units::Unit;
-use dynocar_shared::TrainId;
+use dynocar_shared::{HALF_95, TrainId};
 use serde::Serialize;
 
 use self::answer::EstimatorAnswer;
@@ -225,12 +225,12 @@ pub fn text(answer: &IdentifyAnswer) -> String {
         }
         for (name, value) in &it.values {
             let std = it.std.get(name).copied().unwrap_or(f64::NAN);
-            text += &format!("    {name:<24} {value:>12.6} ± {:.6}\n", 1.96 * std);
+            text += &format!("    {name:<24} {value:>12.6} ± {:.6}\n", HALF_95 * std);
         }
         for point in &it.resistance_shown {
             let at = answer.speed_unit.from_base(point.speed_mps);
             let name = format!("w0 at {at:>4.0} {}", answer.speed_unit.name());
-            let (w0, half) = (point.w0_n_per_kn, 1.96 * point.std);
+            let (w0, half) = (point.w0_n_per_kn, HALF_95 * point.std);
             text += &format!("    {name:<24} {w0:>12.4} ± {half:.4} N/kN\n");
         }
     }

@@ -11,6 +11,7 @@ use super::text::{TextTable, diagnostics};
 use dynocar::cli::Failure;
 use dynocar::dataset;
 use dynocar::output::{give, require_file};
+use dynocar_shared::HALF_95;
 
 /// Estimate deceleration and stopping distance from recorded stops, without forces.
 ///
@@ -128,8 +129,8 @@ fn of_the_brake(study: &Study, law: &Law) -> String {
         table.push(vec![
             format!("{:.0}", point.speed_mps),
             format!("{:.3}", point.deceleration_mps2),
-            format!("{:.3}", 1.96 * point.std_mps2),
-            format!("{:.3}", 1.96 * point.next_std_mps2),
+            format!("{:.3}", HALF_95 * point.std_mps2),
+            format!("{:.3}", HALF_95 * point.next_std_mps2),
             format!("{}", point.stops),
         ]);
     }
@@ -171,7 +172,7 @@ fn modulated(stops: &[RecordedStop]) -> String {
         row.extend(speeds.iter().map(|speed_mps| {
             let at = stop.decelerations.iter().find(|it| it.speed_mps == *speed_mps);
             at.map_or("-".into(), |it| {
-                format!("{:.2} ± {:.2}", it.deceleration_mps2, 1.96 * it.std_mps2)
+                format!("{:.2} ± {:.2}", it.deceleration_mps2, HALF_95 * it.std_mps2)
             })
         }));
         row.push(stop.no_law.clone().unwrap_or_default());
@@ -215,7 +216,7 @@ fn friction(stops: &[RecordedStop]) -> String {
         table.push(vec![
             format!("{:.0}", point.speed_mps),
             format!("{:.2}", point.share),
-            format!("{:.2}", 1.96 * point.share_std),
+            format!("{:.2}", HALF_95 * point.share_std),
             point.adhesion_at_least.map_or("-".into(), |it| format!("{it:.3}")),
         ]);
     }

@@ -9,6 +9,7 @@ use crate::survey::{SurveyFailure, page, survey_folder};
 use clap::Args;
 use dynocar::cli::Failure;
 use dynocar::output::{give, report_line, require_file, require_folder, write_file};
+use dynocar_shared::HALF_95;
 
 /// Survey a line from recordings with GNSS: trips, chainage, stops, gradient.
 #[derive(Debug, Args)]
@@ -76,12 +77,13 @@ fn summary(answer: &SurveyAnswer) -> String {
         text += &format!(
             "gradient from {} passes, ± {:.2} ‰ over 100 m\n",
             answer.line.passes,
-            1.96 * std
+            HALF_95 * std
         );
     }
     if let Some(learned) = &answer.learned {
         let mut row = |name: &str, it: &crate::survey::answer::Value, unit: &str| {
-            text += &format!("    {name:<22} {:>10.4} ± {:.4} {unit}\n", it.value, 1.96 * it.std);
+            text +=
+                &format!("    {name:<22} {:>10.4} ± {:.4} {unit}\n", it.value, HALF_95 * it.std);
         };
         row("mass", &learned.mass_t, "t");
         row("with rotating parts", &learned.inertial_mass_t, "t");

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::survey::Survey;
+use dynocar_shared::HALF_95;
 
 use super::answer::SurveyAnswer;
 use super::write::gradient_entries;
@@ -146,7 +147,7 @@ fn learned(answer: &SurveyAnswer) -> String {
     let head = [("quantity", Column::Words), ("value", Column::Numbers), ("±", Column::Numbers)];
     let mut table = Table::new("Learned, with 95 % intervals", &head);
     let mut row = |name: &str, it: &super::answer::Value| {
-        let half = format!("{:.4}", 1.96 * it.std);
+        let half = format!("{:.4}", HALF_95 * it.std);
         table.push(vec![name.into(), format!("{:.4}", it.value), half]);
     };
     row("mass, t", &learned.mass_t);

@@ -1,6 +1,6 @@
 //! A value and how well it is known.
 
-use crate::explain::answer::HALF_95;
+use dynocar_shared::HALF_95;
 
 /// A value with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,12 +3,14 @@
 //! A resistance of a place retards trains in both directions; what the map says wrong of the
 //! gradient has opposite signs in the two.
 
+use dynocar_shared::HALF_95;
+
 use super::covariates::Covariate;
 use super::panels::{PanelBin, bins, covariance};
 use super::windows::Window;
 use super::words;
 use crate::explain::Explanation;
-use crate::explain::answer::{EffectAnswer, HALF_95, ParameterValue, RunWindow, WindowUncertainty};
+use crate::explain::answer::{EffectAnswer, ParameterValue, RunWindow, WindowUncertainty};
 use crate::explain::evidence::RunData;
 
 /// A section of the line where an effect was found.

@@ -1,6 +1,7 @@
 //! The residual force against one covariate each, in bins with their errors.
 
 use dynocar_core::force::ResolvedSample;
+use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{DMatrix, DVector};
 
@@ -8,7 +9,7 @@ use super::covariates::Covariate;
 use super::windows::Window;
 use crate::dataset::{Dataset, Role};
 use crate::explain::Explanation;
-use crate::explain::answer::{EffectAnswer, HALF_95, ParameterValue, RunWindow};
+use crate::explain::answer::{EffectAnswer, ParameterValue, RunWindow};
 use crate::explain::evidence::RunData;
 use crate::explain::selection::Deviations;
 

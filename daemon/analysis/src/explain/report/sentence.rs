@@ -1,10 +1,12 @@
 //! The verdict in a plain sentence: kind, where, size with unit and interval, error reduction.
 
+use dynocar_shared::HALF_95;
+
 use super::errors::Errors;
 use super::words::{self, joined, kind_name, number};
 use crate::dataset::Role;
 use crate::explain::answer::{
-    EffectAnswer, ExplainAnswer, HALF_95, Location, ParameterValue, Verdict,
+    EffectAnswer, ExplainAnswer, Location, Meaning, ParameterValue, Verdict,
 };
 
 /// Places named in a sentence at most.
@@ -23,7 +25,12 @@ pub fn sentence(answer: &ExplainAnswer, errors: &Errors) -> String {
         Verdict::InsufficientData => {
             format!("These runs do not suffice for a verdict. {}", answer.statement)
         }
-        Verdict::Effect => format!("Found: {found}. {}", gained(errors)),
+        Verdict::Effect => {
+            let means = answer.effects.first().map(|it| meaning(&it.meaning)).unwrap_or_default();
+            let is_one = answer.effects.len() == 1 && !means.is_empty();
+            let means = if is_one { format!(" It {means}.") } else { String::new() };
+            format!("Found: {found}.{means} {}", gained(errors))
+        }
         Verdict::Ambiguous => {
             let competing: Vec<String> =
                 answer.ambiguous_with.iter().map(|kind| kind_name(kind).into()).collect();
@@ -132,6 +139,30 @@ pub fn sizes(effect: &EffectAnswer) -> Vec<String> {
     sizes
 }
 
+/// Share of the traction's energy below which the work of an effect is not worth a word.
+const WORK_SHARE_MIN: f64 = 0.002;
+
+/// What an effect means in kWh and metres, in words without a full stop; empty where nothing is known of it.
+pub fn meaning(meaning: &Meaning) -> String {
+    let percent =
+        |share: f64| format!("{} % of the traction's energy", number(100.0 * share, Some(1.0)));
+    let share = meaning.share_of_traction_energy.filter(|share| share.abs() >= WORK_SHARE_MIN);
+    let work = share.map(|share| {
+        let kwh = meaning.energy_kwh_per_100_km.abs();
+        let kwh = number(kwh, Some(0.1 * kwh));
+        let takes = if share > 0.0 { "takes" } else { "gives" };
+        format!("{takes} {kwh} kWh per 100 km, {}", percent(share.abs()))
+    });
+    let ahead = meaning.distance_error_60_s_m.map(|[without, with]| {
+        let [without, with] = [without, with].map(|m| number(m, Some(0.1 * without.max(with))));
+        format!(
+            "a minute ahead the train is predicted {without} m off without it, {with} m with it"
+        )
+    });
+    let parts: Vec<String> = work.into_iter().chain(ahead).collect();
+    parts.join("; ")
+}
+
 /// Where an effect acts, in words; empty when it acts everywhere.
 pub fn placed(place: &Location) -> String {
     let mut parts = Vec::new();
@@ -194,6 +225,27 @@ mod tests {
     use crate::explain::stop_to_stop::StopToStop;
 
     #[test]
+    fn what_an_effect_means_is_said_in_kwh_and_metres() {
+        let costs = Meaning {
+            energy_kwh_per_100_km: 41.26,
+            share_of_traction_energy: Some(0.0312),
+            distance_error_60_s_m: Some([14.52, 2.13]),
+        };
+        assert_eq!(
+            meaning(&costs),
+            "takes 41.3 kWh per 100 km, 3.1 % of the traction's energy; a minute ahead the train is \
+             predicted 14.5 m off without it, 2.1 m with it"
+        );
+        let helps = Meaning {
+            energy_kwh_per_100_km: -2.0,
+            share_of_traction_energy: Some(-0.01),
+            distance_error_60_s_m: None,
+        };
+        assert_eq!(meaning(&helps), "gives 2.00 kWh per 100 km, 1.0 % of the traction's energy");
+        assert_eq!(meaning(&Meaning::default()), "");
+    }
+
+    #[test]
     fn places_are_reported_in_words() {
         let tunnels = Location::of_intervals(vec![[5200.0, 6900.0], [8000.0, 8100.0]]);
         assert_eq!(placed(&tunnels), "from km 5.20 to 6.90 and from km 8.00 to 8.10");
@@ -226,6 +278,7 @@ mod tests {
             std: number(107.5),
             p_value: 1e-9,
             error_reduction: 0.8,
+            meaning: Meaning::default(),
             runners_up: Vec::new(),
         };
         assert_eq!(
@@ -242,6 +295,7 @@ mod tests {
             std: [(parameter.to_string(), ParameterValue::Number(0.1))].into(),
             p_value: 1e-9,
             error_reduction: 0.8,
+            meaning: Meaning::default(),
             runners_up: Vec::new(),
         }
     }

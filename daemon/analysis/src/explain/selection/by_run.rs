@@ -1,9 +1,9 @@
 //! The run as the unit of evidence.
 
+use dynocar_shared::HALF_95;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::explain::answer::HALF_95;
 use crate::explain::evidence::{Fit, FitProblem, PRIOR_RUNS, RunData, RunNormal};
 
 /// A parameter at its bound is held there to this share of what is looked for.

@@ -9,6 +9,7 @@ use std::fmt::Write as _;
 
 use dynocar_analysis::dataset::{Role, Run};
 use dynocar_core::units::Unit;
+use dynocar_shared::HALF_95;
 use serde::Serialize;
 
 use super::answer::EstimatorAnswer;
@@ -178,7 +179,7 @@ pub(super) fn report(runs: &[RunAnswer], speed_unit: Unit) -> String {
                 answer.samples.used.to_string(),
             ];
             row.extend(quantities.iter().map(|quantity| match quantity.by_run[index] {
-                Some((value, std)) => with_half_width(value, 1.96 * std),
+                Some((value, std)) => with_half_width(value, HALF_95 * std),
                 None => "-".into(),
             }));
             table.push(row);

@@ -1,5 +1,6 @@
 //! A surveyed gradient over the chainage, with its 95 % band.
 
+use dynocar_shared::HALF_95;
 use plotters::backend::SVGBackend;
 use plotters::drawing::IntoDrawingArea;
 use plotters::element::PathElement;
@@ -8,7 +9,6 @@ use super::axes::{Axis, band, chart, frame, padded, range_with_zero, stroke, zer
 use super::reading::Reading;
 use super::speeds::Width;
 use super::{AFTER, Plot, PlotError, SCALE, for_page};
-use dynocar_analysis::explain::answer::HALF_95;
 
 /// A profile of (chainage in m, gradient in ‰, its standard deviation in ‰) as SVG.
 ///
