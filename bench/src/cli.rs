@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use dynocar::cli::parse;
-use dynocar::output::{report_line, write_file};
+use dynocar::output::report_line;
 use serde::Serialize;
 
 use crate::drive::command::{DriveArguments, drive};
@@ -16,7 +16,7 @@ use crate::latency::server::{PeerArguments, serve};
 use crate::latency::{self, LatencyArguments, plot};
 use crate::load::{self, LoadArguments};
 use crate::monitor::command::{MonitorArguments, monitor};
-use crate::output::give;
+use crate::output::{give, write_csv};
 use crate::papers::{self, Row, Seeds, Verdict, table};
 use crate::scenarios::command::{ScenariosArguments, scenarios};
 use crate::survey::{self, SurveyArguments};
@@ -81,9 +81,9 @@ struct PapersArguments {
     /// Write the result for machines; - for standard output
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write the tables as a page of the documentation
+    /// Write the rows as CSV
     #[arg(long, value_name = "FILE")]
-    markdown: Option<PathBuf>,
+    csv: Option<PathBuf>,
 }
 
 #[derive(Serialize)]
@@ -182,9 +182,8 @@ fn papers(arguments: &PapersArguments) -> Result<(), (String, u8)> {
         })
         .collect();
     give(&arguments.json, &PapersAnswer { rows: judged }, || table::for_terminal(&rows))?;
-    if let Some(file) = &arguments.markdown {
-        write_file(file, &table::for_documentation(&rows))
-            .map_err(|error| (error.to_string(), 1))?;
+    if let Some(file) = &arguments.csv {
+        write_csv(file, &table::csv(&rows))?;
     }
     match broken.is_empty() {
         true => Ok(()),

@@ -1,6 +1,6 @@
 //! `dynocar-bench drive`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use dynocar::output::{report_line, write_file};
@@ -8,8 +8,8 @@ use dynocar::output::{report_line, write_file};
 use super::line::{Condition, Service};
 use super::run::{Extent, Informant, drive as drive_all};
 use super::score::{Scored, score};
-use super::{picture, table};
-use crate::output::give;
+use super::{csv, picture, table};
+use crate::output::{give, write_csv};
 use crate::parallel;
 use crate::rig::RigError;
 use crate::scenarios::world::Traffic;
@@ -41,6 +41,9 @@ pub struct DriveArguments {
     /// Write the result for machines; - for standard output
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Write the drives as CSV; FILE_answers and FILE_differences beside it
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
     /// Write the picture of the ordinary scenarios, as SVG
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
@@ -97,16 +100,27 @@ pub fn drive(arguments: &DriveArguments) -> Result<(), (String, u8)> {
         let drawn = picture::svg(&ordinary).map_err(|error| (error.to_string(), 1))?;
         write_file(file, &drawn).map_err(|error| (error.to_string(), 1))?;
     }
+    if let Some(file) = &arguments.csv {
+        write_csv(file, &csv::drives(&scored))?;
+        write_csv(&beside(file, "answers"), &csv::answers(&scored))?;
+        write_csv(&beside(file, "differences"), &csv::differences(&scored))?;
+    }
     give(&arguments.json, &scored, || table::tables(&scored))?;
     let broken: Vec<String> = scored
         .iter()
         .filter(|it| it.comparison.is_broken)
-        .map(|it| format!("{}: {}", it.comparison.scenario, it.comparison.worse.join("; ")))
+        .map(|it| format!("{}: {}", it.comparison.scenario, it.comparison.listed(false).join("; ")))
         .collect();
     match broken.is_empty() {
         true => Ok(()),
         false => Err((format!("worse with Dynocar:\n{}", broken.join("\n")), 1)),
     }
+}
+
+/// A file next to another: `gain_answers.csv` to `gain.csv`.
+fn beside(file: &Path, what: &str) -> PathBuf {
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+    file.with_file_name(format!("{stem}_{what}.csv"))
 }
 
 fn measure(service: Service, extent: Extent) -> Result<Scored, RigError> {

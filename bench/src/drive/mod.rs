@@ -18,6 +18,7 @@
 pub mod answers;
 pub mod braking;
 pub mod command;
+mod csv;
 pub mod driver;
 pub mod journey;
 pub mod knowledge;

@@ -15,6 +15,8 @@ const DRAWS: usize = 400;
 const SAME_STOP_M: f64 = 1.0;
 /// What is no difference that anybody would notice: stop in m, energy in %, lateness in s, jerk in m/s³.
 const UNNOTICED: [f64; 4] = [0.03, 0.3, 0.5, 0.05];
+/// What is compared.
+const MEASURES: [&str; 4] = ["stop_error_rms_m", "energy_percent", "late_s", "jerk_mps3"];
 /// Share of bounds that may be exceeded.
 const EXCEEDED_MAX: f64 = 0.01;
 
@@ -109,12 +111,35 @@ pub struct Answered {
 pub struct Comparison {
     /// The service.
     pub scenario: String,
-    /// What is better, beyond the noise.
-    pub better: Vec<String>,
-    /// What is worse, beyond the noise.
-    pub worse: Vec<String>,
+    /// What differs beyond the noise.
+    pub differences: Vec<Difference>,
+    /// Bounds that were exceeded more often than promised, in words.
+    pub exceeded: Option<String>,
     /// True where that is not paid back by a better stop, or where stops or bounds are worse.
     pub is_broken: bool,
+}
+
+/// A measure that differs beyond the noise.
+#[derive(Clone, Debug, Serialize)]
+pub struct Difference {
+    /// The measure, with its unit.
+    pub measure: &'static str,
+    /// With Dynocar less with declared parameters; less is better.
+    pub figure: Figure,
+    /// Whether it is better.
+    pub is_better: bool,
+}
+
+impl Comparison {
+    /// What is better beyond the noise, or worse, in words.
+    pub fn listed(&self, is_better: bool) -> Vec<String> {
+        let own = self.differences.iter().filter(|it| it.is_better == is_better);
+        let words = own.map(|Difference { measure, figure, .. }| {
+            let Figure { value, low, high } = figure;
+            format!("{measure}: {value:+.3} ({low:+.3} to {high:+.3})")
+        });
+        words.chain(self.exceeded.clone().filter(|_| !is_better)).collect()
+    }
 }
 
 /// Everything about one service.
@@ -247,35 +272,29 @@ fn answered(service: Service, place: usize, driven: &[Driven], stops: usize) -> 
 
 fn comparison(service: Service, all: &[Vec<Driven>; 3], lines: &[ReportRow]) -> Comparison {
     let [declared, learned] = [0, 1].map(|which| Drives { own: &all[which], all });
-    let (mut better, mut worse) = (Vec::new(), Vec::new());
-    let mut is_stop = [false; 2];
-    for (place, name) in
-        ["stop in m", "energy in %", "lateness in s", "jerk in m/s³"].into_iter().enumerate()
-    {
-        let difference = Figure::of(all[0].len(), |it| {
+    let difference = |place: usize| {
+        let figure = Figure::of(all[0].len(), |it| {
             learned.compared(it)[place] - declared.compared(it)[place]
         });
-        let Figure { value, low, high } = difference;
-        let text = format!("{name}: {value:+.3} ({low:+.3} to {high:+.3})");
-        if low > UNNOTICED[place] {
-            worse.push(text);
-            is_stop[1] |= place == 0;
-        } else if high < 0.0 {
-            better.push(text);
-            is_stop[0] |= place == 0;
-        }
-    }
+        let (is_worse, is_better) = (figure.low > UNNOTICED[place], figure.high < 0.0);
+        let measure = MEASURES[place];
+        (is_worse || is_better).then_some(Difference { measure, figure, is_better })
+    };
+    let differences: Vec<Difference> = (0..MEASURES.len()).filter_map(difference).collect();
+    let stop = differences.iter().find(|it| it.measure == MEASURES[0]).map(|it| it.is_better);
     let line = &lines[1];
     let bounds = line.bounds as f64;
     // One in a hundred is promised; two deviations of chance on top.
     let most = EXCEEDED_MAX * bounds + 2.0 * (EXCEEDED_MAX * bounds).sqrt();
     let exceeded = line.exceeded.unwrap_or_default();
     let are_bounds_broken = exceeded as f64 > most;
-    if are_bounds_broken {
-        worse.push(format!("bounds: {exceeded} of {bounds} exceeded"));
+    let is_worse = are_bounds_broken || differences.iter().any(|it| !it.is_better);
+    Comparison {
+        scenario: service.name(),
+        differences,
+        exceeded: are_bounds_broken.then(|| format!("bounds: {exceeded} of {bounds} exceeded")),
+        is_broken: are_bounds_broken || stop == Some(false) || (is_worse && stop != Some(true)),
     }
-    let is_broken = are_bounds_broken || is_stop[1] || (!worse.is_empty() && !is_stop[0]);
-    Comparison { scenario: service.name(), better, worse, is_broken }
 }
 
 #[cfg(test)]

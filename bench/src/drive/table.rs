@@ -84,7 +84,12 @@ fn comparisons(scored: &[Scored]) -> String {
             true => "–".to_owned(),
             false => items.join("; "),
         };
-        text += &format!("| {} | {} | {} |\n", it.scenario, list(&it.better), list(&it.worse));
+        text += &format!(
+            "| {} | {} | {} |\n",
+            it.scenario,
+            list(&it.listed(true)),
+            list(&it.listed(false))
+        );
     }
     text
 }

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::{Row, Verdict};
+use crate::output::{CsvRow, cell};
 
 const HEADINGS: [&str; 13] = [
     "paper",
@@ -93,69 +94,50 @@ pub fn for_terminal(rows: &[Row]) -> String {
     text
 }
 
-/// What stands above the tables of the page.
-const INTRODUCTION: &str = "\
-# The papers' tables, measured
+/// The rows for a file of CSV. What stands behind a quantity, from `paper's method:` or `baseline:` on, is a note.
+pub fn csv(rows: &[Row]) -> Vec<CsvRow> {
+    rows.iter().map(csv_row).collect()
+}
 
-Made by `cargo run --release -p dynocar-bench -- papers --markdown docs/papers.md`: errors over seeded runs.
-
-| column | meaning |
-| --- | --- |
-| paper's method, baseline | the corrected formulas on the same data as ours |
-| bound | Cramér–Rao or posterior Cramér–Rao bound, computed in the same run |
-| coverage | share of our 95 % intervals that hold the truth |
-| NEES | 1 when the covariance is right; the band holds it in 99 % of such measurements. Where all runs share one curve (Xie 2019, Jin 2020, except *drawn coefficients*) it is as wide as one draw leaves it |
-
-Rows that break what the project promises say `BROKEN` and what.
-
-Deviations from the papers:
-
-- Liu: segments end where a noisy speed first reaches a bound, which biases w0 by -1.7 %. V-MILS prints no rule for bad data; the gate here acts on rows that a
-  spike has already spoilt. The size of outliers is assumed (1 to 5 km/h).
-- Xia: windows of 2 km settle late to 0.1 N/kN, since Newton's method seldom reaches the printed tolerance within 100 iterations where the Hessian is not positive definite;
-  to 0.2 N/kN they settle within 1 to 2 km.
-";
-
-/// A page of the documentation: one table for each paper, and below it the notes that several rows share.
-pub fn for_documentation(rows: &[Row]) -> String {
-    let mut text = INTRODUCTION.to_owned();
-    for of_paper in rows.chunk_by(|one, other| one.paper == other.paper) {
-        let mut notes = Vec::new();
-        let _ = writeln!(text, "\n## {}\n", of_paper[0].paper);
-        let _ = writeln!(text, "| {} | seeds |", HEADINGS[1..12].join(" | "));
-        let _ = writeln!(text, "|{}", " --- |".repeat(HEADINGS.len() - 1));
-        for row in of_paper {
-            let mut cells = cells(row);
-            for (from, into, start) in [(2, 2, " (paper's method: "), (12, 11, "; may be wider: ")]
-            {
-                if let Some((cell, note)) = cells[from].clone().split_once(start) {
-                    let note = format!("{}{note}", start.trim_start_matches([' ', '(', ';']));
-                    let cell = if from == into { cell } else { cells[into].as_str() };
-                    cells[into] = format!("{cell} ({})", number_of(&note, &mut notes));
-                }
-            }
-            if cells[12].starts_with("BROKEN") {
-                cells[11] = format!("{} {}", cells[11], cells[12]);
-            }
-            let _ = writeln!(text, "| {} | {} |", cells[1..12].join(" | "), row.seeds);
+fn csv_row(row: &Row) -> CsvRow {
+    let verdict = Verdict::of(row);
+    let (quantity, mut notes) = match NOTES.iter().filter_map(|it| row.quantity.find(it)).min() {
+        Some(at) => {
+            let note = row.quantity[at..].trim_start_matches([' ', '(', ';']);
+            (&row.quantity[..at], vec![note.trim_end_matches(')').to_owned()])
         }
-        for (place, note) in notes.iter().enumerate() {
-            let _ = write!(text, "{}({}) {note}.", if place == 0 { "\n" } else { " " }, place + 1);
-        }
-        text += if notes.is_empty() { "" } else { "\n" };
+        None => (&row.quantity[..], Vec::new()),
+    };
+    if !verdict.broken.is_empty() {
+        notes.push(format!("BROKEN: {}", verdict.broken.join(", ")));
+    } else if let Some(reason) = verdict.may_be_wider.filter(|_| !verdict.promised.is_empty()) {
+        notes.push(format!("may be wider: {reason}"));
     }
-    text
+    let ratio = row.ours.zip(row.bound).filter(|(_, bound)| *bound > 0.0);
+    let band = verdict.nees_band.filter(|_| row.nees.is_some());
+    vec![
+        ("paper", row.paper.to_owned()),
+        ("table", row.table.to_owned()),
+        ("quantity", quantity.to_owned()),
+        ("unit", row.unit.to_owned()),
+        ("published", figure(row.published)),
+        ("papers_method", figure(row.paper_method)),
+        ("baseline", figure(row.baseline)),
+        ("ours", figure(row.ours)),
+        ("bound", figure(row.bound)),
+        ("ours_over_bound", cell(ratio.map(|(ours, bound)| ours / bound), 2)),
+        ("coverage_percent", cell(row.coverage.map(|share| 100.0 * share), 1)),
+        ("nees", cell(row.nees, 2)),
+        ("nees_low", cell(band.map(|it| it.0), 2)),
+        ("nees_high", cell(band.map(|it| it.1), 2)),
+        ("seeds", row.seeds.to_string()),
+        ("note", notes.join("; ")),
+    ]
 }
 
-/// A note's number, from 1.
-fn number_of(note: &str, notes: &mut Vec<String>) -> usize {
-    let note = note.trim_end_matches(')').to_owned();
-    let place = notes.iter().position(|it| *it == note).unwrap_or_else(|| {
-        notes.push(note);
-        notes.len() - 1
-    });
-    place + 1
-}
+/// Where a note begins in a quantity.
+const NOTES: [&str; 6] =
+    [" (paper's method:", "; paper's method:", " (baseline:", "; baseline:", " (EM:", "; EM:"];
 
 #[cfg(test)]
 mod tests {
@@ -185,18 +167,13 @@ mod tests {
     }
 
     #[test]
-    fn a_page_has_one_table_for_each_paper() {
-        let text = for_documentation(&[row(), row()]);
-        assert_eq!(text.matches("## Xia 2023").count(), 1);
-        assert_eq!(text.matches("| Table 3 |").count(), 2);
-    }
-
-    #[test]
-    fn what_several_rows_say_of_a_method_stands_once_below_their_table() {
-        let with_note = Row { quantity: "mass (paper's method: by hand)".into(), ..row() };
-        let text = for_documentation(&[with_note.clone(), with_note]);
-        assert_eq!(text.matches("| mass (1) |").count(), 2);
-        assert!(text.ends_with("\n(1) paper's method: by hand.\n"), "{text}");
+    fn a_file_has_figures_apart_from_notes() {
+        let row = Row { quantity: "mass, 3 km (paper's method: by hand)".into(), ..row() };
+        let cells = csv_row(&row);
+        let of = |name: &str| cells.iter().find(|it| it.0 == name).unwrap().1.as_str();
+        assert_eq!((of("quantity"), of("note")), ("mass, 3 km", "paper's method: by hand"));
+        assert_eq!((of("ours_over_bound"), of("coverage_percent")), ("1.10", "95.1"));
+        assert_eq!((of("baseline"), of("nees")), ("", ""));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use clap::Args;
 use dynocar_shared::PipelineKind;
 
 use super::{rows, table};
-use crate::output::give;
+use crate::output::{give, write_csv};
 
 /// Resistance and mass in a user's day: how long an answer may be used, how soon, how often that
 /// changes, and whether its intervals hold.
@@ -33,6 +33,9 @@ pub struct ScenariosArguments {
     /// Write the result for machines; - for standard output
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Write the result as CSV
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
 }
 
 /// Runs the command; an error has its text and the exit status.
@@ -54,14 +57,17 @@ pub fn scenarios(arguments: &ScenariosArguments) -> Result<(), (String, u8)> {
     if !(arguments.hours > 0.0 && arguments.hours.is_finite()) || arguments.seeds == 0 {
         return Err(("--hours and --seeds: expected more than 0".into(), 2));
     }
-    let lines = table::run(&table::Plan {
+    let plan = table::Plan {
         scenarios: &chosen,
         kinds: &kinds?,
         seeds: arguments.seeds,
         first_seed: arguments.first_seed,
         hours: arguments.hours,
         threads: arguments.threads,
-    })
-    .map_err(|error| (error.to_string(), 1))?;
+    };
+    let lines = table::run(&plan).map_err(|error| (error.to_string(), 1))?;
+    if let Some(file) = &arguments.csv {
+        write_csv(file, &table::csv(&plan, &lines))?;
+    }
     give(&arguments.json, &lines, || table::table(&lines))
 }

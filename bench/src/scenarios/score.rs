@@ -1,6 +1,6 @@
 //! What an answer was worth over a drive.
 
-use dynocar_shared::{Parameter, ParameterSnapshot, Quantity};
+use dynocar_shared::{HALF_95, Parameter, ParameterSnapshot, Quantity};
 
 use nalgebra::{Matrix4, Vector4};
 
@@ -47,7 +47,7 @@ impl Score {
         };
         self.usable += 1;
         self.first_s.get_or_insert(time_s);
-        self.covered += u64::from(error.abs() <= 1.96 * deviation);
+        self.covered += u64::from(error.abs() <= HALF_95 * deviation);
         self.error_square += error * error;
         self.deviation_square += deviation * deviation;
         self.wrong_now_s =

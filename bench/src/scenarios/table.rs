@@ -12,6 +12,7 @@ use super::drive::Drive;
 use super::rows::NamedScenario;
 use super::score::{Score, answer, least_deviation};
 use super::world::{LoadSource, Scenario, World};
+use crate::output::{CsvRow, cell};
 use crate::parallel;
 
 /// Speed in m/s from which an answer counts.
@@ -202,4 +203,29 @@ pub fn table(lines: &[ReportRow]) -> String {
         );
     }
     text
+}
+
+/// The lines for a file of CSV.
+pub fn csv(plan: &Plan<'_>, lines: &[ReportRow]) -> Vec<CsvRow> {
+    let row = |line: &ReportRow| {
+        let (traffic, condition) = line.scenario.split_once(", ").unwrap_or((&line.scenario, ""));
+        let used = |value: f64| Some(value).filter(|_| line.usable_percent > 0.0);
+        vec![
+            ("traffic", traffic.to_owned()),
+            ("condition", condition.to_owned()),
+            ("pipeline", line.pipeline.to_owned()),
+            ("quantity", line.quantity.to_owned()),
+            ("seeds", plan.seeds.to_string()),
+            ("first_seed", plan.first_seed.to_string()),
+            ("usable_percent", cell(Some(line.usable_percent), 1)),
+            ("coverage_percent", cell(used(line.covered_percent), 1)),
+            ("first_use_s", cell(line.first_s, 0)),
+            ("changes_per_h", cell(Some(line.changes_per_h), 1)),
+            ("longest_wrong_s", cell(Some(line.wrong_s), 1)),
+            ("error_percent", cell(used(line.error_percent), 2)),
+            ("error_over_std", cell(used(line.error_over_deviation), 2)),
+            ("error_over_bound", cell(line.error_over_bound, 2)),
+        ]
+    };
+    lines.iter().map(row).collect()
 }
