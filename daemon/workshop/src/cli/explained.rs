@@ -23,6 +23,7 @@ pub fn text(answer: &ExplainAnswer) -> String {
     }
     text += "\n";
     text += &limits(answer);
+    text += "\n";
     text += &figures(answer);
     for considered in &answer.considered {
         let evidence =

@@ -28,7 +28,7 @@ pub fn sentence(answer: &ExplainAnswer, errors: &Errors) -> String {
         Verdict::Effect => {
             let means = answer.effects.first().map(|it| meaning(&it.meaning)).unwrap_or_default();
             let is_one = answer.effects.len() == 1 && !means.is_empty();
-            let means = if is_one { format!(" It {means}.") } else { String::new() };
+            let means = if is_one { format!(" It means {means}.") } else { String::new() };
             format!("Found: {found}.{means} {}", gained(errors))
         }
         Verdict::Ambiguous => {
@@ -150,8 +150,8 @@ pub fn meaning(meaning: &Meaning) -> String {
     let work = share.map(|share| {
         let kwh = meaning.energy_kwh_per_100_km.abs();
         let kwh = number(kwh, Some(0.1 * kwh));
-        let takes = if share > 0.0 { "takes" } else { "gives" };
-        format!("{takes} {kwh} kWh per 100 km, {}", percent(share.abs()))
+        let more = if share > 0.0 { "more" } else { "less" };
+        format!("{kwh} kWh per 100 km {more} than without it, {}", percent(share.abs()))
     });
     let ahead = meaning.distance_error_60_s_m.map(|[without, with]| {
         let [without, with] = [without, with].map(|m| number(m, Some(0.1 * without.max(with))));
@@ -233,15 +233,18 @@ mod tests {
         };
         assert_eq!(
             meaning(&costs),
-            "takes 41.3 kWh per 100 km, 3.1 % of the traction's energy; a minute ahead the train is \
-             predicted 14.5 m off without it, 2.1 m with it"
+            "41.3 kWh per 100 km more than without it, 3.1 % of the traction's energy; a minute ahead the \
+             train is predicted 14.5 m off without it, 2.1 m with it"
         );
         let helps = Meaning {
             energy_kwh_per_100_km: -2.0,
             share_of_traction_energy: Some(-0.01),
             distance_error_60_s_m: None,
         };
-        assert_eq!(meaning(&helps), "gives 2.00 kWh per 100 km, 1.0 % of the traction's energy");
+        assert_eq!(
+            meaning(&helps),
+            "2.00 kWh per 100 km less than without it, 1.0 % of the traction's energy"
+        );
         assert_eq!(meaning(&Meaning::default()), "");
     }
 

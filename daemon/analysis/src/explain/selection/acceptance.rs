@@ -6,6 +6,9 @@ use super::price::at_bound;
 use super::search::Search;
 use crate::explain::effects::AtBound;
 
+/// A smaller share of the error is what an effect is refused for, a larger one its evidence.
+const LITTLE: f64 = 0.1;
+
 /// Why an effect is not accepted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refusal {
@@ -43,11 +46,8 @@ impl std::fmt::Display for Refusal {
             Refusal::Contradiction(why) => return f.write_str(why),
             Refusal::Weak(share) if *share < 0.005 => "takes nothing from the error",
             Refusal::Weak(share) => {
-                let percent = 100.0 * share;
-                return write!(
-                    f,
-                    "takes {percent:.0} % from the error: too little for its evidence"
-                );
+                let why = if *share < LITTLE { ": too little" } else { ", on too little evidence" };
+                return write!(f, "takes {:.0} % from the error{why}", 100.0 * share);
             }
         })
     }

@@ -22,12 +22,19 @@ const EVERYDAY: [EffectKind; 4] = [
     EffectKind::SpeedDelay,
 ];
 
+/// Kinds by which something is late.
+const LATE: [EffectKind; 2] = [EffectKind::ActuatorDelay, EffectKind::SpeedDelay];
+
 impl Search<'_> {
-    /// The trial of the most usual everyday kind that is certain, and only for its size no effect.
+    /// The trial of the most usual everyday kind that is certain, and only for its size no effect. Late forces and a
+    /// late speed look alike: one of them is enough.
     pub(super) fn certain_and_small(trials: &[Trial]) -> Option<&Trial> {
         let is_small = |trial: &&Trial| {
             let refusal = Self::refusal(trial);
+            let effects = &trial.fit.model.effects;
+            let late = effects.iter().filter(|it| LATE.contains(&it.kind())).count();
             trial.evidence > CERTAIN
+                && late < LATE.len()
                 && matches!(refusal, Some(Refusal::Immaterial | Refusal::Weak(_)))
         };
         let of = |kind: &EffectKind| trials.iter().find(|trial| trial.kind == *kind);
