@@ -10,9 +10,9 @@ use crate::explain::evidence::{Fit, SCORE_MIN, acceptance_score};
 pub(super) const CERTAIN: f64 = 40.0;
 /// Standard deviations by the scatter between the runs that such a number is then away from none.
 const CERTAIN_STDS: f64 = 4.0;
-/// Evidence times the share that it takes from the error, for what is chosen among many places or runs: at most 2.3
-/// where nothing acts.
-const CHOSEN_MIN: f64 = 6.0;
+/// Evidence times the share that it takes from the error, with which it is certain too, and which is asked of what is
+/// chosen among many places or runs: at most 2.3 where nothing acts.
+const CERTAIN_WITH_SHARE: f64 = 6.0;
 /// Fewer runs agree on nothing.
 const CERTAIN_RUNS_MIN: usize = 3;
 
@@ -23,7 +23,7 @@ pub(super) fn is_accepted(fit: &Fit, index: usize, evidence: f64, reduction: f64
 }
 
 /// Whether an effect is certain, however little it takes from the error: strong evidence for one number of the
-/// whole train or line, which the runs agree on. What is looked for at many places or in some of the runs must
+/// whole train or line, less of it where it takes more, which the runs agree on. What is looked for at many places or in some of the runs must
 /// take more from the error. Never certain so are loads, winds and slippery rails, which change from run to run, a late
 /// speed, which late forces look like, unmapped tunnels, forms without a name, and a local resistance beside a
 /// fitted gradient, whose straight pieces leave such.
@@ -44,9 +44,11 @@ fn is_certain(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> bool {
         let size = effect.size(fit.effect_parameters(index)).abs();
         size > CERTAIN_STDS * std
     };
-    evidence > CERTAIN
-        && !needs_the_score
-        && (!is_chosen_among_many || evidence * reduction > CHOSEN_MIN)
-        && fit.runs.len() >= CERTAIN_RUNS_MIN
-        && runs_agree()
+    let takes_enough = evidence * reduction > CERTAIN_WITH_SHARE;
+    let is_sure = if is_chosen_among_many {
+        evidence > CERTAIN && takes_enough
+    } else {
+        evidence > CERTAIN || takes_enough
+    };
+    is_sure && !needs_the_score && fit.runs.len() >= CERTAIN_RUNS_MIN && runs_agree()
 }
