@@ -71,6 +71,8 @@ recorder=$!
 "$programs/dynocar" replay config/demo --run 1 --rate 100
 terminal terminal_health "dynocar health" "$programs/dynocar" health
 kill -INT "$recorder" && wait "$recorder" || true
+# The recording program may outlive the one that called it by a moment.
+sleep 1
 terminal terminal_verify "dynocar replay --verify run.mcap" "$programs/dynocar" replay --verify "$place/run.mcap"
 
 mkdir -p target/pictures
